@@ -1,0 +1,31 @@
+"""The errors a user may see. Every message names the file, the row and the column where there is one, says what
+was expected, and how to cure it."""
+
+from __future__ import annotations
+
+
+class FtprocError(Exception):
+    """Root of all errors that carry a plain sentence for the user.
+
+    `exit_code` is what the command line returns: 1 for input that cannot be processed.
+    """
+
+    exit_code = 1
+
+
+class InputError(FtprocError):
+    """A log, truth, trajectory or other input cannot be processed."""
+
+
+class ModelError(InputError):
+    """A file is not a correction model, or is one made for something else."""
+
+
+class OutputError(FtprocError):
+    """A result cannot be written where it was asked for."""
+
+
+class UsageError(FtprocError):
+    """Options that contradict each other or name something unknown."""
+
+    exit_code = 2

@@ -1,0 +1,102 @@
+"""The immutable records that flow from stage to stage: log -> (core) -> trajectory, and the truth beside them.
+
+Components are always in the order range, azimuth, elevation; axes in the order x, y, z; angles in radians.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+FlagArray = NDArray[np.uint8]
+
+COMPONENTS = ("range", "azimuth", "elevation")
+
+#: Values of the trajectory's `outlier_*` columns.
+GOOD, ISOLATED, PATCH, MISSING = 0, 1, 2, 3
+
+
+@dataclass(frozen=True)
+class MeasurementLog:
+    """One tracker's log, checked, in SI units and in time order.
+
+    name: what the user called it (a path, or `<stdin>`), for messages and provenance.
+    time_s: (n,) finite, never decreasing; equal times are separate measurements at one instant.
+    measurement: (n, 3) slant range m, azimuth rad, elevation rad; NaN where missing.
+    row: (n,) 0-based row number in the file the user gave.
+    frame: `local` (x by the log's own convention) or `north-east-up` (azimuth was said to run from north).
+    rows_in_file, rows_without_time, rows_out_of_order, duplicate_times: what was read and what was found.
+    extra: the other columns of the file, row for row with `time_s`; only when they were asked for.
+    """
+
+    name: str
+    time_s: FloatArray
+    measurement: FloatArray
+    row: IntArray
+    frame: str = "local"
+    rows_in_file: int = 0
+    rows_without_time: tuple[int, ...] = ()
+    rows_out_of_order: int = 0
+    duplicate_times: int = 0
+    extra: pa.Table | None = None
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """A reference trajectory in the station's local frame.
+
+    time_s: (n,) never decreasing. position_m: (n, 3). velocity_mps, acceleration_mps2: (n, 3) or None.
+    outlier: (n, 3) non-zero where the log's reading was tampered with, or None.
+    """
+
+    name: str
+    time_s: FloatArray
+    position_m: FloatArray
+    velocity_mps: FloatArray | None = None
+    acceleration_mps2: FloatArray | None = None
+    outlier: FlagArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """The result: one row for every row of the log that has a time, in time order.
+
+    row: (n,) row number in the input log. time_s: (n,).
+    measurement: (n, 3) cleaned range m, azimuth rad, elevation rad (from the estimate).
+    state: (n, 9) x y z m, vx vy vz m/s, ax ay az m/s2. NaN where a method does not estimate it.
+    sigma: (n, 6) 1-sigma of position m and velocity m/s.
+    outlier: (n, 3) GOOD, ISOLATED, PATCH or MISSING per component.
+    nis: (n,) normalised innovation squared of the components used; NaN where none was.
+    correction: (n, 6) what the network added to position m and velocity m/s.
+    metadata: everything needed to make it again (JSON-serialisable), see the README.
+    """
+
+    name: str
+    row: IntArray
+    time_s: FloatArray
+    measurement: FloatArray
+    state: FloatArray
+    sigma: FloatArray
+    outlier: FlagArray
+    nis: FloatArray
+    correction: FloatArray
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+    extra: pa.Table | None = None
+
+    def __len__(self) -> int:
+        return len(self.time_s)
