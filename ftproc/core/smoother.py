@@ -1,0 +1,279 @@
+"""The fixed-interval smoother, and what the same backward pass tells about outliers, noise and manoeuvres.
+
+Rauch-Tung-Striebel estimates in Bryson-Frazier form (the dynamics are linear, so the two are equal): with
+u = S^-1 e - K' r, M = S^-1 + K' N K, going backward
+
+    r <- r + H' u            N <- N - H'(K'N) - (NK)H + H' M H          over a measurement
+    r <- Phi' r              N <- Phi' N Phi                            over an interval
+    x^s = x+ + P+ r+         P^s = P+ - P+ N+ P+
+
+No covariance is inverted. From the same quantities come, at no further cost (de Jong 1988, 1989; Koopman and
+Shephard 1992):
+
+* the leave-one-out residual of each used component, u_i / M_ii with variance 1 / M_ii (what the rest of the record
+  predicts for it), exact to rounding;
+* the score of the likelihood by each noise variance, 1/2 sum(u_i^2 - M_ii), and by each element of each piece of
+  the jerk tensor, 1/2 sum of c(T) contracted with (r r' - N).
+
+Memory stays small on long logs: a forward sweep keeps a checkpoint every BLOCK samples, and the backward sweep
+filters each block again.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ftproc.core import motion, ukf
+from ftproc.core.forward import Model, Start, line_of_sight_sigma
+
+FloatArray = NDArray[np.float64]
+
+BLOCK = 128
+
+
+class SmootherRun(NamedTuple):
+    """What the whole record says of each sample.
+
+    state: (n, 9), SI units. sigma: (n, 9) 1-sigma. los_sigma: (n, 6) as in FilterRun.
+    residual: (n, 3) leave-one-out residual m, rad, rad; NaN where missing. residual_variance: (n, 3) its variance at
+    full weight. nis: (n,) of the innovations used in the forward sweep. log_likelihood: of those innovations.
+    noise_score: (3,) d log-likelihood / d ln(variance). jerk_score: (m, 6) d log-likelihood / d jerk element.
+    """
+
+    state: FloatArray
+    sigma: FloatArray
+    los_sigma: FloatArray
+    residual: FloatArray
+    residual_variance: FloatArray
+    nis: FloatArray
+    log_likelihood: float
+    noise_score: FloatArray
+    jerk_score: FloatArray
+
+
+@njit(cache=True)
+def _sweep(
+    first: int,
+    last: int,
+    time: FloatArray,
+    z: FloatArray,
+    weight: FloatArray,
+    noise: FloatArray,
+    jerk: FloatArray,
+    knot_s: float,
+    start_x: FloatArray,
+    start_p: FloatArray,
+    state: FloatArray,
+    sigma: FloatArray,
+    los_sigma: FloatArray,
+    residual: FloatArray,
+    variance: FloatArray,
+    nis_out: FloatArray,
+    noise_score: FloatArray,
+    jerk_score: FloatArray,
+) -> float:
+    """Both sweeps over samples [first, last); returns the log-likelihood."""
+    factor, b, c, s = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
+    q, z_hat, used = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
+    blocks = (last - first + BLOCK - 1) // BLOCK
+    saved_x, saved_p = np.empty((blocks, 9)), np.empty((blocks, 9, 9))
+    xs, ps = np.empty((BLOCK, 9)), np.empty((BLOCK, 9, 9))
+    hs, es, cs = np.empty((BLOCK, 3, 3)), np.empty((BLOCK, 3)), np.empty((BLOCK, 3))
+    s_invs, gains, pxzs = np.empty((BLOCK, 3, 3)), np.empty((BLOCK, 9, 3)), np.empty((BLOCK, 9, 3))
+    r, n = np.zeros(9), np.zeros((9, 9))
+    likelihood = 0.0
+    for round_ in range(2 * blocks):
+        forward_only = round_ < blocks
+        block = round_ if forward_only else 2 * blocks - 1 - round_
+        low = first + block * BLOCK
+        high = min(low + BLOCK, last)
+        if forward_only:
+            if block == 0:
+                x, p = start_x.copy(), start_p.copy()
+            saved_x[block] = x
+            saved_p[block] = p
+            if block == blocks - 1:
+                continue  # its filtering is done on the way back
+        else:
+            x, p = saved_x[block].copy(), saved_p[block].copy()
+        for k in range(low, high):
+            j = k - low
+            if k > first:
+                piece = motion.knot_index(time[k], time[0], knot_s, jerk.shape[0])
+                motion.predict(x, p, time[k] - time[k - 1], jerk[piece], q)
+            h, e = hs[j], es[j]
+            ukf.linearise(x, p, factor, b, z_hat, h, c)
+            ukf.innovate(z[k], z_hat, e)
+            any_used = False
+            for i in range(3):
+                used[i] = weight[k, i] if math.isfinite(e[i]) else 0.0
+                any_used = any_used or used[i] > 0
+                cs[j, i] = c[i, i]
+            ukf.cross_covariance(p, h, pxzs[j])
+            if any_used:
+                nis, gained = ukf.update(x, p, pxzs[j], c, h, e, noise, used, s, s_invs[j], gains[j])
+                if not forward_only:
+                    nis_out[k] = nis
+                    likelihood += gained
+            else:
+                s_invs[j] = 0.0
+                gains[j] = 0.0
+                nis_out[k] = math.nan
+            xs[j] = x
+            ps[j] = p
+        if forward_only:
+            continue
+        for k in range(high - 1, low - 1, -1):
+            j = k - low
+            _estimate(xs[j], ps[j], r, n, state[k], sigma[k], los_sigma[k])
+            _absorb(
+                r, n, hs[j], es[j], cs[j], s_invs[j], gains[j], pxzs[j], weight[k], noise,
+                residual[k], variance[k], noise_score,
+            )  # fmt: skip
+            if k > first:
+                interval = time[k] - time[k - 1]
+                piece = motion.knot_index(time[k], time[0], knot_s, jerk.shape[0])
+                _score_jerk(r, n, interval, q, jerk_score[piece])
+                motion.adjoint(r, n, interval)
+    return likelihood
+
+
+@njit(cache=True)
+def _estimate(
+    x: FloatArray, p: FloatArray, r: FloatArray, n: FloatArray, state: FloatArray, sigma: FloatArray, los: FloatArray
+) -> None:
+    """x+ + P+ r and P+ - P+ N P+, its diagonal and line-of-sight sigmas."""
+    smoothed = np.empty((9, 9))
+    pn = np.empty((9, 9))
+    for i in range(9):
+        total = x[i]
+        for j in range(9):
+            total += p[i, j] * r[j]
+        state[i] = total
+        for j in range(9):
+            v = 0.0
+            for k in range(9):
+                v += p[i, k] * n[k, j]
+            pn[i, j] = v
+    for i in range(9):
+        for j in range(i + 1):
+            v = p[i, j]
+            if i < 6 or i == j:
+                for k in range(9):
+                    v -= pn[i, k] * p[k, j]
+            smoothed[i, j] = v
+            smoothed[j, i] = v
+        # Rounding may eat a variance that the record has all but determined; it cannot be below that rounding.
+        sigma[i] = math.sqrt(max(smoothed[i, i], 1e-14 * p[i, i]))
+    line_of_sight_sigma(state, smoothed, los)
+
+
+@njit(cache=True)
+def _absorb(
+    r: FloatArray,
+    n: FloatArray,
+    h: FloatArray,
+    e: FloatArray,
+    c: FloatArray,
+    s_inv: FloatArray,
+    gain: FloatArray,
+    pxz: FloatArray,
+    weight: FloatArray,
+    noise: FloatArray,
+    residual: FloatArray,
+    variance: FloatArray,
+    noise_score: FloatArray,
+) -> None:
+    """Take r, N back over one measurement; leave the leave-one-out residuals and their variances behind."""
+    u, m, nk = np.zeros(3), np.zeros((3, 3)), np.zeros((9, 3))
+    for i in range(3):
+        for j in range(3):
+            if weight[j] > 0 and math.isfinite(e[j]):
+                u[i] += s_inv[i, j] * e[j]
+        for a in range(9):
+            u[i] -= gain[a, i] * r[a]
+    for a in range(9):
+        for j in range(3):
+            v = 0.0
+            for b in range(9):
+                v += n[a, b] * gain[b, j]
+            nk[a, j] = v
+    for i in range(3):
+        for j in range(i + 1):
+            v = s_inv[i, j]
+            for a in range(9):
+                v += gain[a, i] * nk[a, j]
+            m[i, j] = v
+            m[j, i] = v
+    for i in range(3):
+        for a in range(3):
+            r[a] += h[i, a] * u[i]
+    for i in range(3):  # (NK)H on the columns of the position, its transpose on the rows
+        for a in range(9):
+            for b in range(3):
+                v = nk[a, i] * h[i, b]
+                n[a, b] -= v
+                n[b, a] -= v
+    for i in range(3):
+        for j in range(3):
+            for a in range(3):
+                for b in range(3):
+                    n[a, b] += h[i, a] * m[i, j] * h[j, b]
+    for i in range(3):
+        if not math.isfinite(e[i]):
+            residual[i] = math.nan
+            variance[i] = math.nan
+        elif weight[i] > 0:
+            residual[i] = u[i] / m[i, i]
+            variance[i] = 1 / m[i, i] + noise[i] * (1 - 1 / weight[i])
+            noise_score[i] += 0.5 * (u[i] * u[i] - m[i, i]) * noise[i] / weight[i]
+        else:  # not used: what all the rest predicts is the smoothed estimate itself
+            predicted, spread = 0.0, c[i]
+            for a in range(9):
+                predicted += pxz[a, i] * r[a]
+                for b in range(9):
+                    spread -= pxz[a, i] * n[a, b] * pxz[b, i]
+            residual[i] = e[i] - predicted
+            variance[i] = max(spread, 0.0) + noise[i]
+
+
+@njit(cache=True)
+def _score_jerk(r: FloatArray, n: FloatArray, interval: float, c: FloatArray, score: FloatArray) -> None:
+    """Add 1/2 c(T) : (r r' - N) to the score of each element of the jerk tensor (off-diagonal ones count twice)."""
+    motion.noise_coefficients(interval, c)
+    k = 0
+    for i in range(3):
+        for j in range(i, 3):
+            total = 0.0
+            for a in range(3):
+                for b in range(3):
+                    total += c[a, b] * (r[3 * a + i] * r[3 * b + j] - n[3 * a + i, 3 * b + j])
+            score[k] += 0.5 * total if i == j else total
+            k += 1
+
+
+def smooth_log(
+    time_s: FloatArray, measurement: FloatArray, weight: FloatArray, model: Model, starts: list[Start]
+) -> SmootherRun:
+    """Smooth the whole log; the record on each side of a start is smoothed by itself.
+
+    time_s (n,), measurement (n, 3), weight (n, 3) in [0, 1]; the first start must be at sample 0.
+    """
+    n = len(time_s)
+    run = SmootherRun(
+        np.empty((n, 9)), np.empty((n, 9)), np.empty((n, 6)), np.empty((n, 3)), np.empty((n, 3)), np.empty(n),
+        0.0, np.zeros(3), np.zeros_like(model.jerk),
+    )  # fmt: skip
+    likelihood = 0.0
+    for start, stop in zip(starts, [s.index for s in starts[1:]] + [n], strict=True):
+        likelihood += _sweep(
+            start.index, stop, time_s, measurement, weight, model.noise_variance, model.jerk, model.knot_s,
+            start.state, start.covariance, run.state, run.sigma, run.los_sigma, run.residual, run.residual_variance,
+            run.nis, run.noise_score, run.jerk_score,
+        )  # fmt: skip
+    return run._replace(log_likelihood=likelihood)
