@@ -16,9 +16,9 @@ IntArray = NDArray[np.int64]
 
 
 class Start(NamedTuple):
-    """Where a recursion begins: sample index, state (9,) and covariance (9, 9) before that sample's update."""
+    """Where a recursion begins: state (9,) and covariance (9, 9) before the update of `sample`."""
 
-    index: int
+    sample: int
     state: FloatArray
     covariance: FloatArray
 
@@ -142,9 +142,9 @@ def filter_log(
     """
     run = empty_run(time_s)
     likelihood = 0.0
-    for start, stop in zip(starts, [s.index for s in starts[1:]] + [len(time_s)], strict=True):
+    for start, stop in zip(starts, [s.sample for s in starts[1:]] + [len(time_s)], strict=True):
         likelihood += run_span(
-            start.index, stop, time_s, measurement, weight, model.noise_variance, model.jerk, model.knot_s,
+            start.sample, stop, time_s, measurement, weight, model.noise_variance, model.jerk, model.knot_s,
             start.state.copy(), start.covariance.copy(), run,
         )  # fmt: skip
     return run._replace(log_likelihood=likelihood)

@@ -270,9 +270,9 @@ def smooth_log(
         0.0, np.zeros(3), np.zeros_like(model.jerk),
     )  # fmt: skip
     likelihood = 0.0
-    for start, stop in zip(starts, [s.index for s in starts[1:]] + [n], strict=True):
+    for start, stop in zip(starts, [s.sample for s in starts[1:]] + [n], strict=True):
         likelihood += _sweep(
-            start.index, stop, time_s, measurement, weight, model.noise_variance, model.jerk, model.knot_s,
+            start.sample, stop, time_s, measurement, weight, model.noise_variance, model.jerk, model.knot_s,
             start.state, start.covariance, run.state, run.sigma, run.los_sigma, run.residual, run.residual_variance,
             run.nis, run.noise_score, run.jerk_score,
         )  # fmt: skip

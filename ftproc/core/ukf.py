@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 SPREAD = 3.0  # sqrt(n + lambda) with n = 9, alpha = 1, kappa = 0
-WEIGHT = 1.0 / 18.0
+MAX_SPREAD_IN_RANGES = 0.3  # of the sigma points about the state
 MIN_RANGE_M = 1.0  # below this the direction of the target has no meaning
 TWO_PI = 2 * math.pi
 
@@ -63,17 +63,25 @@ def position_factor(p: FloatArray, factor: FloatArray) -> None:
 def linearise(
     x: FloatArray, p: FloatArray, factor: FloatArray, b: FloatArray, z_hat: FloatArray, h: FloatArray, c: FloatArray
 ) -> None:
-    """The unscented transform of h at (x, P): fills z_hat (3,), H (3, 3) on the position, C (3, 3)."""
+    """The unscented transform of h at (x, P): fills z_hat (3,), H (3, 3) on the position, C (3, 3).
+
+    When P is so wide (a long coast) that the points would straddle the station, alpha is made smaller, which draws
+    the points together; at alpha = 1 the formulas are those of the module's head.
+    """
     position_factor(p, factor)
     z0, z1, z2 = measure(x[0], x[1], x[2])
+    widest = math.sqrt(p[0, 0] + p[1, 1] + p[2, 2])
+    spread = SPREAD
+    if spread * widest > MAX_SPREAD_IN_RANGES * z0:
+        spread = MAX_SPREAD_IN_RANGES * z0 / widest
+    alpha2 = spread * spread / (SPREAD * SPREAD)
+    weight = 0.5 / (spread * spread)
     m0 = m1 = m2 = 0.0
     c00 = c01 = c02 = c11 = c12 = c22 = 0.0
     for j in range(3):
-        dx, dy, dz = SPREAD * factor[0, j], SPREAD * factor[1, j], SPREAD * factor[2, j]
-        if j > 0:
-            dx = 0.0
-        if j > 1:
-            dy = 0.0
+        dx = spread * factor[0, j]
+        dy = spread * factor[1, j]
+        dz = spread * factor[2, j]
         u0, u1, u2 = measure(x[0] + dx, x[1] + dy, x[2] + dz)
         v0, v1, v2 = measure(x[0] - dx, x[1] - dy, x[2] - dz)
         u0 -= z0
@@ -91,19 +99,19 @@ def linearise(
         c11 += u1 * u1 + v1 * v1
         c12 += u1 * u2 + v1 * v2
         c22 += u2 * u2 + v2 * v2
-        b[j, 0] = (u0 - v0) / (2 * SPREAD)
-        b[j, 1] = (u1 - v1) / (2 * SPREAD)
-        b[j, 2] = (u2 - v2) / (2 * SPREAD)
-    m0 *= WEIGHT
-    m1 *= WEIGHT
-    m2 *= WEIGHT
+        b[j, 0] = (u0 - v0) / (2 * spread)
+        b[j, 1] = (u1 - v1) / (2 * spread)
+        b[j, 2] = (u2 - v2) / (2 * spread)
+    m0 *= weight
+    m1 *= weight
+    m2 *= weight
     z_hat[0], z_hat[1], z_hat[2] = z0 + m0, z1 + m1, z2 + m2
-    c[0, 0] = WEIGHT * c00 - m0 * m0
-    c[1, 1] = WEIGHT * c11 - m1 * m1
-    c[2, 2] = WEIGHT * c22 - m2 * m2
-    c[0, 1] = c[1, 0] = WEIGHT * c01 - m0 * m1
-    c[0, 2] = c[2, 0] = WEIGHT * c02 - m0 * m2
-    c[1, 2] = c[2, 1] = WEIGHT * c12 - m1 * m2
+    c[0, 0] = weight * c00 - alpha2 * m0 * m0
+    c[1, 1] = weight * c11 - alpha2 * m1 * m1
+    c[2, 2] = weight * c22 - alpha2 * m2 * m2
+    c[0, 1] = c[1, 0] = weight * c01 - alpha2 * m0 * m1
+    c[0, 2] = c[2, 0] = weight * c02 - alpha2 * m0 * m2
+    c[1, 2] = c[2, 1] = weight * c12 - alpha2 * m1 * m2
     for i in range(3):  # H' = L^-T B by back substitution, one component at a time
         h[i, 2] = b[2, i] / factor[2, 2]
         h[i, 1] = (b[1, i] - factor[2, 1] * h[i, 2]) / factor[1, 1]

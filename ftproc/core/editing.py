@@ -1,0 +1,101 @@
+"""Two-pass editing: decide which readings are outliers with the whole record in view.
+
+Screening (no model) -> first state -> noise and jerk by maximum likelihood -> smoother -> Markov indicators on its
+leave-one-out residuals -> again, until the decisions stand still; then a jerk profile that follows the flight.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core import indicators, screening, tuning
+from ftproc.core.forward import Model, Start
+from ftproc.core.motion import isotropic
+from ftproc.core.smoother import SmootherRun, smooth_log
+from ftproc.core.start import first_state
+
+FloatArray = NDArray[np.float64]
+
+WINDOWS = (31, 75)  # samples: the short one follows manoeuvres, the long one sees through patches
+MAX_ROUNDS = 8
+TUNING_ROUNDS = 3
+FIRST_JERK = 1.0  # m^2/s^5, where the search begins
+START_INFLATION = 4.0  # on the covariance of a smoothed state that starts a filter over the same record
+
+
+class Edited(NamedTuple):
+    """The decisions and what they rest on.
+
+    weight: (n, 3) 1 good, 0 rejected or missing. model: noise and jerk profile. starts: for the next pass.
+    smoothed: the smoother's run with these. rates: (3, 3) learnt outlier rates per component.
+    rounds: how many passes it took; settled: whether the decisions stood still.
+    """
+
+    weight: FloatArray
+    model: Model
+    starts: list[Start]
+    smoothed: SmootherRun
+    rates: FloatArray
+    rounds: int
+    settled: bool
+
+
+def screen(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n, 3) weights after the first look at each component by itself, and (3,) noise 1-sigma."""
+    weight = np.isfinite(measurement).astype(float)
+    sigma = tuning.NOISE_FLOOR.copy()
+    for c in range(3):
+        channel = np.ascontiguousarray(measurement[:, c])
+        for window in WINDOWS:
+            votes, scales = screening.screen_component(time_s, channel, window, c == 1)
+            weight[votes > 0.5, c] = 0.0
+            if window == WINDOWS[0] and len(scales):
+                sigma[c] = max(float(np.median(scales)), sigma[c])
+    return weight, sigma
+
+
+def edit(
+    time_s: FloatArray,
+    measurement: FloatArray,
+    noise_variance: FloatArray | None = None,
+    jerk_psd: float | None = None,
+) -> Edited:
+    """Edit a whole log. time_s (n,), measurement (n, 3); noise (3,) and jerk given or found from the log.
+
+    Raises ValueError when no sample has all three components good.
+    """
+    weight, sigma = screen(time_s, measurement)
+    model = Model(
+        sigma**2 if noise_variance is None else noise_variance, isotropic(FIRST_JERK if jerk_psd is None else jerk_psd)
+    )
+    rates = np.tile(np.array(indicators.START_RATES), (3, 1))
+    finite = np.isfinite(measurement)
+    settled = False
+    rounds = 0
+    while rounds < MAX_ROUNDS and not settled:
+        starts = [first_state(time_s, measurement, weight, model.noise_variance, 0, 0, len(time_s))]
+        if rounds < TUNING_ROUNDS:
+            model = tuning.fit_level(
+                time_s, measurement, weight, starts, model, noise_variance is not None, jerk_psd is not None
+            )
+        smoothed = smooth_log(time_s, measurement, weight, model, starts)
+        good = indicators.classify(smoothed.residual, smoothed.residual_variance, model.noise_variance, rates)
+        decided = ((good > 0.5) & finite).astype(float)
+        settled = bool((decided == weight).all()) and rounds + 1 >= TUNING_ROUNDS
+        weight = decided
+        rounds += 1
+    if jerk_psd is None:
+        model = tuning.fit_profile(time_s, measurement, weight, starts, model)
+    smoothed = smooth_log(time_s, measurement, weight, model, starts)
+    return Edited(weight, model, starts, smoothed, rates, rounds, settled)
+
+
+def smoothed_start(smoothed: SmootherRun) -> Start:
+    """Where the recursive filter begins over a record that has been smoothed: at the smoothed first state.
+
+    Its covariance is inflated, because the filter will see the same readings once more.
+    """
+    return Start(0, smoothed.state[0].copy(), START_INFLATION * np.diag(smoothed.sigma[0] ** 2))

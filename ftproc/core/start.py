@@ -1,0 +1,84 @@
+"""A first state from the first readings that agree with each other: the "check of the first value" that recursive
+gates need (a wrong one locks them out), done with a whole window in view."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.forward import Start
+from ftproc.core.geometry import line_of_sight_axes, to_cartesian, wrap
+
+FloatArray = NDArray[np.float64]
+
+SAMPLES = 15  # good readings of each component wanted for the first fit
+INFLATION = 3.0  # on every sigma of the first state: its readings are filtered again, so it must weigh little
+ACCELERATION_MPS2 = 30.0  # 1-sigma of an acceleration about which nothing is known
+SPEED_MPS = 1000.0  # likewise, when a rate cannot be had
+WIDEST_IN_RANGES = 0.1  # the position must not be so vague that the target may be behind the station
+
+
+def first_state(
+    time_s: FloatArray,
+    measurement: FloatArray,
+    weight: FloatArray,
+    noise_variance: FloatArray,
+    sample: int,
+    low: int,
+    high: int,
+) -> Start:
+    """Start at `sample` from lines through the good readings of [low, high) nearest to it.
+
+    time_s (n,), measurement (n, 3), weight (n, 3) with zero for rejected readings, noise_variance (3,). Components
+    are fitted one by one, so they need not come at the same instants. The covariance is inflated.
+    Raises ValueError with the component's index when a component has no good reading in the span.
+    """
+    values, rates = np.zeros(3), np.zeros(3)
+    value_sigma, rate_sigma = np.zeros(3), np.zeros(3)
+    for c in range(3):
+        good = np.flatnonzero((weight[low:high, c] > 0) & np.isfinite(measurement[low:high, c])) + low
+        if len(good) == 0:
+            raise ValueError(c)
+        nearest = np.sort(good[np.argsort(np.abs(good - sample), kind="stable")[:SAMPLES]])
+        t = time_s[nearest] - time_s[sample]
+        z = measurement[nearest, c]
+        if c == 1:
+            z = z[0] + np.cumsum(np.r_[0.0, wrap(np.diff(z))])
+        values[c], rates[c], value_sigma[c], rate_sigma[c] = _line(t, z, float(np.sqrt(noise_variance[c])))
+    return _to_state(sample, values, rates, value_sigma, rate_sigma)
+
+
+def _line(t: FloatArray, z: FloatArray, sigma: float) -> tuple[float, float, float, float]:
+    """Value and rate at t = 0 and their 1-sigma (infinite for the rate when all readings are of one instant).
+
+    The scatter about the line stands for what it misses of a curve, so it is not averaged down.
+    """
+    span = float(np.ptp(t))
+    if span <= 0:
+        return float(z.mean()), 0.0, sigma, np.inf
+    middle = float(t.mean())
+    spread = float(((t - middle) ** 2).sum())
+    rate = float(((t - middle) * (z - z.mean())).sum()) / spread
+    value = float(z.mean()) - rate * middle
+    scatter = max(sigma, float(np.abs(z - value - rate * t).max()))
+    rate_sigma = scatter / span * 4
+    return value, rate, float(np.hypot(scatter, rate_sigma * max(abs(middle) - span / 2, 0.0))), rate_sigma
+
+
+def _to_state(
+    sample: int, values: FloatArray, rates: FloatArray, value_sigma: FloatArray, rate_sigma: FloatArray
+) -> Start:
+    """From range, azimuth, elevation and their rates to a Cartesian state with its covariance."""
+    slant = values[0] = max(values[0], 1.0)
+    position = to_cartesian(values)
+    axes = line_of_sight_axes(position[None])[0]
+    scale = np.array([1.0, slant * np.cos(values[2]), slant])  # m per m, rad, rad along radial, cross, up
+    along = np.minimum(scale * value_sigma, WIDEST_IN_RANGES * slant)
+    known = np.isfinite(rate_sigma)
+    speed_sigma = np.minimum(np.where(known, scale * np.where(known, rate_sigma, 0.0), SPEED_MPS), SPEED_MPS)
+    covariance = np.zeros((9, 9))
+    covariance[:3, :3] = axes.T @ np.diag((INFLATION * along) ** 2) @ axes
+    covariance[3:6, 3:6] = axes.T @ np.diag((INFLATION * speed_sigma) ** 2) @ axes
+    covariance[6:, 6:] = np.eye(3) * ACCELERATION_MPS2**2
+    velocity = axes.T @ (scale * rates)
+    return Start(sample, np.r_[position, velocity, np.zeros(3)], covariance)
