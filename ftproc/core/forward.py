@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ftproc.core import motion, ukf
+from ftproc.core import ekf, motion, ukf
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -98,6 +98,7 @@ def run_span(
     knot_s: float,
     x: FloatArray,
     p: FloatArray,
+    extended: bool,
     run: FilterRun,
 ) -> float:
     """Filter samples [first, last) from the state x, P (in place); fills the run; returns the log-likelihood."""
@@ -111,7 +112,10 @@ def run_span(
             motion.predict(x, p, time[k] - time[k - 1], jerk[piece], c)
         for i in range(9):
             run.predicted[k, i] = x[i]
-        ukf.linearise(x, p, factor, b, z_hat, h, c)
+        if extended:
+            ekf.linearise(x, p, z_hat, h, c)
+        else:
+            ukf.linearise(x, p, factor, b, z_hat, h, c)
         ukf.innovate(z[k], z_hat, e)
         any_used = False
         for i in range(3):
@@ -134,17 +138,23 @@ def run_span(
 
 
 def filter_log(
-    time_s: FloatArray, measurement: FloatArray, weight: FloatArray, model: Model, starts: list[Start]
+    time_s: FloatArray,
+    measurement: FloatArray,
+    weight: FloatArray,
+    model: Model,
+    starts: list[Start],
+    extended: bool = False,
 ) -> FilterRun:
     """Run the filter over the whole log, beginning anew at each start.
 
     time_s (n,), measurement (n, 3), weight (n, 3) in [0, 1]; the first start must be at sample 0.
+    extended: linearise by the Jacobian (EKF) instead of the unscented transform.
     """
     run = empty_run(time_s)
     likelihood = 0.0
     for start, stop in zip(starts, [s.sample for s in starts[1:]] + [len(time_s)], strict=True):
         likelihood += run_span(
             start.sample, stop, time_s, measurement, weight, model.noise_variance, model.jerk, model.knot_s,
-            start.state.copy(), start.covariance.copy(), run,
+            start.state.copy(), start.covariance.copy(), extended, run,
         )  # fmt: skip
     return run._replace(log_likelihood=likelihood)
