@@ -1,3 +1,26 @@
-"""Clean trajectories, with honest uncertainties, from dirty theodolite and radar logs."""
+"""Clean trajectories, with honest uncertainties, from dirty theodolite and radar logs.
+
+    import ftproc
+    trajectory = ftproc.filter_log(ftproc.read_log("flight.csv"))
+
+Everything is loaded when first used, so importing the package is cheap.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from ftproc.api import filter_log, read_log, score, simulate, train
+
+__all__ = ["__version__", "filter_log", "read_log", "score", "simulate", "train"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module 'ftproc' has no attribute {name!r}")
+    from ftproc import api
+
+    return getattr(api, name)

@@ -1,4 +1,4 @@
-"""Every default and tolerance, once. Frozen dataclasses; units in the names or the comment beside them."""
+"""Every default a user may change, once. Frozen dataclasses; units in the names or the comment beside them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ class FilterSettings:
     noise: tuple[float, float, float] | None = None  # 1-sigma of range m, azimuth rad, elevation rad
     jerk_psd_m2ps5: float | None = None  # spectral density of white jerk
     gate: float = 4.0  # sigmas
-    max_patch_s: float | None = None  # longest patch of outliers expected
+    max_patch_s: float | None = None  # longest patch of outliers expected, for the recursive gate
+    gain_form: bool = False  # forward editing scales the gain by m (the paper's letter) instead of R by 1/m
     site: tuple[float, float, float] | None = None  # latitude deg, longitude deg, height m
 
 
@@ -23,7 +24,7 @@ class FilterSettings:
 class TrainSettings:
     """GA-BPNN training: network size, genetic search, back-propagation, hold-out verdict."""
 
-    features: str = "window"  # window | correction
+    features: str = "window"  # see ftproc.correction.features
     hidden: int = 12
     population: int = 40
     generations: int = 60

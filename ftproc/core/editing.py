@@ -15,7 +15,7 @@ from ftproc.core import indicators, screening, tuning
 from ftproc.core.forward import Model, Start
 from ftproc.core.motion import isotropic
 from ftproc.core.smoother import SmootherRun, smooth_log
-from ftproc.core.start import first_state
+from ftproc.core.start import begin
 
 FloatArray = NDArray[np.float64]
 
@@ -23,7 +23,8 @@ WINDOWS = (31, 75)  # samples: the short one follows manoeuvres, the long one se
 MAX_ROUNDS = 8
 TUNING_ROUNDS = 3
 FIRST_JERK = 1.0  # m^2/s^5, where the search begins
-START_INFLATION = 4.0  # on the covariance of a smoothed state that starts a filter over the same record
+FEWEST_KEPT = 0.5  # share of what screening trusts that must survive the decisions, in each component
+START_INFLATION = 2.0  # on the covariance of a smoothed state that starts a filter over the same record
 
 
 class Edited(NamedTuple):
@@ -58,32 +59,32 @@ def screen(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, Flo
 
 
 def edit(
-    time_s: FloatArray,
-    measurement: FloatArray,
-    noise_variance: FloatArray | None = None,
-    jerk_psd: float | None = None,
+    time_s: FloatArray, measurement: FloatArray, given_sigma: FloatArray, jerk_psd: float | None, gate: float
 ) -> Edited:
-    """Edit a whole log. time_s (n,), measurement (n, 3); noise (3,) and jerk given or found from the log.
+    """Edit a whole log. time_s (n,), measurement (n, 3).
 
-    Raises ValueError when no sample has all three components good.
+    given_sigma: (3,) noise 1-sigma m, rad, rad, NaN where it is to be found; jerk_psd m^2/s^5 likewise None.
+    gate: sigmas beyond which a lone reading is called an outlier.
+    Raises ValueError when a component has no reading that agrees with its neighbours.
     """
-    weight, sigma = screen(time_s, measurement)
-    model = Model(
-        sigma**2 if noise_variance is None else noise_variance, isotropic(FIRST_JERK if jerk_psd is None else jerk_psd)
-    )
+    screened, sigma = screen(time_s, measurement)
+    weight = screened
+    known = np.isfinite(given_sigma)
+    first_jerk = FIRST_JERK if jerk_psd is None else jerk_psd
+    model = Model(np.where(known, given_sigma, sigma) ** 2, isotropic(first_jerk))
     rates = np.tile(np.array(indicators.START_RATES), (3, 1))
     finite = np.isfinite(measurement)
     settled = False
     rounds = 0
     while rounds < MAX_ROUNDS and not settled:
-        starts = [first_state(time_s, measurement, weight, model.noise_variance, 0, 0, len(time_s))]
+        starts = [begin(time_s, measurement, weight, model.noise_variance)]
         if rounds < TUNING_ROUNDS:
-            model = tuning.fit_level(
-                time_s, measurement, weight, starts, model, noise_variance is not None, jerk_psd is not None
-            )
+            model = tuning.fit_level(time_s, measurement, weight, starts, model, known, jerk_psd is not None)
         smoothed = smooth_log(time_s, measurement, weight, model, starts)
-        good = indicators.classify(smoothed.residual, smoothed.residual_variance, model.noise_variance, rates)
-        decided = ((good > 0.5) & finite).astype(float)
+        good = indicators.classify(
+            smoothed.residual, smoothed.residual_variance, model.noise_variance, rates, gate
+        )
+        decided = _keep_most(((good > 0.5) & finite).astype(float), screened)
         settled = bool((decided == weight).all()) and rounds + 1 >= TUNING_ROUNDS
         weight = decided
         rounds += 1
@@ -93,9 +94,16 @@ def edit(
     return Edited(weight, model, starts, smoothed, rates, rounds, settled)
 
 
+def _keep_most(decided: FloatArray, screened: FloatArray) -> FloatArray:
+    """The decisions (n, 3), but for a component of which hardly anything would be left: a filter that has gone
+    astray calls everything bad, and screening knows better."""
+    lost = decided.sum(0) < FEWEST_KEPT * screened.sum(0)
+    return np.where(lost, screened, decided)
+
+
 def smoothed_start(smoothed: SmootherRun) -> Start:
     """Where the recursive filter begins over a record that has been smoothed: at the smoothed first state.
 
     Its covariance is inflated, because the filter will see the same readings once more.
     """
-    return Start(0, smoothed.state[0].copy(), START_INFLATION * np.diag(smoothed.sigma[0] ** 2))
+    return smoothed.head._replace(covariance=START_INFLATION * smoothed.head.covariance)

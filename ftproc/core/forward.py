@@ -137,6 +137,42 @@ def run_span(
     return likelihood
 
 
+@njit(cache=True)
+def extrapolate_back(
+    sample: int,
+    time: FloatArray,
+    z: FloatArray,
+    noise: FloatArray,
+    jerk: FloatArray,
+    knot_s: float,
+    x: FloatArray,
+    p: FloatArray,
+    state: FloatArray,
+    sigma: FloatArray,
+    los_sigma: FloatArray,
+    residual: FloatArray,
+    variance: FloatArray,
+) -> None:
+    """States of the samples before `sample` from x, P there (in place), going back in time; no reading is used.
+
+    residual, variance (n, 3): reading minus what the state says, and its variance.
+    """
+    factor, b, h, c = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
+    z_hat, e = np.zeros(3), np.zeros(3)
+    for k in range(sample - 1, -1, -1):
+        piece = motion.knot_index(time[k], time[0], knot_s, jerk.shape[0])
+        motion.predict(x, p, time[k] - time[k + 1], jerk[piece], c)
+        ukf.linearise(x, p, factor, b, z_hat, h, c)
+        ukf.innovate(z[k], z_hat, e)
+        for i in range(3):
+            residual[k, i] = e[i]
+            variance[k, i] = c[i, i] + noise[i] if math.isfinite(e[i]) else math.nan
+        for i in range(9):
+            state[k, i] = x[i]
+            sigma[k, i] = math.sqrt(max(p[i, i], 0.0))
+        line_of_sight_sigma(x, p, los_sigma[k])
+
+
 def filter_log(
     time_s: FloatArray,
     measurement: FloatArray,
@@ -147,7 +183,7 @@ def filter_log(
 ) -> FilterRun:
     """Run the filter over the whole log, beginning anew at each start.
 
-    time_s (n,), measurement (n, 3), weight (n, 3) in [0, 1]; the first start must be at sample 0.
+    time_s (n,), measurement (n, 3), weight (n, 3) in [0, 1]. Samples before the first start are extrapolated.
     extended: linearise by the Jacobian (EKF) instead of the unscented transform.
     """
     run = empty_run(time_s)
@@ -157,4 +193,17 @@ def filter_log(
             start.sample, stop, time_s, measurement, weight, model.noise_variance, model.jerk, model.knot_s,
             start.state.copy(), start.covariance.copy(), extended, run,
         )  # fmt: skip
+    lead_in(measurement, model, starts[0], run)
     return run._replace(log_likelihood=likelihood)
+
+
+def lead_in(measurement: FloatArray, model: Model, start: Start, run: FilterRun) -> None:
+    """Fill the run before its first start."""
+    variance = run.innovation_sigma  # squared until the last line
+    extrapolate_back(
+        start.sample, run.time_s, measurement, model.noise_variance, model.jerk, model.knot_s, start.state.copy(),
+        start.covariance.copy(), run.state, run.sigma, run.los_sigma, run.innovation, variance,
+    )  # fmt: skip
+    before = slice(0, start.sample)
+    run.predicted[before] = run.state[before]
+    run.innovation_sigma[before] = np.sqrt(variance[before])

@@ -23,7 +23,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ftproc.core import motion, screening, ukf
-from ftproc.core.forward import FilterRun, Model, Start, empty_run, line_of_sight_sigma
+from ftproc.core.forward import FilterRun, Model, Start, empty_run, lead_in, line_of_sight_sigma
 from ftproc.core.start import first_state
 
 FloatArray = NDArray[np.float64]
@@ -57,6 +57,11 @@ def igg3(u: float, full: float, zero: float) -> float:
         return 0.0
     part = (zero - u) / (zero - full)
     return full / u * part * part
+
+
+def rejection_weight(gate: float) -> float:
+    """The weight at the gate itself: a reading with less is called an outlier."""
+    return float(igg3(gate, FULL_AT * gate, ZERO_AT * gate))
 
 
 @njit(cache=True)
@@ -206,10 +211,10 @@ def run_gated(
 
 @njit(cache=True)
 def _overdue(track: FloatArray, now: float, longest_patch_s: float) -> bool:
+    late = False
     for i in range(3):
-        if track[i, 0] > 0 and now - track[i, 4] > longest_patch_s:
-            return True
-    return False
+        late = late or (track[i, 0] > 0 and now - track[i, 4] > longest_patch_s)
+    return late
 
 
 @njit(cache=True)
@@ -230,13 +235,13 @@ def filter_and_edit(
     """The recursive filter with recursive editing over a whole log, and the samples at which it re-acquired.
 
     time_s (n,), measurement (n, 3); allowed (n, 3): zero bars a reading from the outset (those that the first state
-    was found to contradict); `start` at sample 0.
+    was found to contradict); samples before `start` are extrapolated.
     """
     run = empty_run(time_s)
     track = np.zeros((3, 5))
     track[:, 3] = np.nan
     x, p = start.state.copy(), start.covariance.copy()
-    first = began = retry = 0
+    first = began = retry = start.sample
     reacquired: list[int] = []
     likelihood = 0.0
     while first < len(time_s):
@@ -254,6 +259,7 @@ def filter_and_edit(
             track[:] = 0.0
             track[:, 3] = np.nan
             first = began = lost  # the sample is filtered again, from the new state
+    lead_in(measurement, model, start, run)
     return run._replace(log_likelihood=likelihood), reacquired
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 WIDE = 25.0  # 1-sigma of a bad reading, in sigmas of the noise
+NATURAL_GATE = 4.0  # sigmas at which the chain gives up a lone reading, about; another gate shifts the odds
 START_RATES = (0.02, 0.001, 0.92)  # isolated outlier; patch begins; patch goes on
 MAX_RATES = (0.4, 0.02, 0.98)
 MIN_STAY = 0.7
@@ -27,7 +28,8 @@ ROUNDS = 3
 
 @njit(cache=True)
 def _chain(
-    residual: FloatArray, variance: FloatArray, noise: float, rates: FloatArray, good: FloatArray, counts: FloatArray
+    residual: FloatArray, variance: FloatArray, noise: float, odds: float, rates: FloatArray, good: FloatArray,
+    counts: FloatArray,
 ) -> None:
     """Forward-backward recursion: fills good (n,) = P(good | all) and the expected transition counts (3, 3)."""
     n = len(residual)
@@ -42,7 +44,7 @@ def _chain(
         if not math.isfinite(residual[k]):
             continue
         wide = variance[k] + WIDE * WIDE * noise
-        ratio = 0.5 * residual[k] ** 2 * (1 / variance[k] - 1 / wide) - 0.5 * math.log(wide / variance[k])
+        ratio = odds + 0.5 * residual[k] ** 2 * (1 / variance[k] - 1 / wide) - 0.5 * math.log(wide / variance[k])
         likely[k, 0] = math.exp(min(0.0, -ratio))
         likely[k, 1] = math.exp(min(0.0, ratio))
         total = 0.0
@@ -95,18 +97,19 @@ def _learn(counts: FloatArray, rates: FloatArray) -> None:
 
 @njit(cache=True)
 def classify(
-    residual: FloatArray, variance: FloatArray, noise_variance: FloatArray, rates: FloatArray
+    residual: FloatArray, variance: FloatArray, noise_variance: FloatArray, rates: FloatArray, gate: float
 ) -> FloatArray:
     """(n, 3) probability that each reading is good; zero where missing. `rates` (3, 3) are learnt in place.
 
-    residual, variance: (n, 3) leave-one-out, from the smoother; noise_variance (3,).
+    residual, variance: (n, 3) leave-one-out, from the smoother; noise_variance (3,). gate: sigmas.
     """
+    odds = 0.5 * (NATURAL_GATE**2 - gate**2)
     n = residual.shape[0]
     good, counts, column = np.zeros((n, 3)), np.zeros((3, 3)), np.zeros(n)
     for c in range(3):
         r, v = residual[:, c].copy(), variance[:, c].copy()
         for _ in range(ROUNDS):
-            _chain(r, v, noise_variance[c], rates[c], column, counts)
+            _chain(r, v, noise_variance[c], odds, rates[c], column, counts)
             _learn(counts, rates[c])
         for k in range(n):
             good[k, c] = column[k]

@@ -36,14 +36,15 @@ def knot_index(time: float, first_time: float, knot_s: float, knots: int) -> int
 
 @njit(cache=True)
 def noise_coefficients(interval: float, out: FloatArray) -> None:
-    """The 3 x 3 matrix of Q per unit of jerk density."""
+    """The 3 x 3 matrix of Q per unit of jerk density; a negative interval goes back in time."""
     t = interval
-    out[0, 0] = t**5 / 20
-    out[0, 1] = out[1, 0] = t**4 / 8
-    out[0, 2] = out[2, 0] = t**3 / 6
-    out[1, 1] = t**3 / 3
-    out[1, 2] = out[2, 1] = t * t / 2
-    out[2, 2] = t
+    sign = 1.0 if t >= 0 else -1.0
+    out[0, 0] = sign * t**5 / 20
+    out[0, 1] = out[1, 0] = sign * t**4 / 8
+    out[0, 2] = out[2, 0] = sign * t**3 / 6
+    out[1, 1] = sign * t**3 / 3
+    out[1, 2] = out[2, 1] = sign * t * t / 2
+    out[2, 2] = sign * t
 
 
 @njit(cache=True)

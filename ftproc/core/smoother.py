@@ -29,7 +29,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ftproc.core import motion, ukf
-from ftproc.core.forward import Model, Start, line_of_sight_sigma
+from ftproc.core.forward import Model, Start, extrapolate_back, line_of_sight_sigma
 
 FloatArray = NDArray[np.float64]
 
@@ -43,6 +43,7 @@ class SmootherRun(NamedTuple):
     residual: (n, 3) leave-one-out residual m, rad, rad; NaN where missing. residual_variance: (n, 3) its variance at
     full weight. nis: (n,) of the innovations used in the forward sweep. log_likelihood: of those innovations.
     noise_score: (3,) d log-likelihood / d ln(variance). jerk_score: (m, 6) d log-likelihood / d jerk element.
+    head: smoothed state and covariance at the first start.
     """
 
     state: FloatArray
@@ -54,6 +55,7 @@ class SmootherRun(NamedTuple):
     log_likelihood: float
     noise_score: FloatArray
     jerk_score: FloatArray
+    head: Start
 
 
 @njit(cache=True)
@@ -76,8 +78,10 @@ def _sweep(
     nis_out: FloatArray,
     noise_score: FloatArray,
     jerk_score: FloatArray,
+    head: FloatArray,
 ) -> float:
-    """Both sweeps over samples [first, last); returns the log-likelihood."""
+    """Both sweeps over samples [first, last); returns the log-likelihood. Leaves P+ and N+ of sample
+    `first` in `head` (2, 9, 9)."""
     factor, b, c, s = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
     q, z_hat, used = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     blocks = (last - first + BLOCK - 1) // BLOCK
@@ -85,7 +89,7 @@ def _sweep(
     xs, ps = np.empty((BLOCK, 9)), np.empty((BLOCK, 9, 9))
     hs, es, cs = np.empty((BLOCK, 3, 3)), np.empty((BLOCK, 3)), np.empty((BLOCK, 3))
     s_invs, gains, pxzs = np.empty((BLOCK, 3, 3)), np.empty((BLOCK, 9, 3)), np.empty((BLOCK, 9, 3))
-    r, n = np.zeros(9), np.zeros((9, 9))
+    r, n, smoothed = np.zeros(9), np.zeros((9, 9)), np.zeros((9, 9))
     likelihood = 0.0
     for round_ in range(2 * blocks):
         forward_only = round_ < blocks
@@ -130,7 +134,10 @@ def _sweep(
             continue
         for k in range(high - 1, low - 1, -1):
             j = k - low
-            _estimate(xs[j], ps[j], r, n, state[k], sigma[k], los_sigma[k])
+            if k == first:
+                head[0] = ps[j]
+                head[1] = n
+            _estimate(xs[j], ps[j], r, n, smoothed, state[k], sigma[k], los_sigma[k])
             _absorb(
                 r, n, hs[j], es[j], cs[j], s_invs[j], gains[j], pxzs[j], weight[k], noise,
                 residual[k], variance[k], noise_score,
@@ -145,10 +152,10 @@ def _sweep(
 
 @njit(cache=True)
 def _estimate(
-    x: FloatArray, p: FloatArray, r: FloatArray, n: FloatArray, state: FloatArray, sigma: FloatArray, los: FloatArray
-) -> None:
+    x: FloatArray, p: FloatArray, r: FloatArray, n: FloatArray, smoothed: FloatArray,
+    state: FloatArray, sigma: FloatArray, los: FloatArray,
+) -> None:  # fmt: skip
     """x+ + P+ r and P+ - P+ N P+, its diagonal and line-of-sight sigmas."""
-    smoothed = np.empty((9, 9))
     pn = np.empty((9, 9))
     for i in range(9):
         total = x[i]
@@ -163,9 +170,8 @@ def _estimate(
     for i in range(9):
         for j in range(i + 1):
             v = p[i, j]
-            if i < 6 or i == j:
-                for k in range(9):
-                    v -= pn[i, k] * p[k, j]
+            for k in range(9):
+                v -= pn[i, k] * p[k, j]
             smoothed[i, j] = v
             smoothed[j, i] = v
         # Rounding may eat a variance that the record has all but determined; it cannot be below that rounding.
@@ -224,6 +230,9 @@ def _absorb(
             for a in range(3):
                 for b in range(3):
                     n[a, b] += h[i, a] * m[i, j] * h[j, b]
+    for a in range(9):  # what rounding leaves of asymmetry would grow from sample to sample
+        for b in range(a):
+            n[a, b] = n[b, a] = 0.5 * (n[a, b] + n[b, a])
     for i in range(3):
         if not math.isfinite(e[i]):
             residual[i] = math.nan
@@ -257,23 +266,41 @@ def _score_jerk(r: FloatArray, n: FloatArray, interval: float, c: FloatArray, sc
             k += 1
 
 
+def smoothed_covariance(p: FloatArray, n: FloatArray) -> FloatArray:
+    """P - P N P as L (I - L' N L) L' with P = L L' and eigenvalues kept positive whatever the rounding. (9, 9)."""
+    scale = np.sqrt(np.diag(p))
+    factor = scale[:, None] * np.linalg.cholesky(p / np.outer(scale, scale) + 1e-12 * np.eye(9))
+    share, turn = np.linalg.eigh(np.eye(9) - factor.T @ n @ factor)
+    half = factor @ turn * np.sqrt(np.maximum(share, 1e-12))
+    result: FloatArray = half @ half.T
+    return result
+
+
 def smooth_log(
     time_s: FloatArray, measurement: FloatArray, weight: FloatArray, model: Model, starts: list[Start]
 ) -> SmootherRun:
     """Smooth the whole log; the record on each side of a start is smoothed by itself.
 
-    time_s (n,), measurement (n, 3), weight (n, 3) in [0, 1]; the first start must be at sample 0.
+    time_s (n,), measurement (n, 3), weight (n, 3) in [0, 1]. Samples before the first start are extrapolated.
     """
     n = len(time_s)
-    run = SmootherRun(
-        np.empty((n, 9)), np.empty((n, 9)), np.empty((n, 6)), np.empty((n, 3)), np.empty((n, 3)), np.empty(n),
-        0.0, np.zeros(3), np.zeros_like(model.jerk),
-    )  # fmt: skip
-    likelihood = 0.0
+    state, sigma, los_sigma = np.empty((n, 9)), np.empty((n, 9)), np.empty((n, 6))
+    residual, variance, nis = np.empty((n, 3)), np.empty((n, 3)), np.full(n, np.nan)
+    noise_score, jerk_score = np.zeros(3), np.zeros_like(model.jerk)
+    likelihood, head = 0.0, starts[0]
     for start, stop in zip(starts, [s.sample for s in starts[1:]] + [n], strict=True):
+        ends = np.empty((2, 9, 9))
         likelihood += _sweep(
             start.sample, stop, time_s, measurement, weight, model.noise_variance, model.jerk, model.knot_s,
-            start.state, start.covariance, run.state, run.sigma, run.los_sigma, run.residual, run.residual_variance,
-            run.nis, run.noise_score, run.jerk_score,
+            start.state, start.covariance, state, sigma, los_sigma, residual, variance, nis, noise_score, jerk_score,
+            ends,
         )  # fmt: skip
-    return run._replace(log_likelihood=likelihood)
+        if start is starts[0]:
+            head = Start(start.sample, state[start.sample].copy(), smoothed_covariance(*ends))
+    extrapolate_back(
+        head.sample, time_s, measurement, model.noise_variance, model.jerk, model.knot_s, head.state.copy(),
+        head.covariance.copy(), state, sigma, los_sigma, residual, variance,
+    )  # fmt: skip
+    return SmootherRun(
+        state, sigma, los_sigma, residual, variance, nis, likelihood, noise_score, jerk_score, head
+    )

@@ -11,11 +11,26 @@ from ftproc.core.geometry import line_of_sight_axes, to_cartesian, wrap
 
 FloatArray = NDArray[np.float64]
 
-SAMPLES = 15  # good readings of each component wanted for the first fit
+SAMPLES = 15  # good readings of each component wanted for the first fit,
+LONGEST_FIT_S = 20.0  # if they lie so close together
+LONGEST_REACH_S = 3.0  # back from the first good readings to the first sample
+CURVE = 5  # readings that show a curve
 INFLATION = 3.0  # on every sigma of the first state: its readings are filtered again, so it must weigh little
 ACCELERATION_MPS2 = 30.0  # 1-sigma of an acceleration about which nothing is known
 SPEED_MPS = 1000.0  # likewise, when a rate cannot be had
 WIDEST_IN_RANGES = 0.1  # the position must not be so vague that the target may be behind the station
+
+
+def begin(time_s: FloatArray, measurement: FloatArray, weight: FloatArray, noise_variance: FloatArray) -> Start:
+    """The start of a whole log: at its first sample, or, when that would mean reaching back far, where every
+    component has been seen once. Arguments and errors as in `first_state`."""
+    good = (weight > 0) & np.isfinite(measurement)
+    if not good.any(0).all():
+        raise ValueError(int(np.argmin(good.any(0))))
+    sample = int(good.argmax(0).max())
+    if time_s[sample] - time_s[0] <= LONGEST_REACH_S:
+        sample = 0
+    return first_state(time_s, measurement, weight, noise_variance, sample, 0, len(time_s))
 
 
 def first_state(
@@ -33,49 +48,61 @@ def first_state(
     are fitted one by one, so they need not come at the same instants. The covariance is inflated.
     Raises ValueError with the component's index when a component has no good reading in the span.
     """
-    values, rates = np.zeros(3), np.zeros(3)
-    value_sigma, rate_sigma = np.zeros(3), np.zeros(3)
+    fits = []
     for c in range(3):
         good = np.flatnonzero((weight[low:high, c] > 0) & np.isfinite(measurement[low:high, c])) + low
         if len(good) == 0:
             raise ValueError(c)
-        nearest = np.sort(good[np.argsort(np.abs(good - sample), kind="stable")[:SAMPLES]])
-        t = time_s[nearest] - time_s[sample]
-        z = measurement[nearest, c]
+        away = np.abs(time_s[good] - time_s[sample])
+        nearest = np.argsort(away, kind="stable")[:SAMPLES]
+        close = away[nearest] <= away[nearest[0]] + LONGEST_FIT_S
+        chosen = np.sort(good[nearest[close | (np.arange(len(nearest)) < 2)]])
+        z = measurement[chosen, c]
         if c == 1:
             z = z[0] + np.cumsum(np.r_[0.0, wrap(np.diff(z))])
-        values[c], rates[c], value_sigma[c], rate_sigma[c] = _line(t, z, float(np.sqrt(noise_variance[c])))
-    return _to_state(sample, values, rates, value_sigma, rate_sigma)
+        fits.append(_line(time_s[chosen] - time_s[sample], z, float(np.sqrt(noise_variance[c]))))
+    return _to_state(sample, *(np.array(column) for column in zip(*fits, strict=True)))
 
 
-def _line(t: FloatArray, z: FloatArray, sigma: float) -> tuple[float, float, float, float]:
-    """Value and rate at t = 0 and their 1-sigma (infinite for the rate when all readings are of one instant).
+def _line(t: FloatArray, z: FloatArray, sigma: float) -> tuple[float, float, float, float, float, float]:
+    """Value and rate at t = 0 and their 1-sigma (infinite for the rate when all readings are of one instant); then
+    the time over which a curve may have gone unseen, s: between the readings and from them to t = 0.
 
-    The scatter about the line stands for what it misses of a curve, so it is not averaged down.
+    The scatter about the line stands for what it misses of a curve, so it is not averaged down; too few readings
+    to show a curve leave it to the acceleration that must be allowed for.
     """
+    lead = float(np.abs(t).min())
     span = float(np.ptp(t))
     if span <= 0:
-        return float(z.mean()), 0.0, sigma, np.inf
+        return float(z.mean()), 0.0, sigma, np.inf, 0.0, lead
     middle = float(t.mean())
     spread = float(((t - middle) ** 2).sum())
     rate = float(((t - middle) * (z - z.mean())).sum()) / spread
     value = float(z.mean()) - rate * middle
     scatter = max(sigma, float(np.abs(z - value - rate * t).max()))
-    rate_sigma = scatter / span * 4
-    return value, rate, float(np.hypot(scatter, rate_sigma * max(abs(middle) - span / 2, 0.0))), rate_sigma
+    rate_sigma = 4 * scatter / span
+    return value, rate, float(np.hypot(scatter, rate_sigma * lead)), rate_sigma, span if len(t) < CURVE else 0.0, lead
 
 
 def _to_state(
-    sample: int, values: FloatArray, rates: FloatArray, value_sigma: FloatArray, rate_sigma: FloatArray
+    sample: int,
+    values: FloatArray,
+    rates: FloatArray,
+    value_sigma: FloatArray,
+    rate_sigma: FloatArray,
+    unseen_s: FloatArray,
+    lead_s: FloatArray,
 ) -> Start:
     """From range, azimuth, elevation and their rates to a Cartesian state with its covariance."""
     slant = values[0] = max(values[0], 1.0)
     position = to_cartesian(values)
     axes = line_of_sight_axes(position[None])[0]
     scale = np.array([1.0, slant * np.cos(values[2]), slant])  # m per m, rad, rad along radial, cross, up
-    along = np.minimum(scale * value_sigma, WIDEST_IN_RANGES * slant)
+    curve = ACCELERATION_MPS2 * (unseen_s**2 / 8 + lead_s**2 / 2)
+    along = np.minimum(scale * value_sigma + curve, WIDEST_IN_RANGES * slant)
     known = np.isfinite(rate_sigma)
-    speed_sigma = np.minimum(np.where(known, scale * np.where(known, rate_sigma, 0.0), SPEED_MPS), SPEED_MPS)
+    drift = np.where(known, scale * np.where(known, rate_sigma, 0.0), SPEED_MPS)
+    speed_sigma = np.minimum(drift + ACCELERATION_MPS2 * (unseen_s / 2 + lead_s), SPEED_MPS)
     covariance = np.zeros((9, 9))
     covariance[:3, :3] = axes.T @ np.diag((INFLATION * along) ** 2) @ axes
     covariance[3:6, 3:6] = axes.T @ np.diag((INFLATION * speed_sigma) ** 2) @ axes

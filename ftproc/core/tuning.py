@@ -33,12 +33,15 @@ def fit_level(
     weight: FloatArray,
     starts: list[Start],
     guess: Model,
-    fix_noise: bool = False,
-    fix_jerk: bool = False,
+    fix_noise: NDArray[np.bool_],
+    fix_jerk: bool,
     steps: int = 12,
 ) -> Model:
-    """The likeliest noise variances and single jerk density, from the model `guess` on."""
-    if fix_noise and fix_jerk:
+    """The likeliest noise variances and single jerk density, from the model `guess` on.
+
+    fix_noise: (3,) components whose noise stays as guessed. fix_jerk: the jerk density stays.
+    """
+    if fix_noise.all() and fix_jerk:
         return guess
     floor, ceiling = 2 * np.log(NOISE_FLOOR), 2 * np.log(NOISE_CEILING)
     log_noise, log_jerk = np.log(guess.noise_variance), math.log(guess.jerk[0, 0])

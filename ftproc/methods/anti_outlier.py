@@ -1,0 +1,103 @@
+"""The main method's filter: the anti-outlier UKF (Zuo et al. 2021 section 2.3), recursive or in two passes.
+
+The network's correction (section 2.2) works on its output and is added by the pipeline.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ftproc.core import editing, forward, gate, indicators, tuning
+from ftproc.core.forward import FilterRun, Model, Start
+from ftproc.core.motion import isotropic
+from ftproc.core.smoother import SmootherRun, smooth_log
+from ftproc.core.start import begin
+from ftproc.methods.estimate import Estimate, Readings
+from ftproc.records import MISSING, FlagArray, FloatArray
+from ftproc.settings import FilterSettings
+
+LONGEST_ISOLATED = 2  # readings rejected in a row; more make a patch
+DEFAULT_PATCH_S = 4.0
+DEFAULT_PATCH_SAMPLES = 32  # the longest patch expected is the longer of the two
+
+
+def estimate(readings: Readings, settings: FilterSettings) -> Estimate:
+    """Filter, edit and (if asked) smooth a log by the way of editing that the settings name."""
+    if settings.editing == "two-pass":
+        return _two_pass(readings, settings)
+    if settings.editing == "forward":
+        return _recursive(readings, settings)
+    return unedited(readings, settings)
+
+
+def unedited(readings: Readings, settings: FilterSettings, extended: bool = False) -> Estimate:
+    """The plain UKF (or EKF): every reading is used. Noise and jerk come from the readings that screening trusts."""
+    model, start, _ = prepare(readings, settings)
+    weight = np.isfinite(readings.measurement).astype(float)
+    run = forward.filter_log(*readings[:2], weight, model, [start], extended)
+    return Estimate(run, _labels(weight, readings), model, _smoothed(readings, settings, weight, model, [start]))
+
+
+def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, Start, FloatArray]:
+    """Noise and jerk level, first state and screening weights (n, 3) of a log, without deciding on its outliers."""
+    time_s, measurement, _ = readings
+    weight, sigma = editing.screen(time_s, measurement)
+    given = _given(readings, settings)
+    guess = Model(np.where(np.isfinite(given), given, sigma) ** 2, isotropic(settings.jerk_psd_m2ps5 or 1.0))
+    start = begin(time_s, measurement, weight, guess.noise_variance)
+    fixed = np.isfinite(given)
+    model = tuning.fit_level(
+        time_s, measurement, weight, [start], guess, fixed, settings.jerk_psd_m2ps5 is not None
+    )
+    return model, start, weight
+
+
+def _two_pass(readings: Readings, settings: FilterSettings) -> Estimate:
+    edited = editing.edit(*readings[:2], _given(readings, settings), settings.jerk_psd_m2ps5, settings.gate)
+    start = editing.smoothed_start(edited.smoothed)
+    run = forward.filter_log(*readings[:2], edited.weight, edited.model, [start])
+    smoothed = edited.smoothed if settings.smooth else None
+    return Estimate(run, _labels(edited.weight, readings), edited.model, smoothed, settled=edited.settled)
+
+
+def _recursive(readings: Readings, settings: FilterSettings) -> Estimate:
+    time_s, measurement, _ = readings
+    model, start, screened = prepare(readings, settings)
+    allowed = np.ones_like(measurement)
+    first = slice(0, max(editing.WINDOWS))  # the window that the first state was found in
+    allowed[first] = screened[first]
+    longest = settings.max_patch_s
+    if longest is None:
+        interval = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
+        longest = max(DEFAULT_PATCH_S, DEFAULT_PATCH_SAMPLES * interval)
+    how = gate.GateSettings(settings.gate, longest, settings.gain_form)
+    run, reacquired = gate.filter_and_edit(time_s, measurement, allowed, model, start, how)
+    kept = np.where(run.weight > gate.rejection_weight(settings.gate), 1.0, 0.0)
+    smoothed = _smoothed(readings, settings, kept, model, _restarts(run, start, reacquired))
+    return Estimate(run, _labels(kept, readings), model, smoothed, tuple(reacquired))
+
+
+def _restarts(run: FilterRun, start: Start, reacquired: list[int]) -> list[Start]:
+    """Where a smoother over the same record begins: it must not run through a re-acquisition."""
+    again: list[Start] = []
+    for sample in reacquired:
+        variance = (editing.START_INFLATION * run.sigma[sample]) ** 2
+        again.append(Start(sample, run.state[sample].copy(), np.diag(variance)))
+    return [start, *(s for s in again if s.sample > start.sample)]
+
+
+def _given(readings: Readings, settings: FilterSettings) -> FloatArray:
+    """(3,) noise 1-sigma that need not be found: the user's, else what is assumed; NaN where the log tells."""
+    return readings.assumed_sigma if settings.noise is None else np.array(settings.noise)
+
+
+def _smoothed(
+    readings: Readings, settings: FilterSettings, weight: FloatArray, model: Model, starts: list[Start]
+) -> SmootherRun | None:
+    return smooth_log(*readings[:2], weight, model, starts) if settings.smooth else None
+
+
+def _labels(weight: FloatArray, readings: Readings) -> FlagArray:
+    label = indicators.label_runs(weight, readings.measurement, LONGEST_ISOLATED).astype(np.uint8)
+    label[~np.isfinite(readings.measurement)] = MISSING
+    return label

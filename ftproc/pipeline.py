@@ -1,0 +1,177 @@
+"""From a log to a trajectory: the only place that knows the order of the steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ftproc import __version__
+from ftproc.core.geometry import from_cartesian
+from ftproc.errors import InputError, UsageError
+from ftproc.methods import registry
+from ftproc.methods.estimate import Estimate, Readings
+from ftproc.records import COMPONENTS, MISSING, MeasurementLog, Trajectory, Truth
+from ftproc.settings import FilterSettings, TrainSettings
+from ftproc.summary import summarise
+
+if TYPE_CHECKING:
+    from ftproc.correction.model import Model
+
+EDITING = ("two-pass", "forward", "none")
+ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of a component that the log says too little about
+ASSUMED_READING = (10_000.0, 0.0, 0.0)  # stands in for a component that is missing throughout
+FEWEST_READINGS = 8  # of a component, for its noise to be found from them
+PACKAGED_MODEL = Path(__file__).parent / "correction" / "default.safetensors"
+
+
+@cache
+def default_model() -> Model:
+    """The correction that comes with the package. Raises ModelError if its file is damaged."""
+    from ftproc.correction.model import load
+
+    return load(PACKAGED_MODEL)
+
+
+def filter_log(log: MeasurementLog, settings: FilterSettings | None = None, model: Model | None = None) -> Trajectory:
+    """Clean one log: edit its outliers, filter (and smooth), correct, and say how good the result is.
+
+    model: the network's correction; None for none. Sigmas, labels and everything else are in the Trajectory.
+    Raises InputError when the log cannot be processed, UsageError for settings that make no sense.
+    """
+    settings = settings or FilterSettings()
+    method = registry.named(settings.method)
+    _check(settings)
+    readings, absent = _readings(log)
+    try:
+        estimate = method.run(readings, settings)
+    except ValueError as cause:
+        raise InputError(_no_start(log, cause)) from cause
+    best = estimate.run if estimate.smoothed is None else estimate.smoothed
+    state, sigma = best.state.copy(), best.sigma[:, :6].copy()
+    correction, outside = np.zeros((len(log), 6)), 0.0
+    if model is not None and method.corrected and estimate.smoothed is None and not absent:
+        from ftproc.correction.apply import correct
+
+        correction, outside = correct(estimate.run, model)
+        state[:, :6] += correction
+    cleaned = from_cartesian(state[:, :3])
+    if absent:  # the stand-in made the filter run; what rests on it must not leave the house
+        state[:], sigma[:] = np.nan, np.nan
+        cleaned[:, absent] = np.nan
+        estimate.label[:, absent] = MISSING
+    elif not np.isfinite(state).all():
+        raise InputError(f"{log.name}: the filter diverged; give --noise and --jerk, or check the log's units")
+    summary = summarise(log, estimate, absent, correction, outside)
+    return Trajectory(
+        log.name, log.row, log.time_s, cleaned, state, sigma, estimate.label, best.nis, correction,
+        _provenance(log, settings, estimate, model, summary), log.extra,
+    )  # fmt: skip
+
+
+def _check(settings: FilterSettings) -> None:
+    if settings.editing not in EDITING:
+        raise UsageError(f"editing is one of {', '.join(EDITING)}, not {settings.editing!r}")
+    numbers: list[tuple[str, float | None]] = [("noise", v) for v in settings.noise or ()]
+    numbers += [("jerk", settings.jerk_psd_m2ps5), ("gate", settings.gate), ("max-patch", settings.max_patch_s)]
+    for name, value in numbers:
+        if value is not None and not (np.isfinite(value) and value > 0):
+            raise UsageError(f"{name} must be a positive number, not {value}")
+
+
+def _readings(log: MeasurementLog) -> tuple[Readings, list[int]]:
+    """What the methods see, and the components that are missing throughout (a constant stands in for those)."""
+    if len(log) == 0:
+        raise InputError(f"{log.name}: no row has a time, so there is nothing to filter")
+    measurement = log.measurement.copy()
+    count = np.isfinite(measurement).sum(0)
+    if not count.any():
+        raise InputError(f"{log.name}: range, azimuth and elevation are missing in every row")
+    absent = [c for c in range(3) if count[c] == 0]
+    assumed = np.where(count < FEWEST_READINGS, ASSUMED_SIGMA, np.nan)
+    for c in absent:
+        measurement[:, c] = ASSUMED_READING[c]
+    return Readings(log.time_s - log.time_s[0], np.ascontiguousarray(measurement), assumed), absent
+
+
+def _no_start(log: MeasurementLog, cause: ValueError) -> str:
+    component = cause.args[0] if cause.args and isinstance(cause.args[0], int) else None
+    if component is None:
+        return f"{log.name}: {cause}"
+    return (
+        f"{log.name}: no {COMPONENTS[component]} reading agrees with its neighbours, so there is no first state; "
+        f"check the column and its unit, or leave it out"
+    )
+
+
+def _provenance(
+    log: MeasurementLog,
+    settings: FilterSettings,
+    estimate: Estimate,
+    model: Model | None,
+    summary: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Everything needed to make the trajectory again."""
+    from ftproc.correction.model import sha256
+
+    sigma = np.sqrt(estimate.model.noise_variance)
+    knots = estimate.model.jerk[:, 0]
+    return {
+        "program": "ftproc",
+        "version": __version__,
+        "method": settings.method,
+        "log": log.name,
+        "frame": log.frame,
+        "settings": {
+            "editing": settings.editing,
+            "smooth": settings.smooth,
+            "gate": settings.gate,
+            "max_patch_s": settings.max_patch_s,
+            "gain_form": settings.gain_form,
+            "site": settings.site,
+            "noise_given": settings.noise is not None,
+            "jerk_given": settings.jerk_psd_m2ps5 is not None,
+            "noise_range_m": float(sigma[0]),
+            "noise_azimuth_rad": float(sigma[1]),
+            "noise_elevation_rad": float(sigma[2]),
+            "jerk_psd_m2ps5": [float(q) for q in knots],
+            "jerk_knot_s": float(estimate.model.knot_s) if len(knots) > 1 else None,
+        },
+        "model_sha256": None if model is None else sha256(model),
+        "summary": dict(summary),
+    }
+
+
+def train_flights(
+    pairs: Sequence[tuple[MeasurementLog, Truth]],
+    settings: TrainSettings,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Model:
+    """Filter every log, hold it against its truth, and train a correction on the difference.
+
+    Raises InputError when a log cannot be processed or shares no time with its truth.
+    """
+    from ftproc.correction.samples import Flight
+    from ftproc.correction.training import train
+    from ftproc.score.matching import match
+
+    flights = []
+    for number, (log, truth) in enumerate(pairs):
+        if progress:
+            progress("filtering", number, len(pairs))
+        readings, absent = _readings(log)
+        if absent:
+            names = " and ".join(COMPONENTS[c] for c in absent)
+            raise InputError(f"{log.name}: {names} missing throughout; training needs all three components")
+        run = registry.METHODS["ga-bpnn-ukf"].run(readings, FilterSettings()).run
+        known = match(log.time_s, truth)
+        if not np.isfinite(known.position_m).any():
+            raise InputError(f"{truth.name}: its times do not overlap those of {log.name}")
+        flights.append(Flight(run, known.position_m, known.velocity_mps, log.name))
+    if progress:
+        progress("filtering", len(pairs), len(pairs))
+    return train(flights, settings, progress)
+

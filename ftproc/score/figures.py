@@ -1,0 +1,216 @@
+"""The figures of merit of one trajectory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.geometry import from_cartesian, wrap
+from ftproc.records import COMPONENTS, ISOLATED, PATCH, FlagArray, FloatArray, Trajectory, Truth
+from ftproc.score.matching import match
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """Average gradient F per component: mean change from sample to sample, azimuth the short way round.
+
+    Zuo et al. 2021 eq. 18. NaN where fewer than two consecutive samples have a value. F measures motion as
+    well as noise: compare it with that of the truth.
+    """
+
+    range_m: float
+    azimuth_rad: float
+    elevation_rad: float
+
+
+@dataclass(frozen=True)
+class Detection:
+    """Outliers found in one component: said = flagged isolated or patch, so = tampered with in the truth.
+
+    Counted over samples the truth has at that very time; readings marked missing are counted in neither. A
+    ratio of nothing is NaN. false_alarm_rate: share of the good readings that were flagged.
+    """
+
+    precision: float
+    recall: float
+    f1: float
+    false_alarm_rate: float
+    true_positives: int
+    false_positives: int
+    false_negatives: int
+    true_negatives: int
+
+
+@dataclass(frozen=True)
+class Score:
+    """What `score` finds; everything after `average_gradient` needs a truth and is None without one.
+
+    samples: rows of the trajectory. matched, interpolated, unmatched: of these, how many have a truth at
+    that very time, between two of its times, or none. without_estimate: matched or interpolated, but
+    without a position. rmse_seed_m: mean over the samples of the norm of the position error (Zuo et al.
+    2021 eq. 20 and 21, called RMSE there). rmse_3d_m, rmse_x_m ...: root mean square, in 3-D and per axis;
+    velocity likewise, None if the truth has none. max_error_m, p95_error_m, p99_error_m: of the norm of the
+    position error. in_3sigma: share of samples with all three axes inside 3 published sigmas (0.992 if
+    these are right and independent). nees_position: mean of the sum of (error / published sigma)^2 over the
+    three axes, 3 when the sigmas are right; correlations between the axes are not published and so not
+    used. NaN where nothing could be counted.
+    """
+
+    trajectory: str
+    method: str | None
+    samples: int
+    average_gradient: Gradient
+    truth: str | None = None
+    matched: int | None = None
+    interpolated: int | None = None
+    unmatched: int | None = None
+    without_estimate: int | None = None
+    truth_average_gradient: Gradient | None = None
+    rmse_seed_m: float | None = None
+    rmse_3d_m: float | None = None
+    rmse_x_m: float | None = None
+    rmse_y_m: float | None = None
+    rmse_z_m: float | None = None
+    rmse_v_mps: float | None = None
+    rmse_vx_mps: float | None = None
+    rmse_vy_mps: float | None = None
+    rmse_vz_mps: float | None = None
+    max_error_m: float | None = None
+    p95_error_m: float | None = None
+    p99_error_m: float | None = None
+    in_3sigma: float | None = None
+    nees_position: float | None = None
+    outliers: dict[str, Detection] | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Nested and JSON-serialisable: what is not known is left out, what could not be computed is None."""
+        plain: dict[str, Any] = _plain(self)
+        return plain
+
+
+def score(trajectory: Trajectory, truth: Truth | None = None) -> Score:
+    """Figures of merit of a trajectory: its average gradient, and against a truth its errors and flags.
+
+    The truth is matched by time (see `matching.match`), never extrapolated. Its own average gradient is
+    taken at the matched samples, so that the two compare.
+    """
+    method = trajectory.metadata.get("method")
+    known: dict[str, Any] = {
+        "trajectory": trajectory.name,
+        "method": method if isinstance(method, str) else None,
+        "samples": len(trajectory),
+        "average_gradient": average_gradient(trajectory.measurement),
+    }
+    if truth is not None:
+        known |= _against(trajectory, truth)
+    return Score(**known)
+
+
+def average_gradient(measurement: FloatArray) -> Gradient:
+    """Zuo et al. 2021 eq. 18 for (n, 3) range m, azimuth rad, elevation rad in time order.
+
+    Pairs with a missing value are left out of the mean.
+    """
+    step = np.diff(measurement, axis=0)
+    step[:, 1] = wrap(step[:, 1])
+    return Gradient(*(_mean(np.abs(column)) for column in step.T))
+
+
+def _against(trajectory: Trajectory, truth: Truth) -> dict[str, Any]:
+    found = match(trajectory.time_s, truth)
+    there = np.isfinite(found.position_m).all(axis=1)
+    error = trajectory.state[:, :3] - found.position_m
+    usable = np.isfinite(error).all(axis=1)
+    known: dict[str, Any] = {
+        "truth": truth.name,
+        "matched": int((there & ~found.interpolated).sum()),
+        "interpolated": int(found.interpolated.sum()),
+        "unmatched": int((~there).sum()),
+        "without_estimate": int((there & ~usable).sum()),
+        "truth_average_gradient": average_gradient(from_cartesian(found.position_m)),
+    }
+    known |= _position_figures(error[usable], trajectory.sigma[usable, :3])
+    if found.velocity_mps is not None:
+        known |= _velocity_figures(trajectory.state[:, 3:6] - found.velocity_mps)
+    if found.outlier is not None:
+        known["outliers"] = {
+            name: _detection(trajectory.outlier[found.exact, c], found.outlier[found.exact, c])
+            for c, name in enumerate(COMPONENTS)
+        }
+    return known
+
+
+def _position_figures(error: FloatArray, sigma: FloatArray) -> dict[str, float]:
+    """From (m, 3) errors and published sigmas in m."""
+    norm = np.sqrt(np.sum(error**2, axis=1))
+    published = np.isfinite(sigma).all(axis=1) & (sigma > 0).all(axis=1)
+    ratio = error[published] / sigma[published]
+    x, y, z = (_rms(column) for column in error.T)
+    return {
+        "rmse_seed_m": _mean(norm),
+        "rmse_3d_m": _rms(norm),
+        "rmse_x_m": x,
+        "rmse_y_m": y,
+        "rmse_z_m": z,
+        "max_error_m": float(norm.max()) if len(norm) else np.nan,
+        "p95_error_m": float(np.percentile(norm, 95)) if len(norm) else np.nan,
+        "p99_error_m": float(np.percentile(norm, 99)) if len(norm) else np.nan,
+        "in_3sigma": _mean(np.all(np.abs(ratio) <= 3, axis=1)),
+        "nees_position": _mean(np.sum(ratio**2, axis=1)),
+    }
+
+
+def _velocity_figures(error: FloatArray) -> dict[str, float]:
+    """From (n, 3) velocity errors in m/s, NaN where either is missing."""
+    error = error[np.isfinite(error).all(axis=1)]
+    x, y, z = (_rms(column) for column in error.T)
+    return {
+        "rmse_v_mps": _rms(np.sqrt(np.sum(error**2, axis=1))),
+        "rmse_vx_mps": x,
+        "rmse_vy_mps": y,
+        "rmse_vz_mps": z,
+    }
+
+
+def _detection(flag: FlagArray, injected: FlagArray) -> Detection:
+    """From the (m,) flags of one component and what was injected."""
+    seen = flag <= PATCH
+    said, so = np.isin(flag[seen], (ISOLATED, PATCH)), injected[seen] != 0
+    tp, fp = int((said & so).sum()), int((said & ~so).sum())
+    fn, tn = int((~said & so).sum()), int((~said & ~so).sum())
+    return Detection(
+        precision=_ratio(tp, tp + fp),
+        recall=_ratio(tp, tp + fn),
+        f1=_ratio(2 * tp, 2 * tp + fp + fn),
+        false_alarm_rate=_ratio(fp, fp + tn),
+        true_positives=tp,
+        false_positives=fp,
+        false_negatives=fn,
+        true_negatives=tn,
+    )
+
+
+def _ratio(part: int, whole: int) -> float:
+    return part / whole if whole else float("nan")
+
+
+def _mean(values: FloatArray | NDArray[np.bool_]) -> float:
+    """Mean of the values that are there; NaN if none is."""
+    there = values[np.isfinite(values)]
+    return float(np.mean(there)) if len(there) else float("nan")
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(_mean(values**2)))
+
+
+def _plain(value: Any) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        pairs = ((f.name, getattr(value, f.name)) for f in fields(value))
+        return {name: _plain(inner) for name, inner in pairs if inner is not None}
+    if isinstance(value, dict):
+        return {name: _plain(inner) for name, inner in value.items()}
+    return None if isinstance(value, float) and not np.isfinite(value) else value

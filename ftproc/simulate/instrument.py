@@ -1,0 +1,104 @@
+"""What the instrument does to a true direction: constant errors, refraction, and random noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import accumulate
+
+import numpy as np
+
+from ftproc.core.geometry import from_cartesian, to_cartesian, wrap
+from ftproc.records import FloatArray
+
+REFRACTION_SCALE_HEIGHT_M = 8000.0
+
+
+@dataclass(frozen=True)
+class InstrumentErrors:
+    """Constant errors of a station; the default is a perfect one. Angles in rad.
+
+    range_zero_m, azimuth_zero_rad, elevation_zero_rad: added to the reading (zero-set errors).
+    mislevel_rad: tilt of the vertical axis towards the azimuth mislevel_azimuth_rad.
+    collimation_rad: angle between line of sight and trunnion axis' normal; azimuth is off by it over cos E.
+    refraction: refractivity n - 1 at the station, 2.8e-4 for light, about 3.2e-4 for radar, 0 for none.
+    """
+
+    range_zero_m: float = 0.0
+    azimuth_zero_rad: float = 0.0
+    elevation_zero_rad: float = 0.0
+    mislevel_rad: float = 0.0
+    mislevel_azimuth_rad: float = 0.0
+    collimation_rad: float = 0.0
+    refraction: float = 0.0
+
+
+PERFECT = InstrumentErrors()
+
+
+def systematic(position: FloatArray, errors: InstrumentErrors) -> FloatArray:
+    """(n, 3) range m, azimuth rad, elevation rad that a noiseless instrument reads for (n, 3) true
+    positions in m.
+
+    Order as the light travels: refraction, tilted axis, collimation, zero-set. Azimuth is not yet wrapped.
+    """
+    reading = from_cartesian(position)
+    reading[:, 2] += errors.refraction * _bending(position)
+    if errors.mislevel_rad:
+        reading = from_cartesian(to_cartesian(reading) @ _tilt(errors).T)
+    # Within 1 mrad of the zenith no collimation error is defined: the mount cannot point there.
+    reading[:, 1] += errors.collimation_rad / np.maximum(np.cos(reading[:, 2]), 1e-3)
+    zero_set = np.array([errors.range_zero_m, errors.azimuth_zero_rad, errors.elevation_zero_rad])
+    return np.asarray(reading + zero_set)
+
+
+def _bending(position: FloatArray) -> FloatArray:
+    """(n,) apparent minus true elevation per unit of refractivity, rad.
+
+    Snell's law in flat layers whose refractivity falls off as exp(-h/H): cot E (1 - (H/h)(1 - exp(-h/H))),
+    written so that it stays finite on the horizon. Good above about 2 degrees of elevation.
+    """
+    ground = np.hypot(position[:, 0], position[:, 1]) / REFRACTION_SCALE_HEIGHT_M
+    height = position[:, 2] / REFRACTION_SCALE_HEIGHT_M
+    near = np.abs(height) < 1e-3  # there the difference below would be rounding noise
+    h = np.where(near, 1.0, height)
+    return np.asarray(ground * np.where(near, 0.5 - height / 6, (h + np.expm1(-h)) / h**2))
+
+
+def _tilt(errors: InstrumentErrors) -> FloatArray:
+    """(3, 3) rotation from the level frame into the instrument's, whose vertical axis leans."""
+    c, s = np.cos(errors.mislevel_rad), np.sin(errors.mislevel_rad)
+    ca, sa = np.cos(errors.mislevel_azimuth_rad), np.sin(errors.mislevel_azimuth_rad)
+    turn = np.array([[ca, sa, 0.0], [-sa, ca, 0.0], [0.0, 0.0, 1.0]])
+    lean = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
+    return np.asarray(turn.T @ lean @ turn)
+
+
+def unit_noise(
+    time_s: FloatArray, correlation_s: float, tails_dof: float | None, rng: np.random.Generator
+) -> FloatArray:
+    """(n, 3) noise of unit variance: white, or a first-order Gauss-Markov process of that correlation time.
+
+    x_k = f x_{k-1} + sqrt(1 - f^2) w_k with f = exp(-dt/correlation time), so irregular times need no
+    special case. With Student-t tails, w is scaled to unit variance.
+    """
+    shape = (len(time_s), 3)
+    if tails_dof is None:
+        white = rng.standard_normal(shape)
+    else:
+        white = rng.standard_t(tails_dof, shape) * np.sqrt((tails_dof - 2) / tails_dof)
+    if not correlation_s:
+        return white
+    memory = np.exp(-np.diff(time_s) / correlation_s)
+    fresh = np.sqrt(1.0 - memory**2)
+    columns = []
+    for w in white.T:
+        steps = zip(memory.tolist(), (fresh * w[1:]).tolist(), strict=True)
+        columns.append(list(accumulate(steps, lambda x, step: step[0] * x + step[1], initial=float(w[0]))))
+    return np.array(columns).T
+
+
+def readable(reading: FloatArray) -> FloatArray:
+    """(n, 3) as an instrument shows it: range from 0, azimuth in [-pi, pi), elevation within +-pi/2."""
+    azimuth = wrap(reading[:, 1])
+    azimuth = np.where(azimuth >= np.pi, -np.pi, azimuth)  # modulo of a tiny negative angle rounds up
+    return np.stack([np.maximum(reading[:, 0], 0.0), azimuth, np.clip(reading[:, 2], -np.pi / 2, np.pi / 2)], axis=1)

@@ -1,0 +1,53 @@
+"""When samples are taken: the grid, jitter, gaps and times that appear twice."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.records import FloatArray, IntArray
+from ftproc.simulate.spec import OutlierSpec
+
+
+def sample_times(duration_s: float, dt_s: float, jitter: float, rng: np.random.Generator) -> FloatArray:
+    """(n,) increasing times in s from 0 to the duration, both included.
+
+    jitter: largest shift, a share of dt below 0.5; uniform. Rounded to nanoseconds, so that 3 x 0.1 s
+    prints as 0.3.
+    """
+    time = dt_s * np.arange(row_count(duration_s, dt_s))
+    if jitter:
+        time = np.clip(time + dt_s * rng.uniform(-jitter, jitter, len(time)), 0.0, duration_s)
+    return np.round(time, 9)
+
+
+def row_count(duration_s: float, dt_s: float) -> int:
+    """Samples in a record of a duration, both ends included; a last interval short by rounding counts."""
+    return int(np.floor(duration_s / dt_s + 1e-6)) + 1
+
+
+def kept_rows(time_s: FloatArray, spec: OutlierSpec, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """(n,) False in the gaps, which fall anywhere but in the first and last tenth; left out if too long."""
+    first, last = time_s[0], time_s[-1]
+    low, high = first + 0.1 * (last - first), last - 0.1 * (last - first)
+    keep = np.ones(len(time_s), bool)
+    for count, seconds in spec.gaps:
+        for _ in range(count):
+            length, place = rng.uniform(*seconds), rng.random()
+            begin = low + place * (high - low - length)
+            if begin >= low:
+                keep[(time_s > begin) & (time_s < begin + length)] = False
+    return keep
+
+
+def with_duplicates(n: int, count: int, rng: np.random.Generator) -> tuple[IntArray, NDArray[np.bool_]]:
+    """Row numbers with `count` of them repeated (at most n), and which repeats are fresh readings, not
+    copies.
+
+    Every second repeat on average is a second, good reading of the same instant; the others copy the row.
+    """
+    again = rng.choice(n, min(count, n), replace=False)
+    rows = np.concatenate([np.arange(n), again])
+    fresh = np.concatenate([np.zeros(n, bool), rng.random(len(again)) < 0.5])
+    order = np.argsort(rows, kind="stable")
+    return rows[order], fresh[order]

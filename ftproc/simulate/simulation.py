@@ -1,0 +1,134 @@
+"""From a scenario's name to a log and its truth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ftproc.errors import UsageError
+from ftproc.records import FloatArray, MeasurementLog, Truth
+from ftproc.simulate.flights import FLIGHTS
+from ftproc.simulate.instrument import InstrumentErrors, readable, systematic, unit_noise
+from ftproc.simulate.sampling import kept_rows, row_count, sample_times, with_duplicates
+from ftproc.simulate.scenarios import Plan, draw, find_scenario
+from ftproc.simulate.spec import OutlierSpec, parse_outliers
+from ftproc.simulate.tamper import tamper
+
+MAX_DURATION_S = 1e5
+MAX_ROWS = 10_000_000
+
+# One child generator each, so that another outlier specification leaves the flight and the noise as they are.
+_STREAMS = ("plan", "flight", "times", "noise", "outliers", "gaps", "duplicates")
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A simulated log and what really happened, row for row.
+
+    truth.outlier: what was injected: 0 nothing, 1 spike, 2 offset, 3 ramp, 4 stuck, 5 burst, 6 start of
+    record, 7 zero reading. sigma: 1-sigma of the noise, range m, azimuth rad, elevation rad. untampered:
+    (n, 3) the readings with their noise but without outliers, missing values and rounding.
+    """
+
+    log: MeasurementLog
+    truth: Truth
+    sigma: tuple[float, float, float]
+    untampered: FloatArray
+
+
+def simulate(
+    scenario: str,
+    *,
+    seed: int = 0,
+    duration_s: float | None = None,
+    dt_s: float | None = None,
+    noise: tuple[float, float, float] | None = None,
+    outliers: str | None = None,
+    instrument: InstrumentErrors | None = None,
+) -> Simulation:
+    """Fly one flight of a scenario and measure it from the station at the origin.
+
+    scenario: a name in `list_scenarios()`. seed: another flight, noise and outliers for each; the same
+    gives the same bytes. duration_s, dt_s: length of the record and sample interval; samples at 0 and at
+    the end are both included. noise: 1-sigma of range m, azimuth rad, elevation rad. outliers: a
+    specification, see `GRAMMAR`; it replaces the scenario's own. instrument: constant errors of the
+    station. What is None comes from the scenario.
+
+    A = atan2(y, x) in [-pi, pi), E = atan2(z, hypot(x, y)), range >= 0 (Zuo et al. 2021 eq. 3, read as
+    arctangents). Sizes in sigmas count the noise used; where that is zero, the scenario's own.
+
+    Raises UsageError for an unknown scenario, a bad value, or a record that would be too long.
+    """
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise UsageError(f"The seed must be a whole number from 0, not {seed}.")
+    streams = dict(zip(_STREAMS, np.random.default_rng(seed).spawn(len(_STREAMS)), strict=True))
+    own = draw(find_scenario(scenario), streams["plan"])
+    plan = replace(
+        own,
+        duration_s=own.duration_s if duration_s is None else float(duration_s),
+        dt_s=own.dt_s if dt_s is None else float(dt_s),
+        noise=own.noise if noise is None else noise,
+        outliers=own.outliers if outliers is None else outliers,
+        instrument=instrument or own.instrument,
+    )
+    _check(plan)
+    sigma = np.array([used or usual for used, usual in zip(plan.noise, own.noise, strict=True)])
+    return _measure(plan, sigma, f"simulated {scenario}, seed {seed}", streams)
+
+
+def _check(plan: Plan) -> None:
+    for what, value in (("duration", plan.duration_s), ("sample interval", plan.dt_s)):
+        if not (math.isfinite(value) and value > 0):
+            raise UsageError(f"The {what} must be a positive number of seconds, not {value:g}.")
+    if plan.dt_s > plan.duration_s:
+        raise UsageError(f"The sample interval, {plan.dt_s:g} s, is longer than the record, {plan.duration_s:g} s.")
+    if plan.duration_s > MAX_DURATION_S:
+        raise UsageError(f"The duration is at most {MAX_DURATION_S:g} s, not {plan.duration_s:g} s.")
+    rows = row_count(plan.duration_s, plan.dt_s)
+    if rows > MAX_ROWS:
+        raise UsageError(
+            f"{plan.duration_s:g} s at {plan.dt_s:g} s are {rows} rows; at most {MAX_ROWS} are made. "
+            "Use a longer sample interval."
+        )
+    if len(plan.noise) != 3 or not all(math.isfinite(s) and s >= 0 for s in plan.noise):
+        given = ",".join(f"{s:g}" for s in plan.noise)
+        raise UsageError(
+            "The noise is three numbers from 0: range in m, azimuth and elevation in rad (1 sigma), "
+            f"such as 5,0.0002,0.0002; not {given}."
+        )
+
+
+def _measure(plan: Plan, sigma: FloatArray, name: str, streams: dict[str, np.random.Generator]) -> Simulation:
+    spec = parse_outliers(plan.outliers)
+    flight = FLIGHTS[plan.flight](streams["flight"], plan.duration_s)
+    time = sample_times(plan.duration_s, plan.dt_s, spec.jitter, streams["times"])
+    position, velocity, acceleration = flight.at(time)
+    exact = systematic(position, plan.instrument)
+    clean = exact + plan.noise * unit_noise(time, spec.correlation_s, spec.tails_dof, streams["noise"])
+    reading, code = tamper(clean, spec.faults, sigma, streams["outliers"])
+    rows, fresh = _rows(time, spec, streams)
+    second = exact[rows] + plan.noise * streams["duplicates"].standard_normal((len(rows), 3))
+    clean = np.where(fresh[:, None], second, clean[rows])
+    reading = readable(np.where(fresh[:, None], second, reading[rows]))
+    code = np.where(fresh[:, None], 0, code[rows]).astype(np.uint8)
+    log = MeasurementLog(
+        name=name,
+        time_s=time[rows],
+        measurement=reading,
+        row=np.arange(len(rows)),
+        rows_in_file=len(rows),
+        duplicate_times=int(np.sum(np.diff(time[rows]) == 0)),
+    )
+    truth = Truth(name, time[rows], position[rows], velocity[rows], acceleration[rows], code)
+    return Simulation(log, truth, plan.noise, readable(clean))
+
+
+def _rows(
+    time: FloatArray, spec: OutlierSpec, streams: dict[str, np.random.Generator]
+) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], np.ndarray[tuple[int], np.dtype[np.bool_]]]:
+    """Which samples become rows of the log, and which of those are a second, fresh reading."""
+    kept = np.flatnonzero(kept_rows(time, spec, streams["gaps"]))
+    index, fresh = with_duplicates(len(kept), spec.duplicates, streams["duplicates"])
+    return kept[index], fresh
