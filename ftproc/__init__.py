@@ -1,7 +1,8 @@
 """Clean trajectories, with honest uncertainties, from dirty theodolite and radar logs.
 
     import ftproc
-    trajectory = ftproc.filter_log(ftproc.read_log("flight.csv"))
+    trajectory = ftproc.filter_log("flight.csv")
+    frame = ftproc.to_pandas(trajectory)
 
 Everything is loaded when first used, so importing the package is cheap.
 """
@@ -13,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from ftproc.api import filter_log, read_log, score, simulate, train
+    from ftproc.api import filter_log, read_log, score, simulate, to_pandas, to_table, train
 
-__all__ = ["__version__", "filter_log", "read_log", "score", "simulate", "train"]
+__all__ = ["__version__", "filter_log", "read_log", "score", "simulate", "to_pandas", "to_table", "train"]
 
 
 def __getattr__(name: str) -> Any:

@@ -1,1 +1,113 @@
-def main() -> None: ...
+"""The `ftproc` command: its subcommands, loaded when used, and the one place where errors become sentences."""
+
+from __future__ import annotations
+
+import importlib
+import signal
+import sys
+import traceback
+from typing import Any
+
+import click
+
+from ftproc import __version__
+from ftproc.cli.command import CONTEXT, DEBUG, debug_option, write_examples
+
+COMMANDS = ("simulate", "train", "filter", "score")
+
+INTERRUPTED, TERMINATED = 130, 143  # what a shell reports for Ctrl-C and for `kill`
+
+_EXAMPLES = """
+ftproc simulate --scenario zuo2021-outliers -o flight.csv --truth flight.truth.csv
+ftproc filter flight.csv -o clean.parquet
+ftproc score clean.parquet --truth flight.truth.csv
+"""
+
+
+class Program(click.Group):
+    """The command group. Importing a subcommand is cheap; what it needs it loads when it runs."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command = importlib.import_module(f"ftproc.cli.{cmd_name}").command
+        assert isinstance(command, click.Command)
+        return command
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        write_examples(formatter, _EXAMPLES)
+
+    def main(self, args: Any = None, prog_name: str | None = None, *rest: Any, **extra: Any) -> Any:
+        """Run and exit: 0 done, 1 an input could not be processed, 2 wrong usage."""
+        given = sys.argv[1:] if args is None else list(args)
+        extra["standalone_mode"] = False
+        try:
+            code = super().main(given, prog_name or "ftproc", **extra)
+            sys.stdout.flush()  # a full disk behind a redirection shows here at the latest
+        except (Exception, KeyboardInterrupt) as error:
+            code = _report(error, DEBUG in given)  # the error may have come before it was parsed
+        sys.exit(code if isinstance(code, int) else 0)
+
+
+def _report(error: BaseException, debug: bool) -> int:
+    """Say on standard error what went wrong; the exit code."""
+    if debug:
+        traceback.print_exception(error)
+    if isinstance(error, click.Abort | KeyboardInterrupt):
+        click.echo("ftproc: interrupted", err=True)
+        return INTERRUPTED
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
+        click.echo(error.format_message(), err=True)
+        return error.exit_code
+    if isinstance(error, click.ClickException):
+        click.echo(_usage(error), err=True)
+        return error.exit_code
+    if isinstance(error, BrokenPipeError):  # whoever read our output has seen enough
+        _silence_stdout()
+        return 1
+    from ftproc.batch import failure
+
+    found = failure(error)
+    click.echo(f"ftproc: {found.message}", err=True)
+    return found.exit_code
+
+
+def _usage(error: click.ClickException) -> str:
+    context = getattr(error, "ctx", None)
+    path = context.command_path if context is not None else "ftproc"
+    message = error.format_message().strip()
+    return f"{path}: {message}{'' if message.endswith(('.', '?')) else '.'} See {path} -h."
+
+
+def _silence_stdout() -> None:
+    """Python flushes standard output once more at exit, and would complain again."""
+    import os
+
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _terminated(signum: int, frame: object) -> None:
+    sys.exit(TERMINATED)  # through all `finally`, so that nothing half-written stays behind
+
+
+@click.group("ftproc", cls=Program, context_settings=CONTEXT)
+@click.version_option(__version__, message="%(prog)s %(version)s")
+def cli() -> None:
+    """Clean trajectories, with honest uncertainties, from dirty theodolite and radar logs.
+
+    A log holds the times, slant range R, azimuth A and elevation E of one target as one station saw it. `filter`
+    finds the outliers, estimates position and velocity with the anti-outlier GA-BPNN-UKF (Zuo et al. 2021), and
+    says how far to trust them.
+    """
+
+
+cli.params.append(debug_option())
+
+
+def main() -> None:
+    """The console script."""
+    signal.signal(signal.SIGTERM, _terminated)
+    cli.main()

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core import indicators, screening, tuning
+from ftproc.core import coloured, indicators, screening, tuning
 from ftproc.core.forward import Model, Start
 from ftproc.core.motion import isotropic
 from ftproc.core.smoother import SmootherRun, smooth_log
@@ -58,6 +58,11 @@ def screen(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, Flo
     return weight, sigma
 
 
+def stuck_readings(measurement: FloatArray, sigma: FloatArray) -> NDArray[np.bool_]:
+    """(n, 3) readings that merely repeat the one before; see `screening.stuck`."""
+    return np.stack([screening.stuck(measurement[:, c], float(sigma[c])) for c in range(3)], 1)
+
+
 def edit(
     time_s: FloatArray, measurement: FloatArray, given_sigma: FloatArray, jerk_psd: float | None, gate: float
 ) -> Edited:
@@ -68,26 +73,31 @@ def edit(
     Raises ValueError when a component has no reading that agrees with its neighbours.
     """
     screened, sigma = screen(time_s, measurement)
-    weight = screened
+    possible = np.isfinite(measurement) & ~stuck_readings(measurement, sigma)
+    weight = screened = screened * possible
     known = np.isfinite(given_sigma)
     first_jerk = FIRST_JERK if jerk_psd is None else jerk_psd
     model = Model(np.where(known, given_sigma, sigma) ** 2, isotropic(first_jerk))
     rates = np.tile(np.array(indicators.START_RATES), (3, 1))
-    finite = np.isfinite(measurement)
-    settled = False
-    rounds = 0
+    rounds, settled, coloured_noise = 0, False, False
     while rounds < MAX_ROUNDS and not settled:
         starts = [begin(time_s, measurement, weight, model.noise_variance)]
-        if rounds < TUNING_ROUNDS:
+        if coloured_noise:
+            model = coloured.fit_coloured(time_s, measurement, weight, starts, model, known, jerk_psd is not None)
+            coloured_noise = False  # once is enough; the decisions go on with it
+        elif rounds < TUNING_ROUNDS:
             model = tuning.fit_level(time_s, measurement, weight, starts, model, known, jerk_psd is not None)
         smoothed = smooth_log(time_s, measurement, weight, model, starts)
-        good = indicators.classify(
-            smoothed.residual, smoothed.residual_variance, model.noise_variance, rates, gate
-        )
-        decided = _keep_most(((good > 0.5) & finite).astype(float), screened)
+        variance = smoothed.residual_variance - model.noise_variance + model.reading_variance
+        good = indicators.classify(smoothed.residual, variance, model.reading_variance, rates, gate)
+        decided = _keep_most(((good > 0.5) & possible).astype(float), screened)
         settled = bool((decided == weight).all()) and rounds + 1 >= TUNING_ROUNDS
         weight = decided
         rounds += 1
+        if rounds == TUNING_ROUNDS and not model.correlation.any():
+            correlation = coloured.moments(smoothed, weight, model.noise_variance)[1]
+            coloured_noise = coloured.is_correlated(correlation, weight)
+            settled = settled and not coloured_noise
     if jerk_psd is None:
         model = tuning.fit_profile(time_s, measurement, weight, starts, model)
     smoothed = smooth_log(time_s, measurement, weight, model, starts)

@@ -27,12 +27,20 @@ class Model(NamedTuple):
     """What the filter is told of noise and motion.
 
     noise_variance: (3,) m^2, rad^2, rad^2. jerk: (m, 6) tensor of the jerk density, m^2/s^5, each row holding for
-    `knot_s` seconds from the first sample on.
+    `knot_s` seconds from the first sample on. correlation: (3,) of the noise between neighbouring samples; where it is
+    not zero, noise_variance is the larger variance of white noise that has the same effect (see `coloured`).
     """
 
     noise_variance: FloatArray
     jerk: FloatArray
     knot_s: float = math.inf
+    correlation: FloatArray = np.zeros(3)
+
+    @property
+    def reading_variance(self) -> FloatArray:
+        """(3,) variance of the noise of a single reading."""
+        variance: FloatArray = self.noise_variance * (1 - self.correlation) / (1 + self.correlation)
+        return variance
 
 
 class FilterRun(NamedTuple):

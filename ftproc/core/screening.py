@@ -17,6 +17,9 @@ FloatArray = NDArray[np.float64]
 
 TRIALS = 48  # triples per window: one is clean with probability 0.99998 when 40 % of the samples are bad
 CUT = 4.5  # sigmas from the parabola
+SHORTEST_STUCK = 3  # equal readings in a row
+STUCK_ODDS = 1e-3  # expected number of chance runs in a log that would be called stuck
+MOST_STUCK = 0.2  # share of a component
 
 
 @njit(cache=True)
@@ -127,3 +130,32 @@ def screen_component(
         if looks[k] > 0:
             votes[k] /= looks[k]
     return votes, scales
+
+
+def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
+    """(n,) true where a reading repeats the one before it for so long that noise cannot explain it.
+
+    channel: (n,) one component, NaN where missing; sigma: its noise. Two neighbours of a reading rounded to steps of
+    D agree by chance with probability about D / (2 sqrt(pi) sigma), so a coarse instrument is allowed long runs and
+    a fine one hardly any. The first reading of a run is good. A component of which a fifth is repeats is one that is
+    sampled faster than it measures, not stuck.
+    """
+    found = np.zeros(len(channel), bool)
+    seen = np.flatnonzero(np.isfinite(channel))
+    if len(seen) < SHORTEST_STUCK:
+        return found
+    values = channel[seen]
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > 1e-12 * np.abs(values).max()]
+    step = float(steps.min()) if len(steps) else np.inf
+    chance = step / (2 * np.sqrt(np.pi) * sigma)
+    if chance >= 1:
+        return found
+    repeats_needed = max(np.log(STUCK_ODDS / len(seen)) / np.log(max(chance, 1e-300)), SHORTEST_STUCK - 1)
+    begins = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
+    for begin, end in zip(begins, np.r_[begins[1:], len(seen)], strict=True):
+        if end - begin - 1 >= repeats_needed:
+            found[seen[begin + 1 : end]] = True
+    if found.sum() > MOST_STUCK * len(seen):
+        found[:] = False
+    return found

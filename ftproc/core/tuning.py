@@ -88,7 +88,7 @@ def fit_profile(
         return -run.log_likelihood + 0.5 * WALK_PRECISION * float(walk @ walk), -score + pull
 
     def unpack(theta: FloatArray) -> Model:
-        return Model(level.noise_variance, np.exp(theta)[:, None] * ISOTROPIC, knot_s)
+        return level._replace(jerk=np.exp(theta)[:, None] * ISOTROPIC, knot_s=knot_s)
 
     low, high = math.log(JERK_BOUNDS[0]), math.log(JERK_BOUNDS[1])
     theta = np.full(knots, math.log(level.jerk[0, 0]))

@@ -1,0 +1,127 @@
+# Batch pipeline and development tasks; `make help` lists them. GNU make 4.3 or newer, POSIX sh.
+
+PYTHON ?= python3
+VENV ?= .venv
+LOGS ?= sample_data/*.csv sample_data/*.csv.gz sample_data/*.parquet
+OUT ?= out
+FLAGS ?=
+MODEL_FLAGS ?= --scenario family --flights 60 --seed 2021
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.SECONDEXPANSION:
+.SUFFIXES:
+# A bad log does not stop the others; the messages of parallel jobs do not mix.
+MAKEFLAGS += --keep-going --output-sync=target --no-builtin-rules
+
+bin := $(VENV)/bin
+ftproc := $(bin)/ftproc
+installed := $(VENV)/.installed
+developer := $(VENV)/.installed-dev
+warmed := $(VENV)/.warmed
+
+# --- the logs ---------------------------------------------------------------------------------------------------
+
+# Truths and trajectories are no logs, wherever they lie.
+found := $(sort $(wildcard $(LOGS)))
+logs := $(foreach log,$(found),$(if $(findstring .truth.,$(notdir $(log)))$(findstring .trajectory.,$(notdir $(log))),,$(log)))
+stem = $(patsubst %.csv,%,$(patsubst %.parquet,%,$(patsubst %.csv.gz,%,$(notdir $(1)))))
+output = $(OUT)/$(call stem,$(1)).trajectory.parquet
+truth = $(firstword $(wildcard $(foreach kind,parquet csv csv.gz,$(dir $(1))$(call stem,$(1)).truth.$(kind))))
+$(foreach log,$(logs),$(eval log-of-$(call stem,$(log)) += $(log)))
+
+outputs := $(foreach log,$(logs),$(call output,$(log)))
+scored := $(foreach log,$(logs),$(if $(call truth,$(log)),$(log)))
+program := $(shell find ftproc -name '*.py' -o -name '*.safetensors')
+
+ifneq ($(filter run,$(MAKECMDGOALS)),)
+$(foreach pattern,$(LOGS),$(if $(wildcard $(pattern))$(filter file default,$(origin LOGS)),,\
+  $(error LOGS: there is no file $(pattern))))
+$(foreach log,$(logs),$(if $(filter %.csv %.csv.gz %.parquet,$(log)),,\
+  $(error LOGS: $(log) is not a .csv, .csv.gz or .parquet file)))
+$(foreach log,$(logs),$(if $(word 2,$(log-of-$(call stem,$(log)))),\
+  $(error LOGS: $(log-of-$(call stem,$(log))) would all become $(call output,$(log)); rename them)))
+$(if $(logs),,$(error LOGS: there is no log among "$(LOGS)"))
+endif
+
+.PHONY: help run test samples model bench clean install FORCE
+
+help: ## this list
+	@sed -n 's/^\([a-z]*\):.*## /make \1	/p' Makefile | expand -t 16
+	@echo
+	@echo 'make run LOGS="flights/*.csv" OUT=clean FLAGS="--smooth" filters your own logs; -j2 runs two at a time.'
+	@echo 'Only logs that changed are run again. A truth beside a log (STEM.truth.csv or .parquet) is used for the score.'
+
+run: $(outputs) ## filter the LOGS to OUT with FLAGS, then print the score table
+ifneq ($(scored),)
+	@echo
+	@$(ftproc) score $(foreach log,$(scored),$(call output,$(log)) --truth $(call truth,$(log)))
+else
+	@echo 'No log has a truth beside it, so there is nothing to score.'
+endif
+
+# The log is the first prerequisite. A change of the program, its model or FLAGS makes all results old.
+$(OUT)/%.trajectory.parquet: $$(log-of-$$*) $(OUT)/.flags $(program) | $(warmed)
+	@$(ftproc) filter $< -o $@ $(FLAGS)
+
+export FLAGS
+$(OUT)/.flags: FORCE
+	@mkdir -p $(@D)
+	@printf '%s\n' "$$FLAGS" | cmp -s - $@ || printf '%s\n' "$$FLAGS" > $@
+
+# --- the installation -------------------------------------------------------------------------------------------
+
+install: $(warmed) ## make .venv and install ftproc in it
+
+$(bin)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo 'ftproc needs Python 3.11 or newer: make PYTHON=/path/to/python3 ...' >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
+	  { echo '$(PYTHON) cannot make virtual environments: install python3-venv (apt-get install python3-venv).' >&2; exit 1; }
+	@echo 'making $(VENV)'
+	@$(PYTHON) -m venv $(VENV)
+
+$(installed): pyproject.toml | $(bin)/python
+	@echo 'installing ftproc in $(VENV)'
+	@$(bin)/python -m pip install --quiet --disable-pip-version-check -e '.[geo]'
+	@touch $@
+
+$(developer): pyproject.toml $(installed)
+	@echo 'installing the developer tools in $(VENV)'
+	@$(bin)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,geo]'
+	@touch $@
+
+# Compiled kernels are kept; after this the first log does not wait for the compiler.
+$(warmed): $(installed) $(wildcard ftproc/core/*.py)
+	@$(bin)/python -m ftproc.warm
+	@touch $@
+
+# --- development ------------------------------------------------------------------------------------------------
+
+test: $(developer) $(warmed) ## lint, types and the whole test suite
+	$(bin)/ruff check .
+	$(bin)/ruff format --check .
+	$(bin)/mypy
+	$(bin)/python -m pytest -q
+
+samples: $(warmed) ## make sample_data/ anew (fixed seeds: the same bytes)
+	@mkdir -p sample_data
+	$(ftproc) simulate --scenario zuo2021-outliers --seed 2021 \
+	  -o sample_data/zuo2021-outliers.csv --truth sample_data/zuo2021-outliers.truth.csv
+	$(ftproc) simulate --scenario manoeuvre --seed 7 --duration 75 \
+	  --outliers isolated=0.03:6-300,offset=2:8-30:8-200,ramp=1:10-30:20-200,burst=1:8-20:10-100,nan=0.01,gap=1:2-4 \
+	  -o sample_data/theodolite.parquet --truth sample_data/theodolite.truth.parquet
+	$(ftproc) simulate --scenario radar --seed 11 \
+	  --units range=km,azimuth=deg,elevation=deg --azimuth-from north \
+	  -o sample_data/radar.csv --truth sample_data/radar.truth.csv
+
+model: $(warmed) ## train the packaged model anew (MODEL_FLAGS)
+	$(ftproc) train $(MODEL_FLAGS) -o ftproc/correction/default.safetensors
+
+bench: $(developer) $(warmed) ## measure accuracy and speed
+	$(bin)/python -m tests.bench
+
+clean: ## remove results and caches; the virtual environment stays
+	rm -rf out build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	find ftproc tests -name __pycache__ -type d -prune -exec rm -rf {} +
+	rm -f $(warmed)

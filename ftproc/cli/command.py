@@ -1,0 +1,47 @@
+"""What every command has in common: `-h`, `--debug`, and a help that ends with examples to copy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+
+
+DEBUG = "--debug"
+
+
+def debug_option() -> click.Option:
+    """`--debug`, before or after the command's name."""
+
+    def remember(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+        ctx.meta[DEBUG] = value or ctx.meta.get(DEBUG, False)
+
+    text = "Show where an error came from (Python traceback)."
+    return click.Option([DEBUG], is_flag=True, expose_value=False, callback=remember, help=text)
+
+
+class Command(click.Command):
+    """A command whose help ends with `examples`, one shell command per line.
+
+    more: text for the help that is only known at run time, such as a list of names; asked for when it is shown.
+    """
+
+    def __init__(self, *args: Any, examples: str, more: Callable[[], str] | None = None, **attributes: Any) -> None:
+        attributes["context_settings"] = {**CONTEXT, "show_default": True}
+        super().__init__(*args, **attributes)
+        self.examples, self.more = examples, more
+        self.params.append(debug_option())
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        if self.more is not None:
+            formatter.write("\n" + self.more().rstrip() + "\n")
+        write_examples(formatter, self.examples)
+
+
+def write_examples(formatter: click.HelpFormatter, examples: str) -> None:
+    """The last section of a help; its lines are not wrapped, so that they can be copied."""
+    lines = "".join(f"  {line.strip()}\n" for line in examples.strip().splitlines())
+    formatter.write(f"\nExamples:\n{lines}")

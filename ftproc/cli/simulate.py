@@ -1,0 +1,74 @@
+"""`ftproc simulate`: a flight, measured and spoiled, with its truth."""
+
+from __future__ import annotations
+
+import click
+
+from ftproc.cli import options
+from ftproc.cli.command import Command
+
+_EXAMPLES = """
+ftproc simulate --scenario zuo2021-outliers --seed 3 -o flight.csv --truth flight.truth.csv
+ftproc simulate --scenario manoeuvre --duration 30 --outliers isolated=0.05:8-100,range.offset=1:20:60m -o hard.parquet
+ftproc simulate --scenario radar --units range=km,azimuth=deg,elevation=deg --azimuth-from north -o radar.csv
+"""
+
+
+def _scenarios_and_grammar() -> str:
+    from ftproc.simulate import GRAMMAR, list_scenarios
+
+    scenarios = list_scenarios()
+    width = max(map(len, scenarios))
+    names = "".join(f"  {name.ljust(width)}  {text}\n" for name, text in scenarios.items())
+    return f"Scenarios:\n{names}\nOutliers (--outliers):\n{GRAMMAR}"
+
+
+@click.command(cls=Command, examples=_EXAMPLES, more=_scenarios_and_grammar)
+@options.scenario(True, "Which flight, sampling, noise and outliers; the names are below.")
+@options.seed("Another flight, noise and outliers for each")
+@click.option(
+    "--duration",
+    type=options.number,
+    metavar="S",
+    help="Length of the record in s, such as 60. [default: scenario's]",
+)
+@click.option(
+    "--dt",
+    type=options.number,
+    metavar="S",
+    help="Sample interval in s, such as 0.05 for 20 Hz. [default: scenario's]",
+)
+@options.noise(options.noise_sigmas, None, ". [default: scenario's]")
+@click.option("--outliers", metavar="SPEC", help="How the log is spoiled, or none; see below. [default: scenario's]")
+@options.units("Units to write, such as range=km,azimuth=deg; they show in the column names. [default: m, rad, s]")
+@options.azimuth_from(
+    "north: write the azimuth as a survey does, clockwise from north, from 0 to a full turn. The truth's x is then "
+    "north, y east and z up."
+)
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    metavar="LOG",
+    help="The log to write: .csv, .csv.gz, .parquet, or - for CSV on stdout.",
+)
+@click.option("--truth", metavar="TRUTH", help="Where to write what really happened: states and outlier flags.")
+def command(
+    scenario: str,
+    seed: int,
+    duration: float | None,
+    dt: float | None,
+    noise: tuple[float, float, float] | None,
+    outliers: str | None,
+    units: str | None,
+    azimuth_from: str,
+    output: str,
+    truth: str | None,
+) -> None:
+    """Make a log as dirty as a real one, with its truth."""
+    from ftproc.cli import simulated_files
+    from ftproc.simulate import simulate
+
+    simulated_files.check(output, truth)
+    flight = simulate(scenario, seed=seed, duration_s=duration, dt_s=dt, noise=noise, outliers=outliers)
+    simulated_files.write(flight, output, truth, units, azimuth_from)

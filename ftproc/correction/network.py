@@ -1,0 +1,118 @@
+"""The in-h-out back-propagation network: tanh hidden layer, linear output (Zuo et al. 2021, section 2.1).
+
+All weights travel as one vector [W1, b1, W2, b2], which is also the chromosome of the genetic search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ftproc.records import FloatArray
+
+BLOCK_WORK = 200_000  # multiplications in one matrix product
+
+
+class Shape(NamedTuple):
+    """Layer sizes of a network."""
+
+    inputs: int
+    hidden: int
+    outputs: int
+
+    @property
+    def size(self) -> int:
+        """Number of weights: 237 for the paper's 9-12-9."""
+        return self.hidden * (self.inputs + 1) + self.outputs * (self.hidden + 1)
+
+
+class Weights(NamedTuple):
+    """w1 (h, d), b1 (h,), w2 (o, h), b2 (o,); all dimensionless (inputs and targets are normalised)."""
+
+    w1: FloatArray
+    b1: FloatArray
+    w2: FloatArray
+    b2: FloatArray
+
+
+def unpack(vector: FloatArray, shape: Shape) -> Weights:
+    """Views into `vector` (size,) as layers."""
+    d, h, o = shape
+    first, second, third = h * d, h * d + h, h * d + h + o * h
+    return Weights(
+        vector[:first].reshape(h, d), vector[first:second], vector[second:third].reshape(o, h), vector[third:]
+    )
+
+
+def pack(weights: Weights) -> FloatArray:
+    """The layers as one vector (size,): the inverse of `unpack`."""
+    return np.concatenate([part.ravel() for part in weights])
+
+
+def scale(shape: Shape) -> FloatArray:
+    """(size,) 1/sqrt(fan-in) of each weight: what a gene in [-1, 1] is multiplied with.
+
+    Without it a net of 30 and more inputs starts with every tanh saturated, where the gradient is zero.
+    """
+    d, h, o = shape
+    into_hidden, into_output = 1.0 / np.sqrt(d), 1.0 / np.sqrt(h)
+    return np.concatenate([np.full(h * d + h, into_hidden), np.full(o * h + o, into_output)])
+
+
+def blocks(rows: int, work: int) -> Iterator[slice]:
+    """Rows in blocks whose matrix products, of `work` multiplications per row, a BLAS does in one thread (OpenBLAS:
+    below 262144).
+
+    Threads for so small a product cost more than they bring, much more on a busy machine; and with fixed blocks the
+    sums, to the last bit, do not depend on their number.
+    """
+    step = max(BLOCK_WORK // work, 32)
+    return (slice(first, first + step) for first in range(0, rows, step))
+
+
+def forward(weights: Weights, inputs: FloatArray) -> FloatArray:
+    """Network output (n, o) for normalised inputs (n, d)."""
+    output = np.empty((len(inputs), len(weights.b2)))
+    for rows in blocks(len(inputs), weights.w1.size):
+        output[rows] = np.tanh(inputs[rows] @ weights.w1.T + weights.b1) @ weights.w2.T + weights.b2
+    return output
+
+
+def cost(vector: FloatArray, shape: Shape, inputs: FloatArray, targets: FloatArray) -> float:
+    """E/n: squared error summed over outputs (seed eq. 13), mean over the n samples."""
+    residual = forward(unpack(vector, shape), inputs) - targets
+    return float(np.vdot(residual, residual)) / len(inputs)
+
+
+def cost_and_gradient(
+    vector: FloatArray, shape: Shape, inputs: FloatArray, targets: FloatArray, decay: float
+) -> tuple[float, FloatArray]:
+    """E/n + decay * sum(w1^2 + w2^2) and its gradient (size,) by back-propagation.
+
+    d2 = 2 (Y - T)/n, dW2 = d2' H, d1 = (d2 W2) * (1 - H^2), dW1 = d1' X. Biases do not decay: they carry the
+    repeatable part of the error, which is what is to be learned.
+    """
+    w = unpack(vector, shape)
+    n = len(inputs)
+    value = decay * float(np.vdot(w.w1, w.w1) + np.vdot(w.w2, w.w2))
+    gradient = np.zeros_like(vector)
+    slope = unpack(gradient, shape)
+    for rows in blocks(n, w.w1.size):
+        x = inputs[rows]
+        hidden = np.tanh(x @ w.w1.T + w.b1)
+        residual = hidden @ w.w2.T + w.b2 - targets[rows]
+        value += float(np.vdot(residual, residual)) / n
+        delta2 = residual * (2.0 / n)
+        delta1 = (delta2 @ w.w2) * (1.0 - hidden * hidden)
+        for total, part in zip(slope, (delta1.T @ x, delta1.sum(0), delta2.T @ hidden, delta2.sum(0)), strict=True):
+            total += part
+    slope.w1[...] += 2.0 * decay * w.w1
+    slope.w2[...] += 2.0 * decay * w.w2
+    return value, gradient
+
+
+def population_cost(population: FloatArray, shape: Shape, inputs: FloatArray, targets: FloatArray) -> FloatArray:
+    """E/n of each of p networks (p, size): (p,). One after the other, which is faster than one large product."""
+    return np.array([cost(vector, shape, inputs, targets) for vector in population])

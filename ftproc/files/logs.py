@@ -1,0 +1,170 @@
+"""Logs in: a file, standard input or a table -> a checked `MeasurementLog`. And out again, for `simulate`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError, UsageError
+from ..records import COMPONENTS, FloatArray, MeasurementLog
+from . import cells, schema, tables, values, writing
+from .atomic import Target
+from .units import QUANTITIES, UNITS, parse_units
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_FRAMES = {"x": "local", "north": "north-east-up"}
+
+#: Half of all readings beyond these (rad): no flight but a mistaken unit. Single wild readings are for editing.
+_PLAUSIBLE_MEDIAN = {"azimuth": 4 * math.pi, "elevation": math.pi / 2}
+
+
+def read(
+    source: tables.Source,
+    *,
+    units: str | Mapping[str, str] | None = None,
+    columns: str | Mapping[str, str] | None = None,
+    azimuth_from: str = "x",
+    keep_columns: bool = False,
+) -> MeasurementLog:
+    """Read and check one log; angles become rad, lengths m, times s, rows come in time order.
+
+    source: path of a .csv, .csv.gz or .parquet file, `-` for CSV on standard input, a pyarrow Table or a
+    pandas DataFrame. units: such as `{"range": "km"}` or `"range=km,azimuth=deg"`, for columns whose name
+    states no unit.
+    columns: such as `{"time": "T0"}` or `"time=T0,range=RNG"`; `none` for a quantity the file has not.
+    azimuth_from: `x` (A = atan2(y, x)) or `north`, which makes the frame `north-east-up`.
+    keep_columns: carry the file's other columns through as `extra`.
+
+    Rows are counted from 0, the header not among them, in messages as in `row`; empty lines do not count.
+    Rows without a time are listed and left out; readings of whatever size stay in (a negative range is for
+    the editing to judge). Timestamps become seconds since 00:00 UTC of the day of the earliest one.
+
+    Raises InputError for a file that cannot be read or is no log, UsageError for options that are not
+    understood.
+    """
+    if azimuth_from not in _FRAMES:
+        raise UsageError(f'--azimuth-from: "{azimuth_from}" is not understood; say x or north.')
+    unit_of, column_of = parse_units(units), schema.parse_columns(columns)
+    opened = tables.open_table(source)
+    found = schema.resolve(opened.source, opened.names, unit_of, column_of)
+    wanted = [column.position for column in found.values()]
+    others = [place for place in range(len(opened.names)) if keep_columns and place not in wanted]
+    _check_others(opened, others)
+    table = opened.load(wanted, others)
+    if table.num_rows == 0:
+        raise InputError(f"{opened.source}: there are column names but no rows.")
+    quantities = {
+        quantity: _quantity(table.column(index), column, opened)
+        for index, (quantity, column) in enumerate(found.items())
+    }
+    _check_units(opened.source, quantities, found)
+    extra = table.select(list(range(len(wanted), table.num_columns))) if others else None
+    return _in_time_order(opened.source, quantities, extra, _FRAMES[azimuth_from])
+
+
+def write(log: MeasurementLog, target: Target) -> None:
+    """Write `log` under canonical column names to a .csv, .csv.gz or .parquet file or `-` (CSV on stdout).
+
+    Every float64 reads back bit for bit; a missing reading is an empty cell (NaN in Parquet).
+    Raises OutputError.
+    """
+    import pyarrow as pa
+
+    names = [schema.CANONICAL[quantity] for quantity in QUANTITIES]
+    arrays = [log.time_s, *np.ascontiguousarray(log.measurement.T)]
+    table = pa.table(dict(zip(names, arrays, strict=True)))
+    writing.write_table(writing.with_extra(table, log.extra), target)
+
+
+def _check_others(opened: tables.OpenTable, others: list[int]) -> None:
+    names = [opened.names[position] for position in others]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(
+                f'{opened.source}: column "{name}" is there twice, so both cannot be kept; rename one, '
+                "or leave --keep-columns out."
+            )
+
+
+def _quantity(column: pa.ChunkedArray, found: schema.Column, opened: tables.OpenTable) -> FloatArray:
+    article = "an" if found.quantity in ("azimuth", "elevation") else "a"
+    expected = f"{article} {found.quantity} in {found.unit.name}"
+    if found.quantity == "time":
+        expected += " or an ISO-8601 timestamp"
+    origin = cells.Origin(opened.source, found.name, expected, opened.decimal_comma)
+    if found.quantity == "time":
+        return values.seconds(column, origin, found.unit.to_si)
+    return found.unit.to_si(values.numbers(column, origin))
+
+
+def _check_units(source: str, quantities: Mapping[str, FloatArray], found: Mapping[str, schema.Column]) -> None:
+    """Raise InputError when the angles cannot be in the unit assumed. A unit the user named is believed."""
+    for quantity, limit in _PLAUSIBLE_MEDIAN.items():
+        angles = np.abs(quantities.get(quantity, np.empty(0)))
+        angles = angles[~np.isnan(angles)]
+        if not angles.size or found[quantity].unit_stated_by_user or np.median(angles) <= limit:
+            continue
+        column = found[quantity]
+        assumed = column.unit
+        typical = float(np.median(angles)) * assumed.divide / assumed.multiply
+        other = _likely_unit(quantity, typical)
+        named = f"--columns {quantity}={column.name} " if column.unit_in_name else ""
+        raise InputError(
+            f'{source}: half of column "{column.name}" lies beyond {typical:.4g} {assumed.name}, which is no '
+            f"{quantity}: it looks like {other[1]}; use {named}--units {quantity}={other[0]}"
+            f"{_and_the_other_angle(quantity, found, other[0])}. "
+            f"If {assumed.name} is right, say {named}--units {quantity}={assumed.name}."
+        )
+
+
+def _likely_unit(quantity: str, typical: float) -> tuple[str, str]:
+    words = {"deg": "degrees", "grad": "gradians", "mil": "mils"}
+    limit = _PLAUSIBLE_MEDIAN[quantity] / (2 if quantity == "azimuth" else 1)  # one turn, straight up
+    for name, word in words.items():
+        unit = UNITS[quantity][name]
+        if typical * unit.multiply / unit.divide <= limit:
+            return name, word
+    return "UNIT", "another unit"
+
+
+def _and_the_other_angle(quantity: str, found: Mapping[str, schema.Column], unit: str) -> str:
+    """An elevation of a few degrees passes for radians, so a wrong azimuth is a reason to look at it too."""
+    other = found.get("elevation" if quantity == "azimuth" else "azimuth")
+    if other is None or other.unit_stated_by_user or other.unit != found[quantity].unit:
+        return ""
+    return f" (and {other.quantity}={unit} if that is so too)"
+
+
+def _in_time_order(
+    source: str, quantities: Mapping[str, FloatArray], extra: pa.Table | None, frame: str
+) -> MeasurementLog:
+    time = quantities["time"]
+    measurement = np.full((len(time), len(COMPONENTS)), np.nan)
+    for index, component in enumerate(COMPONENTS):
+        if component in quantities:
+            measurement[:, index] = quantities[component]
+    timed = np.flatnonzero(~np.isnan(time))
+    if not timed.size:
+        raise InputError(f"{source}: no row has a time; there is nothing to process.")
+    if np.isnan(measurement[timed]).all():
+        raise InputError(f"{source}: no row has a range, azimuth or elevation; there is nothing to process.")
+    late = int(np.count_nonzero(time[timed] < np.maximum.accumulate(time[timed])))
+    row = timed[np.argsort(time[timed], kind="stable")] if late else timed
+    everything = len(row) == len(time) and not late
+    return MeasurementLog(
+        name=source,
+        time_s=np.array(time[row]),
+        measurement=measurement if everything else measurement[row],
+        row=row.astype(np.int64),
+        frame=frame,
+        rows_in_file=len(time),
+        rows_without_time=tuple(np.flatnonzero(np.isnan(time)).tolist()),
+        rows_out_of_order=late,
+        duplicate_times=int(np.count_nonzero(np.diff(time[row]) == 0)),
+        extra=extra if extra is None or everything else extra.take(row),
+    )

@@ -1,0 +1,153 @@
+"""Any source the user may name -> its column names, and on demand its columns as Arrow arrays."""
+
+from __future__ import annotations
+
+import gzip
+import sys
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from ..errors import InputError
+from . import csvtext
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+
+Source: TypeAlias = "str | Path | pa.Table | pd.DataFrame"
+
+SUFFIXES = (".csv", ".csv.gz", ".parquet")
+_GZIP_MAGIC = b"\x1f\x8b"
+
+
+@dataclass(frozen=True)
+class OpenTable:
+    """A table of which so far only the header was looked at.
+
+    source: what the user called it, for messages. names: its columns in file order, possibly with repeats.
+    load: (numeric positions, other positions) -> table with these columns; see `CsvText.load`.
+    decimal_comma: numbers may have decimal commas. metadata: key-value pairs of a Parquet file.
+    """
+
+    source: str
+    names: list[str]
+    load: Callable[[Sequence[int], Sequence[int]], pa.Table]
+    decimal_comma: bool = False
+    metadata: Mapping[bytes, bytes] = field(default_factory=dict)
+
+
+def open_table(source: Source) -> OpenTable:
+    """Open a .csv, .csv.gz or .parquet file, `-` (CSV on standard input, even gzipped), or a table in memory.
+
+    Raises InputError with a plain sentence when there is no such file, it cannot be read, is damaged or
+    empty.
+    """
+    if not isinstance(source, str | Path):
+        return _in_memory(source)
+    if str(source) == "-":
+        return _csv("<stdin>", sys.stdin.buffer.read())
+    name, path = str(source), Path(source)
+    kind = kind_of(path)
+    if kind is None:
+        raise InputError(f"{name}: this kind of file is not understood; supported are {', '.join(SUFFIXES)}.")
+    if kind == ".parquet":
+        _read(path, limit=1)  # the plain sentences for a file that is not there
+        return _parquet(name, path)
+    return _csv(name, _read(path), must_be_gzip=kind == ".csv.gz")
+
+
+def kind_of(path: Path) -> str | None:
+    """The one of SUFFIXES that `path` ends in, whatever its case, or None."""
+    return next((suffix for suffix in SUFFIXES if path.name.lower().endswith(suffix)), None)
+
+
+def _read(path: Path, limit: int = -1) -> bytes:
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(limit)
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: there is no such file.") from error
+    except IsADirectoryError as error:
+        raise InputError(f"{path}: this is a directory; name a file in it.") from error
+    except PermissionError as error:
+        raise InputError(f"{path}: no permission to read it.") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error}).") from error
+    if not data:
+        raise InputError(f"{path}: the file is empty; expected a header line and rows.")
+    return data
+
+
+def _csv(name: str, data: bytes, must_be_gzip: bool = False) -> OpenTable:
+    if must_be_gzip or data.startswith(_GZIP_MAGIC):
+        data = _gunzip(name, data)
+    text = csvtext.split(name, data)
+    return OpenTable(name, text.names, text.load, decimal_comma=text.delimiter == ";")
+
+
+def _gunzip(name: str, data: bytes) -> bytes:
+    try:
+        return gzip.decompress(data)
+    except EOFError as error:
+        raise InputError(f"{name}: the gzip file is cut short; copy it again.") from error
+    except (gzip.BadGzipFile, zlib.error) as error:
+        raise InputError(f"{name}: not a gzip file, or a damaged one ({error}); copy it again.") from error
+
+
+def _parquet(name: str, path: Path) -> OpenTable:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    def damaged(error: Exception) -> InputError:
+        reason = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
+        return InputError(f"{name}: no Parquet file, or one cut short or damaged; copy it again ({reason}).")
+
+    def load(numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
+        chosen = [schema.names[position] for position in (*numeric, *others)]
+        try:
+            return pq.read_table(path, columns=chosen, partitioning=None).select(chosen)
+        except (pa.ArrowException, OSError) as error:
+            raise damaged(error) from error
+
+    try:
+        schema = pq.read_schema(path)
+    except (pa.ArrowException, OSError) as error:
+        raise damaged(error) from error
+    return OpenTable(name, list(schema.names), load, metadata=schema.metadata or {})
+
+
+def _in_memory(table: Any) -> OpenTable:
+    import pyarrow as pa
+
+    name = "<table>"
+    if isinstance(table, pa.Table):
+        return OpenTable(
+            name,
+            list(table.column_names),
+            lambda numeric, others: table.select([*numeric, *others]),
+            metadata=table.schema.metadata or {},
+        )
+    pandas = sys.modules.get("pandas")  # whoever has a DataFrame has imported it
+    if pandas is None or not isinstance(table, pandas.DataFrame):
+        raise InputError(f"{name}: expected a path, a pandas DataFrame or a pyarrow Table, not {type(table).__name__}.")
+    names = [str(column) for column in table.columns]
+
+    def load(numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
+        chosen = [*numeric, *others]
+        arrays = [_from_pandas(table.iloc[:, position]) for position in chosen]
+        return pa.Table.from_arrays(arrays, names=[names[position] for position in chosen])
+
+    return OpenTable(name, names, load)
+
+
+def _from_pandas(series: Any) -> pa.Array:
+    import pyarrow as pa
+
+    try:
+        return pa.array(series, from_pandas=True)
+    except (pa.ArrowException, TypeError):  # numbers and words in one column: as text, the words can be named
+        missing = series.isna()
+        return pa.array([None if gone else str(cell) for cell, gone in zip(series, missing, strict=True)])

@@ -1,0 +1,114 @@
+"""Units that a log may be in, and their factors to SI (seconds, metres, radians)."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+from ..errors import UsageError
+from ..records import COMPONENTS, FloatArray
+
+#: What a log is made of, in the order of its canonical columns.
+QUANTITIES = ("time", *COMPONENTS)
+
+#: Bare names, lower case, first the full name. Names are compared without regard to case.
+ALIASES: Mapping[str, tuple[str, ...]] = {
+    "time": ("time", "t"),
+    "range": ("range", "r"),
+    "azimuth": ("azimuth", "az", "a"),
+    "elevation": ("elevation", "el", "e"),
+}
+
+
+class Unit(NamedTuple):
+    """SI value = value * multiply / divide. Two factors, so that milliseconds divide by an exact 1000."""
+
+    name: str
+    multiply: float = 1.0
+    divide: float = 1.0
+
+    def to_si(self, values: FloatArray) -> FloatArray:
+        """`values` of any shape in this unit -> the same in s, m or rad (a new array if anything changes)."""
+        if self.multiply != 1.0:
+            values = values * self.multiply
+        return values / self.divide if self.divide != 1.0 else values
+
+
+_TIMES = (Unit("s"), Unit("ms", divide=1e3), Unit("us", divide=1e6))
+_LENGTHS = (Unit("m"), Unit("km", 1e3), Unit("ft", 0.3048), Unit("nmi", 1852.0))
+_ANGLES = (
+    Unit("rad"),
+    Unit("deg", math.pi, 180.0),
+    Unit("mrad", divide=1e3),
+    Unit("mil", math.pi, 3200.0),  # 6400 to the turn
+    Unit("grad", math.pi, 200.0),  # 400 to the turn
+)
+
+#: quantity -> unit name -> unit; the first of each is the SI unit.
+UNITS: Mapping[str, Mapping[str, Unit]] = {
+    quantity: {unit.name: unit for unit in units}
+    for quantity, units in zip(QUANTITIES, (_TIMES, _LENGTHS, _ANGLES, _ANGLES), strict=True)
+}
+
+
+def si_unit(quantity: str) -> Unit:
+    """The SI unit of `quantity` (one of QUANTITIES)."""
+    return next(iter(UNITS[quantity].values()))
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """`; did you mean "..."?` for the known word most like `word`, or an empty string when none is."""
+    by_lower = {name.lower(): name for name in known}
+    close = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
+    return f'; did you mean "{by_lower[close[0]]}"?' if close else ""
+
+
+def pairs(option: str, given: str | Mapping[str, str] | None) -> dict[str, str]:
+    """`"az=deg, range=km"` or a mapping -> {"azimuth": "deg", "range": "km"}, keys in full.
+
+    Raises UsageError, naming `option`, for a part without `=`, an unknown quantity or one named twice.
+    """
+    if given is None:
+        return {}
+    items = given.items() if isinstance(given, Mapping) else _split(option, given)
+    found: dict[str, str] = {}
+    for key, value in items:
+        quantity = _quantity(option, str(key))
+        if quantity in found:
+            raise UsageError(f"{option} names {quantity} twice; give it once.")
+        found[quantity] = str(value).strip()
+    return found
+
+
+def parse_units(given: str | Mapping[str, str] | None) -> dict[str, str]:
+    """The `--units` option -> {quantity: unit name}. Raises UsageError for a quantity or unit not known."""
+    found = pairs("--units", given)
+    for quantity, name in found.items():
+        if name not in UNITS[quantity]:
+            raise UsageError(
+                f'--units: "{name}" is not a unit of {quantity}; understood are '
+                f"{', '.join(UNITS[quantity])}{nearest(name, UNITS[quantity])}"
+            )
+    return found
+
+
+def _split(option: str, text: str) -> list[tuple[str, str]]:
+    parts = [part.partition("=") for part in text.split(",") if part.strip()]
+    for key, equals, value in parts:
+        if not (key.strip() and equals and value.strip()):
+            example = "range=km,azimuth=deg" if option == "--units" else "time=T0,range=RNG"
+            raise UsageError(f'{option}: "{key + equals + value}" is not QUANTITY=NAME, as in {example}.')
+    return [(key, value) for key, _, value in parts]
+
+
+def _quantity(option: str, key: str) -> str:
+    wanted = key.strip().lower()
+    for quantity, aliases in ALIASES.items():
+        if wanted in aliases:
+            return quantity
+    raise UsageError(
+        f'{option}: "{key.strip()}" is not a quantity of a log; expected {", ".join(QUANTITIES)}'
+        f"{nearest(wanted, QUANTITIES)}"
+    )

@@ -1,0 +1,112 @@
+"""Arrow tables out: .csv, .csv.gz, .parquet, or CSV on standard output. Same table, same bytes."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO, cast
+
+from ..errors import OutputError, UsageError
+from . import atomic, tables
+from .atomic import Target
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_ROWS_AT_ONCE = 65536  # of CSV text held in memory
+_GZIP_LEVEL = 4  # numbers hardly get smaller above it, only slower
+
+
+def kind_of(target: Target) -> str:
+    """`.csv`, `.csv.gz` or `.parquet`; `-` is CSV. Raises OutputError for any other name."""
+    kind = ".csv" if str(target) == "-" else tables.kind_of(Path(target))
+    if kind is None:
+        raise OutputError(
+            f"{target}: not a kind of file that can be written; end the name in {', '.join(tables.SUFFIXES)}."
+        )
+    return kind
+
+
+def write_table(table: pa.Table, target: Target) -> None:
+    """Write `table` whole or not at all; `-` goes to standard output. Raises OutputError.
+
+    A closed standard output raises BrokenPipeError, for the caller to judge.
+    """
+    kind = kind_of(target)
+    if str(target) == "-":
+        for piece in _csv_pieces(table):
+            sys.stdout.buffer.write(piece)
+        sys.stdout.buffer.flush()
+        return
+    with atomic.replacing(target) as stream:
+        write_stream(table, stream, kind)
+
+
+def write_stream(table: pa.Table, stream: BinaryIO, kind: str) -> None:
+    """Write `table` to an open stream in one of the three kinds of file."""
+    if kind == ".parquet":
+        import pyarrow.parquet as pq
+
+        # Readings hardly repeat, so a dictionary only costs time. Of the codecs every reader has, snappy was
+        # fastest.
+        pq.write_table(table, stream, compression="snappy", use_dictionary=_words(table))
+    elif kind == ".csv.gz":
+        # No name and no time of day inside, or the same log would never give the same bytes.
+        with gzip.GzipFile("", "wb", _GZIP_LEVEL, stream, mtime=0) as packed:
+            packed.writelines(_csv_pieces(table))
+    else:
+        stream.writelines(_csv_pieces(table))
+
+
+def with_extra(table: pa.Table, extra: pa.Table | None) -> pa.Table:
+    """`table` with the columns of `extra` behind its own.
+
+    Raises UsageError when a name is in both: two columns of one name cannot be told apart in a file.
+    """
+    if extra is None:
+        return table
+    for name, column in zip(extra.column_names, extra.columns, strict=True):
+        if name in table.column_names:
+            raise UsageError(
+                f'the log\'s column "{name}" has the name of an output column; rename it, or leave --keep-columns out.'
+            )
+        table = table.append_column(name, column)
+    return table
+
+
+def _words(table: pa.Table) -> list[str]:
+    import pyarrow as pa
+
+    return [field.name for field in table.schema if not pa.types.is_floating(field.type)]
+
+
+def _csv_pieces(table: pa.Table) -> Iterator[bytes]:
+    import pyarrow as pa
+    import pyarrow.csv
+
+    header = io.StringIO()
+    csv.writer(header, lineterminator="\n").writerow(table.column_names)
+    yield header.getvalue().encode()
+    options = pyarrow.csv.WriteOptions(include_header=False, batch_size=_ROWS_AT_ONCE)
+    for start in range(0, table.num_rows, _ROWS_AT_ONCE):
+        sink = pa.BufferOutputStream()
+        try:
+            pyarrow.csv.write_csv(_nan_to_null(table.slice(start, _ROWS_AT_ONCE)), sink, options)
+        except pa.ArrowException as error:  # a kept column of lists, say
+            raise OutputError(f"This cannot be written as CSV ({error}); give the output the name .parquet.") from error
+        yield cast(bytes, sink.getvalue().to_pybytes())
+
+
+def _nan_to_null(table: pa.Table) -> pa.Table:
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    for index, field in enumerate(table.schema):
+        if pa.types.is_floating(field.type):
+            column = table.column(index)
+            table = table.set_column(index, field.name, pc.if_else(pc.is_nan(column), None, column))
+    return table

@@ -1,0 +1,89 @@
+"""The worker processes of `batch`: one log at a time each, stopped at once by Ctrl-C, replaced when one dies."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any
+
+from ftproc.batch import Failure, Outcome, Recipe, Say, Task, filter_one
+
+_DIED = "its worker process died (out of memory, or killed). Use fewer --jobs, or split the log."
+
+
+class _Shared:
+    """What all workers see. stop: begin nothing more. said: somebody has told that kernels are being compiled."""
+
+    def __init__(self, context: Any, say: Say | None) -> None:
+        self.stop, self.said, self.say = context.Event(), context.Value("b", False), say
+
+
+def run(tasks: Sequence[Task], recipe: Recipe, jobs: int, say: Say | None) -> Iterator[Outcome]:
+    """Outcomes in the order of the tasks. When a worker dies, what was not done is done one by one."""
+    context = multiprocessing.get_context("spawn")  # fork would copy the threads' locks but not the threads
+    shared = _Shared(context, say)
+    pool = _pool(context, jobs, recipe, shared)
+    futures = [pool.submit(_work, task) for task in tasks]
+    try:
+        for task, future in zip(tasks, futures, strict=True):
+            try:
+                yield future.result()
+            except BrokenProcessPool:
+                yield _alone(context, task, recipe, shared)
+    except BaseException:
+        shared.stop.set()
+        raise
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _pool(context: Any, jobs: int, recipe: Recipe, shared: _Shared) -> ProcessPoolExecutor:
+    given = (recipe, shared.stop, shared.said, shared.say)
+    return ProcessPoolExecutor(jobs, mp_context=context, initializer=_prepare, initargs=given)
+
+
+def _alone(context: Any, task: Task, recipe: Recipe, shared: _Shared) -> Outcome:
+    """In a worker of its own, so that it is known which log it was that killed one."""
+    with _pool(context, 1, recipe, shared) as pool:
+        try:
+            return pool.submit(_work, task).result()
+        except BrokenProcessPool as error:
+            return Outcome(task, failure=Failure(f"{task.log}: {_DIED}", 1, str(error)))
+
+
+_recipe: Recipe
+_say: Say | None
+_stop: Any
+
+
+def _prepare(recipe: Recipe, stop: Any, said: Any, say: Say | None) -> None:
+    """In the worker, before its first task."""
+    global _recipe, _say, _stop
+    _recipe, _stop = recipe, stop
+    _say = None if say is None else _once(say, said)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an idle worker waits for the parent to end it
+
+
+def _once(say: Say, said: Any) -> Say:
+    """`say` for the first of all workers that has something to say."""
+
+    def tell(text: str) -> None:
+        with said.get_lock():
+            first, said.value = not said.value, True
+        if first:
+            say(text)
+
+    return tell
+
+
+def _work(task: Task) -> Outcome:
+    if _stop.is_set():
+        raise KeyboardInterrupt
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        return filter_one(task, _recipe, _say)
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,0 +1,181 @@
+"""`ftproc filter`: what it does with one log and with several."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+from ftproc.files import trajectories
+from ftproc.methods import registry
+from tests.cli.conftest import Result
+
+
+def read(name):
+    return trajectories.read(str(name))
+
+
+def test_just_works(run, flight):
+    result = run("filter", flight)
+    assert (result.code, result.err) == (0, "")
+    assert result.out.startswith(f"{flight}: 61 rows")
+    assert result.out.endswith("\n  -> flight.trajectory.csv\n")
+    assert len(read("flight.trajectory.csv")) == 61
+
+
+def test_summary_goes_where_the_trajectory_does_not(run, flight):
+    text = flight.read_text()
+    to_file = run("filter", "-", "-o", "a.csv", stdin=text)
+    assert to_file.out.startswith("<stdin>: 61 rows")
+    to_stdout = run("filter", "-", "-o", "-", stdin=text)
+    assert to_stdout.out == (flight.parent / "a.csv").read_text()
+    assert to_stdout.err.startswith("<stdin>: 61 rows")
+    assert run("filter", "-", stdin=text) == to_stdout  # in a pipe, out of a pipe
+    assert run("filter", "-", "--summary", "none", stdin=text) == Result(0, to_stdout.out, "")
+
+
+def test_json_summary(run, flight):
+    one = json.loads(run("filter", flight, "-o", "a.parquet", "--summary", "json").out)
+    assert (one["log"], one["output"], one["rows"]) == (str(flight), "a.parquet", 61)
+    shutil.copy(flight, "second.csv")
+    result = run("filter", flight, "none.csv", "second.csv", "-o", "d", "--summary", "json")
+    assert result.code == 1
+    several = json.loads(result.out)
+    assert [each["log"] for each in several] == [str(flight), "none.csv", "second.csv"]
+    assert several[1] == {"log": "none.csv", "error": "none.csv: there is no such file."}
+
+
+def test_every_option_reaches_the_filter(run, flight):
+    options = {
+        "--method": "ga-bpnn-ukf", "--model": "none", "--editing": "forward", "--noise": "3,0.0002,0.0003",
+        "--jerk": "2.5", "--gate": "5", "--max-patch": "7", "--weight-form": "gain", "--site": "48,11,600",
+    }  # fmt: skip
+    flat = [part for pair in options.items() for part in pair]
+    result = run("filter", flight, "--smooth", *flat, "-o", "a.parquet")
+    assert result.code == 0, result.err
+    metadata = json.loads(pq.read_schema("a.parquet").metadata[b"ftproc"])
+    settings = metadata["settings"]
+    assert metadata["method"] == "ga-bpnn-ukf"
+    assert metadata["model_sha256"] is None
+    assert settings["editing"] == "forward"
+    assert settings["smooth"] is True
+    assert settings["noise_range_m"] == pytest.approx(3.0)
+    assert settings["noise_azimuth_rad"] == pytest.approx(0.0002)
+    assert settings["noise_elevation_rad"] == pytest.approx(0.0003)
+    assert settings["jerk_psd_m2ps5"] == pytest.approx([2.5])
+    assert (settings["gate"], settings["max_patch_s"], settings["gain_form"]) == (5.0, 7.0, True)
+    assert settings["site"] == [48.0, 11.0, 600.0]
+
+
+def test_auto_is_the_default(run, flight):
+    assert run("filter", flight, "-o", "a.csv").code == 0
+    assert run("filter", flight, "-o", "b.csv", "--noise", "auto", "--jerk", "AUTO").code == 0
+    assert (flight.parent / "a.csv").read_bytes() == (flight.parent / "b.csv").read_bytes()
+
+
+def test_reading_options(run, flight):
+    table = pd.read_csv(flight)
+    table["note"] = "x"
+    table["RNG"] = table.pop("range_m") / 1000
+    table.to_csv("odd.csv", index=False)
+    assert run("filter", flight, "-o", "a.csv").code == 0
+    args = ("--columns", "range=RNG", "--units", "range=km", "--azimuth-from", "north", "--keep-columns")
+    assert run("filter", "odd.csv", *args, "-o", "b.csv").code == 0
+    plain, odd = read("a.csv"), read("b.csv")
+    np.testing.assert_allclose(odd.state, plain.state, rtol=1e-6, atol=1e-6)
+    assert odd.metadata["frame"] == "north-east-up"
+    assert odd.extra is not None
+    assert odd.extra.column_names == ["note"]
+
+
+@pytest.mark.parametrize(
+    ("args", "said", "axes"),
+    [([], "x is taken as east, y as north", (0, 1)), (["--azimuth-from", "north"], "x is north, y is east", (1, 0))],
+)
+def test_site(run, flight, args, said, axes):
+    result = run("filter", flight, "--site", "-33.9,18.4,100", *args, "-o", "a.parquet", "--summary", "none")
+    assert result == Result(0, "", f"ftproc: positions on the earth: {said}, z is up\n")
+    table = pq.read_table("a.parquet").to_pandas()
+    assert list(table.columns[-3:]) == ["lat_deg", "lon_deg", "height_m"]
+    east, north = (table[["x_m", "y_m"]].to_numpy()[:, axis] for axis in axes)
+    np.testing.assert_allclose(table["lat_deg"] + 33.9, north / 110_900, rtol=0.02)
+    np.testing.assert_allclose(table["lon_deg"] - 18.4, east / (111_320 * np.cos(np.deg2rad(33.9))), rtol=0.02)
+
+
+def test_list_methods(run):
+    result = run("filter", "--list-methods")
+    assert (result.code, result.err) == (0, "")
+    assert all(name in result.out for name in registry.METHODS)
+
+
+def test_all_methods(run, flight):
+    assert run("filter", flight, "--method", "all", "-o", "d").code == 0
+    found = {read(path).metadata["method"] for path in (flight.parent / "d").glob("*.csv")}
+    assert found == set(registry.METHODS)
+    assert (flight.parent / "d" / "flight.ekf.trajectory.csv").exists()
+
+
+def test_a_bad_log_does_not_stop_the_others(run, flight):
+    (flight.parent / "bad.csv").write_text("time_s,range_m,azimuth_rad,elevation_rad\n0,1,wrong,0\n")
+    result = run("filter", "none.csv", "bad.csv", flight, "-o", "d")
+    assert result.code == 1
+    assert [path.name for path in sorted((flight.parent / "d").iterdir())] == [
+        "flight.trajectory.csv",
+        "flight.trajectory.json",
+    ]
+    first, second = result.err.splitlines()
+    assert first == "ftproc: none.csv: there is no such file."
+    assert second.startswith('ftproc: bad.csv: row 0 (the first data row is 0), column "azimuth_rad"')
+
+
+def test_debug_shows_where_a_log_failed(run, here):
+    assert "Traceback" not in run("filter", "none.csv").err
+    result = run("filter", "none.csv", "--debug")
+    assert result.code == 1
+    assert "Traceback" in result.err
+    assert result.err.splitlines()[-1] == "ftproc: none.csv: there is no such file."
+
+
+@pytest.mark.parametrize(
+    ("args", "sentence"),
+    [
+        ([], "Name at least one log."),
+        (["flight.csv", "--method", "ekff"], "there is no method 'ekff'; did you mean 'ekf'?"),
+        (["flight.csv", "--noise", "1,2"], '"1,2" is not three numbers, R,A,E in m, rad, rad'),
+        (["flight.csv", "--noise", "0,1,1"], "a sigma of zero would mean"),
+        (["flight.csv", "--jerk", "-1"], '"-1" is not a number above zero.'),
+        (["flight.csv", "--gate", "inf"], '"inf" is not a number above zero.'),
+        (["flight.csv", "--max-patch", "long"], '"long" is not a number above zero.'),
+        (["flight.csv", "--site", "48,11"], '"48,11" is not three numbers, LAT,LON,HEIGHT'),
+        (["flight.csv", "--site", "98,11,0"], "a latitude lies in -90..90"),
+        (["flight.csv", "--units", "range=ly"], '--units: "ly" is not a unit of range'),
+        (["flight.csv", "--columns", "range"], '--columns: "range" is not QUANTITY=NAME'),
+        (["flight.csv", "--editing", "backward"], "Invalid value for '--editing'"),
+    ],
+)
+def test_wrong_usage(run, flight, args, sentence):
+    result = run("filter", *args)
+    assert (result.code, result.out) == (2, "")
+    assert sentence in result.err
+    assert len(result.err.splitlines()) == 1
+    assert len(list(flight.parent.iterdir())) == 2
+
+
+def test_a_model_that_is_none(run, flight):
+    result = run("filter", flight, "--model", "flight.csv")
+    assert (result.code, result.out) == (1, "")
+    assert result.err == "ftproc: flight.csv: not a correction model; `ftproc train` writes one\n"
+    assert run("filter", flight, "--model", "there").err.startswith("ftproc: there: there is no such file")
+
+
+def test_wrong_usage_that_only_the_log_shows(run, flight):
+    table = pd.read_csv(flight)
+    table["x_m"] = 0.0
+    table.to_csv("kept.csv", index=False)
+    result = run("filter", "kept.csv", "--keep-columns")
+    assert result.code == 2
+    assert 'the log\'s column "x_m" has the name of an output column' in result.err

@@ -1,0 +1,132 @@
+"""Where `ftproc filter` writes, and what it never writes over."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from ftproc.cli import outputs
+from ftproc.errors import OutputError, UsageError
+
+WRITTEN = ".trajectory"
+
+
+def where(*logs: str, output: str | None = None, methods: list[str] | None = None) -> list[str]:
+    return [task.output for task in outputs.plan(logs, output, methods)]
+
+
+@pytest.mark.parametrize(
+    ("log", "output", "expected"),
+    [
+        ("in/a.csv", None, "a.trajectory.csv"),
+        ("in/a.csv.gz", None, "a.trajectory.csv"),
+        ("in/a.b.parquet", None, "a.b.trajectory.parquet"),
+        ("in/A.CSV", None, "A.trajectory.csv"),
+        ("-", None, "-"),
+        ("-", "-", "-"),
+        ("-", "b.parquet", "b.parquet"),
+        ("in/a.csv", "b.csv.gz", "b.csv.gz"),
+        ("in/a.csv", "there", "there/a.trajectory.csv"),
+        ("in/a.csv", "there.csv", "there.csv/a.trajectory.csv"),
+        ("in/a.csv", "new", "new/a.trajectory.csv"),
+        ("in/a.csv", "new/deep", "new/deep/a.trajectory.csv"),
+        ("in/a.csv", "v1.2/", "v1.2/a.trajectory.csv"),
+        ("-", "new", "new/stdin.trajectory.csv"),
+    ],
+)
+def test_one_log(here, log, output, expected):
+    (here / "there").mkdir()
+    (here / "there.csv").mkdir()
+    assert where(log, output=output) == [expected]
+    assert Path(expected).parent.is_dir()
+
+
+def test_several_logs(here):
+    assert where("a.csv", "b/c.parquet", output="new") == ["new/a.trajectory.csv", "new/c.trajectory.parquet"]
+    assert where("a.csv", "b.csv") == ["a.trajectory.csv", "b.trajectory.csv"]
+    assert where("a.csv", output="d", methods=["ukf", "ekf"]) == ["d/a.ukf.trajectory.csv", "d/a.ekf.trajectory.csv"]
+
+
+@pytest.mark.parametrize(
+    ("logs", "output", "sentence"),
+    [
+        (["a.csv", "b.csv"], "c.csv", "-o c.csv: there are several trajectories to write; name a directory"),
+        (["a.csv", "b.csv"], "-", "-o -: there are several"),
+        (["a.csv", "-"], "d", "- stands for one log on standard input"),
+        (["a.csv"], "c.xlsx", "-o c.xlsx: end the name in .csv, .csv.gz, .parquet, or in / if"),
+        (["x/a.csv", "y/a.csv"], "d", "x/a.csv and y/a.csv would both be written to d/a.trajectory.csv"),
+        (["a.csv", "a.csv"], None, "a.csv and a.csv would both be written to a.trajectory.csv"),
+    ],
+)
+def test_wrong_usage(here, logs, output, sentence):
+    with pytest.raises(UsageError, match=r".*") as caught:
+        outputs.plan(logs, output)
+    assert sentence in str(caught.value)
+    assert list(here.iterdir()) == []
+
+
+def test_all_methods_need_a_directory(here):
+    for output in (None, "a.csv", "-"):
+        with pytest.raises(UsageError, match="name a directory"):
+            outputs.plan(["log.csv"], output, ["ukf", "ekf"])
+
+
+def test_a_place_that_cannot_be(here):
+    (here / "file").write_text("")
+    for output, sentence in {
+        "file": "file: this is a file, not a directory",
+        "file/deeper": "file/deeper: the directory cannot be made \\(not a directory\\)",
+        "none/a.csv": "none/a.csv: there is no directory none; create it first",
+    }.items():
+        with pytest.raises(OutputError, match=sentence):
+            outputs.plan(["log.csv"], output)
+
+
+@pytest.mark.parametrize("output", ["flight.csv", "./flight.csv", "symbolic.csv", "hard.csv"])
+def test_never_writes_over_an_input(run, flight, output):
+    Path("symbolic.csv").symlink_to("flight.csv")
+    Path("hard.csv").hardlink_to(flight)
+    before = flight.read_bytes()
+    result = run("filter", "flight.csv", "-o", output)
+    assert (result.code, result.out) == (1, "")
+    assert "this is the input flight.csv, which is never overwritten" in result.err
+    assert flight.read_bytes() == before
+
+
+def test_never_writes_over_another_log_or_the_model(run, flight):
+    shutil.copy(flight, "x.trajectory.csv")
+    shutil.copy(flight, "x.csv")
+    before = flight.read_bytes()
+    result = run("filter", "x.csv", "x.trajectory.csv", "-o", ".")
+    assert (result.code, result.out) == (1, "")
+    assert Path("x.trajectory.csv").read_bytes() == before
+    Path("model.parquet").write_bytes(b"precious")
+    assert "which is never overwritten" in run("filter", "x.csv", "--model", "model.parquet", "-o", "model.parquet").err
+    assert Path("model.parquet").read_bytes() == b"precious"
+
+
+def test_the_sidecar_spares_inputs_too(run, flight):
+    """`-o model.csv` would also write model.json."""
+    Path("model.json").write_bytes(b"precious")
+    assert "which is never overwritten" in run("filter", flight, "--model", "model.json", "-o", "model.csv").err
+    assert Path("model.json").read_bytes() == b"precious"
+
+
+def test_a_failed_log_leaves_an_earlier_result_as_it_was(run, flight):
+    assert run("filter", flight, "-o", "a.parquet").code == 0
+    before = Path("a.parquet").read_bytes()
+    flight.write_text("time_s,range_m\n0,wrong\n")
+    assert run("filter", flight, "-o", "a.parquet").code == 1
+    assert Path("a.parquet").read_bytes() == before
+    assert not list(Path().glob(".*"))
+
+
+def test_a_directory_without_permission(shell, flight):
+    (flight.parent / "closed").mkdir(mode=0o555)
+    result = shell("ftproc filter flight.csv -o closed/a.csv")
+    if result.code == 0:  # for root nothing is closed
+        assert (flight.parent / "closed/a.csv").exists()
+    else:
+        assert result.err.startswith("ftproc: closed/a.csv: no permission to write in closed")

@@ -1,0 +1,180 @@
+"""The program itself: help, versions, and every kind of error in a plain sentence."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import click
+import pytest
+
+from ftproc import __version__, batch
+from ftproc.cli.main import COMMANDS, cli
+from tests.cli.conftest import BIN
+
+
+def commands() -> list[click.Command]:
+    context = click.Context(cli)
+    return [cli, *(cli.get_command(context, name) for name in COMMANDS)]
+
+
+def test_version(run):
+    assert run("--version").out == f"ftproc {__version__}\n"
+
+
+@pytest.mark.parametrize("name", ["", *COMMANDS])
+@pytest.mark.parametrize("flag", ["-h", "--help"])
+def test_help_ends_with_examples(run, name, flag):
+    result = run(*[name] * bool(name), flag)
+    assert result.code == 0
+    assert result.err == ""
+    examples = result.out.partition("\nExamples:\n")[2].splitlines()
+    assert 2 <= len(examples) <= 3
+    assert all(line.startswith("  ftproc ") for line in examples)
+
+
+@pytest.mark.parametrize("command", commands(), ids=["ftproc", *COMMANDS])
+def test_every_command_and_option_has_help(command):
+    assert command.help
+    assert command.get_short_help_str(limit=55).endswith(".")
+    for parameter in command.params:
+        if isinstance(parameter, click.Option):
+            assert parameter.help, f"{command.name} {parameter.name}"
+            assert parameter.help.endswith((".", "]")), parameter.help
+
+
+@pytest.mark.parametrize("name", ["", *COMMANDS])
+def test_examples_run(shell, run, name):
+    text = run(*[name] * bool(name), "-h").out
+    for line in text.partition("\nExamples:\n")[2].splitlines():
+        result = shell(line)
+        assert result.code == 0, result.err
+
+
+@pytest.mark.parametrize("name", ["", *COMMANDS])
+def test_help_is_cheap(name):
+    """Nothing heavy is loaded to show a help (but simulate's, which lists its scenarios)."""
+    script = (
+        "import sys\nfrom ftproc.cli.main import cli\n"
+        f"try: cli.main({[*[name] * bool(name), '-h']!r})\nexcept SystemExit: pass\n"
+        "print([m for m in ('numpy', 'numba', 'pandas', 'pyarrow', 'scipy') if m in sys.modules], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.stderr.strip() == ("['numpy']" if name == "simulate" else "[]")
+
+
+def test_no_command_shows_the_help(run):
+    result = run()
+    assert (result.code, result.out) == (2, "")
+    assert "Commands:" in result.err
+
+
+@pytest.mark.parametrize(
+    ("args", "sentence"),
+    [
+        (["fliter"], "ftproc: No such command 'fliter'.*See ftproc -h."),
+        (["filter", "x.csv", "--smoth"], "ftproc filter: No such option.*--smooth.*See ftproc filter -h."),
+        (["filter", "x.csv", "--editing", "maybe"], "ftproc filter: Invalid value for '--editing'.*two-pass.*"),
+        (["filter", "--jobs", "0", "x.csv"], "ftproc filter: Invalid value for '--jobs'.*"),
+        (["simulate", "--scenario", "radar"], "ftproc simulate: Missing option '-o'.*"),
+    ],
+)
+def test_wrong_usage(run, here, args, sentence):
+    result = run(*args)
+    assert (result.code, result.out) == (2, "")
+    assert len(result.err.splitlines()) == 1
+    assert re.fullmatch(sentence, result.err.strip())
+
+
+def test_an_error_of_our_own_is_a_sentence_and_debug_shows_where(run, here):
+    plain = run("score", "none.csv")
+    assert plain.err == "ftproc: none.csv: there is no such file.\n"
+    for args in (["--debug", "train", "--show", "none.st"], ["train", "--show", "none.st", "--debug"]):
+        shown = run(*args)
+        assert shown.code == 1
+        assert "Traceback" in shown.err
+        assert shown.err.splitlines()[-1].startswith("ftproc: none.st: there is no such file")
+
+
+def test_an_unexpected_error_is_a_sentence_too(run, here, monkeypatch):
+    def broken(*args, **kwargs):
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr("ftproc.score.render", broken)
+    monkeypatch.setattr("ftproc.files.trajectories.read", lambda name: None)
+    monkeypatch.setattr("ftproc.score.score", lambda trajectory, truth: None)
+    result = run("score", "x.csv")
+    assert result.code == 1
+    assert result.err == (
+        "ftproc: internal error (ZeroDivisionError: division by zero); run again with --debug and report it.\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("error", "sentence"),
+    [
+        (MemoryError(), "log.csv: there is not enough memory for it. Use fewer --jobs, or split the log."),
+        (OSError(28, "No space left on device"), "log.csv: no space left on device."),
+        (PermissionError(13, "Permission denied", "/there"), "/there: permission denied."),
+        (
+            RuntimeError("cannot cache function 'f': no locator available for file 'x'"),
+            "the compiled kernels cannot be kept anywhere. Set NUMBA_CACHE_DIR to a directory that can be written to.",
+        ),
+    ],
+)
+def test_errors_of_the_system(error, sentence):
+    assert batch.failure(error, "log.csv").message == sentence
+
+
+def test_interrupted(run, here, monkeypatch):
+    def interrupt(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("ftproc.files.trajectories.read", interrupt)
+    result = run("score", "x.csv")
+    assert result.code == 130
+    assert result.err.strip() == "ftproc: interrupted"
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_stopped_from_outside_leaves_nothing_half_written(tmp_path, number, code):
+    """Two minutes of work, stopped after two seconds: only whole files are there."""
+    command = [BIN / "ftproc", "train", "--scenario", "manoeuvre", "--flights", "500", "-o", "model.safetensors"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        time.sleep(2.0)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == code
+    assert out == ""
+    assert "Traceback" not in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_reader_that_leaves_early_is_no_error_to_tell(shell):
+    result = shell("ftproc simulate --scenario zuo2021 --duration 50000 -o - | head -n 1")
+    assert result.out == "time_s,range_m,azimuth_rad,elevation_rad\n"
+    assert result.err == ""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a disk that is always full")
+def test_a_full_disk_behind_stdout(shell):
+    result = shell("ftproc simulate --scenario zuo2021 -o - > /dev/full")
+    assert (result.code, result.err) == (1, "ftproc: standard output: no space left on device.\n")
+
+
+def test_pipes(shell):
+    result = shell(
+        "ftproc simulate --scenario zuo2021-outliers -o - | ftproc filter - -o - --summary none | ftproc score - --format json"
+    )
+    assert result.code == 0, result.err
+    assert result.err == ""
+    assert '"samples": 61' in result.out
+
+
+def test_environment_is_the_one_tested():
+    assert os.access(BIN / "ftproc", os.X_OK)

@@ -1,0 +1,79 @@
+"""`ftproc score`."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import pytest
+
+from tests.cli.conftest import Result
+
+
+@pytest.fixture
+def clean(run, flight):
+    """`clean.parquet`, the filtered flight."""
+    assert run("filter", flight, "-o", "clean.parquet", "--summary", "none").code == 0
+    return flight.with_name("clean.parquet")
+
+
+def test_table_with_and_without_truth(run, clean):
+    alone, compared = run("score", clean), run("score", clean, "--truth", "flight.truth.csv")
+    assert alone.code == compared.code == 0
+    assert "average gradient R (m)" in alone.out
+    assert "position RMSE" not in alone.out
+    assert "position RMSE (m)" in compared.out
+    assert "range outliers, precision" in compared.out
+
+
+def test_json_has_the_promised_keys(run, clean):
+    found = json.loads(run("score", clean, "--truth", "flight.truth.csv", "--format", "json").out)
+    assert found["average_gradient"].keys() == {"range_m", "azimuth_rad", "elevation_rad"}
+    for key in ("rmse_seed_m", "rmse_3d_m", "rmse_x_m", "rmse_v_mps", "max_error_m"):
+        assert found[key] >= 0
+    assert found["outliers"]["range"].keys() >= {"precision", "recall", "f1"}
+
+
+def test_several_with_one_truth_or_one_each(run, clean):
+    rows = {}
+    for name, truths in {"one": ["flight.truth.csv"], "each": ["flight.truth.csv"] * 2}.items():
+        options = [part for truth in truths for part in ("--truth", truth)]
+        result = run("score", clean, "flight.truth.csv", *options, "--format", "csv")
+        rows[name] = list(csv.DictReader(io.StringIO(result.out)))
+    assert rows["one"] == rows["each"]
+    assert [row["samples"] for row in rows["one"]] == ["61", "61"]
+    assert float(rows["one"][1]["rmse_3d_m"]) == 0.0  # the truth against itself
+
+
+def test_standard_input(run, clean):
+    assert run("filter", "flight.csv", "-o", "clean.csv").code == 0
+    text = clean.with_name("clean.csv").read_text()
+    assert json.loads(run("score", "-", "--format", "json", stdin=text).out)["samples"] == 61
+
+
+def test_a_bad_one_does_not_stop_the_others(run, clean):
+    clean.with_name("bad.csv").write_text("time_s,x_m\n0,1\n")
+    result = run("score", "none.csv", "bad.csv", clean, "--format", "json")
+    assert result.code == 1
+    assert json.loads(result.out)["samples"] == 61
+    assert result.err.splitlines()[0] == "ftproc: none.csv: there is no such file."
+    assert 'bad.csv: there is no column "y_m"' in result.err
+
+
+def test_bad_truth(run, clean):
+    assert run("score", clean, "--truth", "none.csv") == Result(1, "", "ftproc: none.csv: there is no such file.\n")
+
+
+@pytest.mark.parametrize(
+    ("args", "sentence"),
+    [
+        ([], "ftproc score: Missing argument 'TRAJECTORY...'. See ftproc score -h."),
+        (["a", "b", "c", "--truth", "t", "--truth", "u"], "--truth is given 2 times for 3 trajectories; give it once"),
+        (["-", "--truth", "-"], "Standard input (-) can be read only once."),
+    ],
+)
+def test_wrong_usage(run, here, args, sentence):
+    result = run("score", *args)
+    assert (result.code, result.out) == (2, "")
+    assert sentence in result.err

@@ -1,0 +1,141 @@
+"""From a run to inputs and targets and back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ftproc.core.geometry import line_of_sight_axes
+from ftproc.correction import los
+from ftproc.correction.features import FEATURES, SETTLING, WINDOW, Features, Place, named
+from ftproc.errors import UsageError
+
+from . import fake
+
+coordinate = st.floats(-2e5, 2e5)
+
+
+@given(st.tuples(coordinate, coordinate, coordinate), st.integers(0, 1000))
+def test_line_of_sight_mapping_there_and_back(position: tuple[float, float, float], seed: int) -> None:
+    axes = line_of_sight_axes(np.array([position]))
+    vector = np.random.default_rng(seed).normal(size=(1, 6))
+    along = los.to_los(axes, vector)
+    assert los.from_los(axes, along) == pytest.approx(vector, abs=1e-12)
+    assert np.linalg.norm(along[:, :3]) == pytest.approx(np.linalg.norm(vector[:, :3]))
+
+
+@pytest.mark.parametrize(
+    ("position", "axis", "towards"),
+    [
+        ((1000.0, 0.0, 0.0), 0, (1, 0, 0)),
+        ((1000.0, 0.0, 0.0), 1, (0, 1, 0)),  # azimuth grows from x to y
+        ((1000.0, 0.0, 0.0), 2, (0, 0, 1)),
+        ((0.0, -500.0, 0.0), 1, (1, 0, 0)),
+        ((0.0, 0.0, 900.0), 0, (0, 0, 1)),  # straight overhead
+        ((0.0, 0.0, 900.0), 2, (-1, 0, 0)),
+    ],
+)
+def test_what_lies_along_an_axis(position: tuple[float, ...], axis: int, towards: tuple[int, ...]) -> None:
+    axes = line_of_sight_axes(np.array([position]))
+    vector = np.array([[*towards, *(-2 * t for t in towards)]], float)
+    expected = np.zeros((1, 6))
+    expected[0, axis], expected[0, axis + 3] = 1.0, -2.0
+    assert los.to_los(axes, vector) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("features", FEATURES.values(), ids=FEATURES)
+def test_adding_the_wanted_output_gives_the_truth(features: Features) -> None:
+    flight = fake.flights(0, 1, bias=(1, -2, 3, 0, 0.5, 1))[0]
+    place = Place.of(flight.run, 0, 600)
+    wanted = features.targets(place, flight.error)
+    assert wanted.shape == (600, features.output_size)
+    corrected = flight.run.state[:, :6] + features.to_cartesian(place, wanted[:, :6])
+    assert corrected[:, :3] == pytest.approx(flight.truth_position, abs=1e-9)
+    assert corrected[:, 3:] == pytest.approx(flight.truth_velocity, abs=1e-9)
+    assert features.from_cartesian(place, features.to_cartesian(place, wanted[:, :6])) == pytest.approx(wanted[:, :6])
+    assert features.unit(place).shape == (600, 6)
+
+
+def test_the_papers_input_is_update_minus_prediction_and_its_target_truth_minus_estimate() -> None:
+    flight = fake.flights(1, 1)[0]
+    features = named("correction")
+    x, _ = features.inputs(flight.run, 0, 600)
+    assert np.array_equal(x[100], flight.run.state[100] - flight.run.predicted[100])
+    wanted = features.targets(Place.of(flight.run, 0, 600), flight.error)
+    assert wanted[100, :3] == pytest.approx(flight.truth_position[100] - flight.run.state[100, :3])
+    assert (features.input_size, features.output_size) == (9, 9)
+
+
+def test_the_window_holds_the_last_innovations_over_sigma_and_zero_where_not_used() -> None:
+    filtered = fake.without(fake.run(np.random.default_rng(2)), slice(95, 97), [1])
+    x, valid = named("window").inputs(filtered)
+    assert valid[100]
+    for lag in range(WINDOW):
+        for component in range(3):
+            used = not (component == 1 and 100 - lag in (95, 96))
+            ratio = filtered.innovation[100 - lag, component] / filtered.innovation_sigma[100 - lag, component]
+            assert x[100, 3 * lag + component] == (ratio if used else 0.0)
+
+
+def test_the_windows_geometry() -> None:
+    filtered = fake.run(np.random.default_rng(3))
+    x, _ = named("instrument").inputs(filtered)
+    px, py, pz = filtered.state[50, :3]
+    flat, distance = np.hypot(px, py), np.sqrt(px**2 + py**2 + pz**2)
+    angle = np.array([fake.SIGMA[0], fake.SIGMA[1] / flat, fake.SIGMA[2] / distance])
+    ratio = angle / filtered.innovation_sigma[50]
+    expected = [np.log(distance), np.arcsin(pz / distance), *np.log(angle), *np.log(ratio), px / flat, py / flat]
+    assert x[50, 24:] == pytest.approx(np.array(expected))
+    assert named("window").input_size == 32
+    assert named("instrument").input_size == 34
+
+
+@pytest.mark.parametrize("features", FEATURES.values(), ids=FEATURES)
+def test_any_cut_of_a_run_gives_the_same_inputs(features: Features) -> None:
+    filtered = fake.without(fake.run(np.random.default_rng(4), n=100), slice(40, 60))
+    whole, mask = features.inputs(filtered)
+    for cut in (1, 3, WINDOW - 1, WINDOW, 50, 99):
+        parts = [features.inputs(filtered, 0, cut), features.inputs(filtered, cut, 100)]
+        assert np.array_equal(np.concatenate([p[0] for p in parts]), whole)
+        assert np.array_equal(np.concatenate([p[1] for p in parts]), mask)
+
+
+@pytest.mark.parametrize("features", FEATURES.values(), ids=FEATURES)
+def test_valid_is_false_while_coasting_settling_or_without_numbers(features: Features) -> None:
+    filtered = fake.without(fake.run(np.random.default_rng(5)), slice(100, 110))
+    filtered = fake.without(filtered, slice(200, 210), [0, 1])  # elevation still there: not coasting
+    since = filtered.since_start.copy()
+    since[300:] = np.arange(300)
+    state, sigma = filtered.state.copy(), filtered.los_sigma.copy()
+    state[400, 7] = np.nan
+    sigma[410, 2] = 0.0
+    sigma[420, 5] = np.inf
+    x, valid = features.inputs(replace(filtered, since_start=since, state=state, los_sigma=sigma))
+    expected = np.ones(600, bool)
+    expected[:SETTLING] = expected[300 : 300 + SETTLING] = expected[100:110] = False
+    expected[[400, 410, 420]] = False
+    assert np.array_equal(valid, expected)
+    assert not x[~valid].any()
+    assert np.isfinite(x).all()
+
+
+def test_angles_only_logs_have_inputs_too() -> None:
+    x, valid = named("window").inputs(fake.without(fake.run(np.random.default_rng(6)), slice(None), [0]))
+    assert valid[SETTLING:].all()
+    assert not x[:, 0 : 3 * WINDOW : 3].any()
+
+
+@pytest.mark.parametrize("features", FEATURES.values(), ids=FEATURES)
+def test_an_empty_run(features: Features) -> None:
+    x, valid = features.inputs(fake.run(np.random.default_rng(0), n=0))
+    assert x.shape == (0, features.input_size)
+    assert valid.shape == (0,)
+
+
+def test_an_unknown_feature_set_is_named_with_the_known_ones() -> None:
+    with pytest.raises(UsageError, match=r"no feature set 'wndow'.*correction, window"):
+        named("wndow")

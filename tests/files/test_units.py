@@ -1,0 +1,80 @@
+"""Units and their factors; the text of --units."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ftproc.errors import UsageError
+from ftproc.files.units import QUANTITIES, UNITS, nearest, parse_units, si_unit
+
+ONE_IN_SI = [
+    ("time", "s", 1.0),
+    ("time", "ms", 1e-3),
+    ("time", "us", 1e-6),
+    ("range", "m", 1.0),
+    ("range", "km", 1000.0),
+    ("range", "ft", 0.3048),
+    ("range", "nmi", 1852.0),
+    ("azimuth", "rad", 1.0),
+    ("azimuth", "deg", math.pi / 180),
+    ("azimuth", "mrad", 1e-3),
+    ("azimuth", "mil", 2 * math.pi / 6400),
+    ("azimuth", "grad", 2 * math.pi / 400),
+    ("elevation", "deg", math.pi / 180),
+    ("elevation", "mil", 2 * math.pi / 6400),
+    ("elevation", "grad", 2 * math.pi / 400),
+]
+
+
+@pytest.mark.parametrize(("quantity", "unit", "one"), ONE_IN_SI)
+def test_one_of_each_unit_in_si(quantity: str, unit: str, one: float) -> None:
+    assert UNITS[quantity][unit].to_si(np.array([1.0]))[0] == pytest.approx(one, rel=1e-15)
+
+
+def test_the_first_unit_of_each_quantity_is_the_si_unit() -> None:
+    assert [si_unit(quantity).name for quantity in QUANTITIES] == ["s", "m", "rad", "rad"]
+
+
+@given(st.integers(0, 2**50))
+def test_whole_milliseconds_and_microseconds_are_rounded_once(ticks: int) -> None:
+    assert UNITS["time"]["ms"].to_si(np.array([float(ticks)]))[0] == ticks / 1000
+    assert UNITS["time"]["us"].to_si(np.array([float(ticks)]))[0] == ticks / 1000000
+
+
+def test_a_turn_is_a_turn_in_every_unit() -> None:
+    for unit, turn in (("deg", 360.0), ("mil", 6400.0), ("grad", 400.0), ("mrad", 2000 * math.pi)):
+        assert UNITS["azimuth"][unit].to_si(np.array([turn]))[0] == pytest.approx(2 * math.pi, rel=1e-15)
+
+
+def test_units_from_text_and_from_a_mapping_are_the_same() -> None:
+    expected = {"range": "km", "azimuth": "deg", "time": "ms"}
+    assert parse_units("range=km,azimuth=deg,time=ms") == expected
+    assert parse_units(" R = km , Az=deg, t=ms,") == expected
+    assert parse_units({"range": "km", "az": "deg", "time": "ms"}) == expected
+    assert parse_units(None) == parse_units("") == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("range=yd", '--units: "yd" is not a unit of range; understood are m, km, ft, nmi'),
+        ("azimuth=dge", 'understood are rad, deg, mrad, mil, grad; did you mean "deg"?'),
+        ("azimuth=m", '--units: "m" is not a unit of azimuth'),
+        ("azimut=deg", '"azimut" is not a quantity of a log; expected time, range, azimuth, elevation; did you mean'),
+        ("km", '--units: "km" is not QUANTITY=NAME, as in range=km,azimuth=deg'),
+        ("range=", '--units: "range=" is not QUANTITY=NAME'),
+        ("range=km,R=m", "--units names range twice"),
+    ],
+)
+def test_what_is_wrong_with_units_is_said(text: str, sentence: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        parse_units(text)
+    assert sentence in str(caught.value)
+
+
+def test_nearest_ignores_case_and_keeps_quiet_when_nothing_is_near() -> None:
+    assert nearest("rng", ["TIME", "RNG_1"]) == '; did you mean "RNG_1"?'
+    assert nearest("range", ["x", "y"]) == ""
