@@ -102,5 +102,4 @@ def _fit_thinned(
     thinned = np.zeros_like(weight)
     thinned[::every] = weight[::every]
     guess = model._replace(noise_variance=variance, correlation=np.zeros(3))
-    fitted = tuning.fit_level(time_s, measurement, thinned, starts, guess, known, fix_jerk)
-    return fitted
+    return tuning.fit_level(time_s, measurement, thinned, starts, guess, known, fix_jerk)

@@ -6,10 +6,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from ftproc.core import ekf, motion, ukf
+from ftproc.core.jit import kernel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -75,11 +75,11 @@ def empty_run(time_s: FloatArray) -> FilterRun:
     )  # fmt: skip
 
 
-@njit(cache=True)
+@kernel
 def line_of_sight_sigma(x: FloatArray, p: FloatArray, out: FloatArray) -> None:
     """1-sigma of position and velocity along the radial, cross and up axes at x."""
-    ground = max(math.hypot(x[0], x[1]), 1e-9)
-    slant = max(math.hypot(ground, x[2]), 1e-9)
+    ground = max(math.sqrt(x[0] * x[0] + x[1] * x[1]), 1e-9)
+    slant = math.sqrt(ground * ground + x[2] * x[2])
     ca, sa, ce, se = x[0] / ground, x[1] / ground, ground / slant, x[2] / slant
     for axis in range(3):
         u, v, w = -sa, ca, 0.0
@@ -94,7 +94,7 @@ def line_of_sight_sigma(x: FloatArray, p: FloatArray, out: FloatArray) -> None:
             out[o + axis] = math.sqrt(max(variance, 0.0))
 
 
-@njit(cache=True)
+@kernel
 def run_span(
     first: int,
     last: int,
@@ -145,7 +145,7 @@ def run_span(
     return likelihood
 
 
-@njit(cache=True)
+@kernel
 def extrapolate_back(
     sample: int,
     time: FloatArray,

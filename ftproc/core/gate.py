@@ -19,11 +19,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from ftproc.core import motion, screening, ukf
 from ftproc.core.forward import FilterRun, Model, Start, empty_run, lead_in, line_of_sight_sigma
+from ftproc.core.jit import kernel
 from ftproc.core.start import first_state
 
 FloatArray = NDArray[np.float64]
@@ -48,7 +48,7 @@ class GateSettings(NamedTuple):
     gain_form: bool = False
 
 
-@njit(cache=True)
+@kernel
 def igg3(u: float, full: float, zero: float) -> float:
     """Three-segment weight (IGG-III): 1 for u <= full, 0 for u >= zero, smoothly falling between."""
     if u <= full:
@@ -64,7 +64,7 @@ def rejection_weight(gate: float) -> float:
     return float(igg3(gate, FULL_AT * gate, ZERO_AT * gate))
 
 
-@njit(cache=True)
+@kernel
 def _decide(
     k: int,
     time: FloatArray,
@@ -109,7 +109,7 @@ def _decide(
     return inside
 
 
-@njit(cache=True)
+@kernel
 def _update_by_gain(
     x: FloatArray, p: FloatArray, pxz: FloatArray, c: FloatArray, e: FloatArray, noise: FloatArray, used: FloatArray,
     s: FloatArray, s_inv: FloatArray, gain: FloatArray,
@@ -141,7 +141,7 @@ def _update_by_gain(
     return nis, -0.5 * (log_det + nis)
 
 
-@njit(cache=True)
+@kernel
 def run_gated(
     first: int,
     start: int,
@@ -209,7 +209,7 @@ def run_gated(
     return n, likelihood
 
 
-@njit(cache=True)
+@kernel
 def _overdue(track: FloatArray, now: float, longest_patch_s: float) -> bool:
     late = False
     for i in range(3):
@@ -217,7 +217,7 @@ def _overdue(track: FloatArray, now: float, longest_patch_s: float) -> bool:
     return late
 
 
-@njit(cache=True)
+@kernel
 def _wild(x: FloatArray) -> bool:
     speed2 = x[3] * x[3] + x[4] * x[4] + x[5] * x[5]
     acceleration2 = x[6] * x[6] + x[7] * x[7] + x[8] * x[8]

@@ -12,8 +12,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ftproc.core.jit import kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -26,7 +27,7 @@ PRIOR_SAMPLES = 20.0  # weight of START_RATES' spirit against the counts of the 
 ROUNDS = 3
 
 
-@njit(cache=True)
+@kernel
 def _chain(
     residual: FloatArray, variance: FloatArray, noise: float, odds: float, rates: FloatArray, good: FloatArray,
     counts: FloatArray,
@@ -83,7 +84,7 @@ def _chain(
         later = k
 
 
-@njit(cache=True)
+@kernel
 def _learn(counts: FloatArray, rates: FloatArray) -> None:
     """Baum-Welch update of the rates, drawn towards rare outliers where the log says little."""
     outside = counts[0].sum() + counts[1].sum()
@@ -95,7 +96,7 @@ def _learn(counts: FloatArray, rates: FloatArray) -> None:
     rates[2] = min(max(stays, MIN_STAY), MAX_RATES[2])
 
 
-@njit(cache=True)
+@kernel
 def classify(
     residual: FloatArray, variance: FloatArray, noise_variance: FloatArray, rates: FloatArray, gate: float
 ) -> FloatArray:
@@ -116,7 +117,7 @@ def classify(
     return good
 
 
-@njit(cache=True)
+@kernel
 def label_runs(weight: FloatArray, measurement: FloatArray, longest_isolated: int) -> FloatArray:
     """(n, 3) labels as float: 0 good, 1 isolated, 2 patch (a longer run of rejections), 3 missing.
 

@@ -14,8 +14,9 @@ from Q(T1) and Q(T2), so gaps and jittered times need no special case. In three 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ftproc.core.jit import kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -27,14 +28,14 @@ def isotropic(jerk_psd: float) -> FloatArray:
     return np.array([[jerk_psd, 0.0, 0.0, jerk_psd, 0.0, jerk_psd]])
 
 
-@njit(cache=True)
+@kernel
 def knot_index(time: float, first_time: float, knot_s: float, knots: int) -> int:
     """The piece of the jerk profile that holds at `time`."""
     index = int((time - first_time) / knot_s)
     return min(max(index, 0), knots - 1)
 
 
-@njit(cache=True)
+@kernel
 def noise_coefficients(interval: float, out: FloatArray) -> None:
     """The 3 x 3 matrix of Q per unit of jerk density; a negative interval goes back in time."""
     t = interval
@@ -47,37 +48,42 @@ def noise_coefficients(interval: float, out: FloatArray) -> None:
     out[2, 2] = sign * t
 
 
-@njit(cache=True)
+@kernel
 def predict(x: FloatArray, p: FloatArray, interval: float, jerk: FloatArray, c: FloatArray) -> None:
-    """x <- Phi x and P <- Phi P Phi' + Q in place; c is scratch (3, 3)."""
+    """x <- Phi x and P <- Phi P Phi' + Q in place; c is scratch (3, 3).
+
+    Phi mixes position, velocity and acceleration of the same axis only, so each pair of axes (i, j) is a 3 x 3
+    problem by itself, written out here.
+    """
     t = interval
     h = 0.5 * t * t
     for i in range(3):
         x[i] += t * x[i + 3] + h * x[i + 6]
         x[i + 3] += t * x[i + 6]
-    # Rows first (Phi P), then columns (P Phi'): each in place from the top, which reads only untouched rows.
-    for j in range(9):
-        for i in range(3):
-            p[i, j] += t * p[i + 3, j] + h * p[i + 6, j]
-            p[i + 3, j] += t * p[i + 6, j]
-    for i in range(9):
-        for j in range(3):
-            p[i, j] += t * p[i, j + 3] + h * p[i, j + 6]
-            p[i, j + 3] += t * p[i, j + 6]
     noise_coefficients(t, c)
-    for a in range(3):
-        for b in range(3):
-            k = 0
-            for i in range(3):
-                for j in range(i, 3):
-                    q = c[a, b] * jerk[k]
-                    p[3 * a + i, 3 * b + j] += q
-                    if i != j:
-                        p[3 * a + j, 3 * b + i] += q
-                    k += 1
+    for i in range(3):
+        for j in range(3):
+            low, high = min(i, j), max(i, j)
+            q = jerk[low * (5 - low) // 2 + high]
+            pa = p[i, 6 + j] + t * p[3 + i, 6 + j] + h * p[6 + i, 6 + j]
+            pv = p[i, 3 + j] + t * p[3 + i, 3 + j] + h * p[6 + i, 3 + j]
+            pp = p[i, j] + t * p[3 + i, j] + h * p[6 + i, j]
+            va = p[3 + i, 6 + j] + t * p[6 + i, 6 + j]
+            vv = p[3 + i, 3 + j] + t * p[6 + i, 3 + j]
+            vp = p[3 + i, j] + t * p[6 + i, j]
+            aa, av, ap = p[6 + i, 6 + j], p[6 + i, 3 + j], p[6 + i, j]
+            p[i, j] = pp + t * pv + h * pa + q * c[0, 0]
+            p[i, 3 + j] = pv + t * pa + q * c[0, 1]
+            p[i, 6 + j] = pa + q * c[0, 2]
+            p[3 + i, j] = vp + t * vv + h * va + q * c[1, 0]
+            p[3 + i, 3 + j] = vv + t * va + q * c[1, 1]
+            p[3 + i, 6 + j] = va + q * c[1, 2]
+            p[6 + i, j] = ap + t * av + h * aa + q * c[2, 0]
+            p[6 + i, 3 + j] = av + t * aa + q * c[2, 1]
+            p[6 + i, 6 + j] = aa + q * c[2, 2]
 
 
-@njit(cache=True)
+@kernel
 def adjoint(r: FloatArray, n: FloatArray, interval: float) -> None:
     """r <- Phi' r and N <- Phi' N Phi in place: the backward counterpart of `predict`."""
     t = interval
@@ -85,11 +91,17 @@ def adjoint(r: FloatArray, n: FloatArray, interval: float) -> None:
     for i in range(3):
         r[i + 6] += t * r[i + 3] + h * r[i]
         r[i + 3] += t * r[i]
-    for j in range(9):
-        for i in range(3):
-            n[i + 6, j] += t * n[i + 3, j] + h * n[i, j]
-            n[i + 3, j] += t * n[i, j]
-    for i in range(9):
+    for i in range(3):
         for j in range(3):
-            n[i, j + 6] += t * n[i, j + 3] + h * n[i, j]
-            n[i, j + 3] += t * n[i, j]
+            pp, vp, ap = n[i, j], n[3 + i, j], n[6 + i, j]
+            pv = n[i, 3 + j] + t * pp
+            vv = n[3 + i, 3 + j] + t * vp
+            av = n[6 + i, 3 + j] + t * ap
+            pa = n[i, 6 + j] + t * n[i, 3 + j] + h * pp
+            va = n[3 + i, 6 + j] + t * n[3 + i, 3 + j] + h * vp
+            aa = n[6 + i, 6 + j] + t * n[6 + i, 3 + j] + h * ap
+            n[i, 3 + j], n[i, 6 + j] = pv, pa
+            n[3 + i, j], n[3 + i, 3 + j], n[3 + i, 6 + j] = vp + t * pp, vv + t * pv, va + t * pa
+            n[6 + i, j] = ap + t * vp + h * pp
+            n[6 + i, 3 + j] = av + t * vv + h * pv
+            n[6 + i, 6 + j] = aa + t * va + h * pa

@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ftproc.core.jit import kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -22,14 +23,14 @@ STUCK_ODDS = 1e-3  # expected number of chance runs in a log that would be calle
 MOST_STUCK = 0.2  # share of a component
 
 
-@njit(cache=True)
+@kernel
 def _wrapped(value: float, angular: bool) -> float:
-    if angular:
+    if angular and not -math.pi <= value < math.pi:
         return value - 2 * math.pi * math.floor((value + math.pi) / (2 * math.pi))
     return value
 
 
-@njit(cache=True)
+@kernel
 def _median(values: FloatArray, n: int) -> float:
     """Upper median of the first n values, which are reordered (Hoare's selection)."""
     k = n // 2
@@ -55,7 +56,7 @@ def _median(values: FloatArray, n: int) -> float:
     return float(values[k])
 
 
-@njit(cache=True)
+@kernel
 def _best_parabola(
     t: FloatArray, z: FloatArray, n: int, angular: bool, seed: int, residual: FloatArray, work: FloatArray
 ) -> float:
@@ -81,11 +82,15 @@ def _best_parabola(
         tb, tc = t[b] - t[a], t[c] - t[a]
         q = (zc / tc - zb / tb) / (tc - tb)
         v = zb / tb - q * tb
-        for i in range(n):
+        # A median below the best needs more than half of the residuals below it: most trials end early.
+        failing, i = 0, 0
+        while i < n and failing < n - n // 2:
             d = t[i] - t[a]
             work[i] = abs(_wrapped(z[i] - z[a] - d * (v + q * d), angular))
-        median = _median(work, n)
-        if median < best:
+            failing += work[i] >= best
+            i += 1
+        if failing < n - n // 2:
+            median = _median(work, n)
             best = median
             slope, bend, origin, base = v, q, t[a], z[a]
     for i in range(n):
@@ -94,7 +99,7 @@ def _best_parabola(
     return 1.4826 * (1 + 5 / (n - 3)) * best
 
 
-@njit(cache=True)
+@kernel
 def screen_component(
     time: FloatArray, z: FloatArray, window: int, angular: bool
 ) -> tuple[FloatArray, FloatArray]:

@@ -14,17 +14,22 @@ from numpy.typing import NDArray
 
 from ftproc.core import ascent
 from ftproc.core.forward import Model, Start
-from ftproc.core.smoother import smooth_log
+from ftproc.core.smoother import score_log
 
 FloatArray = NDArray[np.float64]
 
 NOISE_FLOOR = np.array([1e-3, 1e-7, 1e-7])  # 1-sigma m, rad, rad: below it, rounding of the readings decides
 NOISE_CEILING = np.array([1e5, 1.0, 1.0])
 JERK_BOUNDS = (1e-7, 1e7)  # m^2/s^5
-KNOT_SAMPLES = 20  # samples to a knot of the jerk profile ...
-KNOT_SECONDS = 8.0  # ... but never less than so many seconds,
-MAX_KNOTS = 400  # nor more than so many knots
-WALK_PRECISION = 0.5  # of the random walk of ln(jerk) from knot to knot
+KNOT_SAMPLES = 10  # samples to a knot of the jerk profile ...
+KNOT_SECONDS = 4.0  # ... but never less than so many seconds,
+MAX_KNOTS = 4000  # nor more than so many knots
+WALK_PRECISION = 1.0  # of the random walk of ln(jerk) from knot to knot
+ALLOWANCE = 1.4  # on the likeliest jerk: too little makes sigmas dishonest, a little too much costs hardly anything
+VERTICAL_PRECISION = 0.5  # with which ln(vertical / horizontal jerk) is drawn to zero
+HORIZONTAL = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+VERTICAL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+ISOTROPIC = (HORIZONTAL + VERTICAL)[None, :]
 
 
 def fit_level(
@@ -51,17 +56,13 @@ def fit_level(
 
     def cost(theta: FloatArray) -> tuple[float, FloatArray]:
         model = Model(np.exp(theta[:3]), math.exp(theta[3]) * ISOTROPIC)
-        run = smooth_log(time_s, measurement, weight, model, starts)
-        score = float(run.jerk_score[0] @ ISOTROPIC[0]) * math.exp(theta[3])
-        return -run.log_likelihood, -np.r_[run.noise_score, score]
+        found = score_log(time_s, measurement, weight, model, starts)
+        return -found.log_likelihood, -np.r_[found.noise, float(found.jerk[0] @ model.jerk[0])]
 
     theta = np.clip(np.r_[log_noise, log_jerk], lower, upper)
     curvature = np.r_[used / 2, used.mean() / 20]
     theta = ascent.minimise(cost, theta, curvature, lower, upper, steps, tolerance=0.05)
     return Model(np.exp(theta[:3]), math.exp(theta[3]) * ISOTROPIC)
-
-
-ISOTROPIC = np.array([[1.0, 0.0, 0.0, 1.0, 0.0, 1.0]])
 
 
 def fit_profile(
@@ -72,27 +73,32 @@ def fit_profile(
     level: Model,
     steps: int = 15,
 ) -> Model:
-    """A jerk density that follows the flight, knot by knot, from the single level on; the noise stays."""
-    span = time_s[-1] - time_s[0]
-    interval = np.median(np.diff(time_s)) if len(time_s) > 1 else 1.0
-    knot_s = max(KNOT_SECONDS, KNOT_SAMPLES * float(interval), float(span) / MAX_KNOTS)
-    knots = max(math.ceil(span / knot_s), 1)
-    if knots == 1:
-        return level
+    """A jerk density that follows the flight, knot by knot, from the single level on; the noise stays.
 
-    def cost(theta: FloatArray) -> tuple[float, FloatArray]:
-        run = smooth_log(time_s, measurement, weight, unpack(theta), starts)
-        score = (run.jerk_score @ ISOTROPIC[0]) * np.exp(theta)
-        walk = np.diff(theta)
-        pull = WALK_PRECISION * (np.r_[0.0, walk] - np.r_[walk, 0.0])
-        return -run.log_likelihood + 0.5 * WALK_PRECISION * float(walk @ walk), -score + pull
+    One ratio of vertical to horizontal jerk holds for the whole flight: aircraft turn harder than they pitch, and
+    range and angles see the two differently.
+    """
+    span = float(time_s[-1] - time_s[0])
+    interval = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+    knot_s = max(KNOT_SECONDS, KNOT_SAMPLES * interval, span / MAX_KNOTS)
+    knots = max(math.ceil(span / knot_s), 1)
 
     def unpack(theta: FloatArray) -> Model:
-        return level._replace(jerk=np.exp(theta)[:, None] * ISOTROPIC, knot_s=knot_s)
+        shape = HORIZONTAL + np.exp(theta[knots]) * VERTICAL
+        return level._replace(jerk=np.exp(theta[:knots, None]) * shape, knot_s=knot_s)
 
-    low, high = math.log(JERK_BOUNDS[0]), math.log(JERK_BOUNDS[1])
-    theta = np.full(knots, math.log(level.jerk[0, 0]))
-    theta = ascent.minimise(
-        cost, theta, np.full(knots, 2.0), np.full(knots, low), np.full(knots, high), steps, tolerance=0.05 * knots**0.5
-    )
-    return unpack(theta)
+    def cost(theta: FloatArray) -> tuple[float, FloatArray]:
+        model = unpack(theta)
+        found = score_log(time_s, measurement, weight, model, starts)
+        by_axis = found.jerk * model.jerk
+        walk, ratio = np.diff(theta[:knots]), theta[knots]
+        pull = np.r_[WALK_PRECISION * (np.r_[0.0, walk] - np.r_[walk, 0.0]), VERTICAL_PRECISION * ratio]
+        penalty = WALK_PRECISION * float(walk @ walk) + VERTICAL_PRECISION * ratio**2
+        score = np.r_[by_axis.sum(1), by_axis[:, 5].sum()]
+        return -found.log_likelihood + 0.5 * penalty, pull - score
+
+    theta = np.r_[np.full(knots, math.log(level.jerk[0, 0])), 0.0]
+    low, high = np.full(knots + 1, math.log(JERK_BOUNDS[0])), np.full(knots + 1, math.log(JERK_BOUNDS[1]))
+    curvature = np.r_[np.full(knots, 2.0), 0.7 * knots]
+    best = unpack(ascent.minimise(cost, theta, curvature, low, high, steps, tolerance=0.05 * knots**0.5))
+    return best._replace(jerk=ALLOWANCE * best.jerk)

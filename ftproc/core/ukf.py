@@ -17,8 +17,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ftproc.core.jit import kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -28,7 +29,7 @@ MIN_RANGE_M = 1.0  # below this the direction of the target has no meaning
 TWO_PI = 2 * math.pi
 
 
-@njit(cache=True)
+@kernel
 def wrap_angle(angle: float) -> float:
     """Angle in rad brought into [-pi, pi); cheap for the usual case of no wrap at all."""
     if -math.pi <= angle < math.pi:
@@ -36,7 +37,7 @@ def wrap_angle(angle: float) -> float:
     return angle - TWO_PI * math.floor((angle + math.pi) / TWO_PI)
 
 
-@njit(cache=True)
+@kernel
 def measure(x: float, y: float, z: float) -> tuple[float, float, float]:
     """h(x): slant range m, azimuth rad, elevation rad."""
     ground2 = x * x + y * y
@@ -44,7 +45,18 @@ def measure(x: float, y: float, z: float) -> tuple[float, float, float]:
     return max(slant, MIN_RANGE_M), math.atan2(y, x), math.atan2(z, math.sqrt(ground2))
 
 
-@njit(cache=True)
+@kernel
+def turn(cross: float, dot: float) -> float:
+    """atan2(cross, dot) in rad: the angle between two directions, by its series where it is small (to rounding)."""
+    if not abs(cross) < 0.05 * dot:
+        return math.atan2(cross, dot)
+    t = cross / dot
+    q = t * t
+    tail = 1 / 7 - q * (1 / 9 - q * (1 / 11 - q * (1 / 13)))
+    return t * (1 - q * (1 / 3 - q * (1 / 5 - q * tail)))
+
+
+@kernel
 def position_factor(p: FloatArray, factor: FloatArray) -> None:
     """Lower Cholesky factor of the position block; a pivot lost to rounding is floored, never taken the root of."""
     floor = 1e-12 * (p[0, 0] + p[1, 1] + p[2, 2]) + 1e-300
@@ -59,7 +71,7 @@ def position_factor(p: FloatArray, factor: FloatArray) -> None:
                 factor[i, j] = s / factor[j, j]
 
 
-@njit(cache=True)
+@kernel
 def linearise(
     x: FloatArray, p: FloatArray, factor: FloatArray, b: FloatArray, z_hat: FloatArray, h: FloatArray, c: FloatArray
 ) -> None:
@@ -69,11 +81,13 @@ def linearise(
     the points together; at alpha = 1 the formulas are those of the module's head.
     """
     position_factor(p, factor)
-    z0, z1, z2 = measure(x[0], x[1], x[2])
+    px, py, pz = x[0], x[1], x[2]
+    ground = math.sqrt(px * px + py * py)
+    slant = max(math.sqrt(px * px + py * py + pz * pz), MIN_RANGE_M)
     widest = math.sqrt(p[0, 0] + p[1, 1] + p[2, 2])
     spread = SPREAD
-    if spread * widest > MAX_SPREAD_IN_RANGES * z0:
-        spread = MAX_SPREAD_IN_RANGES * z0 / widest
+    if spread * widest > MAX_SPREAD_IN_RANGES * slant:
+        spread = MAX_SPREAD_IN_RANGES * slant / widest
     alpha2 = spread * spread / (SPREAD * SPREAD)
     weight = 0.5 / (spread * spread)
     m0 = m1 = m2 = 0.0
@@ -82,14 +96,17 @@ def linearise(
         dx = spread * factor[0, j]
         dy = spread * factor[1, j]
         dz = spread * factor[2, j]
-        u0, u1, u2 = measure(x[0] + dx, x[1] + dy, x[2] + dz)
-        v0, v1, v2 = measure(x[0] - dx, x[1] - dy, x[2] - dz)
-        u0 -= z0
-        v0 -= z0
-        u1 = wrap_angle(u1 - z1)
-        v1 = wrap_angle(v1 - z1)
-        u2 -= z2
-        v2 -= z2
+        # Deviations from the centre point, directly as angles between directions: already wrapped.
+        ux, uy, uz = px + dx, py + dy, pz + dz
+        vx, vy, vz = px - dx, py - dy, pz - dz
+        ug2, vg2 = ux * ux + uy * uy, vx * vx + vy * vy
+        ug, vg = math.sqrt(ug2), math.sqrt(vg2)
+        u0 = max(math.sqrt(ug2 + uz * uz), MIN_RANGE_M) - slant
+        v0 = max(math.sqrt(vg2 + vz * vz), MIN_RANGE_M) - slant
+        u1 = turn(px * uy - py * ux, px * ux + py * uy)
+        v1 = turn(px * vy - py * vx, px * vx + py * vy)
+        u2 = turn(ground * uz - pz * ug, ground * ug + pz * uz)
+        v2 = turn(ground * vz - pz * vg, ground * vg + pz * vz)
         m0 += u0 + v0
         m1 += u1 + v1
         m2 += u2 + v2
@@ -105,7 +122,7 @@ def linearise(
     m0 *= weight
     m1 *= weight
     m2 *= weight
-    z_hat[0], z_hat[1], z_hat[2] = z0 + m0, z1 + m1, z2 + m2
+    z_hat[0], z_hat[1], z_hat[2] = slant + m0, math.atan2(py, px) + m1, math.atan2(pz, ground) + m2
     c[0, 0] = weight * c00 - alpha2 * m0 * m0
     c[1, 1] = weight * c11 - alpha2 * m1 * m1
     c[2, 2] = weight * c22 - alpha2 * m2 * m2
@@ -118,7 +135,7 @@ def linearise(
         h[i, 0] = (b[0, i] - factor[1, 0] * h[i, 1] - factor[2, 0] * h[i, 2]) / factor[0, 0]
 
 
-@njit(cache=True)
+@kernel
 def innovate(z: FloatArray, z_hat: FloatArray, e: FloatArray) -> None:
     """e = z - z^ with the azimuth wrapped; NaN where z is missing."""
     e[0] = z[0] - z_hat[0]
@@ -128,7 +145,7 @@ def innovate(z: FloatArray, z_hat: FloatArray, e: FloatArray) -> None:
         e[1] = wrap_angle(e[1])
 
 
-@njit(cache=True)
+@kernel
 def invert_used(s: FloatArray, used: FloatArray, out: FloatArray) -> float:
     """Inverse of the rows and columns of S whose weight is positive, zero elsewhere; returns ln det of them.
 
@@ -155,7 +172,7 @@ def invert_used(s: FloatArray, used: FloatArray, out: FloatArray) -> float:
     return 2 * math.log(a * d * f)
 
 
-@njit(cache=True)
+@kernel
 def cross_covariance(p: FloatArray, h: FloatArray, pxz: FloatArray) -> None:
     """P_xz = P H' for an H that sees the position only; (9, 3)."""
     for i in range(9):
@@ -163,7 +180,7 @@ def cross_covariance(p: FloatArray, h: FloatArray, pxz: FloatArray) -> None:
             pxz[i, j] = p[i, 0] * h[j, 0] + p[i, 1] * h[j, 1] + p[i, 2] * h[j, 2]
 
 
-@njit(cache=True)
+@kernel
 def update(
     x: FloatArray,
     p: FloatArray,
@@ -213,7 +230,7 @@ def update(
     return nis, -0.5 * (log_det + nis)
 
 
-@njit(cache=True)
+@kernel
 def _restore_joseph(
     p: FloatArray,
     pxz: FloatArray,
