@@ -11,18 +11,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core import coloured, indicators, screening, tuning
+from ftproc.core import bridges, coloured, indicators, screening, tuning
 from ftproc.core.forward import Model, Start
+from ftproc.core.geometry import unwrap
 from ftproc.core.motion import isotropic
 from ftproc.core.smoother import SmootherRun, smooth_log
 from ftproc.core.start import begin
 
 FloatArray = NDArray[np.float64]
 
+SHORT_WINDOW = 11  # samples: sees jumps, and hardly anything else
 WINDOWS = (31, 75)  # samples: the short one follows manoeuvres, the long one sees through patches
 MAX_ROUNDS = 8
 TUNING_ROUNDS = 3
 FIRST_JERK = 1.0  # m^2/s^5, where the search begins
+FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
 FEWEST_KEPT = 0.5  # share of what screening trusts that must survive the decisions, in each component
 START_INFLATION = 2.0  # on the covariance of a smoothed state that starts a filter over the same record
 
@@ -50,11 +53,26 @@ def screen(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, Flo
     sigma = tuning.NOISE_FLOOR.copy()
     for c in range(3):
         channel = np.ascontiguousarray(measurement[:, c])
-        for window in WINDOWS:
-            votes, scales = screening.screen_component(time_s, channel, window, c == 1)
-            weight[votes > 0.5, c] = 0.0
-            if window == WINDOWS[0] and len(scales):
-                sigma[c] = max(float(np.median(scales)), sigma[c])
+        weight[:, c], scale = _screen_channel(time_s, channel, c == 1)
+        sigma[c] = max(scale, sigma[c])
+    return weight, sigma
+
+
+def _screen_channel(time_s: FloatArray, channel: FloatArray, angular: bool) -> tuple[FloatArray, float]:
+    """(n,) weights and the noise 1-sigma of one component."""
+    seen = np.isfinite(channel).astype(float)
+    near, scales = screening.screen_component(time_s, channel, SHORT_WINDOW, angular)
+    weight, sigma = seen.copy(), 0.0
+    for window in WINDOWS:
+        votes, scales = screening.screen_component(time_s, channel, window, angular)
+        screening.bar_runs(votes, near, weight)
+        if window == WINDOWS[0] and len(scales):
+            sigma = float(np.median(scales))
+    weight[bridges.bridged(time_s, unwrap(channel) if angular else channel, weight, sigma) > 0] = 0.0
+    # A component that swings too fast for parabolas loses half of itself: then only the short window is believed.
+    for alternative in (np.where(near > 0.5, 0.0, seen), seen):
+        if weight.sum() < FEWEST_TRUSTED * seen.sum():
+            weight = alternative
     return weight, sigma
 
 

@@ -18,6 +18,7 @@ FloatArray = NDArray[np.float64]
 
 TRIALS = 48  # triples per window: one is clean with probability 0.99998 when 40 % of the samples are bad
 CUT = 4.5  # sigmas from the parabola
+JUMP_VOTES = 0.2  # share of short windows that must find a reading off, at a jump
 SHORTEST_STUCK = 3  # equal readings in a row
 STUCK_ODDS = 1e-3  # expected number of chance runs in a log that would be called stuck
 MOST_STUCK = 0.2  # share of a component
@@ -164,3 +165,30 @@ def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
     if found.sum() > MOST_STUCK * len(seen):
         found[:] = False
     return found
+
+
+@kernel
+def bar_runs(votes: FloatArray, near: FloatArray, weight: FloatArray) -> None:
+    """Set the weights (n,) of outvoted readings to zero, if their run begins or ends with a jump.
+
+    votes: (n,) shares of a long window, near: of a short one, which sees jumps but follows every curve. A long run
+    without a jump at either end is a curve that the parabola of the long window cannot follow.
+    """
+    seen = np.flatnonzero(weight >= 0)
+    n = len(seen)
+    begin = 0
+    while begin < n:
+        if not votes[seen[begin]] > 0.5:
+            begin += 1
+            continue
+        end = begin
+        while end < n and votes[seen[end]] > 0.5:
+            end += 1
+        sharp = end - begin <= 2
+        for edge in (begin, end):
+            for k in range(max(edge - 2, 0), min(edge + 2, n)):
+                sharp = sharp or near[seen[k]] > JUMP_VOTES
+        if sharp:
+            for k in range(begin, end):
+                weight[seen[k]] = 0.0
+        begin = end

@@ -19,13 +19,14 @@ from ftproc.core.smoother import score_log
 FloatArray = NDArray[np.float64]
 
 NOISE_FLOOR = np.array([1e-3, 1e-7, 1e-7])  # 1-sigma m, rad, rad: below it, rounding of the readings decides
-NOISE_CEILING = np.array([1e5, 1.0, 1.0])
+NOISE_GROWTH = 10.0  # times the noise that the search begins with: more of it is a track gone astray, not noise
 JERK_BOUNDS = (1e-7, 1e7)  # m^2/s^5
 KNOT_SAMPLES = 10  # samples to a knot of the jerk profile ...
 KNOT_SECONDS = 4.0  # ... but never less than so many seconds,
 MAX_KNOTS = 4000  # nor more than so many knots
 WALK_PRECISION = 1.0  # of the random walk of ln(jerk) from knot to knot
 ALLOWANCE = 1.4  # on the likeliest jerk: too little makes sigmas dishonest, a little too much costs hardly anything
+CALMEST = 3e-4  # m^2/s^5 along any axis: no aircraft flies more smoothly than the air it is in
 VERTICAL_PRECISION = 0.5  # with which ln(vertical / horizontal jerk) is drawn to zero
 HORIZONTAL = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.0])
 VERTICAL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -48,7 +49,7 @@ def fit_level(
     """
     if fix_noise.all() and fix_jerk:
         return guess
-    floor, ceiling = 2 * np.log(NOISE_FLOOR), 2 * np.log(NOISE_CEILING)
+    floor, ceiling = 2 * np.log(NOISE_FLOOR), np.log(guess.noise_variance) + 2 * math.log(NOISE_GROWTH)
     log_noise, log_jerk = np.log(guess.noise_variance), math.log(guess.jerk[0, 0])
     lower = np.r_[np.where(fix_noise, log_noise, floor), log_jerk if fix_jerk else math.log(JERK_BOUNDS[0])]
     upper = np.r_[np.where(fix_noise, log_noise, ceiling), log_jerk if fix_jerk else math.log(JERK_BOUNDS[1])]
@@ -101,4 +102,4 @@ def fit_profile(
     low, high = np.full(knots + 1, math.log(JERK_BOUNDS[0])), np.full(knots + 1, math.log(JERK_BOUNDS[1]))
     curvature = np.r_[np.full(knots, 2.0), 0.7 * knots]
     best = unpack(ascent.minimise(cost, theta, curvature, low, high, steps, tolerance=0.05 * knots**0.5))
-    return best._replace(jerk=ALLOWANCE * best.jerk)
+    return best._replace(jerk=np.maximum(ALLOWANCE * best.jerk, CALMEST * ISOTROPIC))
