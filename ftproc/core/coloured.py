@@ -26,8 +26,11 @@ FloatArray = NDArray[np.float64]
 LEAST = 0.15  # correlation of neighbours that is worth modelling ...
 LEAST_IN_SIGMAS = 5.0  # ... if so many of its own standard errors away from zero
 MOST = 0.97
+MOST_BELIEVED = 0.9
+GROWTH = 5.0  # times the variance that white noise would have
 INDEPENDENT = 0.1  # correlation left between the samples that remain after thinning
 FEWEST = 60  # samples that must remain
+FEWEST_PAIRS = 200  # neighbours, for their correlation to be asked for
 ITERATIONS = 8
 
 
@@ -44,7 +47,7 @@ def moments(smoothed: SmootherRun, weight: FloatArray, noise_variance: FloatArra
     for c in range(3):
         r, a = residual[:, c], lost[:, c]
         both = used[1:, c] & used[:-1, c]
-        if both.sum() < FEWEST:
+        if both.sum() < FEWEST_PAIRS:
             variance[c] = noise_variance[c]
             continue
         variance[c] = np.nanmean(r * r + a)
@@ -68,7 +71,9 @@ def fit_coloured(
     known: NDArray[np.bool_],
     fix_jerk: bool,
 ) -> Model:
-    """A model with correlated noise, from one that took it for white. known: (3,) components whose sigma is given."""
+    """A model with correlated noise, from one that took it for white; that one if none is believable.
+
+    known: (3,) components whose sigma is given."""
     given = white.noise_variance
     model, variance = white, white.noise_variance
     correlation = np.maximum(moments(smooth_log(time_s, measurement, weight, white, starts), weight, given)[1], 0.0)
@@ -82,7 +87,9 @@ def fit_coloured(
             variance, correlation = moments(run, weight, model.noise_variance)
             variance = np.where(known, given, variance)
             correlation = np.clip(correlation, 0.0, MOST)
-    return model
+    # Slow motion and slow noise look alike; where the search ends among the slowest, it has mistaken one for the other.
+    believable = (correlation < MOST_BELIEVED) & (variance < GROWTH * given)
+    return model if believable.all() else white
 
 
 def _fit_thinned(

@@ -263,9 +263,7 @@ def filter_and_edit(
     return run._replace(log_likelihood=likelihood), reacquired
 
 
-def reacquire(
-    time_s: FloatArray, measurement: FloatArray, noise_variance: FloatArray, sample: int
-) -> Start | None:
+def reacquire(time_s: FloatArray, measurement: FloatArray, noise_variance: FloatArray, sample: int) -> Start | None:
     """A new start at `sample` from the raw readings just before it, if each component's agree with each other."""
     low = max(0, sample + 1 - REACQUIRE_SAMPLES)
     weight = np.zeros_like(measurement)

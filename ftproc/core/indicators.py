@@ -29,7 +29,12 @@ ROUNDS = 3
 
 @kernel
 def _chain(
-    residual: FloatArray, variance: FloatArray, noise: float, odds: float, rates: FloatArray, good: FloatArray,
+    residual: FloatArray,
+    variance: FloatArray,
+    noise: float,
+    odds: float,
+    rates: FloatArray,
+    good: FloatArray,
     counts: FloatArray,
 ) -> None:
     """Forward-backward recursion: fills good (n,) = P(good | all) and the expected transition counts (3, 3)."""

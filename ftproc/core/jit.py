@@ -10,6 +10,4 @@ from numba import njit
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-kernel: Callable[[F], F] = njit(
-    cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"}
-)
+kernel: Callable[[F], F] = njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})

@@ -101,9 +101,7 @@ def _best_parabola(
 
 
 @kernel
-def screen_component(
-    time: FloatArray, z: FloatArray, window: int, angular: bool
-) -> tuple[FloatArray, FloatArray]:
+def screen_component(time: FloatArray, z: FloatArray, window: int, angular: bool) -> tuple[FloatArray, FloatArray]:
     """(n,) share of windows in which each sample lies off the parabola, and (windows,) scale of each window.
 
     time (n,) s, z (n,) reading with NaN where missing, window: samples per window; windows overlap three-fold.

@@ -331,6 +331,4 @@ def smooth_log(
         head.sample, time_s, measurement, model.noise_variance, model.jerk, model.knot_s, head.state.copy(),
         head.covariance.copy(), state, sigma, los_sigma, residual, variance,
     )  # fmt: skip
-    return SmootherRun(
-        state, sigma, los_sigma, residual, variance, nis, likelihood, noise_score, jerk_score, head
-    )
+    return SmootherRun(state, sigma, los_sigma, residual, variance, nis, likelihood, noise_score, jerk_score, head)

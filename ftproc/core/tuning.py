@@ -20,7 +20,8 @@ FloatArray = NDArray[np.float64]
 
 NOISE_FLOOR = np.array([1e-3, 1e-7, 1e-7])  # 1-sigma m, rad, rad: below it, rounding of the readings decides
 NOISE_GROWTH = 10.0  # times the noise that the search begins with: more of it is a track gone astray, not noise
-JERK_BOUNDS = (1e-7, 1e7)  # m^2/s^5
+JERK_SIDES = ((1e-7, -1), (1e7, 1))  # m^2/s^5: lowest and highest
+RATIO_BOUND = 12.0  # on |ln(vertical / horizontal jerk)|
 KNOT_SAMPLES = 10  # samples to a knot of the jerk profile ...
 KNOT_SECONDS = 4.0  # ... but never less than so many seconds,
 MAX_KNOTS = 4000  # nor more than so many knots
@@ -43,27 +44,38 @@ def fit_level(
     fix_jerk: bool,
     steps: int = 12,
 ) -> Model:
-    """The likeliest noise variances and single jerk density, from the model `guess` on.
+    """The likeliest noise variances and single jerk density with its vertical share, from `guess` on.
 
     fix_noise: (3,) components whose noise stays as guessed. fix_jerk: the jerk density stays.
     """
     if fix_noise.all() and fix_jerk:
         return guess
     floor, ceiling = 2 * np.log(NOISE_FLOOR), np.log(guess.noise_variance) + 2 * math.log(NOISE_GROWTH)
-    log_noise, log_jerk = np.log(guess.noise_variance), math.log(guess.jerk[0, 0])
-    lower = np.r_[np.where(fix_noise, log_noise, floor), log_jerk if fix_jerk else math.log(JERK_BOUNDS[0])]
-    upper = np.r_[np.where(fix_noise, log_noise, ceiling), log_jerk if fix_jerk else math.log(JERK_BOUNDS[1])]
+    log_noise = np.log(guess.noise_variance)
+    log_jerk = np.array([math.log(guess.jerk[0, 0]), math.log(guess.jerk[0, 5] / guess.jerk[0, 0])])
+    lowest, highest = (np.array([math.log(bound), side * RATIO_BOUND]) for bound, side in JERK_SIDES)
+    lower = np.r_[np.where(fix_noise, log_noise, floor), log_jerk if fix_jerk else lowest]
+    upper = np.r_[np.where(fix_noise, log_noise, ceiling), log_jerk if fix_jerk else highest]
     used = np.maximum((weight > 0).sum(0), 1)
 
     def cost(theta: FloatArray) -> tuple[float, FloatArray]:
-        model = Model(np.exp(theta[:3]), math.exp(theta[3]) * ISOTROPIC)
+        model = Model(np.exp(theta[:3]), shaped(theta[3:4], theta[4]))
         found = score_log(time_s, measurement, weight, model, starts)
-        return -found.log_likelihood, -np.r_[found.noise, float(found.jerk[0] @ model.jerk[0])]
+        by_axis = found.jerk[0] * model.jerk[0]
+        pull = VERTICAL_PRECISION * theta[4]
+        slope = -np.r_[found.noise, by_axis.sum(), by_axis[5] - pull]
+        return -found.log_likelihood + 0.5 * pull * theta[4], slope
 
     theta = np.clip(np.r_[log_noise, log_jerk], lower, upper)
-    curvature = np.r_[used / 2, used.mean() / 20]
+    curvature = np.r_[used / 2, used.mean() / 20, used.mean() / 60]
     theta = ascent.minimise(cost, theta, curvature, lower, upper, steps, tolerance=0.05)
-    return Model(np.exp(theta[:3]), math.exp(theta[3]) * ISOTROPIC)
+    return Model(np.exp(theta[:3]), shaped(theta[3:4], theta[4]))
+
+
+def shaped(log_jerk: FloatArray, log_ratio: float) -> FloatArray:
+    """(m, 6) jerk tensors from ln of the horizontal density (m,) and ln of vertical over horizontal."""
+    tensors: FloatArray = np.exp(log_jerk)[:, None] * (HORIZONTAL + math.exp(log_ratio) * VERTICAL)
+    return tensors
 
 
 def fit_profile(
@@ -85,8 +97,7 @@ def fit_profile(
     knots = max(math.ceil(span / knot_s), 1)
 
     def unpack(theta: FloatArray) -> Model:
-        shape = HORIZONTAL + np.exp(theta[knots]) * VERTICAL
-        return level._replace(jerk=np.exp(theta[:knots, None]) * shape, knot_s=knot_s)
+        return level._replace(jerk=shaped(theta[:knots], theta[knots]), knot_s=knot_s)
 
     def cost(theta: FloatArray) -> tuple[float, FloatArray]:
         model = unpack(theta)
@@ -98,8 +109,9 @@ def fit_profile(
         score = np.r_[by_axis.sum(1), by_axis[:, 5].sum()]
         return -found.log_likelihood + 0.5 * penalty, pull - score
 
-    theta = np.r_[np.full(knots, math.log(level.jerk[0, 0])), 0.0]
-    low, high = np.full(knots + 1, math.log(JERK_BOUNDS[0])), np.full(knots + 1, math.log(JERK_BOUNDS[1]))
+    ratio = math.log(level.jerk[0, 5] / level.jerk[0, 0])
+    theta = np.r_[np.full(knots, math.log(level.jerk[0, 0])), ratio]
+    low, high = (np.r_[np.full(knots, math.log(bound)), side * RATIO_BOUND] for bound, side in JERK_SIDES)
     curvature = np.r_[np.full(knots, 2.0), 0.7 * knots]
     best = unpack(ascent.minimise(cost, theta, curvature, low, high, steps, tolerance=0.05 * knots**0.5))
     return best._replace(jerk=np.maximum(ALLOWANCE * best.jerk, CALMEST * ISOTROPIC))
