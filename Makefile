@@ -2,10 +2,10 @@
 
 PYTHON ?= python3
 VENV ?= .venv
-LOGS ?= sample_data/*.csv sample_data/*.csv.gz sample_data/*.parquet
-OUT ?= out
-FLAGS ?=
-MODEL_FLAGS ?= --scenario family --flights 60 --seed 2021
+LOGS = sample_data/*.csv sample_data/*.csv.gz sample_data/*.parquet
+OUT = out
+FLAGS =
+MODEL_FLAGS = --scenario family --flights 60 --seed 2021
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -35,7 +35,7 @@ scored := $(foreach log,$(logs),$(if $(call truth,$(log)),$(log)))
 program := $(shell find ftproc -name '*.py' -o -name '*.safetensors')
 
 ifneq ($(filter run,$(MAKECMDGOALS)),)
-$(foreach pattern,$(LOGS),$(if $(wildcard $(pattern))$(filter file default,$(origin LOGS)),,\
+$(foreach pattern,$(LOGS),$(if $(wildcard $(pattern))$(filter file,$(origin LOGS)),,\
   $(error LOGS: there is no file $(pattern))))
 $(foreach log,$(logs),$(if $(filter %.csv %.csv.gz %.parquet,$(log)),,\
   $(error LOGS: $(log) is not a .csv, .csv.gz or .parquet file)))

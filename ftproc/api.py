@@ -28,7 +28,9 @@ def read_log(source: Any, **options: Any) -> MeasurementLog:
     return logs.read(source, **options)
 
 
-def filter_log(log: Any, settings: FilterSettings | None = None, *, model: Model | str | None = "packaged") -> Trajectory:
+def filter_log(
+    log: Any, settings: FilterSettings | None = None, *, model: Model | str | None = "packaged"
+) -> Trajectory:
     """The trajectory of a log (a MeasurementLog, or anything `read_log` takes).
 
     model: the packaged correction, another one, or None for none. Raises InputError, UsageError.
@@ -67,8 +69,6 @@ def score(trajectory: Any, truth: Any = None) -> Score:
     found = trajectory if isinstance(trajectory, Trajectory) else trajectories.read(trajectory)
     known = truth if truth is None or isinstance(truth, Truth) else truths.read(truth)
     return scoring.score(found, known)
-
-
 
 
 def to_table(trajectory: Trajectory) -> pa.Table:

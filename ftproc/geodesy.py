@@ -44,12 +44,12 @@ def with_geodetic(trajectory: Trajectory, site: Site) -> Trajectory:
 
     frame = str(trajectory.metadata.get("frame", "local"))
     extra = trajectory.extra
-    table = pa.table({}) if extra is None else extra
+    found = {} if extra is None else dict(zip(extra.column_names, extra.columns, strict=True))
     for name, values in zip(COLUMNS, geodetic(trajectory.state[:, :3], frame, site), strict=True):
-        if name in table.column_names:
+        if name in found:
             raise UsageError(f'the log\'s column "{name}" has the name of an output column; leave --keep-columns out.')
-        table = table.append_column(name, pa.array(values))
-    return replace(trajectory, extra=table, metadata={**trajectory.metadata, "site_axes": axes(frame)})
+        found[name] = pa.array(values)
+    return replace(trajectory, extra=pa.table(found), metadata={**trajectory.metadata, "site_axes": axes(frame)})
 
 
 def geodetic(position: FloatArray, frame: str, site: Site) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -156,7 +156,7 @@ def train_flights(
     """
     from ftproc.correction.samples import Flight
     from ftproc.correction.training import train
-    from ftproc.score.matching import match
+    from ftproc.scoring.matching import match
 
     flights = []
     for number, (log, truth) in enumerate(pairs):
@@ -174,4 +174,3 @@ def train_flights(
     if progress:
         progress("filtering", len(pairs), len(pairs))
     return train(flights, settings, progress)
-

@@ -51,7 +51,7 @@ def warm() -> None:
     from ftproc import pipeline
     from ftproc.files import logs
     from ftproc.settings import FilterSettings
-    from ftproc.simulate import simulate
+    from ftproc.simulation import simulate
 
     log = _as_read(simulate("manoeuvre", duration_s=20.0).log, logs.read)
     paths = (

@@ -10,7 +10,7 @@ import numpy as np
 
 from ftproc.core.geometry import from_cartesian, wrap
 from ftproc.records import FloatArray, Trajectory, Truth
-from ftproc.simulate import Simulation, simulate
+from ftproc.simulation import Simulation, simulate
 
 G = 9.80665
 

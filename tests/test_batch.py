@@ -17,7 +17,7 @@ from ftproc import batch
 from ftproc.batch import Recipe, Task
 from ftproc.errors import ModelError
 from ftproc.files import logs
-from ftproc.simulate import simulate
+from ftproc.simulation import simulate
 
 
 @pytest.fixture

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-from numba import njit
+import pytest
+from numba import config, njit
 
 from ftproc import warm
 
 BIN = Path(sys.prefix) / "bin"
 
 
+@pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")
 def test_only_our_own_kernels_are_told_of_and_once():
     said: list[str] = []
 
@@ -39,7 +42,7 @@ def test_a_cold_start_says_so_and_a_warm_one_does_not(tmp_path):
     """After `python -m ftproc.warm` no way of filtering compiles anything."""
 
     def execute(*command: str) -> str:
-        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
         done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
         return done.stderr
 
@@ -54,11 +57,19 @@ def test_a_cold_start_says_so_and_a_warm_one_does_not(tmp_path):
 
 
 def test_nowhere_to_keep_the_kernels_is_a_plain_sentence(tmp_path):
+    """A copy of the package with files where the directories of the cache would be."""
+    source = Path(warm.__file__).parent
+    shutil.copytree(source, tmp_path / "ftproc", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "ftproc" / "core" / "__pycache__").write_text("")
     (tmp_path / "file").write_text("")
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "file" / "cache")}
-    command = [str(BIN / "ftproc"), "filter", "-"]
+    nowhere = str(tmp_path / "file" / "deeper")
+    environment = {
+        **os.environ, "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1",
+        "NUMBA_DISABLE_JIT": "0", "HOME": nowhere, "XDG_CACHE_HOME": nowhere, "NUMBA_CACHE_DIR": nowhere,
+    }  # fmt: skip
+    command = [sys.executable, "-c", "from ftproc.cli.main import main; main()", "filter", "-"]
     log = "time_s,range_m,azimuth_rad,elevation_rad\n0,1,0,0\n1,2,0,0\n"
-    done = subprocess.run(command, input=log, env=environment, capture_output=True, text=True)
+    done = subprocess.run(command, input=log, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == 1
     assert "Set NUMBA_CACHE_DIR to a directory that can be written to." in done.stderr
     assert "Traceback" not in done.stderr

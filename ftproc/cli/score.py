@@ -37,7 +37,7 @@ def command(trajectories: tuple[str, ...], truths: tuple[str, ...], form: str) -
     """
     from ftproc.errors import InputError
     from ftproc.files import trajectories as trajectory_files
-    from ftproc.score import render, score
+    from ftproc.scoring import render, score
 
     if len(truths) > 1 and len(truths) != len(trajectories):
         raise click.UsageError(

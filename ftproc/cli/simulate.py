@@ -15,7 +15,7 @@ ftproc simulate --scenario radar --units range=km,azimuth=deg,elevation=deg --az
 
 
 def _scenarios_and_grammar() -> str:
-    from ftproc.simulate import GRAMMAR, list_scenarios
+    from ftproc.simulation import GRAMMAR, list_scenarios
 
     scenarios = list_scenarios()
     width = max(map(len, scenarios))
@@ -67,7 +67,7 @@ def command(
 ) -> None:
     """Make a log as dirty as a real one, with its truth."""
     from ftproc.cli import simulated_files
-    from ftproc.simulate import simulate
+    from ftproc.simulation import simulate
 
     simulated_files.check(output, truth)
     flight = simulate(scenario, seed=seed, duration_s=duration, dt_s=dt, noise=noise, outliers=outliers)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from ftproc.records import MeasurementLog
-    from ftproc.simulate import Simulation
+    from ftproc.simulation import Simulation
 
 
 def check(output: str, truth_output: str | None) -> None:

@@ -147,7 +147,7 @@ def _simulated(
     """Flights that no small seed of `ftproc simulate` makes, so that those stay fit for testing."""
     import numpy as np
 
-    from ftproc.simulate import simulate
+    from ftproc.simulation import simulate
 
     seeds = np.random.SeedSequence(settings.seed).generate_state(settings.flights, np.uint64)
     pairs = []

@@ -55,7 +55,7 @@ def _cubic(t: FloatArray, z: FloatArray, n: int, normal: FloatArray, coefficient
 
 @kernel
 def _value(coefficient: FloatArray, t: float) -> float:
-    return coefficient[0] + t * (coefficient[1] + t * (coefficient[2] + t * coefficient[3]))
+    return float(coefficient[0] + t * (coefficient[1] + t * (coefficient[2] + t * coefficient[3])))
 
 
 @kernel

@@ -46,9 +46,7 @@ def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, Start,
     guess = Model(np.where(np.isfinite(given), given, sigma) ** 2, isotropic(settings.jerk_psd_m2ps5 or 1.0))
     start = begin(time_s, measurement, weight, guess.noise_variance)
     fixed = np.isfinite(given)
-    model = tuning.fit_level(
-        time_s, measurement, weight, [start], guess, fixed, settings.jerk_psd_m2ps5 is not None
-    )
+    model = tuning.fit_level(time_s, measurement, weight, [start], guess, fixed, settings.jerk_psd_m2ps5 is not None)
     return model, start, weight
 
 

@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from ftproc.cli.main import cli
+from ftproc.warm import warm
 
 BIN = Path(sys.prefix) / "bin"
 
@@ -22,6 +23,12 @@ class Result:
     code: int
     out: str
     err: str
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _compiled() -> None:
+    """Kernels are compiled before, so that no test meets the line that says so."""
+    warm()
 
 
 @pytest.fixture

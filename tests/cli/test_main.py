@@ -105,9 +105,9 @@ def test_an_unexpected_error_is_a_sentence_too(run, here, monkeypatch):
     def broken(*args, **kwargs):
         raise ZeroDivisionError("division by zero")
 
-    monkeypatch.setattr("ftproc.score.render", broken)
+    monkeypatch.setattr("ftproc.scoring.render", broken)
     monkeypatch.setattr("ftproc.files.trajectories.read", lambda name: None)
-    monkeypatch.setattr("ftproc.score.score", lambda trajectory, truth: None)
+    monkeypatch.setattr("ftproc.scoring.score", lambda trajectory, truth: None)
     result = run("score", "x.csv")
     assert result.code == 1
     assert result.err == (
@@ -169,7 +169,8 @@ def test_a_full_disk_behind_stdout(shell):
 
 def test_pipes(shell):
     result = shell(
-        "ftproc simulate --scenario zuo2021-outliers -o - | ftproc filter - -o - --summary none | ftproc score - --format json"
+        "ftproc simulate --scenario zuo2021-outliers -o - | ftproc filter - -o - --summary none"
+        " | ftproc score - --format json"
     )
     assert result.code == 0, result.err
     assert result.err == ""

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ftproc.records import Truth
-from ftproc.score import score
-from ftproc.score.matching import match
+from ftproc.scoring import score
+from ftproc.scoring.matching import match
 from tests.simulated import trajectory_for
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ftproc.records import FloatArray
-from ftproc.simulate.flight import GRAVITY_MPS2, Flight, gusts, integrate, smoothed
+from ftproc.simulation.flight import GRAVITY_MPS2, Flight, gusts, integrate, smoothed
 
 Range = tuple[float, float]
 

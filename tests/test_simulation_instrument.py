@@ -7,8 +7,8 @@ import pytest
 
 from ftproc.core.geometry import from_cartesian, wrap
 from ftproc.records import FloatArray
-from ftproc.simulate import InstrumentErrors, simulate
-from ftproc.simulate.instrument import readable, systematic, unit_noise
+from ftproc.simulation import InstrumentErrors, simulate
+from ftproc.simulation.instrument import readable, systematic, unit_noise
 
 
 def test_correlated_noise_has_the_stated_correlation_and_variance() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from ftproc.errors import UsageError
 from ftproc.records import COMPONENTS
-from ftproc.simulate import GRAMMAR, Fault, OutlierSpec, parse_outliers, simulate
+from ftproc.simulation import GRAMMAR, Fault, OutlierSpec, parse_outliers, simulate
 from tests.simulated import codes
 
 numbers = st.floats(0.01, 500).map(lambda x: f"{x:.3g}").filter(lambda s: "e" not in s)

@@ -1,10 +1,10 @@
 """How good a trajectory is: by itself (smoothness) and against a truth (errors, consistency, outliers found).
 
-from ftproc.score import render, score
+from ftproc.scoring import render, score
 print(render([score(trajectory, truth)], "table"))
 """
 
-from ftproc.score.figures import Detection, Gradient, Score, score
-from ftproc.score.rendering import FORMATS, render
+from ftproc.scoring.figures import Detection, Gradient, Score, score
+from ftproc.scoring.rendering import FORMATS, render
 
 __all__ = ["FORMATS", "Detection", "Gradient", "Score", "render", "score"]

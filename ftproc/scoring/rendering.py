@@ -10,7 +10,7 @@ from pathlib import PurePath
 from typing import Any
 
 from ftproc.errors import UsageError
-from ftproc.score.figures import Score
+from ftproc.scoring.figures import Score
 
 TABLE_WIDTH = 100
 

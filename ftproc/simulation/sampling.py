@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.records import FloatArray, IntArray
-from ftproc.simulate.spec import OutlierSpec
+from ftproc.simulation.spec import OutlierSpec
 
 
 def sample_times(duration_s: float, dt_s: float, jitter: float, rng: np.random.Generator) -> FloatArray:

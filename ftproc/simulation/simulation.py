@@ -9,12 +9,12 @@ import numpy as np
 
 from ftproc.errors import UsageError
 from ftproc.records import FloatArray, MeasurementLog, Truth
-from ftproc.simulate.flights import FLIGHTS
-from ftproc.simulate.instrument import InstrumentErrors, readable, systematic, unit_noise
-from ftproc.simulate.sampling import kept_rows, row_count, sample_times, with_duplicates
-from ftproc.simulate.scenarios import Plan, draw, find_scenario
-from ftproc.simulate.spec import OutlierSpec, parse_outliers
-from ftproc.simulate.tamper import tamper
+from ftproc.simulation.flights import FLIGHTS
+from ftproc.simulation.instrument import InstrumentErrors, readable, systematic, unit_noise
+from ftproc.simulation.sampling import kept_rows, row_count, sample_times, with_duplicates
+from ftproc.simulation.scenarios import Plan, draw, find_scenario
+from ftproc.simulation.spec import OutlierSpec, parse_outliers
+from ftproc.simulation.tamper import tamper
 
 MAX_DURATION_S = 1e5
 MAX_ROWS = 10_000_000

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.geometry import from_cartesian, wrap
 from ftproc.records import COMPONENTS, ISOLATED, PATCH, FlagArray, FloatArray, Trajectory, Truth
-from ftproc.score.matching import match
+from ftproc.scoring.matching import match
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from ftproc.core.geometry import from_cartesian, wrap
-from ftproc.simulate import Fault, OutlierSpec, simulate
-from ftproc.simulate.sampling import kept_rows, sample_times, with_duplicates
-from ftproc.simulate.tamper import tamper
+from ftproc.simulation import Fault, OutlierSpec, simulate
+from ftproc.simulation.sampling import kept_rows, sample_times, with_duplicates
+from ftproc.simulation.tamper import tamper
 from tests.simulated import codes, deviation, runs
 
 

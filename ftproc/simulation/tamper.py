@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ftproc.records import FlagArray, FloatArray
-from ftproc.simulate.spec import Fault
+from ftproc.simulation.spec import Fault
 
 #: Codes of the truth's `outlier_*` columns: what was injected.
 SPIKE, OFFSET, RAMP, STUCK, BURST, START, ZERO = 1, 2, 3, 4, 5, 6, 7

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from ftproc.core.geometry import from_cartesian
 from ftproc.records import FloatArray, Trajectory, Truth
-from ftproc.score import render, score
-from ftproc.simulate import simulate
+from ftproc.scoring import render, score
+from ftproc.simulation import simulate
 from tests.simulated import flown, trajectory_for
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ftproc.errors import UsageError
-from ftproc.simulate.instrument import PERFECT, InstrumentErrors
+from ftproc.simulation.instrument import PERFECT, InstrumentErrors
 
 Range = tuple[float, float]
 

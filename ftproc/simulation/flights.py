@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from ftproc.core.geometry import from_cartesian
-from ftproc.simulate.aircraft import Airframe, fly, follow
-from ftproc.simulate.flight import GRAVITY_MPS2, Flight, constant_acceleration, gusts, integrate, smoothed
+from ftproc.simulation.aircraft import Airframe, fly, follow
+from ftproc.simulation.flight import GRAVITY_MPS2, Flight, constant_acceleration, gusts, integrate, smoothed
 
 FIGHTER = Airframe(
     speed_mps=(140, 290), turn_g=(1.5, 5.0), turn_rad=(0.5, 2.8), climb_rad=(0.1, 0.5), pull_g=(0.5, 2.0),

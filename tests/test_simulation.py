@@ -7,9 +7,9 @@ import pytest
 
 from ftproc.core.geometry import from_cartesian, wrap
 from ftproc.errors import UsageError
-from ftproc.simulate import list_scenarios, simulate
-from ftproc.simulate.aircraft import path_acceleration
-from ftproc.simulate.flight import smoothed
+from ftproc.simulation import list_scenarios, simulate
+from ftproc.simulation.aircraft import path_acceleration
+from ftproc.simulation.flight import smoothed
 from tests.simulated import codes, deviation, load_factor
 
 

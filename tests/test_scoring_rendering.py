@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ftproc.errors import UsageError
-from ftproc.score import render, score
+from ftproc.scoring import render, score
 from tests.simulated import flown, trajectory_for
 
 

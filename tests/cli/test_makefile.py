@@ -1,0 +1,194 @@
+"""The batch pipeline of the Makefile, in a copy of the project and with the environment that runs the tests."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from ftproc.files import logs, trajectories, truth
+from tests.cli.conftest import Result
+
+PROJECT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    shutil.copytree(PROJECT / "ftproc", tmp_path / "ftproc", ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("Makefile", "pyproject.toml"):
+        shutil.copy2(PROJECT / name, tmp_path / name)
+    return tmp_path
+
+
+@pytest.fixture
+def make(copy: Path) -> Callable[..., Result]:
+    """make("run", "OUT=there"): the environment counts as installed, whatever else is to be done is done."""
+    mine = {name: value for name, value in os.environ.items() if not name.startswith("MAKE") and name != "MFLAGS"}
+
+    def execute(*args: str, venv: str = sys.prefix) -> Result:
+        installed = [part for name in (".installed", ".warmed") for part in ("-o", f"{venv}/{name}")]
+        command = ["make", f"VENV={venv}", *(installed if venv == sys.prefix else []), *args]
+        done = subprocess.run(command, cwd=copy, env=mine, capture_output=True, text=True, timeout=300)
+        return Result(done.returncode, done.stdout, done.stderr)
+
+    return execute
+
+
+@pytest.fixture
+def flights(copy: Path, run: Callable[..., Result]) -> Path:
+    """a.csv, b.csv.gz and c.parquet, the first and the last with truth."""
+    (copy / "flights").mkdir()
+    for seed, name in enumerate(("a.csv", "b.csv.gz", "c.parquet")):
+        args = ["simulate", "--scenario", "zuo2021-outliers", "--seed", str(seed), "-o", copy / "flights" / name]
+        if seed != 1:
+            kind = "csv" if seed == 0 else "parquet"
+            args += ["--truth", copy / "flights" / f"{name[0]}.truth.{kind}"]
+        assert run(*args).code == 0
+    return copy / "flights"
+
+
+LOGS = "LOGS=flights/*.csv flights/*.csv.gz flights/*.parquet"
+
+
+def done(result: Result) -> list[str]:
+    """Which logs were filtered, by the first line of their summaries."""
+    return sorted(line.split(":")[0] for line in result.out.splitlines() if " rows, " in line)
+
+
+def test_all_logs_then_the_score_table(make, flights, copy):
+    result = make("run", LOGS, "-j2")
+    assert result.code == 0, result.err
+    assert result.err == ""
+    assert done(result) == ["flights/a.csv", "flights/b.csv.gz", "flights/c.parquet"]
+    assert sorted(path.name for path in (copy / "out").glob("*.parquet")) == [
+        f"{name}.trajectory.parquet" for name in "abc"
+    ]
+    table = result.out.split("\n\n")[-1]
+    assert table.split()[:2] == ["a", "c"]  # only these have truth
+    assert "position RMSE (m)" in table
+
+
+def test_only_what_changed_runs_again(make, flights):
+    assert len(done(make("run", LOGS))) == 3
+    again = make("run", LOGS)
+    assert done(again) == []
+    assert "position RMSE (m)" in again.out
+    later = time.time() + 5
+    os.utime(flights / "b.csv.gz", (later, later))
+    assert done(make("run", LOGS)) == ["flights/b.csv.gz"]
+
+
+def test_other_flags_make_all_results_old(make, flights, copy):
+    assert len(done(make("run", LOGS, "OUT=clean", "FLAGS=--model none"))) == 3
+    assert len(done(make("run", LOGS, "OUT=clean", "FLAGS=--model none --smooth"))) == 3
+    assert done(make("run", LOGS, "OUT=clean", "FLAGS=--model none --smooth")) == []
+    metadata = trajectories.read(copy / "clean" / "a.trajectory.parquet").metadata
+    assert metadata["settings"]["smooth"] is True
+    assert metadata["model_sha256"] is None
+
+
+def test_a_failed_log_fails_the_target_but_stops_no_other(make, flights, copy):
+    (flights / "a.csv").write_text("time_s,range_m\n0,wrong\n")
+    result = make("run", LOGS)
+    assert result.code == 2
+    assert 'ftproc: flights/a.csv: row 0 (the first data row is 0), column "range_m"' in result.err
+    assert sorted(path.name for path in (copy / "out").iterdir()) == [
+        ".flags", "b.trajectory.parquet", "c.trajectory.parquet",
+    ]  # fmt: skip
+
+
+def test_logs_without_truth(make, flights):
+    result = make("run", "LOGS=flights/b.csv.gz")
+    assert result.code == 0
+    assert result.out.endswith("No log has a truth beside it, so there is nothing to score.\n")
+
+
+def test_trajectories_and_truths_are_no_logs(make, flights, copy):
+    assert len(done(make("run", LOGS, "OUT=flights"))) == 3
+    assert done(make("run", LOGS, "OUT=flights")) == []
+
+
+@pytest.mark.parametrize(
+    ("named", "sentence"),
+    [
+        ("flights/*.txt", "LOGS: there is no file flights/*.txt"),
+        ("flights/a.csv flights/none.csv", "LOGS: there is no file flights/none.csv"),
+        ("Makefile", "LOGS: Makefile is not a .csv, .csv.gz or .parquet file"),
+        ("flights/a.csv flights/a.parquet", "LOGS: flights/a.csv flights/a.parquet would all become out/a.trajectory"),
+        ("flights/a.truth.csv", 'LOGS: there is no log among "flights/a.truth.csv"'),
+    ],
+)
+def test_wrong_logs(make, flights, copy, named, sentence):
+    shutil.copy(flights / "c.parquet", flights / "a.parquet")
+    result = make("run", f"LOGS={named}")
+    assert result.code == 2
+    assert sentence in result.err
+    assert not (copy / "out").exists()
+
+
+def test_help_lists_every_target(make):
+    result = make()
+    assert result == make("help")
+    for target in ("run", "test", "samples", "model", "bench", "clean", "install"):
+        assert f"\nmake {target} " in result.out
+
+
+@pytest.mark.parametrize(
+    ("lacking", "sentence"),
+    [("version_info", "ftproc needs Python 3.11 or newer"), ("ensurepip", "cannot make virtual environments: install")],
+)
+def test_a_machine_without_the_right_python(make, copy, lacking, sentence):
+    python = copy / "python-without"
+    python.write_text(f'#!/bin/sh\ncase "$*" in *{lacking}*) exit 1;; esac\nexit 0\n')
+    python.chmod(0o755)
+    result = make("install", f"PYTHON={python}", venv="new")
+    assert result.code == 2
+    assert sentence in result.err
+    assert not (copy / "new").exists()
+
+
+def test_test_does_all_that_ci_needs(make):
+    plan = make("-n", "-o", f"{sys.prefix}/.installed-dev", "test").out
+    positions = [plan.index(step) for step in ("ruff check", "ruff format --check", "mypy", "pytest")]
+    assert positions == sorted(positions)
+
+
+def test_clean(make, copy):
+    (copy / "out").mkdir()
+    (copy / "ftproc" / "__pycache__").mkdir()
+    (copy / "tests").mkdir()
+    assert make("clean", f"warmed={copy}/none").code == 0
+    assert not (copy / "out").exists()
+    assert not (copy / "ftproc" / "__pycache__").exists()
+
+
+def test_samples_are_made_anew(make, copy):
+    assert make("samples").code == 0
+    checked_in = {path.name for path in (PROJECT / "sample_data").iterdir()}
+    assert {path.name for path in (copy / "sample_data").iterdir()} == checked_in
+    for name in ("zuo2021-outliers.csv", "theodolite.parquet", "radar.csv"):  # other processors round differently
+        made, kept = (logs.read(root / "sample_data" / name) for root in (copy, PROJECT))
+        assert len(made) == len(kept)
+        assert abs(made.measurement[0] - kept.measurement[0]).max() < 1e-6
+
+
+def test_samples_are_what_they_say():
+    samples = PROJECT / "sample_data"
+    assert sum(path.stat().st_size for path in samples.iterdir()) < 2_000_000
+    for name in ("zuo2021-outliers.csv", "theodolite.parquet", "radar.csv"):
+        stem = name.split(".")[0]
+        real = truth.read(next(samples.glob(f"{stem}.truth.*")))
+        assert real.outlier is not None
+        assert real.outlier.any()
+    assert (samples / "radar.csv").read_text().startswith("time_s,range_km,azimuth_deg,elevation_deg\n")
+    theodolite = pq.read_table(samples / "theodolite.parquet").to_pandas()
+    assert theodolite["range_m"].isna().any()
+    assert theodolite["time_s"].diff().median() == pytest.approx(0.05)
+    assert theodolite["time_s"].diff().max() > 1.0
