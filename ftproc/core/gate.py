@@ -130,12 +130,12 @@ def _update_by_gain(
             gain[i, j] = full * used[j]
             if used[j] > 0:
                 x[i] += gain[i, j] * e[j]
-    spread = gain @ s
     for i in range(9):
         for j in range(i + 1):
             v = p[i, j]
             for m in range(3):
-                v += spread[i, m] * gain[j, m] - gain[i, m] * pxz[j, m] - pxz[i, m] * gain[j, m]
+                spread = gain[i, 0] * s[0, m] + gain[i, 1] * s[1, m] + gain[i, 2] * s[2, m]
+                v += (spread - pxz[i, m]) * gain[j, m] - gain[i, m] * pxz[j, m]
             p[i, j] = v
             p[j, i] = v
     return nis, -0.5 * (log_det + nis)

@@ -33,7 +33,7 @@ from ftproc.core.jit import kernel
 
 FloatArray = NDArray[np.float64]
 
-BLOCK = 128
+BLOCK = 256
 
 
 class SmootherRun(NamedTuple):

@@ -84,7 +84,7 @@ def fit_profile(
     weight: FloatArray,
     starts: list[Start],
     level: Model,
-    steps: int = 15,
+    steps: int = 8,
 ) -> Model:
     """A jerk density that follows the flight, knot by knot, from the single level on; the noise stays.
 
@@ -113,5 +113,5 @@ def fit_profile(
     theta = np.r_[np.full(knots, math.log(level.jerk[0, 0])), ratio]
     low, high = (np.r_[np.full(knots, math.log(bound)), side * RATIO_BOUND] for bound, side in JERK_SIDES)
     curvature = np.r_[np.full(knots, 2.0), 0.7 * knots]
-    best = unpack(ascent.minimise(cost, theta, curvature, low, high, steps, tolerance=0.05 * knots**0.5))
+    best = unpack(ascent.minimise(cost, theta, curvature, low, high, steps, tolerance=0.1 * knots**0.5))
     return best._replace(jerk=np.maximum(ALLOWANCE * best.jerk, CALMEST * ISOTROPIC))

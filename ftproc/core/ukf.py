@@ -251,11 +251,11 @@ def _restore_joseph(
                 rest[i, j] -= h[i, k] * pxz[k, j]
         if used[i] > 0:
             rest[i, i] = max(rest[i, i], 0.0) + noise[i] / used[i]
-    spread = gain @ rest
     for i in range(9):
         for j in range(i + 1):
             v = p[i, j]
             for k in range(3):
-                v += spread[i, k] * gain[j, k] - residue[i, k] * gain[j, k]
+                spread = gain[i, 0] * rest[0, k] + gain[i, 1] * rest[1, k] + gain[i, 2] * rest[2, k]
+                v += (spread - residue[i, k]) * gain[j, k]
             p[i, j] = v
             p[j, i] = v

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError, UsageError
 from ..records import COMPONENTS, FloatArray, MeasurementLog
-from . import cells, schema, tables, values, writing
+from . import arrow, cells, schema, tables, values, writing
 from .atomic import Target
 from .units import QUANTITIES, UNITS, parse_units
 
@@ -73,11 +73,9 @@ def write(log: MeasurementLog, target: Target) -> None:
     Every float64 reads back bit for bit; a missing reading is an empty cell (NaN in Parquet).
     Raises OutputError.
     """
-    import pyarrow as pa
-
     names = [schema.CANONICAL[quantity] for quantity in QUANTITIES]
     arrays = [log.time_s, *np.ascontiguousarray(log.measurement.T)]
-    table = pa.table(dict(zip(names, arrays, strict=True)))
+    table = arrow.table(dict(zip(names, arrays, strict=True)))
     writing.write_table(writing.with_extra(table, log.extra), target)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from ..records import COMPONENTS, FlagArray, FloatArray, Trajectory
-from . import atomic, columns, schema, tables, writing
+from . import arrow, atomic, columns, schema, tables, writing
 from .atomic import Target
 from .columns import ACCELERATION, OUTLIER, POSITION, VELOCITY
 
@@ -37,8 +37,6 @@ def to_table(trajectory: Trajectory) -> pa.Table:
     `ftproc`.
     Raises UsageError when an extra column has the name of one of COLUMNS.
     """
-    import pyarrow as pa
-
     groups: tuple[tuple[Sequence[str], Any], ...] = (
         (MEASUREMENT, trajectory.measurement),
         (STATE, trajectory.state),
@@ -50,7 +48,7 @@ def to_table(trajectory: Trajectory) -> pa.Table:
     arrays: dict[str, Any] = {"row": np.asarray(trajectory.row, np.int64), "time_s": trajectory.time_s}
     for names, group in groups:
         arrays.update(zip(names, np.ascontiguousarray(group.T), strict=True))
-    table = writing.with_extra(pa.table(arrays), trajectory.extra)
+    table = writing.with_extra(arrow.table(arrays), trajectory.extra)
     return table.replace_schema_metadata({METADATA_KEY: _to_json(trajectory.metadata, indent=None)})
 
 

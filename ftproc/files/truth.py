@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..records import FlagArray, FloatArray, IntArray, Truth
-from . import columns, tables, writing
+from . import arrow, columns, tables, writing
 from .atomic import Target
 from .columns import ACCELERATION, OUTLIER, POSITION, VELOCITY
 
@@ -41,8 +41,6 @@ def write(truth: Truth, target: Target) -> None:
 
     Raises OutputError.
     """
-    import pyarrow as pa
-
     groups = (
         (POSITION, truth.position_m),
         (VELOCITY, truth.velocity_mps),
@@ -54,7 +52,7 @@ def write(truth: Truth, target: Target) -> None:
             arrays.update(zip(names, np.ascontiguousarray(group.T), strict=True))
     if truth.outlier is not None:
         arrays.update(zip(OUTLIER, np.ascontiguousarray(truth.outlier.T), strict=True))
-    writing.write_table(pa.table(arrays), target)
+    writing.write_table(arrow.table(arrays), target)
 
 
 def _whole_group(opened: tables.OpenTable, names: Sequence[str]) -> Sequence[str]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..records import FloatArray
+from . import arrow
 from .cells import Origin, as_text, first_bad, has_comma, instant, not_a_number
 
 if TYPE_CHECKING:
@@ -63,13 +64,7 @@ def _plain_numbers(column: pa.ChunkedArray) -> FloatArray | None:
     tests = (types.is_integer, types.is_floating, types.is_decimal, types.is_null)
     if not any(test(kind) for test in tests):
         return None
-    return _to_numpy(column.cast(pa.float64(), safe=False))
-
-
-def _to_numpy(column: pa.ChunkedArray) -> FloatArray:
-    filled = column.fill_null(float("nan")) if column.null_count else column
-    values: FloatArray = filled.to_numpy()
-    return values
+    return arrow.to_numpy(column.cast(pa.float64(), safe=False))
 
 
 def _parsed(text: pa.ChunkedArray, decimal_comma: bool) -> FloatArray | None:
@@ -80,7 +75,7 @@ def _parsed(text: pa.ChunkedArray, decimal_comma: bool) -> FloatArray | None:
         # A point in such a column would separate thousands; "?" makes it no number.
         text = pc.replace_substring(pc.replace_substring(text, ".", "?"), ",", ".")
     try:
-        return _to_numpy(text.cast(pa.float64()))
+        return arrow.to_numpy(text.cast(pa.float64()))
     except pa.ArrowInvalid:
         return None
 
@@ -129,4 +124,4 @@ def _since_midnight(column: pa.ChunkedArray) -> FloatArray:
 def _ticks_to_seconds(ticks: pa.ChunkedArray, unit: str) -> FloatArray:
     import pyarrow as pa
 
-    return _to_numpy(ticks.cast(pa.float64(), safe=False)) / _PER_SECOND[unit]
+    return arrow.to_numpy(ticks.cast(pa.float64(), safe=False)) / _PER_SECOND[unit]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.geometry import wrap
-from ftproc.core.screening import screen_component, stuck
+from ftproc.core.screening import bar_runs, screen_component, stuck
 from tests import naive
 
 
@@ -120,6 +120,25 @@ def test_duplicate_times_do_no_harm():
     votes, scales = screen_component(np.zeros(40), rng.standard_normal(40), 31, False)
     assert not votes.any()  # all at one instant: no parabola, no verdict
     assert np.isinf(scales).all()
+
+
+@pytest.mark.parametrize(
+    ("votes", "near", "weight"),
+    [
+        ("..xxxx..", "........", "11111111"),  # a curve
+        ("..xxxx..", "..j.....", "11000011"),  # jumps in
+        ("..xxxx..", "......j.", "11000011"),  # jumps out
+        ("..xx....", "........", "11001111"),  # too short for a curve
+        ("xxxxxxxx", "........", "11111111"),
+        ("xxxxxxxx", ".......j", "00000000"),
+        (".xxx..xx", ".j......", "10001100"),
+        ("........", "jjjjjjjj", "11111111"),
+    ],
+)
+def test_runs_that_are_outvoted_need_a_jump(votes, near, weight):
+    found = np.ones(len(votes))
+    bar_runs(np.array([float(v == "x") for v in votes]), np.array([float(v == "j") for v in near]), found)
+    assert "".join(str(int(w)) for w in found) == weight
 
 
 def test_stuck_readings_are_found_but_the_first():

@@ -7,7 +7,7 @@ import pytest
 
 from ftproc.core import motion
 from ftproc.core.forward import Model
-from ftproc.core.smoother import smooth_log
+from ftproc.core.smoother import score_log, smooth_log
 from tests import naive
 from tests.core.tracks import matched
 
@@ -96,6 +96,16 @@ def test_jerk_score_is_the_derivative_by_every_element_of_every_piece():
             step[piece, element] = 1e-3
             numeric = np.diff([likelihood(a, moved(a.model, jerk=sign * step)) for sign in (-1, 1)])[0] / 2e-3
             assert score[piece, element] == pytest.approx(numeric, rel=1e-4, abs=1e-4), (piece, element)
+
+
+def test_scores_alone_are_the_same():
+    a = matched(8, 300, irregular=True, missing=0.1, pieces=3)
+    again = a.starts[0]._replace(sample=140, state=a.truth[140])
+    for starts in (a.starts, [a.starts[0], again]):
+        found, alone = smooth(a, starts=starts), score_log(a.time, a.z, a.weight, a.model, starts)
+        np.testing.assert_allclose(alone.noise, found.noise_score, rtol=1e-10)
+        np.testing.assert_allclose(alone.jerk, found.jerk_score, rtol=1e-10, atol=1e-12)
+        assert alone.log_likelihood == pytest.approx(found.log_likelihood, rel=1e-12)
 
 
 def test_scores_vanish_on_average_at_the_truth():

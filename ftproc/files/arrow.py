@@ -1,0 +1,48 @@
+"""numpy <-> Arrow by their buffers. pyarrow's own conversions load pandas, which takes longer than a small log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..records import FloatArray
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+def to_numpy(column: pa.ChunkedArray) -> FloatArray:
+    """(n,) float64 of a float64 column, NaN where missing; shares memory with a column of one chunk without gaps."""
+    parts = [_chunk(chunk) for chunk in column.chunks if len(chunk)]
+    if len(parts) == 1:
+        return parts[0]
+    return np.concatenate(parts) if parts else np.empty(0)
+
+
+def _chunk(chunk: pa.Array) -> FloatArray:
+    validity, data = chunk.buffers()
+    place = slice(chunk.offset, chunk.offset + len(chunk))
+    values: FloatArray = np.frombuffer(data, np.float64)[place]
+    if not chunk.null_count:
+        return values
+    present = np.unpackbits(np.frombuffer(validity, np.uint8), bitorder="little")[place]
+    return np.where(present == 1, values, np.nan)
+
+
+def from_numpy(values: NDArray[Any]) -> pa.Array:
+    """An Arrow array over the memory of a (n,) array of float64, int64 or uint8."""
+    import pyarrow as pa
+
+    kinds = {"f8": pa.float64(), "i8": pa.int64(), "u1": pa.uint8()}
+    plain = np.ascontiguousarray(values)
+    return pa.Array.from_buffers(kinds[plain.dtype.str[1:]], len(plain), [None, pa.py_buffer(plain)])
+
+
+def table(columns: Mapping[str, NDArray[Any]]) -> pa.Table:
+    """A table of named (n,) arrays."""
+    import pyarrow as pa
+
+    return pa.Table.from_arrays([from_numpy(values) for values in columns.values()], names=list(columns))
