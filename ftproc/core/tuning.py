@@ -8,6 +8,7 @@ knot: where the data say little, neighbours decide.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,11 @@ from numpy.typing import NDArray
 from ftproc.core import ascent
 from ftproc.core.forward import Model, Start
 from ftproc.core.smoother import score_log
+from ftproc.core.start import begin
 
 FloatArray = NDArray[np.float64]
 
+SPANS, SPAN = 8, 512  # of samples: what stands for a long log when one noise and one jerk level are looked for
 NOISE_FLOOR = np.array([1e-3, 1e-7, 1e-7])  # 1-sigma m, rad, rad: below it, rounding of the readings decides
 NOISE_GROWTH = 10.0  # times the noise that the search begins with: more of it is a track gone astray, not noise
 JERK_SIDES = ((1e-7, -1), (1e7, 1))  # m^2/s^5: lowest and highest
@@ -32,6 +35,38 @@ VERTICAL_PRECISION = 0.5  # with which ln(vertical / horizontal jerk) is drawn t
 HORIZONTAL = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.0])
 VERTICAL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 ISOTROPIC = (HORIZONTAL + VERTICAL)[None, :]
+
+
+class Part(NamedTuple):
+    """A representative part of a log: spans of it behind one another, each with a start of its own."""
+
+    time_s: FloatArray
+    measurement: FloatArray
+    weight: FloatArray
+    starts: list[Start]
+
+
+def representative(
+    time_s: FloatArray, measurement: FloatArray, weight: FloatArray, starts: list[Start], noise_variance: FloatArray
+) -> Part:
+    """The whole log if it is short, else SPANS spans spread evenly over it; (n,), (n, 3), (n, 3) in and out."""
+    n = len(time_s)
+    if n <= SPANS * SPAN:
+        return Part(time_s, measurement, weight, starts)
+    chosen: list[NDArray[np.int64]] = []
+    begun: list[Start] = []
+    for first in np.linspace(0, n - SPAN, SPANS).astype(int):
+        span = np.arange(first, first + SPAN)
+        try:
+            start = begin(time_s[span], measurement[span], weight[span], noise_variance)
+        except ValueError:  # a component says nothing in this span
+            continue
+        begun.append(start._replace(sample=sum(len(c) for c in chosen)))
+        chosen.append(span[start.sample :])
+    if not begun:
+        return Part(time_s, measurement, weight, starts)
+    rows = np.concatenate(chosen)
+    return Part(time_s[rows], measurement[rows], weight[rows], begun)
 
 
 def fit_level(
@@ -50,17 +85,18 @@ def fit_level(
     """
     if fix_noise.all() and fix_jerk:
         return guess
+    part = representative(time_s, measurement, weight, starts, guess.noise_variance)
     floor, ceiling = 2 * np.log(NOISE_FLOOR), np.log(guess.noise_variance) + 2 * math.log(NOISE_GROWTH)
     log_noise = np.log(guess.noise_variance)
     log_jerk = np.array([math.log(guess.jerk[0, 0]), math.log(guess.jerk[0, 5] / guess.jerk[0, 0])])
     lowest, highest = (np.array([math.log(bound), side * RATIO_BOUND]) for bound, side in JERK_SIDES)
     lower = np.r_[np.where(fix_noise, log_noise, floor), log_jerk if fix_jerk else lowest]
     upper = np.r_[np.where(fix_noise, log_noise, ceiling), log_jerk if fix_jerk else highest]
-    used = np.maximum((weight > 0).sum(0), 1)
+    used = np.maximum((part.weight > 0).sum(0), 1)
 
     def cost(theta: FloatArray) -> tuple[float, FloatArray]:
         model = Model(np.exp(theta[:3]), shaped(theta[3:4], theta[4]))
-        found = score_log(time_s, measurement, weight, model, starts)
+        found = score_log(*part[:3], model, part.starts)
         by_axis = found.jerk[0] * model.jerk[0]
         pull = VERTICAL_PRECISION * theta[4]
         slope = -np.r_[found.noise, by_axis.sum(), by_axis[5] - pull]
