@@ -63,9 +63,9 @@ def command(logs: tuple[str, ...], output: str | None, list_methods: bool, **giv
         return
     if not logs:
         raise click.UsageError("Name at least one log.", click.get_current_context())
-    from ftproc.cli.startup import spare_blas
+    from ftproc.cli.startup import hasten
 
-    spare_blas()
+    hasten()
     from ftproc.cli import filtering
 
     ctx = click.get_current_context()

@@ -62,6 +62,8 @@ def _plain_numbers(column: pa.ChunkedArray) -> FloatArray | None:
 
     types, kind = pa.types, column.type
     tests = (types.is_integer, types.is_floating, types.is_decimal, types.is_null)
+    if types.is_float64(kind):
+        return arrow.to_numpy(column)  # a cast, even to what it is, loads more of pyarrow
     if not any(test(kind) for test in tests):
         return None
     return arrow.to_numpy(column.cast(pa.float64(), safe=False))

