@@ -142,7 +142,7 @@ def _remarks(s: Mapping[str, Any]) -> list[str]:
     if s["editing_settled"] is False:
         remarks.append("the outlier decisions did not settle: look at the flagged stretches")
     if s["reacquired"]:
-        remarks.append(f"the track was lost and taken up again {s['reacquired']} times")
+        remarks.append(f"the track was taken up anew {s['reacquired']} times (lost, or a gap too long to bridge)")
     if s["correction_largest_m"] > 0:
         remarks.append(
             f"network correction up to {s['correction_largest_m']:.3g} m; "

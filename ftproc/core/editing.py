@@ -16,7 +16,7 @@ from ftproc.core.forward import Model, Start
 from ftproc.core.geometry import unwrap
 from ftproc.core.motion import isotropic
 from ftproc.core.smoother import SmootherRun, smooth_log
-from ftproc.core.start import begin
+from ftproc.core.start import begin_all
 
 FloatArray = NDArray[np.float64]
 
@@ -99,7 +99,8 @@ def edit(
     rates = np.tile(np.array(indicators.START_RATES), (3, 1))
     rounds, settled, coloured_noise = 0, False, False
     while rounds < MAX_ROUNDS and not settled:
-        starts = [begin(time_s, measurement, weight, model.noise_variance)]
+        jerk = None if rounds == 0 and jerk_psd is None else float(model.jerk[0, 0])
+        starts = begin_all(time_s, measurement, weight, model.noise_variance, jerk)
         if coloured_noise:
             model = coloured.fit_coloured(time_s, measurement, weight, starts, model, known, jerk_psd is not None)
             coloured_noise = False  # once is enough; the decisions go on with it
@@ -129,9 +130,9 @@ def _keep_most(decided: FloatArray, screened: FloatArray) -> FloatArray:
     return np.where(lost, screened, decided)
 
 
-def smoothed_start(smoothed: SmootherRun) -> Start:
-    """Where the recursive filter begins over a record that has been smoothed: at the smoothed first state.
+def smoothed_starts(smoothed: SmootherRun) -> list[Start]:
+    """Where the recursive filter begins over a record that has been smoothed: at the smoothed states.
 
-    Its covariance is inflated, because the filter will see the same readings once more.
+    Their covariances are inflated, because the filter will see the same readings once more.
     """
-    return smoothed.head._replace(covariance=START_INFLATION * smoothed.head.covariance)
+    return [head._replace(covariance=START_INFLATION * head.covariance) for head in smoothed.heads]

@@ -144,6 +144,7 @@ def _update_by_gain(
 @kernel
 def run_gated(
     first: int,
+    last: int,
     start: int,
     time: FloatArray,
     z: FloatArray,
@@ -160,9 +161,9 @@ def run_gated(
     track: FloatArray,
     run: FilterRun,
 ) -> tuple[int, float]:
-    """Filter and edit from sample `first` on (x, P in place; the track began at sample `start`).
+    """Filter and edit samples [first, last) (x, P in place; the track began at sample `start`).
 
-    Returns the sample after which the track is lost, not before `retry`, or n; and the log-likelihood of what was
+    Returns the sample at which the track is lost, not before `retry`, or `last`; and the log-likelihood of what was
     used.
     """
     factor, b, h, c = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
@@ -170,8 +171,7 @@ def run_gated(
     pxz, gain, s, s_inv = np.zeros((9, 3)), np.zeros((9, 3)), np.zeros((3, 3)), np.zeros((3, 3))
     full, zero = FULL_AT * gate, ZERO_AT * gate
     likelihood = 0.0
-    n = len(time)
-    for k in range(first, n):
+    for k in range(first, last):
         if k > start:
             piece = motion.knot_index(time[k], time[0], knot_s, jerk.shape[0])
             motion.predict(x, p, time[k] - time[k - 1], jerk[piece], c)
@@ -206,7 +206,7 @@ def run_gated(
         run.since_start[k] = k - start
         if k >= retry and (_wild(x) or (not inside and _overdue(track, time[k], longest_patch_s))):
             return k, likelihood
-    return n, likelihood
+    return last, likelihood
 
 
 @kernel
@@ -229,38 +229,55 @@ def filter_and_edit(
     measurement: FloatArray,
     allowed: FloatArray,
     model: Model,
-    start: Start,
+    starts: list[Start],
     settings: GateSettings,
-) -> tuple[FilterRun, list[int]]:
-    """The recursive filter with recursive editing over a whole log, and the samples at which it re-acquired.
+) -> tuple[FilterRun, list[Start]]:
+    """The recursive filter with recursive editing over a whole log, and every start it made.
 
     time_s (n,), measurement (n, 3); allowed (n, 3): zero bars a reading from the outset (those that the first state
-    was found to contradict); samples before `start` are extrapolated.
+    was found to contradict); starts: at the beginning and after gaps; samples before the first are extrapolated.
     """
     run = empty_run(time_s)
+    begun: list[Start] = []
+    likelihood = 0.0
+    for start, stop in zip(starts, [s.sample for s in starts[1:]] + [len(time_s)], strict=True):
+        likelihood += _follow(start, stop, time_s, measurement, allowed, model, settings, run, begun)
+    lead_in(measurement, model, starts[0], run)
+    return run._replace(log_likelihood=likelihood), begun
+
+
+def _follow(
+    start: Start,
+    stop: int,
+    time_s: FloatArray,
+    measurement: FloatArray,
+    allowed: FloatArray,
+    model: Model,
+    settings: GateSettings,
+    run: FilterRun,
+    begun: list[Start],
+) -> float:
+    """Filter from a start up to sample `stop`, re-acquiring when the track is lost; the log-likelihood."""
+    likelihood, first, retry = 0.0, start.sample, start.sample
+    begun.append(start)
     track = np.zeros((3, 5))
     track[:, 3] = np.nan
     x, p = start.state.copy(), start.covariance.copy()
-    first = began = retry = start.sample
-    reacquired: list[int] = []
-    likelihood = 0.0
-    while first < len(time_s):
+    while first < stop:
         lost, gained = run_gated(
-            first, began, time_s, measurement, model.noise_variance, model.jerk, model.knot_s, settings.gate,
-            settings.longest_patch_s, settings.gain_form, retry, allowed, x, p, track, run,
+            first, stop, begun[-1].sample, time_s, measurement, model.noise_variance, model.jerk, model.knot_s,
+            settings.gate, settings.longest_patch_s, settings.gain_form, retry, allowed, x, p, track, run,
         )  # fmt: skip
         likelihood += gained
-        first = lost + 1
-        retry = lost + RETRY_SAMPLES
-        again = reacquire(time_s, measurement, model.noise_variance, lost) if lost < len(time_s) else None
+        first, retry = lost + 1, lost + RETRY_SAMPLES
+        again = reacquire(time_s, measurement, model.noise_variance, lost) if lost < stop else None
         if again is not None:
-            reacquired.append(lost)
+            begun.append(again)
             x, p = again.state.copy(), again.covariance.copy()
             track[:] = 0.0
             track[:, 3] = np.nan
-            first = began = lost  # the sample is filtered again, from the new state
-    lead_in(measurement, model, start, run)
-    return run._replace(log_likelihood=likelihood), reacquired
+            first = lost  # the sample is filtered again, from the new state
+    return likelihood
 
 
 def reacquire(time_s: FloatArray, measurement: FloatArray, noise_variance: FloatArray, sample: int) -> Start | None:

@@ -43,7 +43,7 @@ class SmootherRun(NamedTuple):
     residual: (n, 3) leave-one-out residual m, rad, rad; NaN where missing. residual_variance: (n, 3) its variance at
     full weight. nis: (n,) of the innovations used in the forward sweep. log_likelihood: of those innovations.
     noise_score: (3,) d log-likelihood / d ln(variance). jerk_score: (m, 6) d log-likelihood / d jerk element.
-    head: smoothed state and covariance at the first start.
+    heads: smoothed state and covariance at each start.
     """
 
     state: FloatArray
@@ -55,7 +55,7 @@ class SmootherRun(NamedTuple):
     log_likelihood: float
     noise_score: FloatArray
     jerk_score: FloatArray
-    head: Start
+    heads: list[Start]
 
 
 @kernel
@@ -317,7 +317,8 @@ def smooth_log(
     state, sigma, los_sigma = np.empty((n, 9)), np.empty((n, 9)), np.empty((n, 6))
     residual, variance, nis = np.empty((n, 3)), np.empty((n, 3)), np.full(n, np.nan)
     noise_score, jerk_score = np.zeros(3), np.zeros_like(model.jerk)
-    likelihood, head = 0.0, starts[0]
+    likelihood = 0.0
+    heads: list[Start] = []
     for start, stop in zip(starts, [s.sample for s in starts[1:]] + [n], strict=True):
         ends = np.empty((2, 9, 9))
         likelihood += _sweep(
@@ -325,10 +326,10 @@ def smooth_log(
             start.state, start.covariance, state, sigma, los_sigma, residual, variance, nis, noise_score, jerk_score,
             ends, False,
         )  # fmt: skip
-        if start is starts[0]:
-            head = Start(start.sample, state[start.sample].copy(), smoothed_covariance(*ends))
+        heads.append(Start(start.sample, state[start.sample].copy(), smoothed_covariance(*ends)))
+    head = heads[0]
     extrapolate_back(
         head.sample, time_s, measurement, model.noise_variance, model.jerk, model.knot_s, head.state.copy(),
         head.covariance.copy(), state, sigma, los_sigma, residual, variance,
     )  # fmt: skip
-    return SmootherRun(state, sigma, los_sigma, residual, variance, nis, likelihood, noise_score, jerk_score, head)
+    return SmootherRun(state, sigma, los_sigma, residual, variance, nis, likelihood, noise_score, jerk_score, heads)

@@ -3,6 +3,8 @@ gates need (a wrong one locks them out), done with a whole window in view."""
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,9 @@ FloatArray = NDArray[np.float64]
 SAMPLES = 15  # good readings of each component wanted for the first fit,
 LONGEST_FIT_S = 20.0  # if they lie so close together
 LONGEST_REACH_S = 3.0  # back from the first good readings to the first sample
+GAP_INTERVALS, GAP_S = 20, 5.0  # median intervals and seconds: a longer one is a gap
+WIDEST_BRIDGE = 0.06  # of the range
+FEWEST_READINGS = 8  # of each component after a gap, for a start of its own
 CURVE = 5  # readings that show a curve
 INFLATION = 3.0  # on every sigma of the first state: its readings are filtered again, so it must weigh little
 ACCELERATION_MPS2 = 30.0  # 1-sigma of an acceleration about which nothing is known
@@ -22,7 +27,7 @@ WIDEST_IN_RANGES = 0.1  # the position must not be so vague that the target may 
 
 
 def begin(time_s: FloatArray, measurement: FloatArray, weight: FloatArray, noise_variance: FloatArray) -> Start:
-    """The start of a whole log: at its first sample, or, when that would mean reaching back far, where every
+    """The start of a record: at its first sample, or, when that would mean reaching back far, where every
     component has been seen once. Arguments and errors as in `first_state`."""
     good = (weight > 0) & np.isfinite(measurement)
     if not good.any(0).all():
@@ -31,6 +36,43 @@ def begin(time_s: FloatArray, measurement: FloatArray, weight: FloatArray, noise
     if time_s[sample] - time_s[0] <= LONGEST_REACH_S:
         sample = 0
     return first_state(time_s, measurement, weight, noise_variance, sample, 0, len(time_s))
+
+
+def begin_all(
+    time_s: FloatArray,
+    measurement: FloatArray,
+    weight: FloatArray,
+    noise_variance: FloatArray,
+    jerk_psd: float | None,
+) -> list[Start]:
+    """The start of a log, and one more after every gap that is too long to bridge.
+
+    A gap of G seconds is too long when the position has by its end become vague by a noticeable share of the range,
+    sqrt(q G^5 / 20) > WIDEST_BRIDGE R: a filter that came through it would linearise about a wrong place. With
+    jerk_psd None (m^2/s^5, not known yet) every real gap is taken to be so. Arguments and errors as in `first_state`.
+    """
+    starts = [begin(time_s, measurement, weight, noise_variance)]
+    edges = [*_gaps(time_s), len(time_s)]
+    for low, high in itertools.pairwise(edges):
+        good = (weight[low:high] > 0) & np.isfinite(measurement[low:high])
+        if low <= starts[-1].sample or (good.sum(0) < FEWEST_READINGS).any():
+            continue
+        if jerk_psd is not None:
+            gap = time_s[low] - time_s[low - 1]
+            slant = float(np.median(measurement[low:high, 0][good[:, 0]]))
+            if np.sqrt(jerk_psd * gap**5 / 20) <= WIDEST_BRIDGE * slant:
+                continue
+        starts.append(first_state(time_s, measurement, weight, noise_variance, low, low, high))
+    return starts
+
+
+def _gaps(time_s: FloatArray) -> list[int]:
+    """The first sample after each gap."""
+    interval = np.diff(time_s)
+    if not len(interval):
+        return []
+    longest = max(GAP_INTERVALS * float(np.median(interval)), GAP_S)
+    return [int(k) + 1 for k in np.flatnonzero(interval > longest)]
 
 
 def first_state(

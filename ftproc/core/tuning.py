@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ftproc.core import ascent
 from ftproc.core.forward import Model, Start
 from ftproc.core.smoother import score_log
-from ftproc.core.start import begin
+from ftproc.core.start import begin_all
 
 FloatArray = NDArray[np.float64]
 
@@ -58,11 +58,13 @@ def representative(
     for first in np.linspace(0, n - SPAN, SPANS).astype(int):
         span = np.arange(first, first + SPAN)
         try:
-            start = begin(time_s[span], measurement[span], weight[span], noise_variance)
+            inside = begin_all(time_s[span], measurement[span], weight[span], noise_variance, None)
         except ValueError:  # a component says nothing in this span
             continue
-        begun.append(start._replace(sample=sum(len(c) for c in chosen)))
-        chosen.append(span[start.sample :])
+        skipped = inside[0].sample
+        shift = sum(len(c) for c in chosen) - skipped
+        begun += [start._replace(sample=start.sample + shift) for start in inside]
+        chosen.append(span[skipped:])
     if not begun:
         return Part(time_s, measurement, weight, starts)
     rows = np.concatenate(chosen)

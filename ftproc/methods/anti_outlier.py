@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 
 from ftproc.core import editing, forward, gate, indicators, tuning
-from ftproc.core.forward import FilterRun, Model, Start
+from ftproc.core.forward import Model, Start
 from ftproc.core.motion import isotropic
 from ftproc.core.smoother import SmootherRun, smooth_log
-from ftproc.core.start import begin
+from ftproc.core.start import begin_all
 from ftproc.methods.estimate import Estimate, Readings
 from ftproc.records import MISSING, FlagArray, FloatArray
 from ftproc.settings import FilterSettings
@@ -32,35 +32,41 @@ def estimate(readings: Readings, settings: FilterSettings) -> Estimate:
 
 def unedited(readings: Readings, settings: FilterSettings, extended: bool = False) -> Estimate:
     """The plain UKF (or EKF): every reading is used. Noise and jerk come from the readings that screening trusts."""
-    model, start, _ = prepare(readings, settings)
+    model, starts, _ = prepare(readings, settings)
     weight = np.isfinite(readings.measurement).astype(float)
-    run = forward.filter_log(*readings[:2], weight, model, [start], extended)
-    return Estimate(run, _labels(weight, readings), model, _smoothed(readings, settings, weight, model, [start]))
+    run = forward.filter_log(*readings[:2], weight, model, starts, extended)
+    smoothed = _smoothed(readings, settings, weight, model, starts)
+    return Estimate(run, _labels(weight, readings), model, smoothed, _anew(starts))
 
 
-def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, Start, FloatArray]:
-    """Noise and jerk level, first state and screening weights (n, 3) of a log, without deciding on its outliers."""
+def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[Start], FloatArray]:
+    """Noise and jerk level, starts and screening weights (n, 3) of a log, without deciding on its outliers."""
     time_s, measurement, _ = readings
     weight, sigma = editing.screen(time_s, measurement)
     given = _given(readings, settings)
     guess = Model(np.where(np.isfinite(given), given, sigma) ** 2, isotropic(settings.jerk_psd_m2ps5 or 1.0))
-    start = begin(time_s, measurement, weight, guess.noise_variance)
+    starts = begin_all(time_s, measurement, weight, guess.noise_variance, settings.jerk_psd_m2ps5)
     fixed = np.isfinite(given)
-    model = tuning.fit_level(time_s, measurement, weight, [start], guess, fixed, settings.jerk_psd_m2ps5 is not None)
-    return model, start, weight
+    model = tuning.fit_level(time_s, measurement, weight, starts, guess, fixed, settings.jerk_psd_m2ps5 is not None)
+    return model, begin_all(time_s, measurement, weight, model.noise_variance, float(model.jerk[0, 0])), weight
 
 
 def _two_pass(readings: Readings, settings: FilterSettings) -> Estimate:
     edited = editing.edit(*readings[:2], _given(readings, settings), settings.jerk_psd_m2ps5, settings.gate)
-    start = editing.smoothed_start(edited.smoothed)
-    run = forward.filter_log(*readings[:2], edited.weight, edited.model, [start])
+    starts = editing.smoothed_starts(edited.smoothed)
+    run = forward.filter_log(*readings[:2], edited.weight, edited.model, starts)
     smoothed = edited.smoothed if settings.smooth else None
-    return Estimate(run, _labels(edited.weight, readings), edited.model, smoothed, settled=edited.settled)
+    labels = _labels(edited.weight, readings)
+    return Estimate(run, labels, edited.model, smoothed, _anew(starts), edited.settled)
+
+
+def _anew(starts: list[Start]) -> tuple[int, ...]:
+    return tuple(start.sample for start in starts[1:])
 
 
 def _recursive(readings: Readings, settings: FilterSettings) -> Estimate:
     time_s, measurement, _ = readings
-    model, start, screened = prepare(readings, settings)
+    model, starts, screened = prepare(readings, settings)
     allowed = np.ones_like(measurement)
     first = slice(0, max(editing.WINDOWS))  # the window that the first state was found in
     allowed[first] = screened[first]
@@ -69,19 +75,10 @@ def _recursive(readings: Readings, settings: FilterSettings) -> Estimate:
         interval = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
         longest = max(DEFAULT_PATCH_S, DEFAULT_PATCH_SAMPLES * interval)
     how = gate.GateSettings(settings.gate, longest, settings.gain_form)
-    run, reacquired = gate.filter_and_edit(time_s, measurement, allowed, model, start, how)
+    run, begun = gate.filter_and_edit(time_s, measurement, allowed, model, starts, how)
     kept = np.where(run.weight > gate.rejection_weight(settings.gate), 1.0, 0.0)
-    smoothed = _smoothed(readings, settings, kept, model, _restarts(run, start, reacquired))
-    return Estimate(run, _labels(kept, readings), model, smoothed, tuple(reacquired))
-
-
-def _restarts(run: FilterRun, start: Start, reacquired: list[int]) -> list[Start]:
-    """Where a smoother over the same record begins: it must not run through a re-acquisition."""
-    again: list[Start] = []
-    for sample in reacquired:
-        variance = (editing.START_INFLATION * run.sigma[sample]) ** 2
-        again.append(Start(sample, run.state[sample].copy(), np.diag(variance)))
-    return [start, *(s for s in again if s.sample > start.sample)]
+    smoothed = _smoothed(readings, settings, kept, model, begun)
+    return Estimate(run, _labels(kept, readings), model, smoothed, _anew(begun))
 
 
 def _given(readings: Readings, settings: FilterSettings) -> FloatArray:
