@@ -25,6 +25,8 @@ WINDOWS = (31, 75)  # samples: the short one follows manoeuvres, the long one se
 MAX_ROUNDS = 8
 TUNING_ROUNDS = 3
 FIRST_JERK = 1.0  # m^2/s^5, where the search begins
+SECOND_LOOKS = 2
+STANDS_OUT = 8.0  # times the median of the jerk profile
 FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
 FEWEST_KEPT = 0.5  # share of what screening trusts that must survive the decisions, in each component
 START_INFLATION = 2.0  # on the covariance of a smoothed state that starts a filter over the same record
@@ -81,6 +83,30 @@ def stuck_readings(measurement: FloatArray, sigma: FloatArray) -> NDArray[np.boo
     return np.stack([screening.stuck(measurement[:, c], float(sigma[c])) for c in range(3)], 1)
 
 
+class _Record(NamedTuple):
+    """What stays the same while the decisions are made: the log, the readings that may be good at all (n, 3), what
+    screening trusts (n, 3), which noises are given (3,), whether the jerk is, and the gate in sigmas."""
+
+    time_s: FloatArray
+    measurement: FloatArray
+    possible: NDArray[np.bool_]
+    screened: FloatArray
+    known: NDArray[np.bool_]
+    fix_jerk: bool
+    gate: float
+
+
+class _Decision(NamedTuple):
+    """Weights (n, 3), the model and starts they were made with, outlier rates, rounds taken, whether they settled."""
+
+    weight: FloatArray
+    model: Model
+    starts: list[Start]
+    rates: FloatArray
+    rounds: int = 0
+    settled: bool = False
+
+
 def edit(
     time_s: FloatArray, measurement: FloatArray, given_sigma: FloatArray, jerk_psd: float | None, gate: float
 ) -> Edited:
@@ -92,35 +118,64 @@ def edit(
     """
     screened, sigma = screen(time_s, measurement)
     possible = np.isfinite(measurement) & ~stuck_readings(measurement, sigma)
-    weight = screened = screened * possible
     known = np.isfinite(given_sigma)
+    record = _Record(time_s, measurement, possible, screened * possible, known, jerk_psd is not None, gate)
     first_jerk = FIRST_JERK if jerk_psd is None else jerk_psd
     model = Model(np.where(known, given_sigma, sigma) ** 2, isotropic(first_jerk))
     rates = np.tile(np.array(indicators.START_RATES), (3, 1))
-    rounds, settled, coloured_noise = 0, False, False
+    starts = begin_all(time_s, measurement, record.screened, model.noise_variance, jerk_psd)
+    decision = _decide(record, _Decision(record.screened, model, starts, rates), tune_first=True)
+    if jerk_psd is None:
+        decision = _follow_flight(record, decision)
+    smoothed = smooth_log(time_s, measurement, decision.weight, decision.model, decision.starts)
+    return Edited(*decision[:3], smoothed, *decision[3:])
+
+
+def _decide(record: _Record, begun: _Decision, tune_first: bool) -> _Decision:
+    """Tune, smooth and classify by turns until the decisions stand still."""
+    time_s, measurement = record[:2]
+    weight, model, starts, rates = begun.weight, begun.model, begun.starts, begun.rates.copy()
+    rounds, settled, is_coloured = 0, False, bool(begun.model.correlation.any())
     while rounds < MAX_ROUNDS and not settled:
-        jerk = None if rounds == 0 and jerk_psd is None else float(model.jerk[0, 0])
-        starts = begin_all(time_s, measurement, weight, model.noise_variance, jerk)
-        if coloured_noise:
-            model = coloured.fit_coloured(time_s, measurement, weight, starts, model, known, jerk_psd is not None)
-            coloured_noise = False  # once is enough; the decisions go on with it
-        elif rounds < TUNING_ROUNDS:
-            model = tuning.fit_level(time_s, measurement, weight, starts, model, known, jerk_psd is not None)
+        tuning_round = rounds < TUNING_ROUNDS and (tune_first or rounds > 0) and not model.correlation.any()
+        if is_coloured and not model.correlation.any():
+            model = coloured.fit_coloured(time_s, measurement, weight, starts, model, record.known, record.fix_jerk)
+            is_coloured = False  # once is enough; the decisions go on with it
+        elif tuning_round:
+            model = tuning.fit_level(time_s, measurement, weight, starts, model, record.known, record.fix_jerk)
         smoothed = smooth_log(time_s, measurement, weight, model, starts)
         variance = smoothed.residual_variance - model.noise_variance + model.reading_variance
-        good = indicators.classify(smoothed.residual, variance, model.reading_variance, rates, gate)
-        decided = _keep_most(((good > 0.5) & possible).astype(float), screened)
+        good = indicators.classify(smoothed.residual, variance, model.reading_variance, rates, record.gate)
+        decided = _keep_most(((good > 0.5) & record.possible).astype(float), record.screened)
         settled = bool((decided == weight).all()) and rounds + 1 >= TUNING_ROUNDS
         weight = decided
         rounds += 1
         if rounds == TUNING_ROUNDS and not model.correlation.any():
             correlation = coloured.moments(smoothed, weight, model.noise_variance)[1]
-            coloured_noise = coloured.is_correlated(correlation, weight)
-            settled = settled and not coloured_noise
-    if jerk_psd is None:
-        model = tuning.fit_profile(time_s, measurement, weight, starts, model)
-    smoothed = smooth_log(time_s, measurement, weight, model, starts)
-    return Edited(weight, model, starts, smoothed, rates, rounds, settled)
+            is_coloured = coloured.is_correlated(correlation, weight)
+            settled = settled and not is_coloured
+        starts = begin_all(time_s, measurement, weight, model.noise_variance, float(model.jerk[0, 0]))
+    return _Decision(weight, model, starts, rates, begun.rounds + rounds, settled)
+
+
+def _follow_flight(record: _Record, decision: _Decision) -> _Decision:
+    """Give the model a jerk profile, and look again at what made it jump.
+
+    A patch that escaped makes the level too high for all, so that it goes on escaping. Where the profile stands out,
+    the decisions are made once more from its median on, which no single event can move.
+    """
+    for look in range(SECOND_LOOKS + 1):
+        profile = tuning.fit_profile(*record[:2], decision.weight, decision.starts, decision.model)
+        level = float(np.median(profile.jerk[:, 0]))
+        stands_out = float(profile.jerk[:, 0].max()) > STANDS_OUT * level
+        if look == SECOND_LOOKS or not stands_out:
+            break
+        calm = profile._replace(jerk=level * profile.jerk[:1] / profile.jerk[0, 0], knot_s=np.inf)
+        again = _decide(record, decision._replace(model=calm), tune_first=False)
+        if (again.weight == decision.weight).all():
+            break
+        decision = again
+    return decision._replace(model=profile)
 
 
 def _keep_most(decided: FloatArray, screened: FloatArray) -> FloatArray:
