@@ -117,7 +117,7 @@ def _provenance(
     """Everything needed to make the trajectory again."""
     from ftproc.correction.model import sha256
 
-    sigma = np.sqrt(estimate.model.noise_variance)
+    sigma = np.sqrt(estimate.model.reading_variance)
     knots = estimate.model.jerk[:, 0]
     return {
         "program": "ftproc",
@@ -137,6 +137,7 @@ def _provenance(
             "noise_range_m": float(sigma[0]),
             "noise_azimuth_rad": float(sigma[1]),
             "noise_elevation_rad": float(sigma[2]),
+            "noise_correlation": [float(r) for r in estimate.model.correlation],
             "jerk_psd_m2ps5": [float(q) for q in knots],
             "jerk_knot_s": float(estimate.model.knot_s) if len(knots) > 1 else None,
         },

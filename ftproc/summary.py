@@ -35,7 +35,8 @@ def summarise(
             "patch": int((label[:, c] == PATCH).sum()),
             "missing": int((label[:, c] == MISSING).sum()),
             "longest_patch_s": _longest_patch(log.time_s, label[:, c]),
-            f"noise_{UNITS[c]}": float(np.sqrt(estimate.model.noise_variance[c])) if c not in absent else None,
+            f"noise_{UNITS[c]}": float(np.sqrt(estimate.model.reading_variance[c])) if c not in absent else None,
+            "noise_correlation": float(estimate.model.correlation[c]),
             "innovation_ratio": ratio,
             "verdict": _verdict(ratio),
         }
@@ -139,6 +140,11 @@ def _remarks(s: Mapping[str, Any]) -> list[str]:
     if s["not_observable"]:
         names = " and ".join(s["not_observable"])
         remarks.append(f"{names} missing throughout: position and velocity are not observable and left empty")
+    correlation = max(part["noise_correlation"] for part in s["components"].values())
+    if correlation > 0:
+        remarks.append(
+            f"the noise is correlated from sample to sample (up to {correlation:.2f}); the sigmas allow for it"
+        )
     if s["editing_settled"] is False:
         remarks.append("the outlier decisions did not settle: look at the flagged stretches")
     if s["reacquired"]:

@@ -65,6 +65,13 @@ def test_times_gaps_and_noise(dirty):
     assert 0 < jerk["lowest"] <= jerk["median"] <= jerk["highest"]
 
 
+@pytest.mark.xfail(reason="correlated noise is shown as the white noise of the same effect, 2 to 3 times too large")
+def test_noise_shown_is_that_of_a_reading_even_if_correlated():
+    flight = simulate("cruise", seed=0, duration_s=150.0, outliers="correlation=0.5")
+    components = figures(pipeline.filter_log(flight.log))["components"]
+    assert components["range"]["noise_m"] == pytest.approx(flight.sigma[0], rel=0.2)
+
+
 def test_consistent_filter_is_called_so(dirty):
     s = figures(dirty[1])
     for name in COMPONENTS:
@@ -138,7 +145,7 @@ def test_text_reports_reacquisition_and_correction():
     trajectory = pipeline.filter_log(replace(flight.log, measurement=z), FilterSettings(editing="forward"))
     times = figures(trajectory)["reacquired"]
     assert times >= 1
-    assert f"the track was lost and taken up again {times} time" in summary.text(trajectory)
+    assert f"the track was taken up anew {times} times" in summary.text(trajectory)
     corrected = replace(
         trajectory,
         metadata={

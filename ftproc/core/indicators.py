@@ -19,7 +19,7 @@ from ftproc.core.jit import kernel
 FloatArray = NDArray[np.float64]
 
 WIDE = 25.0  # 1-sigma of a bad reading, in sigmas of the noise
-NATURAL_GATE = 4.0  # sigmas at which the chain gives up a lone reading, about; another gate shifts the odds
+NATURAL_GATE = 4.0  # sigmas at which the chain gives up a lone reading, about; another gate stretches the scale
 START_RATES = (0.02, 0.001, 0.92)  # isolated outlier; patch begins; patch goes on
 MAX_RATES = (0.4, 0.02, 0.98)
 MIN_STAY = 0.7
@@ -32,7 +32,7 @@ def _chain(
     residual: FloatArray,
     variance: FloatArray,
     noise: float,
-    odds: float,
+    stretch: float,
     rates: FloatArray,
     good: FloatArray,
     counts: FloatArray,
@@ -49,8 +49,9 @@ def _chain(
     for k in range(n):
         if not math.isfinite(residual[k]):
             continue
-        wide = variance[k] + WIDE * WIDE * noise
-        ratio = odds + 0.5 * residual[k] ** 2 * (1 / variance[k] - 1 / wide) - 0.5 * math.log(wide / variance[k])
+        narrow = stretch * variance[k]
+        wide = narrow + WIDE * WIDE * noise
+        ratio = 0.5 * residual[k] ** 2 * (1 / narrow - 1 / wide) - 0.5 * math.log(wide / narrow)
         likely[k, 0] = math.exp(min(0.0, -ratio))
         likely[k, 1] = math.exp(min(0.0, ratio))
         total = 0.0
@@ -109,13 +110,13 @@ def classify(
 
     residual, variance: (n, 3) leave-one-out, from the smoother; noise_variance (3,). gate: sigmas.
     """
-    odds = 0.5 * (NATURAL_GATE**2 - gate**2)
+    stretch = (gate / NATURAL_GATE) ** 2
     n = residual.shape[0]
     good, counts, column = np.zeros((n, 3)), np.zeros((3, 3)), np.zeros(n)
     for c in range(3):
         r, v = residual[:, c].copy(), variance[:, c].copy()
         for _ in range(ROUNDS):
-            _chain(r, v, noise_variance[c], odds, rates[c], column, counts)
+            _chain(r, v, noise_variance[c], stretch, rates[c], column, counts)
             _learn(counts, rates[c])
         for k in range(n):
             good[k, c] = column[k]

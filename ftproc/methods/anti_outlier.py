@@ -5,6 +5,8 @@ The network's correction (section 2.2) works on its output and is added by the p
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 
 from ftproc.core import editing, forward, gate, indicators, tuning
@@ -16,6 +18,7 @@ from ftproc.methods.estimate import Estimate, Readings
 from ftproc.records import MISSING, FlagArray, FloatArray
 from ftproc.settings import FilterSettings
 
+HEAD = 256  # samples at the beginning of a log that a recursive filter is given time to look at
 LONGEST_ISOLATED = 2  # readings rejected in a row; more make a patch
 DEFAULT_PATCH_S = 4.0
 DEFAULT_PATCH_SAMPLES = 32  # the longest patch expected is the longer of the two
@@ -40,10 +43,19 @@ def unedited(readings: Readings, settings: FilterSettings, extended: bool = Fals
 
 
 def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[Start], FloatArray]:
-    """Noise and jerk level, starts and screening weights (n, 3) of a log, without deciding on its outliers."""
+    """Noise and jerk level, starts and weights (n, 3) of a log, without deciding on its outliers.
+
+    Only the head of the log is edited with all of itself in view, because a recursion cannot repair a wrong start;
+    further on the weights are those of the screening, and serve to find noise and jerk.
+    """
     time_s, measurement, _ = readings
     weight, sigma = editing.screen(time_s, measurement)
     given = _given(readings, settings)
+    with contextlib.suppress(ValueError):  # too little in the head: the screening has to do
+        head = editing.edit(time_s[:HEAD], measurement[:HEAD], given, settings.jerk_psd_m2ps5, settings.gate)
+        weight[:HEAD] = head.weight
+        if len(time_s) <= HEAD:
+            sigma = np.sqrt(head.model.noise_variance)
     guess = Model(np.where(np.isfinite(given), given, sigma) ** 2, isotropic(settings.jerk_psd_m2ps5 or 1.0))
     starts = begin_all(time_s, measurement, weight, guess.noise_variance, settings.jerk_psd_m2ps5)
     fixed = np.isfinite(given)
@@ -66,10 +78,9 @@ def _anew(starts: list[Start]) -> tuple[int, ...]:
 
 def _recursive(readings: Readings, settings: FilterSettings) -> Estimate:
     time_s, measurement, _ = readings
-    model, starts, screened = prepare(readings, settings)
+    model, starts, edited = prepare(readings, settings)
     allowed = np.ones_like(measurement)
-    first = slice(0, max(editing.WINDOWS))  # the window that the first state was found in
-    allowed[first] = screened[first]
+    allowed[:HEAD] = edited[:HEAD]
     longest = settings.max_patch_s
     if longest is None:
         interval = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0

@@ -12,10 +12,12 @@ from tests import naive
 from tests.core.tracks import SIGMA, matched, position_error
 
 
-def edit(a, z=None, start=None, allowed=None, **settings):
-    z = a.z if z is None else z
-    how = gate.GateSettings(**settings)
-    return gate.filter_and_edit(a.time, z, a.weight if allowed is None else allowed, a.model, start or a.starts[0], how)
+def edit(a, z=None, starts=None, allowed=None, **settings):
+    """The run, and the samples at which the filter began anew."""
+    z, allowed, starts = a.z if z is None else z, a.weight if allowed is None else allowed, starts or a.starts
+    run, begun = gate.filter_and_edit(a.time, z, allowed, a.model, starts, gate.GateSettings(**settings))
+    assert begun[0] is starts[0]
+    return run, [start.sample for start in begun[1:]]
 
 
 def spoiled(a, rows, error, component=slice(None)):
@@ -140,7 +142,7 @@ def test_step_bias_is_followed_in_the_end(components, seed):
 def test_wrong_first_state_is_replaced():
     a = matched(3, 300, q=20.0)
     wrong = Start(0, a.truth[0] + np.r_[500.0, -300, 200, np.zeros(6)], a.starts[0].covariance)
-    run, again = edit(a, start=wrong)
+    run, again = edit(a, starts=[wrong])
     assert len(again) == 1
     assert position_error(run.state, a.truth)[-100:].mean() < 5
     assert run.since_start[again[0]] == 0
@@ -155,10 +157,22 @@ def test_barred_readings_are_not_used():
 
 def test_samples_before_the_start_are_extrapolated():
     a = matched(5, 100)
-    run, _ = edit(a, start=Start(20, a.truth[20], a.starts[0].covariance))
+    run, _ = edit(a, starts=[Start(20, a.truth[20], a.starts[0].covariance)])
     assert not run.weight[:20].any()
     assert np.isfinite(run.state).all()
     np.testing.assert_allclose(run.state[0], naive.transition(-2.0) @ a.truth[20], rtol=1e-9)
+
+
+def test_record_after_a_start_does_not_know_the_one_before():
+    a = matched(9, 200, q=20.0)
+    again = Start(120, a.truth[120], a.starts[0].covariance)
+    run, begun = edit(a, spoiled(a, slice(90, 120), np.full(3, 50.0)), starts=[a.starts[0], again])
+    rest = a._replace(time=a.time[120:], z=a.z[120:], weight=a.weight[120:])
+    alone, _ = edit(rest, starts=[again._replace(sample=0)])
+    assert begun[-1] == 120
+    np.testing.assert_allclose(run.state[120:], alone.state, rtol=1e-12)
+    np.testing.assert_array_equal(run.weight[120:], alone.weight)
+    np.testing.assert_array_equal(run.since_start[120:], np.arange(80))
 
 
 def test_longest_patch_is_what_was_said():

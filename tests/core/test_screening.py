@@ -86,6 +86,18 @@ def test_azimuth_across_the_cut():
     assert flagged(t, z, angular=True)[bad].all()
 
 
+def test_hovering_at_the_cut():
+    """Noise makes the azimuth of a target straight behind the station jump to and fro by a whole turn."""
+    rng = np.random.default_rng(13)
+    t = 0.1 * np.arange(300)
+    z = wrap(np.pi + 1e-4 * rng.standard_normal(300))
+    z[[40, 170]] = wrap(z[[40, 170]] + 0.002)
+    votes, scales = screen_component(t, z, 31, True)
+    assert scales.max() < 3e-4
+    assert (votes[[40, 170]] > 0.5).all()
+    assert (votes > 0.5).sum() < 5
+
+
 def test_missing_readings_are_stepped_over():
     rng = np.random.default_rng(7)
     t, z = parabola(300)
@@ -173,8 +185,11 @@ def test_long_run_of_a_rounded_reading_is_stuck():
 
 def test_sample_and_hold_is_not_stuck():
     """Each reading repeated five times: sampled faster than measured."""
-    z = np.repeat(1000 + np.cumsum(np.random.default_rng(12).uniform(1, 2, 100)), 5)
+    z = np.repeat(1000 + 0.3 * np.arange(100) + np.random.default_rng(12).standard_normal(100), 5)
     assert not stuck(z, 1.0).any()
+    once = z[::5].copy()
+    once[50:55] = once[50]
+    assert stuck(once, 1.0).sum() == 4  # that many repeats, if they come alone, are stuck
 
 
 @pytest.mark.parametrize("z", [[], [1.0], [1.0, 1.0], [np.nan] * 5, [2.0] * 50])

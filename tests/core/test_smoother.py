@@ -99,7 +99,10 @@ def test_segments_are_independent():
     np.testing.assert_allclose(both.noise_score, first.noise_score + rest.noise_score)
     np.testing.assert_allclose(both.jerk_score, first.jerk_score + rest.jerk_score)
     assert both.log_likelihood == pytest.approx(first.log_likelihood + rest.log_likelihood)
-    np.testing.assert_array_equal(both.head.state, first.head.state)
+    np.testing.assert_array_equal([head.sample for head in both.heads], [0, 90])
+    for found, alone in zip(both.heads, (first.heads[0], rest.heads[0]), strict=True):
+        np.testing.assert_allclose(found.state, alone.state, rtol=1e-12)
+        np.testing.assert_allclose(found.covariance, alone.covariance, rtol=1e-6)
 
 
 def test_head_and_extrapolation_before_the_first_start():
@@ -109,7 +112,7 @@ def test_head_and_extrapolation_before_the_first_start():
         a, time=a.time[15:], z=a.z[15:], weight=a.weight[15:], starts=[Start(0, a.truth[15], a.starts[0].covariance)]
     )  # fmt: skip
     np.testing.assert_array_equal(found.state[15:], late.state)
-    head = found.head
+    (head,) = found.heads
     assert head.sample == 15
     np.testing.assert_array_equal(head.state, found.state[15])
     np.testing.assert_allclose(np.sqrt(np.diag(head.covariance)), found.sigma[15], rtol=1e-6)

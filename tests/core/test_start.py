@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.geometry import from_cartesian, wrap
-from ftproc.core.start import begin, first_state
+from ftproc.core.start import begin, begin_all, first_state
 from tests.core.tracks import SIGMA, matched
 
 NOISE = SIGMA**2
@@ -154,3 +154,43 @@ def test_position_is_never_so_vague_that_it_may_lie_behind_the_station():
     z = from_cartesian(np.array([[40.0, 30.0, 10.0]]))
     start = begin(np.zeros(1), z, np.ones((1, 3)), np.array([1e4, 1.0, 1.0]))
     assert np.sqrt(np.linalg.eigvalsh(start.covariance[:3, :3]).max()) < 0.5 * 51
+
+
+def interrupted(gap, n=80, after=60):
+    """A straight flight with a gap of so many seconds after n samples."""
+    time = 0.1 * np.arange(n + after)
+    time[n:] += gap
+    p = np.array([6000.0, -2000.0, 900.0]) + time[:, None] * np.array([-60.0, 30.0, 0.0])
+    z = from_cartesian(p) + SIGMA * np.random.default_rng(3).standard_normal((n + after, 3))
+    z[:, 1] = wrap(z[:, 1])
+    return time, z, np.hstack([p, np.tile([-60.0, 30.0, 0.0], (n + after, 1))])
+
+
+@pytest.mark.parametrize(
+    ("gap", "jerk", "anew"),
+    [(0.0, None, False), (4.0, None, False), (30.0, None, True), (30.0, 1e-3, False), (30.0, 10.0, True),
+     (300.0, 1e-3, True)],
+)  # fmt: skip
+def test_record_begins_anew_after_a_gap_too_long_to_bridge(gap, jerk, anew):
+    """The position is vague by sqrt(q gap^5 / 20); without a jerk level every gap of more than 5 s counts."""
+    time, z, truth = interrupted(gap)
+    starts = begin_all(time, z, seen(z), NOISE, jerk)
+    assert [start.sample for start in starts] == ([0, 80] if anew else [0])
+    for start in starts:
+        assert inside(start, truth[start.sample])
+
+
+def test_too_few_readings_after_a_gap_are_no_start():
+    time, z, _ = interrupted(300.0, after=5)
+    assert len(begin_all(time, z, seen(z), NOISE, None)) == 1
+    time, z, _ = interrupted(300.0)
+    z[84:, 1] = np.nan
+    assert len(begin_all(time, z, seen(z), NOISE, None)) == 1
+
+
+def test_start_after_a_gap_rests_on_its_own_side_only():
+    time, z, _ = interrupted(300.0)
+    spoiled = z.copy()
+    spoiled[:80] += 0.05
+    one, other = (begin_all(time, readings, seen(z), NOISE, None)[1] for readings in (z, spoiled))
+    np.testing.assert_array_equal(one.state, other.state)

@@ -120,7 +120,6 @@ def test_gap_of_minutes_with_recursive_editing(path, seconds, smooth):
     assert (trajectory.sigma > 0).all()
 
 
-@pytest.mark.xfail(reason="two-pass editing loses the track in a gap of minutes and does not find it again")
 @pytest.mark.parametrize("smooth", [False, True])
 @pytest.mark.parametrize("seconds", [120.0, 400.0])
 @pytest.mark.parametrize("path", ["orbit", "receding", "helix"])
