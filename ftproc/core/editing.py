@@ -26,6 +26,7 @@ MAX_ROUNDS = 8
 TUNING_ROUNDS = 3
 FIRST_JERK = 1.0  # m^2/s^5, where the search begins
 SECOND_LOOKS = 2
+LOOK_STEPS, FINAL_STEPS = 4, 5  # of the search for the jerk profile
 STANDS_OUT = 8.0  # times the median of the jerk profile
 FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
 FEWEST_KEPT = 0.5  # share of what screening trusts that must survive the decisions, in each component
@@ -164,18 +165,21 @@ def _follow_flight(record: _Record, decision: _Decision) -> _Decision:
     A patch that escaped makes the level too high for all, so that it goes on escaping. Where the profile stands out,
     the decisions are made once more from its median on, which no single event can move.
     """
-    for look in range(SECOND_LOOKS + 1):
-        profile = tuning.fit_profile(*record[:2], decision.weight, decision.starts, decision.model)
+    log = record[:2]
+    for _ in range(SECOND_LOOKS):
+        profile = tuning.fit_profile(*log, decision.weight, decision.starts, decision.model, LOOK_STEPS)
         level = float(np.median(profile.jerk[:, 0]))
-        stands_out = float(profile.jerk[:, 0].max()) > STANDS_OUT * level
-        if look == SECOND_LOOKS or not stands_out:
+        if profile.jerk[:, 0].max() < STANDS_OUT * level:
             break
         calm = profile._replace(jerk=level * profile.jerk[:1] / profile.jerk[0, 0], knot_s=np.inf)
         again = _decide(record, decision._replace(model=calm), tune_first=False)
         if (again.weight == decision.weight).all():
             break
         decision = again
-    return decision._replace(model=profile)
+    else:
+        profile = tuning.fit_profile(*log, decision.weight, decision.starts, decision.model, LOOK_STEPS)
+    profile = tuning.fit_profile(*log, decision.weight, decision.starts, profile, FINAL_STEPS)
+    return decision._replace(model=tuning.with_allowance(profile))
 
 
 def _keep_most(decided: FloatArray, screened: FloatArray) -> FloatArray:

@@ -121,10 +121,11 @@ def fit_profile(
     measurement: FloatArray,
     weight: FloatArray,
     starts: list[Start],
-    level: Model,
-    steps: int = 8,
+    begun: Model,
+    steps: int,
 ) -> Model:
-    """A jerk density that follows the flight, knot by knot, from the single level on; the noise stays.
+    """A jerk density that follows the flight, knot by knot; the noise stays. `begun` has a single level, or a profile
+    of this same log to go on from.
 
     One ratio of vertical to horizontal jerk holds for the whole flight: aircraft turn harder than they pitch, and
     range and angles see the two differently.
@@ -135,7 +136,7 @@ def fit_profile(
     knots = max(math.ceil(span / knot_s), 1)
 
     def unpack(theta: FloatArray) -> Model:
-        return level._replace(jerk=shaped(theta[:knots], theta[knots]), knot_s=knot_s)
+        return begun._replace(jerk=shaped(theta[:knots], theta[knots]), knot_s=knot_s)
 
     def cost(theta: FloatArray) -> tuple[float, FloatArray]:
         model = unpack(theta)
@@ -147,9 +148,13 @@ def fit_profile(
         score = np.r_[by_axis.sum(1), by_axis[:, 5].sum()]
         return -found.log_likelihood + 0.5 * penalty, pull - score
 
-    ratio = math.log(level.jerk[0, 5] / level.jerk[0, 0])
-    theta = np.r_[np.full(knots, math.log(level.jerk[0, 0])), ratio]
+    ratio = math.log(begun.jerk[0, 5] / begun.jerk[0, 0])
+    theta = np.r_[np.broadcast_to(np.log(begun.jerk[:, 0]), knots), ratio]
     low, high = (np.r_[np.full(knots, math.log(bound)), side * RATIO_BOUND] for bound, side in JERK_SIDES)
     curvature = np.r_[np.full(knots, 2.0), 0.7 * knots]
-    best = unpack(ascent.minimise(cost, theta, curvature, low, high, steps, tolerance=0.1 * knots**0.5))
-    return best._replace(jerk=np.maximum(ALLOWANCE * best.jerk, CALMEST * ISOTROPIC))
+    return unpack(ascent.minimise(cost, theta, curvature, low, high, steps, tolerance=0.1 * knots**0.5))
+
+
+def with_allowance(model: Model) -> Model:
+    """The model with a little more jerk than is likeliest, and nowhere less than there is in the air."""
+    return model._replace(jerk=np.maximum(ALLOWANCE * model.jerk, CALMEST * ISOTROPIC))
