@@ -76,14 +76,16 @@ def fit_coloured(
     known: (3,) components whose sigma is given."""
     given = white.noise_variance
     model, variance = white, white.noise_variance
-    correlation = np.maximum(moments(smooth_log(time_s, measurement, weight, white, starts), weight, given)[1], 0.0)
+    correlation = np.maximum(
+        moments(smooth_log(time_s, measurement, weight, white, starts, residuals_only=True), weight, given)[1], 0.0
+    )
     for _ in range(2):
         model = _fit_thinned(time_s, measurement, weight, starts, model, variance, correlation, known, fix_jerk)
         for _ in range(ITERATIONS):
             model = model._replace(
                 noise_variance=variance * (1 + correlation) / (1 - correlation), correlation=correlation
             )
-            run = smooth_log(time_s, measurement, weight, model, starts)
+            run = smooth_log(time_s, measurement, weight, model, starts, residuals_only=True)
             variance, correlation = moments(run, weight, model.noise_variance)
             variance = np.where(known, given, variance)
             correlation = np.clip(correlation, 0.0, MOST)

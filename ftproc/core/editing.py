@@ -144,7 +144,7 @@ def _decide(record: _Record, begun: _Decision, tune_first: bool) -> _Decision:
             is_coloured = False  # once is enough; the decisions go on with it
         elif tuning_round:
             model = tuning.fit_level(time_s, measurement, weight, starts, model, record.known, record.fix_jerk)
-        smoothed = smooth_log(time_s, measurement, weight, model, starts)
+        smoothed = smooth_log(time_s, measurement, weight, model, starts, residuals_only=True)
         variance = smoothed.residual_variance - model.noise_variance + model.reading_variance
         good = indicators.classify(smoothed.residual, variance, model.reading_variance, rates, record.gate)
         decided = _keep_most(((good > 0.5) & record.possible).astype(float), record.screened)

@@ -80,6 +80,7 @@ def _sweep(
     jerk_score: FloatArray,
     head: FloatArray,
     scores_only: bool,
+    residuals_only: bool,
 ) -> float:
     """Both sweeps over samples [first, last); returns the log-likelihood. With `scores_only` the arrays of the samples
     need only one row, which is scratch. Leaves P+ and N+ of sample
@@ -139,7 +140,7 @@ def _sweep(
                 head[0] = ps[j]
                 head[1] = n
             row = 0 if scores_only else k
-            if not scores_only:
+            if not scores_only and (not residuals_only or k == first):
                 _estimate(xs[j], ps[j], r, n, smoothed, state[k], sigma[k], los_sigma[k])
             _absorb(
                 r, n, hs[j], es[j], cs[j], s_invs[j], gains[j], pxzs[j], weight[k], noise,
@@ -301,17 +302,23 @@ def score_log(
     for start, stop in zip(starts, [s.sample for s in starts[1:]] + [len(time_s)], strict=True):
         likelihood += _sweep(
             start.sample, stop, time_s, measurement, weight, model.noise_variance, model.jerk, model.knot_s,
-            start.state, start.covariance, *scratch, noise, jerk, ends, True,
+            start.state, start.covariance, *scratch, noise, jerk, ends, True, True,
         )  # fmt: skip
     return Scores(likelihood, noise, jerk)
 
 
 def smooth_log(
-    time_s: FloatArray, measurement: FloatArray, weight: FloatArray, model: Model, starts: list[Start]
+    time_s: FloatArray,
+    measurement: FloatArray,
+    weight: FloatArray,
+    model: Model,
+    starts: list[Start],
+    residuals_only: bool = False,
 ) -> SmootherRun:
     """Smooth the whole log; the record on each side of a start is smoothed by itself.
 
     time_s (n,), measurement (n, 3), weight (n, 3) in [0, 1]. Samples before the first start are extrapolated.
+    residuals_only: states and sigmas are left undefined, for who needs only what the record says of its readings.
     """
     n = len(time_s)
     state, sigma, los_sigma = np.empty((n, 9)), np.empty((n, 9)), np.empty((n, 6))
@@ -324,7 +331,7 @@ def smooth_log(
         likelihood += _sweep(
             start.sample, stop, time_s, measurement, weight, model.noise_variance, model.jerk, model.knot_s,
             start.state, start.covariance, state, sigma, los_sigma, residual, variance, nis, noise_score, jerk_score,
-            ends, False,
+            ends, False, residuals_only,
         )  # fmt: skip
         heads.append(Start(start.sample, state[start.sample].copy(), smoothed_covariance(*ends)))
     head = heads[0]

@@ -20,7 +20,7 @@ from ftproc.core.start import begin_all
 
 FloatArray = NDArray[np.float64]
 
-SPANS, SPAN = 8, 512  # of samples: what stands for a long log when one noise and one jerk level are looked for
+SPANS, SPAN = 6, 400  # of samples: what stands for a long log when one noise and one jerk level are looked for
 NOISE_FLOOR = np.array([1e-3, 1e-7, 1e-7])  # 1-sigma m, rad, rad: below it, rounding of the readings decides
 NOISE_GROWTH = 10.0  # times the noise that the search begins with: more of it is a track gone astray, not noise
 JERK_SIDES = ((1e-7, -1), (1e7, 1))  # m^2/s^5: lowest and highest
