@@ -63,6 +63,7 @@ def summarise(
         "components_used_mean": float(used.sum() / max(int(used.any(1).sum()), 1)),
         "reacquired": len(estimate.reacquired),
         "editing_settled": estimate.settled,
+        "slow_noise": estimate.slow_noise,
         "correction_largest_m": float(np.linalg.norm(correction[:, :3], axis=1).max()) if len(correction) else 0.0,
         "correction_outside_training": outside,
     }
@@ -145,6 +146,8 @@ def _remarks(s: Mapping[str, Any]) -> list[str]:
         remarks.append(
             f"the noise is correlated from sample to sample (up to {correlation:.2f}); the sigmas allow for it"
         )
+    if s["slow_noise"]:
+        remarks.append("the noise is correlated so slowly that it passes for motion: the sigmas are too small")
     if s["editing_settled"] is False:
         remarks.append("the outlier decisions did not settle: look at the flagged stretches")
     if s["reacquired"]:

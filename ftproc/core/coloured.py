@@ -25,9 +25,9 @@ FloatArray = NDArray[np.float64]
 
 LEAST = 0.15  # correlation of neighbours that is worth modelling ...
 LEAST_IN_SIGMAS = 5.0  # ... if so many of its own standard errors away from zero
-MOST = 0.97
-MOST_BELIEVED = 0.9
-GROWTH = 5.0  # times the variance that white noise would have
+MOST = 0.98
+FEWEST_INDEPENDENT = 30  # readings of each component that the correlation must leave worth of
+GROWTH = 60.0  # times the variance that white noise would have
 INDEPENDENT = 0.1  # correlation left between the samples that remain after thinning
 FEWEST = 60  # samples that must remain
 FEWEST_PAIRS = 200  # neighbours, for their correlation to be asked for
@@ -90,7 +90,8 @@ def fit_coloured(
             variance = np.where(known, given, variance)
             correlation = np.clip(correlation, 0.0, MOST)
     # Slow motion and slow noise look alike; where the search ends among the slowest, it has mistaken one for the other.
-    believable = (correlation < MOST_BELIEVED) & (variance < GROWTH * given)
+    independent = (weight > 0).sum(0) * (1 - correlation) / (1 + correlation)
+    believable = (independent > FEWEST_INDEPENDENT) & (variance < GROWTH * given)
     return model if believable.all() else white
 
 

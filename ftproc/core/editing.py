@@ -38,7 +38,8 @@ class Edited(NamedTuple):
 
     weight: (n, 3) 1 good, 0 rejected or missing. model: noise and jerk profile. starts: for the next pass.
     smoothed: the smoother's run with these. rates: (3, 3) learnt outlier rates per component.
-    rounds: how many passes it took; settled: whether the decisions stood still.
+    rounds: how many passes it took; settled: whether the decisions stood still. slow_noise: the noise is correlated,
+    but so slowly that it cannot be told from motion; the sigmas are then too small.
     """
 
     weight: FloatArray
@@ -48,6 +49,7 @@ class Edited(NamedTuple):
     rates: FloatArray
     rounds: int
     settled: bool
+    slow_noise: bool
 
 
 def screen(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -98,7 +100,7 @@ class _Record(NamedTuple):
 
 
 class _Decision(NamedTuple):
-    """Weights (n, 3), the model and starts they were made with, outlier rates, rounds taken, whether they settled."""
+    """Weights (n, 3), the model and starts they were made with, and the rest as in Edited."""
 
     weight: FloatArray
     model: Model
@@ -106,6 +108,7 @@ class _Decision(NamedTuple):
     rates: FloatArray
     rounds: int = 0
     settled: bool = False
+    slow_noise: bool = False
 
 
 def edit(
@@ -129,19 +132,21 @@ def edit(
     if jerk_psd is None:
         decision = _follow_flight(record, decision)
     smoothed = smooth_log(time_s, measurement, decision.weight, decision.model, decision.starts)
-    return Edited(*decision[:3], smoothed, *decision[3:])
+    d = decision
+    return Edited(d.weight, d.model, d.starts, smoothed, d.rates, d.rounds, d.settled, d.slow_noise)
 
 
 def _decide(record: _Record, begun: _Decision, tune_first: bool) -> _Decision:
     """Tune, smooth and classify by turns until the decisions stand still."""
     time_s, measurement = record[:2]
     weight, model, starts, rates = begun.weight, begun.model, begun.starts, begun.rates.copy()
-    rounds, settled, is_coloured = 0, False, bool(begun.model.correlation.any())
+    rounds, settled, is_coloured, slow_noise = 0, False, False, begun.slow_noise
     while rounds < MAX_ROUNDS and not settled:
         tuning_round = rounds < TUNING_ROUNDS and (tune_first or rounds > 0) and not model.correlation.any()
         if is_coloured and not model.correlation.any():
             model = coloured.fit_coloured(time_s, measurement, weight, starts, model, record.known, record.fix_jerk)
             is_coloured = False  # once is enough; the decisions go on with it
+            slow_noise = not model.correlation.any()
         elif tuning_round:
             model = tuning.fit_level(time_s, measurement, weight, starts, model, record.known, record.fix_jerk)
         smoothed = smooth_log(time_s, measurement, weight, model, starts, residuals_only=True)
@@ -156,7 +161,7 @@ def _decide(record: _Record, begun: _Decision, tune_first: bool) -> _Decision:
             is_coloured = coloured.is_correlated(correlation, weight)
             settled = settled and not is_coloured
         starts = begin_all(time_s, measurement, weight, model.noise_variance, float(model.jerk[0, 0]))
-    return _Decision(weight, model, starts, rates, begun.rounds + rounds, settled)
+    return _Decision(weight, model, starts, rates, begun.rounds + rounds, settled, slow_noise)
 
 
 def _follow_flight(record: _Record, decision: _Decision) -> _Decision:

@@ -69,7 +69,7 @@ def _two_pass(readings: Readings, settings: FilterSettings) -> Estimate:
     run = forward.filter_log(*readings[:2], edited.weight, edited.model, starts)
     smoothed = edited.smoothed if settings.smooth else None
     labels = _labels(edited.weight, readings)
-    return Estimate(run, labels, edited.model, smoothed, _anew(starts), edited.settled)
+    return Estimate(run, labels, edited.model, smoothed, _anew(starts), edited.settled, edited.slow_noise)
 
 
 def _anew(starts: list[Start]) -> tuple[int, ...]:

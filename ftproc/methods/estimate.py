@@ -24,7 +24,8 @@ class Estimate(NamedTuple):
 
     run: the recursive filter. label: (n, 3) good, isolated, patch, missing. model: noise and jerk used.
     smoothed: the smoother's run when it was asked for. reacquired: samples at which the filter began anew.
-    settled: whether two-pass editing's decisions stood still; None where there were none to make.
+    settled: whether two-pass editing's decisions stood still; None where there were none to make. slow_noise: the
+    noise is correlated too slowly to be told from motion, so the sigmas are too small.
     """
 
     run: FilterRun
@@ -33,3 +34,4 @@ class Estimate(NamedTuple):
     smoothed: SmootherRun | None = None
     reacquired: tuple[int, ...] = ()
     settled: bool | None = None
+    slow_noise: bool = False
