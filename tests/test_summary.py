@@ -65,7 +65,6 @@ def test_times_gaps_and_noise(dirty):
     assert 0 < jerk["lowest"] <= jerk["median"] <= jerk["highest"]
 
 
-@pytest.mark.xfail(reason="correlated noise is shown as the white noise of the same effect, 2 to 3 times too large")
 def test_noise_shown_is_that_of_a_reading_even_if_correlated():
     flight = simulate("cruise", seed=0, duration_s=150.0, outliers="correlation=0.5")
     components = figures(pipeline.filter_log(flight.log))["components"]

@@ -174,8 +174,8 @@ def _follow_flight(record: _Record, decision: _Decision) -> _Decision:
     for _ in range(SECOND_LOOKS):
         profile = tuning.fit_profile(*log, decision.weight, decision.starts, decision.model, LOOK_STEPS)
         level = float(np.median(profile.jerk[:, 0]))
-        if profile.jerk[:, 0].max() < STANDS_OUT * level:
-            break
+        if profile.jerk[:, 0].max() < STANDS_OUT * level or profile.correlation.any():
+            break  # nothing stands out; or the level was found from thinned readings, which no patch dominates
         calm = profile._replace(jerk=level * profile.jerk[:1] / profile.jerk[0, 0], knot_s=np.inf)
         again = _decide(record, decision._replace(model=calm), tune_first=False)
         if (again.weight == decision.weight).all():

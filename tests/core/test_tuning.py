@@ -77,7 +77,7 @@ def piecewise(seed):
 def test_profile_follows_the_flight():
     a = piecewise(0)
     single = level(a)
-    profile = tuning.fit_profile(a.time, a.z, a.weight, a.starts, single)
+    profile = tuning.fit_profile(a.time, a.z, a.weight, a.starts, single, 15)
     np.testing.assert_array_equal(profile.noise_variance, single.noise_variance)
     knots = len(profile.jerk)
     assert knots > 3
@@ -96,7 +96,7 @@ def test_profile_follows_the_flight():
 def test_tiny_logs_have_a_model(n):
     a = matched(6, n)
     single = tuning.fit_level(a.time, a.z, a.weight, a.starts, a.model, FREE, False)
-    profile = tuning.fit_profile(a.time, a.z, a.weight, a.starts, single)
+    profile = tuning.fit_profile(a.time, a.z, a.weight, a.starts, single, 15)
     for model in (single, profile):
         assert np.isfinite(model.noise_variance).all()
         assert (model.noise_variance >= tuning.NOISE_FLOOR**2 * (1 - 1e-9)).all()
