@@ -67,8 +67,11 @@ def test_times_gaps_and_noise(dirty):
 
 def test_noise_shown_is_that_of_a_reading_even_if_correlated():
     flight = simulate("cruise", seed=0, duration_s=150.0, outliers="correlation=0.5")
-    components = figures(pipeline.filter_log(flight.log))["components"]
-    assert components["range"]["noise_m"] == pytest.approx(flight.sigma[0], rel=0.2)
+    trajectory = pipeline.filter_log(flight.log)
+    part = figures(trajectory)["components"]["range"]
+    assert part["noise_m"] == pytest.approx(flight.sigma[0], rel=0.2)
+    assert part["noise_correlation"] == pytest.approx(np.exp(-0.2), abs=0.06)
+    assert "the noise is correlated from sample to sample (up to 0.8" in summary.text(trajectory)
 
 
 def test_consistent_filter_is_called_so(dirty):
@@ -157,6 +160,8 @@ def test_text_reports_reacquisition_and_correction():
         trajectory, metadata={**trajectory.metadata, "summary": {**figures(trajectory), "editing_settled": False}}
     )
     assert "did not settle" in summary.text(unsettled)
+    slow = replace(trajectory, metadata={**trajectory.metadata, "summary": {**figures(trajectory), "slow_noise": True}})
+    assert "correlated so slowly that it passes for motion: the sigmas are too small" in summary.text(slow)
 
 
 def test_single_row():
