@@ -139,6 +139,7 @@ def _provenance(
             "noise_elevation_rad": float(sigma[2]),
             "noise_correlation": [float(r) for r in estimate.model.correlation],
             "jerk_psd_m2ps5": [float(q) for q in knots],
+            "jerk_vertical_ratio": float(estimate.model.jerk[0, 5] / estimate.model.jerk[0, 0]),
             "jerk_knot_s": float(estimate.model.knot_s) if len(knots) > 1 else None,
         },
         "model_sha256": None if model is None else sha256(model),

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ftproc import consistency
 from ftproc.methods.estimate import Estimate
 from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, FloatArray, MeasurementLog, Trajectory
 
 UNITS = ("m", "rad", "rad")
-TRUSTED_RATIO = (0.8, 1.2)  # of innovation scatter to what the filter expects, to be called consistent
 GAP_INTERVALS = 3.0  # median intervals that make a gap
 
 
@@ -20,6 +20,7 @@ def summarise(
 ) -> dict[str, Any]:
     """The figures of the summary, JSON-serialisable; units are in the names."""
     label, run = estimate.label, estimate.run
+    best_sigma = (run if estimate.smoothed is None else estimate.smoothed).sigma
     used = run.weight > 0
     with np.errstate(invalid="ignore", divide="ignore"):
         scaled = np.where(used, run.innovation / run.innovation_sigma, np.nan)
@@ -28,17 +29,18 @@ def summarise(
     gaps = interval[interval > GAP_INTERVALS * typical] if typical > 0 else interval[:0]
     components: dict[str, Any] = {}
     for c, name in enumerate(COMPONENTS):
-        ratio = float(np.sqrt(np.nanmean(scaled[:, c] ** 2))) if used[:, c].any() and c not in absent else None
+        noise = float(np.sqrt(estimate.model.reading_variance[c]))
+        seen = used[:, c] & (c not in absent)
         components[name] = {
             "good": int((label[:, c] == GOOD).sum()),
             "isolated": int((label[:, c] == ISOLATED).sum()),
             "patch": int((label[:, c] == PATCH).sum()),
             "missing": int((label[:, c] == MISSING).sum()),
             "longest_patch_s": _longest_patch(log.time_s, label[:, c]),
-            f"noise_{UNITS[c]}": float(np.sqrt(estimate.model.reading_variance[c])) if c not in absent else None,
+            f"noise_{UNITS[c]}": noise if c not in absent else None,
             "noise_correlation": float(estimate.model.correlation[c]),
-            "innovation_ratio": ratio,
-            "verdict": _verdict(ratio),
+            "prediction_vagueness": consistency.vagueness(run.innovation_sigma[:, c], seen, noise),
+            **consistency.scatter(np.where(seen, scaled[:, c], np.nan)),
         }
     levels = estimate.model.jerk[:, [0, 3, 5]].mean(1)
     return {
@@ -61,6 +63,7 @@ def summarise(
         },
         "nis_mean": float(np.nanmean(run.nis)) if np.isfinite(run.nis).any() else None,
         "components_used_mean": float(used.sum() / max(int(used.any(1).sum()), 1)),
+        "hardly_observable": [] if absent else consistency.blind_stretches(log.time_s, best_sigma[:, :3]),
         "reacquired": len(estimate.reacquired),
         "editing_settled": estimate.settled,
         "slow_noise": estimate.slow_noise,
@@ -79,14 +82,6 @@ def _longest_patch(time_s: FloatArray, label: Any) -> float:
             begin = time_s[k] if begin is None else begin
             longest = max(longest, float(time_s[k] - begin))
     return longest
-
-
-def _verdict(ratio: float | None) -> str:
-    if ratio is None:
-        return "not observable"
-    if ratio < TRUSTED_RATIO[0]:
-        return "cautious"
-    return "consistent" if ratio <= TRUSTED_RATIO[1] else "overconfident"
 
 
 def as_dict(trajectory: Trajectory) -> dict[str, Any]:
@@ -146,6 +141,16 @@ def _remarks(s: Mapping[str, Any]) -> list[str]:
         remarks.append(
             f"the noise is correlated from sample to sample (up to {correlation:.2f}); the sigmas allow for it"
         )
+    for name, part in s["components"].items():
+        vague = part["prediction_vagueness"]
+        if vague is not None and vague > consistency.VAGUE:
+            remarks.append(
+                f"the {name} gate can hardly fire: predictions are {vague:.0f} times vaguer than readings, so only far "
+                "larger outliers are noticed"
+            )
+    for blind in s["hardly_observable"]:
+        when = f"from {blind['from_s']:.6g} to {blind['to_s']:.6g} s"
+        remarks.append(f"{when} the position is hardly observable: 1 sigma up to {blind['sigma_m']:.3g} m")
     if s["slow_noise"]:
         remarks.append("the noise is correlated so slowly that it passes for motion: the sigmas are too small")
     if s["editing_settled"] is False:

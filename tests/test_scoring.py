@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from ftproc.core.geometry import from_cartesian
 from ftproc.records import FloatArray, Trajectory, Truth
 from ftproc.scoring import render, score
+from ftproc.scoring.figures import sigma_verdict
 from ftproc.simulation import simulate
 from tests.simulated import flown, trajectory_for
 
@@ -239,3 +240,17 @@ def test_tiny_trajectories(n: int) -> None:
     if n == 0:
         assert math.isnan(found.rmse_3d_m or 0)
         assert math.isnan(found.average_gradient.range_m)
+
+
+@pytest.mark.parametrize(
+    ("scale", "verdict"),
+    [((1, 1, 1), "consistent"), ((0.3, 0.3, 0.3), "cautious"), ((1, 1, 3), "overconfident in z"),
+     ((2, 2, 2), "overconfident in x, y, z")],
+)  # fmt: skip
+def test_sigma_verdict_in_words(scale, verdict):
+    ratio = np.random.default_rng(5).standard_normal((4000, 3)) * scale
+    assert sigma_verdict(ratio) == verdict
+
+
+def test_no_sigma_no_verdict():
+    assert sigma_verdict(np.empty((0, 3))) is None

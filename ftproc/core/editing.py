@@ -70,7 +70,7 @@ def _screen_channel(time_s: FloatArray, channel: FloatArray, angular: bool) -> t
     weight, sigma = seen.copy(), 0.0
     for window in WINDOWS:
         votes, scales = screening.screen_component(time_s, channel, window, angular)
-        screening.bar_runs(votes, near, weight)
+        screening.bar_runs(channel, votes, near, weight)
         if window == WINDOWS[0] and len(scales):
             sigma = float(np.median(scales))
     weight[bridges.bridged(time_s, unwrap(channel) if angular else channel, weight, sigma) > 0] = 0.0

@@ -166,13 +166,14 @@ def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
 
 
 @kernel
-def bar_runs(votes: FloatArray, near: FloatArray, weight: FloatArray) -> None:
-    """Set the weights (n,) of outvoted readings to zero, if their run begins or ends with a jump.
+def bar_runs(channel: FloatArray, votes: FloatArray, near: FloatArray, weight: FloatArray) -> None:
+    """Set the weights (n,) of outvoted readings to zero, if their run begins or ends with a jump; missing readings (NaN
+    in the channel) neither end a run nor belong to it.
 
     votes: (n,) shares of a long window, near: of a short one, which sees jumps but follows every curve. A long run
     without a jump at either end is a curve that the parabola of the long window cannot follow.
     """
-    seen = np.flatnonzero(weight >= 0)
+    seen = np.flatnonzero(np.isfinite(channel))
     n = len(seen)
     begin = 0
     while begin < n:

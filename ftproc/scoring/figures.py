@@ -12,6 +12,9 @@ from ftproc.core.geometry import from_cartesian, wrap
 from ftproc.records import COMPONENTS, ISOLATED, PATCH, FlagArray, FloatArray, Trajectory, Truth
 from ftproc.scoring.matching import match
 
+NEES_BOUNDS = (1.0, 5.0)  # of the mean over a flight, for sigmas to be called consistent; 3 is right
+LEAST_IN_3SIGMA = 0.97
+
 
 @dataclass(frozen=True)
 class Gradient:
@@ -56,7 +59,7 @@ class Score:
     position error. in_3sigma: share of samples with all three axes inside 3 published sigmas (0.992 if
     these are right and independent). nees_position: mean of the sum of (error / published sigma)^2 over the
     three axes, 3 when the sigmas are right; correlations between the axes are not published and so not
-    used. NaN where nothing could be counted.
+    used. sigma_verdict: what these two say in words. NaN where nothing could be counted.
     """
 
     trajectory: str
@@ -83,6 +86,7 @@ class Score:
     p99_error_m: float | None = None
     in_3sigma: float | None = None
     nees_position: float | None = None
+    sigma_verdict: str | None = None
     outliers: dict[str, Detection] | None = None
 
     def as_dict(self) -> dict[str, Any]:
@@ -143,7 +147,7 @@ def _against(trajectory: Trajectory, truth: Truth) -> dict[str, Any]:
     return known
 
 
-def _position_figures(error: FloatArray, sigma: FloatArray) -> dict[str, float]:
+def _position_figures(error: FloatArray, sigma: FloatArray) -> dict[str, float | str | None]:
     """From (m, 3) errors and published sigmas in m."""
     norm = np.sqrt(np.sum(error**2, axis=1))
     published = np.isfinite(sigma).all(axis=1) & (sigma > 0).all(axis=1)
@@ -160,7 +164,23 @@ def _position_figures(error: FloatArray, sigma: FloatArray) -> dict[str, float]:
         "p99_error_m": float(np.percentile(norm, 99)) if len(norm) else np.nan,
         "in_3sigma": _mean(np.all(np.abs(ratio) <= 3, axis=1)),
         "nees_position": _mean(np.sum(ratio**2, axis=1)),
+        "sigma_verdict": sigma_verdict(ratio),
     }
+
+
+def sigma_verdict(ratio: FloatArray) -> str | None:
+    """In words, from (m, 3) errors over their published sigmas: `consistent`, `cautious`, or `overconfident in x`.
+
+    Errors of neighbouring samples are alike, so the chi-square bounds of independent ones would be far too narrow;
+    these are what a flight of a few minutes allows to say.
+    """
+    if not len(ratio):
+        return None
+    by_axis = np.mean(ratio**2, axis=0)
+    if by_axis.sum() > NEES_BOUNDS[1] or np.mean(np.all(np.abs(ratio) <= 3, axis=1)) < LEAST_IN_3SIGMA:
+        named = [axis for axis, size in zip("xyz", by_axis, strict=True) if size >= 0.8 * by_axis.max()]
+        return f"overconfident in {', '.join(named)}"
+    return "cautious" if by_axis.sum() < NEES_BOUNDS[0] else "consistent"
 
 
 def _velocity_figures(error: FloatArray) -> dict[str, float]:

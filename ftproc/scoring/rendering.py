@@ -41,6 +41,7 @@ _LABELS = {
     "p99_error_m": "  99 % below",
     "in_3sigma": "share inside 3 sigma",
     "nees_position": "position NEES (3 if honest)",
+    "sigma_verdict": "the sigmas are",
 } | {
     f"outliers.{component}.{key}": f"{component} outliers, precision" if key == "precision" else f"  {label}"
     for component in ("range", "azimuth", "elevation")

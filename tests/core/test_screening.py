@@ -149,8 +149,17 @@ def test_duplicate_times_do_no_harm():
 )
 def test_runs_that_are_outvoted_need_a_jump(votes, near, weight):
     found = np.ones(len(votes))
-    bar_runs(np.array([float(v == "x") for v in votes]), np.array([float(v == "j") for v in near]), found)
+    outvoted, jumps = np.array([float(v == "x") for v in votes]), np.array([float(v == "j") for v in near])
+    bar_runs(np.zeros(len(votes)), outvoted, jumps, found)
     assert "".join(str(int(w)) for w in found) == weight
+
+
+def test_missing_readings_do_not_cut_a_run():
+    channel, votes, near, weight = np.zeros(20), np.zeros(20), np.zeros(20), np.ones(20)
+    votes[5:15], near[[5, 14]] = 1.0, 1.0
+    channel[[8, 11]], votes[[8, 11]] = np.nan, 0.0
+    bar_runs(channel, votes, near, weight)
+    np.testing.assert_array_equal(np.flatnonzero(weight == 0), [5, 6, 7, 9, 10, 12, 13, 14])
 
 
 def test_stuck_readings_are_found_but_the_first():

@@ -1,0 +1,69 @@
+"""Verdicts on a run."""
+
+import numpy as np
+import pytest
+
+from ftproc import consistency, pipeline, summary
+from ftproc.settings import FilterSettings
+from tests.simulated import simulate
+
+
+@pytest.mark.parametrize(("size", "verdict"), [(0.5, "cautious"), (1.0, "consistent"), (1.5, "overconfident")])
+def test_verdict_of_many_innovations(size, verdict):
+    found = consistency.scatter(size * np.random.default_rng(0).standard_normal(5000))
+    assert found["verdict"] == verdict
+    assert found["innovation_ratio"] == pytest.approx(size, rel=0.05)
+    assert found["innovation_bounds"] == [pytest.approx(0.8), pytest.approx(1.2)]
+
+
+def test_few_innovations_have_wide_bounds():
+    """99 % of honest filters with 20 readings lie within."""
+    rng = np.random.default_rng(1)
+    said = [consistency.scatter(rng.standard_normal(20))["verdict"] for _ in range(2000)]
+    assert 0.97 < said.count("consistent") / 2000 < 1
+
+
+def test_unused_innovations_do_not_count():
+    assert consistency.scatter(np.full(9, np.nan))["verdict"] == "not observable"
+    assert consistency.scatter(np.array([1.0, np.nan, -1.0]))["innovation_ratio"] == 1.0
+
+
+def test_blind_stretches_are_named_with_their_worst_sigma():
+    sigma = np.ones((100, 3))
+    sigma[40:50, 2], sigma[45, 0], sigma[99] = 50.0, 300.0, 60.0
+    first, last = consistency.blind_stretches(10.0 + np.arange(100), sigma)
+    assert (first["from_s"], first["to_s"]) == (50.0, 59.0)
+    assert first["sigma_m"] == pytest.approx(np.sqrt(300**2 + 1 + 50**2))
+    assert (last["from_s"], last["to_s"]) == (109.0, 109.0)
+
+
+def test_at_most_twenty_stretches_the_longest():
+    sigma = np.ones((300, 3))
+    for k in range(30):
+        sigma[10 * k : 10 * k + 1 + k // 10] = 99.0
+    found = consistency.blind_stretches(np.arange(300.0), sigma)
+    assert len(found) == consistency.MOST_BLIND
+    assert found == sorted(found, key=lambda s: s["from_s"])
+    assert all(s["to_s"] > s["from_s"] for s in found)
+
+
+def test_log_without_range_for_half_a_minute_is_called_hardly_observable():
+    flight = simulate("manoeuvre-clean", seed=4, duration_s=60.0, dt_s=0.1)
+    flight.log.measurement[200:500] = np.nan
+    trajectory = pipeline.filter_log(flight.log)
+    (stretch,) = trajectory.metadata["summary"]["hardly_observable"]
+    assert 20 < stretch["from_s"] < stretch["to_s"] < 53
+    assert "the position is hardly observable: 1 sigma up to" in summary.text(trajectory)
+
+
+def test_gate_that_cannot_fire_is_reported():
+    """One reading in a minute of a turning target: whatever comes fits the prediction."""
+    flight = simulate("manoeuvre-clean", seed=2, duration_s=120.0, dt_s=0.5)
+    settings = FilterSettings(noise=(0.01, 1e-6, 1e-6), jerk_psd_m2ps5=1e4)
+    text = summary.text(pipeline.filter_log(flight.log, settings))
+    assert "gate can hardly fire: predictions are" in text
+
+
+def test_usual_flight_has_no_such_remarks():
+    text = summary.text(pipeline.filter_log(simulate("manoeuvre-clean", seed=3, duration_s=60.0).log))
+    assert "hardly" not in text
