@@ -93,6 +93,7 @@ $(developer): pyproject.toml $(installed)
 
 # Compiled kernels are kept; after this the first log does not wait for the compiler.
 $(warmed): $(installed) $(wildcard ftproc/core/*.py)
+	@rm -f ftproc/core/__pycache__/*.nb?
 	@$(bin)/python -m ftproc.warm
 	@touch $@
 

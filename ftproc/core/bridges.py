@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.jit import kernel
+from ftproc.core.jit import kernel, part
 
 FloatArray = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ OFF = 3.5  # sigmas off the bridge that count as off
 MOSTLY = 0.75  # share of the readings inside that must be off
 
 
-@kernel
+@part
 def _cubic(t: FloatArray, z: FloatArray, n: int, normal: FloatArray, coefficient: FloatArray) -> bool:
     """Least-squares cubic through n points with t within about [-1, 1]; normal (4, 5) is scratch."""
     normal[:] = 0.0
@@ -53,12 +53,12 @@ def _cubic(t: FloatArray, z: FloatArray, n: int, normal: FloatArray, coefficient
     return True
 
 
-@kernel
+@part
 def _value(coefficient: FloatArray, t: float) -> float:
     return float(coefficient[0] + t * (coefficient[1] + t * (coefficient[2] + t * coefficient[3])))
 
 
-@kernel
+@part
 def _is_patch(
     begin: int, end: int, t: FloatArray, z: FloatArray, sigma: float, x: FloatArray, y: FloatArray,
     normal: FloatArray, coefficient: FloatArray,

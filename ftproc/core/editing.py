@@ -26,7 +26,7 @@ MAX_ROUNDS = 8
 TUNING_ROUNDS = 3
 FIRST_JERK = 1.0  # m^2/s^5, where the search begins
 SECOND_LOOKS = 2
-LOOK_STEPS, FINAL_STEPS = 4, 5  # of the search for the jerk profile
+LOOK_STEPS, FINAL_STEPS = 3, 4  # of the search for the jerk profile
 STANDS_OUT = 8.0  # times the median of the jerk profile
 FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
 FEWEST_KEPT = 0.5  # share of what screening trusts that must survive the decisions, in each component
@@ -140,7 +140,7 @@ def _decide(record: _Record, begun: _Decision, tune_first: bool) -> _Decision:
     """Tune, smooth and classify by turns until the decisions stand still."""
     time_s, measurement = record[:2]
     weight, model, starts, rates = begun.weight, begun.model, begun.starts, begun.rates.copy()
-    rounds, settled, is_coloured, slow_noise = 0, False, False, begun.slow_noise
+    rounds, settled, asked, is_coloured, slow_noise = 0, False, False, False, begun.slow_noise
     while rounds < MAX_ROUNDS and not settled:
         tuning_round = rounds < TUNING_ROUNDS and (tune_first or rounds > 0) and not model.correlation.any()
         if is_coloured and not model.correlation.any():
@@ -153,10 +153,11 @@ def _decide(record: _Record, begun: _Decision, tune_first: bool) -> _Decision:
         variance = smoothed.residual_variance - model.noise_variance + model.reading_variance
         good = indicators.classify(smoothed.residual, variance, model.reading_variance, rates, record.gate)
         decided = _keep_most(((good > 0.5) & record.possible).astype(float), record.screened)
-        settled = bool((decided == weight).all()) and rounds + 1 >= TUNING_ROUNDS
+        settled = bool((decided == weight).all()) and rounds > 0
         weight = decided
         rounds += 1
-        if rounds == TUNING_ROUNDS and not model.correlation.any():
+        if (settled or rounds == TUNING_ROUNDS) and not (asked or model.correlation.any()):
+            asked = True
             correlation = coloured.moments(smoothed, weight, model.noise_variance)[1]
             is_coloured = coloured.is_correlated(correlation, weight)
             settled = settled and not is_coloured

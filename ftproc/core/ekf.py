@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.jit import kernel
+from ftproc.core.jit import part
 from ftproc.core.ukf import MIN_RANGE_M, measure
 
 FloatArray = NDArray[np.float64]
@@ -18,7 +18,7 @@ FloatArray = NDArray[np.float64]
 MIN_COS_ELEVATION = 1e-3  # nearer to the zenith than this the azimuth says nothing
 
 
-@kernel
+@part
 def jacobian(x: FloatArray, h: FloatArray) -> None:
     """Rows R, A, E of eq. 4 on the position columns (its others are zero), at the state x (9,)."""
     ground = math.hypot(x[0], x[1])
@@ -30,7 +30,7 @@ def jacobian(x: FloatArray, h: FloatArray) -> None:
     h[2, 0], h[2, 1], h[2, 2] = -ca * se / slant, -sa * se / slant, ce / slant
 
 
-@kernel
+@part
 def linearise(x: FloatArray, p: FloatArray, z_hat: FloatArray, h: FloatArray, c: FloatArray) -> None:
     """z^ = h(x), H the Jacobian, C = H P H'."""
     z_hat[0], z_hat[1], z_hat[2] = measure(x[0], x[1], x[2])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core import ekf, motion, ukf
-from ftproc.core.jit import kernel
+from ftproc.core.jit import kernel, part
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -75,7 +75,7 @@ def empty_run(time_s: FloatArray) -> FilterRun:
     )  # fmt: skip
 
 
-@kernel
+@part
 def line_of_sight_sigma(x: FloatArray, p: FloatArray, out: FloatArray) -> None:
     """1-sigma of position and velocity along the radial, cross and up axes at x."""
     ground = max(math.sqrt(x[0] * x[0] + x[1] * x[1]), 1e-9)
@@ -207,6 +207,8 @@ def filter_log(
 
 def lead_in(measurement: FloatArray, model: Model, start: Start, run: FilterRun) -> None:
     """Fill the run before its first start."""
+    if start.sample == 0:
+        return
     variance = run.innovation_sigma  # squared until the last line
     extrapolate_back(
         start.sample, run.time_s, measurement, model.noise_variance, model.jerk, model.knot_s, start.state.copy(),

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ftproc.core import motion, screening, ukf
 from ftproc.core.forward import FilterRun, Model, Start, empty_run, lead_in, line_of_sight_sigma
-from ftproc.core.jit import kernel
+from ftproc.core.jit import kernel, part
 from ftproc.core.start import first_state
 
 FloatArray = NDArray[np.float64]
@@ -64,7 +64,7 @@ def rejection_weight(gate: float) -> float:
     return float(igg3(gate, FULL_AT * gate, ZERO_AT * gate))
 
 
-@kernel
+@part
 def _decide(
     k: int,
     time: FloatArray,
@@ -109,7 +109,7 @@ def _decide(
     return inside
 
 
-@kernel
+@part
 def _update_by_gain(
     x: FloatArray, p: FloatArray, pxz: FloatArray, c: FloatArray, e: FloatArray, noise: FloatArray, used: FloatArray,
     s: FloatArray, s_inv: FloatArray, gain: FloatArray,
@@ -209,7 +209,7 @@ def run_gated(
     return last, likelihood
 
 
-@kernel
+@part
 def _overdue(track: FloatArray, now: float, longest_patch_s: float) -> bool:
     late = False
     for i in range(3):
@@ -217,7 +217,7 @@ def _overdue(track: FloatArray, now: float, longest_patch_s: float) -> bool:
     return late
 
 
-@kernel
+@part
 def _wild(x: FloatArray) -> bool:
     speed2 = x[3] * x[3] + x[4] * x[4] + x[5] * x[5]
     acceleration2 = x[6] * x[6] + x[7] * x[7] + x[8] * x[8]

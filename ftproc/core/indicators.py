@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.jit import kernel
+from ftproc.core.jit import kernel, part
 
 FloatArray = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ PRIOR_SAMPLES = 20.0  # weight of START_RATES' spirit against the counts of the 
 ROUNDS = 3
 
 
-@kernel
+@part
 def _chain(
     residual: FloatArray,
     variance: FloatArray,
@@ -90,7 +90,7 @@ def _chain(
         later = k
 
 
-@kernel
+@part
 def _learn(counts: FloatArray, rates: FloatArray) -> None:
     """Baum-Welch update of the rates, drawn towards rare outliers where the log says little."""
     outside = counts[0].sum() + counts[1].sum()

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.jit import kernel
+from ftproc.core.jit import part
 
 FloatArray = NDArray[np.float64]
 
@@ -28,14 +28,14 @@ def isotropic(jerk_psd: float) -> FloatArray:
     return np.array([[jerk_psd, 0.0, 0.0, jerk_psd, 0.0, jerk_psd]])
 
 
-@kernel
+@part
 def knot_index(time: float, first_time: float, knot_s: float, knots: int) -> int:
     """The piece of the jerk profile that holds at `time`."""
     index = int((time - first_time) / knot_s)
     return min(max(index, 0), knots - 1)
 
 
-@kernel
+@part
 def noise_coefficients(interval: float, out: FloatArray) -> None:
     """The 3 x 3 matrix of Q per unit of jerk density; a negative interval goes back in time."""
     t = interval
@@ -48,7 +48,7 @@ def noise_coefficients(interval: float, out: FloatArray) -> None:
     out[2, 2] = sign * t
 
 
-@kernel
+@part
 def predict(x: FloatArray, p: FloatArray, interval: float, jerk: FloatArray, c: FloatArray) -> None:
     """x <- Phi x and P <- Phi P Phi' + Q in place; c is scratch (3, 3).
 
@@ -83,7 +83,7 @@ def predict(x: FloatArray, p: FloatArray, interval: float, jerk: FloatArray, c: 
             p[6 + i, 6 + j] = aa + q * c[2, 2]
 
 
-@kernel
+@part
 def adjoint(r: FloatArray, n: FloatArray, interval: float) -> None:
     """r <- Phi' r and N <- Phi' N Phi in place: the backward counterpart of `predict`."""
     t = interval

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.jit import kernel
+from ftproc.core.jit import kernel, part
 
 FloatArray = NDArray[np.float64]
 
@@ -24,14 +24,14 @@ STUCK_ODDS = 1e-3  # expected number of chance runs in a log that would be calle
 MOST_STUCK = 0.2  # share of a component
 
 
-@kernel
+@part
 def _wrapped(value: float, angular: bool) -> float:
     if angular and not -math.pi <= value < math.pi:
         return value - 2 * math.pi * math.floor((value + math.pi) / (2 * math.pi))
     return value
 
 
-@kernel
+@part
 def _median(values: FloatArray, n: int) -> float:
     """Upper median of the first n values, which are reordered (Hoare's selection)."""
     k = n // 2
@@ -57,7 +57,7 @@ def _median(values: FloatArray, n: int) -> float:
     return float(values[k])
 
 
-@kernel
+@part
 def _best_parabola(
     t: FloatArray, z: FloatArray, n: int, angular: bool, seed: int, residual: FloatArray, work: FloatArray
 ) -> float:

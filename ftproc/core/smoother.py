@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from ftproc.core import motion, ukf
 from ftproc.core.forward import Model, Start, extrapolate_back, line_of_sight_sigma
-from ftproc.core.jit import kernel
+from ftproc.core.jit import kernel, part
 
 FloatArray = NDArray[np.float64]
 
@@ -93,6 +93,7 @@ def _sweep(
     hs, es, cs = np.empty((BLOCK, 3, 3)), np.empty((BLOCK, 3)), np.empty((BLOCK, 3))
     s_invs, gains, pxzs = np.empty((BLOCK, 3, 3)), np.empty((BLOCK, 9, 3)), np.empty((BLOCK, 9, 3))
     r, n, smoothed = np.zeros(9), np.zeros((9, 9)), np.zeros((9, 9))
+    u, m, nk, pn = np.zeros(3), np.zeros((3, 3)), np.zeros((9, 3)), np.zeros((9, 9))  # scratch
     likelihood = 0.0
     for round_ in range(2 * blocks):
         forward_only = round_ < blocks
@@ -141,9 +142,9 @@ def _sweep(
                 head[1] = n
             row = 0 if scores_only else k
             if not scores_only and (not residuals_only or k == first):
-                _estimate(xs[j], ps[j], r, n, smoothed, state[k], sigma[k], los_sigma[k])
+                _estimate(xs[j], ps[j], r, n, pn, smoothed, state[k], sigma[k], los_sigma[k])
             _absorb(
-                r, n, hs[j], es[j], cs[j], s_invs[j], gains[j], pxzs[j], weight[k], noise,
+                r, n, u, m, nk, hs[j], es[j], cs[j], s_invs[j], gains[j], pxzs[j], weight[k], noise,
                 residual[row], variance[row], noise_score,
             )  # fmt: skip
             if k > first:
@@ -154,28 +155,26 @@ def _sweep(
     return likelihood
 
 
-@kernel
+@part
 def _estimate(
-    x: FloatArray, p: FloatArray, r: FloatArray, n: FloatArray, smoothed: FloatArray,
+    x: FloatArray, p: FloatArray, r: FloatArray, n: FloatArray, pn: FloatArray, smoothed: FloatArray,
     state: FloatArray, sigma: FloatArray, los: FloatArray,
 ) -> None:  # fmt: skip
     """x+ + P+ r and P+ - P+ N P+, its diagonal and line-of-sight sigmas."""
-    pn = np.empty((9, 9))
     for i in range(9):
         total = x[i]
         for j in range(9):
             total += p[i, j] * r[j]
+            pn[i, j] = 0.0
         state[i] = total
-        for j in range(9):
-            v = 0.0
-            for k in range(9):
-                v += p[i, k] * n[k, j]
-            pn[i, j] = v
+        for k in range(9):
+            for j in range(9):
+                pn[i, j] += p[i, k] * n[k, j]
     for i in range(9):
         for j in range(i // 3 * 3 if i < 6 else i, i + 1):  # the blocks of position and velocity, and the diagonal
             v = p[i, j]
             for k in range(9):
-                v -= pn[i, k] * p[k, j]
+                v -= pn[i, k] * p[j, k]
             smoothed[i, j] = v
             smoothed[j, i] = v
         # Rounding may eat a variance that the record has all but determined; it cannot be below that rounding.
@@ -183,10 +182,13 @@ def _estimate(
     line_of_sight_sigma(state, smoothed, los)
 
 
-@kernel
+@part
 def _absorb(
     r: FloatArray,
     n: FloatArray,
+    u: FloatArray,
+    m: FloatArray,
+    nk: FloatArray,
     h: FloatArray,
     e: FloatArray,
     c: FloatArray,
@@ -199,20 +201,22 @@ def _absorb(
     variance: FloatArray,
     noise_score: FloatArray,
 ) -> None:
-    """Take r, N back over one measurement; leave the leave-one-out residuals and their variances behind."""
-    u, m, nk = np.zeros(3), np.zeros((3, 3)), np.zeros((9, 3))
+    """Take r, N back over one measurement; leave the leave-one-out residuals and their variances behind. u (3,),
+    m (3, 3), nk (9, 3) are scratch."""
     for i in range(3):
+        u[i] = 0.0
         for j in range(3):
             if weight[j] > 0 and math.isfinite(e[j]):
                 u[i] += s_inv[i, j] * e[j]
         for a in range(9):
             u[i] -= gain[a, i] * r[a]
     for a in range(9):
-        for j in range(3):
-            v = 0.0
-            for b in range(9):
-                v += n[a, b] * gain[b, j]
-            nk[a, j] = v
+        s0 = s1 = s2 = 0.0
+        for b in range(9):
+            s0 += n[a, b] * gain[b, 0]
+            s1 += n[a, b] * gain[b, 1]
+            s2 += n[a, b] * gain[b, 2]
+        nk[a, 0], nk[a, 1], nk[a, 2] = s0, s1, s2
     for i in range(3):
         for j in range(i + 1):
             v = s_inv[i, j]
@@ -259,7 +263,7 @@ def _absorb(
             variance[i] = max(spread, 0.0) + noise[i]
 
 
-@kernel
+@part
 def _score_jerk(r: FloatArray, n: FloatArray, interval: float, c: FloatArray, score: FloatArray) -> None:
     """Add 1/2 c(T) : (r r' - N) to the score of each element of the jerk tensor (off-diagonal ones count twice)."""
     motion.noise_coefficients(interval, c)

@@ -19,7 +19,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.jit import kernel
+from ftproc.core.jit import part
 
 FloatArray = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ MIN_RANGE_M = 1.0  # below this the direction of the target has no meaning
 TWO_PI = 2 * math.pi
 
 
-@kernel
+@part
 def wrap_angle(angle: float) -> float:
     """Angle in rad brought into [-pi, pi); cheap for the usual case of no wrap at all."""
     if -math.pi <= angle < math.pi:
@@ -37,7 +37,7 @@ def wrap_angle(angle: float) -> float:
     return angle - TWO_PI * math.floor((angle + math.pi) / TWO_PI)
 
 
-@kernel
+@part
 def measure(x: float, y: float, z: float) -> tuple[float, float, float]:
     """h(x): slant range m, azimuth rad, elevation rad."""
     ground2 = x * x + y * y
@@ -45,7 +45,7 @@ def measure(x: float, y: float, z: float) -> tuple[float, float, float]:
     return max(slant, MIN_RANGE_M), math.atan2(y, x), math.atan2(z, math.sqrt(ground2))
 
 
-@kernel
+@part
 def turn(cross: float, dot: float) -> float:
     """atan2(cross, dot) in rad: the angle between two directions, by its series where it is small (to rounding)."""
     if not abs(cross) < 0.05 * dot:
@@ -56,7 +56,7 @@ def turn(cross: float, dot: float) -> float:
     return t * (1 - q * (1 / 3 - q * (1 / 5 - q * tail)))
 
 
-@kernel
+@part
 def position_factor(p: FloatArray, factor: FloatArray) -> None:
     """Lower Cholesky factor of the position block; a pivot lost to rounding is floored, never taken the root of."""
     floor = 1e-12 * (p[0, 0] + p[1, 1] + p[2, 2]) + 1e-300
@@ -71,7 +71,7 @@ def position_factor(p: FloatArray, factor: FloatArray) -> None:
                 factor[i, j] = s / factor[j, j]
 
 
-@kernel
+@part
 def linearise(
     x: FloatArray, p: FloatArray, factor: FloatArray, b: FloatArray, z_hat: FloatArray, h: FloatArray, c: FloatArray
 ) -> None:
@@ -135,7 +135,7 @@ def linearise(
         h[i, 0] = (b[0, i] - factor[1, 0] * h[i, 1] - factor[2, 0] * h[i, 2]) / factor[0, 0]
 
 
-@kernel
+@part
 def innovate(z: FloatArray, z_hat: FloatArray, e: FloatArray) -> None:
     """e = z - z^ with the azimuth wrapped; NaN where z is missing."""
     e[0] = z[0] - z_hat[0]
@@ -145,7 +145,7 @@ def innovate(z: FloatArray, z_hat: FloatArray, e: FloatArray) -> None:
         e[1] = wrap_angle(e[1])
 
 
-@kernel
+@part
 def invert_used(s: FloatArray, used: FloatArray, out: FloatArray) -> float:
     """Inverse of the rows and columns of S whose weight is positive, zero elsewhere; returns ln det of them.
 
@@ -172,7 +172,7 @@ def invert_used(s: FloatArray, used: FloatArray, out: FloatArray) -> float:
     return 2 * math.log(a * d * f)
 
 
-@kernel
+@part
 def cross_covariance(p: FloatArray, h: FloatArray, pxz: FloatArray) -> None:
     """P_xz = P H' for an H that sees the position only; (9, 3)."""
     for i in range(9):
@@ -180,7 +180,7 @@ def cross_covariance(p: FloatArray, h: FloatArray, pxz: FloatArray) -> None:
             pxz[i, j] = p[i, 0] * h[j, 0] + p[i, 1] * h[j, 1] + p[i, 2] * h[j, 2]
 
 
-@kernel
+@part
 def update(
     x: FloatArray,
     p: FloatArray,
@@ -230,7 +230,7 @@ def update(
     return nis, -0.5 * (log_det + nis)
 
 
-@kernel
+@part
 def _restore_joseph(
     p: FloatArray,
     pxz: FloatArray,
