@@ -74,14 +74,10 @@ def summarise(
 
 def _longest_patch(time_s: FloatArray, label: Any) -> float:
     """Duration in s of the longest patch of one component; missing readings inside do not end it."""
-    longest, begin = 0.0, None
-    for k in np.flatnonzero(label != MISSING):
-        if label[k] != PATCH:
-            begin = None
-        else:
-            begin = time_s[k] if begin is None else begin
-            longest = max(longest, float(time_s[k] - begin))
-    return longest
+    seen = np.flatnonzero(label != MISSING)
+    inside = np.r_[False, label[seen] == PATCH, False]
+    edges = np.flatnonzero(inside[1:] != inside[:-1]).reshape(-1, 2)
+    return float((time_s[seen[edges[:, 1] - 1]] - time_s[seen[edges[:, 0]]]).max(initial=0.0))
 
 
 def as_dict(trajectory: Trajectory) -> dict[str, Any]:

@@ -157,9 +157,9 @@ def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
         return found
     repeats_needed = max(np.log(STUCK_ODDS / len(seen)) / np.log(max(chance, 1e-300)), SHORTEST_STUCK - 1)
     begins = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
-    for begin, end in zip(begins, np.r_[begins[1:], len(seen)], strict=True):
-        if end - begin - 1 >= repeats_needed:
-            found[seen[begin + 1 : end]] = True
+    ends = np.r_[begins[1:], len(seen)]
+    for run in np.flatnonzero(ends - begins - 1 >= repeats_needed):
+        found[seen[begins[run] + 1 : ends[run]]] = True
     if found.sum() > MOST_STUCK * len(seen):
         found[:] = False
     return found

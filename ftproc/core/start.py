@@ -95,6 +95,8 @@ def first_state(
         good = np.flatnonzero((weight[low:high, c] > 0) & np.isfinite(measurement[low:high, c])) + low
         if len(good) == 0:
             raise ValueError(c)
+        here = int(np.searchsorted(good, sample))
+        good = good[max(here - SAMPLES, 0) : here + SAMPLES]  # the nearest are among these
         away = np.abs(time_s[good] - time_s[sample])
         nearest = np.argsort(away, kind="stable")[:SAMPLES]
         close = away[nearest] <= away[nearest[0]] + LONGEST_FIT_S
