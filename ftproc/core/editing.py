@@ -153,7 +153,7 @@ def _decide(record: _Record, begun: _Decision, tune_first: bool) -> _Decision:
         variance = smoothed.residual_variance - model.noise_variance + model.reading_variance
         good = indicators.classify(smoothed.residual, variance, model.reading_variance, rates, record.gate)
         decided = _keep_most(((good > 0.5) & record.possible).astype(float), record.screened)
-        settled = bool((decided == weight).all()) and rounds > 0
+        settled = bool((decided == weight).all()) and (rounds > 0 or not tune_first)
         weight = decided
         rounds += 1
         if (settled or rounds == TUNING_ROUNDS) and not (asked or model.correlation.any()):

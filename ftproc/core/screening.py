@@ -16,7 +16,7 @@ from ftproc.core.jit import kernel, part
 
 FloatArray = NDArray[np.float64]
 
-TRIALS = 48  # triples per window: one is clean with probability 0.99998 when 40 % of the samples are bad
+TRIALS = 32  # triples per window: one is clean with probability 0.9996 when 40 % of the samples are bad
 CUT = 4.5  # sigmas from the parabola
 JUMP_VOTES = 0.2  # share of short windows that must find a reading off, at a jump
 SHORTEST_STUCK = 3  # equal readings in a row
