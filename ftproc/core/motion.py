@@ -20,8 +20,6 @@ from ftproc.core.jit import part
 
 FloatArray = NDArray[np.float64]
 
-AXIS_PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-
 
 def isotropic(jerk_psd: float) -> FloatArray:
     """(1, 6) jerk tensor of the same density (m^2/s^5) along every axis, for the whole log."""

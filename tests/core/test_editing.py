@@ -143,3 +143,18 @@ def test_first_state_from_the_edited_log_is_near_the_truth():
     )  # fmt: skip
     error = position_error(start.state[None], flight.truth.position_m[:1])[0]
     assert error < 3 * np.sqrt(np.trace(start.covariance[:3, :3]))
+
+
+def test_second_look_finds_the_patch_that_made_the_jerk_jump(monkeypatch):
+    """A ramp in elevation at the very beginning; without the second look it passes for a manoeuvre."""
+    spec = "isolated=0.03:6-300,offset=2:8-30:8-200,ramp=1:10-30:20-200,burst=1:8-20:10-100,nan=0.01,gap=1:2-4"
+    flight = simulate("manoeuvre", seed=7, duration_s=75.0, outliers=spec)
+
+    def rms():
+        error = edit(flight).smoothed.state[:, :3] - flight.truth.position_m
+        return np.sqrt((error**2).sum(1).mean())
+
+    looked_twice = rms()
+    monkeypatch.setattr(editing, "SECOND_LOOKS", 0)
+    assert looked_twice < 0.7
+    assert rms() > 3 * looked_twice

@@ -156,10 +156,10 @@ def test_runs_that_are_outvoted_need_a_jump(votes, near, weight):
 
 def test_missing_readings_do_not_cut_a_run():
     channel, votes, near, weight = np.zeros(20), np.zeros(20), np.zeros(20), np.ones(20)
-    votes[5:15], near[[5, 14]] = 1.0, 1.0
-    channel[[8, 11]], votes[[8, 11]] = np.nan, 0.0
+    votes[3:18], near[[3, 17]] = 1.0, 1.0
+    channel[[7, 13]], votes[[7, 13]] = np.nan, 0.0  # between them a piece without a jump of its own
     bar_runs(channel, votes, near, weight)
-    np.testing.assert_array_equal(np.flatnonzero(weight == 0), [5, 6, 7, 9, 10, 12, 13, 14])
+    np.testing.assert_array_equal(np.flatnonzero(weight == 0), [3, 4, 5, 6, 8, 9, 10, 11, 12, 14, 15, 16, 17])
 
 
 def test_stuck_readings_are_found_but_the_first():
