@@ -13,6 +13,7 @@ from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, FloatArra
 
 UNITS = ("m", "rad", "rad")
 GAP_INTERVALS = 3.0  # median intervals that make a gap
+MOST_REJECTED = 0.35  # of a component's readings; more, and the rest may be the wrong ones
 
 
 def summarise(
@@ -138,6 +139,13 @@ def _remarks(s: Mapping[str, Any]) -> list[str]:
             f"the noise is correlated from sample to sample (up to {correlation:.2f}); the sigmas allow for it"
         )
     for name, part in s["components"].items():
+        rejected = part["isolated"] + part["patch"]
+        share = rejected / max(rejected + part["good"], 1)
+        if share > MOST_REJECTED:
+            remarks.append(
+                f"{100 * share:.0f} % of the {name} readings were rejected: too many to be sure that the right ones "
+                "were kept; look at the track, and check column and unit"
+            )
         vague = part["prediction_vagueness"]
         if vague is not None and vague > consistency.VAGUE:
             remarks.append(

@@ -67,3 +67,10 @@ def test_gate_that_cannot_fire_is_reported():
 def test_usual_flight_has_no_such_remarks():
     text = summary.text(pipeline.filter_log(simulate("manoeuvre-clean", seed=3, duration_s=60.0).log))
     assert "hardly" not in text
+
+
+def test_log_of_which_much_was_rejected_is_not_trusted():
+    flight = simulate("cruise", seed=3, duration_s=60.0, outliers="range.isolated=0.45:20-300")
+    text = summary.text(pipeline.filter_log(flight.log))
+    assert " % of the range readings were rejected: too many to be sure that the right ones were kept" in text
+    assert "of the azimuth readings" not in text

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core import bridges, coloured, indicators, screening, tuning
+from ftproc.core import bridges, coloured, indicators, runs, screening, swaps, tuning
 from ftproc.core.forward import Model, Start
 from ftproc.core.geometry import unwrap
 from ftproc.core.motion import isotropic
@@ -24,8 +24,10 @@ SHORT_WINDOW = 11  # samples: sees jumps, and hardly anything else
 WINDOWS = (31, 75)  # samples: the short one follows manoeuvres, the long one sees through patches
 MAX_ROUNDS = 8
 TUNING_ROUNDS = 3
+READMITTED = 0.8  # probability of being good from which a rejected reading is used again, after these: else some
+# swing to and fro, each time changing what the smoother says of themselves
 FIRST_JERK = 1.0  # m^2/s^5, where the search begins
-SECOND_LOOKS = 2
+SECOND_LOOKS = 6
 LOOK_STEPS, FINAL_STEPS = 3, 4  # of the search for the jerk profile
 STANDS_OUT = 8.0  # times the median of the jerk profile
 FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
@@ -88,12 +90,14 @@ def stuck_readings(measurement: FloatArray, sigma: FloatArray) -> NDArray[np.boo
 
 class _Record(NamedTuple):
     """What stays the same while the decisions are made: the log, the readings that may be good at all (n, 3), what
-    screening trusts (n, 3), which noises are given (3,), whether the jerk is, and the gate in sigmas."""
+    screening trusts (n, 3) and the noise 1-sigma (3,) that it saw, which noises are given (3,), whether the jerk is,
+    and the gate in sigmas."""
 
     time_s: FloatArray
     measurement: FloatArray
     possible: NDArray[np.bool_]
     screened: FloatArray
+    sigma: FloatArray
     known: NDArray[np.bool_]
     fix_jerk: bool
     gate: float
@@ -123,7 +127,7 @@ def edit(
     screened, sigma = screen(time_s, measurement)
     possible = np.isfinite(measurement) & ~stuck_readings(measurement, sigma)
     known = np.isfinite(given_sigma)
-    record = _Record(time_s, measurement, possible, screened * possible, known, jerk_psd is not None, gate)
+    record = _Record(time_s, measurement, possible, screened * possible, sigma, known, jerk_psd is not None, gate)
     first_jerk = FIRST_JERK if jerk_psd is None else jerk_psd
     model = Model(np.where(known, given_sigma, sigma) ** 2, isotropic(first_jerk))
     rates = np.tile(np.array(indicators.START_RATES), (3, 1))
@@ -148,11 +152,14 @@ def _decide(record: _Record, begun: _Decision, tune_first: bool) -> _Decision:
             is_coloured = False  # once is enough; the decisions go on with it
             slow_noise = not model.correlation.any()
         elif tuning_round:
-            model = tuning.fit_level(time_s, measurement, weight, starts, model, record.known, record.fix_jerk)
+            model = tuning.fit_level(
+                time_s, measurement, weight, starts, model, record.known, record.fix_jerk, record.sigma
+            )
         smoothed = smooth_log(time_s, measurement, weight, model, starts, residuals_only=True)
         variance = smoothed.residual_variance - model.noise_variance + model.reading_variance
         good = indicators.classify(smoothed.residual, variance, model.reading_variance, rates, record.gate)
-        decided = _keep_most(((good > 0.5) & record.possible).astype(float), record.screened)
+        sure = np.where((weight > 0) | (rounds < TUNING_ROUNDS), 0.5, READMITTED)
+        decided = _keep_most(((good > sure) & record.possible).astype(float), record.screened)
         settled = bool((decided == weight).all()) and (rounds > 0 or not tune_first)
         weight = decided
         rounds += 1
@@ -169,16 +176,22 @@ def _follow_flight(record: _Record, decision: _Decision) -> _Decision:
     """Give the model a jerk profile, and look again at what made it jump.
 
     A patch that escaped makes the level too high for all, so that it goes on escaping. Where the profile stands out,
-    the decisions are made once more from its median on, which no single event can move.
+    or runs are off together, or the opposite of a decision is likelier, the decisions are made once more from the
+    profile's median on, which no single event can move.
     """
     log = record[:2]
     for _ in range(SECOND_LOOKS):
         profile = tuning.fit_profile(*log, decision.weight, decision.starts, decision.model, LOOK_STEPS)
+        if profile.correlation.any():
+            break  # the level was found from thinned readings, which no patch dominates
         level = float(np.median(profile.jerk[:, 0]))
-        if profile.jerk[:, 0].max() < STANDS_OUT * level or profile.correlation.any():
-            break  # nothing stands out; or the level was found from thinned readings, which no patch dominates
         calm = profile._replace(jerk=level * profile.jerk[:1] / profile.jerk[0, 0], knot_s=np.inf)
-        again = _decide(record, decision._replace(model=calm), tune_first=False)
+        suspects = _suspects(log, decision, calm, profile)
+        whole = swaps.Neighbourhood(*log, record.possible, calm, decision.rates, record.gate)
+        weight = swaps.try_opposites(whole, np.where(suspects, 0.0, decision.weight))
+        if profile.jerk[:, 0].max() < STANDS_OUT * level and (weight == decision.weight).all():
+            break  # nothing stands out
+        again = _decide(record, decision._replace(weight=weight, model=calm), tune_first=False)
         if (again.weight == decision.weight).all():
             break
         decision = again
@@ -186,6 +199,20 @@ def _follow_flight(record: _Record, decision: _Decision) -> _Decision:
         profile = tuning.fit_profile(*log, decision.weight, decision.starts, decision.model, LOOK_STEPS)
     profile = tuning.fit_profile(*log, decision.weight, decision.starts, profile, FINAL_STEPS)
     return decision._replace(model=tuning.with_allowance(profile))
+
+
+def _suspects(
+    log: tuple[FloatArray, FloatArray], decision: _Decision, calm: Model, profile: Model
+) -> NDArray[np.bool_]:
+    """(n, 3) readings that are good so far, in runs that are off together if the flight is calm, and off at once at
+    both ends even if it is not."""
+    weight, starts = decision.weight, decision.starts
+    smoothed = smooth_log(*log, weight, calm, starts, residuals_only=True)
+    suspects = runs.suspicious(log[0], smoothed.residual, smoothed.residual_variance, weight)
+    if suspects.any():
+        without = smooth_log(*log, np.where(suspects, 0.0, weight), profile, starts, residuals_only=True)
+        suspects = runs.confirmed(suspects, without.residual, without.residual_variance)
+    return suspects
 
 
 def _keep_most(decided: FloatArray, screened: FloatArray) -> FloatArray:

@@ -17,7 +17,8 @@ SAMPLES = 15  # good readings of each component wanted for the first fit,
 LONGEST_FIT_S = 20.0  # if they lie so close together
 LONGEST_REACH_S = 3.0  # back from the first good readings to the first sample
 GAP_INTERVALS, GAP_S = 20, 5.0  # median intervals and seconds: a longer one is a gap
-WIDEST_BRIDGE = 0.06  # of the range
+WIDEST_BRIDGE = 0.06  # of the range, over a gap of all components
+WIDEST_BLIND_BRIDGE = 0.2  # of the range, over a gap of one component: the others hold the track meanwhile
 FEWEST_READINGS = 8  # of each component after a gap, for a start of its own
 CURVE = 5  # readings that show a curve
 INFLATION = 3.0  # on every sigma of the first state: its readings are filtered again, so it must weigh little
@@ -52,27 +53,35 @@ def begin_all(
     jerk_psd None (m^2/s^5, not known yet) every real gap is taken to be so. Arguments and errors as in `first_state`.
     """
     starts = [begin(time_s, measurement, weight, noise_variance)]
-    edges = [*_gaps(time_s), len(time_s)]
+    good = (weight > 0) & np.isfinite(measurement)
+    gaps = _gaps(time_s, good)
+    edges = [*sorted(gaps), len(time_s)]
     for low, high in itertools.pairwise(edges):
-        good = (weight[low:high] > 0) & np.isfinite(measurement[low:high])
-        if low <= starts[-1].sample or (good.sum(0) < FEWEST_READINGS).any():
+        if low <= starts[-1].sample or (good[low:high].sum(0) < FEWEST_READINGS).any():
             continue
         if jerk_psd is not None:
-            gap = time_s[low] - time_s[low - 1]
-            slant = float(np.median(measurement[low:high, 0][good[:, 0]]))
-            if np.sqrt(jerk_psd * gap**5 / 20) <= WIDEST_BRIDGE * slant:
+            slant = float(np.median(measurement[low:high, 0][good[low:high, 0]]))
+            duration_s, widest = gaps[low]
+            if np.sqrt(jerk_psd * duration_s**5 / 20) <= widest * slant:
                 continue
         starts.append(first_state(time_s, measurement, weight, noise_variance, low, low, high))
     return starts
 
 
-def _gaps(time_s: FloatArray) -> list[int]:
-    """The first sample after each gap."""
+def _gaps(time_s: FloatArray, good: NDArray[np.bool_]) -> dict[int, tuple[float, float]]:
+    """The first sample after each gap, with the gap's length in s and how vague (in ranges) the position may be by
+    its end: gaps between samples, and those in which one component has no good reading. good (n, 3)."""
     interval = np.diff(time_s)
     if not len(interval):
-        return []
+        return {}
     longest = max(GAP_INTERVALS * float(np.median(interval)), GAP_S)
-    return [int(k) + 1 for k in np.flatnonzero(interval > longest)]
+    found = {int(k) + 1: (float(interval[k]), WIDEST_BRIDGE) for k in np.flatnonzero(interval > longest)}
+    for c in range(3):
+        seen = np.flatnonzero(good[:, c])
+        blind = np.diff(time_s[seen])
+        for k in np.flatnonzero(blind > longest):
+            found.setdefault(int(seen[k + 1]), (float(blind[k]), WIDEST_BLIND_BRIDGE))
+    return found
 
 
 def first_state(

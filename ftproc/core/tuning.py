@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 
 SPANS, SPAN = 6, 400  # of samples: what stands for a long log when one noise and one jerk level are looked for
 NOISE_FLOOR = np.array([1e-3, 1e-7, 1e-7])  # 1-sigma m, rad, rad: below it, rounding of the readings decides
-NOISE_GROWTH = 10.0  # times the noise that the search begins with: more of it is a track gone astray, not noise
+NOISE_GROWTH = 3.0  # times the noise that the search begins with: more of it is a track gone astray, not noise
 JERK_SIDES = ((1e-7, -1), (1e7, 1))  # m^2/s^5: lowest and highest
 RATIO_BOUND = 12.0  # on |ln(vertical / horizontal jerk)|
 KNOT_SAMPLES = 10  # samples to a knot of the jerk profile ...
@@ -79,17 +79,20 @@ def fit_level(
     guess: Model,
     fix_noise: NDArray[np.bool_],
     fix_jerk: bool,
+    expected_sigma: FloatArray | None = None,
     steps: int = 12,
 ) -> Model:
     """The likeliest noise variances and single jerk density with its vertical share, from `guess` on.
 
-    fix_noise: (3,) components whose noise stays as guessed. fix_jerk: the jerk density stays.
+    fix_noise: (3,) components whose noise stays as guessed. fix_jerk: the jerk density stays. expected_sigma: (3,)
+    noise that NOISE_GROWTH counts from, if not the guess.
     """
     if fix_noise.all() and fix_jerk:
         return guess
     part = representative(time_s, measurement, weight, starts, guess.noise_variance)
-    floor, ceiling = 2 * np.log(NOISE_FLOOR), np.log(guess.noise_variance) + 2 * math.log(NOISE_GROWTH)
     log_noise = np.log(guess.noise_variance)
+    expected = log_noise if expected_sigma is None else 2 * np.log(expected_sigma)
+    floor, ceiling = 2 * np.log(NOISE_FLOOR), expected + 2 * math.log(NOISE_GROWTH)
     log_jerk = np.array([math.log(guess.jerk[0, 0]), math.log(guess.jerk[0, 5] / guess.jerk[0, 0])])
     lowest, highest = (np.array([math.log(bound), side * RATIO_BOUND]) for bound, side in JERK_SIDES)
     lower = np.r_[np.where(fix_noise, log_noise, floor), log_jerk if fix_jerk else lowest]

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ftproc.core import editing
 from ftproc.core.geometry import from_cartesian, wrap
 from ftproc.core.start import begin, begin_all, first_state
 from tests.core.tracks import SIGMA, matched
+from tests.simulated import simulate
 
 NOISE = SIGMA**2
 
@@ -194,3 +196,27 @@ def test_start_after_a_gap_rests_on_its_own_side_only():
     spoiled[:80] += 0.05
     one, other = (begin_all(time, readings, seen(z), NOISE, None)[1] for readings in (z, spoiled))
     np.testing.assert_array_equal(one.state, other.state)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "jerk", "anew"), [(4.0, None, False), (20.0, None, True), (20.0, 1e-3, False), (20.0, 100.0, True)]
+)
+@pytest.mark.parametrize("component", range(3))
+def test_record_begins_anew_after_one_component_was_blind_too_long(component, seconds, jerk, anew):
+    """The others hold the track, so the gap may be longer; a filter that comes out of it would be lost."""
+    time, z, truth = interrupted(0.1, n=300, after=100)
+    z[300 - round(seconds / 0.1) : 300, component] = np.nan
+    starts = begin_all(time, z, seen(z), NOISE, jerk)
+    assert [start.sample for start in starts] == ([0, 300] if anew else [0])
+    for start in starts:
+        assert inside(start, truth[start.sample])
+
+
+def test_flight_with_blind_turns_does_not_run_away():
+    """5 g turns seen once a second with patches of half a minute: the patches cannot be bridged, the rest can."""
+    flight = simulate("manoeuvre", seed=15, dt_s=1.0, duration_s=600.0, outliers="patch=3:10-30:10-50")
+    log = flight.log
+    edited = editing.edit(log.time_s, log.measurement, np.full(3, np.nan), None, 4.0)
+    error = np.linalg.norm(edited.smoothed.state[:, :3] - flight.truth.position_m, axis=1)
+    assert np.median(error) < 5
+    assert np.quantile(error, 0.9) < 500
