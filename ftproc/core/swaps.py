@@ -1,8 +1,9 @@
 """The opposite decision, tried: is it the readings between two patches that are the patch?
 
 A filter that has followed a patch calls the good readings on both sides of it bad, and the decisions stand still
-there, because each supports the others. Where a short stretch of used readings lies between two rejected runs, the
-decisions are made again from the opposite on, over the neighbourhood alone, and the likelier outcome is kept.
+there, because each supports the others. Where a short stretch of used readings lies between two rejected runs, or
+between one and a gap, the decisions are made again from the opposite on, over the neighbourhood alone, and the
+likelier outcome is kept.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ IntArray = NDArray[np.int64]
 
 SHORTEST_RUN = 3  # rejected readings on each side
 LONGEST = 48  # used readings between them
+GAP_INTERVALS = 8.0  # median intervals without a reading, which a patch may end at
 AROUND = 80  # samples on each side that the comparison looks at
 ROUNDS = 5
 MARGIN = 5.0  # by which the log-probability of the opposite must be better
@@ -48,7 +50,7 @@ class Neighbourhood(NamedTuple):
 def try_opposites(log: Neighbourhood, weight: FloatArray) -> FloatArray:
     """The decisions (n, 3), with better ones in their place where the opposite is likelier."""
     result = weight.copy()
-    for component, first, begin, end, last in islands(weight, log.possible)[:MOST]:
+    for component, first, begin, end, last in islands(log.time_s, weight, log.possible)[:MOST]:
         low = max(first - AROUND, 0)
         near = slice(low, last + AROUND)
         opposite = result[near].copy()
@@ -65,18 +67,31 @@ def try_opposites(log: Neighbourhood, weight: FloatArray) -> FloatArray:
     return result
 
 
-def islands(weight: FloatArray, possible: NDArray[np.bool_]) -> list[tuple[int, int, int, int, int]]:
+def islands(
+    time_s: FloatArray, weight: FloatArray, possible: NDArray[np.bool_]
+) -> list[tuple[int, int, int, int, int]]:
     """(component, first, begin, end, last): used readings [begin, end) between rejected runs [first, begin) and
-    [end, last). weight, possible: (n, 3)."""
+    [end, last), one of which may be a gap or an end of the log instead. time_s (n,), weight, possible: (n, 3)."""
     found = []
     for c in range(3):
         seen = np.flatnonzero(possible[:, c])
+        if not len(seen):
+            continue
         bad = runs_of(weight[seen, c] <= 0)
         bad = bad[bad[:, 1] - bad[:, 0] >= SHORTEST_RUN]
-        for (low, begin), (end, high) in itertools.pairwise(bad):
-            if end - begin <= LONGEST:
-                found.append((c, int(seen[low]), int(seen[begin]), int(seen[end]), int(seen[high - 1]) + 1))
+        interval = np.diff(time_s[seen])
+        gaps = np.flatnonzero(interval > GAP_INTERVALS * np.median(interval)) + 1
+        walls = np.r_[0, gaps, len(seen)]
+        banks = sorted({*map(tuple, bad.tolist()), *((w, w) for w in walls.tolist() if not _inside(w, bad))})
+        for (low, begin), (end, high) in itertools.pairwise(banks):
+            if 0 < end - begin <= LONGEST and low + end < begin + high:
+                found.append((c, int(seen[low]), int(seen[begin]), int(seen[end - 1]) + 1, int(seen[high - 1]) + 1))
     return found
+
+
+def _inside(place: int, runs: IntArray) -> bool:
+    """Whether a gap lies in one of the runs (m, 2), or at its edge."""
+    return bool(((runs[:, 0] <= place) & (place <= runs[:, 1])).any())
 
 
 def _decisions(log: Neighbourhood, weight: FloatArray) -> list[tuple[FloatArray, float]]:

@@ -50,13 +50,32 @@ def test_islands_lie_between_two_rejected_runs():
     weight[30:32, 1] = 0.0  # too short to be a patch
     weight[50:55, 2] = 0.0  # no second run
     possible[16, 1] = False
-    assert swaps.islands(weight, possible) == [(1, 10, 14, 20, 23)]
+    weight[4:8, 2] = 0.0
+    time = 0.1 * np.arange(60)
+    assert swaps.islands(time, weight, possible) == [
+        (1, 0, 0, 10, 14),
+        (1, 10, 14, 20, 23),
+        (1, 20, 23, 60, 60),
+        (2, 0, 0, 4, 8),
+        (2, 4, 8, 50, 55),
+        (2, 50, 55, 60, 60),
+    ]
+
+
+def test_islands_end_at_gaps():
+    weight = np.ones((60, 3))
+    weight[20:24, 0] = 0.0
+    time = 0.1 * np.arange(60)
+    time[30:] += 2.0
+    assert swaps.islands(time, weight, weight > -1) == [(0, 0, 0, 20, 24), (0, 20, 24, 30, 30)]
+    time[22:] += 2.0  # within the rejected run it ends nothing
+    assert swaps.islands(time, weight, weight > -1) == [(0, 0, 0, 20, 24), (0, 20, 24, 30, 30)]
 
 
 def test_far_apart_runs_have_no_island_between_them():
-    weight = np.ones((100, 3))
-    weight[10:14, 0] = weight[14 + swaps.LONGEST + 1 : 70, 0] = 0.0
-    assert swaps.islands(weight, np.ones((100, 3), bool)) == []
+    weight = np.ones((200, 3))
+    weight[60:64, 0] = weight[64 + swaps.LONGEST + 1 : 120, 0] = 0.0
+    assert swaps.islands(0.1 * np.arange(200), weight, np.ones((200, 3), bool)) == []
 
 
 def test_neighbourhood_that_says_too_little_is_left():
