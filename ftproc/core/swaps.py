@@ -47,6 +47,17 @@ class Neighbourhood(NamedTuple):
         return self._replace(time_s=self.time_s[near], measurement=self.measurement[near], possible=self.possible[near])
 
 
+class Island(NamedTuple):
+    """Used readings [begin, end) of a component between rejected runs [first, begin) and [end, last), one of which may
+    be a gap or an end of the log instead."""
+
+    component: int
+    first: int
+    begin: int
+    end: int
+    last: int
+
+
 def try_opposites(log: Neighbourhood, weight: FloatArray) -> FloatArray:
     """The decisions (n, 3), with better ones in their place where the opposite is likelier."""
     result = weight.copy()
@@ -67,11 +78,8 @@ def try_opposites(log: Neighbourhood, weight: FloatArray) -> FloatArray:
     return result
 
 
-def islands(
-    time_s: FloatArray, weight: FloatArray, possible: NDArray[np.bool_]
-) -> list[tuple[int, int, int, int, int]]:
-    """(component, first, begin, end, last): used readings [begin, end) between rejected runs [first, begin) and
-    [end, last), one of which may be a gap or an end of the log instead. time_s (n,), weight, possible: (n, 3)."""
+def islands(time_s: FloatArray, weight: FloatArray, possible: NDArray[np.bool_]) -> list[Island]:
+    """Where a patch may have been followed. time_s (n,), weight, possible: (n, 3)."""
     found = []
     for c in range(3):
         seen = np.flatnonzero(possible[:, c])
@@ -85,7 +93,8 @@ def islands(
         banks = sorted({*map(tuple, bad.tolist()), *((w, w) for w in walls.tolist() if not _inside(w, bad))})
         for (low, begin), (end, high) in itertools.pairwise(banks):
             if 0 < end - begin <= LONGEST and low + end < begin + high:
-                found.append((c, int(seen[low]), int(seen[begin]), int(seen[end - 1]) + 1, int(seen[high - 1]) + 1))
+                outer = int(seen[low]), int(seen[high - 1]) + 1
+                found.append(Island(c, outer[0], int(seen[begin]), int(seen[end - 1]) + 1, outer[1]))
     return found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core import editing
+from ftproc.core import deciding, editing
 from ftproc.core.start import first_state
 from tests.core.tracks import matched, position_error
 from tests.simulated import codes, deviation, simulate
@@ -115,7 +115,7 @@ def test_missing_readings_have_no_weight_and_decisions_are_all_or_nothing():
     edited = edit(flight)
     assert not edited.weight[~np.isfinite(flight.log.measurement)].any()
     assert set(np.unique(edited.weight)) <= {0.0, 1.0}
-    assert edited.rounds <= editing.MAX_ROUNDS
+    assert edited.rounds <= deciding.MAX_ROUNDS
 
 
 def test_smoothed_start_is_the_head_with_a_wider_covariance():

@@ -1,0 +1,128 @@
+"""The second look: a jerk profile that follows the flight, and the decisions made again where something stands out.
+
+A patch that escaped makes the jerk level too high hereabouts, so that it goes on escaping. So the places where the
+profile stands out, where runs of readings are off together, and where the opposite of a decision may be likelier,
+are looked at again from the profile's median on, which no single event can move. Only there: the rest of a long log
+stays as it is.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core import runs, swaps, tuning
+from ftproc.core.deciding import Decision, Record, decide
+from ftproc.core.forward import Model
+from ftproc.core.runs import runs_of
+from ftproc.core.smoother import smooth_log
+from ftproc.core.start import begin_all
+
+FloatArray = NDArray[np.float64]
+
+LOOKS = 6
+LOOK_STEPS, FINAL_STEPS = 3, 4  # of the search for the jerk profile
+STANDS_OUT = 8.0  # times the median of the jerk profile
+AROUND = 200  # samples on each side of what stands out that are decided with it
+LONGEST_SPAN = 3000  # samples that are decided together
+SHORT_LOG, MOST = 8000, 0.5  # samples, and share that stands out: then all of it is looked at again, and noise as well
+
+
+def follow_flight(record: Record, decision: Decision) -> Decision:
+    """Give the model a jerk profile, and make the decisions again where it stands out or readings are suspicious."""
+    profile = tuning.fit_profile(*record.log, decision.weight, decision.starts, decision.model, LOOK_STEPS)
+    if not profile.correlation.any():  # else the level was found from thinned readings, which no patch dominates
+        decision, profile = _look_again(record, decision, profile)
+    profile = tuning.fit_profile(*record.log, decision.weight, decision.starts, profile, FINAL_STEPS)
+    return decision._replace(model=tuning.with_allowance(profile))
+
+
+def _look_again(record: Record, decision: Decision, profile: Model) -> tuple[Decision, Model]:
+    calm = _calm(profile)
+    suspects = _suspects(record, decision, calm, profile)
+    marked = suspects.any(1) | _stands_out(record.time_s, profile)
+    for island in swaps.islands(record.time_s, decision.weight, record.possible):
+        marked[island.first : island.last] = True
+    widened = _widened(marked)
+    if len(widened) <= SHORT_LOG and widened.mean() > MOST:
+        return _look_until_settled(record, decision, profile)
+    weight = decision.weight.copy()
+    fixed = record._replace(known=np.ones(3, bool))  # a span is too short to tell the noise from
+    for span in _spans(widened):
+        part = fixed.part(span)
+        try:
+            starts = begin_all(*part.log, weight[span], calm.noise_variance, float(calm.jerk[0, 0]))
+        except ValueError:  # a component says too little hereabouts
+            continue
+        begun = Decision(weight[span], calm, starts, decision.rates)
+        weight[span] = _look_until_settled(part, begun, None)[0].weight
+    starts = begin_all(*record.log, weight, calm.noise_variance, float(calm.jerk[0, 0]))
+    return decision._replace(weight=weight, starts=starts), profile
+
+
+def _look_until_settled(record: Record, decision: Decision, profile: Model | None) -> tuple[Decision, Model]:
+    """Look again from the calm level on until nothing changes, or LOOKS times."""
+    for _ in range(LOOKS):
+        if profile is None:
+            profile = tuning.fit_profile(*record.log, decision.weight, decision.starts, decision.model, LOOK_STEPS)
+        calm = _calm(profile)
+        suspects = _suspects(record, decision, calm, profile)
+        whole = swaps.Neighbourhood(*record.log, record.possible, calm, decision.rates, record.gate)
+        weight = swaps.try_opposites(whole, np.where(suspects, 0.0, decision.weight))
+        if not _stands_out(record.time_s, profile).any() and (weight == decision.weight).all():
+            break
+        again = decide(record, decision._replace(weight=weight, model=calm), tune_first=False)
+        if (again.weight == decision.weight).all():
+            break
+        decision, profile = again, None
+    if profile is None:
+        profile = tuning.fit_profile(*record.log, decision.weight, decision.starts, decision.model, LOOK_STEPS)
+    return decision, profile
+
+
+def _calm(profile: Model) -> Model:
+    """The model with the profile's median for all of the flight."""
+    level = float(np.median(profile.jerk[:, 0]))
+    return profile._replace(jerk=level * profile.jerk[:1] / profile.jerk[0, 0], knot_s=np.inf)
+
+
+def _stands_out(time_s: FloatArray, profile: Model) -> NDArray[np.bool_]:
+    """(n,) samples in pieces of the profile that are far above its median."""
+    jerk = profile.jerk[:, 0]
+    piece = np.zeros(len(time_s), int)
+    if np.isfinite(profile.knot_s):
+        piece = np.clip(((time_s - time_s[0]) / profile.knot_s).astype(int), 0, len(jerk) - 1)
+    found: NDArray[np.bool_] = (jerk >= STANDS_OUT * np.median(jerk))[piece]
+    return found
+
+
+def _widened(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(n,) true within AROUND samples of what is marked."""
+    edges = np.zeros(len(marked) + 1, int)
+    for begin, end in runs_of(marked):
+        edges[max(begin - AROUND, 0)] += 1
+        edges[min(end + AROUND, len(marked))] -= 1
+    return np.cumsum(edges)[:-1] > 0
+
+
+def _spans(marked: NDArray[np.bool_]) -> Iterator[slice]:
+    """The runs of what is marked, in pieces that are not too long."""
+    for begin, end in runs_of(marked):
+        pieces = max(1, round((end - begin) / LONGEST_SPAN))
+        for low, high in itertools.pairwise(np.linspace(begin, end, pieces + 1).astype(int)):
+            yield slice(low, high)
+
+
+def _suspects(record: Record, decision: Decision, calm: Model, profile: Model) -> NDArray[np.bool_]:
+    """(n, 3) readings that are good so far, in runs that are off together if the flight is calm, and off at once at
+    both ends even if it is not."""
+    weight, starts = decision.weight, decision.starts
+    smoothed = smooth_log(*record.log, weight, calm, starts, residuals_only=True)
+    suspects = runs.suspicious(record.time_s, smoothed.residual, smoothed.residual_variance, weight)
+    if suspects.any():
+        without = smooth_log(*record.log, np.where(suspects, 0.0, weight), profile, starts, residuals_only=True)
+        suspects = runs.confirmed(suspects, without.residual, without.residual_variance)
+    return suspects
