@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core import deciding, editing
+from ftproc.core import deciding, editing, second_look
 from ftproc.core.start import first_state
 from tests.core.tracks import matched, position_error
 from tests.simulated import codes, deviation, simulate
@@ -155,6 +155,31 @@ def test_second_look_finds_the_patch_that_made_the_jerk_jump(monkeypatch):
         return np.sqrt((error**2).sum(1).mean())
 
     looked_twice = rms()
-    monkeypatch.setattr(editing, "SECOND_LOOKS", 0)
+    monkeypatch.setattr(second_look, "_look_again", lambda record, decision, profile: (decision, profile))
     assert looked_twice < 0.7
     assert rms() > 3 * looked_twice
+
+
+def test_long_log_is_looked_at_again_in_spans_only(monkeypatch):
+    """The same outliers are found as with all of it looked at, though hardly any of it is."""
+    spec = "isolated=0.03:6-300,range.patch=12:15-40:4-7"
+    flight = simulate("manoeuvre", seed=4, duration_s=500.0, outliers=spec)
+    assert len(flight.log) > second_look.SHORT_LOG
+    spans = []
+    whole = second_look._look_until_settled
+
+    def spy(record, decision, profile):
+        spans.append(len(record.time_s))
+        return whole(record, decision, profile)
+
+    monkeypatch.setattr(second_look, "_look_until_settled", spy)
+    in_spans = edit(flight)
+    assert 0 < sum(spans) < len(flight.log)
+    assert max(spans) <= 1.5 * second_look.LONGEST_SPAN
+    monkeypatch.setattr(second_look, "SHORT_LOG", 10**6)
+    monkeypatch.setattr(second_look, "MOST", 0.0)
+    entire = edit(flight)
+    assert (in_spans.weight != entire.weight).mean() < 0.002
+    rejected, large, good = flags(flight, in_spans)
+    assert rejected[large].mean() > 0.98
+    assert rejected[good].mean() < 0.002
