@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ftproc import pipeline
+from ftproc import batch, geodesy, pipeline
+from ftproc.config import load, recipe
 from ftproc.records import MeasurementLog, Trajectory, Truth
 from ftproc.settings import FilterSettings, TrainSettings
 
@@ -18,25 +20,41 @@ if TYPE_CHECKING:
     from ftproc.simulation import Simulation
 
 
-def read_log(source: Any, **options: Any) -> MeasurementLog:
-    """A log from a file (.csv, .csv.gz, .parquet), a pandas DataFrame or a pyarrow Table.
+def read_log(source: Any, *, config: str | Path | None = None, **options: Any) -> MeasurementLog:
+    """A log from a file (.csv, .csv.gz, .parquet, .feather), a pandas DataFrame or a pyarrow Table.
 
-    options: units, columns, azimuth_from, keep_columns; see `ftproc.files.logs.read`. Raises InputError.
+    config: what `--config` takes. options: units, columns, azimuth_from, keep_columns, station; they win over
+    it; see `ftproc.files.logs.read`. Raises InputError, UsageError.
     """
     from ftproc.files import logs
 
-    return logs.read(source, **options)
+    return logs.read(source, **{**_recipe(config).reading(), **options})
 
 
 def filter_log(
-    log: Any, settings: FilterSettings | None = None, *, model: Model | str | None = "packaged"
+    log: Any,
+    settings: FilterSettings | None = None,
+    *,
+    model: Model | str | None = batch.PACKAGED,
+    config: str | Path | None = None,
 ) -> Trajectory:
     """The trajectory of a log (a MeasurementLog, or anything `read_log` takes).
 
-    model: the packaged correction, another one, or None for none. Raises InputError, UsageError.
+    model: the packaged correction, another one (or its file), or None for none.
+    config: what `--config` takes: how the log is read (one that was read already stays as it is), and the
+    settings and the model where they are not given here. With a site in the settings the trajectory has its
+    `lat_deg`, `lon_deg`, `height_m` too. Raises InputError, UsageError.
     """
-    chosen = pipeline.default_model() if isinstance(model, str) else model
-    return pipeline.filter_log(log if isinstance(log, MeasurementLog) else read_log(log), settings, chosen)
+    usual = _recipe(config)
+    settings = settings or usual.settings
+    if isinstance(model, str):
+        model = batch.model_named(usual.model if model == batch.PACKAGED else model)
+    read = log if isinstance(log, MeasurementLog) else read_log(log, config=config)
+    return geodesy.located(pipeline.filter_log(read, settings, model), settings)
+
+
+def _recipe(config: str | Path | None) -> batch.Recipe:
+    return batch.Recipe() if config is None else recipe(load(config))
 
 
 def train(pairs: Sequence[tuple[Any, Any]], settings: TrainSettings | None = None) -> Model:

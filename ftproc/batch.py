@@ -12,7 +12,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from ftproc.errors import FtprocError
-from ftproc.settings import FilterSettings
+from ftproc.settings import FilterSettings, Station
 
 if TYPE_CHECKING:
     from ftproc.correction.model import Model
@@ -37,10 +37,14 @@ class Recipe:
 
     settings: FilterSettings = field(default_factory=FilterSettings)
     model: str = PACKAGED
-    units: str | None = None
-    columns: str | None = None
-    azimuth_from: str = "x"
+    units: str | Mapping[str, str] | None = None
+    columns: str | Mapping[str, str] | None = None
+    station: Station = field(default_factory=Station)
     keep_columns: bool = False
+
+    def reading(self) -> dict[str, Any]:
+        """What `files.logs.read` is told."""
+        return {name: getattr(self, name) for name in ("units", "columns", "station", "keep_columns")}
 
 
 @dataclass(frozen=True)
@@ -84,15 +88,11 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
     from ftproc.files import logs, trajectories
 
     try:
-        log = logs.read(
-            task.log, units=recipe.units, columns=recipe.columns,
-            azimuth_from=recipe.azimuth_from, keep_columns=recipe.keep_columns,
-        )  # fmt: skip
+        log = logs.read(task.log, **recipe.reading())
         settings = replace(recipe.settings, method=task.method or recipe.settings.method)
         with warm.announced(say):
-            trajectory = pipeline.filter_log(log, settings, _model(recipe.model))
-        if settings.site is not None:
-            trajectory = geodesy.with_geodetic(trajectory, settings.site)
+            trajectory = pipeline.filter_log(log, settings, model_named(recipe.model))
+        trajectory = geodesy.located(trajectory, settings)
         trajectories.write(trajectory, task.output)
         return Outcome(task, summary.text(trajectory), summary.as_dict(trajectory))
     except BrokenPipeError:
@@ -122,13 +122,13 @@ def failure(error: BaseException, source: str | None = None) -> Failure:
 def _check(recipe: Recipe) -> None:
     from ftproc import geodesy
 
-    _model(recipe.model)
-    if recipe.settings.site is not None:
-        geodesy.require_pymap3d()
+    model_named(recipe.model)
+    geodesy.check(recipe.settings)
 
 
 @cache
-def _model(name: str) -> Model | None:
+def model_named(name: str) -> Model | None:
+    """`packaged`, `none` or a file -> the correction. Raises ModelError."""
     if name == NO_MODEL:
         return None
     from ftproc import pipeline

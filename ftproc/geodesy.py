@@ -9,8 +9,10 @@ import numpy as np
 
 from ftproc.errors import UsageError
 from ftproc.records import FloatArray, Trajectory
+from ftproc.settings import FilterSettings
 
 COLUMNS = ("lat_deg", "lon_deg", "height_m")
+ECEF = ("x_ecef_m", "y_ecef_m", "z_ecef_m", "vx_ecef_mps", "vy_ecef_mps", "vz_ecef_mps")
 
 #: frame of a log -> which local axes point east and north, and how that is said.
 _AXES = {"local": ((0, 1), "x is taken as east, y as north"), "north-east-up": ((1, 0), "x is north, y is east")}
@@ -32,24 +34,40 @@ def axes(frame: str) -> str:
     return _AXES[frame][1]
 
 
-def with_geodetic(trajectory: Trajectory, site: Site) -> Trajectory:
-    """The trajectory with `lat_deg`, `lon_deg`, `height_m` among its extra columns, NaN where not estimated.
+def check(settings: FilterSettings) -> None:
+    """Raise UsageError when places on the earth are asked for and cannot be had."""
+    if settings.site is not None:
+        require_pymap3d()
+    elif settings.ecef:
+        raise UsageError("--ecef needs the station: give --site LAT,LON,HEIGHT, or [site] in the --config file.")
 
-    site: the station's geodetic latitude deg, longitude deg and height above the ellipsoid m (WGS-84).
-    The local z is the station's vertical. In the frame `local` the convention A = atan2(y, x) leaves open
-    where x points: east is taken, as the metadata say under `site_axes`.
+
+def located(trajectory: Trajectory, settings: FilterSettings) -> Trajectory:
+    """The trajectory with its places on the earth among its extra columns, NaN where not estimated.
+
+    With a site `lat_deg`, `lon_deg`, `height_m` (above the ellipsoid, WGS-84); with `ecef` also earth-centred,
+    earth-fixed positions in m and velocities in m/s. Without a site, as it was.
+    The local z is the normal of the ellipsoid at the station: the deflection of the vertical is not known. In the
+    frame `local` the convention A = atan2(y, x) leaves open where x points: east is taken, as the metadata say under
+    `site_axes`.
     Raises UsageError when pymap3d is missing or a kept column already has one of the names.
     """
     import pyarrow as pa
 
+    check(settings)
+    if settings.site is None:
+        return trajectory
     frame = str(trajectory.metadata.get("frame", "local"))
-    extra = trajectory.extra
-    found = {} if extra is None else dict(zip(extra.column_names, extra.columns, strict=True))
-    for name, values in zip(COLUMNS, geodetic(trajectory.state[:, :3], frame, site), strict=True):
-        if name in found:
+    found = dict(zip(COLUMNS, geodetic(trajectory.state[:, :3], frame, settings.site), strict=True))
+    if settings.ecef:
+        found |= zip(ECEF, earth_centred(trajectory.state[:, :6], frame, settings.site), strict=True)
+    extra = pa.table({}) if trajectory.extra is None else trajectory.extra
+    for name in found:
+        if name in extra.column_names:
             raise UsageError(f'the log\'s column "{name}" has the name of an output column; leave --keep-columns out.')
-        found[name] = pa.array(values)
-    return replace(trajectory, extra=pa.table(found), metadata={**trajectory.metadata, "site_axes": axes(frame)})
+    kept = dict(zip(extra.column_names, extra.columns, strict=True))
+    table = pa.table(kept | {name: pa.array(values) for name, values in found.items()})
+    return replace(trajectory, extra=table, metadata={**trajectory.metadata, "site_axes": axes(frame)})
 
 
 def geodetic(position: FloatArray, frame: str, site: Site) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -57,3 +75,12 @@ def geodetic(position: FloatArray, frame: str, site: Site) -> tuple[FloatArray, 
     east, north = (position[:, axis] for axis in _AXES[frame][0])
     latitude, longitude, height = require_pymap3d().enu2geodetic(east, north, position[:, 2], *site)
     return np.asarray(latitude, float), np.asarray(longitude, float), np.asarray(height, float)
+
+
+def earth_centred(state: FloatArray, frame: str, site: Site) -> list[FloatArray]:
+    """x, y, z in m and their velocities in m/s, each (n,), of (n, 6) local states; the earth's frame turns with it."""
+    pymap3d = require_pymap3d()
+    (east, north), up = _AXES[frame][0], 2
+    position = pymap3d.enu2ecef(state[:, east], state[:, north], state[:, up], *site)
+    velocity = pymap3d.enu2uvw(state[:, 3 + east], state[:, 3 + north], state[:, 3 + up], *site[:2])
+    return [np.asarray(column, float) for column in (*position, *velocity)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ import numpy as np
 from ftproc import __version__
 from ftproc.core.geometry import from_cartesian
 from ftproc.errors import InputError, UsageError
+from ftproc.files.conventions import CONVENTION, in_words
 from ftproc.methods import registry
 from ftproc.methods.estimate import Estimate, Readings
 from ftproc.records import COMPONENTS, MISSING, MeasurementLog, Trajectory, Truth
@@ -125,6 +127,9 @@ def _provenance(
         "method": settings.method,
         "log": log.name,
         "frame": log.frame,
+        "convention": CONVENTION[log.frame],
+        "station": {**asdict(log.station), "in_words": in_words(log.station)},
+        "epoch": log.epoch,
         "settings": {
             "editing": settings.editing,
             "smooth": settings.smooth,
@@ -132,7 +137,9 @@ def _provenance(
             "max_patch_s": settings.max_patch_s,
             "gain_form": settings.gain_form,
             "site": settings.site,
-            "noise_given": settings.noise is not None,
+            "geoid_m": settings.geoid_m,
+            "ecef": settings.ecef,
+            "noise_given": settings.noise is not None and None not in settings.noise,
             "jerk_given": settings.jerk_psd_m2ps5 is not None,
             "noise_range_m": float(sigma[0]),
             "noise_azimuth_rad": float(sigma[1]),

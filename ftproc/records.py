@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.settings import Station
+
 if TYPE_CHECKING:
     import pyarrow as pa
 
@@ -36,6 +38,7 @@ class MeasurementLog:
     frame: `local` (x by the log's own convention) or `north-east-up` (azimuth was said to run from north).
     rows_in_file, rows_without_time, rows_out_of_order, duplicate_times: what was read and what was found.
     extra: the other columns of the file, row for row with `time_s`; only when they were asked for.
+    station: what was known of the instrument, and is applied already. epoch: the instant of time zero (ISO 8601) or "".
     """
 
     name: str
@@ -48,6 +51,8 @@ class MeasurementLog:
     rows_out_of_order: int = 0
     duplicate_times: int = 0
     extra: pa.Table | None = None
+    station: Station = field(default_factory=Station)
+    epoch: str = ""
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -4,6 +4,29 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+Noise = tuple[float | None, float | None, float | None]
+
+
+@dataclass(frozen=True)
+class Air:
+    """The air at a station, for the refraction of light."""
+
+    temperature_c: float = 15.0
+    pressure_hpa: float = 1013.25
+
+
+@dataclass(frozen=True)
+class Station:
+    """How the readings of an instrument are to be understood, and what is known to be wrong with them."""
+
+    azimuth_from: str = "x"  # x | north: the axis that the azimuth is counted from, see ftproc.files.logs
+    azimuth_sense: str | None = None  # clockwise | anticlockwise from above; None: north clockwise, x anticlockwise
+    azimuth_zero_rad: float = 0.0  # what the azimuth is where the instrument reads zero
+    elevation_from: str = "horizon"  # horizon | zenith
+    bias: tuple[float, float, float] = (0.0, 0.0, 0.0)  # reading minus truth: range m, azimuth rad, elevation rad
+    time_offset_s: float = 0.0  # is added to every time
+    refraction: Air | None = None  # bends the elevation of an optical instrument; None: it is corrected already
+
 
 @dataclass(frozen=True)
 class FilterSettings:
@@ -12,12 +35,14 @@ class FilterSettings:
     method: str = "ga-bpnn-ukf"
     editing: str = "two-pass"  # two-pass | forward | none
     smooth: bool = False
-    noise: tuple[float, float, float] | None = None  # 1-sigma of range m, azimuth rad, elevation rad
+    noise: Noise | None = None  # 1-sigma of range m, azimuth rad, elevation rad; each may be None
     jerk_psd_m2ps5: float | None = None  # spectral density of white jerk
     gate: float = 4.0  # sigmas
     max_patch_s: float | None = None  # longest patch of outliers expected, for the recursive gate
     gain_form: bool = False  # forward editing scales the gain by m (the paper's letter) instead of R by 1/m
-    site: tuple[float, float, float] | None = None  # latitude deg, longitude deg, height m
+    site: tuple[float, float, float] | None = None  # latitude deg, longitude deg, height m above the ellipsoid
+    ecef: bool = False  # with a site: earth-centred coordinates too
+    geoid_m: float | None = None  # height of the geoid above the ellipsoid at the site
 
 
 @dataclass(frozen=True)

@@ -33,12 +33,28 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     help="The station on the earth (WGS-84; degrees, degrees, m), such as 48.0812,11.2803,612: adds lat_deg, lon_deg, "
     "height_m. x is taken as east and y as north; with --azimuth-from north, x as north and y as east.",
 )
+@click.option(
+    "--ecef", is_flag=True, help="With a site: add x_ecef_m ... vz_ecef_mps, earth-centred, earth-fixed (WGS-84)."
+)
 @options.azimuth_from("Where the azimuth is counted from: x, A = atan2(y, x), or north, clockwise; then x is north.")
+@click.option(
+    "--elevation-from",
+    type=click.Choice(["horizon", "zenith"]),
+    default="horizon",
+    help="What the elevation is counted from; zenith: the log has zenith angles.",
+)
 @options.units("Units of columns whose names state none, such as range=km,azimuth=deg. [default: s, m, rad]")
 @click.option(
     "--columns", metavar="NAME=COLUMN,...", help="Names of columns that are not understood, such as time=T0,range=RNG."
 )
-@click.option("--keep-columns", is_flag=True, help="Carry the log's other columns through to the trajectory.")
+@click.option("--keep-columns/--no-keep-columns", help="Carry the log's other columns through to the trajectory.")
+@click.option(
+    "--config",
+    metavar="FILE",
+    help="A station file (TOML): site, conventions, columns, known biases, noise and options of one instrument. "
+    "Options given here win over it.",
+)
+@click.option("--write-config", is_flag=True, help="Print a station file with the options given, and filter nothing.")
 @click.option(
     "--jobs", type=click.IntRange(min=1), default=1, metavar="N", help="Worker processes, for several logs at a time."
 )
@@ -49,7 +65,9 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     help="What to print of each trajectory; on stderr when the trajectory itself goes to stdout.",
 )
 @click.option("--list-methods", is_flag=True, help="List the methods, and filter nothing.")
-def command(logs: tuple[str, ...], output: str | None, list_methods: bool, **given: Any) -> None:
+def command(
+    logs: tuple[str, ...], output: str | None, jobs: int, summary: str, list_methods: bool, write_config: bool, **_: Any
+) -> None:
     """Find the outliers of LOGs, and estimate where the target was, how fast, and how sure that is.
 
     A LOG is a .csv, .csv.gz or .parquet file with time, range, azimuth and elevation, or - for CSV on standard input.
@@ -61,12 +79,18 @@ def command(logs: tuple[str, ...], output: str | None, list_methods: bool, **giv
 
         click.echo(registry.list_methods())
         return
+    ctx = click.get_current_context()
+    if write_config:
+        from ftproc.cli import stations
+
+        click.echo(stations.as_file(ctx), nl=False)
+        return
     if not logs:
-        raise click.UsageError("Name at least one log.", click.get_current_context())
+        raise click.UsageError("Name at least one log.", ctx)
     from ftproc.cli.startup import hasten
 
     hasten()
-    from ftproc.cli import filtering
+    from ftproc.cli import filtering, stations
 
-    ctx = click.get_current_context()
-    ctx.exit(filtering.run(logs, output, debug=ctx.meta[DEBUG], **given))
+    recipe = stations.recipe(ctx)
+    ctx.exit(filtering.run(logs, output, recipe, jobs=jobs, summary=summary, debug=ctx.meta[DEBUG]))

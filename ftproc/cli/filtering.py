@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Any
 
 import click
 
@@ -12,21 +11,20 @@ from ftproc import batch, geodesy
 from ftproc.batch import Outcome, Recipe
 from ftproc.cli import outputs
 from ftproc.cli.progress import Progress
-from ftproc.files import schema, units
+from ftproc.cli.stations import ALL
+from ftproc.files import conventions
 from ftproc.methods import registry
-from ftproc.settings import FilterSettings
-
-ALL = "all"
 
 
-def run(logs: Sequence[str], output: str | None, *, jobs: int, summary: str, debug: bool, **given: Any) -> int:
+def run(logs: Sequence[str], output: str | None, recipe: Recipe, *, jobs: int, summary: str, debug: bool) -> int:
     """Filter the logs and print what became of them; the exit code. Raises FtprocError for wrong usage."""
-    recipe = _recipe(given)
-    methods = list(registry.METHODS) if given["method"] == ALL else None
+    methods = list(registry.METHODS) if recipe.settings.method == ALL else None
     inputs = [] if recipe.model in (batch.PACKAGED, batch.NO_MODEL) else [recipe.model]
     tasks = outputs.plan(logs, output, methods, inputs)
+    if readings := conventions.in_words(recipe.station):
+        _tell(f"readings: {', '.join(readings)}")
     if recipe.settings.site is not None:
-        _tell(f"positions on the earth: {geodesy.axes(_frame(recipe))}, z is up")
+        _tell(f"positions on the earth: {geodesy.axes(conventions.FRAMES[recipe.station.azimuth_from])}, z is up")
     done: list[Outcome] = []
     with Progress() as progress:
         for outcome in batch.run(tasks, recipe, jobs, _tell):
@@ -38,31 +36,6 @@ def run(logs: Sequence[str], output: str | None, *, jobs: int, summary: str, deb
         _show_json(done)
     failures = [outcome.failure.exit_code for outcome in done if outcome.failure is not None]
     return failures[0] if len(done) == 1 and failures else int(bool(failures))
-
-
-def _recipe(given: dict[str, Any]) -> Recipe:
-    """Raises UsageError for what is wrong whatever the log."""
-    method = FilterSettings.method if given["method"] == ALL else given["method"]
-    registry.named(method)
-    units.parse_units(given["units"])
-    schema.parse_columns(given["columns"])
-    settings = FilterSettings(
-        method=method,
-        editing=given["editing"],
-        smooth=given["smooth"],
-        noise=given["noise"],
-        jerk_psd_m2ps5=given["jerk"],
-        gate=given["gate"],
-        max_patch_s=given["max_patch"],
-        gain_form=given["weight_form"] == "gain",
-        site=given["site"],
-    )
-    reading = {name: given[name] for name in ("model", "units", "columns", "azimuth_from", "keep_columns")}
-    return Recipe(settings, **reading)
-
-
-def _frame(recipe: Recipe) -> str:
-    return "north-east-up" if recipe.azimuth_from == "north" else "local"
 
 
 def _tell(text: str) -> None:

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from ftproc.settings import FilterSettings
+from ftproc.settings import FilterSettings, Noise
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -38,14 +38,18 @@ def noise_sigmas(text: Any) -> tuple[float, float, float]:
     return values
 
 
-def noise_or_auto(text: Any) -> tuple[float, float, float] | None:
-    """The same above zero, or `auto`."""
+def noise_or_auto(text: Any) -> Noise | None:
+    """The same above zero, or `auto` for all or any of them: None, found from the log."""
     if _is_auto(text):
         return None
-    values = noise_sigmas(text)
-    if min(values) <= 0:
+    parts = str(text).split(",")
+    values = _triple(",".join("1" if _is_auto(part) else part for part in parts))
+    if values is None or min(values) < 0:
+        raise click.BadParameter(f'"{text}" is not {_NOISE_FORM}.')
+    if min(values) == 0:
         raise click.BadParameter(f'"{text}": a sigma of zero would mean that no reading is ever off; give what it is.')
-    return values
+    first, second, third = (None if _is_auto(part) else value for part, value in zip(parts, values, strict=True))
+    return first, second, third
 
 
 def site(text: Any) -> tuple[float, float, float]:
@@ -53,7 +57,7 @@ def site(text: Any) -> tuple[float, float, float]:
     values = _triple(text)
     if values is None:
         raise click.BadParameter(f'"{text}" is not {_SITE_FORM}.')
-    if abs(values[0]) > 90 or abs(values[1]) > 360:
+    if not (-90 <= values[0] <= 90 and -180 <= values[1] <= 360):
         raise click.BadParameter(f'"{text}": a latitude lies in -90..90 and a longitude in -180..360 degrees.')
     return values
 
@@ -117,12 +121,12 @@ _TRACKER: tuple[Callable[[Any], Any], ...] = (
         "--model", metavar="MODEL|none", default="packaged",
         help="The network that corrects the filter: a file that `ftproc train` wrote, `none`, or the packaged one.",
     ),
-    click.option("--smooth", is_flag=True, help="Add the fixed-interval smoother: the best estimate of trajectory."),
+    click.option("--smooth/--no-smooth", help="Add the fixed-interval smoother: the best estimate of trajectory."),
     click.option(
         "--editing", type=click.Choice(["two-pass", "forward", "none"]), default=FilterSettings.editing,
         help="How outliers are found: with the whole log in view, recursively as a live system must, or not at all.",
     ),
-    noise(noise_or_auto, AUTO, "; auto: from the log."),
+    noise(noise_or_auto, AUTO, "; auto, for all or for one: from the log."),
     click.option(
         "--jerk", type=number_or_auto, default=AUTO, metavar="S",
         help="How hard the target manoeuvres: spectral density of white jerk in m2/s5, such as 1 for gentle "

@@ -68,7 +68,7 @@ def _numbers(column: pa.ChunkedArray, name: str, opened: tables.OpenTable) -> Fl
     expected = "seconds or an ISO-8601 timestamp" if name == "time_s" else "a number"
     origin = cells.Origin(opened.source, name, expected, opened.decimal_comma, cure="Correct the cell.")
     if name == "time_s":
-        return values.seconds(column, origin, lambda time: time)
+        return values.seconds(column, origin, lambda time: time)[0]
     return values.numbers(column, origin)
 
 

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError, UsageError
+from ..errors import InputError
 from ..records import COMPONENTS, FloatArray, MeasurementLog
-from . import arrow, cells, schema, tables, values, writing
+from ..settings import Station
+from . import arrow, cells, conventions, schema, tables, values, writing
 from .atomic import Target
 from .units import QUANTITIES, UNITS, parse_units
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-_FRAMES = {"x": "local", "north": "north-east-up"}
-
 #: Half of all readings beyond these (rad): no flight but a mistaken unit. Single wild readings are for editing.
-_PLAUSIBLE_MEDIAN = {"azimuth": 4 * math.pi, "elevation": math.pi / 2}
+_PLAUSIBLE_MEDIAN = {"azimuth": 4 * math.pi, "elevation": math.pi / 2, "zenith angle": math.pi}
 
 
 def read(
@@ -28,8 +28,9 @@ def read(
     *,
     units: str | Mapping[str, str] | None = None,
     columns: str | Mapping[str, str] | None = None,
-    azimuth_from: str = "x",
+    azimuth_from: str | None = None,
     keep_columns: bool = False,
+    station: Station | None = None,
 ) -> MeasurementLog:
     """Read and check one log; angles become rad, lengths m, times s, rows come in time order.
 
@@ -37,8 +38,9 @@ def read(
     pandas DataFrame. units: such as `{"range": "km"}` or `"range=km,azimuth=deg"`, for columns whose name
     states no unit.
     columns: such as `{"time": "T0"}` or `"time=T0,range=RNG"`; `none` for a quantity the file has not.
-    azimuth_from: `x` (A = atan2(y, x)) or `north`, which makes the frame `north-east-up`.
+    azimuth_from: `x` (A = atan2(y, x), the default) or `north`, which makes the frame `north-east-up`.
     keep_columns: carry the file's other columns through as `extra`.
+    station: what else is known of the instrument, see `conventions`.
 
     Rows are counted from 0, the header not among them, in messages as in `row`; empty lines do not count.
     Rows without a time are listed and left out; readings of whatever size stay in (a negative range is for
@@ -47,8 +49,10 @@ def read(
     Raises InputError for a file that cannot be read or is no log, UsageError for options that are not
     understood.
     """
-    if azimuth_from not in _FRAMES:
-        raise UsageError(f'--azimuth-from: "{azimuth_from}" is not understood; say x or north.')
+    station = station or Station()
+    if azimuth_from is not None:
+        station = replace(station, azimuth_from=azimuth_from)
+    conventions.check(station)
     unit_of, column_of = parse_units(units), schema.parse_columns(columns)
     opened = tables.open_table(source)
     found = schema.resolve(opened.source, opened.names, unit_of, column_of)
@@ -58,13 +62,16 @@ def read(
     table = opened.load(wanted, others)
     if table.num_rows == 0:
         raise InputError(f"{opened.source}: there are column names but no rows.")
-    quantities = {
+    time_s, epoch = _time(table.column(0), found["time"], opened)
+    quantities = {"time": time_s} | {
         quantity: _quantity(table.column(index), column, opened)
         for index, (quantity, column) in enumerate(found.items())
+        if quantity != "time"
     }
-    _check_units(opened.source, quantities, found)
+    _check_units(opened.source, quantities, found, station.elevation_from)
     extra = table.select(list(range(len(wanted), table.num_columns))) if others else None
-    return _in_time_order(opened.source, quantities, extra, _FRAMES[azimuth_from])
+    log = _in_time_order(opened.source, quantities, extra, epoch)
+    return conventions.apply(log, station)
 
 
 def write(log: MeasurementLog, target: Target) -> None:
@@ -89,20 +96,28 @@ def _check_others(opened: tables.OpenTable, others: list[int]) -> None:
             )
 
 
+def _time(column: pa.ChunkedArray, found: schema.Column, opened: tables.OpenTable) -> tuple[FloatArray, str]:
+    expected = f"a time in {found.unit.name} or an ISO-8601 timestamp"
+    return values.seconds(
+        column, cells.Origin(opened.source, found.name, expected, opened.decimal_comma), found.unit.to_si
+    )
+
+
 def _quantity(column: pa.ChunkedArray, found: schema.Column, opened: tables.OpenTable) -> FloatArray:
     article = "an" if found.quantity in ("azimuth", "elevation") else "a"
-    expected = f"{article} {found.quantity} in {found.unit.name}"
-    if found.quantity == "time":
-        expected += " or an ISO-8601 timestamp"
-    origin = cells.Origin(opened.source, found.name, expected, opened.decimal_comma)
-    if found.quantity == "time":
-        return values.seconds(column, origin, found.unit.to_si)
+    origin = cells.Origin(
+        opened.source, found.name, f"{article} {found.quantity} in {found.unit.name}", opened.decimal_comma
+    )
     return found.unit.to_si(values.numbers(column, origin))
 
 
-def _check_units(source: str, quantities: Mapping[str, FloatArray], found: Mapping[str, schema.Column]) -> None:
+def _check_units(
+    source: str, quantities: Mapping[str, FloatArray], found: Mapping[str, schema.Column], elevation_from: str
+) -> None:
     """Raise InputError when the angles cannot be in the unit assumed. A unit the user named is believed."""
-    for quantity, limit in _PLAUSIBLE_MEDIAN.items():
+    for quantity in ("azimuth", "elevation"):
+        what = "zenith angle" if (quantity, elevation_from) == ("elevation", "zenith") else quantity
+        limit = _PLAUSIBLE_MEDIAN[what]
         angles = np.abs(quantities.get(quantity, np.empty(0)))
         angles = angles[~np.isnan(angles)]
         if not angles.size or found[quantity].unit_stated_by_user or np.median(angles) <= limit:
@@ -110,19 +125,18 @@ def _check_units(source: str, quantities: Mapping[str, FloatArray], found: Mappi
         column = found[quantity]
         assumed = column.unit
         typical = float(np.median(angles)) * assumed.divide / assumed.multiply
-        other = _likely_unit(quantity, typical)
+        other = _likely_unit(quantity, typical, limit / (2 if quantity == "azimuth" else 1))  # one turn, straight up
         named = f"--columns {quantity}={column.name} " if column.unit_in_name else ""
         raise InputError(
             f'{source}: half of column "{column.name}" lies beyond {typical:.4g} {assumed.name}, which is no '
-            f"{quantity}: it looks like {other[1]}; use {named}--units {quantity}={other[0]}"
+            f"{what}: it looks like {other[1]}; use {named}--units {quantity}={other[0]}"
             f"{_and_the_other_angle(quantity, found, other[0])}. "
             f"If {assumed.name} is right, say {named}--units {quantity}={assumed.name}."
         )
 
 
-def _likely_unit(quantity: str, typical: float) -> tuple[str, str]:
+def _likely_unit(quantity: str, typical: float, limit: float) -> tuple[str, str]:
     words = {"deg": "degrees", "grad": "gradians", "mil": "mils"}
-    limit = _PLAUSIBLE_MEDIAN[quantity] / (2 if quantity == "azimuth" else 1)  # one turn, straight up
     for name, word in words.items():
         unit = UNITS[quantity][name]
         if typical * unit.multiply / unit.divide <= limit:
@@ -139,7 +153,7 @@ def _and_the_other_angle(quantity: str, found: Mapping[str, schema.Column], unit
 
 
 def _in_time_order(
-    source: str, quantities: Mapping[str, FloatArray], extra: pa.Table | None, frame: str
+    source: str, quantities: Mapping[str, FloatArray], extra: pa.Table | None, epoch: str
 ) -> MeasurementLog:
     time = quantities["time"]
     measurement = np.full((len(time), len(COMPONENTS)), np.nan)
@@ -159,10 +173,10 @@ def _in_time_order(
         time_s=np.array(time[row]),
         measurement=measurement if everything else measurement[row],
         row=row.astype(np.int64),
-        frame=frame,
         rows_in_file=len(time),
         rows_without_time=tuple(np.flatnonzero(np.isnan(time)).tolist()),
         rows_out_of_order=late,
         duplicate_times=int(np.count_nonzero(np.diff(time[row]) == 0)),
+        epoch=epoch,
         extra=extra if extra is None or everything else extra.take(row),
     )

@@ -10,6 +10,7 @@ Two columns that could be the same quantity are an error, not a guess.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -87,7 +88,7 @@ def listed(names: Sequence[str]) -> str:
 def _named(source: str, names: Sequence[str], quantity: str, name: str, unit: str | None) -> Column:
     if name not in names:
         raise InputError(
-            f'{source}: there is no column "{name}", which --columns names for {quantity}'
+            f'{source}: there is no column "{name}", which --columns or the station file names for {quantity}'
             f"{nearest(name, names) or '.'} Its columns are: {listed(names)}."
         )
     _refuse_twice(source, names, name)
@@ -104,6 +105,7 @@ def _recognised(source: str, names: Sequence[str], quantity: str, claimed: set[s
         fits = {name: stated for name, stated in fits.items() if stated is not None}
     if not fits:
         _refuse_unknown_unit(source, free, quantity)
+        _refuse_zenith(source, free, quantity)
         return None
     if len(fits) > 1:
         raise InputError(
@@ -148,6 +150,16 @@ def _refuse_unknown_unit(source: str, names: Sequence[str], quantity: str) -> No
                 f'{source}: "{suffix}" in column "{name}" is not a unit of {quantity}; understood are '
                 f"{', '.join(UNITS[quantity])}. Convert the column and rename it, "
                 f"or say --columns {quantity}={name} --units {quantity}=UNIT{_or_absent(quantity)}."
+            )
+
+
+def _refuse_zenith(source: str, names: Sequence[str], quantity: str) -> None:
+    """A log with zenith angles is not one without elevations."""
+    for name in names:
+        if quantity == "elevation" and re.match(r"(zenith|zen|zd)(_|$)", name.lower()):
+            raise InputError(
+                f'{source}: column "{name}" looks like a zenith angle. Say --columns elevation={name} '
+                f"--elevation-from zenith{_or_absent(quantity)}."
             )
 
 

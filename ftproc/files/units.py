@@ -44,6 +44,9 @@ _ANGLES = (
     Unit("mrad", divide=1e3),
     Unit("mil", math.pi, 3200.0),  # 6400 to the turn
     Unit("grad", math.pi, 200.0),  # 400 to the turn
+    Unit("gon", math.pi, 200.0),  # the same, as surveyors write it
+    Unit("mgon", math.pi, 200e3),
+    Unit("arcsec", math.pi, 648e3),
 )
 
 #: quantity -> unit name -> unit; the first of each is the SI unit.

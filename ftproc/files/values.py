@@ -34,8 +34,12 @@ def numbers(column: pa.ChunkedArray, origin: Origin) -> FloatArray:
     return values
 
 
-def seconds(column: pa.ChunkedArray, origin: Origin, to_si: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """(n,) float64 seconds, NaN where missing: numbers through `to_si`, timestamps from midnight.
+def seconds(
+    column: pa.ChunkedArray, origin: Origin, to_si: Callable[[FloatArray], FloatArray]
+) -> tuple[FloatArray, str]:
+    """(n,) float64 seconds, NaN where missing: numbers through `to_si`, timestamps from midnight; and which midnight.
+
+    The latter is such as 2024-05-31T00:00:00Z, or "" where nothing tells.
 
     Timestamps (UTC where they name no zone) become seconds since 00:00 UTC of the day of the earliest one. So
     float64 keeps better than 0.1 microsecond for a week, the order of the rows does not matter, and all logs
@@ -48,13 +52,13 @@ def seconds(column: pa.ChunkedArray, origin: Origin, to_si: Callable[[FloatArray
     if pa.types.is_timestamp(kind) or pa.types.is_date(kind):
         return _since_midnight(column)
     if pa.types.is_duration(kind):
-        return _ticks_to_seconds(column.cast(pa.int64()), kind.unit)
+        return _ticks_to_seconds(column.cast(pa.int64()), kind.unit), ""
     if _plain_numbers(column) is None:
         text = as_text(column)
         if _parsed(text, origin.decimal_comma) is None:
             return _since_midnight(_timestamps(text, origin))
         column = text
-    return to_si(numbers(column, origin))
+    return to_si(numbers(column, origin)), ""
 
 
 def _plain_numbers(column: pa.ChunkedArray) -> FloatArray | None:
@@ -111,7 +115,7 @@ def _refuse_infinite(values: FloatArray, origin: Origin) -> None:
         raise origin.bad(row, f"{values[row]:g}", "finite")
 
 
-def _since_midnight(column: pa.ChunkedArray) -> FloatArray:
+def _since_midnight(column: pa.ChunkedArray) -> tuple[FloatArray, str]:
     import pyarrow as pa
     import pyarrow.compute as pc
 
@@ -120,7 +124,9 @@ def _since_midnight(column: pa.ChunkedArray) -> FloatArray:
     per_day = _DAY_S * _PER_SECOND[column.type.unit]
     ticks = column.cast(pa.int64())
     earliest = pc.min(ticks).as_py() or 0  # None when every cell is missing
-    return _ticks_to_seconds(pc.subtract(ticks, earliest // per_day * per_day), column.type.unit)
+    day = earliest // per_day
+    midnight = f"{np.datetime64(day, 'D')}T00:00:00Z"
+    return _ticks_to_seconds(pc.subtract(ticks, day * per_day), column.type.unit), midnight
 
 
 def _ticks_to_seconds(ticks: pa.ChunkedArray, unit: str) -> FloatArray:

@@ -94,7 +94,8 @@ def _recursive(readings: Readings, settings: FilterSettings) -> Estimate:
 
 def _given(readings: Readings, settings: FilterSettings) -> FloatArray:
     """(3,) noise 1-sigma that need not be found: the user's, else what is assumed; NaN where the log tells."""
-    return readings.assumed_sigma if settings.noise is None else np.array(settings.noise)
+    stated = np.array(settings.noise or (None, None, None), float)  # None becomes NaN
+    return np.where(np.isnan(stated), readings.assumed_sigma, stated)
 
 
 def _smoothed(

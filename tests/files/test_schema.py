@@ -133,7 +133,10 @@ def test_a_column_given_to_one_quantity_is_not_taken_for_another() -> None:
 
 def test_a_named_column_that_is_absent_is_refused_with_the_nearest() -> None:
     sentence = refused(["time_s", "RNG1", "A"], columns={"range": "RNG"})
-    assert 'there is no column "RNG", which --columns names for range; did you mean "RNG1"?' in sentence
+    assert (
+        'there is no column "RNG", which --columns or the station file names for range; did you mean "RNG1"?'
+        in sentence
+    )
     assert "Its columns are: time_s, RNG1, A." in sentence
 
 

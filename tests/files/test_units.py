@@ -26,6 +26,9 @@ ONE_IN_SI = [
     ("elevation", "deg", math.pi / 180),
     ("elevation", "mil", 2 * math.pi / 6400),
     ("elevation", "grad", 2 * math.pi / 400),
+    ("elevation", "gon", 2 * math.pi / 400),
+    ("azimuth", "mgon", 2 * math.pi / 400e3),
+    ("azimuth", "arcsec", math.pi / 180 / 3600),
 ]
 
 
@@ -45,7 +48,8 @@ def test_whole_milliseconds_and_microseconds_are_rounded_once(ticks: int) -> Non
 
 
 def test_a_turn_is_a_turn_in_every_unit() -> None:
-    for unit, turn in (("deg", 360.0), ("mil", 6400.0), ("grad", 400.0), ("mrad", 2000 * math.pi)):
+    turns = {"deg": 360.0, "mil": 6400.0, "grad": 400.0, "gon": 400.0, "arcsec": 1_296_000.0, "mrad": 2000 * math.pi}
+    for unit, turn in turns.items():
         assert UNITS["azimuth"][unit].to_si(np.array([turn]))[0] == pytest.approx(2 * math.pi, rel=1e-15)
 
 
@@ -61,7 +65,7 @@ def test_units_from_text_and_from_a_mapping_are_the_same() -> None:
     ("text", "sentence"),
     [
         ("range=yd", '--units: "yd" is not a unit of range; understood are m, km, ft, nmi'),
-        ("azimuth=dge", 'understood are rad, deg, mrad, mil, grad; did you mean "deg"?'),
+        ("azimuth=dge", 'understood are rad, deg, mrad, mil, grad, gon, mgon, arcsec; did you mean "deg"?'),
         ("azimuth=m", '--units: "m" is not a unit of azimuth'),
         ("azimut=deg", '"azimut" is not a quantity of a log; expected time, range, azimuth, elevation; did you mean'),
         ("km", '--units: "km" is not QUANTITY=NAME, as in range=km,azimuth=deg'),

@@ -1,0 +1,122 @@
+"""Every key of a station file, once: where it stands, what it may be, which option it sets, and what it means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+from ftproc.config.kinds import Kind, flag, method, number, positive, text, words
+from ftproc.files.units import UNITS
+from ftproc.records import COMPONENTS
+from ftproc.settings import Air, FilterSettings
+
+
+class Key(NamedTuple):
+    """option: the name of what it sets, as the command line has it; part: of that option, when it has several.
+
+    example: what a comment shows, in example_unit; also the default where there is one. quantity: of a value with a
+    unit, which the file has in the key's name, such as bias_mrad.
+    """
+
+    option: str
+    kind: Kind
+    example: Any
+    meaning: str
+    part: int | str | None = None
+    quantity: str | None = None
+    default: Any = None
+    example_unit: str = ""
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        return tuple(UNITS[self.quantity]) if self.quantity else ()
+
+
+SECTIONS: Mapping[str, str] = {
+    "site": "Where the station is. Needed for latitudes, earth-centred coordinates and maps.",
+    "time": "The columns of the log, and what is known of the instrument.",
+    "range": "",
+    "azimuth": "",
+    "elevation": "",
+    "refraction": "Light is bent on its way through the air; for optical instruments, not for radars.",
+    "filter": "What the options of the same names say.",
+}
+
+
+def _column(quantity: str, example: str) -> dict[str, Key]:
+    names = tuple(UNITS[quantity])
+    known = "its unit, where the name does not say it: " + ", ".join(names)
+    return {
+        "column": Key("columns", text, example, 'name of the column, or "none"', quantity),
+        "unit": Key("units", words(*names), names[0], known, quantity),
+    }
+
+
+def _errors(quantity: str, sigma: float, bias: float) -> dict[str, Key]:
+    index, unit = COMPONENTS.index(quantity), "m" if quantity == "range" else "mrad"
+    return {
+        "sigma": Key("noise", positive(), sigma, "noise, 1 sigma; left out: from the log", index, quantity, None, unit),
+        "bias": Key("bias", number(), bias, "reading minus truth, taken off every reading", index, quantity, 0.0, unit),
+    }
+
+
+_FROM_X = "x: A = atan2(y, x); north: then x is north, y east"
+_SENSE = "seen from above; left out: clockwise from north, anticlockwise from x"
+_GEOID = "of the geoid above the ellipsoid; heights in KML count from the geoid"
+_MODEL = "packaged, none, or a file beside this one"
+_PATCH = "longest patch of outliers expected (forward editing)"
+
+KEYS: Mapping[str, Mapping[str, Key]] = {
+    "site": {
+        "lat_deg": Key("site", number(-90, 90), 48.0812, "geodetic latitude, north positive", 0),
+        "lon_deg": Key("site", number(-180, 360), 11.2803, "longitude, east positive", 1),
+        "height_m": Key("site", number(-1000, 100_000), 612.0, "above the ellipsoid, not above the sea", 2),
+        "geoid_m": Key("geoid_m", number(-150, 150), 46.2, _GEOID),
+        "datum": Key("datum", words("WGS-84"), "WGS-84", "no other is understood", default="WGS-84"),
+    },
+    "time": {
+        **_column("time", "UTC"),
+        "offset": Key("time_offset_s", number(), 12.0, "is added to every time", None, "time", 0.0, "ms"),
+    },
+    "range": {**_column("range", "RNG"), **_errors("range", 3.0, 2.5)},
+    "azimuth": {
+        **_column("azimuth", "AZ"),
+        "from": Key("azimuth_from", words("x", "north"), "x", _FROM_X, default="x"),
+        "sense": Key("azimuth_sense", words("clockwise", "anticlockwise"), "clockwise", _SENSE),
+        "zero": Key("azimuth_zero_rad", number(), 14.5, "azimuth where it reads zero", None, "azimuth", 0.0, "deg"),
+        **_errors("azimuth", 0.2, 0.1),
+    },
+    "elevation": {
+        **_column("elevation", "EL"),
+        "from": Key("elevation_from", words("horizon", "zenith"), "horizon", "or zenith angles", default="horizon"),
+        **_errors("elevation", 0.2, 0.1),
+    },
+    "refraction": {
+        "correct": Key("refraction", flag, False, "take it off the elevation", default=False),
+        "temperature_c": Key("temperature_c", number(-90, 60), Air.temperature_c, "at the station", default=15.0),
+        "pressure_hpa": Key(
+            "pressure_hpa", number(300, 1100), Air.pressure_hpa, "at the station, not at the sea", default=1013.25
+        ),
+    },
+    "filter": {
+        "method": Key("method", method, FilterSettings.method, "see --list-methods", default=FilterSettings.method),
+        "model": Key("model", text, "packaged", _MODEL, default="packaged"),
+        "smooth": Key("smooth", flag, False, "the best estimate of trajectory", default=False),
+        "editing": Key(
+            "editing", words("two-pass", "forward", "none"), "two-pass", "how outliers are found", default="two-pass"
+        ),
+        "jerk_psd_m2ps5": Key("jerk", positive(), 10.0, "how hard the target manoeuvres; left out: from the log"),
+        "gate": Key("gate", positive(), FilterSettings.gate, "in sigmas", default=FilterSettings.gate),
+        "max_patch_s": Key("max_patch", positive(), 5.0, _PATCH),
+        "weight_form": Key("weight_form", words("noise", "gain"), "noise", "in forward editing", default="noise"),
+        "ecef": Key("ecef", flag, False, "earth-centred coordinates too", default=False),
+        "keep_columns": Key("keep_columns", flag, False, "carry other columns through", default=False),
+    },
+}
+
+
+def every() -> Iterator[tuple[str, str, Key]]:
+    """Section, name and key of all, in the order of the file."""
+    for section, keys in KEYS.items():
+        for name, key in keys.items():
+            yield section, name, key

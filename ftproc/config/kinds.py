@@ -1,0 +1,65 @@
+"""What a value in a station file may be: each kind takes what TOML gives and says what it expected instead."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+#: The value as it is kept, or a ValueError that says what was expected.
+Kind = Callable[[object], Any]
+
+
+def number(low: float = -math.inf, high: float = math.inf) -> Kind:
+    """A finite number from low to high; above zero when low is the smallest float above it."""
+    if low > 0 and high == math.inf:
+        expected = "a number above zero"
+    elif math.isinf(low) and math.isinf(high):
+        expected = "a number"
+    else:
+        expected = f"a number from {low:g} to {high:g}"
+
+    def kind(value: object) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ValueError(expected)
+        if not (math.isfinite(value) and low <= value <= high):
+            raise ValueError(expected)
+        return float(value)
+
+    return kind
+
+
+def positive() -> Kind:
+    return number(low=math.ulp(0.0))
+
+
+def words(*known: str) -> Kind:
+    """One of some words."""
+
+    def kind(value: object) -> str:
+        if value not in known:
+            raise ValueError(" or ".join(f'"{word}"' for word in known))
+        return str(value)
+
+    return kind
+
+
+def text(value: object) -> str:
+    """Any text that is not empty."""
+    if not isinstance(value, str) or not value.strip():
+        raise ValueError("a text in quotes")
+    return value
+
+
+def flag(value: object) -> bool:
+    """true or false."""
+    if not isinstance(value, bool):
+        raise ValueError("true or false")
+    return value
+
+
+def method(value: object) -> str:
+    """The name of a method."""
+    from ftproc.methods import registry
+
+    return str(words(*registry.METHODS)(value))

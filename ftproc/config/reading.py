@@ -1,0 +1,121 @@
+"""A station file in: TOML, every key checked -> options by the names that the command line has for them."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from ftproc.config.keys import KEYS, Key, every
+from ftproc.errors import UsageError
+from ftproc.files.units import UNITS, nearest
+
+#: What a file without any key amounts to, for the options that consist of parts.
+_NO_PARTS = {"site": None, "noise": None, "bias": 0.0}
+_WORDS_FOR_MODELS = ("packaged", "none")
+
+
+def load(path: str | Path) -> dict[str, Any]:
+    """The options that a station file sets, such as {"site": (48.1, 11.3, 612.0), "smooth": True}; lengths in m, angles
+    in rad. Raises UsageError, naming file and key, for what cannot be read or is not understood."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise UsageError(f"{path}: there is no such file. ftproc filter --write-config > {path} makes one.") from error
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path}: this is not UTF-8 text; save it as UTF-8.") from error
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be read ({(error.strerror or str(error)).lower()}).") from error
+    options = parse(text, str(path))
+    if options.get("model", "none") not in _WORDS_FOR_MODELS:
+        options["model"] = str(Path(path).parent / options["model"])
+    return options
+
+
+def parse(text: str, name: str) -> dict[str, Any]:
+    """As `load`, from the text of a file called `name`."""
+    try:
+        found = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise UsageError(f"{name}: this is not TOML: {error}.") from error
+    values: dict[tuple[str, str], Any] = {}
+    for section, keys in found.items():
+        _check_section(name, section, keys)
+        for written, value in keys.items():
+            key_name, to_si = _known(name, section, written)
+            if (section, key_name) in values:
+                raise UsageError(f"{name}: [{section}] has {key_name} in two units; leave one out.")
+            values[section, key_name] = to_si(_checked(name, section, written, KEYS[section][key_name], value))
+    return _options(name, values)
+
+
+def _check_section(name: str, section: str, keys: object) -> None:
+    if section in KEYS and isinstance(keys, Mapping):
+        return
+    if section in KEYS:
+        raise UsageError(f'{name}: "{section}" is a section: write [{section}], and its keys below it.')
+    homes = [home for home, key_name, _ in every() if key_name == section]
+    if homes and not isinstance(keys, Mapping):
+        raise UsageError(f'{name}: "{section}" stands outside of its section; write it below [{"] or [".join(homes)}].')
+    kind = "section" if isinstance(keys, Mapping) else "key"
+    sections = ", ".join(f"[{known}]" for known in KEYS)
+    raise UsageError(f'{name}: there is no {kind} "{section}"{nearest(section, KEYS) or "."} The sections: {sections}.')
+
+
+def _known(name: str, section: str, written: str) -> tuple[str, Any]:
+    """The key that is written so, and what brings its value to SI."""
+    keys = KEYS[section]
+    stem, _, unit = written.rpartition("_")
+    if written in keys and not keys[written].quantity:
+        return written, lambda value: value
+    key = keys.get(stem)
+    if key is not None and key.quantity and unit in key.units:
+        scale = UNITS[key.quantity][unit]
+        return stem, lambda value: value * scale.multiply / scale.divide
+    bare = keys.get(written) or key
+    if bare is not None and bare.quantity:
+        first = written if written in keys else stem
+        raise UsageError(
+            f'{name}: [{section}] "{written}" must end in its unit: {", ".join(_spelt(first, bare))}'
+            f"{nearest(written, _spelt(first, bare))}"
+        )
+    all_names = [form for known, its in keys.items() for form in _spelt(known, its)]
+    short = ", ".join(f"{known}_UNIT" if its.quantity else known for known, its in keys.items())
+    raise UsageError(
+        f'{name}: [{section}] has no key "{written}"{nearest(written, all_names) or "."} Its keys are: {short}.'
+    )
+
+
+def _spelt(name: str, key: Key) -> Iterable[str]:
+    return [f"{name}_{unit}" for unit in key.units] or [name]
+
+
+def _checked(name: str, section: str, written: str, key: Key, value: object) -> Any:
+    try:
+        return key.kind(value)
+    except ValueError as error:
+        shown = f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else value
+        words = str(error).replace('"', "").split(" or ") if isinstance(value, str) else []
+        raise UsageError(
+            f"{name}: [{section}] {written} = {shown}: expected {error}{nearest(str(value), words) or '.'}"
+        ) from error
+
+
+def _options(name: str, values: Mapping[tuple[str, str], Any]) -> dict[str, Any]:
+    options: dict[str, Any] = {}
+    for section, key_name, key in every():
+        if (section, key_name) not in values:
+            continue
+        value = values[section, key_name]
+        if key.part is None:
+            options[key.option] = value
+        elif isinstance(key.part, str):
+            options.setdefault(key.option, {})[key.part] = value
+        else:
+            parts = list(options.get(key.option, (_NO_PARTS[key.option],) * 3))
+            parts[key.part] = value
+            options[key.option] = tuple(parts)
+    if None in options.get("site", ()):
+        raise UsageError(f"{name}: [site] needs all of lat_deg, lon_deg and height_m.")
+    return options

@@ -1,0 +1,206 @@
+"""Station files: what they say, what they refuse and in what words, and that what is written reads back the same."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ftproc import config
+from ftproc.batch import Recipe
+from ftproc.config.keys import KEYS, every
+from ftproc.errors import UsageError
+from ftproc.settings import Air, FilterSettings, Station
+
+FULL = """
+[site]
+lat_deg = 48
+lon_deg = 11.5
+height_m = 612.0
+geoid_m = 46.2
+datum = "WGS-84"
+[time]
+column = "UTC"
+unit = "ms"
+offset_ms = -20
+[range]
+column = "RNG"
+unit = "km"
+sigma_ft = 10
+bias_km = 0.002
+[azimuth]
+from = "north"
+sense = "anticlockwise"
+zero_gon = 100
+bias_mgon = 2
+[elevation]
+column = "none"
+from = "zenith"
+sigma_arcsec = 20
+bias_deg = -0.5
+[refraction]
+correct = true
+temperature_c = -3
+pressure_hpa = 900
+[filter]
+method = "ukf"
+model = "none"
+smooth = true
+editing = "forward"
+jerk_psd_m2ps5 = 5
+gate = 3.5
+max_patch_s = 9
+weight_form = "gain"
+ecef = true
+keep_columns = true
+"""
+
+
+def test_every_key_is_understood():
+    said = {(section, key.rpartition("_")[0] if key.rpartition("_")[0] in KEYS[section] else key)
+            for section, keys in tomllib.loads(FULL).items() for key in keys}  # fmt: skip
+    unsaid = {(section, name) for section, name, _ in every()} - said
+    assert unsaid == {("azimuth", "column"), ("azimuth", "unit"), ("azimuth", "sigma"), ("elevation", "unit")}
+    found = config.recipe(config.parse(FULL, "s.toml"))
+    assert found.settings == FilterSettings(
+        "ukf", "forward", True, (3.048, None, pytest.approx(20 * math.pi / 648000)), 5.0, 3.5, 9.0, True,
+        (48.0, 11.5, 612.0), True, 46.2,
+    )  # fmt: skip
+    assert found.station == Station(
+        "north", "anticlockwise", pytest.approx(math.pi / 2), "zenith",
+        (2.0, pytest.approx(0.002 * math.pi / 200), pytest.approx(math.radians(-0.5))), -0.02, Air(-3.0, 900.0),
+    )  # fmt: skip
+    assert (found.model, found.keep_columns) == ("none", True)
+    assert found.units == {"time": "ms", "range": "km"}
+    assert found.columns == {"time": "UTC", "range": "RNG", "elevation": "none"}
+
+
+def test_an_empty_file_is_the_usual():
+    assert config.recipe(config.parse("", "s.toml")) == Recipe()
+    assert config.parse(config.dump({}), "s.toml") == {}
+
+
+def test_defaults_that_a_comment_shows_are_the_real_ones():
+    """Uncommented, every key that has a default says what is so anyway."""
+    usual = tuple(f"# {name} = " for _, name, key in every() if key.default)
+    lines = [line.removeprefix("# ") if line.startswith(usual) else line for line in config.dump({}).splitlines()]
+    said = config.parse("\n".join(lines), "s.toml")
+    assert {"method", "gate", "editing", "model", "azimuth_from", "temperature_c", "pressure_hpa"} <= set(said)
+    assert config.recipe(said) == Recipe()
+
+
+def test_every_example_can_be_used():
+    lines = [line.removeprefix("# ") if " = " in line else line for line in config.dump({}).splitlines()]
+    said = config.parse("\n".join(lines[2:]), "s.toml")
+    assert set(said) == {key.option for _, _, key in every()}
+
+
+numbers = st.floats(1e-6, 1e6, allow_subnormal=False)
+names = st.text(st.characters(codec="utf-8", exclude_characters="\r"), min_size=1).filter(str.strip)
+OPTIONS = st.fixed_dictionaries(
+    {},
+    optional={
+        "site": st.tuples(st.floats(-90, 90), st.floats(-180, 360), st.floats(-1000, 1e5)),
+        "geoid_m": st.floats(-150, 150),
+        "noise": st.tuples(*[st.none() | numbers] * 3).filter(any),
+        "bias": st.tuples(numbers, numbers, numbers),
+        "columns": st.dictionaries(st.sampled_from(["time", "range", "azimuth"]), names, min_size=1),
+        "units": st.just({"range": "km"}) | st.just({"time": "us", "azimuth": "mil", "elevation": "gon"}),
+        "time_offset_s": numbers,
+        "azimuth_from": st.just("north"),
+        "azimuth_sense": st.sampled_from(["clockwise", "anticlockwise"]),
+        "azimuth_zero_rad": numbers,
+        "elevation_from": st.just("zenith"),
+        "refraction": st.just(True),
+        "temperature_c": st.floats(-90, 14),
+        "pressure_hpa": st.floats(300, 1000),
+        "method": st.just("ekf"),
+        "model": st.just("none"),
+        "smooth": st.just(True),
+        "editing": st.sampled_from(["forward", "none"]),
+        "jerk": numbers,
+        "gate": st.floats(5, 50),
+        "max_patch": numbers,
+        "weight_form": st.just("gain"),
+        "ecef": st.just(True),
+        "keep_columns": st.just(True),
+    },
+)
+
+
+@given(OPTIONS)
+def test_what_is_written_reads_back_the_same(options):
+    assert config.parse(config.dump(options), "s.toml") == options
+
+
+def test_every_option_is_in_the_round_trip():
+    in_round_trip = set(OPTIONS.wrapped_strategy.optional if hasattr(OPTIONS, "wrapped_strategy") else OPTIONS.optional)
+    assert in_round_trip == {key.option for _, _, key in every()} - {"datum"}
+
+
+def test_a_model_lies_beside_its_file(tmp_path, monkeypatch):
+    (tmp_path / "s.toml").write_text('[filter]\nmodel = "m.safetensors"\n')
+    found = config.load(tmp_path / "s.toml")
+    assert found["model"] == str(tmp_path / "m.safetensors")
+    monkeypatch.chdir(tmp_path)
+    assert f'model = "{tmp_path}/m.safetensors"' in config.dump({"model": "m.safetensors"})
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("[range]\nbais_m = 1", '[range] has no key "bais_m"; did you mean "bias_m"? Its keys are: column, unit, '
+         "sigma_UNIT, bias_UNIT."),
+        ("[azimut]\nzero_deg = 1", 'there is no section "azimut"; did you mean "azimuth"? The sections: [site], '
+         "[time], [range], [azimuth], [elevation], [refraction], [filter]."),
+        ("gate = 3", '"gate" stands outside of its section; write it below [filter].'),
+        ("unit = 'm'", '"unit" stands outside of its section; write it below [time] or [range] or [azimuth] or '
+         "[elevation]."),
+        ("nonsense = 3", 'there is no key "nonsense". The sections: [site], [time], [range], [azimuth], [elevation], '
+         "[refraction], [filter]."),
+        ("site = 3", '"site" is a section: write [site], and its keys below it.'),
+        ("[range]\nbias_yd = 1", '[range] "bias_yd" must end in its unit: bias_m, bias_km, bias_ft, bias_nmi; did you '
+         'mean "bias_m"?'),
+        ("[range]\nbias = 1", '[range] "bias" must end in its unit: bias_m, bias_km, bias_ft, bias_nmi; did you mean '
+         '"bias_m"?'),
+        ("[range]\nbias_m = 1\nbias_ft = 3", "[range] has bias in two units; leave one out."),
+        ("[site]\nlat_deg = 98\nlon_deg = 1\nheight_m = 1", "[site] lat_deg = 98: expected a number from -90 to 90."),
+        ("[site]\nlat_deg = '48'", '[site] lat_deg = "48": expected a number from -90 to 90.'),
+        ("[site]\nlat_deg = 48.0", "[site] needs all of lat_deg, lon_deg and height_m."),
+        ("[site]\ndatum = 'ED50'", '[site] datum = "ED50": expected "WGS-84".'),
+        ("[filter]\nsmooth = 1", "[filter] smooth = 1: expected true or false."),
+        ("[filter]\ngate = true", "[filter] gate = true: expected a number above zero."),
+        ("[filter]\ngate = 0", "[filter] gate = 0: expected a number above zero."),
+        ("[filter]\ngate = inf", "[filter] gate = inf: expected a number above zero."),
+        ("[filter]\nmethod = 'ekff'", '[filter] method = "ekff": expected "ga-bpnn-ukf" or "ga-bpnn-ukf-plain" or '
+         '"ukf" or "ekf"; did you mean "ekf"?'),
+        ("[azimuth]\nsense = 'clokwise'", '[azimuth] sense = "clokwise": expected "clockwise" or "anticlockwise"; did '
+         'you mean "clockwise"?'),
+        ("[azimuth]\nunit = 'km'", '[azimuth] unit = "km": expected "rad" or "deg" or "mrad" or "mil" or "grad" or '
+         '"gon" or "mgon" or "arcsec".'),
+        ("[azimuth]\nbias_deg = 'x'", '[azimuth] bias_deg = "x": expected a number.'),
+        ("[range]\ncolumn = ''", '[range] column = "": expected a text in quotes.'),
+        ("[refraction]\npressure_hpa = 101325", "[refraction] pressure_hpa = 101325: expected a number from 300 to "
+         "1100."),
+        ("[range\n", "this is not TOML: Expected ']' at the end of a table declaration (at line 1, column 7)."),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said(text, sentence):
+    with pytest.raises(UsageError) as caught:
+        config.parse(text, "s.toml")
+    assert str(caught.value) == f"s.toml: {sentence}"
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    for name, sentence in {
+        "none.toml": "there is no such file. ftproc filter --write-config > {} makes one.",
+        "": "cannot be read (is a directory).",
+        "latin.toml": "this is not UTF-8 text; save it as UTF-8.",
+    }.items():
+        (tmp_path / "latin.toml").write_bytes(b"# \xe9t\xe9\n")
+        with pytest.raises(UsageError) as caught:
+            config.load(tmp_path / name)
+        assert str(caught.value) == f"{tmp_path / name}: {sentence.format(tmp_path / name)}"
