@@ -22,8 +22,9 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     "-o",
     "--output",
     metavar="OUT",
-    help="File (.parquet, .csv, .csv.gz), - for CSV on stdout, or a directory, which is made when absent; several "
-    "logs need a directory. [default: STEM.trajectory.parquet or .csv, like the log, in the current directory]",
+    help="File (.parquet, .feather, .csv, .csv.gz; with a site also .kml, .geojson, .czml), - for CSV on stdout, or a "
+    "directory, which is made when absent; several logs need a directory. "
+    "[default: STEM.trajectory.parquet or .csv, like the log, in the current directory]",
 )
 @options.tracker
 @click.option(
@@ -70,9 +71,9 @@ def command(
 ) -> None:
     """Find the outliers of LOGs, and estimate where the target was, how fast, and how sure that is.
 
-    A LOG is a .csv, .csv.gz or .parquet file with time, range, azimuth and elevation, or - for CSV on standard input.
-    Noise and manoeuvre level are found from the log itself. A bad log does not stop the others; the exit code is
-    then 1.
+    A LOG is a .csv, .csv.gz, .parquet or .feather file with time, range, azimuth and elevation, or - for CSV on
+    standard input. Noise and manoeuvre level are found from the log itself. A bad log does not stop the others; the
+    exit code is then 1.
     """
     if list_methods:
         from ftproc.methods import registry

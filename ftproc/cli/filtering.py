@@ -12,7 +12,7 @@ from ftproc.batch import Outcome, Recipe
 from ftproc.cli import outputs
 from ftproc.cli.progress import Progress
 from ftproc.cli.stations import ALL
-from ftproc.files import conventions
+from ftproc.files import conventions, maps
 from ftproc.methods import registry
 
 
@@ -21,6 +21,8 @@ def run(logs: Sequence[str], output: str | None, recipe: Recipe, *, jobs: int, s
     methods = list(registry.METHODS) if recipe.settings.method == ALL else None
     inputs = [] if recipe.model in (batch.PACKAGED, batch.NO_MODEL) else [recipe.model]
     tasks = outputs.plan(logs, output, methods, inputs)
+    for task in tasks:
+        maps.check(task.output, recipe.settings.site)
     if readings := conventions.in_words(recipe.station):
         _tell(f"readings: {', '.join(readings)}")
     if recipe.settings.site is not None:

@@ -10,7 +10,7 @@ from ftproc.errors import OutputError, UsageError
 from ftproc.files import atomic, tables, trajectories
 
 #: What a trajectory's name ends in, by what the log's name ends in.
-_SUFFIX = {".csv": ".csv", ".csv.gz": ".csv", ".parquet": ".parquet"}
+_SUFFIX = {".csv": ".csv", ".csv.gz": ".csv", ".parquet": ".parquet", ".feather": ".feather"}
 
 
 def plan(
@@ -43,12 +43,14 @@ def _directory(output: str, several: bool) -> Path | None:
     path = Path(output)
     if output != "-" and (path.is_dir() or output.endswith("/")):
         return path
-    if output == "-" or tables.kind_of(path) is not None:
+    if output == "-" or trajectories.kind_of(path) is not None:
         if several:
             raise UsageError(f"-o {output}: there are several trajectories to write; name a directory.")
         return None
     if path.suffix and not several:
-        raise UsageError(f"-o {output}: end the name in {', '.join(tables.SUFFIXES)}, or in / if it is a directory.")
+        raise UsageError(
+            f"-o {output}: end the name in {', '.join(trajectories.SUFFIXES)}, or in / if it is a directory."
+        )
     return path
 
 

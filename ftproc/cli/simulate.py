@@ -50,7 +50,7 @@ def _scenarios_and_grammar() -> str:
     "--output",
     required=True,
     metavar="LOG",
-    help="The log to write: .csv, .csv.gz, .parquet, or - for CSV on stdout.",
+    help="The log to write: .csv, .csv.gz, .parquet, .feather, or - for CSV on stdout.",
 )
 @click.option("--truth", metavar="TRUTH", help="Where to write what really happened: states and outlier flags.")
 def command(

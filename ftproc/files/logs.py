@@ -34,7 +34,7 @@ def read(
 ) -> MeasurementLog:
     """Read and check one log; angles become rad, lengths m, times s, rows come in time order.
 
-    source: path of a .csv, .csv.gz or .parquet file, `-` for CSV on standard input, a pyarrow Table or a
+    source: path of a .csv, .csv.gz, .parquet or .feather file, `-` for CSV on standard input, a pyarrow Table or a
     pandas DataFrame. units: such as `{"range": "km"}` or `"range=km,azimuth=deg"`, for columns whose name
     states no unit.
     columns: such as `{"time": "T0"}` or `"time=T0,range=RNG"`; `none` for a quantity the file has not.
@@ -75,7 +75,7 @@ def read(
 
 
 def write(log: MeasurementLog, target: Target) -> None:
-    """Write `log` under canonical column names to a .csv, .csv.gz or .parquet file or `-` (CSV on stdout).
+    """Write `log` under canonical column names to a .csv, .csv.gz, .parquet or .feather file or `-` (CSV on stdout).
 
     Every float64 reads back bit for bit; a missing reading is an empty cell (NaN in Parquet).
     Raises OutputError.

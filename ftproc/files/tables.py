@@ -6,7 +6,7 @@ import gzip
 import sys
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Source: TypeAlias = "str | Path | pa.Table | pd.DataFrame"
 
-SUFFIXES = (".csv", ".csv.gz", ".parquet")
+SUFFIXES = (".csv", ".csv.gz", ".parquet", ".feather")
 _GZIP_MAGIC = b"\x1f\x8b"
 
 
@@ -40,7 +40,7 @@ class OpenTable:
 
 
 def open_table(source: Source) -> OpenTable:
-    """Open a .csv, .csv.gz or .parquet file, `-` (CSV on standard input, even gzipped), or a table in memory.
+    """Open a .csv, .csv.gz, .parquet or .feather file, `-` (CSV on standard input, even gzipped), or a table in memory.
 
     Raises InputError with a plain sentence when there is no such file, it cannot be read, is damaged or
     empty.
@@ -56,6 +56,8 @@ def open_table(source: Source) -> OpenTable:
     if kind == ".parquet":
         _read(path, limit=1)  # the plain sentences for a file that is not there
         return _parquet(name, path)
+    if kind == ".feather":
+        return _feather(name, _read(path))
     return _csv(name, _read(path), must_be_gzip=kind == ".csv.gz")
 
 
@@ -117,6 +119,19 @@ def _parquet(name: str, path: Path) -> OpenTable:
     except (pa.ArrowException, OSError) as error:
         raise damaged(error) from error
     return OpenTable(name, list(schema.names), load, metadata=schema.metadata or {})
+
+
+def _feather(name: str, data: bytes) -> OpenTable:
+    import pyarrow as pa
+
+    try:
+        table = pa.ipc.open_file(pa.py_buffer(data)).read_all()
+    except (pa.ArrowException, OSError) as error:
+        reason = str(error).splitlines()[0][:200]
+        raise InputError(
+            f"{name}: no Feather file (version 2), or one cut short or damaged; copy it again ({reason})."
+        ) from error
+    return replace(_in_memory(table), source=name)
 
 
 def _in_memory(table: Any) -> OpenTable:

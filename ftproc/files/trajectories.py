@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from ..records import COMPONENTS, FlagArray, FloatArray, Trajectory
-from . import arrow, atomic, columns, schema, tables, writing
+from . import arrow, atomic, columns, maps, schema, tables, writing
 from .atomic import Target
 from .columns import ACCELERATION, OUTLIER, POSITION, VELOCITY
 
@@ -24,6 +24,9 @@ CORRECTION = tuple(f"correction_{name}" for name in (*POSITION, *VELOCITY))
 
 #: Every column a trajectory always has, in the order in which it is written.
 COLUMNS = ("row", "time_s", *MEASUREMENT, *STATE, *SIGMA, *OUTLIER, "nis", *CORRECTION)
+
+#: What the name of a trajectory file may end in.
+SUFFIXES = (*tables.SUFFIXES, *maps.SUFFIXES)
 
 #: Key of the metadata in a Parquet file.
 METADATA_KEY = b"ftproc"
@@ -53,31 +56,40 @@ def to_table(trajectory: Trajectory) -> pa.Table:
 
 
 def write(trajectory: Trajectory, target: Target) -> None:
-    """Write a .parquet, .csv or .csv.gz file, or CSV on standard output for `-`, whole or not at all.
+    """Write a file of one of SUFFIXES, or CSV on standard output for `-`, whole or not at all.
 
-    Beside a CSV file goes its metadata, see `sidecar`. The same trajectory gives the same bytes.
-    Raises OutputError; BrokenPipeError when standard output is closed; UsageError as `to_table`.
+    Beside a CSV file or a map goes its metadata, see `sidecar`. The same trajectory gives the same bytes.
+    Raises OutputError; BrokenPipeError when standard output is closed; UsageError as `to_table` and `maps.check`.
     """
-    table, kind = to_table(trajectory), writing.kind_of(target)
     beside = sidecar(target)
     if beside is None:
-        writing.write_table(table, target)
+        writing.write_table(to_table(trajectory), target)
         return
+    drawn = maps.kind_of(target)
+    whole = maps.as_bytes(trajectory, drawn) if drawn else b""
     with atomic.replacing(target) as stream:
-        writing.write_stream(table, stream, kind)
+        if drawn:
+            stream.write(whole)
+        else:
+            writing.write_stream(to_table(trajectory), stream, writing.kind_of(target))
         # The sidecar is in place before the file it belongs to: whoever waits for the file finds both.
         _sync_if_file(stream)
         with atomic.replacing(beside) as text:
             text.write(_to_json(trajectory.metadata, indent=2) + b"\n")
 
 
+def kind_of(path: Path) -> str | None:
+    """The one of SUFFIXES that `path` ends in, whatever its case, or None."""
+    return tables.kind_of(path) or maps.kind_of(path)
+
+
 def sidecar(target: Target) -> Path | None:
-    """`out.json` for `out.csv` or `out.csv.gz`; None for Parquet and `-`, which need or have none."""
+    """`out.json` for `out.csv`, `out.kml` and such; None for Parquet, Feather and `-`, which need or have none."""
     path = Path(target)
-    kind = None if str(target) == "-" else tables.kind_of(path)
-    if kind is None or kind == ".parquet":
+    kind = None if str(target) == "-" else kind_of(path)
+    if kind in (None, ".parquet", ".feather"):
         return None
-    return path.with_name(path.name[: -len(kind)] + ".json")
+    return path.with_name(path.name[: -len(str(kind))] + ".json")
 
 
 def read(source: tables.Source) -> Trajectory:

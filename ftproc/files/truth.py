@@ -37,7 +37,7 @@ def read(source: tables.Source) -> Truth:
 
 
 def write(truth: Truth, target: Target) -> None:
-    """Write `truth` to a .csv, .csv.gz or .parquet file or `-` (CSV on stdout), bit for bit.
+    """Write `truth` to a .csv, .csv.gz, .parquet or .feather file or `-` (CSV on stdout), bit for bit.
 
     Raises OutputError.
     """

@@ -1,4 +1,4 @@
-"""Arrow tables out: .csv, .csv.gz, .parquet, or CSV on standard output. Same table, same bytes."""
+"""Arrow tables out: .csv, .csv.gz, .parquet, .feather, or CSV on standard output. Same table, same bytes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _GZIP_LEVEL = 4  # numbers hardly get smaller above it, only slower
 
 
 def kind_of(target: Target) -> str:
-    """`.csv`, `.csv.gz` or `.parquet`; `-` is CSV. Raises OutputError for any other name."""
+    """`.csv`, `.csv.gz`, `.parquet` or `.feather`; `-` is CSV. Raises OutputError for any other name."""
     kind = ".csv" if str(target) == "-" else tables.kind_of(Path(target))
     if kind is None:
         raise OutputError(
@@ -47,13 +47,18 @@ def write_table(table: pa.Table, target: Target) -> None:
 
 
 def write_stream(table: pa.Table, stream: BinaryIO, kind: str) -> None:
-    """Write `table` to an open stream in one of the three kinds of file."""
+    """Write `table` to an open stream in one of the kinds of file."""
     if kind == ".parquet":
         import pyarrow.parquet as pq
 
         # Readings hardly repeat, so a dictionary only costs time. Of the codecs every reader has, snappy was
         # fastest.
         pq.write_table(table, stream, compression="snappy", use_dictionary=_words(table))
+    elif kind == ".feather":
+        import pyarrow as pa
+
+        with pa.ipc.new_file(stream, table.schema, options=pa.ipc.IpcWriteOptions(compression="lz4")) as file:
+            file.write_table(table)
     elif kind == ".csv.gz":
         # No name and no time of day inside, or the same log would never give the same bytes.
         with gzip.GzipFile("", "wb", _GZIP_LEVEL, stream, mtime=0) as packed:

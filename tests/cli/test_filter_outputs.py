@@ -55,7 +55,11 @@ def test_several_logs(here):
         (["a.csv", "b.csv"], "c.csv", "-o c.csv: there are several trajectories to write; name a directory"),
         (["a.csv", "b.csv"], "-", "-o -: there are several"),
         (["a.csv", "-"], "d", "- stands for one log on standard input"),
-        (["a.csv"], "c.xlsx", "-o c.xlsx: end the name in .csv, .csv.gz, .parquet, or in / if"),
+        (
+            ["a.csv"],
+            "c.xlsx",
+            ".csv, .csv.gz, .parquet, .feather, .kml, .geojson, .czml, or in / if",
+        ),
         (["x/a.csv", "y/a.csv"], "d", "x/a.csv and y/a.csv would both be written to d/a.trajectory.csv"),
         (["a.csv", "a.csv"], None, "a.csv and a.csv would both be written to a.trajectory.csv"),
     ],
@@ -130,3 +134,22 @@ def test_a_directory_without_permission(shell, flight):
         assert (flight.parent / "closed/a.csv").exists()
     else:
         assert result.err.startswith("ftproc: closed/a.csv: no permission to write in closed")
+
+
+@pytest.mark.parametrize("kind", ["kml", "geojson", "czml"])
+def test_maps(run, flight, kind):
+    name = f"there.{kind}"
+    result = run("filter", flight, "-o", name)
+    assert (result.code, result.out) == (2, "")
+    cure = "give --site LAT,LON,HEIGHT, or [site] in the --config file."
+    assert result.err == f"ftproc: {name}: a .{kind} map needs the station: {cure}\n"
+    assert not Path(name).exists()
+    assert run("filter", flight, "-o", name, "--site", "48,11,600").code == 0
+    assert "48.00" in Path(name).read_text()
+    assert '"method": "ga-bpnn-ukf"' in Path("there.json").read_text()
+
+
+def test_feather_in_feather_out(run, here):
+    assert run("simulate", "--scenario", "zuo2021", "-o", "a.feather", "--truth", "a.truth.feather").code == 0
+    assert run("filter", "a.feather").out.endswith("\n  -> a.trajectory.feather\n")
+    assert "position RMSE" in run("score", "a.trajectory.feather", "--truth", "a.truth.feather").out

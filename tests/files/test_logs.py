@@ -40,7 +40,7 @@ def some_logs(draw: st.DrawFn) -> MeasurementLog:
     return MeasurementLog("a", time, measurement, np.arange(n))
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".csv.gz", ".parquet"])
+@pytest.mark.parametrize("suffix", [".csv", ".csv.gz", ".parquet", ".feather"])
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=40)
 @given(log=some_logs())
 def test_every_bit_comes_back(tmp_path: Path, suffix: str, log: MeasurementLog) -> None:

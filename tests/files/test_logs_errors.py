@@ -152,7 +152,7 @@ def test_files_that_cannot_be_opened(tmp_path: Path, make: Make) -> None:
     assert refused(tmp_path / "none.parquet").endswith("there is no such file.")
     (tmp_path / "dir.csv").mkdir()
     assert "this is a directory; name a file in it." in refused(tmp_path / "dir.csv")
-    assert "supported are .csv, .csv.gz, .parquet." in refused(make("t,R\n0,1\n", "log.xlsx"))
+    assert "supported are .csv, .csv.gz, .parquet, .feather." in refused(make("t,R\n0,1\n", "log.xlsx"))
     assert "the file is empty" in refused(make(b"", "log.parquet"))
     assert "the file is empty" in refused(make(b"", "log.csv.gz"))
 

@@ -116,7 +116,9 @@ def test_each_number_stands_in_the_column_of_its_name() -> None:
     assert [row[f"outlier_{name}"] for name in ("range", "azimuth", "elevation")] == [1, 2, 3]
 
 
-@pytest.mark.parametrize("name", ["out.parquet", "out.csv", "out.trajectory.csv", "out.csv.gz", "OUT.CSV"])
+@pytest.mark.parametrize(
+    "name", ["out.parquet", "out.feather", "out.csv", "out.trajectory.csv", "out.csv.gz", "OUT.CSV"]
+)
 def test_what_is_written_comes_back_with_its_metadata(tmp_path: Path, name: str) -> None:
     original = some()
     trajectories.write(original, tmp_path / name)
@@ -151,7 +153,7 @@ def test_where_the_sidecar_stands() -> None:
     assert trajectories.sidecar("-") is None
 
 
-@pytest.mark.parametrize("name", ["out.parquet", "out.csv", "out.csv.gz"])
+@pytest.mark.parametrize("name", ["out.parquet", "out.feather", "out.csv", "out.csv.gz"])
 def test_the_same_trajectory_gives_the_same_bytes_at_any_time(
     tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -281,3 +283,23 @@ def test_a_full_disk_leaves_both_the_earlier_file_and_its_sidecar(
     with pytest.raises(OutputError, match=r"out\.csv: the disk is full"):
         trajectories.write(replace(some(9), metadata={"other": 1}), tmp_path / "out.csv")
     assert {entry.name: entry.read_bytes() for entry in tmp_path.iterdir()} == before
+
+
+def test_feather_carries_the_metadata_and_pandas_reads_it(tmp_path: Path) -> None:
+    path = tmp_path / "out.feather"
+    trajectories.write(some(3), path)
+    assert list(pd.read_feather(path).columns) == PROMISED
+    assert trajectories.read(path).metadata == trajectories.read(trajectories.to_table(some(3))).metadata != {}
+    assert [entry.name for entry in tmp_path.iterdir()] == ["out.feather"]
+
+
+def test_a_damaged_feather_file(tmp_path: Path) -> None:
+    path = tmp_path / "out.feather"
+    trajectories.write(some(3), path)
+    sentence = r"out\.feather: no Feather file \(version 2\), or one cut short or damaged; copy it again"
+    for data in (path.read_bytes()[:200], b"FEA1 of old", b"time_s,x_m\n"):
+        path.write_bytes(data)
+        with pytest.raises(
+            InputError, match=r"out\.feather: no Feather file \(version 2\), or one cut short or damaged;"
+        ):
+            trajectories.read(path)

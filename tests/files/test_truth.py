@@ -38,7 +38,7 @@ def assert_same(one: np.ndarray | None, other: np.ndarray | None) -> None:
         assert (one.shape, one.dtype, one.tobytes()) == (other.shape, other.dtype, other.tobytes())
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".csv.gz", ".parquet"])
+@pytest.mark.parametrize("suffix", [".csv", ".csv.gz", ".parquet", ".feather"])
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=30)
 @given(original=some_truths())
 def test_every_bit_comes_back(tmp_path: Path, suffix: str, original: Truth) -> None:
