@@ -3,6 +3,8 @@ was expected, and how to cure it."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class FtprocError(Exception):
     """Root of all errors that carry a plain sentence for the user.
@@ -29,3 +31,12 @@ class UsageError(FtprocError):
     """Options that contradict each other or name something unknown."""
 
     exit_code = 2
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """`; did you mean "..."?` for the known word most like `word`, or an empty string when none is."""
+    import difflib
+
+    by_lower = {name.lower(): name for name in known}
+    close = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
+    return f'; did you mean "{by_lower[close[0]]}"?' if close else ""

@@ -17,10 +17,11 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
 
 
 @click.command(cls=Command, short_help="Dirty logs in, clean trajectories out.", examples=_EXAMPLES)
-@click.argument("logs", nargs=-1, metavar="LOG...")
+@click.argument("logs", nargs=-1, type=options.FILE, metavar="LOG...")
 @click.option(
     "-o",
     "--output",
+    type=options.FILE,
     metavar="OUT",
     help="File (.parquet, .feather, .csv, .csv.gz; with a site also .kml, .geojson, .czml), - for CSV on stdout, or a "
     "directory, which is made when absent; several logs need a directory. "
@@ -51,6 +52,7 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
 @click.option("--keep-columns/--no-keep-columns", help="Carry the log's other columns through to the trajectory.")
 @click.option(
     "--config",
+    type=options.FILE,
     metavar="FILE",
     help="A station file (TOML): site, conventions, columns, known biases, noise and options of one instrument. "
     "Options given here win over it.",
@@ -67,7 +69,14 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
 )
 @click.option("--list-methods", is_flag=True, help="List the methods, and filter nothing.")
 def command(
-    logs: tuple[str, ...], output: str | None, jobs: int, summary: str, list_methods: bool, write_config: bool, **_: Any
+    logs: tuple[str, ...],
+    output: str | None,
+    config: str | None,
+    jobs: int,
+    summary: str,
+    list_methods: bool,
+    write_config: bool,
+    **_: Any,
 ) -> None:
     """Find the outliers of LOGs, and estimate where the target was, how fast, and how sure that is.
 
@@ -94,4 +103,4 @@ def command(
     from ftproc.cli import filtering, stations
 
     recipe = stations.recipe(ctx)
-    ctx.exit(filtering.run(logs, output, recipe, jobs=jobs, summary=summary, debug=ctx.meta[DEBUG]))
+    ctx.exit(filtering.run(logs, output, recipe, config, jobs=jobs, summary=summary, debug=ctx.meta[DEBUG]))

@@ -16,10 +16,15 @@ from ftproc.files import conventions, maps
 from ftproc.methods import registry
 
 
-def run(logs: Sequence[str], output: str | None, recipe: Recipe, *, jobs: int, summary: str, debug: bool) -> int:
-    """Filter the logs and print what became of them; the exit code. Raises FtprocError for wrong usage."""
+def run(
+    logs: Sequence[str], output: str | None, recipe: Recipe, config: str | None, *, jobs: int, summary: str, debug: bool
+) -> int:
+    """Filter the logs and print what became of them; the exit code. Raises FtprocError for wrong usage.
+
+    config: where the recipe is from, not to be written over.
+    """
     methods = list(registry.METHODS) if recipe.settings.method == ALL else None
-    inputs = [] if recipe.model in (batch.PACKAGED, batch.NO_MODEL) else [recipe.model]
+    inputs = [name for name in (recipe.model, config) if name not in (batch.PACKAGED, batch.NO_MODEL, None)]
     tasks = outputs.plan(logs, output, methods, inputs)
     for task in tasks:
         maps.check(task.output, recipe.settings.site)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 import click
@@ -81,6 +81,26 @@ def _triple(text: Any) -> tuple[float, float, float] | None:
     return (values[0], values[1], values[2])
 
 
+#: The name of a file; shells complete it.
+FILE = click.Path()
+
+
+def _starting(names: Iterable[str], incomplete: str) -> list[str]:
+    return [name for name in names if name.startswith(incomplete)]
+
+
+def _complete_method(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    from ftproc.methods import registry
+
+    return _starting([*registry.METHODS, "all"], incomplete)
+
+
+def _complete_scenario(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    from ftproc.simulation import list_scenarios
+
+    return _starting(list_scenarios(), incomplete)
+
+
 def seed(what: str) -> Callable[[F], F]:
     kind = click.IntRange(min=0)
     return click.option(
@@ -89,7 +109,7 @@ def seed(what: str) -> Callable[[F], F]:
 
 
 def scenario(required: bool, text: str) -> Callable[[F], F]:
-    return click.option("--scenario", metavar="NAME", required=required, help=text)
+    return click.option("--scenario", metavar="NAME", shell_complete=_complete_scenario, required=required, help=text)
 
 
 def noise(kind: Callable[[Any], Any], default: str | None, text: str) -> Callable[[F], F]:
@@ -114,11 +134,11 @@ def tracker(function: F) -> F:
 
 _TRACKER: tuple[Callable[[Any], Any], ...] = (
     click.option(
-        "--method", metavar="NAME", default=FilterSettings.method,
+        "--method", metavar="NAME", default=FilterSettings.method, shell_complete=_complete_method,
         help="How to filter; see --list-methods. `all` runs every method, with -o DIRECTORY.",
     ),
     click.option(
-        "--model", metavar="MODEL|none", default="packaged",
+        "--model", type=FILE, metavar="MODEL|none", default="packaged",
         help="The network that corrects the filter: a file that `ftproc train` wrote, `none`, or the packaged one.",
     ),
     click.option("--smooth/--no-smooth", help="Add the fixed-interval smoother: the best estimate of trajectory."),

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ftproc.cli import options
 from ftproc.cli.command import Command
 
 if TYPE_CHECKING:
@@ -19,11 +20,12 @@ ftproc score clean.parquet --truth flight.truth.csv --format json
 
 
 @click.command(cls=Command, examples=_EXAMPLES)
-@click.argument("trajectories", nargs=-1, required=True, metavar="TRAJECTORY...")
+@click.argument("trajectories", nargs=-1, required=True, type=options.FILE, metavar="TRAJECTORY...")
 @click.option(
     "--truth",
     "truths",
     multiple=True,
+    type=options.FILE,
     metavar="TRUTH",
     help="What really happened: once for all trajectories, or once for each, in the same order.",
 )

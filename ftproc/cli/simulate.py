@@ -49,10 +49,13 @@ def _scenarios_and_grammar() -> str:
     "-o",
     "--output",
     required=True,
+    type=options.FILE,
     metavar="LOG",
     help="The log to write: .csv, .csv.gz, .parquet, .feather, or - for CSV on stdout.",
 )
-@click.option("--truth", metavar="TRUTH", help="Where to write what really happened: states and outlier flags.")
+@click.option(
+    "--truth", type=options.FILE, metavar="TRUTH", help="Where to write what really happened: states and outlier flags."
+)
 def command(
     scenario: str,
     seed: int,

@@ -22,9 +22,22 @@ ftproc train --show radar.safetensors
 
 @click.command(cls=Command, short_help="A correction model from flights with truth.", examples=_EXAMPLES)
 @click.option(
-    "--log", "logs", multiple=True, metavar="LOG", help="A log to learn from; give --log and --truth in pairs."
+    "--log",
+    "logs",
+    multiple=True,
+    type=options.FILE,
+    metavar="LOG",
+    help="A log to learn from; give --log and --truth in pairs.",
 )
-@click.option("--truth", "truths", multiple=True, metavar="TRUTH", help="The truth of the --log at the same place.")
+@click.option(
+    "--truth",
+    "truths",
+    multiple=True,
+    type=options.FILE,
+    metavar="TRUTH",
+    help="The truth of the --log at the same place.",
+)
+@click.option("--config", type=options.FILE, metavar="FILE", help="The station file that tells how to read the logs.")
 @options.scenario(False, "Learn from simulated flights instead; the names are in `ftproc simulate -h`.")
 @click.option(
     "--flights",
@@ -33,7 +46,7 @@ ftproc train --show radar.safetensors
     metavar="N",
     help="How many flights to simulate.",
 )
-@click.option("-o", "--output", metavar="MODEL", help="The model file to write (safetensors).")
+@click.option("-o", "--output", type=options.FILE, metavar="MODEL", help="The model file to write (safetensors).")
 @options.seed("Another network, search and set of simulated flights for each")
 @click.option(
     "--features",
@@ -70,10 +83,11 @@ ftproc train --show radar.safetensors
     metavar="N",
     help="Epochs of back-propagation at most; it stops when held-out samples no longer gain.",
 )
-@click.option("--show", metavar="MODEL", help="Print the card of a model file, and train nothing.")
+@click.option("--show", type=options.FILE, metavar="MODEL", help="Print the card of a model file, and train nothing.")
 def command(
     logs: tuple[str, ...],
     truths: tuple[str, ...],
+    config: str | None,
     scenario: str | None,
     flights: int,
     output: str | None,
@@ -94,18 +108,22 @@ def command(
 
         click.echo(model.card(model.load(show)))
         return
-    _check(logs, truths, scenario, output)
+    _check(logs, truths, config, scenario, output)
     settings = TrainSettings(features, hidden, population, generations, epochs, len(logs) or flights, seed)
-    _train(logs, truths, scenario, str(output), settings)
+    _train(logs, truths, config, scenario, str(output), settings)
 
 
-def _check(logs: tuple[str, ...], truths: tuple[str, ...], scenario: str | None, output: str | None) -> None:
+def _check(
+    logs: tuple[str, ...], truths: tuple[str, ...], config: str | None, scenario: str | None, output: str | None
+) -> None:
     if output is None:
         raise click.UsageError("-o MODEL is missing: where shall the model go?", click.get_current_context())
     if (scenario is None) == (not logs and not truths):
         raise click.UsageError(
             "Learn either from --log LOG --truth TRUTH pairs or from --scenario NAME.", click.get_current_context()
         )
+    if config is not None and scenario is not None:
+        raise click.UsageError("--config tells how to read a --log; --scenario has none.", click.get_current_context())
     if len(logs) != len(truths):
         raise click.UsageError(
             f"--log is given {len(logs)} times and --truth {len(truths)} times; give them in pairs.",
@@ -114,7 +132,12 @@ def _check(logs: tuple[str, ...], truths: tuple[str, ...], scenario: str | None,
 
 
 def _train(
-    logs: tuple[str, ...], truths: tuple[str, ...], scenario: str | None, output: str, settings: TrainSettings
+    logs: tuple[str, ...],
+    truths: tuple[str, ...],
+    config: str | None,
+    scenario: str | None,
+    output: str,
+    settings: TrainSettings,
 ) -> None:
     from ftproc import warm
     from ftproc.cli.progress import Progress
@@ -125,20 +148,22 @@ def _train(
 
     if output == "-":
         raise UsageError("-o -: a model is not written to standard output; name a file.")
-    atomic.refuse_overwriting(output, [*logs, *truths])
+    atomic.refuse_overwriting(output, [*logs, *truths, *([config] if config else [])])
     atomic.check_target(output)
     with Progress() as progress, warm.announced(lambda text: click.echo(f"ftproc: {text}", err=True)):
-        pairs = _read(logs, truths) if scenario is None else _simulated(scenario, settings, progress)
+        pairs = _read(logs, truths, config) if scenario is None else _simulated(scenario, settings, progress)
         trained = train_flights(pairs, settings, progress)
     model.save(trained, output)
     click.echo(model.card(model.load(output)))  # as whoever uses the file will see it
 
 
-def _read(logs: tuple[str, ...], truths: tuple[str, ...]) -> list[tuple[MeasurementLog, Truth]]:
-    from ftproc.files import logs as log_files
+def _read(logs: tuple[str, ...], truths: tuple[str, ...], config: str | None) -> list[tuple[MeasurementLog, Truth]]:
+    from ftproc import api
     from ftproc.files import truth as truth_files
 
-    return [(log_files.read(log), truth_files.read(truth)) for log, truth in zip(logs, truths, strict=True)]
+    return [
+        (api.read_log(log, config=config), truth_files.read(truth)) for log, truth in zip(logs, truths, strict=True)
+    ]
 
 
 def _simulated(

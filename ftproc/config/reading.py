@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ftproc.config.keys import KEYS, Key, every
-from ftproc.errors import UsageError
-from ftproc.files.units import UNITS, nearest
+from ftproc.errors import UsageError, nearest
+from ftproc.files.units import UNITS
 
 #: What a file without any key amounts to, for the options that consist of parts.
 _NO_PARTS = {"site": None, "noise": None, "bias": 0.0}

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, nearest
 from ..records import FlagArray, FloatArray
 from . import cells, tables, values
 from .csvtext import row_named
 from .schema import listed
-from .units import nearest
 
 if TYPE_CHECKING:
     import pyarrow as pa

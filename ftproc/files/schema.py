@@ -14,8 +14,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from ..errors import InputError, UsageError
-from .units import ALIASES, QUANTITIES, UNITS, Unit, nearest, pairs, si_unit
+from ..errors import InputError, UsageError, nearest
+from .units import ALIASES, QUANTITIES, UNITS, Unit, pairs, si_unit
 
 CANONICAL: Mapping[str, str] = {quantity: f"{quantity}_{si_unit(quantity).name}" for quantity in QUANTITIES}
 

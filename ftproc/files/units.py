@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
-from ..errors import UsageError
+from ..errors import UsageError, nearest
 from ..records import COMPONENTS, FloatArray
 
 #: What a log is made of, in the order of its canonical columns.
@@ -55,17 +54,32 @@ UNITS: Mapping[str, Mapping[str, Unit]] = {
     for quantity, units in zip(QUANTITIES, (_TIMES, _LENGTHS, _ANGLES, _ANGLES), strict=True)
 }
 
+#: How words begin that a user may write instead of the unit.
+_SPELT = {
+    "ms": "milli",
+    "us": "micro",
+    "s": "sec",
+    "km": "kilo",
+    "m": "met",
+    "ft": "f",
+    "nmi": "n",
+    "rad": "radi",
+    "deg": "degr",
+    "mrad": "millir",
+    "grad": "gradi",
+    "arcsec": "arc",
+}
+
 
 def si_unit(quantity: str) -> Unit:
     """The SI unit of `quantity` (one of QUANTITIES)."""
     return next(iter(UNITS[quantity].values()))
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
-    """`; did you mean "..."?` for the known word most like `word`, or an empty string when none is."""
-    by_lower = {name.lower(): name for name in known}
-    close = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
-    return f'; did you mean "{by_lower[close[0]]}"?' if close else ""
+def _nearest_unit(word: str, known: Mapping[str, Unit]) -> str:
+    """As `nearest`, also for a unit that is spelt out: metres, degrees."""
+    spelt = next((unit for unit, stem in _SPELT.items() if unit in known and word.lower().startswith(stem)), None)
+    return nearest(spelt or word, known)
 
 
 def pairs(option: str, given: str | Mapping[str, str] | None) -> dict[str, str]:
@@ -92,7 +106,7 @@ def parse_units(given: str | Mapping[str, str] | None) -> dict[str, str]:
         if name not in UNITS[quantity]:
             raise UsageError(
                 f'--units: "{name}" is not a unit of {quantity}; understood are '
-                f"{', '.join(UNITS[quantity])}{nearest(name, UNITS[quantity])}"
+                f"{', '.join(UNITS[quantity])}{_nearest_unit(name, UNITS[quantity])}"
             )
     return found
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ftproc.errors import UsageError
+from ftproc.errors import UsageError, nearest
 from ftproc.simulation.instrument import PERFECT, InstrumentErrors
 
 Range = tuple[float, float]
@@ -208,5 +208,6 @@ def list_scenarios() -> Mapping[str, str]:
 def find_scenario(name: str) -> Scenario:
     """The scenario of that name. Raises UsageError with the names there are."""
     if name not in _SCENARIOS:
-        raise UsageError(f'There is no scenario "{name}"; choose one of {", ".join(_SCENARIOS)}.')
+        hint = nearest(name, _SCENARIOS)
+        raise UsageError(f'There is no scenario "{name}"{hint or "."} Choose one of {", ".join(_SCENARIOS)}.')
     return _SCENARIOS[name]

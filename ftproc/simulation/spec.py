@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from ftproc.errors import UsageError
+from ftproc.errors import UsageError, nearest
 from ftproc.records import COMPONENTS
 
 GRAMMAR = """\
@@ -150,7 +150,9 @@ def _split(item: str) -> tuple[str, str, dict[str, tuple[float, float, str]]]:
         raise UsageError('Outlier specification: "none" stands alone; drop it or the other items.')
     if kind not in forms:
         what = f'unknown item "{item}"' if item else "an item is empty"
-        raise UsageError(f"Outlier specification: {what}; it takes {', '.join(forms)} or none.")
+        raise UsageError(
+            f"Outlier specification: {what}{nearest(kind, forms) or '.'} It takes {', '.join(forms)} or none."
+        )
     if not equals:
         raise UsageError(f'Outlier specification: "{item}" lacks its value; write {kind}={_example(forms[kind])}.')
     if dot and kind in _LOG_FORMS:

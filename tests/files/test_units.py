@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ftproc.errors import UsageError
-from ftproc.files.units import QUANTITIES, UNITS, nearest, parse_units, si_unit
+from ftproc.errors import UsageError, nearest
+from ftproc.files.units import QUANTITIES, UNITS, parse_units, si_unit
 
 ONE_IN_SI = [
     ("time", "s", 1.0),
