@@ -28,6 +28,7 @@ logs := $(foreach log,$(found),$(if $(findstring .truth.,$(notdir $(log)))$(find
 stem = $(patsubst %.csv,%,$(patsubst %.parquet,%,$(patsubst %.csv.gz,%,$(notdir $(1)))))
 output = $(OUT)/$(call stem,$(1)).trajectory.parquet
 truth = $(firstword $(wildcard $(foreach kind,parquet csv csv.gz,$(dir $(1))$(call stem,$(1)).truth.$(kind))))
+station = $(wildcard $(dir $(1))$(call stem,$(1)).toml)
 $(foreach log,$(logs),$(eval log-of-$(call stem,$(log)) += $(log)))
 
 outputs := $(foreach log,$(logs),$(call output,$(log)))
@@ -50,7 +51,8 @@ help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /make \1	/p' Makefile | expand -t 16
 	@echo
 	@echo 'make run LOGS="flights/*.csv" OUT=clean FLAGS="--smooth" filters your own logs; -j2 runs two at a time.'
-	@echo 'Only logs that changed are run again. A truth beside a log (STEM.truth.csv or .parquet) is used for the score.'
+	@echo 'Only logs that changed are run again. A truth beside a log (STEM.truth.csv or .parquet) is used for the score,'
+	@echo 'a station file beside it (STEM.toml) for reading it.'
 
 run: $(outputs) ## filter the LOGS to OUT with FLAGS, then print the score table
 ifneq ($(scored),)
@@ -61,8 +63,8 @@ else
 endif
 
 # The log is the first prerequisite. A change of the program, its model or FLAGS makes all results old.
-$(OUT)/%.trajectory.parquet: $$(log-of-$$*) $(OUT)/.flags $(program) | $(warmed)
-	@$(ftproc) filter $< -o $@ $(FLAGS)
+$(OUT)/%.trajectory.parquet: $$(log-of-$$*) $$(call station,$$(log-of-$$*)) $(OUT)/.flags $(program) | $(warmed)
+	@$(ftproc) filter $< -o $@ $(addprefix --config ,$(call station,$<)) $(FLAGS)
 
 export FLAGS
 $(OUT)/.flags: FORCE
@@ -115,6 +117,11 @@ samples: $(warmed) ## make sample_data/ anew (fixed seeds: the same bytes)
 	$(ftproc) simulate --scenario radar --seed 11 \
 	  --units range=km,azimuth=deg,elevation=deg --azimuth-from north \
 	  -o sample_data/radar.csv --truth sample_data/radar.truth.csv
+	$(ftproc) simulate --scenario zuo2021-outliers --seed 5 --noise 0.02,0.00003,0.00003 --azimuth-from north \
+	  --units azimuth=gon,elevation=gon -o - --truth sample_data/total_station.truth.csv | awk -F, 'BEGIN { OFS = "," } \
+	  NR == 1 { print "t", "SD", "Hz", "V"; next } \
+	  { hz = 37.25 - $$3; if (hz < 0) hz += 400; \
+	    printf "%.3f,%.4f,%.5f,%.5f\n", $$1, $$2 + 0.0344, hz, 100 - $$4 + 0.003 }' > sample_data/total_station.csv
 
 model: $(warmed) ## train the packaged model anew (MODEL_FLAGS)
 	$(ftproc) train $(MODEL_FLAGS) -o ftproc/correction/default.safetensors

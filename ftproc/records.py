@@ -39,6 +39,7 @@ class MeasurementLog:
     rows_in_file, rows_without_time, rows_out_of_order, duplicate_times: what was read and what was found.
     extra: the other columns of the file, row for row with `time_s`; only when they were asked for.
     station: what was known of the instrument, and is applied already. epoch: the instant of time zero (ISO 8601) or "".
+    remarks: what a user should know of how the file was understood.
     """
 
     name: str
@@ -53,6 +54,7 @@ class MeasurementLog:
     extra: pa.Table | None = None
     station: Station = field(default_factory=Station)
     epoch: str = ""
+    remarks: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -51,6 +51,7 @@ def summarise(
         "first_row_without_time": log.rows_without_time[0] if log.rows_without_time else None,
         "rows_out_of_order": log.rows_out_of_order,
         "duplicate_times": log.duplicate_times,
+        "remarks": list(log.remarks),
         "duration_s": float(log.time_s[-1] - log.time_s[0]),
         "interval_s": typical,
         "gaps": len(gaps),
@@ -125,7 +126,7 @@ def _oddities(s: Mapping[str, Any]) -> list[str]:
         found.append(f"{s['duplicate_times']} rows share the time of the row before")
     if s["gaps"]:
         found.append(f"{s['gaps']} gaps, the longest {s['longest_gap_s']:.4g} s")
-    return [f"  {line}" for line in found]
+    return [f"  {line}" for line in (*s["remarks"], *found)]
 
 
 def _remarks(s: Mapping[str, Any]) -> list[str]:

@@ -239,7 +239,7 @@ def test_noise_free_log_is_the_truth_and_outliers_keep_their_size() -> None:
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        ({"scenario": "acrobatics"}, 'There is no scenario "acrobatics"; choose one of zuo2021, zuo2021-outliers,'),
+        ({"scenario": "acrobatics"}, 'There is no scenario "acrobatics". Choose one of zuo2021, zuo2021-outliers,'),
         ({"seed": -1}, "The seed must be a whole number from 0, not -1."),
         ({"seed": 1.5}, "The seed must be a whole number from 0, not 1.5."),
         ({"duration_s": 0.0}, "The duration must be a positive number of seconds, not 0."),

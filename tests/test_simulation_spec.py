@@ -106,8 +106,8 @@ def test_every_example_of_the_grammar_is_valid() -> None:
 
 
 OUTLIER_ERRORS = [
-    ("spikes=3", 'unknown item "spikes=3"; it takes isolated, offset'),
-    ("", "an item is empty; it takes isolated"),
+    ("spikes=3", 'unknown item "spikes=3". It takes isolated, offset'),
+    ("", "an item is empty. It takes isolated"),
     ("isolated=0.1,", "an item is empty"),
     ("none,isolated=0.1", '"none" stands alone; drop it or the other items.'),
     ("isolated", '"isolated" lacks its value; write isolated=0.05:8-100.'),

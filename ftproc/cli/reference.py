@@ -17,16 +17,18 @@ what is told in [Choose your options](../README.md).
 
 def text() -> str:
     """The reference as Markdown."""
-    program = click.Context(cli, info_name="ftproc", terminal_width=_WIDTH, max_content_width=_WIDTH)
+    program = _context(cli, None, "ftproc")
     parts = [_HEAD, _section("ftproc", cli.get_help(program))]
     for name in COMMANDS:
         command = cli.get_command(program, name)
         assert command is not None
-        context = click.Context(
-            command, program, name, terminal_width=_WIDTH, max_content_width=_WIDTH, **command.context_settings
-        )
-        parts.append(_section(f"ftproc {name}", command.get_help(context)))
+        parts.append(_section(f"ftproc {name}", command.get_help(_context(command, program, name))))
     return "\n".join(parts)
+
+
+def _context(command: click.Command, parent: click.Context | None, name: str) -> click.Context:
+    settings = {**command.context_settings, "max_content_width": _WIDTH, "terminal_width": _WIDTH}
+    return click.Context(command, parent, name, **settings)
 
 
 def _section(title: str, help_text: str) -> str:

@@ -27,6 +27,7 @@ CONVENTION = {
 _OWN_SENSE = {"x": "anticlockwise", "north": "clockwise"}
 _CHOICES = {"azimuth_from": ("x", "north"), "elevation_from": ("horizon", "zenith")}
 
+_STEEP = math.radians(60)  # hardly any record is steeper than this for half of its length
 _NEIGHBOURS = 11  # readings whose median range stands for the target's distance: an outlier must not bend the ray
 
 
@@ -59,7 +60,18 @@ def apply(log: MeasurementLog, station: Station) -> MeasurementLog:
         measurement[:, 2] -= _bent(measurement, station.refraction)
     if station.time_offset_s:
         time_s = time_s + station.time_offset_s
-    return replace(log, measurement=measurement, time_s=time_s, frame=FRAMES[station.azimuth_from], station=station)
+    remarks = (*log.remarks, *_doubts(measurement, station))
+    frame = FRAMES[station.azimuth_from]
+    return replace(log, measurement=measurement, time_s=time_s, frame=frame, station=station, remarks=remarks)
+
+
+def _doubts(measurement: FloatArray, station: Station) -> list[str]:
+    """A forgotten option that no check can prove."""
+    elevation = measurement[np.isfinite(measurement[:, 2]), 2]
+    if station.elevation_from == "zenith" or not elevation.size or np.median(elevation) < _STEEP:
+        return []
+    steep = math.degrees(_STEEP)
+    return [f"half of the elevations are above {steep:.0f} deg: if they are zenith angles, say --elevation-from zenith"]
 
 
 def _reversed(station: Station) -> bool:
@@ -91,8 +103,9 @@ def _distance(range_m: FloatArray) -> FloatArray:
 
 def in_words(station: Station) -> list[str]:
     """What is done to the readings, one sentence each; nothing of what is usual."""
-    components = zip(("range", "azimuth", "elevation"), station.bias, ("m", "rad", "rad"), strict=True)
-    said = [f"{name} bias of {bias:g} {unit} taken off" for name, bias, unit in components if bias]
+    elevation = "zenith angle" if station.elevation_from == "zenith" else "elevation"
+    bias = zip(("range", "azimuth", elevation), station.bias, ((1, "m"), (1e3, "mrad"), (1e3, "mrad")), strict=True)
+    said = [f"{name} bias of {value * many:g} {unit} taken off" for name, value, (many, unit) in bias if value]
     if station.time_offset_s:
         said.append(f"{station.time_offset_s:g} s added to the time")
     if _reversed(station):

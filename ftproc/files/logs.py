@@ -70,7 +70,8 @@ def read(
     }
     _check_units(opened.source, quantities, found, station.elevation_from)
     extra = table.select(list(range(len(wanted), table.num_columns))) if others else None
-    log = _in_time_order(opened.source, quantities, extra, epoch)
+    log = _in_time_order(opened.source, quantities, extra)
+    log = replace(log, epoch=epoch, remarks=schema.remarks(opened.names, found, bool(epoch)))
     return conventions.apply(log, station)
 
 
@@ -152,9 +153,7 @@ def _and_the_other_angle(quantity: str, found: Mapping[str, schema.Column], unit
     return f" (and {other.quantity}={unit} if that is so too)"
 
 
-def _in_time_order(
-    source: str, quantities: Mapping[str, FloatArray], extra: pa.Table | None, epoch: str
-) -> MeasurementLog:
+def _in_time_order(source: str, quantities: Mapping[str, FloatArray], extra: pa.Table | None) -> MeasurementLog:
     time = quantities["time"]
     measurement = np.full((len(time), len(COMPONENTS)), np.nan)
     for index, component in enumerate(COMPONENTS):
@@ -177,6 +176,5 @@ def _in_time_order(
         rows_without_time=tuple(np.flatnonzero(np.isnan(time)).tolist()),
         rows_out_of_order=late,
         duplicate_times=int(np.count_nonzero(np.diff(time[row]) == 0)),
-        epoch=epoch,
         extra=extra if extra is None or everything else extra.take(row),
     )

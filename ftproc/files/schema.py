@@ -4,7 +4,7 @@ The rules, first to last:
 1. a column named by `--columns`;
 2. the canonical name, exactly: `time_s`, `range_m`, `azimuth_rad`, `elevation_rad`. It wins over bare names,
    so that a temperature `T` or an acceleration `A` beside it does no harm;
-3. one column by bare name (`R`, `az`: the unit of `--units`, else SI) or by bare name and unit (`az_deg`).
+3. one column by bare name (`R`, `az`: the unit of `--units`, else SI) or by bare name and unit (`az_deg`, `Az [deg]`).
 Two columns that could be the same quantity are an error, not a guess.
 """
 
@@ -79,6 +79,26 @@ def resolve(
     return found
 
 
+def remarks(names: Sequence[str], found: Mapping[str, Column], timestamps: bool) -> tuple[str, ...]:
+    """What a user should know of the columns taken: units that nobody stated, and columns that may have been meant.
+
+    timestamps: the time needs no unit.
+    """
+    said = []
+    assumed = [
+        f'"{column.name}" in {column.unit.name}'
+        for column in found.values()
+        if not (column.unit_in_name or column.unit_stated_by_user or (timestamps and column.quantity == "time"))
+    ]
+    if assumed:
+        said.append(f"no unit is stated, so these are taken to be: {', '.join(assumed)}")
+    absent = [quantity for quantity in QUANTITIES if quantity not in found]
+    unused = [name for place, name in enumerate(names) if place not in {column.position for column in found.values()}]
+    if absent and unused:
+        said.append(f"no column is taken for {' and '.join(absent)}; not used: {listed(unused)}")
+    return tuple(said)
+
+
 def listed(names: Sequence[str]) -> str:
     """The columns of a file for a message, at most twenty of them."""
     shown = ", ".join(names[:20])
@@ -92,7 +112,7 @@ def _named(source: str, names: Sequence[str], quantity: str, name: str, unit: st
             f"{nearest(name, names) or '.'} Its columns are: {listed(names)}."
         )
     _refuse_twice(source, names, name)
-    suffix = UNITS[quantity].get(name.rpartition("_")[2].lower()) if "_" in name else None
+    suffix = UNITS[quantity].get(_stem_and_suffix(name)[1])
     chosen = UNITS[quantity][unit] if unit else suffix or si_unit(quantity)
     return Column(quantity, names.index(name), name, chosen, unit is not None, suffix is not None)
 
@@ -129,8 +149,15 @@ def _fits(quantity: str, name: str) -> bool:
 
 def _unit_in_name(quantity: str, name: str) -> Unit | None:
     """The unit that a name such as `az_deg` states, or None."""
-    stem, _, suffix = name.lower().rpartition("_")
+    stem, suffix = _stem_and_suffix(name)
     return UNITS[quantity].get(suffix) if stem in ALIASES[quantity] else None
+
+
+def _stem_and_suffix(name: str) -> tuple[str, str]:
+    """`az_deg`, `Az (deg)` or `AZ [deg]` -> az and deg; a name without a unit has the suffix ""."""
+    bracketed = re.fullmatch(r"(.*?)\s*[(\[]\s*(\S+?)\s*[)\]]", name)
+    stem, _, suffix = (f"{bracketed[1]}_{bracketed[2]}" if bracketed else name).lower().rpartition("_")
+    return (stem, suffix) if stem else (suffix, "")
 
 
 def _refuse_twice(source: str, names: Sequence[str], name: str) -> None:
@@ -144,8 +171,8 @@ def _refuse_twice(source: str, names: Sequence[str], name: str) -> None:
 def _refuse_unknown_unit(source: str, names: Sequence[str], quantity: str) -> None:
     """A log without a range may be angles-only; one with `range_yd` is not, and must not be taken for it."""
     for name in names:
-        stem, _, suffix = name.lower().rpartition("_")
-        if len(stem) > 1 and stem in ALIASES[quantity] and suffix not in _NOT_UNITS:
+        stem, suffix = _stem_and_suffix(name)
+        if len(stem) > 1 and suffix and stem in ALIASES[quantity] and suffix not in _NOT_UNITS:
             raise InputError(
                 f'{source}: "{suffix}" in column "{name}" is not a unit of {quantity}; understood are '
                 f"{', '.join(UNITS[quantity])}. Convert the column and rename it, "

@@ -36,7 +36,7 @@ class Unit(NamedTuple):
 
 
 _TIMES = (Unit("s"), Unit("ms", divide=1e3), Unit("us", divide=1e6))
-_LENGTHS = (Unit("m"), Unit("km", 1e3), Unit("ft", 0.3048), Unit("nmi", 1852.0))
+_LENGTHS = (Unit("m"), Unit("km", 1e3), Unit("ft", 0.3048), Unit("nmi", 1852.0), Unit("nm", 1852.0))
 _ANGLES = (
     Unit("rad"),
     Unit("deg", math.pi, 180.0),
@@ -101,7 +101,7 @@ def pairs(option: str, given: str | Mapping[str, str] | None) -> dict[str, str]:
 
 def parse_units(given: str | Mapping[str, str] | None) -> dict[str, str]:
     """The `--units` option -> {quantity: unit name}. Raises UsageError for a quantity or unit not known."""
-    found = pairs("--units", given)
+    found = {quantity: name.lower() for quantity, name in pairs("--units", given).items()}
     for quantity, name in found.items():
         if name not in UNITS[quantity]:
             raise UsageError(

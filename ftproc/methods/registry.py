@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ftproc.errors import UsageError, nearest
+from ftproc.errors import UsageError
 from ftproc.settings import FilterSettings
 
 if TYPE_CHECKING:
@@ -65,7 +65,11 @@ def named(name: str) -> Method:
     """The method of that name. Raises UsageError for any other, with the nearest."""
     if name in METHODS:
         return METHODS[name]
-    raise UsageError(f"there is no method {name!r}{nearest(name, METHODS)} (`ftproc filter --list-methods` lists them)")
+    import difflib
+
+    nearest = difflib.get_close_matches(name, METHODS, n=1)
+    hint = f"; did you mean {nearest[0]!r}?" if nearest else ""
+    raise UsageError(f"there is no method {name!r}{hint} (`ftproc filter --list-methods` lists them)")
 
 
 def list_methods() -> str:

@@ -14,6 +14,7 @@ import click
 import pytest
 
 from ftproc import __version__, batch
+from ftproc.cli import reference
 from ftproc.cli.main import COMMANDS, cli
 from tests.cli.conftest import BIN
 
@@ -77,7 +78,17 @@ def test_no_command_shows_the_help(run):
 @pytest.mark.parametrize(
     ("args", "sentence"),
     [
-        (["fliter"], "ftproc: No such command 'fliter'.*See ftproc -h."),
+        (["fliter"], 'ftproc: There is no command "fliter"; did you mean "filter". See ftproc -h.'),
+        (["ftlr", "-h"], 'ftproc: There is no command "ftlr"; did you mean "filter". See ftproc -h.'),
+        (["zzz"], 'ftproc: There is no command "zzz". See ftproc -h.'),
+        (["filter", "x.csv", "--units", "range=metres"], '.*understood are m, km, ft, nmi, nm; did you mean "m".'),
+        (["filter", "x.csv", "--units", "az=degrees"], '.*did you mean "deg".'),
+        (["filter", "x.csv", "--units", "el=gradians"], '.*did you mean "grad".'),
+        (["filter", "x.csv", "--units", "el=gom"], '.*did you mean "gon".'),
+        (["filter", "x.csv", "--columns", "elevaton=EL"], '.*is not a quantity of a log.*did you mean "elevation".'),
+        (["filter", "x.csv", "--method", "ufk"], ".*there is no method 'ufk'; did you mean 'ukf'.*"),
+        (["simulate", "--scenario", "rader", "-o", "x.csv"], '.*no scenario "rader"; did you mean "radar". Choose.*'),
+        (["simulate", "--scenario", "radar", "-o", "x.csv", "--outliers", "isolatd=1"], '.*did you mean "isolated".*'),
         (["filter", "x.csv", "--smoth"], "ftproc filter: No such option.*--smooth.*See ftproc filter -h."),
         (["filter", "x.csv", "--editing", "maybe"], "ftproc filter: Invalid value for '--editing'.*two-pass.*"),
         (["filter", "--jobs", "0", "x.csv"], "ftproc filter: Invalid value for '--jobs'.*"),
@@ -179,3 +190,46 @@ def test_pipes(shell):
 
 def test_environment_is_the_one_tested():
     assert os.access(BIN / "ftproc", os.X_OK)
+
+
+def test_as_a_module(shell):
+    result = shell(f"{sys.executable} -m ftproc --version")
+    assert (result.code, result.out) == (0, f"ftproc {__version__}\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("ftproc fil", ["plain,filter"]),
+        ("ftproc filter --editing t", ["plain,two-pass"]),
+        ("ftproc filter --method uk", ["plain,ukf"]),
+        ("ftproc filter --conf", ["plain,--config"]),
+        ("ftproc filter --config s", ["file,s"]),
+        ("ftproc filter fl", ["file,fl"]),
+        ("ftproc score --truth t", ["file,t"]),
+        ("ftproc simulate --scenario man", ["plain,manoeuvre", "plain,manoeuvre-clean"]),
+    ],
+)
+def test_completion(shell, words, expected):
+    count = len(words.split()) - 1
+    result = shell("ftproc", COMP_WORDS=words, COMP_CWORD=str(count), _FTPROC_COMPLETE="bash_complete")
+    assert result.out.splitlines() == expected
+
+
+def test_the_shell_s_part_of_completion(shell):
+    assert "_FTPROC_COMPLETE=bash_complete" in shell("ftproc", _FTPROC_COMPLETE="bash_source").out
+
+
+def test_the_reference_is_current():
+    """python -m ftproc.cli.reference > ftproc/cli/README.md"""
+    kept = Path(reference.__file__).with_name("README.md").read_text()
+    assert kept.split() == reference.text().split()  # line breaks may differ from one version of click to another
+
+
+def test_the_pages_name_only_options_that_there_are():
+    """In the README, in `Choose your options`, and in the station files' comments."""
+    known = {name for command in commands() for p in command.params for name in (*p.opts, *p.secondary_opts)}
+    root = Path(reference.__file__).parents[2]
+    for page in (root / "README.md", root / "ftproc" / "README.md", *(root / "sample_data").glob("*.toml")):
+        named = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", page.read_text()))
+        assert named - known - {"--help"} == set(), page

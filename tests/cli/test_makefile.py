@@ -110,6 +110,18 @@ def test_logs_without_truth(make, flights):
     assert result.out.endswith("No log has a truth beside it, so there is nothing to score.\n")
 
 
+def test_a_station_file_beside_a_log_is_used(make, copy):
+    """And the result is old when it changes."""
+    shutil.copytree(PROJECT / "sample_data", copy / "sample_data")
+    result = make("run", "LOGS=sample_data/total_station.csv")
+    assert result.code == 0, result.err
+    assert "elevation from zenith angles" in result.err
+    assert done(make("run", "LOGS=sample_data/total_station.csv")) == []
+    later = time.time() + 5
+    os.utime(copy / "sample_data" / "total_station.toml", (later, later))
+    assert done(make("run", "LOGS=sample_data/total_station.csv")) == ["sample_data/total_station.csv"]
+
+
 def test_trajectories_and_truths_are_no_logs(make, flights, copy):
     assert len(done(make("run", LOGS, "OUT=flights"))) == 3
     assert done(make("run", LOGS, "OUT=flights")) == []
@@ -171,12 +183,14 @@ def test_clean(make, copy):
 
 def test_samples_are_made_anew(make, copy):
     assert make("samples").code == 0
-    checked_in = {path.name for path in (PROJECT / "sample_data").iterdir()}
+    checked_in = {path.name for path in (PROJECT / "sample_data").iterdir() if path.suffix != ".toml"}
     assert {path.name for path in (copy / "sample_data").iterdir()} == checked_in
     for name in ("zuo2021-outliers.csv", "theodolite.parquet", "radar.csv"):  # other processors round differently
         made, kept = (logs.read(root / "sample_data" / name) for root in (copy, PROJECT))
         assert len(made) == len(kept)
         assert abs(made.measurement[0] - kept.measurement[0]).max() < 1e-6
+    head = (PROJECT / "sample_data" / "total_station.csv").read_text().splitlines()[:5]
+    assert (copy / "sample_data" / "total_station.csv").read_text().splitlines()[:5] == head
 
 
 def test_samples_are_what_they_say():

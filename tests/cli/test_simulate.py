@@ -62,7 +62,7 @@ def test_units_and_azimuth_from_north(run, here):
 @pytest.mark.parametrize(
     ("args", "sentence"),
     [
-        (["--scenario", "moon", "-o", "a.csv"], 'There is no scenario "moon"; choose one of zuo2021,'),
+        (["--scenario", "moon", "-o", "a.csv"], 'There is no scenario "moon". Choose one of zuo2021,'),
         (["--scenario", "radar", "-o", "a.xlsx"], "a.xlsx: not a kind of file that can be written"),
         (["--scenario", "radar", "-o", "no/a.csv"], "there is no directory no; create it first"),
         (["--scenario", "radar", "-o", "a.csv", "--truth", "./a.csv"], "-o and --truth are both a.csv"),

@@ -39,7 +39,7 @@ def test_everything_at_once():
     np.testing.assert_array_equal(found.time_s, [0.25, 1.25, 2.25])
     assert (found.frame, found.station) == ("north-east-up", station)
     assert conventions.in_words(station) == [
-        "range bias of 5 m taken off", "azimuth bias of 0.01 rad taken off", "elevation bias of -0.02 rad taken off",
+        "range bias of 5 m taken off", "azimuth bias of 10 mrad taken off", "zenith angle bias of -20 mrad taken off",
         "0.25 s added to the time", "azimuth counted anticlockwise from north, turned round",
         "azimuth zero at 114.591559 deg from north", "elevation from zenith angles",
     ]  # fmt: skip
@@ -125,6 +125,13 @@ def test_a_zenith_angle_may_be_more_than_a_right_angle_but_not_two():
     assert found[0, 2] == pytest.approx(math.pi / 2 - 1.7, rel=1e-12)
     with pytest.raises(InputError, match="which is no zenith angle: it looks like degrees"):
         logs.read(table(elevation_rad=[95.0, 96.0]), station=station)
+
+
+def test_a_forgotten_zenith_is_suspected():
+    sentence = "half of the elevations are above 60 deg: if they are zenith angles, say --elevation-from zenith"
+    assert logs.read(table(elevation_rad=[1.5, 1.4])).remarks == (sentence,)
+    assert logs.read(table(elevation_rad=[1.0, 1.0])).remarks == ()
+    assert logs.read(table(elevation_rad=[0.1, 0.2]), station=Station(elevation_from="zenith")).remarks == ()
 
 
 def test_the_day_of_timestamps_is_kept():

@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ftproc.errors import InputError, UsageError
-from ftproc.files.schema import CANONICAL, parse_columns, resolve
-from ftproc.files.units import ALIASES, UNITS
+from ftproc.files.schema import CANONICAL, parse_columns, remarks, resolve
+from ftproc.files.units import ALIASES, UNITS, parse_units
 
 
 def found(
@@ -154,7 +154,7 @@ def test_a_name_and_units_that_contradict_are_refused_and_the_cure_works() -> No
 
 def test_an_unknown_unit_in_a_name_is_not_taken_for_an_angles_only_log() -> None:
     sentence = refused(["time_s", "range_yd", "azimuth_rad"])
-    assert '"yd" in column "range_yd" is not a unit of range; understood are m, km, ft, nmi' in sentence
+    assert '"yd" in column "range_yd" is not a unit of range; understood are m, km, ft, nmi, nm' in sentence
     assert "--columns range=none" in sentence
     assert set(found(["time_s", "range_yd", "azimuth_rad"], columns={"range": "none"})) == {"time", "azimuth"}
     assert "range=none" not in refused(["time_h", "range_m"])
@@ -186,3 +186,30 @@ def test_what_is_wrong_with_columns_is_said(text: str, sentence: str) -> None:
     with pytest.raises(UsageError) as caught:
         parse_columns(text)
     assert sentence in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "unit"),
+    [("Range (km)", "range", "km"), ("EL[gon]", "elevation", "gon"), ("Az [ deg ]", "azimuth", "deg"),
+     ("R_NM", "range", "nm"), ("time [ms]", "time", "ms")],
+)  # fmt: skip
+def test_units_in_brackets(name: str, quantity: str, unit: str) -> None:
+    names = ["t", "A", name] if quantity == "range" else ["t", "R", name] if quantity != "time" else [name, "R"]
+    assert found(names)[quantity] == (name, unit)
+
+
+def test_an_unknown_unit_in_brackets() -> None:
+    assert '"yd" in column "Range (yd)" is not a unit of range' in refused(["t", "Range (yd)", "A"])
+
+
+def test_what_a_user_should_know_of_the_columns() -> None:
+    names = ["time_s", "RNG", "A", "el_deg", "note"]
+    units, columns = parse_units("az=deg"), {"range": "RNG"}
+    taken = resolve("log.csv", names, units, columns)
+    assert remarks(names, taken, False) == ('no unit is stated, so these are taken to be: "RNG" in m',)
+    taken = resolve("log.csv", ["t", "A", "x", "y"], {}, {})
+    assert remarks(["t", "A", "x", "y"], taken, True) == (
+        'no unit is stated, so these are taken to be: "A" in rad',
+        "no column is taken for range and elevation; not used: x, y",
+    )
+    assert remarks(["time_s", "range_m"], resolve("log.csv", ["time_s", "range_m"], {}, {}), False) == ()

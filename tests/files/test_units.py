@@ -18,6 +18,7 @@ ONE_IN_SI = [
     ("range", "km", 1000.0),
     ("range", "ft", 0.3048),
     ("range", "nmi", 1852.0),
+    ("range", "nm", 1852.0),
     ("azimuth", "rad", 1.0),
     ("azimuth", "deg", math.pi / 180),
     ("azimuth", "mrad", 1e-3),
@@ -64,7 +65,7 @@ def test_units_from_text_and_from_a_mapping_are_the_same() -> None:
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("range=yd", '--units: "yd" is not a unit of range; understood are m, km, ft, nmi'),
+        ("range=yd", '--units: "yd" is not a unit of range; understood are m, km, ft, nmi, nm'),
         ("azimuth=dge", 'understood are rad, deg, mrad, mil, grad, gon, mgon, arcsec; did you mean "deg"?'),
         ("azimuth=m", '--units: "m" is not a unit of azimuth'),
         ("azimut=deg", '"azimut" is not a quantity of a log; expected time, range, azimuth, elevation; did you mean'),
