@@ -54,8 +54,8 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     "--config",
     type=options.FILE,
     metavar="FILE",
-    help="A station file (TOML): site, conventions, columns, known biases, noise and options of one instrument. "
-    "Options given here win over it.",
+    help="A station file (TOML): site, conventions, columns, known biases, noise and options of one instrument; "
+    "--write-config prints one. Options given here win over it.",
 )
 @click.option("--write-config", is_flag=True, help="Print a station file with the options given, and filter nothing.")
 @click.option(

@@ -27,7 +27,7 @@ CONVENTION = {
 _OWN_SENSE = {"x": "anticlockwise", "north": "clockwise"}
 _CHOICES = {"azimuth_from": ("x", "north"), "elevation_from": ("horizon", "zenith")}
 
-_STEEP = math.radians(60)  # hardly any record is steeper than this for half of its length
+_STEEP_DEG = 60  # hardly any record is steeper than this for half of its length
 _NEIGHBOURS = 11  # readings whose median range stands for the target's distance: an outlier must not bend the ray
 
 
@@ -60,18 +60,22 @@ def apply(log: MeasurementLog, station: Station) -> MeasurementLog:
         measurement[:, 2] -= _bent(measurement, station.refraction)
     if station.time_offset_s:
         time_s = time_s + station.time_offset_s
-    remarks = (*log.remarks, *_doubts(measurement, station))
+    remarks = (*log.remarks, *_doubts(log.measurement, station))
     frame = FRAMES[station.azimuth_from]
     return replace(log, measurement=measurement, time_s=time_s, frame=frame, station=station, remarks=remarks)
 
 
 def _doubts(measurement: FloatArray, station: Station) -> list[str]:
-    """A forgotten option that no check can prove."""
-    elevation = measurement[np.isfinite(measurement[:, 2]), 2]
-    if station.elevation_from == "zenith" or not elevation.size or np.median(elevation) < _STEEP:
-        return []
-    steep = math.degrees(_STEEP)
-    return [f"half of the elevations are above {steep:.0f} deg: if they are zenith angles, say --elevation-from zenith"]
+    """Forgotten options that no check can prove, from the readings as they are."""
+    azimuth, elevation = (np.degrees(column[np.isfinite(column)]) for column in measurement.T[1:])
+    doubts = []
+    if azimuth.size and azimuth.min() > -1 and 370 < np.quantile(azimuth, 0.99) <= 400:
+        doubts.append("the azimuth runs from 0 to 400 deg: if they are gon, say --units azimuth=gon")
+    if station.elevation_from == "horizon" and elevation.size and np.median(elevation) > _STEEP_DEG:
+        doubts.append(
+            f"half of the elevations are above {_STEEP_DEG} deg: if they are zenith angles, say --elevation-from zenith"
+        )
+    return doubts
 
 
 def _reversed(station: Station) -> bool:

@@ -22,6 +22,7 @@ from .atomic import Target
 
 _DEGREES, _METRES = 9, 4  # decimals: a tenth of a millimetre
 _SOME_DAY = "2000-01-01T00:00:00Z"  # stands for a day that the log does not tell; CZML cannot do without
+_XML = '<?xml version="1.0" encoding="UTF-8"?>'
 _NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
 
 
@@ -132,7 +133,8 @@ def _kml(track: Track) -> str:
         moving = document.newgxtrack(name=f"{track.name} in time", altitudemode="absolute")
         moving.newwhen(_instants(track))
         moving.newgxcoord(places.tolist())
-    return cast(str, document.kml())
+    # Without indents, for which simplekml would parse all of it again.
+    return f"{_XML}\n{document.kml(format=False)}\n"
 
 
 def _instants(track: Track) -> list[str]:

@@ -134,6 +134,14 @@ def test_a_forgotten_zenith_is_suspected():
     assert logs.read(table(elevation_rad=[0.1, 0.2]), station=Station(elevation_from="zenith")).remarks == ()
 
 
+def test_a_turn_of_400_degrees_is_suspected():
+    gon = np.linspace(0, 399, 50)
+    log = pa.table({"time_s": np.arange(50.0), "azimuth_deg": gon})
+    assert logs.read(log).remarks == ("the azimuth runs from 0 to 400 deg: if they are gon, say --units azimuth=gon",)
+    assert logs.read(log.rename_columns(["time_s", "azimuth_gon"])).remarks == ()
+    assert logs.read(log.set_column(1, "azimuth_deg", pa.array(gon + 300))).remarks == ()  # counts on after a turn
+
+
 def test_the_day_of_timestamps_is_kept():
     stamped = pa.table({"time": ["2024-05-31T23:59:59Z", "2024-06-01T00:00:01Z"], "range_m": [1.0, 2.0]})
     found = logs.read(stamped)
