@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -35,6 +34,8 @@ def load(path: str | Path) -> dict[str, Any]:
 
 def parse(text: str, name: str) -> dict[str, Any]:
     """As `load`, from the text of a file called `name`."""
+    import tomllib
+
     try:
         found = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
