@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from ftproc import consistency, pipeline, summary
 from ftproc.settings import FilterSettings
@@ -67,3 +68,15 @@ def test_gate_that_cannot_fire_is_reported():
 def test_usual_flight_has_no_such_remarks():
     text = summary.text(pipeline.filter_log(simulate("manoeuvre-clean", seed=3, duration_s=60.0).log))
     assert "hardly" not in text
+
+
+def test_bounds_of_nis_are_those_of_chi_square_until_they_are_narrow():
+    freedom = np.array([0.0, 12.0, 30.0, 90.0, 3e5])
+    low, high = consistency.nis_bounds(freedom)
+    assert np.isnan(low[0])
+    assert np.isnan(high[0])
+    # what 99 % of chi-square variables lie between, from SciPy; at 90 the wider of the two
+    np.testing.assert_allclose(low[1:3], stats.chi2.ppf(0.005, freedom[1:3]), rtol=0.02)
+    np.testing.assert_allclose(high[1:4], stats.chi2.ppf(0.995, freedom[1:4]), rtol=0.02)
+    assert low[4] == pytest.approx(0.64 * freedom[4])
+    assert high[4] == pytest.approx(1.44 * freedom[4])
