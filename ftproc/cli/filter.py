@@ -11,7 +11,7 @@ from ftproc.cli.command import DEBUG, Command
 
 _EXAMPLES = """
 ftproc simulate --scenario zuo2021-outliers -o flight.csv
-ftproc filter flight.csv --smooth
+ftproc filter flight.csv --smooth --report flight.html
 ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
 """
 
@@ -48,6 +48,7 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     default="text",
     help="What to print of each trajectory; on stderr when the trajectory itself goes to stdout.",
 )
+@options.report("a trajectory, the readings it was made from, and whether to trust it")
 @click.option("--list-methods", is_flag=True, help="List the methods, and filter nothing.")
 def command(logs: tuple[str, ...], output: str | None, list_methods: bool, **given: Any) -> None:
     """Find the outliers of LOGs, and estimate where the target was, how fast, and how sure that is.

@@ -4,27 +4,34 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import click
 
 from ftproc import batch, geodesy
 from ftproc.batch import Outcome, Recipe
-from ftproc.cli import outputs
+from ftproc.cli import outputs, reports
 from ftproc.cli.progress import Progress
 from ftproc.files import schema, units
 from ftproc.methods import registry
+from ftproc.report import Entry
 from ftproc.settings import FilterSettings
+from ftproc.summary import line
 
 ALL = "all"
 
 
-def run(logs: Sequence[str], output: str | None, *, jobs: int, summary: str, debug: bool, **given: Any) -> int:
+def run(
+    logs: Sequence[str], output: str | None, *, jobs: int, summary: str, report: str | None, debug: bool, **given: Any
+) -> int:
     """Filter the logs and print what became of them; the exit code. Raises FtprocError for wrong usage."""
     recipe = _recipe(given)
     methods = list(registry.METHODS) if given["method"] == ALL else None
     inputs = [] if recipe.model in (batch.PACKAGED, batch.NO_MODEL) else [recipe.model]
     tasks = outputs.plan(logs, output, methods, inputs)
+    pages, index = reports.plan([task.output for task in tasks], report, [*logs, *inputs])
+    tasks = [replace(task, report=page) for task, page in zip(tasks, pages, strict=True)]
     if recipe.settings.site is not None:
         _tell(f"positions on the earth: {geodesy.axes(_frame(recipe))}, z is up")
     done: list[Outcome] = []
@@ -34,6 +41,7 @@ def run(logs: Sequence[str], output: str | None, *, jobs: int, summary: str, deb
             progress.clear()
             _show(outcome, summary, debug)
             progress("filtering", len(done), len(tasks))
+    reports.write_index([_entry(outcome) for outcome in done], index)
     if summary == "json":
         _show_json(done)
     failures = [outcome.failure.exit_code for outcome in done if outcome.failure is not None]
@@ -76,15 +84,27 @@ def _show(outcome: Outcome, summary: str, debug: bool) -> None:
         _tell(outcome.failure.message)
     elif summary == "text":
         on_stdout = outcome.task.output == "-"
-        place = "" if on_stdout else f"\n  -> {outcome.task.output}"
-        click.echo(outcome.text + place, err=on_stdout)
+        places = [place for place in (outcome.task.output, outcome.task.report) if place not in (None, "-")]
+        lines = [outcome.text, line("time", f"{outcome.elapsed_s:.2f} s"), *(f"  -> {place}" for place in places)]
+        click.echo("\n".join(lines), err=on_stdout)
+
+
+def _entry(outcome: Outcome) -> Entry:
+    if outcome.failure is not None:
+        return Entry(outcome.task.log, None, {}, outcome.failure.message)
+    return Entry(outcome.task.log, outcome.task.report, outcome.summary)
+
+
+def _written(outcome: Outcome) -> dict[str, str]:
+    """Where the trajectory is and, if one was made, the page."""
+    report = outcome.task.report
+    return {"output": outcome.task.output, **({} if report is None else {"report": report})}
 
 
 def _show_json(done: Sequence[Outcome]) -> None:
     """One object for one trajectory, a list for several."""
     plain = [
-        {"log": o.task.log, "error": o.failure.message} if o.failure else {**o.summary, "output": o.task.output}
-        for o in done
+        {"log": o.task.log, "error": o.failure.message} if o.failure else {**o.summary, **_written(o)} for o in done
     ]
     on_stdout = any(o.task.output == "-" for o in done)
     click.echo(json.dumps(plain[0] if len(plain) == 1 else plain, indent=2), err=on_stdout)
