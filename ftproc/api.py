@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ftproc import pipeline
@@ -69,6 +70,19 @@ def score(trajectory: Any, truth: Any = None) -> Score:
     found = trajectory if isinstance(trajectory, Trajectory) else trajectories.read(trajectory)
     known = truth if truth is None or isinstance(truth, Truth) else truths.read(truth)
     return scoring.score(found, known)
+
+
+def write_report(trajectory: Any, target: str | Path, truth: Any = None) -> None:
+    """Write an HTML page that shows a trajectory, and with a truth its errors (records or files).
+
+    A trajectory from `filter_log` is shown with its raw readings. Raises OutputError, UsageError (no plotly).
+    """
+    from ftproc import report
+    from ftproc.files import trajectories
+    from ftproc.files import truth as truths
+
+    found = trajectory if isinstance(trajectory, Trajectory) else trajectories.read(trajectory)
+    report.write(found, target, truth if truth is None or isinstance(truth, Truth) else truths.read(truth))
 
 
 def to_table(trajectory: Trajectory) -> pa.Table:

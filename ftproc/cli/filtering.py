@@ -26,6 +26,7 @@ def run(
     logs: Sequence[str], output: str | None, *, jobs: int, summary: str, report: str | None, debug: bool, **given: Any
 ) -> int:
     """Filter the logs and print what became of them; the exit code. Raises FtprocError for wrong usage."""
+    reports.check(report)
     recipe = _recipe(given)
     methods = list(registry.METHODS) if given["method"] == ALL else None
     inputs = [] if recipe.model in (batch.PACKAGED, batch.NO_MODEL) else [recipe.model]

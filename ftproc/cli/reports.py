@@ -8,11 +8,17 @@ from pathlib import Path
 from ftproc.cli import outputs
 from ftproc.errors import UsageError
 from ftproc.files import atomic, tables, trajectories
-from ftproc.report import Entry
+from ftproc.report import Entry, require_plotly
 
 INDEX = "index.html"
 _SUFFIXES = (".html", ".htm")
 _OPTION = "--report"
+
+
+def check(given: str | None) -> None:
+    """Raise UsageError, before anything is done or made, when pages are wanted and plotly is missing."""
+    if given is not None:
+        require_plotly()
 
 
 def plan(names: Sequence[str], given: str | None, inputs: Sequence[str] = ()) -> tuple[list[str | None], str | None]:

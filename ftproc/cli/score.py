@@ -57,8 +57,7 @@ def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: 
     from ftproc.files import trajectories as trajectory_files
     from ftproc.scoring import render, score
 
-    if report is not None:
-        pages.require_plotly()
+    reports.check(report)
     places, index = reports.plan(trajectories, report, truths)
     scores, entries, failed = [], [], False
     known: dict[str, Truth] = {}
