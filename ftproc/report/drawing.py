@@ -35,7 +35,7 @@ def rows(timeline: Timeline, titles: Sequence[str], height: int, columns: int = 
 
     count = len(titles) // columns
     figure = make_subplots(
-        count, columns, shared_xaxes="all", vertical_spacing=0.16 / count, horizontal_spacing=0.08
+        count, columns, shared_xaxes="all", vertical_spacing=0.16 / count, horizontal_spacing=0.13
     )  # fmt: skip
     figure.update_layout(**style.LAYOUT, height=height)
     figure.update_xaxes(**style.axis(range=span(timeline.time_s, margin=EDGE)))

@@ -15,6 +15,7 @@ from ftproc.report.view import View
 
 ROW_HEIGHT = 190
 ROOM = 0.35  # of the range of the trajectory, above and below it, for outliers to stand in
+FOOT = 0.08  # of the height, below the lowest outlier: where missing readings are marked
 FARTHEST = 3.0  # gates, at which residuals stand that are farther off
 FARTHEST_SIGMAS = 12.0  # the same where no gate is known
 
@@ -39,10 +40,12 @@ def readings(view: View) -> Drawn:
     for row, c in enumerate(seen):
         good = np.where(flags[:, c] == GOOD, raw[:, c], np.nan)
         limits = drawing.span(view.cleaned[:, c], good, margin=ROOM)
+        foot = limits[0] - FOOT * (limits[1] - limits[0])
         traces = [] if view.reading is None else [drawing.dots(timeline, good, "good reading", style.READING)]
         for flag, kind in style.KINDS.items():
-            value = _marked_at(view, raw, c, flag, limits[0])
-            traces.append(drawing.marks(timeline.time_s, value, chosen[flag, c], kind, limits, total))
+            value = _marked_at(view, raw, c, flag, foot)
+            within = (foot, limits[1]) if flag == MISSING else limits
+            traces.append(drawing.marks(timeline.time_s, value, chosen[flag, c], kind, within, total))
         traces.append(drawing.line(timeline, view.cleaned[:, c], "estimate", style.ESTIMATE))
         _add(figure, traces, row, named)
     where = "An outlier beyond the axis stands at its edge; point at it for its value."

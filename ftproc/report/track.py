@@ -19,7 +19,7 @@ COLUMNS = 2000  # in each of which the extremes of x, y and z are drawn
 FLATTEST = 0.2  # height over width of the figure in space; a flatter flight is drawn higher, and that is said
 NEAR = 1.0  # a station so many widths of the flight away, or nearer, is drawn too
 HEIGHT = 460
-FILLING = 1.45  # diagonal of the flight against the distance of the eye
+FILLING = 1.3  # diagonal of the flight against the distance of the eye
 NOTHING = "There is no position to draw: what was measured does not tell it."
 
 _NORTH = {"x": "x (north), m", "y": "y (east), m", "z": "z (up), m"}
