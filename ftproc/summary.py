@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ftproc import consistency, trust
-from ftproc.methods.estimate import Estimate
 from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, FloatArray, MeasurementLog, Trajectory
+
+if TYPE_CHECKING:
+    from ftproc.methods.estimate import Estimate
 
 UNITS = ("m", "rad", "rad")
 GAP_INTERVALS = 3.0  # median intervals that make a gap

@@ -9,7 +9,7 @@ import numpy as np
 from ftproc.records import FloatArray, IntArray
 from ftproc.summary import GAP_INTERVALS
 
-COLUMNS = 1200  # pixel columns of a wide figure; at most two points are drawn in each
+COLUMNS = 1000  # pixel columns of a wide figure; at most two points are drawn in each
 MOST_MARKED = 100_000  # flagged readings that are all drawn
 
 

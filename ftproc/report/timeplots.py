@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from ftproc.records import FloatArray
 from ftproc.report import drawing, require_plotly, style
 from ftproc.report.drawing import DASHES, Drawn
 from ftproc.report.view import View, load_factor, speed
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
 
 STRETCHES, LEAST_IN_STRETCH = 60, 25  # means of NIS that are drawn, and samples in each
 TICKS = [m * 10.0**k for k in range(-6, 9) for m in (1, 3)]  # of logarithmic axes
@@ -29,7 +32,7 @@ def nis(view: View) -> Drawn:
     _, freedom, _ = view.timeline.means(np.where(np.isfinite(value), view.components_used, np.nan), number)
     samples = np.where(samples > 0, samples, np.nan)
     low, high = consistency.nis_bounds(freedom)
-    go = require_plotly()
+    plotly = require_plotly()
     if not view.timeline.thinned:
         drawing.add(figure, drawing.dots(view.timeline, value, "sample", style.READING))
     how = [("mean over a stretch", total, style.BLUE, "solid"), ("expected", freedom, style.BLACK, "solid"),
@@ -37,7 +40,7 @@ def nis(view: View) -> Drawn:
     for index, (name, sums, colour, dash) in enumerate(how):
         path = {"color": colour, "dash": dash, "width": 1.5 if index else 2, "shape": "hvh"}
         mode = "lines+markers" if number == 1 or not index else "lines"
-        trace = go.Scatter(x=middle, y=sums / samples, name=name, mode=mode, line=path, marker={"size": 5})
+        trace = plotly.Scatter(x=middle, y=sums / samples, name=name, mode=mode, line=path, marker={"size": 5})
         drawing.add(figure, trace, first=index < 3)
     top = 1.3 * float(np.nanmax(np.maximum(high, total) / samples))
     if not view.timeline.thinned:
@@ -56,7 +59,7 @@ def sigmas(view: View) -> Drawn:
     if not np.isfinite(sigma).any():
         return Drawn(None, "The trajectory has no sigmas: its position is not known.")
     figure = drawing.rows(view.timeline, ["σ position, m", "σ velocity, m/s"], 440)
-    _triples(figure, view, sigma, ("x", "y", "z"))
+    _triples(figure, view, sigma)
     figure.update_yaxes(type="log", tickvals=TICKS, ticktext=[f"{tick:g}" for tick in TICKS])
     return Drawn(figure, "1 sigma of the estimate, along the axes.")
 
@@ -90,7 +93,7 @@ def correction(view: View) -> Drawn:
     if not np.nan_to_num(added).any():
         return Drawn(None, "The network changed nothing: this is the plain filter or smoother.")
     figure = drawing.rows(view.timeline, ["position, m", "velocity, m/s"], 440)
-    _triples(figure, view, added, ("x", "y", "z"))
+    _triples(figure, view, added)
     return Drawn(figure, "Estimate minus this is the plain filter.")
 
 
@@ -117,10 +120,10 @@ def errors(view: View) -> Drawn:
     return Drawn(figure, "")
 
 
-def _triples(figure: object, view: View, value: FloatArray, names: Sequence[str]) -> None:
+def _triples(figure: go.Figure, view: View, value: FloatArray) -> None:
     """(n, 6): x, y, z of position in the first row, of velocity in the second."""
     for row in range(2):
-        for axis, name in enumerate(names):
+        for axis, name in enumerate("xyz"):
             one = value[:, 3 * row + axis]
             if np.isfinite(one).any():
                 trace = drawing.line(view.timeline, one, name, style.AXES[axis], DASHES[axis])

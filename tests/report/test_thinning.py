@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ftproc.report.thinning import Timeline
+from ftproc.report.thinning import COLUMNS, Timeline
 
 
 def walked(time_s, value, columns):
@@ -48,7 +48,7 @@ def test_no_extreme_is_lost_in_a_long_log():
     value[50_000] = 99.0
     timeline = Timeline.of(time_s)
     x, y = timeline.line(value)
-    assert len(x) <= 2 * 1200
+    assert len(x) <= 2 * COLUMNS
     assert y.max() == 99.0
     assert y.min() == value.min()
     assert x[y.argmax()] == time_s[50_000]
