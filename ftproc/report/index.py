@@ -14,14 +14,16 @@ from ftproc.records import COMPONENTS
 from ftproc.report import Entry, tables
 from ftproc.report.page import document
 from ftproc.report.style import GREY, VERDICT
+from ftproc.summary import counted
 
 _HEADER = ("log", "method", "verdict", "rows", "duration", "outliers R, A, E", "why")
 
 
 def write(entries: Sequence[Entry], target: Target) -> None:
     """Write the index, whole or not at all. Raises OutputError."""
-    count = f"{len(entries)} report{'' if len(entries) == 1 else 's'}"
-    body = f"<h1>{count}</h1>{tables.table(_HEADER, map(_cells, entries), links=3)}"
+    failed = sum(entry.failure is not None for entry in entries)
+    count = counted(len(entries) - failed, "report") + (f", {failed} failed" if failed else "")
+    body = f"<h1>{count}</h1>{tables.table(_HEADER, map(_cells, entries), 'index', links=3)}"
     with atomic.replacing(target) as stream:
         stream.write(document("Reports", body).encode())
 

@@ -21,7 +21,7 @@ def test_a_line_for_each_log(tmp_path):
         Entry("d.csv", None, {}, "d.csv: there is no such file."),
         Entry("e.csv", "out/e.report.html", {}),
     )
-    assert "<h1>4 reports</h1>" in text
+    assert "<h1>3 reports, 1 failed</h1>" in text
     assert '<a href="./a%20b%231.report.html">in/a.csv</a>' in text
     assert ">trust</span></td><td>" in text
     assert ">be careful</span>" in text
