@@ -85,12 +85,12 @@ $(bin)/python:
 
 $(installed): pyproject.toml | $(bin)/python
 	@echo 'installing ftproc in $(VENV)'
-	@$(bin)/python -m pip install --quiet --disable-pip-version-check -e '.[geo]'
+	@$(bin)/python -m pip install --quiet --disable-pip-version-check -e '.[geo,report]'
 	@touch $@
 
 $(developer): pyproject.toml $(installed)
 	@echo 'installing the developer tools in $(VENV)'
-	@$(bin)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,geo]'
+	@$(bin)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,geo,report]'
 	@touch $@
 
 # Compiled kernels are kept; after this the first log does not wait for the compiler.

@@ -89,6 +89,19 @@ def score(trajectory: Any, truth: Any = None) -> Score:
     return scoring.score(found, known)
 
 
+def write_report(trajectory: Any, target: str | Path, truth: Any = None) -> None:
+    """Write an HTML page that shows a trajectory, and with a truth its errors (records or files).
+
+    A trajectory from `filter_log` is shown with its raw readings. Raises OutputError, UsageError (no plotly).
+    """
+    from ftproc import report
+    from ftproc.files import trajectories
+    from ftproc.files import truth as truths
+
+    found = trajectory if isinstance(trajectory, Trajectory) else trajectories.read(trajectory)
+    report.write(found, target, truth if truth is None or isinstance(truth, Truth) else truths.read(truth))
+
+
 def to_table(trajectory: Trajectory) -> pa.Table:
     """The trajectory as a pyarrow Table, with the columns and the metadata of its Parquet file."""
     from ftproc.files import trajectories

@@ -5,6 +5,7 @@ The results come in the order of the tasks, and are the same bytes whatever the 
 
 from __future__ import annotations
 
+import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,11 +25,13 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Task:
-    """One log to filter and where its trajectory goes; either may be `-`. method: instead of the recipe's."""
+    """One log to filter and where its trajectory goes; either may be `-`. method: instead of the recipe's. report:
+    where the HTML page goes, if one is wanted."""
 
     log: str
     output: str
     method: str | None = None
+    report: str | None = None
 
 
 @dataclass(frozen=True)
@@ -58,21 +61,23 @@ class Failure:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a task: its summary as text and as a dictionary, or its failure."""
+    """What became of a task: its summary as text and as a dictionary, or its failure; and the time it took."""
 
     task: Task
     text: str = ""
     summary: Mapping[str, Any] = field(default_factory=dict)
     failure: Failure | None = None
+    elapsed_s: float = 0.0
 
 
 def run(tasks: Sequence[Task], recipe: Recipe, jobs: int = 1, say: Say | None = None) -> Iterator[Outcome]:
     """Filter every log, in up to `jobs` processes. Yields the outcomes in the order of the tasks.
 
     say: is told when kernels are being compiled, which takes a while; with workers it must be picklable.
-    Raises ModelError, and UsageError when a site is given and pymap3d is not there, before any log is touched.
+    Raises ModelError, and UsageError when a site or a report is asked for and pymap3d or plotly is not there, before
+    any log is touched.
     """
-    _check(recipe)
+    _check(tasks, recipe)
     if jobs > 1 and len(tasks) > 1:
         from ftproc import workers
 
@@ -84,9 +89,10 @@ def run(tasks: Sequence[Task], recipe: Recipe, jobs: int = 1, say: Say | None = 
 
 def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
     """Read, filter and write one log. Whatever goes wrong with it is in the outcome; only a closed pipe is raised."""
-    from ftproc import geodesy, pipeline, summary, warm
+    from ftproc import geodesy, pipeline, report, summary, warm
     from ftproc.files import logs, trajectories
 
+    began = time.perf_counter()
     try:
         log = logs.read(task.log, **recipe.reading())
         settings = replace(recipe.settings, method=task.method or recipe.settings.method)
@@ -94,7 +100,10 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
             trajectory = pipeline.filter_log(log, settings, model_named(recipe.model))
         trajectory = geodesy.located(trajectory, settings)
         trajectories.write(trajectory, task.output)
-        return Outcome(task, summary.text(trajectory), summary.as_dict(trajectory))
+        if task.report is not None:
+            report.write(trajectory, task.report)
+        elapsed_s = time.perf_counter() - began
+        return Outcome(task, summary.text(trajectory), summary.as_dict(trajectory), elapsed_s=elapsed_s)
     except BrokenPipeError:
         raise
     except Exception as error:
@@ -119,11 +128,13 @@ def failure(error: BaseException, source: str | None = None) -> Failure:
     return Failure(f"{about}internal error ({kind}); run again with --debug and report it.", 1, trace)
 
 
-def _check(recipe: Recipe) -> None:
-    from ftproc import geodesy
+def _check(tasks: Sequence[Task], recipe: Recipe) -> None:
+    from ftproc import geodesy, report
 
     model_named(recipe.model)
     geodesy.check(recipe.settings)
+    if any(task.report is not None for task in tasks):
+        report.require_plotly()
 
 
 @cache

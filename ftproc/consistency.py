@@ -30,6 +30,16 @@ def scatter(scaled: FloatArray) -> dict[str, Any]:
     return {"innovation_ratio": ratio, "innovation_bounds": [low, high], "verdict": verdict}
 
 
+def nis_bounds(freedom: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Within which the sum of normalised innovations squared of so many degrees of freedom (n,) lies: 99 % of honest
+    filters (chi-square by Wilson and Hilferty's cube root), but at least 20 % of a sigma wide; NaN for no freedom."""
+    freedom = np.where(freedom > 0, freedom, np.nan)
+    share = 2 / (9 * freedom)
+    low, high = (1 - share + sign * NORMAL_99 * np.sqrt(share) for sign in (-1, 1))
+    low, high = freedom * np.maximum(low, 0.0) ** 3, freedom * high**3
+    return np.minimum(low, freedom * (1 - LEAST_WIDTH) ** 2), np.maximum(high, freedom * (1 + LEAST_WIDTH) ** 2)
+
+
 def vagueness(innovation_sigma: FloatArray, used: NDArray[np.bool_], noise_sigma: float) -> float | None:
     """By how much predictions are vaguer than readings (median over the used ones): a gate of C sigmas lets pass what
     is C times so many noise sigmas off."""

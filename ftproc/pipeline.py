@@ -16,7 +16,7 @@ from ftproc.errors import InputError, UsageError
 from ftproc.files.conventions import CONVENTION, in_words
 from ftproc.methods import registry
 from ftproc.methods.estimate import Estimate, Readings
-from ftproc.records import COMPONENTS, MISSING, MeasurementLog, Trajectory, Truth
+from ftproc.records import COMPONENTS, MISSING, Diagnostics, MeasurementLog, Trajectory, Truth
 from ftproc.settings import FilterSettings, TrainSettings
 from ftproc.summary import summarise
 
@@ -70,8 +70,17 @@ def filter_log(log: MeasurementLog, settings: FilterSettings | None = None, mode
     summary = summarise(log, estimate, absent, correction, outside)
     return Trajectory(
         log.name, log.row, log.time_s, cleaned, state, sigma, estimate.label, best.nis, correction,
-        _provenance(log, settings, estimate, model, summary), log.extra,
+        _provenance(log, settings, estimate, model, summary), log.extra, _diagnostics(log, estimate),
     )  # fmt: skip
+
+
+def _diagnostics(log: MeasurementLog, estimate: Estimate) -> Diagnostics:
+    missing = ~np.isfinite(log.measurement)  # also what a stand-in was filtered for
+    if estimate.smoothed is None:
+        residual, sigma = estimate.run.innovation, estimate.run.innovation_sigma
+        return Diagnostics(log.measurement, np.where(missing, np.nan, residual), sigma, "innovation")
+    residual, sigma = estimate.smoothed.residual, np.sqrt(estimate.smoothed.residual_variance)
+    return Diagnostics(log.measurement, np.where(missing, np.nan, residual), sigma, "leave-one-out residual")
 
 
 def _check(settings: FilterSettings) -> None:

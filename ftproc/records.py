@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ftproc.settings import Station
 
 if TYPE_CHECKING:
+    import plotly.graph_objects as go
     import pyarrow as pa
 
 FloatArray = NDArray[np.float64]
@@ -80,6 +81,22 @@ class Truth:
 
 
 @dataclass(frozen=True)
+class Diagnostics:
+    """What a trajectory was made from and how its filter fared, row for row with it; not part of its file.
+
+    reading: (n, 3) raw range m, azimuth rad, elevation rad; NaN where missing.
+    residual: (n, 3) reading minus what the other readings say of it, NaN where missing: the innovation (against all
+    readings before), or after smoothing the leave-one-out residual (against all others).
+    residual_sigma: (n, 3) 1-sigma that the filter expects of it.
+    """
+
+    reading: FloatArray
+    residual: FloatArray
+    residual_sigma: FloatArray
+    residual_kind: Literal["innovation", "leave-one-out residual"]
+
+
+@dataclass(frozen=True)
 class Trajectory:
     """The result: one row for every row of the log that has a time, in time order.
 
@@ -91,6 +108,7 @@ class Trajectory:
     nis: (n,) normalised innovation squared of the components used; NaN where none was.
     correction: (n, 6) what the network added to position m and velocity m/s.
     metadata: everything needed to make it again (JSON-serialisable), see the README.
+    extra: further columns, row for row. diagnostics: only of a trajectory that was just made, not of one read.
     """
 
     name: str
@@ -104,6 +122,14 @@ class Trajectory:
     correction: FloatArray
     metadata: Mapping[str, Any] = field(default_factory=dict)
     extra: pa.Table | None = None
+    diagnostics: Diagnostics | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+    def plot(self, what: str = "track") -> go.Figure:
+        """One figure of the report, for a notebook: track, ground, readings, residuals, nis, sigmas, motion or
+        correction. Raises UsageError for another name, when plotly is missing, or when there is nothing to draw."""
+        from ftproc.report import plot
+
+        return plot(self, what)

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ftproc import consistency
-from ftproc.methods.estimate import Estimate
+from ftproc import consistency, trust
 from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, FloatArray, MeasurementLog, Trajectory
+
+if TYPE_CHECKING:
+    from ftproc.methods.estimate import Estimate
 
 UNITS = ("m", "rad", "rad")
 GAP_INTERVALS = 3.0  # median intervals that make a gap
-MOST_REJECTED = 0.35  # of a component's readings; more, and the rest may be the wrong ones
 
 
 def summarise(
@@ -44,7 +45,7 @@ def summarise(
             **consistency.scatter(np.where(seen, scaled[:, c], np.nan)),
         }
     levels = estimate.model.jerk[:, [0, 3, 5]].mean(1)
-    return {
+    figures = {
         "rows": len(log),
         "rows_in_file": log.rows_in_file,
         "rows_without_time": len(log.rows_without_time),
@@ -72,6 +73,7 @@ def summarise(
         "correction_largest_m": float(np.linalg.norm(correction[:, :3], axis=1).max()) if len(correction) else 0.0,
         "correction_outside_training": outside,
     }
+    return figures | {"trust": trust.verdict(trust.remarks(figures))}
 
 
 def _longest_patch(time_s: FloatArray, label: Any) -> float:
@@ -89,82 +91,81 @@ def as_dict(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def text(trajectory: Trajectory) -> str:
-    """A dozen lines for the terminal."""
+    """At most a screen for the terminal, in plain text."""
     s, settings = trajectory.metadata["summary"], trajectory.metadata["settings"]
     way = "smoothed" if settings["smooth"] else "filtered"
-    lines = [f"{trajectory.metadata['log']}: {s['rows']} rows, {s['duration_s']:.6g} s, {way} by "
+    lines = [f"{trajectory.metadata['log']}: {counted(s['rows'], 'row')}, {s['duration_s']:.6g} s, {way} by "
              f"{trajectory.metadata['method']} ({settings['editing']} editing)"]  # fmt: skip
-    lines += _oddities(s)
-    header = ("", "good", "isolated", "patch", "missing", "longest patch", "noise (1 sigma)", "sigmas")
-    rows = [header, *(_row(name, c, s["components"][name]) for c, name in enumerate(COMPONENTS))]
-    widths = [max(len(r[i]) for r in rows) for i in range(len(header))]
-    for r in rows:
-        cells = (v.rjust(w) for v, w in zip(r[1:], widths[1:], strict=True))
-        lines.append("  ".join(["  " + r[0].ljust(widths[0]), *cells]))
-    jerk = s["jerk_psd_m2ps5"]
-    lines.append(f"  jerk density {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.2g} to {jerk['highest']:.2g})")
-    if s["nis_mean"] is not None:
-        lines.append(f"  NIS {s['nis_mean']:.2f} on average, {s['components_used_mean']:.2f} expected")
-    lines += _remarks(s)
-    return "\n".join(lines)
+    lines += _table(s["components"])
+    told = facts(s)
+    reasons = s["trust"]["reasons"]
+    told += [("note", text) for text in notes(s)]
+    if len(reasons) < 2:
+        told.append(("verdict", trust.sentence(s["trust"])))
+    else:
+        told += [("verdict", f"{trust.opening(s['trust'])}:"), *(("", f"- {reason}") for reason in reasons)]
+    return "\n".join([*lines, *(line(name, what) for name, what in told)])
 
 
-def _row(name: str, c: int, part: Mapping[str, Any]) -> tuple[str, ...]:
+def counted(number: int, what: str) -> str:
+    """1 row, 2 rows."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def line(name: str, what: str) -> str:
+    """A named line of the text."""
+    return f"  {name:{_NAME}}  {what}"
+
+
+HEADER = ("", "good", "isolated", "patch", "missing", "outliers", "longest patch", "noise (1 sigma)", "sigmas")
+_NAME = len("elevation")
+
+
+def _table(components: Mapping[str, Any]) -> list[str]:
+    rows = [HEADER, *(component_cells(name, components[name]) for name in COMPONENTS)]
+    widths = [max(len(r[i]) for r in rows) for i in range(len(HEADER))]
+    return [
+        "  ".join(["  " + r[0].ljust(widths[0]), *(v.rjust(w) for v, w in zip(r[1:], widths[1:], strict=True))])
+        for r in rows
+    ]
+
+
+def component_cells(name: str, part: Mapping[str, Any]) -> tuple[str, ...]:
+    """One component's line of the table, under HEADER."""
+    c = COMPONENTS.index(name)
     noise = part[f"noise_{UNITS[c]}"]
     spoken = "-" if noise is None else f"{noise:.3g} m" if c == 0 else f"{1e3 * noise:.3g} mrad"
     counts = (str(part[k]) for k in ("good", "isolated", "patch", "missing"))
-    return (name, *counts, f"{part['longest_patch_s']:.3g} s", spoken, part["verdict"])
+    share = f"{100 * trust.outlier_share(part):.2f} %"
+    return (name, *counts, share, f"{part['longest_patch_s']:.3g} s", spoken, part["verdict"])
+
+
+def facts(s: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What there is to say of every run: name and text."""
+    found = [("gaps", f"{s['gaps']}, the longest {s['longest_gap_s']:.4g} s" if s["gaps"] else "none")]
+    found += [("rows", line) for line in _oddities(s)]
+    jerk = s["jerk_psd_m2ps5"]
+    found.append(("jerk", f"density {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.3g} to {jerk['highest']:.3g})"))
+    if s["nis_mean"] is not None:
+        found.append(("NIS", f"{s['nis_mean']:.2f} on average, {s['components_used_mean']:.2f} expected"))
+    return found
+
+
+def notes(s: Mapping[str, Any]) -> list[str]:
+    """The remarks on a run that are not the reasons of its verdict."""
+    return [remark.text for remark in trust.remarks(s) if remark.text not in s["trust"]["reasons"]]
 
 
 def _oddities(s: Mapping[str, Any]) -> list[str]:
-    found = []
+    """What was odd about the rows of the log, and how its columns were understood."""
+    found = list(s["remarks"])
     if s["rows_without_time"]:
-        found.append(f"{s['rows_without_time']} rows have no time (first: row {s['first_row_without_time']})")
+        have = "has" if s["rows_without_time"] == 1 else "have"
+        lost = counted(s["rows_without_time"], "row")
+        found.append(f"{lost} {have} no time (first: row {s['first_row_without_time']})")
     if s["rows_out_of_order"]:
-        found.append(f"{s['rows_out_of_order']} rows out of time order, sorted")
+        found.append(f"{counted(s['rows_out_of_order'], 'row')} out of time order, sorted")
     if s["duplicate_times"]:
-        found.append(f"{s['duplicate_times']} rows share the time of the row before")
-    if s["gaps"]:
-        found.append(f"{s['gaps']} gaps, the longest {s['longest_gap_s']:.4g} s")
-    return [f"  {line}" for line in (*s["remarks"], *found)]
-
-
-def _remarks(s: Mapping[str, Any]) -> list[str]:
-    remarks = []
-    if s["not_observable"]:
-        names = " and ".join(s["not_observable"])
-        remarks.append(f"{names} missing throughout: position and velocity are not observable and left empty")
-    correlation = max(part["noise_correlation"] for part in s["components"].values())
-    if correlation > 0:
-        remarks.append(
-            f"the noise is correlated from sample to sample (up to {correlation:.2f}); the sigmas allow for it"
-        )
-    for name, part in s["components"].items():
-        rejected = part["isolated"] + part["patch"]
-        share = rejected / max(rejected + part["good"], 1)
-        if share > MOST_REJECTED:
-            remarks.append(
-                f"{100 * share:.0f} % of the {name} readings were rejected: too many to be sure that the right ones "
-                "were kept; look at the track, and check column and unit"
-            )
-        vague = part["prediction_vagueness"]
-        if vague is not None and vague > consistency.VAGUE:
-            remarks.append(
-                f"the {name} gate can hardly fire: predictions are {vague:.0f} times vaguer than readings, so only far "
-                "larger outliers are noticed"
-            )
-    for blind in s["hardly_observable"]:
-        when = f"from {blind['from_s']:.6g} to {blind['to_s']:.6g} s"
-        remarks.append(f"{when} the position is hardly observable: 1 sigma up to {blind['sigma_m']:.3g} m")
-    if s["slow_noise"]:
-        remarks.append("the noise is correlated so slowly that it passes for motion: the sigmas are too small")
-    if s["editing_settled"] is False:
-        remarks.append("the outlier decisions did not settle: look at the flagged stretches")
-    if s["reacquired"]:
-        remarks.append(f"the track was taken up anew {s['reacquired']} times (lost, or a gap too long to bridge)")
-    if s["correction_largest_m"] > 0:
-        remarks.append(
-            f"network correction up to {s['correction_largest_m']:.3g} m; "
-            f"{100 * s['correction_outside_training']:.1f} % of samples outside its training got none"
-        )
-    return [f"  {line}" for line in remarks]
+        share = "shares" if s["duplicate_times"] == 1 else "share"
+        found.append(f"{counted(s['duplicate_times'], 'row')} {share} the time of the row before")
+    return found

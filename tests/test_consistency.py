@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from ftproc import consistency, pipeline, summary
 from ftproc.settings import FilterSettings
@@ -69,8 +70,13 @@ def test_usual_flight_has_no_such_remarks():
     assert "hardly" not in text
 
 
-def test_log_of_which_much_was_rejected_is_not_trusted():
-    flight = simulate("cruise", seed=3, duration_s=60.0, outliers="range.isolated=0.45:20-300")
-    text = summary.text(pipeline.filter_log(flight.log))
-    assert " % of the range readings were rejected: too many to be sure that the right ones were kept" in text
-    assert "of the azimuth readings" not in text
+def test_bounds_of_nis_are_those_of_chi_square_until_they_are_narrow():
+    freedom = np.array([0.0, 12.0, 30.0, 90.0, 3e5])
+    low, high = consistency.nis_bounds(freedom)
+    assert np.isnan(low[0])
+    assert np.isnan(high[0])
+    # what 99 % of chi-square variables lie between, from SciPy; at 90 the wider of the two
+    np.testing.assert_allclose(low[1:3], stats.chi2.ppf(0.005, freedom[1:3]), rtol=0.02)
+    np.testing.assert_allclose(high[1:4], stats.chi2.ppf(0.995, freedom[1:4]), rtol=0.02)
+    assert low[4] == pytest.approx(0.64 * freedom[4])
+    assert high[4] == pytest.approx(1.44 * freedom[4])

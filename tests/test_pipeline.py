@@ -237,3 +237,22 @@ def test_training_refuses_what_it_cannot_learn_from(flight):
     late = Truth("late.csv", flight.truth.time_s + 1e4, flight.truth.position_m)
     with pytest.raises(InputError, match=r"^late\.csv: its times do not overlap those of "):
         pipeline.train_flights([(flight.log, late)], settings)
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_diagnostics_are_what_the_estimate_was_made_from(flight, smooth):
+    z = flight.log.measurement.copy()
+    z[5, 0], z[:, 2] = np.nan, np.nan
+    log = replace(flight.log, measurement=z)
+    trajectory = pipeline.filter_log(log, FilterSettings(smooth=smooth))
+    found = trajectory.diagnostics
+    assert found is not None
+    np.testing.assert_array_equal(found.reading, z)
+    np.testing.assert_array_equal(np.isnan(found.residual), np.isnan(z))
+    assert found.residual_kind == ("leave-one-out residual" if smooth else "innovation")
+    good = trajectory.outlier[:, :2] == 0
+    scaled = (found.residual / found.residual_sigma)[:, :2][good]
+    assert np.sqrt((scaled**2).mean()) == pytest.approx(1, abs=0.2)
+    off = (trajectory.outlier[:, :2] == 1) | (trajectory.outlier[:, :2] == 2)
+    if off.any():
+        assert np.abs((found.residual / found.residual_sigma)[:, :2][off]).max() > 4

@@ -109,19 +109,40 @@ def test_text_has_a_line_for_each_component(dirty):
         assert counts == [str(part[k]) for k in ("good", "isolated", "patch", "missing")]
         assert line.endswith("consistent")
         assert (" mrad " in line) == (c > 0)
-    assert any("gaps, the longest" in line for line in lines)
-    assert "  4 rows share the time of the row before" in lines
+        flagged = (dirty[1].outlier[:, c] == ISOLATED) | (dirty[1].outlier[:, c] == PATCH)
+        there = dirty[1].outlier[:, c] != MISSING
+        assert f" {100 * flagged.sum() / there.sum():.2f} % " in line
+    (gaps,) = [line for line in lines if line.startswith("  gaps ")]
+    assert gaps.split(None, 1)[1].startswith("1, the longest ")
+    assert "  rows       4 rows share the time of the row before" in lines
     assert len(lines) < 16
+    assert max(map(len, lines)) <= 120
+
+
+def test_lines_stand_under_each_other(dirty):
+    """Names to the left, what they say from one column on; the table's columns end together."""
+    _, header, *table = summary.text(dirty[1]).splitlines()[:5]
+    assert len({len(line) for line in (header, *table)}) == 1
+    rest = summary.text(dirty[1]).splitlines()[5:]
+    assert {line[13] != " " and line[11:13] == "  " for line in rest} == {True}
+
+
+def test_text_says_whether_to_trust(dirty):
+    verdict = summary.text(dirty[1]).splitlines()[-1]
+    assert verdict == (
+        "  verdict    Trust it: readings are no farther off than the sigmas say, and nothing else is in doubt."
+    )
+    assert figures(dirty[1])["trust"] == {"verdict": "trust", "reasons": []}
 
 
 def test_text_tells_what_was_odd_about_the_rows():
     flight = simulate("cruise", seed=3, duration_s=20.0, outliers="none")
     log = replace(flight.log, rows_without_time=(17, 40), rows_out_of_order=3, rows_in_file=len(flight.log) + 2)
     text = summary.text(pipeline.filter_log(log, FilterSettings(smooth=True)))
-    assert "  2 rows have no time (first: row 17)" in text
-    assert "  3 rows out of time order, sorted" in text
+    assert "  rows       2 rows have no time (first: row 17)" in text
+    assert "  rows       3 rows out of time order, sorted" in text
     assert "smoothed by" in text
-    assert "gaps" not in text
+    assert "  gaps       none\n" in text
 
 
 def test_text_names_what_is_not_observable():
@@ -147,7 +168,8 @@ def test_text_reports_reacquisition_and_correction():
     trajectory = pipeline.filter_log(replace(flight.log, measurement=z), FilterSettings(editing="forward"))
     times = figures(trajectory)["reacquired"]
     assert times >= 1
-    assert f"the track was taken up anew {times} times" in summary.text(trajectory)
+    often = "once" if times == 1 else f"{times} times"
+    assert f"the track was taken up anew {often} (lost" in summary.text(trajectory)
     corrected = replace(
         trajectory,
         metadata={
@@ -171,4 +193,4 @@ def test_single_row():
     )  # fmt: skip
     s = figures(pipeline.filter_log(log))
     assert (s["rows"], s["duration_s"], s["interval_s"], s["gaps"], s["longest_gap_s"]) == (1, 0.0, 0.0, 0, 0.0)
-    assert "1 rows" in summary.text(pipeline.filter_log(log))
+    assert ": 1 row, 0 s" in summary.text(pipeline.filter_log(log))

@@ -11,7 +11,7 @@ from ftproc.cli.command import DEBUG, Command
 
 _EXAMPLES = """
 ftproc simulate --scenario zuo2021-outliers -o flight.csv
-ftproc filter flight.csv --smooth
+ftproc filter flight.csv --smooth --report flight.html
 ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
 """
 
@@ -67,6 +67,7 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     default="text",
     help="What to print of each trajectory; on stderr when the trajectory itself goes to stdout.",
 )
+@options.report("a trajectory, the readings it was made from, and whether to trust it")
 @click.option("--list-methods", is_flag=True, help="List the methods, and filter nothing.")
 def command(
     logs: tuple[str, ...],
@@ -74,6 +75,7 @@ def command(
     config: str | None,
     jobs: int,
     summary: str,
+    report: str | None,
     list_methods: bool,
     write_config: bool,
     **_: Any,
@@ -103,4 +105,6 @@ def command(
     from ftproc.cli import filtering, stations
 
     recipe = stations.recipe(ctx)
-    ctx.exit(filtering.run(logs, output, recipe, config, jobs=jobs, summary=summary, debug=ctx.meta[DEBUG]))
+    ctx.exit(
+        filtering.run(logs, output, recipe, config, jobs=jobs, summary=summary, report=report, debug=ctx.meta[DEBUG])
+    )

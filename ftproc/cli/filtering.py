@@ -4,30 +4,37 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 
 import click
 
 from ftproc import batch, geodesy
 from ftproc.batch import Outcome, Recipe
-from ftproc.cli import outputs
+from ftproc.cli import outputs, reports
 from ftproc.cli.progress import Progress
 from ftproc.cli.stations import ALL
 from ftproc.files import conventions, maps
 from ftproc.methods import registry
+from ftproc.report import Entry
+from ftproc.summary import line
 
 
 def run(
-    logs: Sequence[str], output: str | None, recipe: Recipe, config: str | None, *, jobs: int, summary: str, debug: bool
-) -> int:
+    logs: Sequence[str], output: str | None, recipe: Recipe, config: str | None, *,
+    jobs: int, summary: str, report: str | None, debug: bool,
+) -> int:  # fmt: skip
     """Filter the logs and print what became of them; the exit code. Raises FtprocError for wrong usage.
 
     config: where the recipe is from, not to be written over.
     """
+    reports.check(report)
     methods = list(registry.METHODS) if recipe.settings.method == ALL else None
     inputs = [name for name in (recipe.model, config) if name not in (batch.PACKAGED, batch.NO_MODEL, None)]
     tasks = outputs.plan(logs, output, methods, inputs)
     for task in tasks:
         maps.check(task.output, recipe.settings.site)
+    pages, index = reports.plan([task.output for task in tasks], report, [*logs, *inputs])
+    tasks = [replace(task, report=page) for task, page in zip(tasks, pages, strict=True)]
     if readings := conventions.in_words(recipe.station):
         _tell(f"readings: {', '.join(readings)}")
     if recipe.settings.site is not None:
@@ -39,6 +46,7 @@ def run(
             progress.clear()
             _show(outcome, summary, debug)
             progress("filtering", len(done), len(tasks))
+    reports.write_index([_entry(outcome) for outcome in done], index)
     if summary == "json":
         _show_json(done)
     failures = [outcome.failure.exit_code for outcome in done if outcome.failure is not None]
@@ -56,15 +64,27 @@ def _show(outcome: Outcome, summary: str, debug: bool) -> None:
         _tell(outcome.failure.message)
     elif summary == "text":
         on_stdout = outcome.task.output == "-"
-        place = "" if on_stdout else f"\n  -> {outcome.task.output}"
-        click.echo(outcome.text + place, err=on_stdout)
+        places = [place for place in (outcome.task.output, outcome.task.report) if place not in (None, "-")]
+        lines = [outcome.text, line("time", f"{outcome.elapsed_s:.2f} s"), *(f"  -> {place}" for place in places)]
+        click.echo("\n".join(lines), err=on_stdout)
+
+
+def _entry(outcome: Outcome) -> Entry:
+    if outcome.failure is not None:
+        return Entry(outcome.task.log, None, {}, outcome.failure.message)
+    return Entry(outcome.task.log, outcome.task.report, outcome.summary)
+
+
+def _written(outcome: Outcome) -> dict[str, str]:
+    """Where the trajectory is and, if one was made, the page."""
+    report = outcome.task.report
+    return {"output": outcome.task.output, **({} if report is None else {"report": report})}
 
 
 def _show_json(done: Sequence[Outcome]) -> None:
     """One object for one trajectory, a list for several."""
     plain = [
-        {"log": o.task.log, "error": o.failure.message} if o.failure else {**o.summary, "output": o.task.output}
-        for o in done
+        {"log": o.task.log, "error": o.failure.message} if o.failure else {**o.summary, **_written(o)} for o in done
     ]
     on_stdout = any(o.task.output == "-" for o in done)
     click.echo(json.dumps(plain[0] if len(plain) == 1 else plain, indent=2), err=on_stdout)

@@ -117,6 +117,14 @@ def noise(kind: Callable[[Any], Any], default: str | None, text: str) -> Callabl
     return click.option("--noise", type=kind, default=default, metavar="R,A,E", help=f"{what}{text}")
 
 
+def report(what: str) -> Callable[[F], F]:
+    text = (
+        f"Write an HTML page that shows {what}; it opens in any browser, without a network. FILE.html for one, or a "
+        'directory for a page of each and an index.html that lists them. Needs plotly: pip install "plotly>=6.0".'
+    )
+    return click.option("--report", metavar="FILE.html|DIR", help=text)
+
+
 def units(text: str) -> Callable[[F], F]:
     return click.option("--units", metavar="NAME=UNIT,...", help=text)
 

@@ -32,7 +32,7 @@ def plan(
     tasks = [_task(log, output, directory, method) for log in logs for method in (methods or (None,))]
     _check(tasks, [*logs, *inputs])
     if directory is not None:
-        _make(directory)
+        make(directory)
     for task in tasks:
         atomic.check_target(task.output)
     return tasks
@@ -80,11 +80,14 @@ def _check(tasks: Sequence[Task], inputs: Sequence[str]) -> None:
             atomic.refuse_overwriting(target, inputs)
 
 
-def _make(directory: Path) -> None:
+def make(directory: Path, option: str = "-o") -> None:
+    """Make a directory for outputs if it is not there. Raises OutputError."""
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except FileExistsError as error:
-        raise OutputError(f"{directory}: this is a file, not a directory; give another name with -o.") from error
+        raise OutputError(f"{directory}: this is a file, not a directory; give another name with {option}.") from error
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
-        raise OutputError(f"{directory}: the directory cannot be made ({reason}); give another with -o.") from error
+        raise OutputError(
+            f"{directory}: the directory cannot be made ({reason}); give another with {option}."
+        ) from error

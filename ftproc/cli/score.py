@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -10,12 +11,12 @@ from ftproc.cli import options
 from ftproc.cli.command import Command
 
 if TYPE_CHECKING:
-    from ftproc.records import Truth
+    from ftproc.records import Trajectory, Truth
 
 _EXAMPLES = """
 ftproc simulate --scenario zuo2021-outliers -o flight.csv --truth flight.truth.csv
 ftproc filter flight.csv --summary none -o clean.parquet
-ftproc score clean.parquet --truth flight.truth.csv --format json
+ftproc score clean.parquet --truth flight.truth.csv --report errors.html
 """
 
 
@@ -30,17 +31,14 @@ ftproc score clean.parquet --truth flight.truth.csv --format json
     help="What really happened: once for all trajectories, or once for each, in the same order.",
 )
 @click.option("--format", "form", type=click.Choice(["table", "json", "csv"]), default="table", help="How to print it.")
-def command(trajectories: tuple[str, ...], truths: tuple[str, ...], form: str) -> None:
+@options.report("a trajectory and, with a truth, its errors inside their sigmas")
+def command(trajectories: tuple[str, ...], truths: tuple[str, ...], form: str, report: str | None) -> None:
     """Print how good trajectories are, side by side.
 
     A TRAJECTORY is a file that `filter` wrote, any table with time_s, x_m, y_m, z_m, or - for CSV on standard input.
     Without a truth only the smoothness (average gradient) can be told; with it also the errors, whether the
     uncertainties are honest, and how well the outliers were found.
     """
-    from ftproc.errors import InputError
-    from ftproc.files import trajectories as trajectory_files
-    from ftproc.scoring import render, score
-
     if len(truths) > 1 and len(truths) != len(trajectories):
         raise click.UsageError(
             f"--truth is given {len(truths)} times for {len(trajectories)} trajectories; "
@@ -49,19 +47,41 @@ def command(trajectories: tuple[str, ...], truths: tuple[str, ...], form: str) -
         )
     if [*trajectories, *truths].count("-") > 1:
         raise click.UsageError("Standard input (-) can be read only once.", click.get_current_context())
-    scores, failed = [], False
+    click.get_current_context().exit(_run(trajectories, truths, form, report))
+
+
+def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: str | None) -> int:
+    """Score one after the other, print the scores, and write the pages; the exit code."""
+    from ftproc import report as pages
+    from ftproc.cli import reports
+    from ftproc.errors import InputError
+    from ftproc.files import trajectories as trajectory_files
+    from ftproc.scoring import render, score
+
+    reports.check(report)
+    places, index = reports.plan(trajectories, report, truths)
+    scores, entries, failed = [], [], False
     known: dict[str, Truth] = {}
-    for index, name in enumerate(trajectories):
+    for number, (name, place) in enumerate(zip(trajectories, places, strict=True)):
         try:
-            truth = _truth(truths[index % len(truths)], known) if truths else None
-            scores.append(score(trajectory_files.read(name), truth))
+            truth = _truth(truths[number % len(truths)], known) if truths else None
+            trajectory = trajectory_files.read(name)
+            scores.append(score(trajectory, truth))
+            if place is not None:
+                pages.write(trajectory, place, truth)
+                entries.append(pages.Entry(name, place, _summary(trajectory)))
         except InputError as error:
             click.echo(f"ftproc: {error}", err=True)
+            entries.append(pages.Entry(name, None, {}, str(error)))
             failed = True
+    reports.write_index(entries, index)
     if scores:
         click.echo(render(scores, form), nl=False)
-    if failed:
-        click.get_current_context().exit(1)
+    return int(failed)
+
+
+def _summary(trajectory: Trajectory) -> dict[str, Any]:
+    return {"method": trajectory.metadata.get("method", ""), **trajectory.metadata.get("summary", {})}
 
 
 def _truth(name: str, known: dict[str, Truth]) -> Truth:

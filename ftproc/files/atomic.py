@@ -15,15 +15,15 @@ from ..errors import OutputError
 Target = str | Path
 
 
-def refuse_overwriting(target: Target, inputs: Iterable[Target]) -> None:
+def refuse_overwriting(target: Target, inputs: Iterable[Target], option: str = "-o") -> None:
     """Raise OutputError when `target` is one of `inputs`, by whatever path, symbolic or hard link.
 
-    `-` (a standard stream) is never a file.
+    `-` (a standard stream) is never a file. option: the one that names the target.
     """
     for given in inputs:
         if "-" not in (str(target), str(given)) and _same_file(Path(target), Path(given)):
             raise OutputError(
-                f"{target}: this is the input {given}, which is never overwritten. Give another name with -o."
+                f"{target}: this is the input {given}, which is never overwritten. Give another name with {option}."
             )
 
 

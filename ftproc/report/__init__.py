@@ -1,0 +1,69 @@
+"""The report: one HTML page that says what became of a log, whether to trust it, and shows it.
+
+    from ftproc import report
+    report.write(trajectory, "flight.html")     # one self-contained page
+    report.plot(trajectory, "residuals")        # one of its figures
+
+plotly draws; it is an extra (`report`) and is loaded when first used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from ftproc.errors import UsageError
+from ftproc.files import atomic
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+    from ftproc.files.atomic import Target
+    from ftproc.records import Trajectory, Truth
+
+
+class Entry(NamedTuple):
+    """A log, its page beside the index (None when it has none), its summary (may be empty), why it failed."""
+
+    log: str
+    page: str | None
+    summary: Mapping[str, Any]
+    failure: str | None = None
+
+
+def require_plotly() -> Any:
+    """The module plotly.graph_objects. Raises UsageError when it is not installed."""
+    try:
+        import plotly.graph_objects
+    except ImportError as error:
+        raise UsageError('reports need plotly, which is not installed: pip install "plotly>=6.0".') from error
+    return plotly.graph_objects
+
+
+def write(trajectory: Trajectory, target: Target, truth: Truth | None = None) -> None:
+    """Write the page of a trajectory, whole or not at all; with a truth also its errors.
+
+    A trajectory that was read from a file has no raw readings, and the page says so. The same trajectory gives the
+    same bytes. Raises OutputError; UsageError when plotly is missing.
+    """
+    require_plotly()
+    from ftproc.report.page import page
+
+    text = page(trajectory, truth)
+    with atomic.replacing(target) as stream:
+        stream.write(text.encode())
+
+
+def plot(trajectory: Trajectory, what: str = "track") -> go.Figure:
+    """One figure of the page by its name. Raises UsageError for an unknown name, when plotly is missing, or when
+    the trajectory holds nothing of it."""
+    require_plotly()
+    from ftproc.report.figures import FIGURES
+    from ftproc.report.view import view
+
+    if what not in FIGURES:
+        raise UsageError(f"there is no figure {what!r}; there are {', '.join(FIGURES)}")
+    drawn = FIGURES[what](view(trajectory))
+    if drawn.figure is None:
+        raise UsageError(f"{trajectory.name}: {drawn.note}")
+    return drawn.figure

@@ -1,0 +1,55 @@
+"""The page that lists the reports of several logs."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from pathlib import PurePath
+from urllib.parse import quote
+
+from ftproc import trust
+from ftproc.files import atomic
+from ftproc.files.atomic import Target
+from ftproc.records import COMPONENTS
+from ftproc.report import Entry, tables
+from ftproc.report.page import document
+from ftproc.report.style import GREY, VERDICT
+from ftproc.summary import counted
+
+_HEADER = ("log", "method", "verdict", "rows", "duration", "outliers R, A, E", "why")
+
+
+def write(entries: Sequence[Entry], target: Target) -> None:
+    """Write the index, whole or not at all. Raises OutputError."""
+    failed = sum(entry.failure is not None for entry in entries)
+    count = counted(len(entries) - failed, "report") + (f", {failed} failed" if failed else "")
+    body = f"<h1>{count}</h1>{tables.table(_HEADER, map(_cells, entries), 'index', links=3)}"
+    with atomic.replacing(target) as stream:
+        stream.write(document("Reports", body).encode())
+
+
+def _cells(entry: Entry) -> tuple[str, ...]:
+    """The first three cells are HTML."""
+    name = html.escape(entry.log)
+    if entry.page is not None:
+        name = f'<a href="./{html.escape(quote(PurePath(entry.page).name))}">{name}</a>'
+    s = entry.summary
+    if entry.failure is not None or "trust" not in s:
+        return (name, "", _badge("failed" if entry.failure else "unknown", GREY), "", "", "", entry.failure or "")
+    said = s["trust"]
+    rates = ", ".join(f"{100 * trust.outlier_share(s['components'][name]):.1f} %" for name in COMPONENTS)
+    badge = _badge(said["verdict"], VERDICT[said["verdict"]])
+    why = "; ".join(said["reasons"])
+    return (
+        name,
+        html.escape(str(s.get("method", ""))),
+        badge,
+        f"{s['rows']:,}",
+        f"{s['duration_s']:,.6g} s",
+        rates,
+        why,
+    )
+
+
+def _badge(text: str, colour: str) -> str:
+    return f'<span class="badge" style="border-color: {colour}">{html.escape(text)}</span>'

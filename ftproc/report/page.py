@@ -1,0 +1,106 @@
+"""The page: verdict, tables and figures in one HTML file that needs nothing else, and runs nothing but its own script.
+
+Names and values from files reach the page only escaped: as text (`html.escape`) or as JSON without any `<`. What
+slips through all the same does not run: the page allows scripts only by their SHA-256.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ftproc.records import Trajectory, Truth
+from ftproc.report import tables
+from ftproc.report.drawing import Drawn
+from ftproc.report.figures import ERRORS, FIGURES
+from ftproc.report.view import view
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+_HERE = Path(__file__).parent
+
+#: The sections with figures: title, names of figures; those of one section stand side by side.
+_SECTIONS = (
+    ("Track", ("track", "ground")),
+    ("Readings", ("readings",)),
+    ("How far the readings were off", ("residuals",)),
+    ("Normalised innovation squared", ("nis",)),
+    ("Uncertainty", ("sigmas",)),
+    ("Motion", ("motion",)),
+    ("Network correction", ("correction",)),
+)
+
+
+def page(trajectory: Trajectory, truth: Truth | None = None) -> str:
+    """The whole page as HTML text."""
+    shown = view(trajectory, truth)
+    parts = [tables.heading(shown), tables.verdict(shown), tables.summary(shown)]
+    if truth is not None:
+        parts.append(_section("Against the truth", [("errors", ERRORS(shown))], tables.score(shown)))
+    for title, names in _SECTIONS:
+        parts.append(_section(title, [(name, FIGURES[name](shown)) for name in names]))
+    parts.append(tables.provenance(shown))
+    return document(tables.name(trajectory), "\n".join(parts), drawn=True)
+
+
+def document(title: str, body: str, drawn: bool = False) -> str:
+    """A page around its body (HTML). drawn: it has figures."""
+    scripts = [_plotly(), _text("page.js")] if drawn else []
+    allowed = " ".join([*(f"'sha256-{_sha256(script)}'" for script in scripts), "'unsafe-eval'"]) if drawn else "'none'"
+    policy = f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:"
+    return "\n".join(
+        [
+            "<!DOCTYPE html>",
+            '<html lang="en">',
+            '<head><meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f"<title>{html.escape(title)}</title>",
+            f"<style>\n{_text('page.css')}</style></head>",
+            f"<body><main>\n{body}\n</main>",
+            *(f"<script>{script}</script>" for script in scripts),
+            "</body></html>\n",
+        ]
+    )
+
+
+def _section(title: str, figures: list[tuple[str, Drawn]], before: str = "") -> str:
+    shown = [_figure(name, drawn.figure) for name, drawn in figures if drawn.figure is not None]
+    notes = dict.fromkeys(drawn.note for _, drawn in figures if drawn.note)  # each once
+    said = f'<p class="note">{html.escape(" ".join(notes))}</p>' if notes else ""
+    side = f'<div class="figures">{"".join(shown)}</div>' if shown else ""
+    return f"<section><h2>{html.escape(title)}</h2>{before}{side}{said}</section>"
+
+
+def _figure(name: str, figure: go.Figure) -> str:
+    """A place for the figure, and the figure as JSON: no character in it can end the script element."""
+    text = figure.to_json()
+    for character in "<>&\u2028\u2029":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    height = int(figure.layout.height)
+    return (
+        f'<figure id="{name}" data-height="{height}" style="height: {height}px"></figure>'
+        f'<script type="application/json" data-figure="{name}">{text}</script>'
+    )
+
+
+def _sha256(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+
+
+@cache
+def _text(file: str) -> str:
+    return (_HERE / file).read_text(encoding="utf-8")
+
+
+@cache
+def _plotly() -> str:
+    from plotly.offline import get_plotlyjs
+
+    text: str = get_plotlyjs()
+    return text

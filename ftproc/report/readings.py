@@ -1,0 +1,119 @@
+"""The readings beside what was made of them, and how far off they were."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, FloatArray, IntArray
+from ftproc.report import drawing, style
+from ftproc.report.drawing import Drawn
+from ftproc.report.thinning import MOST_MARKED
+from ftproc.report.view import View
+
+ROW_HEIGHT = 190
+ROOM = 0.35  # of the range of the trajectory, above and below it, for outliers to stand in
+FOOT = 0.08  # of the height, below the lowest outlier: where missing readings are marked
+FARTHEST = 3.0  # gates, at which residuals stand that are farther off
+FARTHEST_SIGMAS = 12.0  # the same where no gate is known
+
+NOT_KNOWN = "A trajectory file does not hold the raw readings; the page that `ftproc filter --report` writes has them."
+_WHAT = {
+    "innovation": "Innovation: the reading minus what the readings before it predict",
+    "leave-one-out residual": "Leave-one-out residual: the reading minus what all other readings say of it",
+}
+
+
+def readings(view: View) -> Drawn:
+    """R, A and E over time: raw, cleaned, flagged."""
+    raw = view.cleaned if view.reading is None else view.reading
+    seen = [c for c in range(len(COMPONENTS)) if np.isfinite(raw[:, c]).any() or np.isfinite(view.cleaned[:, c]).any()]
+    if not seen:
+        return Drawn(None, NOT_KNOWN)
+    figure = drawing.rows(view.timeline, [style.COMPONENT[c].title for c in seen], _height(seen))
+    timeline, flags = view.timeline, view.trajectory.outlier
+    chosen, note = _chosen(view, raw, seen)
+    total = sum(map(len, chosen.values()))
+    named: set[str] = set()
+    for row, c in enumerate(seen):
+        good = np.where(flags[:, c] == GOOD, raw[:, c], np.nan)
+        limits = drawing.span(view.cleaned[:, c], good, margin=ROOM)
+        foot = limits[0] - FOOT * (limits[1] - limits[0])
+        traces = [] if view.reading is None else [drawing.dots(timeline, good, "good reading", style.READING)]
+        for flag, kind in style.KINDS.items():
+            value = _marked_at(view, raw, c, flag, foot)
+            within = (foot, limits[1]) if flag == MISSING else limits
+            traces.append(drawing.marks(timeline.time_s, value, chosen[flag, c], kind, within, total))
+        traces.append(drawing.line(timeline, view.cleaned[:, c], "estimate", style.ESTIMATE))
+        _add(figure, traces, row, named)
+    where = "An outlier beyond the axis stands at its edge; point at it for its value."
+    if view.reading is None:
+        where = f"{NOT_KNOWN} Outliers are marked at the estimate."
+    return Drawn(figure, f"{where} {note}".strip())
+
+
+def residuals(view: View) -> Drawn:
+    """Readings minus what the others say of them, in sigmas, with the gate."""
+    known = view.diagnostics
+    if known is None:
+        return Drawn(None, NOT_KNOWN)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scaled = known.residual / known.residual_sigma
+    seen = [c for c in range(len(COMPONENTS)) if np.isfinite(scaled[:, c]).any()]
+    figure = drawing.rows(view.timeline, [f"{style.COMPONENT[c].label} in sigmas" for c in seen], _height(seen))
+    timeline, flags, gate = view.timeline, view.trajectory.outlier, view.gate
+    farthest = FARTHEST_SIGMAS if gate is None else FARTHEST * gate
+    named: set[str] = set()
+    for row, c in enumerate(seen):
+        parts = {flag: np.where(flags[:, c] == flag, scaled[:, c], np.nan) for flag in (GOOD, ISOLATED, PATCH)}
+        traces = [drawing.dots(timeline, parts[GOOD], "good reading", style.READING)]
+        for flag in (ISOLATED, PATCH):
+            at = timeline.extremes(parts[flag])
+            limits = (-farthest, farthest)
+            traces.append(
+                drawing.marks(timeline.time_s, parts[flag], at, style.KINDS[flag], limits, len(seen) * len(at))
+            )
+        if gate is not None:
+            traces += [drawing.level(timeline, sign * gate, f"gate of {gate:g} sigmas") for sign in (-1, 1)]
+        _add(figure, traces, row, named)
+    note = "Decisions look at neighbours too: some readings inside the gate are outliers, some outside not."
+    if view.trajectory.metadata.get("settings", {}).get("editing") == "none":
+        note = "Nothing was edited, so the gate decided nothing."
+    return Drawn(figure, f"{_WHAT[known.residual_kind]}. {note}")
+
+
+def _height(seen: list[int]) -> int:
+    return 70 + ROW_HEIGHT * len(seen)
+
+
+def _add(figure: Any, traces: Iterable[Any], row: int, named: set[str]) -> None:
+    """Add what has any points; each name once in the legend."""
+    for trace in traces:
+        if len(trace.x):
+            drawing.add(figure, trace, row, first=trace.name not in named)
+            named.add(trace.name)
+
+
+def _marked_at(view: View, raw: FloatArray, c: int, flag: int, foot: float) -> FloatArray:
+    """(n,) height at which readings with the flag are marked: where they are, missing ones at the foot."""
+    if flag == MISSING:
+        return np.full(len(raw), foot)
+    return np.where(np.isfinite(raw[:, c]), raw[:, c], view.cleaned[:, c])
+
+
+def _chosen(view: View, raw: FloatArray, seen: list[int]) -> tuple[dict[tuple[int, int], IntArray], str]:
+    """Which flagged readings are marked, by flag and component, and a sentence when that is not all of them."""
+    flags = view.trajectory.outlier
+    every = {(flag, c): np.flatnonzero(flags[:, c] == flag) for flag in style.KINDS for c in seen}
+    total = sum(map(len, every.values()))
+    if total <= MOST_MARKED:
+        return every, ""
+    chosen = {}
+    for (flag, c), rows in every.items():
+        value = np.full(len(flags), np.nan)
+        value[rows] = _marked_at(view, raw, c, flag, 0.0)[rows]
+        chosen[flag, c] = view.timeline.extremes(value)
+    drawn = sum(map(len, chosen.values()))
+    return chosen, f"Of {total:,} flagged readings the {drawn:,} that stand out in each pixel column are marked."

@@ -1,0 +1,85 @@
+"""How the report looks: colours, symbols, labels and units, once.
+
+Colours are Okabe and Ito's, which people with any colour vision tell apart; kinds of readings also differ in symbol.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ftproc.records import ISOLATED, MISSING, PATCH
+from ftproc.trust import CAREFUL, NO, TRUST
+
+BLUE, ORANGE, GREEN, SKY = "#0072B2", "#E69F00", "#009E73", "#56B4E9"
+VERMILLION, PURPLE, GREY, BLACK = "#D55E00", "#AA4499", "#8C8C8C", "#222222"
+GRID, AXIS = "#E6E6E6", "#9A9A9A"
+
+READING, ESTIMATE, LIMIT = GREY, BLUE, BLACK
+AXES = (BLUE, ORANGE, GREEN)  # x, y, z
+BAND = "rgba(0, 114, 178, 0.15)"
+
+VERDICT = {TRUST: GREEN, CAREFUL: ORANGE, NO: VERMILLION}
+
+
+class Kind(NamedTuple):
+    """How one kind of flagged reading is drawn."""
+
+    name: str
+    marker: dict[str, Any]
+
+
+KINDS = {
+    ISOLATED: Kind("isolated outlier", {"color": VERMILLION, "symbol": "x-thin-open", "size": 7, "line": {"width": 2}}),
+    PATCH: Kind("patch outlier", {"color": PURPLE, "symbol": "diamond-open", "size": 7, "line": {"width": 1.5}}),
+    MISSING: Kind("missing (at the foot)", {"color": BLACK, "symbol": "line-ns-open", "size": 7, "line": {"width": 1}}),
+}
+
+
+class Quantity(NamedTuple):
+    """factor: from SI to the unit shown."""
+
+    label: str
+    unit: str
+    factor: float = 1.0
+
+    @property
+    def title(self) -> str:
+        return f"{self.label}, {self.unit}"
+
+
+DEGREE = 180 / np.pi
+COMPONENT = (Quantity("R", "m"), Quantity("A", "deg", DEGREE), Quantity("E", "deg", DEGREE))
+RESIDUAL_UNIT = (Quantity("R", "m"), Quantity("A", "mrad", 1e3), Quantity("E", "mrad", 1e3))
+POSITION = tuple(Quantity(axis, "m") for axis in "xyz")
+VELOCITY = tuple(Quantity(f"v{axis}", "m/s") for axis in "xyz")
+TIME = "time, s"
+
+_AXIS = {
+    "gridcolor": GRID, "linecolor": AXIS, "zeroline": False, "ticks": "outside", "tickcolor": AXIS, "ticklen": 4,
+    "exponentformat": "none", "separatethousands": True, "showline": True, "mirror": True,
+    "title": {"standoff": 8},
+}  # fmt: skip
+LAYOUT: dict[str, Any] = {
+    "template": "none",
+    "paper_bgcolor": "white",
+    "plot_bgcolor": "white",
+    "font": {"family": "system-ui, 'Segoe UI', Helvetica, Arial, sans-serif", "size": 12, "color": BLACK},
+    "margin": {"l": 88, "r": 16, "t": 36, "b": 46},
+    "legend": {
+        "orientation": "h",
+        "x": 0,
+        "y": 1,
+        "yanchor": "bottom",
+        "itemsizing": "constant",
+        "bgcolor": "rgba(0,0,0,0)",
+    },
+    "hovermode": "closest",
+    "hoverlabel": {"bgcolor": "white", "font": {"color": BLACK}},
+}
+
+
+def axis(**changes: Any) -> dict[str, Any]:
+    """An axis of a plane figure."""
+    return {**_AXIS, **changes}

@@ -1,0 +1,122 @@
+"""The words and tables of the page. Everything from a file is escaped here."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import PurePath
+from typing import Any
+
+from ftproc import summary as figures
+from ftproc import trust
+from ftproc.records import COMPONENTS, Trajectory
+from ftproc.report.style import GREY, VERDICT
+from ftproc.report.view import View
+from ftproc.scoring import render
+
+_LONGEST_LIST = 6  # values that are all shown
+
+
+def name(trajectory: Trajectory) -> str:
+    """What the page is about: the log's file name, or the trajectory's own."""
+    return PurePath(str(trajectory.metadata.get("log") or trajectory.name)).name
+
+
+def heading(view: View) -> str:
+    """The log, and in a line what was done to it."""
+    meta, s = view.trajectory.metadata, view.summary
+    parts = []
+    if s:
+        settings = meta["settings"]
+        way = "smoothed" if settings["smooth"] else "filtered"
+        parts = [f"{s['rows']:,} rows", f"{s['duration_s']:,.6g} s",
+                 f"{way} by {meta['method']}, {settings['editing']} editing"]  # fmt: skip
+    elif len(view.trajectory):
+        parts = [f"{len(view.trajectory):,} rows"]
+    if view.score is not None:
+        parts.append(f"compared with {view.score.truth}")
+    return f'<h1>{html.escape(name(view.trajectory))}</h1><p class="sub">{html.escape(" · ".join(parts))}</p>'
+
+
+def verdict(view: View) -> str:
+    """Whether to trust it, in a sentence, with a colour that says the same."""
+    said = view.summary.get("trust")
+    if not said:
+        return _banner(GREY, "This file does not say how it was made, so it cannot be judged by itself.", [])
+    reasons = said["reasons"]
+    if len(reasons) < 2:
+        return _banner(VERDICT[said["verdict"]], trust.sentence(said), [])
+    return _banner(VERDICT[said["verdict"]], f"{trust.opening(said)}:", reasons)
+
+
+def _banner(colour: str, sentence: str, reasons: Sequence[str]) -> str:
+    said = f"<strong>{html.escape(sentence)}</strong>{_list(reasons)}"
+    return f'<div class="verdict" style="border-color: {colour}">{said}</div>'
+
+
+def summary(view: View) -> str:
+    """Counts, rates and noise per component; gaps, jerk, NIS; what else is worth knowing."""
+    s = view.summary
+    if not s:
+        return ""
+    rows = [figures.component_cells(component, s["components"][component]) for component in COMPONENTS]
+    notes = figures.notes(s)
+    body = table(figures.HEADER, rows, "numbers") + _pairs(figures.facts(s)) + _list(notes)
+    return f"<section><h2>Summary</h2>{body}</section>"
+
+
+def score(view: View) -> str:
+    """The figures of `ftproc score`."""
+    if view.score is None:
+        return ""
+    return f"<pre>{html.escape(render([view.score], 'table'))}</pre>"
+
+
+def provenance(view: View) -> str:
+    """Settings (also those found), and what made the trajectory."""
+    meta = view.trajectory.metadata
+    if not meta:
+        return ""
+    settings = meta.get("settings")
+    about = [(key, meta[key]) for key in meta if key not in ("settings", "summary")]
+    parts = [_pairs((str(key), _spoken(value)) for key, value in about)]
+    if isinstance(settings, Mapping):
+        parts.insert(0, _pairs((str(key), _spoken(value)) for key, value in settings.items()))
+    title = "Settings, noise and jerk as used; where it comes from"
+    return f'<section><h2>{title}</h2><div class="tables">{"".join(parts)}</div></section>'
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "", links: int = 0) -> str:
+    """A table of texts. links: so many cells of each row are HTML already."""
+    head = "".join(f"<th>{html.escape(cell)}</th>" for cell in header)
+    lines = []
+    for row in rows:
+        cells = (*row[:links], *map(html.escape, row[links:]))
+        lines.append("".join(f"<td>{cell}</td>" for cell in cells))
+    body = "".join(f"<tr>{line}</tr>" for line in lines)
+    return (
+        f'<div class="scroll"><table class="{kind}"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    )
+
+
+def _pairs(pairs: Iterable[tuple[str, str]]) -> str:
+    cells = "".join(f"<tr><th>{html.escape(key)}</th><td>{html.escape(value)}</td></tr>" for key, value in pairs)
+    return f"<div><table><tbody>{cells}</tbody></table></div>"
+
+
+def _list(texts: Sequence[str]) -> str:
+    return f"<ul>{''.join(f'<li>{html.escape(text)}</li>' for text in texts)}</ul>" if texts else ""
+
+
+def _spoken(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list | tuple):
+        if len(value) > _LONGEST_LIST and all(isinstance(v, int | float) for v in value):
+            return f"{len(value)} values, from {min(value):.3g} to {max(value):.3g}"
+        return ", ".join(map(_spoken, value))
+    return str(value)

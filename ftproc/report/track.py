@@ -1,0 +1,102 @@
+"""Where the target flew: in space and over the ground, at equal scales."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ftproc.records import FloatArray
+from ftproc.report import require_plotly, style
+from ftproc.report.drawing import Drawn
+from ftproc.report.thinning import Timeline
+from ftproc.report.view import View
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+COLUMNS = 2000  # in each of which the extremes of x, y and z are drawn
+FLATTEST = 0.2  # height over width of the figure in space; a flatter flight is drawn higher, and that is said
+NEAR = 1.0  # a station so many widths of the flight away, or nearer, is drawn too
+HEIGHT = 460
+FILLING = 1.3  # diagonal of the flight against the distance of the eye
+NOTHING = "There is no position to draw: what was measured does not tell it."
+
+_NORTH = {"x": "x (north), m", "y": "y (east), m", "z": "z (up), m"}
+_LOCAL = {"x": "x, m", "y": "y, m", "z": "z (up), m"}
+
+
+def track(view: View) -> Drawn:
+    """x, y and z."""
+    if not view.has_position:
+        return Drawn(None, NOTHING)
+    x, y, z = _path(view)
+    size = np.array([np.nanmax(v) - np.nanmin(v) for v in (x, y, z)])
+    widest = max(float(size.max()), 1e-9)
+    share = np.maximum(size / widest, [0.02, 0.02, FLATTEST])
+    scale = FILLING / float(np.linalg.norm(share))
+    names = _names(view)
+    go = require_plotly()
+    figure = go.Figure(
+        go.Scatter3d(x=x, y=y, z=z, mode="lines", name="estimate", line={"color": style.BLUE, "width": 4})
+    )
+    for index, name, symbol in ((0, "start", "circle"), (-1, "end", "square")):
+        figure.add_scatter3d(
+            x=x[[index]], y=y[[index]], z=z[[index]], mode="markers", name=name,
+            marker={"color": style.BLACK, "symbol": symbol, "size": 4},
+        )  # fmt: skip
+    axes = {f"{a}axis": {"title": {"text": names[a]}, "gridcolor": style.GRID, "exponentformat": "none",
+                         "separatethousands": True, "nticks": 5, "showspikes": False} for a in "xyz"}  # fmt: skip
+    scene = {**axes, "aspectmode": "manual", "aspectratio": dict(zip("xyz", scale * share, strict=True)),
+             "camera": {"eye": {"x": -1.1, "y": -1.3, "z": 0.8}, "center": {"x": 0, "y": 0, "z": -0.12}}}  # fmt: skip
+    figure.update_layout(**{**style.LAYOUT, "margin": {"l": 0, "r": 0, "t": 30, "b": 0}}, scene=scene, height=HEIGHT)
+    raised = share[2] * widest / size[2] if size[2] > 0 else 1.0
+    note = "Equal scales." if raised < 1.01 else f"Heights are drawn {raised:.2g} times larger than x and y."
+    return Drawn(figure, f"In space: {note[0].lower()}{note[1:]} Drag to turn it.")
+
+
+def ground(view: View) -> Drawn:
+    """x and y as on a map: north up where it is known, else y."""
+    if not view.has_position:
+        return Drawn(None, NOTHING)
+    path, names = _path(view), _names(view)
+    across, up = (1, 0) if names is _NORTH else (0, 1)
+    go = require_plotly()
+    figure = go.Figure()
+    figure.add_scatter(
+        x=path[across], y=path[up], mode="lines", name="estimate", line={"color": style.BLUE, "width": 2}
+    )  # fmt: skip
+    for index, name, symbol in ((0, "start", "circle"), (-1, "end", "square")):
+        _spot(figure, path[across, index], path[up, index], name, symbol)
+    width = float(max(np.nanmax(v) - np.nanmin(v) for v in path[:2]))
+    if float(np.nanmin(np.hypot(path[0], path[1]))) <= NEAR * width:
+        _spot(figure, 0.0, 0.0, "station", "triangle-up-open")
+    axes = "xy"
+    figure.update_layout(**style.LAYOUT, height=HEIGHT)
+    figure.update_xaxes(**style.axis(title={"text": names[axes[across]], "standoff": 8}, nticks=6, tickangle=0))
+    figure.update_yaxes(
+        **style.axis(title={"text": names[axes[up]], "standoff": 8}, nticks=8, scaleanchor="x", scaleratio=1)
+    )  # fmt: skip
+    return Drawn(figure, "Over the ground: equal scales.")
+
+
+def _spot(figure: go.Figure, x: float, y: float, name: str, symbol: str) -> None:
+    marker: dict[str, Any] = {"color": style.BLACK, "symbol": symbol, "size": 9}
+    figure.add_scatter(x=[x], y=[y], mode="markers", name=name, marker=marker)
+
+
+def _names(view: View) -> dict[str, str]:
+    return _NORTH if view.trajectory.metadata.get("frame") == "north-east-up" else _LOCAL
+
+
+def _path(view: View) -> FloatArray:
+    """(3, m) thinned x, y, z in m, NaN where broken; the first and the last are there."""
+    state = view.trajectory.state
+    there = np.asarray(np.isfinite(state[:, :3]).all(1))
+    timeline = Timeline.of(view.trajectory.time_s, COLUMNS)
+    position = np.where(there[:, None], state[:, :3], np.nan).T
+    chosen = timeline.extremes(*position)
+    ends = np.flatnonzero(there)[[0, -1]]
+    chosen = np.union1d(chosen, ends)
+    found: FloatArray = np.array([timeline.broken(chosen, axis)[1] for axis in position], np.float32)
+    return found

@@ -1,0 +1,127 @@
+"""The page in a real browser: it draws, complains of nothing, answers the mouse, and prints."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from ftproc import report
+from tests.report.browser import NEEDED, Opened, browser
+from tests.report.flights import angles_only, filtered, flight, hostile
+
+pytestmark = [NEEDED, pytest.mark.filterwarnings("default")]  # of playwright's own
+
+
+@pytest.fixture(scope="module")
+def context(tmp_path_factory):
+    with browser(tmp_path_factory.mktemp("profile")) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def show(context, tmp_path_factory):
+    """show(trajectory, truth) -> the page, opened."""
+
+    def written(trajectory, truth=None):
+        file = tmp_path_factory.mktemp("page") / "page.html"
+        report.write(trajectory, file, truth)
+        return Opened(context, file)
+
+    return written
+
+
+@pytest.fixture(scope="module")
+def usual(show):
+    return show(filtered(), flight().truth)
+
+
+def test_everything_is_drawn_without_complaint(usual):
+    assert usual.complaints == []
+    drawn = usual.page.evaluate(
+        "() => Array.from(document.querySelectorAll('figure')).map(f => [f.id, f._fullData.length, f.clientWidth,"
+        " f.querySelectorAll('.scatterlayer .trace, canvas').length])"
+    )
+    assert [name for name, *_ in drawn] == [
+        "errors", "track", "ground", "readings", "residuals", "nis", "sigmas", "motion",
+    ]  # fmt: skip
+    assert all(traces > 0 and width > 300 and marks > 0 for _, traces, width, marks in drawn)
+
+
+def test_nothing_sticks_out_of_a_laptop_window(usual):
+    wide = usual.page.evaluate("document.documentElement.scrollWidth")
+    assert wide <= 1366
+
+
+@pytest.mark.parametrize("name", ["readings", "residuals", "nis", "sigmas", "motion", "errors"])
+def test_axis_titles_and_labels_do_not_stand_on_each_other(usual, name):
+    """Boxes of all texts of a figure, taken from the browser; none overlaps another or leaves the figure."""
+    boxes = usual.page.evaluate(
+        "id => { const place = document.getElementById(id), frame = place.getBoundingClientRect();"
+        " const kinds = '.ytick text, .xtick text, .g-xtitle text, [class^=g-y] text, .legendtext';"
+        " const texts = place.querySelectorAll(kinds);"
+        " return Array.from(texts).filter(t => t.textContent.trim()).map(t => { const b = t.getBoundingClientRect();"
+        " return [t.textContent, b.left - frame.left, b.top - frame.top, b.right - frame.left, b.bottom - frame.top,"
+        " frame.width, frame.height]; }); }",
+        name,
+    )
+    assert len(boxes) > 5
+    for text, left, top, right, bottom, width, height in boxes:
+        assert left >= -1, text
+        assert top >= -1, text
+        assert right <= width + 1, text
+        assert bottom <= height + 1, text
+    for i, (text, left, top, right, bottom, *_) in enumerate(boxes):
+        for other, a, b, c, d, *_ in boxes[i + 1 :]:
+            assert min(right, c) - max(left, a) < 1 or min(bottom, d) - max(top, b) < 1, f"{text!r} stands on {other!r}"
+
+
+def test_pointing_tells_and_the_legend_takes_away(usual):
+    page = usual.page
+    page.locator("#motion").scroll_into_view_if_needed()
+    page.locator("#motion .nsewdrag").first.hover()
+    page.wait_for_selector("#motion .hoverlayer .hovertext", timeout=5000)
+    seen = "t => t.name === 'good reading' && t.visible === true"
+    count = f"() => document.getElementById('readings')._fullData.filter({seen}).length"
+    assert page.evaluate(count) == 3
+    page.locator("#readings .legendtoggle").first.click()
+    page.wait_for_function(f"() => ({count})() === 0", timeout=5000)
+
+
+def test_hostile_names_do_nothing(show):
+    opened = show(hostile())
+    assert opened.complaints == []
+    assert opened.page.locator("figure .main-svg, figure canvas").count() > 0
+
+
+def test_a_crowded_page_leaves_its_marks_to_the_graphics_card(show, monkeypatch):
+    monkeypatch.setattr("ftproc.report.drawing.MANY_MARKS", 10)
+    opened = show(angles_only())
+    assert opened.complaints == []
+    kinds = opened.page.evaluate("() => document.getElementById('readings')._fullData.map(t => t.type)")
+    assert "scattergl" in kinds
+
+
+def test_what_slips_through_does_not_run(context, tmp_path, monkeypatch):
+    """Even if a name were not escaped, the page's policy keeps it from running."""
+    monkeypatch.setattr("ftproc.report.tables.html.escape", lambda text: text)
+    made = replace(
+        filtered(), metadata={**filtered().metadata, "log": "<script>alert(1)</script><img src=x onerror=alert(2)>"}
+    )
+    report.write(made, tmp_path / "page.html")
+    opened = Opened(context, tmp_path / "page.html")
+    assert not any(re.fullmatch(r"\d", complaint) for complaint in opened.complaints)  # no dialog
+    assert any("Content Security Policy" in complaint for complaint in opened.complaints)
+
+
+def test_printing_fits_the_paper_and_gives_the_window_back(usual):
+    page = usual.page
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.wait_for_function("() => document.getElementById('readings')._fullLayout.width === 680", timeout=5000)
+    assert page.evaluate("() => document.getElementById('ground')._fullLayout.width") == 340
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    page.wait_for_function("() => document.getElementById('readings')._fullLayout.width > 1000", timeout=5000)
+    paper = page.pdf(format="A4", prefer_css_page_size=True)
+    pages = paper.count(b"/Type /Page\n") or len(re.findall(rb"/Type\s*/Page\b", paper))
+    assert 3 <= pages <= 8

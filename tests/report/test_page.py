@@ -1,0 +1,150 @@
+"""The page as text: what is in it, and that nothing in a file can run."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from types import SimpleNamespace
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+
+from ftproc import report
+from ftproc.report.page import _figure, document, page
+from tests.report.flights import HOSTILE, angles_only, filtered, flight, hostile, one_row, position_only
+
+
+class Elements(HTMLParser):
+    """Every element with its attributes, and the text by element."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found, self.text, self.inside = [], {}, []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.found.append((tag, dict(attributes)))
+        self.inside.append(tag)
+
+    def handle_endtag(self, tag):
+        if tag in self.inside:
+            while self.inside.pop() != tag:
+                pass
+
+    def handle_data(self, data):
+        if self.inside:
+            self.text.setdefault(self.inside[-1], []).append(data)
+
+
+def scripts(text):
+    """Scripts that run."""
+    return re.findall(r"<script>(.*?)</script>", text, re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def text():
+    return page(filtered())
+
+
+def test_one_plotly_and_no_other_address(text):
+    assert len(scripts(text)) == 2
+    own = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
+    assert not re.search(r"(src|href)=|https?:|url\(|@import", own)
+    assert len(text) - sum(map(len, scripts(text))) < 2_000_000
+
+
+def test_only_the_two_own_scripts_may_run(text):
+    (policy,) = re.findall(r'http-equiv="Content-Security-Policy" content="([^"]*)"', text)
+    digests = {base64.b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in scripts(text)}
+    assert set(re.findall(r"'sha256-([^']*)'", policy)) == digests
+    assert policy.startswith("default-src 'none'; ")
+    assert "'unsafe-inline'" not in policy.split("script-src")[1].split(";")[0]
+
+
+@pytest.mark.parametrize("truth", [False, True])
+def test_nothing_from_a_file_becomes_an_element(truth):
+    known = replace(flight().truth, name=HOSTILE) if truth else None
+    made, plain = Elements(page(hostile(), known)), Elements(page(filtered(), flight().truth if truth else None))
+    extra = [tag for tag, _ in made.found if tag not in ("tr", "th", "td")]
+    assert extra == [tag for tag, _ in plain.found if tag not in ("tr", "th", "td")]
+    assert not any(name.startswith("on") for _, attributes in made.found for name in attributes)
+    assert made.text["h1"] == ["script>.csv"]  # the name's last part, as text
+    assert HOSTILE in made.text["td"]
+
+
+def test_a_figure_cannot_end_its_element():
+    """Whatever the library leaves in its JSON."""
+    words = "</script><!-- & \u2028 > \\u003c"
+    figure = SimpleNamespace(to_json=lambda: json.dumps({"x": words}, ensure_ascii=False), layout=Mock(height=50))
+    found = _figure("x", figure)
+    inside = re.search(r"<script[^>]*>(.*)</script>", found, re.DOTALL)
+    assert inside is not None
+    assert not set(inside[1]) & set("<>&\u2028")
+    assert json.loads(inside[1]) == {"x": words}
+
+
+def figures(text):
+    found = re.findall(r'data-figure="(\w+)">(.*?)</script>', text, re.DOTALL)
+    return {name: json.loads(content) for name, content in found}
+
+
+def test_figures_are_json_and_have_their_places(text):
+    found = figures(text)
+    assert list(found) == ["track", "ground", "readings", "residuals", "nis", "sigmas", "motion"]
+    places = [attributes["id"] for tag, attributes in Elements(text).found if tag == "figure"]
+    assert places == list(found)
+    x = found["motion"]["data"][0]["x"]
+    times = np.frombuffer(base64.b64decode(x["bdata"]), x["dtype"])
+    np.testing.assert_array_equal(times[np.isfinite(times)], filtered().time_s)
+
+
+def test_words_of_the_page(text):
+    assert "<h1>simulated manoeuvre, seed 3</h1>" in text
+    assert f"{len(filtered()):,} rows · 40 s · filtered by ga-bpnn-ukf, two-pass editing" in text
+    assert "<strong>Trust it: readings are no farther off than the sigmas say" in text
+    part = filtered().metadata["summary"]["components"]["azimuth"]
+    assert f"<td>{part['good']}</td><td>{part['isolated']}</td><td>{part['patch']}</td>" in text
+    assert "<th>jerk_psd_m2ps5</th><td>10 values, from" in text
+    assert "<th>version</th><td>" in text
+    assert "The network changed nothing" in text
+    assert "Against the truth" not in text
+
+
+def test_several_doubts_are_a_list():
+    assert "<strong>Be careful:</strong><ul><li>1 good readings of range are too few" in page(one_row())
+    assert 'style="border-color: #E69F00"' in page(one_row())
+
+
+def test_page_without_position_says_so():
+    text = page(angles_only())
+    assert list(figures(text)) == ["readings", "residuals", "nis"]
+    assert "There is no position to draw" in text
+    assert "range missing throughout: position and velocity are not observable" in text
+
+
+def test_page_of_a_file_of_other_make_with_truth():
+    text = page(position_only(), flight().truth)
+    assert "This file does not say how it was made, so it cannot be judged by itself." in text
+    assert "Summary</h2>" not in text
+    assert "Against the truth" in text
+    assert "position RMSE (m)" in text
+    assert "errors" in figures(text)
+
+
+def test_same_trajectory_same_bytes(tmp_path):
+    for name in ("one.html", "two.html"):
+        report.write(filtered(True), tmp_path / name, flight().truth)
+    assert (tmp_path / "one.html").read_bytes() == (tmp_path / "two.html").read_bytes()
+    assert (tmp_path / "one.html").stat().st_size < 8_000_000
+
+
+def test_document_without_figures_runs_nothing():
+    text = document("A & B", "<p>x</p>")
+    assert "script-src 'none'" in text
+    assert "<title>A &amp; B</title>" in text
+    assert scripts(text) == []

@@ -1,0 +1,53 @@
+"""What the README shows in Python runs as it stands, and pandas and pyarrow give the same."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+import ftproc
+from ftproc.files import logs
+
+README = Path(__file__).parents[1] / "README.md"
+
+
+def test_python_section_runs(tmp_path, monkeypatch, capsys):
+    (code,) = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    logs.write(ftproc.simulate("zuo2021-outliers", seed=3).log, "flight.csv")
+    made = {}
+    exec(compile(code, "README.md", "exec"), made)
+    assert list(made["frame"].columns) == made["table"].column_names
+    np.testing.assert_array_equal(made["frame"]["x_m"], ftproc.filter_log("flight.csv").state[:, 0])
+    assert len(made["figure"].data) > 3
+    assert (tmp_path / "flight.html").stat().st_size > 1_000_000
+    printed = capsys.readouterr().out
+    assert "Name: time_s" in printed
+    assert 0 < float(printed.splitlines()[-1]) < 5
+
+
+def test_files_tables_and_frames_give_the_same(tmp_path):
+    import pandas as pd
+    import pyarrow.csv
+
+    file = tmp_path / "flight.csv"
+    logs.write(ftproc.simulate("zuo2021-outliers", seed=3).log, file)
+    found = [ftproc.filter_log(source) for source in (file, pd.read_csv(file), pyarrow.csv.read_csv(file))]
+    for other in found[1:]:
+        np.testing.assert_array_equal(other.state, found[0].state)
+        np.testing.assert_array_equal(other.outlier, found[0].outlier)
+
+
+def test_report_from_records_and_files(tmp_path):
+    flight = ftproc.simulate("zuo2021-outliers", seed=3)
+    trajectory = ftproc.filter_log(flight.log)
+    from ftproc.files import trajectories, truth
+
+    trajectories.write(trajectory, tmp_path / "t.parquet")
+    truth.write(flight.truth, tmp_path / "truth.csv")
+    ftproc.write_report(tmp_path / "t.parquet", tmp_path / "read.html", tmp_path / "truth.csv")
+    ftproc.write_report(trajectory, tmp_path / "made.html")
+    assert 'data-figure="errors"' in (tmp_path / "read.html").read_text()
+    assert 'data-figure="residuals"' in (tmp_path / "made.html").read_text()
