@@ -83,7 +83,7 @@ def islands(time_s: FloatArray, weight: FloatArray, possible: NDArray[np.bool_])
     found = []
     for c in range(3):
         seen = np.flatnonzero(possible[:, c])
-        if not len(seen):
+        if len(seen) < 2:
             continue
         bad = runs_of(weight[seen, c] <= 0)
         bad = bad[bad[:, 1] - bad[:, 0] >= SHORTEST_RUN]
