@@ -16,6 +16,7 @@ from ftproc.settings import FilterSettings
 
 if TYPE_CHECKING:
     from ftproc.correction.model import Model
+    from ftproc.methods.registry import Method
 
 PACKAGED, NO_MODEL = "packaged", "none"
 
@@ -82,6 +83,7 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
     """Read, filter and write one log. Whatever goes wrong with it is in the outcome; only a closed pipe is raised."""
     from ftproc import geodesy, pipeline, summary, warm
     from ftproc.files import logs, trajectories
+    from ftproc.methods import registry
 
     try:
         log = logs.read(
@@ -89,8 +91,10 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
             azimuth_from=recipe.azimuth_from, keep_columns=recipe.keep_columns,
         )  # fmt: skip
         settings = replace(recipe.settings, method=task.method or recipe.settings.method)
+        named = None if task.method is None else registry.named(task.method)
+        model = _model(recipe.model) if named is None else model_for(named, recipe.model)
         with warm.announced(say):
-            trajectory = pipeline.filter_log(log, settings, _model(recipe.model))
+            trajectory = pipeline.filter_log(log, settings, model)
         if settings.site is not None:
             trajectory = geodesy.with_geodetic(trajectory, settings.site)
         trajectories.write(trajectory, task.output)
@@ -99,6 +103,13 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
         raise
     except Exception as error:
         return Outcome(task, failure=failure(error, task.log))
+
+
+def model_for(method: Method, name: str) -> Model | None:
+    """The model of that name if it was trained for the method, else the packaged one: when all methods are run side
+    by side, one model cannot suit them all. Raises ModelError."""
+    model = _model(name)
+    return model if model is None or method.suits(model.made_for) else _model(PACKAGED)
 
 
 def failure(error: BaseException, source: str | None = None) -> Failure:

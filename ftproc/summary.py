@@ -43,6 +43,7 @@ def summarise(
             **consistency.scatter(np.where(seen, scaled[:, c], np.nan)),
         }
     levels = estimate.model.jerk[:, [0, 3, 5]].mean(1)
+    modelled = bool(np.isfinite(levels).all())
     return {
         "rows": len(log),
         "rows_in_file": log.rows_in_file,
@@ -60,7 +61,9 @@ def summarise(
             "lowest": float(levels.min()),
             "median": float(np.median(levels)),
             "highest": float(levels.max()),
-        },
+        }
+        if modelled
+        else None,
         "nis_mean": float(np.nanmean(run.nis)) if np.isfinite(run.nis).any() else None,
         "components_used_mean": float(used.sum() / max(int(used.any(1).sum()), 1)),
         "hardly_observable": [] if absent else consistency.blind_stretches(log.time_s, best_sigma[:, :3]),
@@ -100,7 +103,8 @@ def text(trajectory: Trajectory) -> str:
         cells = (v.rjust(w) for v, w in zip(r[1:], widths[1:], strict=True))
         lines.append("  ".join(["  " + r[0].ljust(widths[0]), *cells]))
     jerk = s["jerk_psd_m2ps5"]
-    lines.append(f"  jerk density {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.2g} to {jerk['highest']:.2g})")
+    if jerk is not None:
+        lines.append(f"  jerk density {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.2g} to {jerk['highest']:.2g})")
     if s["nis_mean"] is not None:
         lines.append(f"  NIS {s['nis_mean']:.2f} on average, {s['components_used_mean']:.2f} expected")
     lines += _remarks(s)

@@ -22,7 +22,7 @@ ALL = "all"
 def run(logs: Sequence[str], output: str | None, *, jobs: int, summary: str, debug: bool, **given: Any) -> int:
     """Filter the logs and print what became of them; the exit code. Raises FtprocError for wrong usage."""
     recipe = _recipe(given)
-    methods = list(registry.METHODS) if given["method"] == ALL else None
+    methods = _applicable(recipe) if given["method"] == ALL else None
     inputs = [] if recipe.model in (batch.PACKAGED, batch.NO_MODEL) else [recipe.model]
     tasks = outputs.plan(logs, output, methods, inputs)
     if recipe.settings.site is not None:
@@ -38,6 +38,19 @@ def run(logs: Sequence[str], output: str | None, *, jobs: int, summary: str, deb
         _show_json(done)
     failures = [outcome.failure.exit_code for outcome in done if outcome.failure is not None]
     return failures[0] if len(done) == 1 and failures else int(bool(failures))
+
+
+def _applicable(recipe: Recipe) -> list[str]:
+    """Every method that can be run so; says why the others are left out."""
+    found = []
+    for method in registry.METHODS.values():
+        model = batch.model_for(method, recipe.model)
+        why = registry.obstacle(method, recipe.settings.smooth, None if model is None else model.made_for)
+        if why is None:
+            found.append(method.name)
+        else:
+            _tell(f"left out: {why}")
+    return found
 
 
 def _recipe(given: dict[str, Any]) -> Recipe:

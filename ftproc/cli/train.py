@@ -70,6 +70,12 @@ ftproc train --show radar.safetensors
     metavar="N",
     help="Epochs of back-propagation at most; it stops when held-out samples no longer gain.",
 )
+@click.option(
+    "--method",
+    metavar="NAME",
+    default=TrainSettings.method,
+    help="The filter whose error is learnt; bpnn-ekf is trained from random first weights, without the genetic search.",
+)
 @click.option("--show", metavar="MODEL", help="Print the card of a model file, and train nothing.")
 def command(
     logs: tuple[str, ...],
@@ -83,6 +89,7 @@ def command(
     population: int,
     generations: int,
     epochs: int,
+    method: str,
     show: str | None,
 ) -> None:
     """Teach the network what the filter gets wrong, from logs with truth or simulated flights.
@@ -95,7 +102,7 @@ def command(
         click.echo(model.card(model.load(show)))
         return
     _check(logs, truths, scenario, output)
-    settings = TrainSettings(features, hidden, population, generations, epochs, len(logs) or flights, seed)
+    settings = TrainSettings(features, hidden, population, generations, epochs, len(logs) or flights, seed, method)
     _train(logs, truths, scenario, str(output), settings)
 
 
