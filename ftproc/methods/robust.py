@@ -15,7 +15,7 @@ from ftproc.settings import FilterSettings
 HUBER_K = 1.345  # sigmas: 95 % efficient on Gaussian noise
 STUDENT_NU = 4.0  # degrees of freedom
 CORRENTROPY_B = 2.5  # sigmas: bandwidth of the kernel
-LOST_AT = 100.0  # times the median range: no target is there
+LOST_AT = 10.0  # times the range that 99 % of the readings stay below: no target is there
 
 
 def huber(readings: Readings, settings: FilterSettings) -> Estimate:
@@ -43,7 +43,7 @@ def _run(readings: Readings, settings: FilterSettings, kind: int, parameter: flo
         )
 
     run = run_spans(time_s, measurement, model, starts, span)
-    if not np.linalg.norm(run.state[:, :3], axis=1).max() < LOST_AT * np.nanmedian(np.abs(measurement[:, 0])):
+    if not np.linalg.norm(run.state[:, :3], axis=1).max() < LOST_AT * np.nanquantile(np.abs(measurement[:, 0]), 0.99):
         raise ValueError(f"{settings.method} lost the track, and has no way to take it up again; use ga-bpnn-ukf")
     at_gate = robust.weight_of(kind, parameter, settings.gate)  # a reading with less is called an outlier
     kept = (run.weight > at_gate).astype(float)

@@ -136,7 +136,7 @@ def test_logs_of_a_few_rows(name, rows):
 
 
 def test_lost_track_of_a_robust_filter_is_a_sentence(monkeypatch):
-    monkeypatch.setattr("ftproc.methods.robust.LOST_AT", 1.0)  # times the median range
+    monkeypatch.setattr("ftproc.methods.robust.LOST_AT", 0.5)
     message = r"^flight\.csv: mcc-ukf lost the track, and has no way to take it up again; use ga-bpnn-ukf$"
     with pytest.raises(InputError, match=message):
         run(measured(PATHS["receding"](TIME)), "mcc-ukf")
