@@ -58,8 +58,8 @@ def finished(
     return Estimate(run, labels(kept, readings), model, smoothed, _anew(starts))
 
 
-def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[Start], FloatArray]:
-    """Noise and jerk level, starts and weights (n, 3) of a log, without deciding on its outliers.
+def trusted(readings: Readings, settings: FilterSettings) -> tuple[FloatArray, FloatArray]:
+    """(n, 3) weights, zero for readings not to be believed before a filter has run, and (3,) noise 1-sigma.
 
     Only the head of the log is edited with all of itself in view, because a recursion cannot repair a wrong start;
     further on the weights are those of the screening, and serve to find noise and jerk.
@@ -72,7 +72,15 @@ def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[S
         weight[:HEAD] = head.weight
         if len(time_s) <= HEAD:
             sigma = np.sqrt(head.model.noise_variance)
-    guess = Model(np.where(np.isfinite(given), given, sigma) ** 2, isotropic(settings.jerk_psd_m2ps5 or 1.0))
+    return weight, np.where(np.isfinite(given), given, sigma)
+
+
+def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[Start], FloatArray]:
+    """Noise and jerk level, starts and weights (n, 3) of a log, without deciding on its outliers."""
+    time_s, measurement, _ = readings
+    weight, sigma = trusted(readings, settings)
+    given = given_sigma(readings, settings)
+    guess = Model(sigma**2, isotropic(settings.jerk_psd_m2ps5 or 1.0))
     starts = begin_all(time_s, measurement, weight, guess.noise_variance, settings.jerk_psd_m2ps5)
     fixed = np.isfinite(given)
     model = tuning.fit_level(time_s, measurement, weight, starts, guess, fixed, settings.jerk_psd_m2ps5 is not None)

@@ -8,10 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core import editing
 from ftproc.core.forward import FilterRun, Model, empty_run
 from ftproc.core.geometry import line_of_sight_axes, to_cartesian, wrap
-from ftproc.methods.anti_outlier import given_sigma, labels
+from ftproc.methods.anti_outlier import labels, trusted
 from ftproc.methods.estimate import Estimate, Readings
 from ftproc.records import FloatArray
 from ftproc.settings import FilterSettings
@@ -48,18 +47,16 @@ class Cleaned(NamedTuple):
 def look(readings: Readings, settings: FilterSettings) -> Log:
     """What there is to know of a log before it is filtered: these papers leave their thresholds to the engineer."""
     time_s, measurement, _ = readings
-    trusted, found = editing.screen(time_s, measurement)
-    given = given_sigma(readings, settings)
+    weight, sigma = trusted(readings, settings)
     steps = np.diff(time_s)
     interval = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
     change, elapsed = [], []
     for c in range(3):
-        rows = np.flatnonzero(trusted[:, c] > 0)
+        rows = np.flatnonzero(weight[:, c] > 0)
         difference = np.diff(measurement[rows, c])
         change.append(wrap(difference) if c == AZIMUTH else difference)
         elapsed.append(np.diff(time_s[rows]))
-    sigma = np.where(np.isfinite(given), given, found)
-    return Log(interval, sigma, np.where(trusted > 0, measurement, np.nan), change, elapsed)
+    return Log(interval, sigma, np.where(weight > 0, measurement, np.nan), change, elapsed)
 
 
 def largest_change(log: Log, c: int, gate: float) -> float:

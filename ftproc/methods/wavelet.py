@@ -21,6 +21,7 @@ from ftproc.records import FloatArray
 from ftproc.settings import FilterSettings
 
 WAVELET, LEVELS = "db4", 4
+EDGES = "antireflect"  # a mirror without the kink that a slope would get, which would pass for detail
 GAP_INTERVALS = 5.0  # a longer pause ends the stretch that is denoised as one
 FIRST = 10  # readings that the first state comes from
 VAGUE = 1e3  # times the noise, per second: 1-sigma of rates about which nothing is known
@@ -80,8 +81,8 @@ def denoise(values: FloatArray) -> FloatArray:
     level = min(LEVELS, pywt.dwt_max_level(n, pywt.Wavelet(WAVELET).dec_len))
     if level < 1:
         return values
-    coarse, *details = pywt.wavedec(values, WAVELET, mode="symmetric", level=level)
+    coarse, *details = pywt.wavedec(values, WAVELET, mode=EDGES, level=level)
     bound = np.sqrt(2 * np.log(n)) / GAUSSIAN
     shrunk = [np.sign(d) * np.maximum(np.abs(d) - bound * np.median(np.abs(d)), 0.0) for d in details]
-    restored: FloatArray = np.asarray(pywt.waverec([coarse, *shrunk], WAVELET, mode="symmetric"))[:n]
+    restored: FloatArray = np.asarray(pywt.waverec([coarse, *shrunk], WAVELET, mode=EDGES))[:n]
     return restored
