@@ -45,7 +45,7 @@ $(foreach log,$(logs),$(if $(word 2,$(log-of-$(call stem,$(log)))),\
 $(if $(logs),,$(error LOGS: there is no log among "$(LOGS)"))
 endif
 
-.PHONY: help run test samples model bench clean install FORCE
+.PHONY: help run test samples model bench reproduce clean install FORCE
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /make \1	/p' Makefile | expand -t 16
@@ -128,6 +128,9 @@ model: $(warmed) ## train the packaged model anew (MODEL_FLAGS)
 
 bench: $(developer) $(warmed) ## measure accuracy and speed
 	$(bin)/python -m tests.bench
+
+reproduce: $(developer) $(warmed) ## do the papers' experiments again: out/reproduce/reproduce.md
+	$(bin)/python -m tests.acceptance.reproduce
 
 clean: ## remove results and caches; the virtual environment stays
 	rm -rf out build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis

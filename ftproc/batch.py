@@ -17,6 +17,7 @@ from ftproc.settings import FilterSettings, Station
 
 if TYPE_CHECKING:
     from ftproc.correction.model import Model
+    from ftproc.methods.registry import Method
 
 PACKAGED, NO_MODEL = "packaged", "none"
 
@@ -91,13 +92,16 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
     """Read, filter and write one log. Whatever goes wrong with it is in the outcome; only a closed pipe is raised."""
     from ftproc import geodesy, pipeline, report, summary, warm
     from ftproc.files import logs, trajectories
+    from ftproc.methods import registry
 
     began = time.perf_counter()
     try:
         log = logs.read(task.log, **recipe.reading())
         settings = replace(recipe.settings, method=task.method or recipe.settings.method)
+        named = None if task.method is None else registry.named(task.method)
+        model = model_named(recipe.model) if named is None else model_for(named, recipe.model)
         with warm.announced(say):
-            trajectory = pipeline.filter_log(log, settings, model_named(recipe.model))
+            trajectory = pipeline.filter_log(log, settings, model)
         trajectory = geodesy.located(trajectory, settings)
         trajectories.write(trajectory, task.output)
         if task.report is not None:
@@ -108,6 +112,13 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
         raise
     except Exception as error:
         return Outcome(task, failure=failure(error, task.log))
+
+
+def model_for(method: Method, name: str) -> Model | None:
+    """The model of that name if it was trained for the method, else the packaged one: when all methods are run side
+    by side, one model cannot suit them all. Raises ModelError."""
+    model = model_named(name)
+    return model if model is None or method.suits(model.made_for) else model_named(PACKAGED)
 
 
 def failure(error: BaseException, source: str | None = None) -> Failure:

@@ -22,6 +22,7 @@ from ftproc.summary import summarise
 
 if TYPE_CHECKING:
     from ftproc.correction.model import Model
+    from ftproc.methods.registry import Method
 
 EDITING = ("two-pass", "forward", "none")
 ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of a component that the log says too little about
@@ -47,6 +48,8 @@ def filter_log(log: MeasurementLog, settings: FilterSettings | None = None, mode
     settings = settings or FilterSettings()
     method = registry.named(settings.method)
     _check(settings)
+    if (why := registry.obstacle(method, settings.smooth, None if model is None else model.made_for)) is not None:
+        raise UsageError(why)
     readings, absent = _readings(log)
     try:
         estimate = method.run(readings, settings)
@@ -60,17 +63,17 @@ def filter_log(log: MeasurementLog, settings: FilterSettings | None = None, mode
 
         correction, outside = correct(estimate.run, model)
         state[:, :6] += correction
-    cleaned = from_cartesian(state[:, :3])
+    cleaned = from_cartesian(state[:, :3]) if estimate.cleaned is None else estimate.cleaned
     if absent:  # the stand-in made the filter run; what rests on it must not leave the house
         state[:], sigma[:] = np.nan, np.nan
         cleaned[:, absent] = np.nan
         estimate.label[:, absent] = MISSING
-    elif not np.isfinite(state).all():
-        raise InputError(f"{log.name}: the filter diverged; give --noise and --jerk, or check the log's units")
+    elif np.isinf(state).any() or (estimate.cleaned is None and np.isnan(state).any()):
+        raise InputError(f"{log.name}: {method.name} diverged; give --noise and --jerk, or check the log's units")
     summary = summarise(log, estimate, absent, correction, outside)
     return Trajectory(
         log.name, log.row, log.time_s, cleaned, state, sigma, estimate.label, best.nis, correction,
-        _provenance(log, settings, estimate, model, summary), log.extra, _diagnostics(log, estimate),
+        _provenance(log, method, settings, estimate, model, summary), log.extra, _diagnostics(log, estimate),
     )  # fmt: skip
 
 
@@ -120,6 +123,7 @@ def _no_start(log: MeasurementLog, cause: ValueError) -> str:
 
 def _provenance(
     log: MeasurementLog,
+    method: Method,
     settings: FilterSettings,
     estimate: Estimate,
     model: Model | None,
@@ -129,18 +133,19 @@ def _provenance(
     from ftproc.correction.model import sha256
 
     sigma = np.sqrt(estimate.model.reading_variance)
-    knots = estimate.model.jerk[:, 0]
+    motion = estimate.model.jerk if np.isfinite(estimate.model.jerk).all() else None
     return {
         "program": "ftproc",
         "version": __version__,
-        "method": settings.method,
+        "method": method.name,
+        "sees": method.sees(settings),
         "log": log.name,
         "frame": log.frame,
         "convention": CONVENTION[log.frame],
         "station": {**asdict(log.station), "in_words": in_words(log.station)},
         "epoch": log.epoch,
         "settings": {
-            "editing": settings.editing,
+            "editing": method.editing(settings),
             "smooth": settings.smooth,
             "gate": settings.gate,
             "max_patch_s": settings.max_patch_s,
@@ -154,9 +159,9 @@ def _provenance(
             "noise_azimuth_rad": float(sigma[1]),
             "noise_elevation_rad": float(sigma[2]),
             "noise_correlation": [float(r) for r in estimate.model.correlation],
-            "jerk_psd_m2ps5": [float(q) for q in knots],
-            "jerk_vertical_ratio": float(estimate.model.jerk[0, 5] / estimate.model.jerk[0, 0]),
-            "jerk_knot_s": float(estimate.model.knot_s) if len(knots) > 1 else None,
+            "jerk_psd_m2ps5": None if motion is None else [float(q) for q in motion[:, 0]],
+            "jerk_vertical_ratio": None if motion is None else float(motion[0, 5] / motion[0, 0]),
+            "jerk_knot_s": float(estimate.model.knot_s) if motion is not None and len(motion) > 1 else None,
         },
         "model_sha256": None if model is None else sha256(model),
         "summary": dict(summary),
@@ -170,12 +175,16 @@ def train_flights(
 ) -> Model:
     """Filter every log, hold it against its truth, and train a correction on the difference.
 
-    Raises InputError when a log cannot be processed or shares no time with its truth.
+    Raises InputError when a log cannot be processed or shares no time with its truth, UsageError for a method that
+    takes no correction.
     """
     from ftproc.correction.samples import Flight
     from ftproc.correction.training import train
     from ftproc.scoring.matching import match
 
+    method = registry.named(settings.method)
+    if not method.corrected:
+        raise UsageError(f"{method.name} takes no correction, so there is nothing to train for it")
     flights = []
     for number, (log, truth) in enumerate(pairs):
         if progress:
@@ -184,11 +193,11 @@ def train_flights(
         if absent:
             names = " and ".join(COMPONENTS[c] for c in absent)
             raise InputError(f"{log.name}: {names} missing throughout; training needs all three components")
-        run = registry.METHODS["ga-bpnn-ukf"].run(readings, FilterSettings()).run
+        run = method.run(readings, FilterSettings()).run
         known = match(log.time_s, truth)
         if not np.isfinite(known.position_m).any():
             raise InputError(f"{truth.name}: its times do not overlap those of {log.name}")
         flights.append(Flight(run, known.position_m, known.velocity_mps, log.name))
     if progress:
         progress("filtering", len(pairs), len(pairs))
-    return train(flights, settings, progress)
+    return train(flights, settings, progress, start="random" if method.own_model else "genetic")

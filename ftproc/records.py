@@ -27,6 +27,9 @@ COMPONENTS = ("range", "azimuth", "elevation")
 #: Values of the trajectory's `outlier_*` columns.
 GOOD, ISOLATED, PATCH, MISSING = 0, 1, 2, 3
 
+#: What an estimate rests on, the least first.
+PAST, EDITED, WHOLE = "past readings", "past readings, edited with the whole record in view", "the whole record"
+
 
 @dataclass(frozen=True)
 class MeasurementLog:

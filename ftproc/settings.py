@@ -56,3 +56,4 @@ class TrainSettings:
     epochs: int = 400
     flights: int = 24  # simulated flights when training on a scenario
     seed: int = 0
+    method: str = "ga-bpnn-ukf"  # the filter whose error is learnt

@@ -45,6 +45,7 @@ def summarise(
             **consistency.scatter(np.where(seen, scaled[:, c], np.nan)),
         }
     levels = estimate.model.jerk[:, [0, 3, 5]].mean(1)
+    modelled = bool(np.isfinite(levels).all())
     figures = {
         "rows": len(log),
         "rows_in_file": log.rows_in_file,
@@ -63,7 +64,9 @@ def summarise(
             "lowest": float(levels.min()),
             "median": float(np.median(levels)),
             "highest": float(levels.max()),
-        },
+        }
+        if modelled
+        else None,
         "nis_mean": float(np.nanmean(run.nis)) if np.isfinite(run.nis).any() else None,
         "components_used_mean": float(used.sum() / max(int(used.any(1).sum()), 1)),
         "hardly_observable": [] if absent else consistency.blind_stretches(log.time_s, best_sigma[:, :3]),
@@ -145,7 +148,10 @@ def facts(s: Mapping[str, Any]) -> list[tuple[str, str]]:
     found = [("gaps", f"{s['gaps']}, the longest {s['longest_gap_s']:.4g} s" if s["gaps"] else "none")]
     found += [("rows", line) for line in _oddities(s)]
     jerk = s["jerk_psd_m2ps5"]
-    found.append(("jerk", f"density {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.3g} to {jerk['highest']:.3g})"))
+    if jerk is not None:
+        found.append(
+            ("jerk", f"density {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.3g} to {jerk['highest']:.3g})")
+        )
     if s["nis_mean"] is not None:
         found.append(("NIS", f"{s['nis_mean']:.2f} on average, {s['components_used_mean']:.2f} expected"))
     return found

@@ -50,17 +50,17 @@ def warm() -> None:
 
     from ftproc import pipeline
     from ftproc.files import logs
+    from ftproc.methods import registry
     from ftproc.settings import FilterSettings
     from ftproc.simulation import simulate
 
     log = _as_read(simulate("manoeuvre", duration_s=20.0).log, logs.read)
-    paths = (
+    paths: list[dict[str, Any]] = [
         {"smooth": True},
         {"editing": "forward"},
         {"editing": "forward", "gain_form": True},
-        {"editing": "none"},
-        {"method": "ekf"},
-    )
+        *({"method": m.name} for m in registry.METHODS.values() if registry.obstacle(m, False, None) is None),
+    ]
     for path in paths:
         pipeline.filter_log(log, replace(FilterSettings(), **path))
 

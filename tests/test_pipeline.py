@@ -118,9 +118,22 @@ def test_metadata_is_complete_and_serialisable(flight):
     assert pipeline.filter_log(log).metadata["model_sha256"] is None
 
 
-@pytest.mark.parametrize("method", list(registry.METHODS))
-def test_metadata_names_the_method(flight, method):
-    assert pipeline.filter_log(flight.log, FilterSettings(method=method)).metadata["method"] == method
+@pytest.mark.parametrize(
+    ("settings", "editing", "sees"),
+    [
+        ({}, "two-pass", "past readings, edited with the whole record in view"),
+        ({"editing": "forward"}, "forward", "past readings"),
+        ({"smooth": True}, "two-pass", "the whole record"),
+        ({"method": "ukf"}, "none", "past readings"),
+        ({"method": "ukf", "smooth": True}, "none", "the whole record"),
+        ({"method": "huber-ukf"}, "its own", "past readings"),
+        ({"method": "wavelet-akf"}, "its own", "the whole record"),
+    ],
+)
+def test_metadata_say_what_an_estimate_rests_on(flight, settings, editing, sees):
+    metadata = pipeline.filter_log(flight.log, FilterSettings(**settings)).metadata
+    assert metadata["method"] == settings.get("method", "ga-bpnn-ukf")
+    assert (metadata["settings"]["editing"], metadata["sees"]) == (editing, sees)
 
 
 @pytest.mark.parametrize("component", range(3))
@@ -206,8 +219,24 @@ def test_refuses_to_publish_a_diverged_filter(monkeypatch):
         found.run.state[3:] = np.nan
         return found
 
-    with pytest.raises(InputError, match=r"^x\.csv: the filter diverged; give --noise and --jerk"):
+    with pytest.raises(InputError, match=r"^x\.csv: ukf diverged; give --noise and --jerk, or check the log's units$"):
         stub(monkeypatch, diverge)()
+
+
+def test_a_blank_of_a_channel_method_is_no_divergence_but_infinity_is(monkeypatch):
+    plain = registry.METHODS["gate"].run
+
+    def run(value):
+        def changed(*arguments):
+            found = plain(*arguments)
+            found.run.state[3:] = value
+            return found
+
+        return changed
+
+    assert np.isnan(stub(monkeypatch, run(np.nan))().state[3:]).all()
+    with pytest.raises(InputError, match=r"^x\.csv: ukf diverged; "):
+        stub(monkeypatch, run(np.inf))()
 
 
 @pytest.mark.parametrize(
@@ -232,6 +261,8 @@ def test_training_refuses_what_it_cannot_learn_from(flight):
     z = flight.log.measurement.copy()
     z[:, :2] = np.nan
     settings = pipeline.TrainSettings()
+    with pytest.raises(UsageError, match=r"^ukf takes no correction, so there is nothing to train for it$"):
+        pipeline.train_flights([(flight.log, flight.truth)], replace(settings, method="ukf"))
     with pytest.raises(InputError, match="range and azimuth missing throughout; training needs all three components"):
         pipeline.train_flights([(replace(flight.log, measurement=z), flight.truth)], settings)
     late = Truth("late.csv", flight.truth.time_s + 1e4, flight.truth.position_m)

@@ -28,7 +28,7 @@ def run(
     config: where the recipe is from, not to be written over.
     """
     reports.check(report)
-    methods = list(registry.METHODS) if recipe.settings.method == ALL else None
+    methods = _applicable(recipe) if recipe.settings.method == ALL else None
     inputs = [name for name in (recipe.model, config) if name not in (batch.PACKAGED, batch.NO_MODEL, None)]
     tasks = outputs.plan(logs, output, methods, inputs)
     for task in tasks:
@@ -51,6 +51,19 @@ def run(
         _show_json(done)
     failures = [outcome.failure.exit_code for outcome in done if outcome.failure is not None]
     return failures[0] if len(done) == 1 and failures else int(bool(failures))
+
+
+def _applicable(recipe: Recipe) -> list[str]:
+    """Every method that can be run so; says why the others are left out."""
+    found = []
+    for method in registry.METHODS.values():
+        model = batch.model_for(method, recipe.model)
+        why = registry.obstacle(method, recipe.settings.smooth, None if model is None else model.made_for)
+        if why is None:
+            found.append(method.name)
+        else:
+            _tell(f"left out: {why}")
+    return found
 
 
 def _tell(text: str) -> None:

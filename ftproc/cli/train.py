@@ -83,6 +83,12 @@ ftproc train --show radar.safetensors
     metavar="N",
     help="Epochs of back-propagation at most; it stops when held-out samples no longer gain.",
 )
+@click.option(
+    "--method",
+    metavar="NAME",
+    default=TrainSettings.method,
+    help="The filter whose error is learnt; bpnn-ekf is trained from random first weights, without the genetic search.",
+)
 @click.option("--show", type=options.FILE, metavar="MODEL", help="Print the card of a model file, and train nothing.")
 def command(
     logs: tuple[str, ...],
@@ -97,6 +103,7 @@ def command(
     population: int,
     generations: int,
     epochs: int,
+    method: str,
     show: str | None,
 ) -> None:
     """Teach the network what the filter gets wrong, from logs with truth or simulated flights.
@@ -109,7 +116,7 @@ def command(
         click.echo(model.card(model.load(show)))
         return
     _check(logs, truths, config, scenario, output)
-    settings = TrainSettings(features, hidden, population, generations, epochs, len(logs) or flights, seed)
+    settings = TrainSettings(features, hidden, population, generations, epochs, len(logs) or flights, seed, method)
     _train(logs, truths, config, scenario, str(output), settings)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -94,6 +95,16 @@ def line_of_sight_sigma(x: FloatArray, p: FloatArray, out: FloatArray) -> None:
             out[o + axis] = math.sqrt(max(variance, 0.0))
 
 
+@part
+def store(k: int, first: int, x: FloatArray, p: FloatArray, run: FilterRun) -> None:
+    """The updated state of sample k of a run that began at `first`."""
+    for i in range(9):
+        run.state[k, i] = x[i]
+        run.sigma[k, i] = math.sqrt(max(p[i, i], 0.0))
+    line_of_sight_sigma(x, p, run.los_sigma[k])
+    run.since_start[k] = k - first
+
+
 @kernel
 def run_span(
     first: int,
@@ -137,11 +148,7 @@ def run_span(
             nis, gained = ukf.update(x, p, pxz, c, h, e, noise, used, s, s_inv, gain)
             run.nis[k] = nis
             likelihood += gained
-        for i in range(9):
-            run.state[k, i] = x[i]
-            run.sigma[k, i] = math.sqrt(max(p[i, i], 0.0))
-        line_of_sight_sigma(x, p, run.los_sigma[k])
-        run.since_start[k] = k - first
+        store(k, first, x, p, run)
     return likelihood
 
 
@@ -194,13 +201,36 @@ def filter_log(
     time_s (n,), measurement (n, 3), weight (n, 3) in [0, 1]. Samples before the first start are extrapolated.
     extended: linearise by the Jacobian (EKF) instead of the unscented transform.
     """
+
+    def span(first: int, stop: int, x: FloatArray, p: FloatArray, run: FilterRun) -> float:
+        return run_span(
+            first,
+            stop,
+            time_s,
+            measurement,
+            weight,
+            model.noise_variance,
+            model.jerk,
+            model.knot_s,
+            x,
+            p,
+            extended,
+            run,
+        )
+
+    return run_spans(time_s, measurement, model, starts, span)
+
+
+#: first and one past the last sample, state and covariance before the first (changed in place), the run to fill.
+Span = Callable[[int, int, FloatArray, FloatArray, FilterRun], float]
+
+
+def run_spans(time_s: FloatArray, measurement: FloatArray, model: Model, starts: list[Start], span: Span) -> FilterRun:
+    """A run over the whole log by a filter that begins anew at each start; `span` returns its log-likelihood."""
     run = empty_run(time_s)
     likelihood = 0.0
     for start, stop in zip(starts, [s.sample for s in starts[1:]] + [len(time_s)], strict=True):
-        likelihood += run_span(
-            start.sample, stop, time_s, measurement, weight, model.noise_variance, model.jerk, model.knot_s,
-            start.state.copy(), start.covariance.copy(), extended, run,
-        )  # fmt: skip
+        likelihood += span(start.sample, stop, start.state.copy(), start.covariance.copy(), run)
     lead_in(measurement, model, starts[0], run)
     return run._replace(log_likelihood=likelihood)
 

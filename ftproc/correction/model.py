@@ -18,6 +18,7 @@ from ftproc.correction.network import Shape, Weights
 from ftproc.correction.verdict import Verdict
 from ftproc.errors import ModelError
 from ftproc.records import FloatArray
+from ftproc.settings import TrainSettings
 
 SCHEMA = 1
 _KEY = "ftproc-correction"  # one key only: safetensors writes several in no fixed order
@@ -44,6 +45,11 @@ class Model:
     fingerprint: str
     settings: Mapping[str, Any] = field(default_factory=dict)
     verdict: Verdict | None = None
+
+    @property
+    def made_for(self) -> str:
+        """The method whose error it learnt."""
+        return str(self.settings.get("method", TrainSettings.method))
 
     @property
     def shape(self) -> Shape:

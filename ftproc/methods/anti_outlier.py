@@ -10,9 +10,9 @@ import contextlib
 import numpy as np
 
 from ftproc.core import editing, forward, gate, indicators, tuning
-from ftproc.core.forward import Model, Start
+from ftproc.core.forward import FilterRun, Model, Start
 from ftproc.core.motion import isotropic
-from ftproc.core.smoother import SmootherRun, smooth_log
+from ftproc.core.smoother import smooth_log
 from ftproc.core.start import begin_all
 from ftproc.methods.estimate import Estimate, Readings
 from ftproc.records import MISSING, FlagArray, FloatArray
@@ -38,25 +38,49 @@ def unedited(readings: Readings, settings: FilterSettings, extended: bool = Fals
     model, starts, _ = prepare(readings, settings)
     weight = np.isfinite(readings.measurement).astype(float)
     run = forward.filter_log(*readings[:2], weight, model, starts, extended)
-    smoothed = _smoothed(readings, settings, weight, model, starts)
-    return Estimate(run, _labels(weight, readings), model, smoothed, _anew(starts))
+    return finished(readings, settings, run, weight, weight, model, starts)
 
 
-def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[Start], FloatArray]:
-    """Noise and jerk level, starts and weights (n, 3) of a log, without deciding on its outliers.
+def finished(
+    readings: Readings,
+    settings: FilterSettings,
+    run: FilterRun,
+    weight: FloatArray,
+    kept: FloatArray,
+    model: Model,
+    starts: list[Start],
+) -> Estimate:
+    """What a recursive filter found, with the smoother over the same weights (n, 3) if it was asked for.
+
+    kept: (n, 3) zero for the readings that are called outliers.
+    """
+    smoothed = smooth_log(*readings[:2], weight, model, starts) if settings.smooth else None
+    return Estimate(run, labels(kept, readings), model, smoothed, _anew(starts))
+
+
+def trusted(readings: Readings, settings: FilterSettings) -> tuple[FloatArray, FloatArray]:
+    """(n, 3) weights, zero for readings not to be believed before a filter has run, and (3,) noise 1-sigma.
 
     Only the head of the log is edited with all of itself in view, because a recursion cannot repair a wrong start;
     further on the weights are those of the screening, and serve to find noise and jerk.
     """
     time_s, measurement, _ = readings
     weight, sigma = editing.screen(time_s, measurement)
-    given = _given(readings, settings)
+    given = given_sigma(readings, settings)
     with contextlib.suppress(ValueError):  # too little in the head: the screening has to do
         head = editing.edit(time_s[:HEAD], measurement[:HEAD], given, settings.jerk_psd_m2ps5, settings.gate)
         weight[:HEAD] = head.weight
         if len(time_s) <= HEAD:
             sigma = np.sqrt(head.model.noise_variance)
-    guess = Model(np.where(np.isfinite(given), given, sigma) ** 2, isotropic(settings.jerk_psd_m2ps5 or 1.0))
+    return weight, np.where(np.isfinite(given), given, sigma)
+
+
+def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[Start], FloatArray]:
+    """Noise and jerk level, starts and weights (n, 3) of a log, without deciding on its outliers."""
+    time_s, measurement, _ = readings
+    weight, sigma = trusted(readings, settings)
+    given = given_sigma(readings, settings)
+    guess = Model(sigma**2, isotropic(settings.jerk_psd_m2ps5 or 1.0))
     starts = begin_all(time_s, measurement, weight, guess.noise_variance, settings.jerk_psd_m2ps5)
     fixed = np.isfinite(given)
     model = tuning.fit_level(time_s, measurement, weight, starts, guess, fixed, settings.jerk_psd_m2ps5 is not None)
@@ -64,12 +88,12 @@ def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[S
 
 
 def _two_pass(readings: Readings, settings: FilterSettings) -> Estimate:
-    edited = editing.edit(*readings[:2], _given(readings, settings), settings.jerk_psd_m2ps5, settings.gate)
+    edited = editing.edit(*readings[:2], given_sigma(readings, settings), settings.jerk_psd_m2ps5, settings.gate)
     starts = editing.smoothed_starts(edited.smoothed)
     run = forward.filter_log(*readings[:2], edited.weight, edited.model, starts)
     smoothed = edited.smoothed if settings.smooth else None
-    labels = _labels(edited.weight, readings)
-    return Estimate(run, labels, edited.model, smoothed, _anew(starts), edited.settled, edited.slow_noise)
+    label = labels(edited.weight, readings)
+    return Estimate(run, label, edited.model, smoothed, _anew(starts), edited.settled, edited.slow_noise)
 
 
 def _anew(starts: list[Start]) -> tuple[int, ...]:
@@ -88,23 +112,17 @@ def _recursive(readings: Readings, settings: FilterSettings) -> Estimate:
     how = gate.GateSettings(settings.gate, longest, settings.gain_form)
     run, begun = gate.filter_and_edit(time_s, measurement, allowed, model, starts, how)
     kept = np.where(run.weight > gate.rejection_weight(settings.gate), 1.0, 0.0)
-    smoothed = _smoothed(readings, settings, kept, model, begun)
-    return Estimate(run, _labels(kept, readings), model, smoothed, _anew(begun))
+    return finished(readings, settings, run, kept, kept, model, begun)
 
 
-def _given(readings: Readings, settings: FilterSettings) -> FloatArray:
+def given_sigma(readings: Readings, settings: FilterSettings) -> FloatArray:
     """(3,) noise 1-sigma that need not be found: the user's, else what is assumed; NaN where the log tells."""
     stated = np.array(settings.noise or (None, None, None), float)  # None becomes NaN
     return np.where(np.isnan(stated), readings.assumed_sigma, stated)
 
 
-def _smoothed(
-    readings: Readings, settings: FilterSettings, weight: FloatArray, model: Model, starts: list[Start]
-) -> SmootherRun | None:
-    return smooth_log(*readings[:2], weight, model, starts) if settings.smooth else None
-
-
-def _labels(weight: FloatArray, readings: Readings) -> FlagArray:
+def labels(weight: FloatArray, readings: Readings) -> FlagArray:
+    """(n, 3) good, isolated, patch or missing from weights (n, 3), zero where rejected."""
     label = indicators.label_runs(weight, readings.measurement, LONGEST_ISOLATED).astype(np.uint8)
     label[~np.isfinite(readings.measurement)] = MISSING
     return label

@@ -25,7 +25,8 @@ class Estimate(NamedTuple):
     run: the recursive filter. label: (n, 3) good, isolated, patch, missing. model: noise and jerk used.
     smoothed: the smoother's run when it was asked for. reacquired: samples at which the filter began anew.
     settled: whether two-pass editing's decisions stood still; None where there were none to make. slow_noise: the
-    noise is correlated too slowly to be told from motion, so the sigmas are too small.
+    noise is correlated too slowly to be told from motion, so the sigmas are too small. cleaned: (n, 3) readings of a
+    method that works on range, azimuth and elevation by themselves; NaN there and in its run means not estimated.
     """
 
     run: FilterRun
@@ -35,3 +36,4 @@ class Estimate(NamedTuple):
     reacquired: tuple[int, ...] = ()
     settled: bool | None = None
     slow_noise: bool = False
+    cleaned: FloatArray | None = None

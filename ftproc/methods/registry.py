@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
 
 from ftproc.errors import UsageError
+from ftproc.records import EDITED, PAST, WHOLE
 from ftproc.settings import FilterSettings
 
 if TYPE_CHECKING:
@@ -14,12 +18,15 @@ if TYPE_CHECKING:
 
 Run = Callable[["Readings", FilterSettings], "Estimate"]
 
+MAIN = FilterSettings.method
+
 
 @dataclass(frozen=True)
 class Method:
     """causal: the estimate of a sample needs no later one, once noise and start are set (two-pass editing, the
     default of the main method, looks at the whole record to decide what is an outlier). corrected: the network
-    works on its output."""
+    works on its output; own_model: only one trained for this very method. smooths: --smooth can be had. needs: a
+    module that must be installed, and the extra that brings it."""
 
     name: str
     title: str
@@ -28,35 +35,78 @@ class Method:
     handles_outliers: bool
     corrected: bool
     run: Run
+    own_model: bool = False
+    smooths: bool = True
+    needs: tuple[str, str] | None = None
+
+    def editing(self, settings: FilterSettings) -> str:
+        """How outliers are found: the settings' way in the main method, else by the method's own means or not."""
+        if self.name == MAIN:
+            return settings.editing
+        return "its own" if self.handles_outliers else "none"
+
+    def suits(self, made_for: str) -> bool:
+        """Whether a model that was trained for the method `made_for` corrects this one."""
+        return made_for == (self.name if self.own_model else MAIN)
+
+    def sees(self, settings: FilterSettings) -> str:
+        """What an estimate rests on."""
+        if settings.smooth or not self.causal:
+            return WHOLE
+        return EDITED if self.editing(settings) == "two-pass" else PAST
 
 
-def _anti_outlier(readings: Readings, settings: FilterSettings) -> Estimate:
-    from ftproc.methods import anti_outlier
+def _from(module: str, function: str = "estimate", **how: Any) -> Run:
+    """A function of a module in this package, which is imported when it is first run."""
 
-    return anti_outlier.estimate(readings, settings)
+    def run(readings: Readings, settings: FilterSettings) -> Estimate:
+        found: Run = partial(getattr(import_module(f"ftproc.methods.{module}"), function), **how)
+        return found(readings, settings)
 
-
-def _ukf(readings: Readings, settings: FilterSettings) -> Estimate:
-    from ftproc.methods import anti_outlier
-
-    return anti_outlier.unedited(readings, settings)
-
-
-def _ekf(readings: Readings, settings: FilterSettings) -> Estimate:
-    from ftproc.methods import anti_outlier
-
-    return anti_outlier.unedited(readings, settings, extended=True)
+    return run
 
 
 METHODS: dict[str, Method] = {
     m.name: m
     for m in (
         Method("ga-bpnn-ukf", "anti-outlier UKF with network correction", "Zuo et al. 2021, section 2.3",
-               True, True, True, _anti_outlier),
+               True, True, True, _from("anti_outlier")),
         Method("ga-bpnn-ukf-plain", "UKF with network correction, no editing", "Zuo et al. 2021, section 2.2",
-               True, False, True, _ukf),
-        Method("ukf", "unscented Kalman filter", "Julier and Uhlmann 2004", True, False, False, _ukf),
-        Method("ekf", "extended Kalman filter", "Zuo et al. 2021, eq. 4", True, False, False, _ekf),
+               True, False, True, _from("anti_outlier", "unedited")),
+        Method("ukf", "unscented Kalman filter", "Julier and Uhlmann 2004",
+               True, False, False, _from("anti_outlier", "unedited")),
+        Method("ekf", "extended Kalman filter", "Zuo et al. 2021, eq. 4",
+               True, False, False, _from("anti_outlier", "unedited", extended=True)),
+        Method("bpnn-ekf", "EKF with a network trained from a random start", "Feng, Xu and Shi 2017",
+               True, False, True, _from("anti_outlier", "unedited", extended=True), own_model=True),
+        Method("kf", "linear Kalman filter on converted measurements", "Lerro and Bar-Shalom 1993",
+               True, False, False, _from("converted"), smooths=False),
+        Method("imm-ukf", "interacting models of calm flight and manoeuvres", "Zhang, Li and He 2012",
+               True, False, False, _from("multiple"), smooths=False),
+        Method("huber-ukf", "UKF with Huber's weights", "Karlgaard and Schaub 2007",
+               True, True, False, _from("robust", "huber")),
+        Method("student-t-ukf", "UKF with Student's t weights", "Agamennoni et al. 2012",
+               True, True, False, _from("robust", "student")),
+        Method("mcc-ukf", "UKF by maximum correntropy", "Chen et al. 2017",
+               True, True, False, _from("robust", "correntropy")),
+        Method("gate", "readings that jump are dropped", "Yu et al., range tests",
+               True, True, False, _from("range_test", "gate"), smooths=False),
+        Method("gate-improved", "the same, with the first reading checked", "Yu et al., range tests",
+               True, True, False, _from("range_test", "gate", check_first=True), smooths=False),
+        Method("ls4", "readings off the line through the last four replaced", "Yu et al., range tests",
+               True, True, False, _from("range_test", "four_points"), smooths=False),
+        Method("outlier-kf", "anti-outlier Kalman filter, channel by channel", "Yu et al., range tests",
+               True, True, False, _from("range_test", "outlier_kalman"), smooths=False),
+        Method("outlier-kf-improved", "the same, first reading checked, gains apart", "Yu et al., range tests",
+               True, True, False, _from("range_test", "outlier_kalman", improved=True), smooths=False),
+        Method("ls-window-kf", "outliers repaired by a line, Kalman filter", "Zhang and Zhang, reliable KF",
+               True, True, False, _from("reliable", "window_kalman"), smooths=False),
+        Method("rkf", "the same, with noises that adapt (regularised)", "Zhang and Zhang, reliable KF",
+               True, True, False, _from("reliable", "reliable"), smooths=False),
+        Method("rkf-literal", "the same to the letter: gives back its input", "Zhang and Zhang, reliable KF",
+               True, True, False, _from("reliable", "reliable", literal=True), smooths=False),
+        Method("wavelet-akf", "adaptive Kalman filter, then wavelets", "Wu and Ran 2021",
+               False, True, False, _from("wavelet"), smooths=False, needs=("pywt", "PyWavelets>=1.5")),
     )
 }  # fmt: skip
 
@@ -72,12 +122,36 @@ def named(name: str) -> Method:
     raise UsageError(f"there is no method {name!r}{hint} (`ftproc filter --list-methods` lists them)")
 
 
+def obstacle(method: Method, smooth: bool, made_for: str | None) -> str | None:
+    """Why the method cannot be run so, as a sentence; None if it can. made_for: the method that the model, if there is
+    one, was trained for."""
+    if method.needs is not None and find_spec(method.needs[0]) is None:
+        package = method.needs[1]
+        return f'{method.name} needs {package.split(">")[0]}, which is not installed: pip install "{package}".'
+    if smooth and not method.smooths:
+        return f"{method.name} has no smoother; leave --smooth out."
+    if method.own_model and (made_for is None or not method.suits(made_for)):
+        train = f"ftproc train --method {method.name} --scenario manoeuvre -o M.safetensors"
+        return f"{method.name} needs a model trained for it: {train}, then --model M.safetensors."
+    if method.corrected and made_for is not None and not method.suits(made_for):
+        return f"{method.name} cannot use a model that was trained for {made_for}; give another with --model, or none."
+    return None
+
+
 def list_methods() -> str:
     """A table of the methods for the terminal."""
     rows = [("name", "what it is", "source", "causal", "outliers", "needs a model")]
     yes = {True: "yes", False: "no"}
     rows += [
-        (m.name, m.title, m.source, yes[m.causal], yes[m.handles_outliers], yes[m.corrected]) for m in METHODS.values()
+        (
+            m.name,
+            m.title,
+            m.source,
+            yes[m.causal],
+            yes[m.handles_outliers],
+            "its own" if m.own_model else yes[m.corrected],
+        )
+        for m in METHODS.values()
     ]
     widths = [max(len(r[i]) for r in rows) for i in range(6)]
     return "\n".join("  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
@@ -51,8 +52,9 @@ class Detection:
 class Score:
     """What `score` finds; everything after `average_gradient` needs a truth and is None without one.
 
-    samples: rows of the trajectory. matched, interpolated, unmatched: of these, how many have a truth at
-    that very time, between two of its times, or none. without_estimate: matched or interpolated, but
+    sees: what the estimates rest on (past readings, or the whole record); smoothed: by --smooth; both None when the
+    file does not say. samples: rows of the trajectory. matched, interpolated, unmatched: of these, how many have a
+    truth at that very time, between two of its times, or none. without_estimate: matched or interpolated, but
     without a position. rmse_seed_m: mean over the samples of the norm of the position error (Zuo et al.
     2021 eq. 20 and 21, called RMSE there). rmse_3d_m, rmse_x_m ...: root mean square, in 3-D and per axis;
     velocity likewise, None if the truth has none. max_error_m, p95_error_m, p99_error_m: of the norm of the
@@ -88,6 +90,8 @@ class Score:
     nees_position: float | None = None
     sigma_verdict: str | None = None
     outliers: dict[str, Detection] | None = None
+    sees: str | None = None
+    smoothed: bool | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Nested and JSON-serialisable: what is not known is left out, what could not be computed is None."""
@@ -101,10 +105,14 @@ def score(trajectory: Trajectory, truth: Truth | None = None) -> Score:
     The truth is matched by time (see `matching.match`), never extrapolated. Its own average gradient is
     taken at the matched samples, so that the two compare.
     """
-    method = trajectory.metadata.get("method")
+    method, sees = trajectory.metadata.get("method"), trajectory.metadata.get("sees")
+    settings = trajectory.metadata.get("settings")
+    smoothed = settings.get("smooth") if isinstance(settings, Mapping) else None
     known: dict[str, Any] = {
         "trajectory": trajectory.name,
         "method": method if isinstance(method, str) else None,
+        "sees": sees if isinstance(sees, str) else None,
+        "smoothed": smoothed if isinstance(smoothed, bool) else None,
         "samples": len(trajectory),
         "average_gradient": average_gradient(trajectory.measurement),
     }

@@ -10,6 +10,7 @@ from pathlib import PurePath
 from typing import Any
 
 from ftproc.errors import UsageError
+from ftproc.scoring import comparison
 from ftproc.scoring.figures import Score
 
 TABLE_WIDTH = 100
@@ -57,7 +58,7 @@ def render(scores: Sequence[Score], format: str = "table") -> str:
     json: one score is one object, several are a list. Keys as in `Score`, nested; what needs a truth is
     absent without one; what could not be computed is null. csv: one line per score, keys joined by dots,
     same names; empty where unknown. table: one column per score, in blocks that fit a terminal of 100
-    columns.
+    columns; for several methods held against one truth, one line per method, see `comparison`.
 
     Raises UsageError for another format, and when there is no score.
     """
@@ -98,6 +99,10 @@ def _flat(nested: dict[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def _table(scores: Sequence[Score]) -> str:
+    return comparison.table(scores) if comparison.is_one(scores) else _side_by_side(scores)
+
+
+def _side_by_side(scores: Sequence[Score]) -> str:
     columns = [_flat(score.as_dict()) for score in scores]
     keys = [key for key in _LABELS if any(key in column for column in columns)]
     heads = _headings([score.trajectory for score in scores])

@@ -121,10 +121,45 @@ def test_list_methods(run):
 
 
 def test_all_methods(run, flight):
-    assert run("filter", flight, "--method", "all", "-o", "d").code == 0
+    result = run("filter", flight, "--method", "all", "-o", "d")
+    assert result.code == 0
+    (left_out,) = result.err.splitlines()
+    assert left_out.startswith(
+        "ftproc: left out: bpnn-ekf needs a model trained for it: ftproc train --method bpnn-ekf "
+    )
     found = {read(path).metadata["method"] for path in (flight.parent / "d").glob("*.csv")}
-    assert found == set(registry.METHODS)
+    assert found == set(registry.METHODS) - {"bpnn-ekf"}
     assert (flight.parent / "d" / "flight.ekf.trajectory.csv").exists()
+
+
+def test_all_methods_that_apply(run, flight, monkeypatch):
+    """Without PyWavelets, with the smoother, and with a model for one of them: each gets what suits it."""
+    monkeypatch.setattr(registry, "find_spec", lambda name: None)
+    train = ("--population", "4", "--generations", "1", "--epochs", "3", "--flights", "3")
+    assert run("train", "--method", "bpnn-ekf", "--scenario", "radar", *train, "-o", "m.safetensors").code == 0
+    result = run("filter", flight, "--method", "all", "--smooth", "--model", "m.safetensors", "-o", "d")
+    assert result.code == 0
+    smoothers = {m.name for m in registry.METHODS.values() if m.smooths}
+    assert {read(path).metadata["method"] for path in (flight.parent / "d").glob("*.csv")} == smoothers
+    assert 'ftproc: left out: wavelet-akf needs PyWavelets, which is not installed: pip install "PyWa' in result.err
+    assert "ftproc: left out: gate has no smoother; leave --smooth out." in result.err
+    assert len(result.err.splitlines()) == len(registry.METHODS) - len(smoothers)
+    used = {read(path).metadata["model_sha256"] for path in (flight.parent / "d").glob("*bpnn*.csv")}
+    assert len(used) == 2
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["--method", "gate", "--smooth"], "gate has no smoother; leave --smooth out."),
+        (["--method", "bpnn-ekf"], "bpnn-ekf needs a model trained for it: ftproc train --method bpnn-ekf --scenario"),
+    ],
+)
+def test_a_method_that_cannot_be_run_so(run, flight, args, message):
+    result = run("filter", flight, *args, "-o", "a.csv")
+    assert (result.code, result.out) == (2, "")
+    assert result.err.startswith(f"ftproc: {message}")
+    assert not flight.with_name("a.csv").exists()
 
 
 def test_a_bad_log_does_not_stop_the_others(run, flight):

@@ -77,3 +77,17 @@ def test_wrong_usage(run, here, args, sentence):
     result = run("score", *args)
     assert (result.code, result.out) == (2, "")
     assert sentence in result.err
+
+
+def test_comparison_of_all_methods(run, flight):
+    assert run("filter", flight, "--method", "all", "-o", "d", "--summary", "none").code == 0
+    files = sorted((flight.parent / "d").glob("*.csv"))
+    result = run("score", *files, "--truth", "flight.truth.csv")
+    assert (result.code, result.err) == (0, "")
+    lines = result.out.splitlines()
+    assert len(lines) == len(files) + 5  # a heading, three kinds of method, a note
+    assert lines[1] == "from past readings"
+    assert max(map(len, lines)) <= 120
+    rows = list(csv.DictReader(io.StringIO(run("score", *files, "--truth", "flight.truth.csv", "--format", "csv").out)))
+    assert len(rows) == len(files)  # in the order given, with the keys of a single score
+    assert {"trajectory", "method", "samples", "rmse_3d_m", "outliers.range.recall"} <= rows[0].keys()

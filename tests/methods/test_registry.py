@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from ftproc import pipeline
 from ftproc.errors import UsageError
 from ftproc.methods import registry
 from ftproc.methods.estimate import Readings
-from ftproc.settings import FilterSettings
+from ftproc.settings import FilterSettings, TrainSettings
 from tests.simulated import simulate
 
 
@@ -21,7 +24,7 @@ def test_every_method_runs(name):
     found = method.run(readings, FilterSettings(method=name))
     assert found.run.state.shape == (len(flight.log), 9)
     assert found.label.shape == (len(flight.log), 3)
-    assert np.isfinite(found.run.state).all()
+    assert np.isfinite(found.run.state).all() == (found.cleaned is None)
     assert bool(found.label[np.isfinite(flight.log.measurement)].any()) == method.handles_outliers
 
 
@@ -35,7 +38,7 @@ def test_default_is_the_anti_outlier_filter():
     ("name", "message"),
     [
         ("ufk", "there is no method 'ufk'; did you mean 'ukf'? (`ftproc filter --list-methods` lists them)"),
-        ("wavelets!", "there is no method 'wavelets!' (`ftproc filter --list-methods` lists them)"),
+        ("butterworth!", "there is no method 'butterworth!' (`ftproc filter --list-methods` lists them)"),
     ],
 )
 def test_unknown_method_names_the_nearest(name, message):
@@ -51,3 +54,51 @@ def test_list_shows_every_method():
         assert line.startswith(method.name + " ")
         assert method.title in line
         assert method.source in line
+
+
+@pytest.mark.parametrize(
+    ("name", "smooth", "made_for", "message"),
+    [
+        ("ga-bpnn-ukf", True, None, None),
+        ("ga-bpnn-ukf", False, "ga-bpnn-ukf", None),
+        ("ukf", False, "bpnn-ekf", None),
+        ("bpnn-ekf", False, "bpnn-ekf", None),
+        ("gate", True, None, "gate has no smoother; leave --smooth out."),
+        (
+            "bpnn-ekf", False, "ga-bpnn-ukf",
+            "bpnn-ekf needs a model trained for it: ftproc train --method bpnn-ekf --scenario manoeuvre "
+            "-o M.safetensors, then --model M.safetensors.",
+        ),
+        (
+            "ga-bpnn-ukf", False, "bpnn-ekf",
+            "ga-bpnn-ukf cannot use a model that was trained for bpnn-ekf; give another with --model, or none.",
+        ),
+    ],
+)  # fmt: skip
+def test_obstacles(name, smooth, made_for, message):
+    assert registry.obstacle(registry.named(name), smooth, made_for) == message
+
+
+def test_missing_extra_is_a_sentence(monkeypatch):
+    monkeypatch.setattr(registry, "find_spec", lambda name: None)
+    message = 'wavelet-akf needs PyWavelets, which is not installed: pip install "PyWavelets>=1.5".'
+    assert registry.obstacle(registry.named("wavelet-akf"), False, None) == message
+    with pytest.raises(UsageError) as caught:
+        pipeline.filter_log(simulate("cruise", duration_s=10.0).log, FilterSettings(method="wavelet-akf"))
+    assert str(caught.value) == message
+
+
+def test_a_model_for_the_ekf_corrects_the_ekf_and_only_that():
+    flights = [simulate("cruise", seed=seed, duration_s=60.0) for seed in range(4)]
+    settings = TrainSettings(method="bpnn-ekf", hidden=4, epochs=20, seed=1)
+    model = pipeline.train_flights([(f.log, f.truth) for f in flights], settings)
+    assert model.made_for == "bpnn-ekf"
+    assert model.settings["start"] == "random"
+    model = replace(model, gain=np.full(6, 0.5))  # whatever held-out flights say
+    log = flights[0].log
+    plain = pipeline.filter_log(log, FilterSettings(method="ekf"))
+    corrected = pipeline.filter_log(log, FilterSettings(method="bpnn-ekf"), model)
+    assert np.abs(corrected.correction).max() > 0
+    np.testing.assert_allclose(corrected.state[:, :6] - corrected.correction, plain.state[:, :6], atol=1e-9)
+    with pytest.raises(UsageError, match=r"^ga-bpnn-ukf cannot use a model that was trained for bpnn-ekf; "):
+        pipeline.filter_log(log, FilterSettings(), model)

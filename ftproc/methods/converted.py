@@ -1,0 +1,27 @@
+"""The linear Kalman filter on readings converted to positions; see `ftproc.core.converted`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ftproc.core.converted import run_converted
+from ftproc.core.forward import FilterRun, run_spans
+from ftproc.methods.anti_outlier import finished, prepare
+from ftproc.methods.estimate import Estimate, Readings
+from ftproc.records import FloatArray
+from ftproc.settings import FilterSettings
+
+
+def estimate(readings: Readings, settings: FilterSettings) -> Estimate:
+    """Convert and filter; every reading is used."""
+    model, starts, _ = prepare(readings, settings)
+    time_s, measurement, _ = readings
+
+    def span(first: int, stop: int, x: FloatArray, p: FloatArray, run: FilterRun) -> float:
+        return run_converted(
+            first, stop, time_s, measurement, model.noise_variance, model.jerk, model.knot_s, x, p, run
+        )
+
+    run = run_spans(time_s, measurement, model, starts, span)
+    weight = np.isfinite(measurement).astype(float)
+    return finished(readings, settings, run, weight, weight, model, starts)

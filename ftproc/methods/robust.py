@@ -1,0 +1,51 @@
+"""UKFs that weigh readings down instead of editing them: Huber, Student t, maximum correntropy. One kernel, three
+weights; see `ftproc.core.robust`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ftproc.core import robust
+from ftproc.core.forward import FilterRun, run_spans
+from ftproc.methods.anti_outlier import finished, prepare
+from ftproc.methods.estimate import Estimate, Readings
+from ftproc.records import FloatArray
+from ftproc.settings import FilterSettings
+
+HUBER_K = 1.345  # sigmas: 95 % efficient on Gaussian noise
+STUDENT_NU = 4.0  # degrees of freedom
+CORRENTROPY_B = 2.5  # sigmas: bandwidth of the kernel
+LOST_AT = 10.0  # times the range that 99 % of the readings stay below: no target is there
+
+
+def huber(readings: Readings, settings: FilterSettings) -> Estimate:
+    """Huber's weight min(1, k / u)."""
+    return _run(readings, settings, robust.HUBER, HUBER_K)
+
+
+def student(readings: Readings, settings: FilterSettings) -> Estimate:
+    """The weight (nu + 1) / (nu + u^2) of Student's t."""
+    return _run(readings, settings, robust.STUDENT, STUDENT_NU)
+
+
+def correntropy(readings: Readings, settings: FilterSettings) -> Estimate:
+    """The weight exp(-u^2 / (2 b^2)) of the maximum correntropy criterion."""
+    return _run(readings, settings, robust.CORRENTROPY, CORRENTROPY_B)
+
+
+def _run(readings: Readings, settings: FilterSettings, kind: int, parameter: float) -> Estimate:
+    model, starts, _ = prepare(readings, settings)
+    time_s, measurement, _ = readings
+
+    def span(first: int, stop: int, x: FloatArray, p: FloatArray, run: FilterRun) -> float:
+        return robust.run_robust(
+            first, stop, time_s, measurement, model.noise_variance, model.jerk, model.knot_s, kind, parameter, x, p, run
+        )
+
+    run = run_spans(time_s, measurement, model, starts, span)
+    if not np.linalg.norm(run.state[:, :3], axis=1).max() < LOST_AT * np.nanquantile(np.abs(measurement[:, 0]), 0.99):
+        raise ValueError(f"{settings.method} lost the track, and has no way to take it up again; use ga-bpnn-ukf")
+    at_gate = robust.weight_of(kind, parameter, settings.gate)  # a reading with less is called an outlier
+    kept = (run.weight > at_gate).astype(float)
+    kept[: starts[0].sample] = np.isfinite(measurement[: starts[0].sample])  # extrapolated, not judged
+    return finished(readings, settings, run, run.weight, kept, model, starts)

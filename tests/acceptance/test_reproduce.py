@@ -1,0 +1,59 @@
+"""`make reproduce`: every claim that it marks, and the page itself."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from tests.acceptance.reproduce import __main__ as reproduce
+from tests.acceptance.reproduce import range_test
+from tests.acceptance.reproduce.page import Page, table
+
+
+@pytest.mark.parametrize(("claim", "here", "holds"), range_test.claims(), ids=lambda value: str(value)[:40])
+def test_claims_of_the_range_test(claim, here, holds):
+    assert holds, here
+
+
+def test_an_outlier_smaller_than_the_grown_gate_is_let_in_at_the_sixth():
+    """The limit that the page states: 4 sqrt(P + 6 Q + R), with P the steady variance."""
+    p = range_test.P0
+    for _ in range(50):
+        s = p + range_test.Q + range_test.R
+        p = (p + range_test.Q) * range_test.R / s
+    limit = range_test.SIGMAS * np.sqrt(p + 6 * range_test.Q + range_test.R)
+    for size, survives in ((limit + 0.08, True), (limit - 0.08, False)):
+        z = range_test.readings(range(30, 36), by=np.full(2, -size))
+        assert (range_test.worst(range_test.kalman(z, True)) < range_test.NEAR) == survives
+
+
+def test_page_has_a_section_and_plots_for_each_experiment(tmp_path, capsys):
+    assert list(reproduce.experiments())[:2] == ["zuo2021", "range_test"]
+    reproduce.main(["range_test"], tmp_path)
+    assert capsys.readouterr().out == f"-> {tmp_path / 'reproduce.md'}\n"
+    text = (tmp_path / "reproduce.md").read_text()
+    plots = re.findall(r"\]\((\w+\.png)\)", text)
+    assert len(plots) == 3
+    for plot in plots:
+        assert (tmp_path / plot).read_bytes().startswith(b"\x89PNG")
+    assert "| yes |" in text
+    assert "**no**" not in text
+
+
+def test_unknown_experiment_is_a_sentence(tmp_path):
+    with pytest.raises(SystemExit, match=r"^there is no experiment alchemy; there are zuo2021, range_test"):
+        reproduce.main(["alchemy"], tmp_path)
+
+
+def test_markdown_table():
+    assert table(("a", "b"), [(1.23456, True), ("x", False)]) == (
+        "| a | b |\n| --- | --- |\n| 1.235 | yes |\n| x | **no** |\n"
+    )
+
+
+def test_page_directory_is_used(tmp_path):
+    shown = Page(tmp_path).plot("one", "One", lambda axis: axis.plot([0, 1], label="line"))
+    assert shown == "![One](one.png)\n\n*One*\n"
+    assert (tmp_path / "one.png").exists()
