@@ -5,13 +5,15 @@ The results come in the order of the tasks, and are the same bytes whatever the 
 
 from __future__ import annotations
 
+import contextlib
 import traceback
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from ftproc.errors import FtprocError
+from ftproc.errors import FtprocError, FtprocWarning
 from ftproc.settings import FilterSettings
 
 if TYPE_CHECKING:
@@ -89,7 +91,7 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
             azimuth_from=recipe.azimuth_from, keep_columns=recipe.keep_columns,
         )  # fmt: skip
         settings = replace(recipe.settings, method=task.method or recipe.settings.method)
-        with warm.announced(say):
+        with warm.announced(say), _passed_on(task.log, say):
             trajectory = pipeline.filter_log(log, settings, _model(recipe.model))
         if settings.site is not None:
             trajectory = geodesy.with_geodetic(trajectory, settings.site)
@@ -99,6 +101,26 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
         raise
     except Exception as error:
         return Outcome(task, failure=failure(error, task.log))
+
+
+@contextlib.contextmanager
+def _passed_on(source: str, say: Say | None) -> Iterator[None]:
+    """Inside the block, warnings of ours go to `say`, naming their source."""
+    if say is None:
+        yield
+        return
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", FtprocWarning)
+        show = warnings.showwarning
+
+        def tell(message: Warning | str, category: type[Warning], *where: Any) -> None:
+            if issubclass(category, FtprocWarning):
+                say(f"{source}: {message}")
+            else:
+                show(message, category, *where)
+
+        warnings.showwarning = tell  # type: ignore[assignment]
+        yield
 
 
 def failure(error: BaseException, source: str | None = None) -> Failure:

@@ -60,6 +60,7 @@ def warm() -> None:
         {"editing": "forward", "gain_form": True},
         {"editing": "none"},
         {"method": "ekf"},
+        {"method": "renpf"},
     )
     for path in paths:
         pipeline.filter_log(log, replace(FilterSettings(), **path))

@@ -54,6 +54,8 @@ def _recipe(given: dict[str, Any]) -> Recipe:
         jerk_psd_m2ps5=given["jerk"],
         gate=given["gate"],
         max_patch_s=given["max_patch"],
+        particles=given["particles"],
+        seed=given["seed"],
         gain_form=given["weight_form"] == "gain",
         site=given["site"],
     )

@@ -39,7 +39,7 @@ def unedited(readings: Readings, settings: FilterSettings, extended: bool = Fals
     weight = np.isfinite(readings.measurement).astype(float)
     run = forward.filter_log(*readings[:2], weight, model, starts, extended)
     smoothed = _smoothed(readings, settings, weight, model, starts)
-    return Estimate(run, _labels(weight, readings), model, smoothed, _anew(starts))
+    return Estimate(run, labels(weight, readings), model, smoothed, _anew(starts))
 
 
 def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[Start], FloatArray]:
@@ -68,8 +68,8 @@ def _two_pass(readings: Readings, settings: FilterSettings) -> Estimate:
     starts = editing.smoothed_starts(edited.smoothed)
     run = forward.filter_log(*readings[:2], edited.weight, edited.model, starts)
     smoothed = edited.smoothed if settings.smooth else None
-    labels = _labels(edited.weight, readings)
-    return Estimate(run, labels, edited.model, smoothed, _anew(starts), edited.settled, edited.slow_noise)
+    label = labels(edited.weight, readings)
+    return Estimate(run, label, edited.model, smoothed, _anew(starts), edited.settled, edited.slow_noise)
 
 
 def _anew(starts: list[Start]) -> tuple[int, ...]:
@@ -89,7 +89,7 @@ def _recursive(readings: Readings, settings: FilterSettings) -> Estimate:
     run, begun = gate.filter_and_edit(time_s, measurement, allowed, model, starts, how)
     kept = np.where(run.weight > gate.rejection_weight(settings.gate), 1.0, 0.0)
     smoothed = _smoothed(readings, settings, kept, model, begun)
-    return Estimate(run, _labels(kept, readings), model, smoothed, _anew(begun))
+    return Estimate(run, labels(kept, readings), model, smoothed, _anew(begun))
 
 
 def _given(readings: Readings, settings: FilterSettings) -> FloatArray:
@@ -103,7 +103,8 @@ def _smoothed(
     return smooth_log(*readings[:2], weight, model, starts) if settings.smooth else None
 
 
-def _labels(weight: FloatArray, readings: Readings) -> FlagArray:
+def labels(weight: FloatArray, readings: Readings) -> FlagArray:
+    """(n, 3) good, isolated, patch or missing from weights (n, 3), zero where rejected."""
     label = indicators.label_runs(weight, readings.measurement, LONGEST_ISOLATED).astype(np.uint8)
     label[~np.isfinite(readings.measurement)] = MISSING
     return label

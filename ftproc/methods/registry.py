@@ -28,6 +28,7 @@ class Method:
     handles_outliers: bool
     corrected: bool
     run: Run
+    random: bool = False  # draws random numbers, so that --particles and --seed matter
 
 
 def _anti_outlier(readings: Readings, settings: FilterSettings) -> Estimate:
@@ -48,6 +49,15 @@ def _ekf(readings: Readings, settings: FilterSettings) -> Estimate:
     return anti_outlier.unedited(readings, settings, extended=True)
 
 
+def _ensemble(name: str) -> Run:
+    def run(readings: Readings, settings: FilterSettings) -> Estimate:
+        from ftproc.methods import ensemble
+
+        return ensemble.estimate(readings, settings, name)
+
+    return run
+
+
 METHODS: dict[str, Method] = {
     m.name: m
     for m in (
@@ -57,6 +67,14 @@ METHODS: dict[str, Method] = {
                True, False, True, _ukf),
         Method("ukf", "unscented Kalman filter", "Julier and Uhlmann 2004", True, False, False, _ukf),
         Method("ekf", "extended Kalman filter", "Zuo et al. 2021, eq. 4", True, False, False, _ekf),
+        Method("enkf", "ensemble Kalman filter", "Evensen 1994",
+               True, False, False, _ensemble("enkf"), random=True),
+        Method("enpf", "particle filter with an EnKF for its proposals", "Shao et al. 2020",
+               True, False, False, _ensemble("enpf"), random=True),
+        Method("enpf-chi2", "the same behind a chi-square gate", "Shao et al. 2020",
+               True, True, False, _ensemble("enpf-chi2"), random=True),
+        Method("renpf", "particle filter with fuzzy weights and Markov chains", "Shao et al. 2020",
+               True, True, False, _ensemble("renpf"), random=True),
     )
 }  # fmt: skip
 
