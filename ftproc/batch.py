@@ -5,14 +5,16 @@ The results come in the order of the tasks, and are the same bytes whatever the 
 
 from __future__ import annotations
 
+import contextlib
 import time
 import traceback
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from ftproc.errors import FtprocError
+from ftproc.errors import FtprocError, FtprocWarning
 from ftproc.settings import FilterSettings, Station
 
 if TYPE_CHECKING:
@@ -100,7 +102,7 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
         settings = replace(recipe.settings, method=task.method or recipe.settings.method)
         named = None if task.method is None else registry.named(task.method)
         model = model_named(recipe.model) if named is None else model_for(named, recipe.model)
-        with warm.announced(say):
+        with warm.announced(say), _passed_on(task.log, say):
             trajectory = pipeline.filter_log(log, settings, model)
         trajectory = geodesy.located(trajectory, settings)
         trajectories.write(trajectory, task.output)
@@ -119,6 +121,26 @@ def model_for(method: Method, name: str) -> Model | None:
     by side, one model cannot suit them all. Raises ModelError."""
     model = model_named(name)
     return model if model is None or method.suits(model.made_for) else model_named(PACKAGED)
+
+
+@contextlib.contextmanager
+def _passed_on(source: str, say: Say | None) -> Iterator[None]:
+    """Inside the block, warnings of ours go to `say`, naming their source."""
+    if say is None:
+        yield
+        return
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", FtprocWarning)
+        show = warnings.showwarning
+
+        def tell(message: Warning | str, category: type[Warning], *where: Any) -> None:
+            if issubclass(category, FtprocWarning):
+                say(f"{source}: {message}")
+            else:
+                show(message, category, *where)
+
+        warnings.showwarning = tell  # type: ignore[assignment]
+        yield
 
 
 def failure(error: BaseException, source: str | None = None) -> Failure:

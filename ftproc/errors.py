@@ -15,6 +15,10 @@ class FtprocError(Exception):
     exit_code = 1
 
 
+class FtprocWarning(UserWarning):
+    """Something the user should know that does not stop the work."""
+
+
 class InputError(FtprocError):
     """A log, truth, trajectory or other input cannot be processed."""
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 EDITING = ("two-pass", "forward", "none")
 ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of a component that the log says too little about
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # stands in for a component that is missing throughout
+FEWEST_PARTICLES = 20
 FEWEST_READINGS = 8  # of a component, for its noise to be found from them
 PACKAGED_MODEL = Path(__file__).parent / "correction" / "default.safetensors"
 
@@ -89,6 +90,8 @@ def _diagnostics(log: MeasurementLog, estimate: Estimate) -> Diagnostics:
 def _check(settings: FilterSettings) -> None:
     if settings.editing not in EDITING:
         raise UsageError(f"editing is one of {', '.join(EDITING)}, not {settings.editing!r}")
+    if settings.particles < FEWEST_PARTICLES:
+        raise UsageError(f"particles must be {FEWEST_PARTICLES} or more, not {settings.particles}")
     numbers: list[tuple[str, float | None]] = [("noise", v) for v in settings.noise or ()]
     numbers += [("jerk", settings.jerk_psd_m2ps5), ("gate", settings.gate), ("max-patch", settings.max_patch_s)]
     for name, value in numbers:
@@ -154,6 +157,7 @@ def _provenance(
             "geoid_m": settings.geoid_m,
             "ecef": settings.ecef,
             "noise_given": settings.noise is not None and None not in settings.noise,
+            **({"particles": settings.particles, "seed": settings.seed} if method.random else {}),
             "jerk_given": settings.jerk_psd_m2ps5 is not None,
             "noise_range_m": float(sigma[0]),
             "noise_azimuth_rad": float(sigma[1]),

@@ -39,6 +39,8 @@ class FilterSettings:
     jerk_psd_m2ps5: float | None = None  # spectral density of white jerk
     gate: float = 4.0  # sigmas
     max_patch_s: float | None = None  # longest patch of outliers expected, for the recursive gate
+    particles: int = 100  # of the ensemble and particle filters
+    seed: int = 0  # of their random numbers
     gain_form: bool = False  # forward editing scales the gain by m (the paper's letter) instead of R by 1/m
     site: tuple[float, float, float] | None = None  # latitude deg, longitude deg, height m above the ellipsoid
     ecef: bool = False  # with a site: earth-centred coordinates too

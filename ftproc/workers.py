@@ -10,6 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 from ftproc.batch import Failure, Outcome, Recipe, Say, Task, filter_one
+from ftproc.warm import COMPILING
 
 _DIED = "its worker process died (out of memory, or killed). Use fewer --jobs, or split the log."
 
@@ -68,9 +69,12 @@ def _prepare(recipe: Recipe, stop: Any, said: Any, say: Say | None) -> None:
 
 
 def _once(say: Say, said: Any) -> Say:
-    """`say` for the first of all workers that has something to say."""
+    """`say`, but that the kernels are being compiled only from the first of all workers."""
 
     def tell(text: str) -> None:
+        if text != COMPILING:
+            say(text)
+            return
         with said.get_lock():
             first, said.value = not said.value, True
         if first:

@@ -170,6 +170,11 @@ _TRACKER: tuple[Callable[[Any], Any], ...] = (
         "[default: 4 s or 32 samples]",
     ),
     click.option(
+        "--particles", type=click.IntRange(min=20), default=FilterSettings.particles, metavar="N",
+        help="Members of the ensemble and particle filters.",
+    ),
+    seed("Random numbers of these filters"),
+    click.option(
         "--weight-form", type=click.Choice(["noise", "gain"]), default="noise",
         help="In forward editing the outlier weight divides the measurement noise, or scales the gain as Zuo et al. "
         "2021 write it.",

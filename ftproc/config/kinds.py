@@ -33,6 +33,17 @@ def positive() -> Kind:
     return number(low=math.ulp(0.0))
 
 
+def whole(low: int) -> Kind:
+    """A whole number from low on."""
+
+    def kind(value: object) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or value < low:
+            raise ValueError(f"a whole number from {low}")
+        return value
+
+    return kind
+
+
 def words(*known: str) -> Kind:
     """One of some words."""
 

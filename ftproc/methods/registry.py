@@ -26,7 +26,8 @@ class Method:
     """causal: the estimate of a sample needs no later one, once noise and start are set (two-pass editing, the
     default of the main method, looks at the whole record to decide what is an outlier). corrected: the network
     works on its output; own_model: only one trained for this very method. smooths: --smooth can be had. needs: a
-    module that must be installed, and the extra that brings it."""
+    module that must be installed, and the extra that brings it. random: it draws random numbers, so --particles and
+    --seed matter."""
 
     name: str
     title: str
@@ -38,6 +39,7 @@ class Method:
     own_model: bool = False
     smooths: bool = True
     needs: tuple[str, str] | None = None
+    random: bool = False
 
     def editing(self, settings: FilterSettings) -> str:
         """How outliers are found: the settings' way in the main method, else by the method's own means or not."""
@@ -107,6 +109,14 @@ METHODS: dict[str, Method] = {
                True, True, False, _from("reliable", "reliable", literal=True), smooths=False),
         Method("wavelet-akf", "adaptive Kalman filter, then wavelets", "Wu and Ran 2021",
                False, True, False, _from("wavelet"), smooths=False, needs=("pywt", "PyWavelets>=1.5")),
+        Method("enkf", "ensemble Kalman filter", "Evensen 1994",
+               True, False, False, _from("ensemble", method="enkf"), smooths=False, random=True),
+        Method("enpf", "particle filter with an EnKF for its proposals", "Shao et al. 2020",
+               True, False, False, _from("ensemble", method="enpf"), smooths=False, random=True),
+        Method("enpf-chi2", "the same behind a chi-square gate", "Shao et al. 2020",
+               True, True, False, _from("ensemble", method="enpf-chi2"), smooths=False, random=True),
+        Method("renpf", "particle filter with fuzzy weights and Markov chains", "Shao et al. 2020",
+               True, True, False, _from("ensemble", method="renpf"), smooths=False, random=True),
     )
 }  # fmt: skip
 

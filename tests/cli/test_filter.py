@@ -78,6 +78,21 @@ def test_every_option_reaches_the_filter(run, flight):
     assert settings["site"] == [48.0, 11.0, 600.0]
 
 
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_random_methods_take_particles_and_a_seed(run, shell, flight, jobs):
+    """And what they warn of is said on stderr, log by log, by workers too."""
+    shutil.copy(flight, "second.csv")
+    options = "--method renpf --particles 40 --seed 3 --summary none"
+    result = shell(f"ftproc filter flight.csv second.csv {options} --jobs {jobs} -o d")
+    warned = "renpf: 40 particles are few for 9 states; 90 or more are trustworthy"
+    said = {f"ftproc: {name}: {warned}" for name in ("flight.csv", "second.csv")}
+    assert (result.code, result.out, set(result.err.splitlines())) == (0, "", said)
+    settings = read("d/flight.trajectory.csv").metadata["settings"]
+    assert (settings["particles"], settings["seed"]) == (40, 3)
+    run("filter", flight, "-o", "plain.csv")
+    assert "particles" not in read("plain.csv").metadata["settings"]
+
+
 def test_auto_is_the_default(run, flight):
     assert run("filter", flight, "-o", "a.csv").code == 0
     assert run("filter", flight, "-o", "b.csv", "--noise", "auto", "--jerk", "AUTO").code == 0
