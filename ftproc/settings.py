@@ -24,10 +24,12 @@ class FilterSettings:
 class TrainSettings:
     """GA-BPNN training: network size, genetic search, back-propagation, hold-out verdict."""
 
-    features: str = "window"  # see ftproc.correction.features
+    features: str = "auto"  # what held-out flights choose, or one of ftproc.correction.feature_sets
     hidden: int = 12
     population: int = 40
     generations: int = 60
     epochs: int = 400
     flights: int = 24  # simulated flights when training on a scenario
     seed: int = 0
+    optimiser: str = "l-bfgs"  # or momentum, as in the paper
+    start: str = "auto"  # first weights, see ftproc.correction.starts

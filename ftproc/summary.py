@@ -153,6 +153,8 @@ def _remarks(s: Mapping[str, Any]) -> list[str]:
         remarks.append("the outlier decisions did not settle: look at the flagged stretches")
     if s["reacquired"]:
         remarks.append(f"the track was taken up anew {s['reacquired']} times (lost, or a gap too long to bridge)")
+    if s["correction_lost_by_smoothing"]:
+        remarks.append("the model corrects the filter only: what was smoothed is not corrected")
     if s["correction_largest_m"] > 0:
         remarks.append(
             f"network correction up to {s['correction_largest_m']:.3g} m; "

@@ -1,13 +1,13 @@
-"""`python -m tests.bench [accuracy] [speed]`: the tables of the README, as Markdown on standard output."""
+"""`python -m tests.bench [accuracy] [correction] [speed]`: the tables of the README, as Markdown on standard output."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
 
-from tests.bench import accuracy, speed
+from tests.bench import accuracy, correction, speed
 
-TABLES = {"accuracy": accuracy, "speed": speed}
+TABLES = {"accuracy": accuracy, "correction": correction, "speed": speed}
 
 
 def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
