@@ -32,4 +32,4 @@ class TrainSettings:
     flights: int = 24  # simulated flights when training on a scenario
     seed: int = 0
     optimiser: str = "l-bfgs"  # or momentum, as in the paper
-    start: str = "auto"  # first weights, see ftproc.correction.starts
+    start: str = "genetic"  # first weights, see ftproc.correction.starts

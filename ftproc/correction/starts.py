@@ -2,7 +2,8 @@
 
 `genetic` is the paper's: all weights are genes (Zuo et al. 2021, section 2.1). `genetic-solved` searches only the
 weights into the hidden layer, solves for the others by least squares, and judges them on other flights than they were
-solved on. `random` and `solved` are the same without the search.
+solved on. `random` and `solved` are the same without the search. None is better than another where it was measured
+(`ftproc train --compare-starts`); training takes the paper's.
 """
 
 from __future__ import annotations

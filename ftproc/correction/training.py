@@ -102,20 +102,16 @@ def _weights(
     progress: Progress | None,
 ) -> FloatArray:
     shape = data.shape(settings.hidden)
-    start = default_start(data.features) if settings.start == "auto" else settings.start
     search = GeneticSettings(population=settings.population, generations=settings.generations)
-    vector = starts.first_weights(start, shape, data.training, search, searching, _told(progress, "genetic search"))
+    vector = starts.first_weights(
+        settings.start, shape, data.training, search, searching, _told(progress, "genetic search")
+    )
     fit = _descended(vector, shape, data, settings, descending, _told(progress, "back-propagation"))
     if shape.direct:  # what is linear asks less of the data, and holds farther from them
         straight = starts.linear(shape, data.training)
         if fit.validation_cost > (1.0 - BEND_WORTH) * network.cost(straight, shape, *data.validation):
             return straight
     return fit.vector
-
-
-def default_start(features: Features) -> str:
-    """The paper's own search for the paper's network; for the others the one that came out best."""
-    return "genetic-solved" if features.direct else "genetic"
 
 
 def _descended(
@@ -140,8 +136,8 @@ def _streams(seed: int) -> list[np.random.Generator]:
 
 
 def _check_choices(settings: TrainSettings) -> None:
-    if settings.optimiser not in OPTIMISERS or settings.start not in ("auto", *STARTS):
-        raise UsageError(f"optimiser is one of {', '.join(OPTIMISERS)}; start is one of auto, {', '.join(STARTS)}")
+    if settings.optimiser not in OPTIMISERS or settings.start not in STARTS:
+        raise UsageError(f"optimiser is one of {', '.join(OPTIMISERS)}; start is one of {', '.join(STARTS)}")
 
 
 def _check_enough(tables: Sequence[tuple[FloatArray, FloatArray]]) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
@@ -39,6 +38,7 @@ class Case:
     outliers: str | None = None
     told: Callable[[tuple[float, float, float], float], FilterSettings] | None = None
     training: int = TRAINING
+    duration_s: float | None = None
 
 
 CASES = {
@@ -61,7 +61,8 @@ def flights(case: Case, seeds: range) -> dict[str, list[Flight]]:
     """Runs with truth, by stage."""
     found: dict[str, list[Flight]] = {"filter": [], "smoother": []}
     for seed in seeds:
-        flight = simulate(case.scenario, seed=seed, instrument=case.instrument, outliers=case.outliers)
+        how = {"instrument": case.instrument, "outliers": case.outliers, "duration_s": case.duration_s}
+        flight = simulate(case.scenario, seed=seed, **how)  # type: ignore[arg-type]
         known = pipeline.known_flights([(flight.log, flight.truth)], _told(case, flight))
         for stage in found:
             found[stage] += known[stage]
@@ -76,20 +77,32 @@ def _told(case: Case, flight: Simulation) -> FilterSettings:
     return case.told(noise, float(np.exp(np.mean(np.log(settings["jerk_psd_m2ps5"])))))
 
 
-@cache
-def learned(name: str) -> Model:
-    """The model from the training flights of a case."""
-    case = CASES[name]
-    return train_model(flights(case, range(FIRST_SEED, FIRST_SEED + case.training)), TrainSettings())
+@dataclass(frozen=True)
+class Result:
+    """model: what was learned. squares: by stage and quantity, the sums of squared errors of each new flight (n, 2),
+    with the network and without."""
+
+    model: Model
+    squares: dict[str, FloatArray]
+
+    def ratio(self, what: str = "filter position") -> float:
+        """Root mean square of the error with the network over that without, over all new flights."""
+        total = self.squares[what].sum(0)
+        return float(np.sqrt(total[0] / total[1]))
+
+    def interval(self, what: str) -> str:
+        """The ratio with its 90 % bootstrap interval over flights."""
+        each = self.squares[what]
+        drawn = each[np.random.default_rng(0).integers(0, len(each), (2000, len(each)))].sum(1)
+        low, high = np.quantile(np.sqrt(drawn[:, 0] / drawn[:, 1]), [0.05, 0.95])
+        return f"{self.ratio(what):.3f} ({low:.3f} to {high:.3f})"
 
 
-@cache
-def squares(name: str) -> dict[str, FloatArray]:
-    """Sums of squared errors of each new flight (NEW, 2), with and without the network, by stage and quantity."""
-    case, model = CASES[name], learned(name)
-    new = flights(case, range(FIRST_SEED + TRAINING, FIRST_SEED + TRAINING + NEW))
-    found = {}
-    for stage, runs in new.items():
+def result(case: Case, new: int = NEW, settings: TrainSettings | None = None) -> Result:
+    """Learn from the training flights of a case, and hold what was learned against new ones."""
+    model = train_model(flights(case, range(FIRST_SEED, FIRST_SEED + case.training)), settings or TrainSettings())
+    squares = {}
+    for stage, runs in flights(case, range(FIRST_SEED + TRAINING, FIRST_SEED + TRAINING + new)).items():
         for quantity, columns in (("position", slice(0, 3)), ("velocity", slice(3, 6))):
             pairs = []
             for flight in runs:
@@ -98,27 +111,14 @@ def squares(name: str) -> dict[str, FloatArray]:
                 left = error if used is None else error - correct(flight.run, used).values
                 known = np.isfinite(error).all(1)
                 pairs.append([np.sum(e[known][:, columns] ** 2) for e in (left, error)])
-            found[f"{stage} {quantity}"] = np.array(pairs)
-    return found
-
-
-def ratio(name: str, what: str = "filter position") -> float:
-    """Root mean square of the error with the network over that without, over all new flights."""
-    total = squares(name)[what].sum(0)
-    return float(np.sqrt(total[0] / total[1]))
-
-
-def _interval(name: str, what: str) -> str:
-    each = squares(name)[what]
-    drawn = each[np.random.default_rng(0).integers(0, len(each), (2000, len(each)))].sum(1)
-    low, high = np.quantile(np.sqrt(drawn[:, 0] / drawn[:, 1]), [0.05, 0.95])
-    return f"{ratio(name, what):.3f} ({low:.3f} to {high:.3f})"
+            squares[f"{stage} {quantity}"] = np.array(pairs)
+    return Result(model, squares)
 
 
 def rows() -> Iterator[tuple[str, ...]]:
     """One row per case."""
-    for name, case in CASES.items():
-        model = learned(name)
-        used = ", ".join(f"{stage.features.name}" for stage in model.stages.values() if stage.helps)
-        ratios = (_interval(name, what) for what in ("filter position", "filter velocity", "smoother position"))
-        yield (case.name, str(case.training), used or "none", *ratios)
+    for case in CASES.values():
+        found = result(case)
+        used = (f"{stage.features.name} ({name})" for name, stage in found.model.stages.items() if stage.helps)
+        ratios = (found.interval(what) for what in ("filter position", "filter velocity", "smoother position"))
+        yield (case.name, str(case.training), ", ".join(used) or "none", *ratios)
