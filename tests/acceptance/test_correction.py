@@ -14,7 +14,7 @@ QUICK = TrainSettings(epochs=120, population=10, generations=10)
 
 @pytest.mark.parametrize(("name", "bound"), [("a", 0.65), ("c", 0.95)])
 def test_a_filter_that_is_told_wrong_is_corrected(name, bound):
-    found = result(replace(CASES[name], training=16, duration_s=50.0), new=4, settings=QUICK)
+    found = result(replace(CASES[name], training=14, duration_s=50.0), new=4, settings=QUICK)
     assert found.ratio() <= bound
 
 
@@ -25,14 +25,14 @@ def test_an_instrument_learned_from_two_calibration_flights_is_corrected_on_new_
 
 
 def test_a_repeatable_elevation_bias_is_taken_out_of_filter_and_smoother():
-    found = result(replace(CASES["b"], training=8), new=3, settings=QUICK)
+    found = result(replace(CASES["b"], training=8, duration_s=60.0), new=3, settings=QUICK)
     assert {s.features.name for s in found.model.stages.values()} == {"instrument"}
     assert found.ratio() <= 0.6
     assert found.ratio("smoother position") <= 0.6
 
 
 def test_a_filter_that_is_told_right_is_not_harmed():
-    found = result(replace(CASES["matched"], training=8), new=3, settings=QUICK)
+    found = result(replace(CASES["matched"], training=8, duration_s=60.0), new=3, settings=QUICK)
     for what, squares in found.squares.items():
         assert found.ratio(what) <= 1.005
         assert (squares[:, 0] <= 1.01**2 * squares[:, 1]).all()
