@@ -115,6 +115,16 @@ def test_the_envelope_holds_its_training_data_whatever_their_tails() -> None:
         assert not envelope.contains(z + 100.0).any()
 
 
+def test_an_envelope_reaches_so_many_times_as_far() -> None:
+    z = np.random.default_rng(8).normal(size=(500, 4))
+    near, far = Envelope.fit(z), Envelope.fit(z, 3.0)
+    edge = z * np.sqrt(near.limit / near.distance(z))[:, None]
+    assert near.contains(0.99 * edge).all()
+    assert not near.contains(1.01 * edge).any()
+    assert far.contains(2.99 * edge).all()
+    assert not far.contains(3.01 * edge).any()
+
+
 def test_a_column_that_was_constant_in_training_does_not_make_a_razor_thin_envelope() -> None:
     z = np.random.default_rng(7).normal(size=(500, 4))
     z[:, 3] = 0.0
