@@ -57,8 +57,13 @@ def _recipe(config: str | Path | None) -> batch.Recipe:
     return batch.Recipe() if config is None else recipe(load(config))
 
 
-def train(pairs: Sequence[tuple[Any, Any]], settings: TrainSettings | None = None) -> Model:
-    """A correction learnt from (log, truth) pairs: records, files or tables. Raises InputError, UsageError."""
+def train(
+    pairs: Sequence[tuple[Any, Any]], settings: TrainSettings | None = None, filtering: FilterSettings | None = None
+) -> Model:
+    """A correction learnt from (log, truth) pairs: records, files or tables.
+
+    filtering: the settings of the filter that it is made for. Raises InputError, UsageError.
+    """
     from ftproc.files import truth as truths
 
     read = [
@@ -68,7 +73,7 @@ def train(pairs: Sequence[tuple[Any, Any]], settings: TrainSettings | None = Non
         )
         for log, truth in pairs
     ]
-    return pipeline.train_flights(read, settings or TrainSettings())
+    return pipeline.train_flights(read, settings or TrainSettings(), filtering=filtering)
 
 
 def simulate(scenario: str, **options: Any) -> Simulation:

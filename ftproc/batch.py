@@ -176,6 +176,6 @@ def model_named(name: str) -> Model | None:
     if name == NO_MODEL:
         return None
     from ftproc import pipeline
-    from ftproc.correction import model
+    from ftproc.correction import model_file
 
-    return pipeline.default_model() if name == PACKAGED else model.load(name)
+    return pipeline.default_model() if name == PACKAGED else model_file.load(name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,12 +16,15 @@ from ftproc.errors import InputError, UsageError
 from ftproc.files.conventions import CONVENTION, in_words
 from ftproc.methods import registry
 from ftproc.methods.estimate import Estimate, Readings
-from ftproc.records import COMPONENTS, MISSING, Diagnostics, MeasurementLog, Trajectory, Truth
+from ftproc.records import COMPONENTS, MISSING, Diagnostics, FloatArray, MeasurementLog, Trajectory, Truth
 from ftproc.settings import FilterSettings, TrainSettings
 from ftproc.summary import summarise
 
 if TYPE_CHECKING:
+    from ftproc.core.forward import FilterRun
+    from ftproc.core.smoother import SmootherRun
     from ftproc.correction.model import Model
+    from ftproc.correction.samples import Flight
     from ftproc.methods.registry import Method
 
 EDITING = ("two-pass", "forward", "none")
@@ -35,7 +38,7 @@ PACKAGED_MODEL = Path(__file__).parent / "correction" / "default.safetensors"
 @cache
 def default_model() -> Model:
     """The correction that comes with the package. Raises ModelError if its file is damaged."""
-    from ftproc.correction.model import load
+    from ftproc.correction.model_file import load
 
     return load(PACKAGED_MODEL)
 
@@ -59,10 +62,8 @@ def filter_log(log: MeasurementLog, settings: FilterSettings | None = None, mode
     best = estimate.run if estimate.smoothed is None else estimate.smoothed
     state, sigma = best.state.copy(), best.sigma[:, :6].copy()
     correction, outside = np.zeros((len(log), 6)), 0.0
-    if model is not None and method.corrected and estimate.smoothed is None and not absent:
-        from ftproc.correction.apply import correct
-
-        correction, outside = correct(estimate.run, model)
+    if model is not None and method.corrected and not absent:
+        correction, outside = _corrected(estimate, model)
         state[:, :6] += correction
     cleaned = from_cartesian(state[:, :3]) if estimate.cleaned is None else estimate.cleaned
     if absent:  # the stand-in made the filter run; what rests on it must not leave the house
@@ -72,10 +73,29 @@ def filter_log(log: MeasurementLog, settings: FilterSettings | None = None, mode
     elif np.isinf(state).any() or (estimate.cleaned is None and np.isnan(state).any()):
         raise InputError(f"{log.name}: {method.name} diverged; give --noise and --jerk, or check the log's units")
     summary = summarise(log, estimate, absent, correction, outside)
+    summary["correction_lost_by_smoothing"] = bool(
+        model and method.corrected and settings.smooth and model.filter.helps and model.smoother is None
+    )
     return Trajectory(
         log.name, log.row, log.time_s, cleaned, state, sigma, estimate.label, best.nis, correction,
         _provenance(log, method, settings, estimate, model, summary), log.extra, _diagnostics(log, estimate),
     )  # fmt: skip
+
+
+def _corrected(estimate: Estimate, model: Model) -> tuple[FloatArray, float]:
+    """(n, 6) what the network of the stage adds, and the share of samples outside its training."""
+    from ftproc.correction.apply import correct
+
+    if estimate.smoothed is None:
+        return correct(estimate.run, model.filter)
+    if model.smoother is None:
+        return np.zeros((len(estimate.run.time_s), 6)), 0.0
+    return correct(_smoothed(estimate.run, estimate.smoothed), model.smoother)
+
+
+def _smoothed(run: FilterRun, smoothed: SmootherRun) -> FilterRun:
+    """The run with the smoother's state and sigmas in place of the filter's."""
+    return run._replace(state=smoothed.state, sigma=smoothed.sigma, los_sigma=smoothed.los_sigma)
 
 
 def _diagnostics(log: MeasurementLog, estimate: Estimate) -> Diagnostics:
@@ -133,7 +153,7 @@ def _provenance(
     summary: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Everything needed to make the trajectory again."""
-    from ftproc.correction.model import sha256
+    from ftproc.correction.model_file import sha256
 
     sigma = np.sqrt(estimate.model.reading_variance)
     motion = estimate.model.jerk if np.isfinite(estimate.model.jerk).all() else None
@@ -176,20 +196,39 @@ def train_flights(
     pairs: Sequence[tuple[MeasurementLog, Truth]],
     settings: TrainSettings,
     progress: Callable[[str, int, int], None] | None = None,
+    filtering: FilterSettings | None = None,
+    jobs: int = 1,
 ) -> Model:
-    """Filter every log, hold it against its truth, and train a correction on the difference.
+    """Filter and smooth every log, hold it against its truth, and train a correction on the difference.
 
-    Raises InputError when a log cannot be processed or shares no time with its truth, UsageError for a method that
-    takes no correction.
+    filtering: the settings that the correction is made for. Raises InputError when a log cannot be processed or
+    shares no time with its truth, UsageError for a method that takes no correction.
     """
+    from ftproc.correction.stages import train_model
+
+    told = replace(filtering or FilterSettings(), method=settings.method)
+    if registry.named(settings.method).own_model:
+        settings = replace(settings, start="random")
+    model = train_model(known_flights(pairs, told, progress), settings, progress, jobs)
+    made_for = {"editing": told.editing, "noise": told.noise or "auto", "jerk": told.jerk_psd_m2ps5 or "auto"}
+    return replace(model, settings={**model.settings, **made_for})
+
+
+def known_flights(
+    pairs: Sequence[tuple[MeasurementLog, Truth]],
+    filtering: FilterSettings | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> dict[str, list[Flight]]:
+    """Runs with truth, by the stage (`filter`, `smoother`) they come from. Raises InputError as `train_flights`."""
     from ftproc.correction.samples import Flight
-    from ftproc.correction.training import train
     from ftproc.scoring.matching import match
 
+    settings = replace(filtering or FilterSettings(), smooth=True)
+    _check(settings)
     method = registry.named(settings.method)
     if not method.corrected:
         raise UsageError(f"{method.name} takes no correction, so there is nothing to train for it")
-    flights = []
+    flights: dict[str, list[Flight]] = {"filter": [], "smoother": []}
     for number, (log, truth) in enumerate(pairs):
         if progress:
             progress("filtering", number, len(pairs))
@@ -197,11 +236,18 @@ def train_flights(
         if absent:
             names = " and ".join(COMPONENTS[c] for c in absent)
             raise InputError(f"{log.name}: {names} missing throughout; training needs all three components")
-        run = method.run(readings, FilterSettings()).run
+        try:
+            estimate = method.run(readings, settings)
+        except ValueError as cause:
+            raise InputError(_no_start(log, cause)) from cause
         known = match(log.time_s, truth)
         if not np.isfinite(known.position_m).any():
             raise InputError(f"{truth.name}: its times do not overlap those of {log.name}")
-        flights.append(Flight(run, known.position_m, known.velocity_mps, log.name))
+        runs = {"filter": estimate.run}
+        if estimate.smoothed is not None:
+            runs["smoother"] = _smoothed(estimate.run, estimate.smoothed)
+        for stage, run in runs.items():
+            flights[stage].append(Flight(run, known.position_m, known.velocity_mps, log.name))
     if progress:
         progress("filtering", len(pairs), len(pairs))
-    return train(flights, settings, progress, start="random" if method.own_model else "genetic")
+    return {stage: found for stage, found in flights.items() if found}

@@ -51,7 +51,7 @@ class FilterSettings:
 class TrainSettings:
     """GA-BPNN training: network size, genetic search, back-propagation, hold-out verdict."""
 
-    features: str = "window"  # see ftproc.correction.features
+    features: str = "auto"  # what held-out flights choose, or one of ftproc.correction.feature_sets
     hidden: int = 12
     population: int = 40
     generations: int = 60
@@ -59,3 +59,5 @@ class TrainSettings:
     flights: int = 24  # simulated flights when training on a scenario
     seed: int = 0
     method: str = "ga-bpnn-ukf"  # the filter whose error is learnt
+    optimiser: str = "l-bfgs"  # or momentum, as in the paper
+    start: str = "genetic"  # first weights, see ftproc.correction.starts

@@ -31,6 +31,8 @@ def remarks(s: Mapping[str, Any]) -> list[Remark]:
     if correlation > 0:
         text = f"the noise is correlated from sample to sample (up to {correlation:.2f}); the sigmas allow for it"
         found.append(Remark(TRUST, text))
+    if s.get("correction_lost_by_smoothing"):
+        found.append(Remark(TRUST, "the model corrects the filter only: what was smoothed is not corrected"))
     if s["correction_largest_m"] > 0:
         outside = f"{100 * s['correction_outside_training']:.1f} % of samples outside its training got none"
         found.append(Remark(TRUST, f"network correction up to {s['correction_largest_m']:.3g} m; {outside}"))

@@ -12,10 +12,13 @@ from ftproc import __version__, pipeline
 from ftproc.core.geometry import from_cartesian
 from ftproc.correction import apply
 from ftproc.correction.apply import Correction
+from ftproc.correction.model import Model
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import registry
 from ftproc.records import MISSING, MeasurementLog, Truth
 from ftproc.settings import FilterSettings
+from ftproc.summary import text
+from tests.correction.test_apply import constant
 from tests.simulated import simulate
 
 
@@ -82,14 +85,40 @@ def test_packaged_correction_is_bounded_by_the_sigmas(flight):
     plain = pipeline.filter_log(flight.log)
     corrected = pipeline.filter_log(flight.log, model=pipeline.default_model())
     np.testing.assert_allclose(corrected.state[:, :6] - plain.state[:, :6], corrected.correction, atol=1e-9)
-    limit = pipeline.default_model().bound_sigma[:3].max() * np.linalg.norm(plain.sigma[:, :3], axis=1)
+    limit = pipeline.default_model().filter.bound_sigma[:3].max() * np.linalg.norm(plain.sigma[:, :3], axis=1)
     assert (np.linalg.norm(corrected.correction[:, :3], axis=1) <= 1.001 * limit).all()
 
 
-@pytest.mark.parametrize("settings", [{"smooth": True}, {"method": "ukf"}, {"method": "ekf"}], ids=str)
-def test_smoother_and_plain_filters_are_not_corrected(flight, settings):
-    trajectory = pipeline.filter_log(flight.log, FilterSettings(**settings), pipeline.default_model())
-    assert not trajectory.correction.any()
+@pytest.mark.parametrize("method", ["ukf", "ekf"])
+def test_plain_filters_are_not_corrected(flight, method):
+    model = Model({"filter": constant("instrument", 1e-4, bound=1e9)})
+    assert not pipeline.filter_log(flight.log, FilterSettings(method=method), model).correction.any()
+
+
+def test_each_stage_is_corrected_by_its_own_network(flight):
+    model = Model(
+        {"filter": constant("instrument", 1e-4, bound=1e9), "smoother": constant("instrument", 3e-4, bound=1e9)}
+    )
+    for smooth, angle in ((False, 1e-4), (True, 3e-4)):
+        plain = pipeline.filter_log(flight.log, FilterSettings(smooth=smooth))
+        corrected = pipeline.filter_log(flight.log, FilterSettings(smooth=smooth), model)
+        turned = corrected.measurement - plain.measurement
+        np.testing.assert_allclose(turned[30:, 2], angle, rtol=1e-3)
+        np.testing.assert_allclose(corrected.correction, corrected.state[:, :6] - plain.state[:, :6], atol=1e-9)
+        assert not corrected.correction[:, 3:].any()
+        np.testing.assert_array_equal(corrected.sigma, plain.sigma)
+
+
+def test_a_model_without_a_network_for_the_smoother_leaves_it_alone_and_says_so(flight):
+    model = Model({"filter": constant("instrument", 1e-4, bound=1e9)})
+    smoothed = pipeline.filter_log(flight.log, FilterSettings(smooth=True), model)
+    assert not smoothed.correction.any()
+    assert "corrects the filter only" in text(smoothed)
+    for trajectory in (
+        pipeline.filter_log(flight.log, model=model),
+        pipeline.filter_log(flight.log, FilterSettings(smooth=True), pipeline.default_model()),
+    ):
+        assert "corrects the filter only" not in text(trajectory)
 
 
 def test_metadata_is_complete_and_serialisable(flight):

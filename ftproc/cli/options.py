@@ -135,10 +135,32 @@ def azimuth_from(text: str) -> Callable[[F], F]:
 
 def tracker(function: F) -> F:
     """What the filter does: method, editing, tuning, smoothing."""
-    for option in reversed(_TRACKER):
+    return _with(_TRACKER, function)
+
+
+def tuned(function: F) -> F:
+    """Editing, noise and jerk level: what a correction depends on."""
+    return _with(_TUNED, function)
+
+
+def _with(options: tuple[Callable[[Any], Any], ...], function: F) -> F:
+    for option in reversed(options):
         function = option(function)
     return function
 
+
+_TUNED: tuple[Callable[[Any], Any], ...] = (
+    click.option(
+        "--editing", type=click.Choice(["two-pass", "forward", "none"]), default=FilterSettings.editing,
+        help="How outliers are found: with the whole log in view, recursively as a live system must, or not at all.",
+    ),
+    noise(noise_or_auto, AUTO, "; auto, for all or for one: from the log."),
+    click.option(
+        "--jerk", type=number_or_auto, default=AUTO, metavar="S",
+        help="How hard the target manoeuvres: spectral density of white jerk in m2/s5, such as 1 for gentle "
+        "turns and 100 for a fighter; auto: from the log.",
+    ),
+)  # fmt: skip
 
 _TRACKER: tuple[Callable[[Any], Any], ...] = (
     click.option(
@@ -150,16 +172,7 @@ _TRACKER: tuple[Callable[[Any], Any], ...] = (
         help="The network that corrects the filter: a file that `ftproc train` wrote, `none`, or the packaged one.",
     ),
     click.option("--smooth/--no-smooth", help="Add the fixed-interval smoother: the best estimate of trajectory."),
-    click.option(
-        "--editing", type=click.Choice(["two-pass", "forward", "none"]), default=FilterSettings.editing,
-        help="How outliers are found: with the whole log in view, recursively as a live system must, or not at all.",
-    ),
-    noise(noise_or_auto, AUTO, "; auto, for all or for one: from the log."),
-    click.option(
-        "--jerk", type=number_or_auto, default=AUTO, metavar="S",
-        help="How hard the target manoeuvres: spectral density of white jerk in m2/s5, such as 1 for gentle "
-        "turns and 100 for a fighter; auto: from the log.",
-    ),
+    *_TUNED,
     click.option(
         "--gate", type=number, default=FilterSettings.gate, metavar="C",
         help="A reading so many sigmas off is suspected of being an outlier.",

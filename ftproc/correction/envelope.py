@@ -44,8 +44,8 @@ class Envelope:
     limit: float
 
     @classmethod
-    def fit(cls, normalised: FloatArray) -> Envelope:
-        """From the training inputs (n, d), with floored eigenvalues of their covariance.
+    def fit(cls, normalised: FloatArray, reach: float = 1.0) -> Envelope:
+        """From the training inputs (n, d), with floored eigenvalues of their covariance, `reach` times as far.
 
         The limit is chi-square(d) at 0.999, or what holds 99.9 % of the training inputs where their tails are
         longer: a filter told of too little manoeuvre makes long tails, and these are what is to be corrected.
@@ -55,7 +55,8 @@ class Envelope:
         value, vector = np.linalg.eigh(normalised.T @ normalised / len(normalised))
         precision = (vector / np.maximum(value, STIFFEST)) @ vector.T
         distance = cls(precision, np.inf).distance(normalised)
-        return cls(precision, float(max(chdtri(len(value), TAIL), np.quantile(distance, 1.0 - TAIL))))
+        limit = max(chdtri(len(value), TAIL), np.quantile(distance, 1.0 - TAIL))
+        return cls(precision, float(limit) * reach**2)
 
     def distance(self, normalised: FloatArray) -> FloatArray:
         """(n,) squared Mahalanobis distance of normalised inputs (n, d)."""

@@ -12,7 +12,7 @@ import numpy as np
 from ftproc.correction.apply import answer, bounded
 from ftproc.correction.bootstrap import Blocks
 from ftproc.correction.features import APPLIED, Place
-from ftproc.correction.model import Model
+from ftproc.correction.model import Stage
 from ftproc.correction.samples import Flight, Piece, Split
 from ftproc.correction.verdict import ComponentVerdict, Ratio, Verdict
 from ftproc.records import FloatArray
@@ -33,12 +33,12 @@ class _Evidence:
     blocks: Blocks
 
 
-def _gather(model: Model, flights: Sequence[Flight], pieces: Sequence[Piece]) -> _Evidence:
+def _gather(stage: Stage, flights: Sequence[Flight], pieces: Sequence[Piece]) -> _Evidence:
     position, sigma, output, error = [np.empty((0, 3))], [np.empty((0, 6))], [np.empty((0, 6))], [np.empty((0, 6))]
     times = []
     for piece in pieces:
         flight, rows = flights[piece.flight], slice(piece.start, piece.stop)
-        said = answer(flight.run, model, piece.start, piece.stop)
+        said = answer(flight.run, stage, piece.start, piece.stop)
         wanted = flight.error[rows, :APPLIED]
         keep = said.usable & np.all(np.isfinite(wanted), axis=1)
         position.append(flight.run.state[rows, :3][keep])
@@ -50,24 +50,24 @@ def _gather(model: Model, flights: Sequence[Flight], pieces: Sequence[Piece]) ->
     return _Evidence(place, np.concatenate(output), np.concatenate(error), Blocks.of(times))
 
 
-def _best_gain(model: Model, evidence: _Evidence) -> FloatArray:
+def _best_gain(stage: Stage, evidence: _Evidence) -> FloatArray:
     """(6,) g = clip(sum B d / sum B^2, 0, 1) of output B and wanted output d."""
-    wanted = model.features.from_cartesian(evidence.place, evidence.error)
+    wanted = stage.features.from_cartesian(evidence.place, evidence.error)
     power = np.sum(evidence.output**2, axis=0)
     product = np.sum(evidence.output * wanted, axis=0)
     gain: FloatArray = np.divide(product, power, out=np.zeros_like(power), where=power > 0.0)
     return gain.clip(0.0, 1.0)
 
 
-def _proof(model: Model, evidence: _Evidence, gain: FloatArray, rng: np.random.Generator) -> FloatArray:
+def _proof(stage: Stage, evidence: _Evidence, gain: FloatArray, rng: np.random.Generator) -> FloatArray:
     """(6,) lower bound of the relative decrease of squared error, of the whole path with gain and bound.
 
     The 5 % quantile of the bootstrap, shared among the six outputs. Taken in the output's units and in metres,
     whichever is worse: an average in sigmas can fall while that in metres rises.
     """
-    features = model.features
+    features = stage.features
     before = features.from_cartesian(evidence.place, evidence.error)
-    applied = bounded(evidence.place, model, evidence.output * gain)
+    applied = bounded(evidence.place, stage, evidence.output * gain)
     after = features.from_cartesian(evidence.place, evidence.error - applied)
     worst = np.full(APPLIED, np.inf)
     for unit in (np.ones_like(before), features.unit(evidence.place)):
@@ -78,16 +78,16 @@ def _proof(model: Model, evidence: _Evidence, gain: FloatArray, rng: np.random.G
     return worst
 
 
-def _proven_gain(model: Model, evidence: _Evidence, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+def _proven_gain(stage: Stage, evidence: _Evidence, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """Gains (6,) with the unproven ones zero, and the proof (6,) of each while it still had its gain."""
     if len(evidence.blocks) < FEWEST_BLOCKS:
         return np.zeros(APPLIED), np.zeros(APPLIED)
-    gain = _best_gain(model, evidence)
+    gain = _best_gain(stage, evidence)
     proof = np.zeros(APPLIED)
     while gain.any():
         # Each output is bounded together with the others, so those that stay are asked again.
         alive = gain > 0.0
-        proof = np.where(alive, _proof(model, evidence, gain, rng), proof)
+        proof = np.where(alive, _proof(stage, evidence, gain, rng), proof)
         if np.all(proof[alive] > MATERIAL):
             break
         gain = np.where(proof > MATERIAL, gain, 0.0)
@@ -106,21 +106,29 @@ def _ratio(evidence: _Evidence, before: FloatArray, after: FloatArray, rng: np.r
     return Ratio(float(np.sqrt(total[0] / total[1])), float(low), float(high))
 
 
-def judge(model: Model, flights: Sequence[Flight], parts: Split, rng: np.random.Generator) -> Model:
-    """The model with its gain and verdict, from the held-out parts of `flights`."""
-    gain, proof = _proven_gain(model, _gather(model, flights, parts.validation), rng)
-    test = _gather(model, flights, parts.test)
-    features = model.features
-    unit = features.unit(test.place)
-    applied = bounded(test.place, model, test.output * gain)
-    before = features.from_cartesian(test.place, test.error) * unit
-    after = features.from_cartesian(test.place, test.error - applied) * unit
+def judge(stage: Stage, flights: Sequence[Flight], parts: Split, rng: np.random.Generator) -> Stage:
+    """The stage with its gain and verdict, from the held-out parts of `flights`."""
+    validation = _gather(stage, flights, parts.validation)
+    gain, proof = _proven_gain(stage, validation, rng)
+    judged = replace(stage, gain=gain)
+    before, after = _errors(judged, validation)
+    validated = _ratio(validation, before[:, :3], after[:, :3], rng)
+    test = _gather(stage, flights, parts.test)
+    before, after = _errors(judged, test)
     components = tuple(
-        ComponentVerdict(name, float(g), float(p), _ratio(test, before[:, [c]], after[:, [c]], rng))
-        for c, (name, g, p) in enumerate(zip(features.outputs[:APPLIED], gain, proof, strict=True))
+        ComponentVerdict(name, float(gain[c]), float(proof[c]), _ratio(test, before[:, [c]], after[:, [c]], rng))
+        for c, name in enumerate(stage.features.applied)
     )
     verdict = Verdict(
-        parts.by, len(parts.training), len(parts.validation), len(parts.test), components,
+        parts.by, len(parts.training), len(parts.validation), len(parts.test), components, validated,
         _ratio(test, before[:, :3], after[:, :3], rng), _ratio(test, before[:, 3:], after[:, 3:], rng),
     )  # fmt: skip
-    return replace(model, gain=gain, verdict=verdict)
+    return replace(judged, verdict=verdict)
+
+
+def _errors(stage: Stage, evidence: _Evidence) -> tuple[FloatArray, FloatArray]:
+    """(n, 6) errors without and with the correction, m and m/s along the axes of its outputs."""
+    features, place = stage.features, evidence.place
+    unit = features.unit(place)
+    left = evidence.error - bounded(place, stage, evidence.output * stage.gain)
+    return features.from_cartesian(place, evidence.error) * unit, features.from_cartesian(place, left) * unit

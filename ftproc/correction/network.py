@@ -1,6 +1,7 @@
 """The in-h-out back-propagation network: tanh hidden layer, linear output (Zuo et al. 2021, section 2.1).
 
-All weights travel as one vector [W1, b1, W2, b2], which is also the chromosome of the genetic search.
+All weights travel as one vector [W1, b1, W2, b2], and the direct connections where there are any; it is also the
+chromosome of the genetic search.
 """
 
 from __future__ import annotations
@@ -16,33 +17,51 @@ BLOCK_WORK = 200_000  # multiplications in one matrix product
 
 
 class Shape(NamedTuple):
-    """Layer sizes of a network."""
+    """Layer sizes of a network. direct: inputs also reach the outputs without passing the hidden layer, so that what
+    is linear need not be built from tanh."""
 
     inputs: int
     hidden: int
     outputs: int
+    direct: bool = False
 
     @property
     def size(self) -> int:
         """Number of weights: 237 for the paper's 9-12-9."""
-        return self.hidden * (self.inputs + 1) + self.outputs * (self.hidden + 1)
+        return self.searched + self.outputs * (self.regressors + 1)
+
+    @property
+    def searched(self) -> int:
+        """Number of weights into the hidden layer; given these, the best others solve linear equations."""
+        return self.hidden * (self.inputs + 1)
+
+    @property
+    def regressors(self) -> int:
+        """How many numbers an output adds up, besides its bias."""
+        return self.hidden + (self.inputs if self.direct else 0)
 
 
 class Weights(NamedTuple):
-    """w1 (h, d), b1 (h,), w2 (o, h), b2 (o,); all dimensionless (inputs and targets are normalised)."""
+    """w1 (h, d), b1 (h,), w2 (o, h), b2 (o,), direct (o, d), or (o, 0) without direct connections; all dimensionless
+    (inputs and targets are normalised)."""
 
     w1: FloatArray
     b1: FloatArray
     w2: FloatArray
     b2: FloatArray
+    direct: FloatArray
 
 
 def unpack(vector: FloatArray, shape: Shape) -> Weights:
     """Views into `vector` (size,) as layers."""
-    d, h, o = shape
-    first, second, third = h * d, h * d + h, h * d + h + o * h
+    d, h, o, _ = shape
+    first, second, third, fourth = np.cumsum([h * d, h, o * h, o])
     return Weights(
-        vector[:first].reshape(h, d), vector[first:second], vector[second:third].reshape(o, h), vector[third:]
+        vector[:first].reshape(h, d),
+        vector[first:second],
+        vector[second:third].reshape(o, h),
+        vector[third:fourth],
+        vector[fourth:].reshape(o, -1),
     )
 
 
@@ -56,9 +75,9 @@ def scale(shape: Shape) -> FloatArray:
 
     Without it a net of 30 and more inputs starts with every tanh saturated, where the gradient is zero.
     """
-    d, h, o = shape
-    into_hidden, into_output = 1.0 / np.sqrt(d), 1.0 / np.sqrt(h)
-    return np.concatenate([np.full(h * d + h, into_hidden), np.full(o * h + o, into_output)])
+    into_hidden, into_output = 1.0 / np.sqrt(shape.inputs), 1.0 / np.sqrt(shape.regressors)
+    rest = shape.size - shape.searched
+    return np.concatenate([np.full(shape.searched, into_hidden), np.full(rest, into_output)])
 
 
 def blocks(rows: int, work: int) -> Iterator[slice]:
@@ -77,6 +96,8 @@ def forward(weights: Weights, inputs: FloatArray) -> FloatArray:
     output = np.empty((len(inputs), len(weights.b2)))
     for rows in blocks(len(inputs), weights.w1.size):
         output[rows] = np.tanh(inputs[rows] @ weights.w1.T + weights.b1) @ weights.w2.T + weights.b2
+        if weights.direct.size:
+            output[rows] += inputs[rows] @ weights.direct.T
     return output
 
 
@@ -89,28 +110,53 @@ def cost(vector: FloatArray, shape: Shape, inputs: FloatArray, targets: FloatArr
 def cost_and_gradient(
     vector: FloatArray, shape: Shape, inputs: FloatArray, targets: FloatArray, decay: float
 ) -> tuple[float, FloatArray]:
-    """E/n + decay * sum(w1^2 + w2^2) and its gradient (size,) by back-propagation.
+    """E/n + decay * sum(w1^2 + w2^2 + direct^2) and its gradient (size,) by back-propagation.
 
-    d2 = 2 (Y - T)/n, dW2 = d2' H, d1 = (d2 W2) * (1 - H^2), dW1 = d1' X. Biases do not decay: they carry the
-    repeatable part of the error, which is what is to be learned.
+    d2 = 2 (Y - T)/n, dW2 = d2' H, d1 = (d2 W2) * (1 - H^2), dW1 = d1' X, dDirect = d2' X. Biases do not decay: they
+    carry the repeatable part of the error, which is what is to be learned.
     """
     w = unpack(vector, shape)
     n = len(inputs)
-    value = decay * float(np.vdot(w.w1, w.w1) + np.vdot(w.w2, w.w2))
+    value = decay * sum(float(np.vdot(part, part)) for part in (w.w1, w.w2, w.direct))
     gradient = np.zeros_like(vector)
     slope = unpack(gradient, shape)
     for rows in blocks(n, w.w1.size):
         x = inputs[rows]
         hidden = np.tanh(x @ w.w1.T + w.b1)
         residual = hidden @ w.w2.T + w.b2 - targets[rows]
+        if shape.direct:
+            residual += x @ w.direct.T
         value += float(np.vdot(residual, residual)) / n
         delta2 = residual * (2.0 / n)
         delta1 = (delta2 @ w.w2) * (1.0 - hidden * hidden)
-        for total, part in zip(slope, (delta1.T @ x, delta1.sum(0), delta2.T @ hidden, delta2.sum(0)), strict=True):
+        for total, part in zip(slope[:4], (delta1.T @ x, delta1.sum(0), delta2.T @ hidden, delta2.sum(0)), strict=True):
             total += part
-    slope.w1[...] += 2.0 * decay * w.w1
-    slope.w2[...] += 2.0 * decay * w.w2
+        if shape.direct:
+            slope.direct[...] += delta2.T @ x
+    for total, part in zip(slope[::2], w[::2], strict=True):  # not the biases
+        total += 2.0 * decay * part
     return value, gradient
+
+
+def solved(into_hidden: FloatArray, shape: Shape, inputs: FloatArray, targets: FloatArray, ridge: float) -> FloatArray:
+    """The whole vector (size,) for given weights into the hidden layer (searched,): all others by least squares.
+
+    Minimises E/n + ridge * (the squares of the others but the biases), which is linear in them. With an empty
+    hidden layer this is linear regression.
+    """
+    w = unpack(np.concatenate([into_hidden, np.zeros(shape.size - shape.searched)]), shape)
+    n, m = len(inputs), shape.regressors
+    normal, right = np.zeros((m + 1, m + 1)), np.zeros((m + 1, shape.outputs))
+    for rows in blocks(n, (m + 1) * (m + 1)):
+        hidden = np.tanh(inputs[rows] @ w.w1.T + w.b1)
+        direct = inputs[rows] if shape.direct else hidden[:, :0]
+        columns = np.concatenate([hidden, direct, np.ones((len(hidden), 1))], axis=1)
+        normal += columns.T @ columns
+        right += columns.T @ targets[rows]
+    normal[np.arange(m), np.arange(m)] += n * ridge
+    found = np.asarray(np.linalg.solve(normal, right).T, np.float64)
+    h = shape.hidden
+    return pack(w._replace(w2=found[:, :h], b2=found[:, m], direct=found[:, h:m]))
 
 
 def population_cost(population: FloatArray, shape: Shape, inputs: FloatArray, targets: FloatArray) -> FloatArray:

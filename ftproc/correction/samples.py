@@ -12,12 +12,13 @@ from functools import cached_property
 import numpy as np
 
 from ftproc.correction import los
-from ftproc.correction.features import APPLIED, WINDOW, Features, FilterRecord, Place, usable
+from ftproc.correction.features import APPLIED, Features, Place, Record, usable
 from ftproc.errors import InputError
 from ftproc.records import FloatArray
 
 WHOLE_FLIGHTS = 6  # with fewer, flights are cut into blocks
 BLOCK_S = 30.0  # shortest block, s
+APART = 8  # samples left out between two blocks of a flight, for neighbours share their error
 VALIDATION_SHARE, TEST_SHARE = 1 / 3, 1 / 6
 
 
@@ -29,7 +30,7 @@ class Flight:
     the position when None. Rows where the truth is not known are NaN and are not used.
     """
 
-    run: FilterRecord
+    run: Record
     truth_position: FloatArray
     truth_velocity: FloatArray | None = None
     name: str = ""
@@ -79,7 +80,7 @@ def _rate(time_s: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def _blocks(flights: Sequence[Flight]) -> list[Piece]:
-    """Blocks of at least 30 s; each but a flight's first starts late, so that no window reaches across."""
+    """Blocks of at least 30 s; each but a flight's first starts late."""
     pieces = []
     for number, flight in enumerate(flights):
         time = flight.run.time_s
@@ -89,7 +90,7 @@ def _blocks(flights: Sequence[Flight]) -> list[Piece]:
         edges = np.searchsorted(time, np.linspace(time[0], time[-1], count + 1)[1:-1])
         starts, stops = [0, *(int(e) for e in edges)], [*(int(e) for e in edges), len(time)]
         pieces += [
-            Piece(number, start + (WINDOW if start else 0), stop) for start, stop in zip(starts, stops, strict=True)
+            Piece(number, start + (APART if start else 0), stop) for start, stop in zip(starts, stops, strict=True)
         ]
     return [piece for piece in pieces if piece.stop > piece.start]
 

@@ -33,13 +33,15 @@ class ComponentVerdict:
 
 @dataclass(frozen=True)
 class Verdict:
-    """by: "flight" or "block", what was held out. training, validation, test: how many of these."""
+    """by: "flight" or "block", what was held out. training, validation, test: how many of these. validated: position on
+    the validation data, by which feature sets are compared; position, velocity: on the untouched test data."""
 
     by: str
     training: int
     validation: int
     test: int
     components: tuple[ComponentVerdict, ...]
+    validated: Ratio | None
     position: Ratio | None
     velocity: Ratio | None
 
@@ -76,7 +78,7 @@ class Verdict:
         fields = dict(content)
         parts = [{**c, "test": _ratio(c["test"])} for c in fields["components"]]
         fields["components"] = tuple(ComponentVerdict(**c) for c in parts)
-        for name in ("position", "velocity"):
+        for name in ("validated", "position", "velocity"):
             fields[name] = _ratio(fields[name])
         return cls(**fields)
 

@@ -1,13 +1,13 @@
-"""`python -m tests.bench [accuracy] [methods] [speed]`: the tables of the README, as Markdown on standard output."""
+"""`python -m tests.bench [accuracy] [methods] [correction] [speed]`: the tables of the README, as Markdown."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
 
-from tests.bench import accuracy, methods, speed
+from tests.bench import accuracy, correction, methods, speed
 
-TABLES = {"accuracy": accuracy, "methods": methods, "speed": speed}
+TABLES = {"accuracy": accuracy, "methods": methods, "correction": correction, "speed": speed}
 
 
 def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import pandas
 import pytest
 
+from ftproc.correction import study
 from tests.cli.conftest import Result
 
 SMALL = ("--population", 6, "--generations", 2, "--epochs", 5, "--hidden", 4)
@@ -20,7 +22,7 @@ def test_from_logs_with_truth(run, here):
     pairs = [part for number in range(4) for part in simulate(run, number)]
     trained = run("train", *pairs, *SMALL, "-o", "model.safetensors")
     assert trained.code == 0, trained.err
-    assert trained.out.startswith("Correction model, schema 1, feature set 'window', network ")
+    assert trained.out.startswith("Correction model, schema 2\ntraining: editing two-pass, epochs 5, features auto, ")
     assert run("train", "--show", "model.safetensors") == Result(0, trained.out, "")
     assert run("filter", "0.parquet", "--model", "model.safetensors", "-o", "clean.csv").code == 0
 
@@ -33,6 +35,60 @@ def test_from_a_scenario_the_same_seed_gives_the_same_bytes(run, here):
     assert a == b != c
 
 
+def test_two_workers_write_the_same_bytes_as_one(run, here):
+    for jobs in (1, 2):
+        args = ("--scenario", "manoeuvre-clean", "--flights", 6, *SMALL, "--jobs", jobs, "-o", f"{jobs}.safetensors")
+        assert run("train", *args).code == 0
+    assert (here / "1.safetensors").read_bytes() == (here / "2.safetensors").read_bytes()
+
+
+def test_what_the_filter_is_told_is_trained_for_and_kept(run, here):
+    args = ("--scenario", "radar", "--flights", 3, *SMALL, "--jerk", "0.01", "--editing", "none")
+    trained = run("train", *args, "-o", "told.safetensors")
+    assert "editing none" in trained.out
+    assert "jerk 0.01" in trained.out
+    run("train", *args[:-4], "-o", "auto.safetensors")
+    assert "jerk auto" in run("train", "--show", "auto.safetensors").out
+    assert (here / "told.safetensors").read_bytes() != (here / "auto.safetensors").read_bytes()
+
+
+def test_logs_with_columns_and_units_of_their_own(run, here):
+    pair = simulate(run, 0)
+    frame = pandas.read_parquet("0.parquet").rename(columns={"range_m": "RNG"})
+    frame["RNG"] /= 1000.0
+    frame.to_csv("odd.csv", index=False)
+    args = ("--features", "window", *SMALL, "-o", "m")
+    odd = run(
+        "train", *["--log", "odd.csv", "--truth", pair[3]] * 4, *args, "--columns", "range=RNG", "--units", "range=km"
+    )
+    assert odd.code == 0, odd.err
+    assert (
+        "there is no column"
+        in run("train", *["--log", "odd.csv", "--truth", pair[3]] * 4, *args, "--columns", "range=X").err
+    )
+
+
+def test_the_study_of_first_weights(run, here):
+    args = ("--scenario", "radar", "--flights", 3, *SMALL, "--epochs", 40, "--compare-starts")
+    one, two = run("train", *args), run("train", *args, "--jobs", 2)
+    assert one.code == 0, one.err
+    assert one.out == two.out
+    assert "First weights of the network 'window' at equal cost" in one.out
+    for name in study.CONTENDERS:
+        assert name in one.out
+    assert list(here.iterdir()) == []
+
+
+def test_ctrl_c_leaves_no_file(run, here, monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("ftproc.correction.training.judge", interrupt)
+    result = run("train", "--scenario", "radar", "--flights", 3, *SMALL, "-o", "m.safetensors")
+    assert result.code != 0
+    assert list(here.iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("args", "sentence"),
     [
@@ -41,6 +97,7 @@ def test_from_a_scenario_the_same_seed_gives_the_same_bytes(run, here):
         (["-o", "m", "--scenario", "radar", "--log", "a", "--truth", "b"], "Learn either from"),
         (["-o", "m", "--log", "a"], "--log is given 1 times and --truth 0 times; give them in pairs."),
         (["-o", "m", "--scenario", "moon"], 'There is no scenario "moon"'),
+        (["-o", "m", "--scenario", "radar", "--compare-starts"], "--compare-starts writes no model; leave out -o."),
         (["-o", "-", "--scenario", "radar"], "a model is not written to standard output"),
         (["-o", "m", "--scenario", "zuo2021", "--flights", "2", "--features", "magic"], "magic"),
     ],

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ftproc.core.geometry import line_of_sight_axes
-from ftproc.correction.features import FilterRecord
+from ftproc.correction.features import Record
 from ftproc.correction.samples import Flight
 from ftproc.records import FloatArray, IntArray
 
@@ -46,7 +46,7 @@ def run(rng: np.random.Generator, n: int = 600, dt: float = 0.1) -> FakeRun:
     )
 
 
-def with_error(filtered: FilterRecord, in_sigmas: FloatArray, name: str = "fake") -> Flight:
+def with_error(filtered: Record, in_sigmas: FloatArray, name: str = "fake") -> Flight:
     """The flight whose truth is off the estimate by `in_sigmas` (n, 6) along the line of sight."""
     axes = line_of_sight_axes(filtered.state[:, :3])
     metres = (in_sigmas * filtered.los_sigma).reshape(-1, 2, 3)
@@ -80,3 +80,8 @@ def without(filtered: FakeRun, rows: slice, components: Sequence[int] = (0, 1, 2
         weight[rows, component] = 0.0
         innovation[rows, component] = np.nan
     return replace(filtered, weight=weight, innovation=innovation)
+
+
+def cut(filtered: FakeRun, rows: slice) -> FakeRun:
+    """These rows of the run."""
+    return FakeRun(**{name: value[rows] for name, value in vars(filtered).items()})

@@ -11,25 +11,26 @@ from ftproc.core.geometry import line_of_sight_axes
 from ftproc.correction import apply, los
 from ftproc.correction.apply import correct
 from ftproc.correction.envelope import Envelope, Normaliser
-from ftproc.correction.features import FEATURES, SETTLING, named
-from ftproc.correction.model import Model
+from ftproc.correction.feature_sets import FEATURES, named
+from ftproc.correction.features import SETTLING
+from ftproc.correction.model import Stage
 from ftproc.correction.network import Weights
 
 from . import fake
 
 
-def constant(name: str, says: float, gain: float = 1.0) -> Model:
-    """A model that answers `says` on each output, whatever it sees, and knows no limits."""
+def constant(name: str, says: float, gain: float = 1.0, bound: float = 2.0) -> Stage:
+    """A stage that answers `says` on each output, whatever it sees, and knows no limits."""
     features = named(name)
     d, o = features.input_size, features.output_size
-    return Model(
+    return Stage(
         features,
-        Weights(np.zeros((2, d)), np.zeros(2), np.zeros((o, 2)), np.full(o, says)),
+        Weights(np.zeros((2, d)), np.zeros(2), np.zeros((o, 2)), np.full(o, says), np.zeros((o, d * features.direct))),
         Normaliser(np.zeros(d), np.ones(d)),
         Normaliser(np.zeros(o), np.ones(o)),
         Envelope(np.eye(d), 1e12),
         np.full(6, gain),
-        np.full(6, 2.0),
+        np.full(6, bound),
         "none",
     )
 
@@ -81,14 +82,14 @@ def test_zero_outside_the_training_envelope_and_the_share_is_told() -> None:
 
 def test_samples_the_guards_skip_anyway_do_not_count_as_outside() -> None:
     filtered = fake.without(fake.run(np.random.default_rng(3)), slice(None))
-    model = replace(constant("window", 0.5), envelope=Envelope(np.eye(32), 0.0))
+    model = replace(constant("window", 0.5), envelope=Envelope(np.eye(41), 0.0))
     assert correct(filtered, model).outside == 0.0
 
 
 def test_long_runs_in_chunks_give_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     filtered = fake.run(np.random.default_rng(4))
     model = constant("window", 0.0)
-    model = replace(model, weights=model.weights._replace(w1=np.ones((2, 32)), w2=np.ones((6, 2))))
+    model = replace(model, weights=model.weights._replace(w1=np.ones((2, 41)), w2=np.ones((6, 2))))
     whole = correct(filtered, model)
     monkeypatch.setattr(apply, "CHUNK", 37)
     assert correct(filtered, model).values == pytest.approx(whole.values, abs=1e-12)
@@ -112,6 +113,16 @@ def test_the_envelope_holds_its_training_data_whatever_their_tails() -> None:
         envelope = Envelope.fit(z)
         assert envelope.contains(z).mean() >= 0.998
         assert not envelope.contains(z + 100.0).any()
+
+
+def test_an_envelope_reaches_so_many_times_as_far() -> None:
+    z = np.random.default_rng(8).normal(size=(500, 4))
+    near, far = Envelope.fit(z), Envelope.fit(z, 3.0)
+    edge = z * np.sqrt(near.limit / near.distance(z))[:, None]
+    assert near.contains(0.99 * edge).all()
+    assert not near.contains(1.01 * edge).any()
+    assert far.contains(2.99 * edge).all()
+    assert not far.contains(3.01 * edge).any()
 
 
 def test_a_column_that_was_constant_in_training_does_not_make_a_razor_thin_envelope() -> None:

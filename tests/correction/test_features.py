@@ -9,10 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ftproc.core.geometry import line_of_sight_axes
+from ftproc.core.geometry import line_of_sight_axes, to_cartesian
 from ftproc.correction import los
-from ftproc.correction.features import FEATURES, SETTLING, WINDOW, Features, Place, named
+from ftproc.correction.feature_sets import FEATURES, named
+from ftproc.correction.features import SETTLING, Features, Place
 from ftproc.errors import UsageError
+from ftproc.simulation.instrument import InstrumentErrors, systematic
 
 from . import fake
 
@@ -53,10 +55,12 @@ def test_adding_the_wanted_output_gives_the_truth(features: Features) -> None:
     place = Place.of(flight.run, 0, 600)
     wanted = features.targets(place, flight.error)
     assert wanted.shape == (600, features.output_size)
-    corrected = flight.run.state[:, :6] + features.to_cartesian(place, wanted[:, :6])
+    said = np.zeros((600, 6))
+    said[:, : features.output_size] = wanted[:, :6]
+    corrected = flight.run.state[:, :6] + features.to_cartesian(place, said)
     assert corrected[:, :3] == pytest.approx(flight.truth_position, abs=1e-9)
-    assert corrected[:, 3:] == pytest.approx(flight.truth_velocity, abs=1e-9)
-    assert features.from_cartesian(place, features.to_cartesian(place, wanted[:, :6])) == pytest.approx(wanted[:, :6])
+    assert features.output_size < 6 or corrected[:, 3:] == pytest.approx(flight.truth_velocity, abs=1e-9)
+    assert features.from_cartesian(place, features.to_cartesian(place, said)) == pytest.approx(said)
     assert features.unit(place).shape == (600, 6)
 
 
@@ -74,31 +78,64 @@ def test_the_window_holds_the_last_innovations_over_sigma_and_zero_where_not_use
     filtered = fake.without(fake.run(np.random.default_rng(2)), slice(95, 97), [1])
     x, valid = named("window").inputs(filtered)
     assert valid[100]
-    for lag in range(WINDOW):
-        for component in range(3):
-            used = not (component == 1 and 100 - lag in (95, 96))
-            ratio = filtered.innovation[100 - lag, component] / filtered.innovation_sigma[100 - lag, component]
-            assert x[100, 3 * lag + component] == (ratio if used else 0.0)
+    ratio = np.where(filtered.weight > 0, filtered.innovation / filtered.innovation_sigma, 0.0)
+    for lag in range(8):
+        assert np.array_equal(x[100, 3 * lag : 3 * lag + 3], ratio[100 - lag])
+    assert x[100, 3 * 5 + 1] == x[100, 3 * 4 + 1] == 0.0
+    for place, width in ((24, 8), (27, 16), (30, 32)):
+        before = ratio[100 - 2 * width + 1 : 100 - width + 1]
+        assert x[100, place : place + 3] == pytest.approx(before.sum(0) / np.sqrt(width), abs=1e-12)
+
+
+def test_the_window_does_not_reach_before_a_restart() -> None:
+    filtered = fake.run(np.random.default_rng(2))
+    since = filtered.since_start.copy()
+    since[300:] = np.arange(300)
+    x, _ = named("window").inputs(replace(filtered, since_start=since))
+    alone = replace(
+        fake.cut(filtered, slice(300, 600)),
+        since_start=since[300:],
+    )
+    expected, _ = named("window").inputs(alone)
+    assert np.array_equal(x[300:], expected)
 
 
 def test_the_windows_geometry() -> None:
     filtered = fake.run(np.random.default_rng(3))
-    x, _ = named("instrument").inputs(filtered)
+    x, _ = named("window").inputs(filtered)
     px, py, pz = filtered.state[50, :3]
     flat, distance = np.hypot(px, py), np.sqrt(px**2 + py**2 + pz**2)
     angle = np.array([fake.SIGMA[0], fake.SIGMA[1] / flat, fake.SIGMA[2] / distance])
     ratio = angle / filtered.innovation_sigma[50]
-    expected = [np.log(distance), np.arcsin(pz / distance), *np.log(angle), *np.log(ratio), px / flat, py / flat]
-    assert x[50, 24:] == pytest.approx(np.array(expected))
-    assert named("window").input_size == 32
-    assert named("instrument").input_size == 34
+    expected = [np.log(distance), np.arcsin(pz / distance), *np.log(angle), *np.log(ratio)]
+    assert x[50, 33:] == pytest.approx(np.array(expected))
+    assert named("window").input_size == 41
+
+
+def test_an_instruments_constant_errors_are_linear_in_its_features() -> None:
+    rng = np.random.default_rng(4)
+    state = np.zeros((400, 9))
+    state[:, :3] = to_cartesian(
+        np.stack([rng.uniform(2e3, 9e3, 400), rng.uniform(-3, 3, 400), rng.uniform(0.1, 0.9, 400)], axis=1)
+    )
+    errors = InstrumentErrors(3.0, 2e-4, -3e-4, 4e-4, 0.7, 5e-4)
+    seen = to_cartesian(systematic(state[:, :3], errors))
+    features = named("instrument")
+    run = replace(fake.run(rng, n=400), state=state)
+    x, _ = features.inputs(run)
+    place = Place(state[SETTLING:, :3], run.los_sigma[SETTLING:])
+    target = features.targets(place, np.concatenate([state[:, :3] - seen, np.zeros((400, 6))], axis=1)[SETTLING:])
+    columns = np.concatenate([x[SETTLING:], np.ones((400 - SETTLING, 1))], axis=1)
+    left = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
+    assert np.sqrt((target**2).mean(0)).min() > 1e-4
+    assert (np.abs(left).max(0) < [5e-3, 2e-6, 2e-6]).all()  # m, rad, rad: second order in the errors
 
 
 @pytest.mark.parametrize("features", FEATURES.values(), ids=FEATURES)
 def test_any_cut_of_a_run_gives_the_same_inputs(features: Features) -> None:
     filtered = fake.without(fake.run(np.random.default_rng(4), n=100), slice(40, 60))
     whole, mask = features.inputs(filtered)
-    for cut in (1, 3, WINDOW - 1, WINDOW, 50, 99):
+    for cut in (1, 3, 7, 8, 50, 63, 64, 65, 99):
         parts = [features.inputs(filtered, 0, cut), features.inputs(filtered, cut, 100)]
         assert np.array_equal(np.concatenate([p[0] for p in parts]), whole)
         assert np.array_equal(np.concatenate([p[1] for p in parts]), mask)
@@ -126,7 +163,7 @@ def test_valid_is_false_while_coasting_settling_or_without_numbers(features: Fea
 def test_angles_only_logs_have_inputs_too() -> None:
     x, valid = named("window").inputs(fake.without(fake.run(np.random.default_rng(6)), slice(None), [0]))
     assert valid[SETTLING:].all()
-    assert not x[:, 0 : 3 * WINDOW : 3].any()
+    assert not x[:, 0:33:3].any()
 
 
 @pytest.mark.parametrize("features", FEATURES.values(), ids=FEATURES)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from safetensors.numpy import load as parse
 from safetensors.numpy import save as serialise
 
 from ftproc.correction.apply import correct
-from ftproc.correction.model import Model, card, from_bytes, load, save, sha256, to_bytes
+from ftproc.correction.model import Model, card
+from ftproc.correction.model_file import from_bytes, load, save, sha256, to_bytes
 from ftproc.correction.training import train
 from ftproc.errors import ModelError, OutputError
 from ftproc.settings import TrainSettings
@@ -25,7 +27,17 @@ KEY = "ftproc-correction"
 @pytest.fixture(scope="module")
 def model() -> Model:
     settings = TrainSettings(hidden=4, population=6, generations=3, epochs=20, seed=3)
-    return train(fake.flights(0, 6, bias=(0, 0, 1.5, 0, 0, 0)), settings)
+    flights = fake.flights(0, 6, bias=(0, 0, 1.5, 0, 0, 0))
+    stages = {
+        name: train(flights, replace(settings, features=features))
+        for name, features in (("filter", "window"), ("smoother", "instrument"))
+    }
+    return Model(stages, asdict(settings))
+
+
+def changed(model: Model, **changes: Any) -> Model:
+    """The model with another filter stage."""
+    return replace(model, stages={**model.stages, "filter": replace(model.filter, **changes)})
 
 
 def header_of(content: bytes) -> dict[str, Any]:
@@ -35,12 +47,13 @@ def header_of(content: bytes) -> dict[str, Any]:
 
 
 def rewritten(model: Model, drop: str = "", **changes: Any) -> bytes:
-    """The model's file with entries of its header replaced, or a tensor dropped."""
-    header = {**header_of(to_bytes(model)), **changes}
-    tensors = {**model.weights._asdict(), "precision": model.envelope.precision}
+    """The model's file with entries of its header, or of its filter's, replaced, or a tensor dropped."""
+    content = to_bytes(model)
+    header, tensors = header_of(content), parse(content)
+    for key, value in changes.items():
+        (header if key in header else header["stages"]["filter"])[key] = value
     tensors.pop(drop, None)
-    contiguous = {k: np.ascontiguousarray(v) for k, v in tensors.items()}
-    return serialise(contiguous, metadata={KEY: json.dumps(header)})
+    return serialise(tensors, metadata={KEY: json.dumps(header)})
 
 
 def test_there_and_back(model: Model, tmp_path: Path) -> None:
@@ -48,11 +61,13 @@ def test_there_and_back(model: Model, tmp_path: Path) -> None:
     save(model, path)
     again = load(path)
     assert to_bytes(again) == to_bytes(model) == path.read_bytes()
-    assert again.verdict == model.verdict
+    assert again.filter.verdict == model.filter.verdict
     assert again.settings == model.settings
     filtered = fake.run(np.random.default_rng(9))
-    assert np.array_equal(correct(filtered, again).values, correct(filtered, model).values)
-    assert correct(filtered, again).values.any()
+    for stage in ("filter", "smoother"):
+        said = correct(filtered, again.stages[stage]).values
+        assert np.array_equal(said, correct(filtered, model.stages[stage]).values)
+        assert said.any()
     assert [p.name for p in tmp_path.iterdir()] == ["model.safetensors"]
 
 
@@ -65,13 +80,15 @@ def test_the_hash_is_that_of_the_file(model: Model, tmp_path: Path) -> None:
 
 def test_the_header_says_what_the_model_is(model: Model) -> None:
     header = header_of(to_bytes(model))
-    assert header["schema"] == 1
-    assert header["features"] == "window"
-    assert header["layers"] == [32, 4, 6]
-    assert len(header["input_mean"]) == len(header["input_scale"]) == 32
+    assert header["schema"] == 2
     assert header["settings"]["seed"] == 3
-    assert len(header["fingerprint"]) == 64
-    assert len(header["verdict"]["components"]) == 6
+    stage = header["stages"]["filter"]
+    assert stage["features"] == "window"
+    assert stage["layers"] == [41, 4, 6, False]
+    assert len(stage["input_mean"]) == len(stage["input_scale"]) == 41
+    assert len(stage["fingerprint"]) == 64
+    assert len(stage["verdict"]["components"]) == 6
+    assert header["stages"]["smoother"]["layers"] == [7, 4, 3, True]
 
 
 def test_a_model_cannot_be_written_where_there_is_no_directory(model: Model, tmp_path: Path) -> None:
@@ -111,14 +128,16 @@ def test_a_safetensors_file_of_something_else() -> None:
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"schema": 2}, "schema 2, this version reads 1; train it again"),
+        ({"schema": 1}, "schema 1, this version reads 2; train it again"),
+        ({"stages": {}}, r"header is damaged \(its stages are none\)"),
+        ({"stages": {"smoother": {}}}, "its stages are smoother"),
         ({"features": "fourier"}, "made for the feature set 'fourier'; known are correction, window"),
         ({"features": "correction"}, "do not fit the feature set 'correction' of 9 inputs and 9 outputs"),
-        ({"layers": [32, 5, 6]}, "do not fit"),
+        ({"layers": [41, 5, 6, False]}, "do not fit"),
         ({"gain": [1.0]}, r"sizes \(gain\) do not fit"),
-        ({"input_scale": [1.0] * 31}, "input scale"),
+        ({"input_scale": [1.0] * 40}, "input scale"),
         ({"gain": [2.0] * 6}, "out of its range"),
-        ({"input_scale": [0.0] * 32}, "out of its range"),
+        ({"input_scale": [0.0] * 41}, "out of its range"),
         ({"bound_sigma": [-1.0] * 6}, "out of its range"),
         ({"envelope_limit": float("nan")}, "not finite"),
         ({"target_mean": [float("inf")] * 6}, "not finite"),
@@ -142,26 +161,29 @@ def test_a_header_that_is_no_object(model: Model) -> None:
 
 def test_a_missing_tensor(model: Model) -> None:
     with pytest.raises(ModelError, match="lacks its w2"):
-        from_bytes(rewritten(model, drop="w2"), "m")
+        from_bytes(rewritten(model, drop="filter.w2"), "m")
 
 
 @pytest.mark.parametrize("tensor", ["w1", "b1", "w2", "b2"])
 def test_weights_that_are_not_finite(model: Model, tensor: str) -> None:
-    array = getattr(model.weights, tensor).copy()
+    array = getattr(model.filter.weights, tensor).copy()
     array.flat[0] = np.nan
-    broken = replace(model, weights=model.weights._replace(**{tensor: array}))
+    broken = changed(model, weights=model.filter.weights._replace(**{tensor: array}))
     with pytest.raises(ModelError, match="not finite"):
         from_bytes(to_bytes(broken), "m")
 
 
 def test_weights_of_another_size(model: Model) -> None:
-    broken = replace(model, weights=model.weights._replace(w2=np.zeros((6, 5))))
+    broken = changed(model, weights=model.filter.weights._replace(w2=np.zeros((6, 5))))
     with pytest.raises(ModelError, match=r"sizes \(w2\) do not fit"):
         from_bytes(to_bytes(broken), "m")
 
 
 def test_the_card_tells_all_in_plain_words(model: Model) -> None:
     told = card(model)
-    for part in ("32-4-6", "'window'", "seed 3", model.fingerprint, "bounded to 2 sigma", "up: gain"):
+    for part in ("41-4-6", "'window'", "seed 3", model.filter.fingerprint, "bounded to 2 to ", "up: gain"):
         assert part in told
-    assert "no verdict" in card(replace(model, verdict=None))
+    assert "smoother: feature set 'instrument', network 7-4-3 and direct connections" in told
+    assert "no verdict" in card(changed(model, verdict=None))
+    alone = replace(model, stages={"filter": model.filter})
+    assert "smoother: no network; --smooth is not corrected" in card(alone)

@@ -11,7 +11,7 @@ from ftproc.correction import descent, network
 from ftproc.correction.descent import Samples
 from ftproc.correction.network import Shape
 
-SHAPES = [Shape(9, 12, 9), Shape(1, 1, 1), Shape(32, 5, 6), Shape(2, 7, 3)]
+SHAPES = [Shape(9, 12, 9), Shape(1, 1, 1), Shape(32, 5, 6), Shape(2, 7, 3), Shape(7, 4, 3, direct=True)]
 
 
 def problem(shape: Shape, n: int = 40) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -45,6 +45,8 @@ def test_forward_equals_the_formula_written_out(shape: Shape) -> None:
         ]
         for o in range(shape.outputs):
             naive = sum(w.w2[o, j] * hidden[j] for j in range(shape.hidden)) + w.b2[o]
+            if shape.direct:
+                naive += sum(w.direct[o, i] * x[k, i] for i in range(shape.inputs))
             assert output[k, o] == pytest.approx(naive, abs=1e-12)
 
 
@@ -83,6 +85,17 @@ def test_a_population_costs_what_each_network_costs(shape: Shape) -> None:
     each = [network.cost(vector, shape, x, t) for vector in population]
     assert network.population_cost(population, shape, x, t) == pytest.approx(each, rel=1e-12)
     assert network.cost_and_gradient(population[0], shape, x, t, 0.0)[0] == pytest.approx(each[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_no_outer_weights_do_better_than_the_solved_ones(shape: Shape) -> None:
+    vector, x, t = problem(shape)
+    inner = vector[: shape.searched]
+    found = network.solved(inner, shape, x, t, 0.01)
+    assert np.array_equal(found[: shape.searched], inner)
+    value, gradient = network.cost_and_gradient(found, shape, x, t, 0.01)
+    assert gradient[shape.searched :] == pytest.approx(np.zeros(shape.size - shape.searched), abs=1e-10)
+    assert value <= network.cost_and_gradient(vector, shape, x, t, 0.01)[0]
 
 
 def taught(n: int, seed: int, noise: float = 0.05) -> Samples:

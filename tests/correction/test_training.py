@@ -10,20 +10,22 @@ import numpy as np
 import pytest
 
 from ftproc.correction.apply import correct
-from ftproc.correction.features import SETTLING, WINDOW, named
-from ftproc.correction.model import Model, to_bytes
-from ftproc.correction.samples import BLOCK_S, Flight, honesty, split, table
+from ftproc.correction.feature_sets import named
+from ftproc.correction.features import SETTLING
+from ftproc.correction.model import Model, Stage
+from ftproc.correction.model_file import to_bytes
+from ftproc.correction.samples import APART, BLOCK_S, Flight, honesty, split, table
 from ftproc.correction.training import train
 from ftproc.errors import InputError, UsageError
 from ftproc.settings import TrainSettings
 
 from . import fake
 
-QUICK = TrainSettings(hidden=6, population=8, generations=5, epochs=60)
+QUICK = TrainSettings("window", hidden=6, population=8, generations=5, epochs=60)
 BIAS = (0.0, 0.0, 1.5, 0.0, 0.0, 0.0)
 
 
-def ratio(model: Model, flights: Sequence[Flight], columns: slice = slice(0, 3)) -> float:
+def ratio(model: Stage, flights: Sequence[Flight], columns: slice = slice(0, 3)) -> float:
     """Error with the correction over error without, on new flights."""
     before = after = 0.0
     for flight in flights:
@@ -76,7 +78,7 @@ def test_a_repeatable_bias_is_learned_in_the_papers_way_too() -> None:
 
 @pytest.mark.parametrize(("optimiser", "start"), [("l-bfgs", "random"), ("momentum", "genetic")])
 def test_what_an_earlier_innovation_tells_is_learned(optimiser: str, start: str) -> None:
-    model = train(fake.flights(2, 8, lag=2.0), QUICK, optimiser=optimiser, start=start)
+    model = train(fake.flights(2, 8, lag=2.0), replace(QUICK, optimiser=optimiser, start=start))
     assert model.gain[0] > 0.9
     assert ratio(model, fake.flights(102, 3, lag=2.0)) < 0.75
 
@@ -87,19 +89,19 @@ def test_a_correction_that_does_not_hold_on_other_flights_gets_zero_gain() -> No
     assert not train(flights, QUICK).gain[2]
 
 
-def test_widening_lets_the_correction_follow_an_overconfident_filter() -> None:
+def test_the_bound_follows_an_overconfident_filter() -> None:
     bias = (0.0, 8.0, 0.0, 0.0, 0.0, 0.0)
-    narrow, wide = (train(fake.flights(5, 8, bias=bias), QUICK, widen=w) for w in (False, True))
-    assert narrow.bound_sigma == pytest.approx(np.full(6, 2.0))
-    assert wide.bound_sigma[1] == pytest.approx(2 * 8.5, abs=0.5)
-    assert wide.bound_sigma[0] == pytest.approx(2.0, abs=0.1)
+    model = train(fake.flights(5, 8, bias=bias), QUICK)
+    assert model.bound_sigma[1] == pytest.approx(2 * 8.5, abs=0.5)
+    assert model.bound_sigma[0] == pytest.approx(2.0, abs=0.1)
     fresh = fake.flights(105, 3, bias=bias)
-    assert ratio(wide, fresh) < 0.5 < ratio(narrow, fresh) < 1.0
+    narrow = replace(model, bound_sigma=np.full(6, 2.0))
+    assert ratio(model, fresh) < 0.5 < ratio(narrow, fresh) < 1.0
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others() -> None:
     flights = fake.flights(6, 8, bias=BIAS)
-    first, second, other = (to_bytes(train(flights, replace(QUICK, seed=s))) for s in (7, 7, 8))
+    first, second, other = (to_bytes(Model({"filter": train(flights, replace(QUICK, seed=s))})) for s in (7, 7, 8))
     assert first == second
     assert first != other
 
@@ -128,7 +130,7 @@ def test_few_flights_are_cut_into_long_blocks_that_share_no_window() -> None:
     assert len(pieces) == 12
     for one, following in itertools.pairwise(pieces):
         if one.flight == following.flight:
-            assert following.start - one.stop == WINDOW
+            assert following.start - one.stop == APART
     for piece in pieces:
         time = flights[piece.flight].run.time_s
         assert time[piece.stop - 1] - time[piece.start] > BLOCK_S - 1.0
@@ -203,8 +205,8 @@ def test_progress_is_told_stage_by_stage_and_an_interrupt_ends_the_training() ->
 
 def test_unknown_choices_are_named() -> None:
     with pytest.raises(UsageError, match="l-bfgs, momentum"):
-        train([], QUICK, optimiser="adam")
-    with pytest.raises(UsageError, match="genetic, random"):
-        train([], QUICK, start="zero")
+        train([], replace(QUICK, optimiser="adam"))
+    with pytest.raises(UsageError, match="genetic, genetic-solved, random, solved"):
+        train([], replace(QUICK, start="zero"))
     with pytest.raises(UsageError, match="no feature set"):
         train([], replace(QUICK, features="all"))

@@ -16,7 +16,14 @@ from . import fake
 from .test_apply import constant
 
 PLAIN = Verdict(
-    "flight", 12, 8, 4, (ComponentVerdict("radial", 0.8, 0.1, Ratio(0.7, 0.6, 0.8)),), Ratio(0.9, 0.85, 0.95), None
+    "flight",
+    12,
+    8,
+    4,
+    (ComponentVerdict("radial", 0.8, 0.1, Ratio(0.7, 0.6, 0.8)),),
+    None,
+    Ratio(0.9, 0.85, 0.95),
+    None,
 )
 
 

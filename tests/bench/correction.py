@@ -1,0 +1,124 @@
+"""Where the network helps, and what it costs where it cannot: error in position with it over error without, on flights
+it has not seen, with 90 % bootstrap intervals over these."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ftproc import pipeline
+from ftproc.correction.apply import correct
+from ftproc.correction.model import Model
+from ftproc.correction.samples import Flight
+from ftproc.correction.stages import train_model
+from ftproc.records import FloatArray
+from ftproc.settings import FilterSettings, TrainSettings
+from ftproc.simulation import InstrumentErrors, Simulation, simulate
+
+TRAINING, NEW = 24, 12  # flights
+FIRST_SEED = 5000
+REFRACTED = InstrumentErrors(elevation_zero_rad=3e-4, refraction=2.8e-4)
+THEODOLITE = InstrumentErrors(
+    azimuth_zero_rad=3e-4, elevation_zero_rad=-2e-4, mislevel_rad=6e-4, mislevel_azimuth_rad=0.7,
+    collimation_rad=4e-4, refraction=2.8e-4,
+)  # fmt: skip
+
+HEADER = ("what is wrong", "flights learned from", "features", "filter", "velocity", "smoother")
+
+
+@dataclass(frozen=True)
+class Case:
+    """told: what the filter is told, given the noise and jerk level that the log itself shows."""
+
+    name: str
+    scenario: str = "manoeuvre-clean"
+    instrument: InstrumentErrors | None = None
+    outliers: str | None = None
+    told: Callable[[tuple[float, float, float], float], FilterSettings] | None = None
+    training: int = TRAINING
+    duration_s: float | None = None
+
+
+CASES = {
+    "matched": Case("nothing"),
+    "a": Case(
+        "jerk level 100 times too small", told=lambda _, jerk: FilterSettings(editing="none", jerk_psd_m2ps5=jerk / 100)
+    ),
+    "b": Case("elevation bias and refraction", instrument=REFRACTED),
+    "c": Case(
+        "elevation noise stated 5 times too small",
+        told=lambda noise, _: FilterSettings(editing="none", noise=(noise[0], noise[1], noise[2] / 5)),
+    ),
+    "d": Case("noise correlated over 0.5 s", outliers="correlation=0.5"),
+    "calibration": Case("zero-set, mislevel, collimation, refraction", "calibration", THEODOLITE, training=3),
+    "manoeuvre": Case("the same, manoeuvring flights", "manoeuvre", THEODOLITE, training=6),
+}
+
+
+def flights(case: Case, seeds: range) -> dict[str, list[Flight]]:
+    """Runs with truth, by stage."""
+    found: dict[str, list[Flight]] = {"filter": [], "smoother": []}
+    for seed in seeds:
+        how = {"instrument": case.instrument, "outliers": case.outliers, "duration_s": case.duration_s}
+        flight = simulate(case.scenario, seed=seed, **how)  # type: ignore[arg-type]
+        known = pipeline.known_flights([(flight.log, flight.truth)], _told(case, flight))
+        for stage in found:
+            found[stage] += known[stage]
+    return found
+
+
+def _told(case: Case, flight: Simulation) -> FilterSettings:
+    if case.told is None:
+        return FilterSettings()
+    settings = pipeline.filter_log(flight.log).metadata["settings"]
+    noise = (settings["noise_range_m"], settings["noise_azimuth_rad"], settings["noise_elevation_rad"])
+    return case.told(noise, float(np.exp(np.mean(np.log(settings["jerk_psd_m2ps5"])))))
+
+
+@dataclass(frozen=True)
+class Result:
+    """model: what was learned. squares: by stage and quantity, the sums of squared errors of each new flight (n, 2),
+    with the network and without."""
+
+    model: Model
+    squares: dict[str, FloatArray]
+
+    def ratio(self, what: str = "filter position") -> float:
+        """Root mean square of the error with the network over that without, over all new flights."""
+        total = self.squares[what].sum(0)
+        return float(np.sqrt(total[0] / total[1]))
+
+    def interval(self, what: str) -> str:
+        """The ratio with its 90 % bootstrap interval over flights."""
+        each = self.squares[what]
+        drawn = each[np.random.default_rng(0).integers(0, len(each), (2000, len(each)))].sum(1)
+        low, high = np.quantile(np.sqrt(drawn[:, 0] / drawn[:, 1]), [0.05, 0.95])
+        return f"{self.ratio(what):.3f} ({low:.3f} to {high:.3f})"
+
+
+def result(case: Case, new: int = NEW, settings: TrainSettings | None = None) -> Result:
+    """Learn from the training flights of a case, and hold what was learned against new ones."""
+    model = train_model(flights(case, range(FIRST_SEED, FIRST_SEED + case.training)), settings or TrainSettings())
+    squares = {}
+    for stage, runs in flights(case, range(FIRST_SEED + TRAINING, FIRST_SEED + TRAINING + new)).items():
+        for quantity, columns in (("position", slice(0, 3)), ("velocity", slice(3, 6))):
+            pairs = []
+            for flight in runs:
+                error = flight.error[:, :6]
+                used = model.stages.get(stage)
+                left = error if used is None else error - correct(flight.run, used).values
+                known = np.isfinite(error).all(1)
+                pairs.append([np.sum(e[known][:, columns] ** 2) for e in (left, error)])
+            squares[f"{stage} {quantity}"] = np.array(pairs)
+    return Result(model, squares)
+
+
+def rows() -> Iterator[tuple[str, ...]]:
+    """One row per case."""
+    for case in CASES.values():
+        found = result(case)
+        used = (f"{stage.features.name} ({name})" for name, stage in found.model.stages.items() if stage.helps)
+        ratios = (found.interval(what) for what in ("filter position", "filter velocity", "smoother position"))
+        yield (case.name, str(case.training), ", ".join(used) or "none", *ratios)
