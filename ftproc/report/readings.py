@@ -19,6 +19,7 @@ FOOT = 0.08  # of the height, below the lowest outlier: where missing readings a
 FARTHEST = 3.0  # gates, at which residuals stand that are farther off
 FARTHEST_SIGMAS = 12.0  # the same where no gate is known
 
+NONE_TOLD = "This method does not tell by how many sigmas a reading is off."
 NOT_KNOWN = "A trajectory file does not hold the raw readings; the page that `ftproc filter --report` writes has them."
 _WHAT = {
     "innovation": "Innovation: the reading minus what the readings before it predict",
@@ -62,6 +63,8 @@ def residuals(view: View) -> Drawn:
     with np.errstate(invalid="ignore", divide="ignore"):
         scaled = known.residual / known.residual_sigma
     seen = [c for c in range(len(COMPONENTS)) if np.isfinite(scaled[:, c]).any()]
+    if not seen:
+        return Drawn(None, NONE_TOLD)
     figure = drawing.rows(view.timeline, [f"{style.COMPONENT[c].label} in sigmas" for c in seen], _height(seen))
     timeline, flags, gate = view.timeline, view.trajectory.outlier, view.gate
     farthest = FARTHEST_SIGMAS if gate is None else FARTHEST * gate

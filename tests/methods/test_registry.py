@@ -94,7 +94,8 @@ def test_a_model_for_the_ekf_corrects_the_ekf_and_only_that():
     model = pipeline.train_flights([(f.log, f.truth) for f in flights], settings)
     assert model.made_for == "bpnn-ekf"
     assert model.settings["start"] == "random"
-    model = replace(model, gain=np.full(6, 0.5))  # whatever held-out flights say
+    stage = replace(model.filter, gain=np.full(6, 0.5))  # whatever held-out flights say
+    model = replace(model, stages={"filter": stage})
     log = flights[0].log
     plain = pipeline.filter_log(log, FilterSettings(method="ekf"))
     corrected = pipeline.filter_log(log, FilterSettings(method="bpnn-ekf"), model)
