@@ -24,10 +24,9 @@ stands beside ours; a claim is marked by whether it came out.
 
 def experiments() -> dict[str, ModuleType]:
     """The modules with a `section`, by name, in the order of the page."""
-    names = [
-        m.name for m in pkgutil.iter_modules(reproduce.__path__) if not m.name.startswith("_") and m.name != "page"
-    ]
-    modules = {name: importlib.import_module(f"{reproduce.__name__}.{name}") for name in names}
+    names = [m.name for m in pkgutil.iter_modules(reproduce.__path__) if not m.name.startswith("_")]
+    every = {name: importlib.import_module(f"{reproduce.__name__}.{name}") for name in names}
+    modules = {name: module for name, module in every.items() if hasattr(module, "section")}
     return dict(sorted(modules.items(), key=lambda item: (getattr(item[1], "ORDER", 99), item[0])))
 
 

@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from ftproc.core.fuzzy import chi_square_tail
 from tests.acceptance.reproduce import alignment_plots as plots
 from tests.acceptance.reproduce.aligning import OUTLIER_TIMES_S, Run, Update, align
 from tests.acceptance.reproduce.drive import drive
+from tests.acceptance.reproduce.page import Page
 
 RUNS, SPOILED_RUNS = 30, 15
 OFF_DEGREES = 15.0  # half the first heading error: an attitude further off is not aligned
@@ -35,15 +35,16 @@ FILTERS: dict[str, Update] = {
 }
 
 Case = tuple[str, int, bool]  # filter, members, outliers
+ORDER = 3
 Runs = dict[Case, list[Run]]
 
 
-def section(out: Path) -> str:
-    """Do the experiment with every core; writes the plots to the directory and returns the section in Markdown."""
+def section(page: Page) -> str:
+    """Do the experiment with every core; writes the plots and returns the section in Markdown."""
     began = time.monotonic()
     cases = [(name, n, bad) for bad in (False, True) for n in (PAPER_MEMBERS, ENOUGH_MEMBERS) for name in FILTERS]
     runs = all_runs([(case, seed) for case in cases for seed in range(SPOILED_RUNS if case[2] else RUNS)])
-    plots.draw(out, runs, ENOUGH_MEMBERS, PAPER_GATE)
+    plots.draw(page.directory, runs, ENOUGH_MEMBERS, PAPER_GATE)
     return report(runs, time.monotonic() - began)
 
 
