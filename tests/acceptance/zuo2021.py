@@ -29,7 +29,7 @@ PAPER = {  # Table 1: the clean flight
 SCENARIOS = {"clean": "zuo2021", "outliers": "zuo2021-outliers"}
 FLIGHTS = 24  # to train on; their seeds are far from the trials'
 METHODS = {
-    "BPNN-EKF": ("ekf", TrainSettings("correction", optimiser="momentum", start="random", epochs=200)),
+    "BPNN-EKF": ("bpnn-ekf", TrainSettings("correction", optimiser="momentum", start="random", epochs=200)),
     "GA-BPNN-UKF": ("ga-bpnn-ukf", TrainSettings("correction", start="genetic")),
 }
 HEADER = ("flight", "method", *(f"trial {t}" for t in TRIALS), "mean", "without the network", "Zuo et al. 2021, mean")

@@ -62,7 +62,7 @@ def mean_error(trajectory: Trajectory, flight: Simulation) -> float:
 
 def applied(scenario: str) -> str:
     """What the held-out flights say of the two networks."""
-    gains = {method: model(method, scenario).gain for method in ("bpnn-ekf", "ga-bpnn-ukf")}
+    gains = {method: model(method, scenario).filter.gain for method in ("bpnn-ekf", "ga-bpnn-ukf")}
     said = [f"{method}: {', '.join(f'{g:.2f}' for g in gain)}" for method, gain in gains.items()]
     return (
         f"Share of the network's answer that held-out flights let through (x, y, z, vx, vy, vz): {'; '.join(said)}.\n"
