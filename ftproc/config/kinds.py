@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from ftproc.errors import nearest
+
 #: The value as it is kept, or a ValueError that says what was expected.
 Kind = Callable[[object], Any]
 
@@ -37,9 +39,9 @@ def whole(low: int) -> Kind:
     """A whole number from low on."""
 
     def kind(value: object) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or value < low:
+        if isinstance(value, bool) or not isinstance(value, int | float) or value < low or value % 1 != 0:
             raise ValueError(f"a whole number from {low}")
-        return value
+        return int(value)
 
     return kind
 
@@ -73,4 +75,7 @@ def method(value: object) -> str:
     """The name of a method."""
     from ftproc.methods import registry
 
-    return str(words(*registry.METHODS)(value))
+    if value not in registry.METHODS:
+        hint = nearest(str(value), registry.METHODS)
+        raise ValueError("the name of a method, see --list-methods" + hint.removesuffix("?"))
+    return str(value)

@@ -86,6 +86,8 @@ def fit_coloured(
                 noise_variance=variance * (1 + correlation) / (1 - correlation), correlation=correlation
             )
             run = smooth_log(time_s, measurement, weight, model, starts, residuals_only=True)
+            if not math.isfinite(run.log_likelihood):  # the filter was lost among so few readings
+                return white
             variance, correlation = moments(run, weight, model.noise_variance)
             variance = np.where(known, given, variance)
             correlation = np.clip(correlation, 0.0, MOST)

@@ -24,6 +24,7 @@ from ftproc.core.start import begin_all
 FloatArray = NDArray[np.float64]
 
 LOOKS = 6
+LEAST_KEPT = 0.88  # of the readings of a component that were good before the first look
 LOOK_STEPS, FINAL_STEPS = 3, 4  # of the search for the jerk profile
 STANDS_OUT = 8.0  # times the median of the jerk profile
 AROUND = 200  # samples on each side of what stands out that are decided with it
@@ -64,7 +65,12 @@ def _look_again(record: Record, decision: Decision, profile: Model) -> tuple[Dec
 
 
 def _look_until_settled(record: Record, decision: Decision, profile: Model | None) -> tuple[Decision, Model]:
-    """Look again from the calm level on until nothing changes, or LOOKS times."""
+    """Look again from the calm level on until nothing changes, or LOOKS times.
+
+    A look that rejects much of what was good is not believed: where the smallest noise that explains the readings
+    left is taken for theirs, ever fewer are left.
+    """
+    first = decision.weight
     for _ in range(LOOKS):
         if profile is None:
             profile = tuning.fit_profile(*record.log, decision.weight, decision.starts, decision.model, LOOK_STEPS)
@@ -75,7 +81,7 @@ def _look_until_settled(record: Record, decision: Decision, profile: Model | Non
         if not _stands_out(record.time_s, profile).any() and (weight == decision.weight).all():
             break
         again = decide(record, decision._replace(weight=weight, model=calm), tune_first=False)
-        if (again.weight == decision.weight).all():
+        if (again.weight == decision.weight).all() or (again.weight.sum(0) < LEAST_KEPT * first.sum(0)).any():
             break
         decision, profile = again, None
     if profile is None:

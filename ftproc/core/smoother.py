@@ -156,7 +156,12 @@ def _sweep(
 
 
 def smoothed_covariance(p: FloatArray, n: FloatArray) -> FloatArray:
-    """P - P N P as L (I - L' N L) L' with P = L L' and eigenvalues kept positive whatever the rounding. (9, 9)."""
+    """P - P N P as L (I - L' N L) L' with P = L L' and eigenvalues kept positive whatever the rounding. (9, 9).
+
+    Of a run that has diverged, P itself.
+    """
+    if not (np.isfinite(p).all() and np.isfinite(n).all()):
+        return p
     scale = np.sqrt(np.diag(p))
     factor = scale[:, None] * np.linalg.cholesky(p / np.outer(scale, scale) + 1e-12 * np.eye(9))
     share, turn = np.linalg.eigh(np.eye(9) - factor.T @ n @ factor)

@@ -21,10 +21,13 @@ from ftproc.core.start import begin_all
 FloatArray = NDArray[np.float64]
 
 SPANS, SPAN = 6, 400  # of samples: what stands for a long log when one noise and one jerk level are looked for
-NOISE_FLOOR = np.array([1e-3, 1e-7, 1e-7])  # 1-sigma m, rad, rad: below it, rounding of the readings decides
+NOISE_FLOOR = np.array([1e-3, 5e-6, 5e-6])  # 1-sigma m, rad, rad: no tracker is better; below, rounding decides
 NOISE_GROWTH = 3.0  # times the noise that the search begins with: more of it is a track gone astray, not noise
+NOISE_SHRINKS = 4.0  # likewise, less of it is readings left out until the rest fits
+NOISE_ALLOWED = np.array([1.0, 1e-4, 1e-4])  # 1-sigma m, rad, rad that are never too much: a component computed from
+# another shows no noise at all to begin with
 JERK_SIDES = ((1e-7, -1), (1e7, 1))  # m^2/s^5: lowest and highest
-RATIO_BOUND = 12.0  # on |ln(vertical / horizontal jerk)|
+RATIO_BOUND = 6.0  # on |ln(vertical / horizontal jerk)|
 KNOT_SAMPLES = 10  # samples to a knot of the jerk profile ...
 KNOT_SECONDS = 4.0  # ... but never less than so many seconds,
 MAX_KNOTS = 4000  # nor more than so many knots
@@ -91,8 +94,9 @@ def fit_level(
         return guess
     part = representative(time_s, measurement, weight, starts, guess.noise_variance)
     log_noise = np.log(guess.noise_variance)
-    expected = log_noise if expected_sigma is None else 2 * np.log(expected_sigma)
-    floor, ceiling = 2 * np.log(NOISE_FLOOR), expected + 2 * math.log(NOISE_GROWTH)
+    expected = np.sqrt(guess.noise_variance) if expected_sigma is None else expected_sigma
+    floor = 2 * np.log(np.maximum(NOISE_FLOOR, expected / NOISE_SHRINKS if expected_sigma is not None else 0.0))
+    ceiling = 2 * np.log(np.maximum(NOISE_GROWTH * expected, NOISE_ALLOWED))
     log_jerk = np.array([math.log(guess.jerk[0, 0]), math.log(guess.jerk[0, 5] / guess.jerk[0, 0])])
     lowest, highest = (np.array([math.log(bound), side * RATIO_BOUND]) for bound, side in JERK_SIDES)
     lower = np.r_[np.where(fix_noise, log_noise, floor), log_jerk if fix_jerk else lowest]

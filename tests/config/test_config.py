@@ -55,6 +55,8 @@ gate = 3.5
 max_patch_s = 9
 weight_form = "gain"
 ecef = true
+particles = 150
+seed = 7
 keep_columns = true
 """
 
@@ -66,7 +68,7 @@ def test_every_key_is_understood():
     assert unsaid == {("azimuth", "column"), ("azimuth", "unit"), ("azimuth", "sigma"), ("elevation", "unit")}
     found = config.recipe(config.parse(FULL, "s.toml"))
     assert found.settings == FilterSettings(
-        "ukf", "forward", True, (3.048, None, pytest.approx(20 * math.pi / 648000)), 5.0, 3.5, 9.0, True,
+        "ukf", "forward", True, (3.048, None, pytest.approx(20 * math.pi / 648000)), 5.0, 3.5, 9.0, 150, 7, True,
         (48.0, 11.5, 612.0), True, 46.2,
     )  # fmt: skip
     assert found.station == Station(
@@ -126,6 +128,8 @@ OPTIONS = st.fixed_dictionaries(
         "max_patch": numbers,
         "weight_form": st.just("gain"),
         "ecef": st.just(True),
+        "particles": st.integers(101, 10_000),
+        "seed": st.integers(1, 2**31),
         "keep_columns": st.just(True),
     },
 )
@@ -175,8 +179,8 @@ def test_a_model_lies_beside_its_file(tmp_path, monkeypatch):
         ("[filter]\ngate = true", "[filter] gate = true: expected a number above zero."),
         ("[filter]\ngate = 0", "[filter] gate = 0: expected a number above zero."),
         ("[filter]\ngate = inf", "[filter] gate = inf: expected a number above zero."),
-        ("[filter]\nmethod = 'ekff'", '[filter] method = "ekff": expected "ga-bpnn-ukf" or "ga-bpnn-ukf-plain" or '
-         '"ukf" or "ekf"; did you mean "ekf"?'),
+        ("[filter]\nmethod = 'ekff'", '[filter] method = "ekff": expected the name of a method, see --list-methods; '
+         'did you mean "ekf".'),
         ("[azimuth]\nsense = 'clokwise'", '[azimuth] sense = "clokwise": expected "clockwise" or "anticlockwise"; did '
          'you mean "clockwise"?'),
         ("[azimuth]\nunit = 'km'", '[azimuth] unit = "km": expected "rad" or "deg" or "mrad" or "mil" or "grad" or '
