@@ -24,7 +24,7 @@ from ftproc.core.start import begin_all
 FloatArray = NDArray[np.float64]
 
 LOOKS = 6
-LEAST_KEPT = 0.88  # of the readings of a component that were good before the first look
+LEAST_KEPT = 0.8  # of the readings of a component that were good before the first look
 LOOK_STEPS, FINAL_STEPS = 3, 4  # of the search for the jerk profile
 STANDS_OUT = 8.0  # times the median of the jerk profile
 AROUND = 200  # samples on each side of what stands out that are decided with it
