@@ -1,6 +1,7 @@
-"""Many logs through the same filter: each by itself, so that a bad one stops no other, and in any number of workers.
+"""Many logs through the same filter: each by itself, so that a bad one stops no other, and by whatever crew: this
+process, worker processes (`workers`) or a Dask cluster (`cluster`).
 
-The results come in the order of the tasks, and are the same bytes whatever the number of workers.
+The results come in the order of the tasks, and are the same bytes whoever works.
 """
 
 from __future__ import annotations
@@ -9,9 +10,11 @@ import contextlib
 import time
 import traceback
 import warnings
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ftproc.errors import FtprocError, FtprocWarning
@@ -29,20 +32,27 @@ Say = Callable[[str], None]
 @dataclass(frozen=True)
 class Task:
     """One log to filter and where its trajectory goes; either may be `-`. method: instead of the recipe's. report:
-    where the HTML page goes, if one is wanted."""
+    where the HTML page goes, if one is wanted. place: the directory that names start from, when it is not the one in
+    which the worker stands."""
 
     log: str
     output: str
     method: str | None = None
     report: str | None = None
+    place: str = ""
+
+    def at(self, name: str) -> str:
+        """Where the file of that name is for whoever does the task."""
+        return str(Path(self.place, name)) if self.place else name
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """What is done with every log. model: `packaged`, `none` or a path; the rest as `files.logs.read` takes it."""
+    """What is done with every log. model: `packaged`, `none`, a path, or one that was loaded; the rest as
+    `files.logs.read` takes it."""
 
     settings: FilterSettings = field(default_factory=FilterSettings)
-    model: str = PACKAGED
+    model: str | Model = PACKAGED
     units: str | Mapping[str, str] | None = None
     columns: str | Mapping[str, str] | None = None
     station: Station = field(default_factory=Station)
@@ -73,21 +83,39 @@ class Outcome:
     elapsed_s: float = 0.0
 
 
-def run(tasks: Sequence[Task], recipe: Recipe, jobs: int = 1, say: Say | None = None) -> Iterator[Outcome]:
-    """Filter every log, in up to `jobs` processes. Yields the outcomes in the order of the tasks.
+#: Takes a task and returns what waits for its outcome.
+Begin = Callable[[Task], Callable[[], Outcome]]
+
+
+def run(
+    tasks: Sequence[Task], recipe: Recipe, jobs: int = 1, say: Say | None = None, scheduler: str | None = None
+) -> Iterator[Outcome]:
+    """Filter every log, in up to `jobs` processes or by the workers of a Dask cluster, whose scheduler has the address
+    `scheduler`. Yields the outcomes in the order of the tasks.
 
     say: is told when kernels are being compiled, which takes a while; with workers it must be picklable.
-    Raises ModelError, and UsageError when a site or a report is asked for and pymap3d or plotly is not there, before
-    any log is touched.
+    Raises ModelError, and UsageError when a site or a report is asked for and pymap3d or plotly is not there, or when
+    the cluster is not, before any log is touched.
     """
     _check(tasks, recipe)
-    if jobs > 1 and len(tasks) > 1:
+    with _crew(len(tasks), recipe, jobs, say, scheduler) as begin:
+        waiting = deque([begin(task) for task in tasks])
+        while waiting:
+            yield waiting.popleft()()
+
+
+def _crew(
+    tasks: int, recipe: Recipe, jobs: int, say: Say | None, scheduler: str | None
+) -> contextlib.AbstractContextManager[Begin]:
+    if scheduler is not None:
+        from ftproc import cluster
+
+        return cluster.crew(recipe, scheduler)
+    if jobs > 1 and tasks > 1:
         from ftproc import workers
 
-        yield from workers.run(tasks, recipe, min(jobs, len(tasks)), say)
-        return
-    for task in tasks:
-        yield filter_one(task, recipe, say)
+        return workers.crew(recipe, min(jobs, tasks), say)
+    return contextlib.nullcontext(lambda task: partial(filter_one, task, recipe, say))
 
 
 def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
@@ -98,16 +126,18 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
 
     began = time.perf_counter()
     try:
-        log = logs.read(task.log, **recipe.reading())
+        log = logs.read(task.at(task.log), **recipe.reading())
+        if task.place:
+            log = replace(log, name=task.log)  # the trajectory says where it comes from in the user's words
         settings = replace(recipe.settings, method=task.method or recipe.settings.method)
         named = None if task.method is None else registry.named(task.method)
         model = model_named(recipe.model) if named is None else model_for(named, recipe.model)
         with warm.announced(say), _passed_on(task.log, say):
             trajectory = pipeline.filter_log(log, settings, model)
         trajectory = geodesy.located(trajectory, settings)
-        trajectories.write(trajectory, task.output)
+        trajectories.write(trajectory, task.at(task.output))
         if task.report is not None:
-            report.write(trajectory, task.report)
+            report.write(trajectory, task.at(task.report))
         elapsed_s = time.perf_counter() - began
         return Outcome(task, summary.text(trajectory), summary.as_dict(trajectory), elapsed_s=elapsed_s)
     except BrokenPipeError:
@@ -116,8 +146,8 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
         return Outcome(task, failure=failure(error, task.log))
 
 
-def model_for(method: Method, name: str) -> Model | None:
-    """The model of that name if it was trained for the method, else the packaged one: when all methods are run side
+def model_for(method: Method, name: str | Model) -> Model | None:
+    """The model named if it was trained for the method, else the packaged one: when all methods are run side
     by side, one model cannot suit them all. Raises ModelError."""
     model = model_named(name)
     return model if model is None or method.suits(model.made_for) else model_named(PACKAGED)
@@ -170,11 +200,15 @@ def _check(tasks: Sequence[Task], recipe: Recipe) -> None:
         report.require_plotly()
 
 
-@cache
-def model_named(name: str) -> Model | None:
-    """`packaged`, `none` or a file -> the correction. Raises ModelError."""
+def model_named(name: str | Model) -> Model | None:
+    """`packaged`, `none` or a file -> the correction; one that was loaded is what it is. Raises ModelError."""
     if name == NO_MODEL:
         return None
+    return _loaded(name) if isinstance(name, str) else name
+
+
+@cache
+def _loaded(name: str) -> Model:
     from ftproc import pipeline
     from ftproc.correction import model_file
 

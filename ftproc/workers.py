@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import signal
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from typing import Any
 
-from ftproc.batch import Failure, Outcome, Recipe, Say, Task, filter_one
+from ftproc.batch import Begin, Failure, Outcome, Recipe, Say, Task, filter_one
 from ftproc.warm import COMPILING
 
 _DIED = "its worker process died (out of memory, or killed). Use fewer --jobs, or split the log."
@@ -22,23 +24,34 @@ class _Shared:
         self.stop, self.said, self.say = context.Event(), context.Value("b", False), say
 
 
-def run(tasks: Sequence[Task], recipe: Recipe, jobs: int, say: Say | None) -> Iterator[Outcome]:
-    """Outcomes in the order of the tasks. When a worker dies, what was not done is done one by one."""
+@contextlib.contextmanager
+def crew(recipe: Recipe, jobs: int, say: Say | None) -> Iterator[Begin]:
+    """`jobs` processes. When one dies, what was not done is done one by one."""
     context = multiprocessing.get_context("spawn")  # fork would copy the threads' locks but not the threads
     shared = _Shared(context, say)
     pool = _pool(context, jobs, recipe, shared)
-    futures = [pool.submit(_work, task) for task in tasks]
+
+    def begin(task: Task) -> Callable[[], Outcome]:
+        alone = partial(_alone, context, task, recipe, shared)
+        try:
+            return partial(_outcome, pool.submit(_work, task), alone)
+        except BrokenProcessPool:
+            return alone
+
     try:
-        for task, future in zip(tasks, futures, strict=True):
-            try:
-                yield future.result()
-            except BrokenProcessPool:
-                yield _alone(context, task, recipe, shared)
+        yield begin
     except BaseException:
         shared.stop.set()
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _outcome(future: Future[Outcome], alone: Callable[[], Outcome]) -> Outcome:
+    try:
+        return future.result()
+    except BrokenProcessPool:
+        return alone()
 
 
 def _pool(context: Any, jobs: int, recipe: Recipe, shared: _Shared) -> ProcessPoolExecutor:

@@ -62,6 +62,12 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     "--jobs", type=click.IntRange(min=1), default=1, metavar="N", help="Worker processes, for several logs at a time."
 )
 @click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Let the workers of a Dask cluster do it: the address of its scheduler, such as tcp://10.0.0.1:8786. Logs and "
+    "outputs must lie where all workers see them under the same name.",
+)
+@click.option(
     "--summary",
     type=click.Choice(["text", "json", "none"]),
     default="text",
@@ -74,6 +80,7 @@ def command(
     output: str | None,
     config: str | None,
     jobs: int,
+    scheduler: str | None,
     summary: str,
     report: str | None,
     list_methods: bool,
@@ -105,6 +112,5 @@ def command(
     from ftproc.cli import filtering, stations
 
     recipe = stations.recipe(ctx)
-    ctx.exit(
-        filtering.run(logs, output, recipe, config, jobs=jobs, summary=summary, report=report, debug=ctx.meta[DEBUG])
-    )
+    crew = filtering.Crew(jobs, scheduler)
+    ctx.exit(filtering.run(logs, output, recipe, config, crew, summary=summary, report=report, debug=ctx.meta[DEBUG]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import click
 
@@ -13,23 +14,34 @@ from ftproc.batch import Outcome, Recipe
 from ftproc.cli import outputs, reports
 from ftproc.cli.progress import Progress
 from ftproc.cli.stations import ALL
+from ftproc.errors import UsageError
 from ftproc.files import conventions, maps
 from ftproc.methods import registry
 from ftproc.report import Entry
 from ftproc.summary import line
 
 
+class Crew(NamedTuple):
+    """Who does the work: `jobs` processes, or the cluster of a scheduler."""
+
+    jobs: int = 1
+    scheduler: str | None = None
+
+
 def run(
-    logs: Sequence[str], output: str | None, recipe: Recipe, config: str | None, *,
-    jobs: int, summary: str, report: str | None, debug: bool,
+    logs: Sequence[str], output: str | None, recipe: Recipe, config: str | None, crew: Crew, *,
+    summary: str, report: str | None, debug: bool,
 ) -> int:  # fmt: skip
     """Filter the logs and print what became of them; the exit code. Raises FtprocError for wrong usage.
 
     config: where the recipe is from, not to be written over.
     """
+    if crew.scheduler is not None and crew.jobs > 1:
+        raise UsageError("--jobs is for processes on this machine, --scheduler for a cluster; give one of the two.")
     reports.check(report)
     methods = _applicable(recipe) if recipe.settings.method == ALL else None
-    inputs = [name for name in (recipe.model, config) if name not in (batch.PACKAGED, batch.NO_MODEL, None)]
+    named = (name for name in (recipe.model, config) if isinstance(name, str))
+    inputs = [name for name in named if name not in (batch.PACKAGED, batch.NO_MODEL)]
     tasks = outputs.plan(logs, output, methods, inputs)
     for task in tasks:
         maps.check(task.output, recipe.settings.site)
@@ -41,7 +53,7 @@ def run(
         _tell(f"positions on the earth: {geodesy.axes(conventions.FRAMES[recipe.station.azimuth_from])}, z is up")
     done: list[Outcome] = []
     with Progress() as progress:
-        for outcome in batch.run(tasks, recipe, jobs, _tell):
+        for outcome in batch.run(tasks, recipe, crew.jobs, _tell, crew.scheduler):
             done.append(outcome)
             progress.clear()
             _show(outcome, summary, debug)

@@ -72,4 +72,5 @@ def rows() -> Iterator[tuple[str, ...]]:
 if __name__ == "__main__":
     from tests.bench.__main__ import markdown
 
-    markdown(HEADER, rows())
+    for line in markdown(HEADER, rows()):
+        print(line, flush=True)

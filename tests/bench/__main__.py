@@ -1,28 +1,36 @@
-"""`python -m tests.bench [accuracy] [methods] [correction] [speed]`: the tables of the README, as Markdown."""
+"""`python -m tests.bench [accuracy] [methods] [correction] [speed] [scale]`: the tables of the README, as Markdown on
+standard output and in out/bench.md."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
+from itertools import chain
+from pathlib import Path
 
-from tests.bench import accuracy, correction, methods, speed
+from tests.bench import accuracy, correction, methods, scale, speed
 
-TABLES = {"accuracy": accuracy, "methods": methods, "correction": correction, "speed": speed}
+TABLES = {"accuracy": accuracy, "methods": methods, "correction": correction, "speed": speed, "scale": scale}
+KEPT = Path("out/bench.md")
 
 
-def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table as it comes."""
-    print("| " + " | ".join(header) + " |")
-    print("|" + " --- |" * len(header))
+def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterable[str]:
+    """The lines of a table, as they come."""
+    yield "| " + " | ".join(header) + " |"
+    yield "|" + " --- |" * len(header)
     for row in rows:
-        print("| " + " | ".join(row) + " |", flush=True)
+        yield "| " + " | ".join(row) + " |"
 
 
 def main() -> None:
-    """Print the tables that are named, or all."""
-    for name in sys.argv[1:] or TABLES:
-        print(f"\n{TABLES[name].__doc__}\n")
-        markdown(TABLES[name].HEADER, TABLES[name].rows())
+    """Print and keep the tables that are named, or all."""
+    KEPT.parent.mkdir(exist_ok=True)
+    with KEPT.open("w", encoding="utf-8") as kept:
+        for name in sys.argv[1:] or TABLES:
+            table = TABLES[name]
+            for line in chain([f"\n{table.__doc__}\n"], markdown(table.HEADER, table.rows())):
+                print(line, file=kept, flush=True)
+                print(line, flush=True)
 
 
 if __name__ == "__main__":

@@ -1,101 +1,107 @@
-"""Speed as ratios within one run: to filterpy's UKF, and of whole processes to loading the libraries they need."""
+"""Speed per sample on one log, medians of interleaved repetitions: our kernels, the same in C, and other libraries."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 
 from ftproc import pipeline
-from ftproc.core import forward, motion
+from ftproc.core import forward, gate, motion
 from ftproc.core.smoother import smooth_log
-from ftproc.files import logs
 from ftproc.settings import FilterSettings
-from ftproc.simulation import simulate
+from ftproc.simulation import Simulation, simulate
+from tests.bench import c_kernel, measuring, peers
 
-HEADER = ("what", "time", "ratio", "to")
+HEADER = ("what", "per sample", "ratio", "to", "bound")
+PLAIN, GATED, C = "UKF forward pass", "forward pass with gate and editing", "the same UKF in C (gcc -O3 -march=native)"
+JERK = 10.0  # m^2/s^5
+ROUNDS = 9
+PEER_SAMPLES = 400
 
 
 def rows() -> Iterator[tuple[str, ...]]:
-    """Kernels per sample, then whole processes."""
-    flight = simulate("manoeuvre", seed=1, duration_s=500.0)
-    log, n = flight.log, len(flight.log)
-    readings = log.time_s - log.time_s[0], log.measurement, np.isfinite(log.measurement).astype(float)
+    """Kernels to C, then other libraries to filterpy."""
+    flight = simulate("manoeuvre", seed=1, duration_s=2500.0)
+    model, start = told(flight)
+    readings = _readings(flight)
+    time_s, z, _ = readings
+    n = len(time_s)
+    kernels: dict[str, Callable[[], object]] = {
+        PLAIN: lambda: forward.filter_log(*readings, model, [start]),
+        GATED: lambda: gate.filter_and_edit(time_s, z, np.ones_like(z), model, [start], gate.GateSettings()),
+        "forward pass and smoother": lambda: smooth_log(*readings, model, [start]),
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        in_c = c_kernel.compiled(Path(folder))
+        if in_c is not None:
+            _compare(in_c(*readings, model, start), forward.filter_log(*readings, model, [start]))
+            kernels = {C: lambda: in_c(*readings, model, start), **kernels}
+        taken = {name: each.seconds / n for name, each in measuring.calls(kernels, ROUNDS).items()}
+    bounds = {PLAIN: "<= 1.2", GATED: "<= 2.0"}
+    for name, each in taken.items():
+        ratio = f"{each / taken[C]:.2f}" if C in taken else "-"
+        yield name, _us(each), ratio, "C", bounds.get(name, "")
+    yield from _peers(readings, model, start, flight)
+
+
+def told(flight: Simulation) -> tuple[forward.Model, forward.Start]:
+    """The true noise and start of a flight, and one jerk level."""
     assert flight.truth.velocity_mps is not None
     state = np.r_[flight.truth.position_m[0], flight.truth.velocity_mps[0], np.zeros(3)]
     start = forward.Start(0, state, np.diag([25.0] * 3 + [4.0] * 3 + [25.0] * 3))
-    model = forward.Model(np.array(flight.sigma) ** 2, motion.isotropic(10.0))
-    peer = _best(lambda: _filterpy(readings[0][:400], readings[1][:400], model, start), 2) / 400
-    yield "filterpy UKF, per sample", f"{1e6 * peer:.0f} us", "1", "itself"
-    for name, call in (
-        ("UKF forward pass", lambda: forward.filter_log(*readings, model, [start])),
-        ("forward pass and smoother", lambda: smooth_log(*readings, model, [start])),
-        ("filter, --editing forward", lambda: pipeline.filter_log(log, FilterSettings(editing="forward"))),
-        ("filter, the default", lambda: pipeline.filter_log(log)),
-        ("filter, --smooth", lambda: pipeline.filter_log(log, FilterSettings(smooth=True))),
-    ):
-        each = _best(call, 3) / n
-        yield f"{name}, per sample", f"{1e6 * each:.2f} us", f"{peer / each:.0f} x faster", "filterpy UKF"
-    yield from _processes(log)
+    return forward.Model(np.array(flight.sigma) ** 2, motion.isotropic(JERK)), start
 
 
-def _processes(log: object) -> Iterator[tuple[str, ...]]:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "log.csv"
-        logs.write(log, path)  # type: ignore[arg-type]
-        ftproc = [sys.executable, "-c", "from ftproc.cli.main import main; main()"]
-        run = [*ftproc, "filter", str(path), "-o", str(Path(folder) / "out.parquet"), "--summary", "none"]
-        for name, command, reference in (
-            ("`ftproc filter`, 10,000 rows, process", run, "import numpy, numba, pyarrow.parquet"),
-            ("the same, --editing forward", [*run, "--editing", "forward"], "import numpy, numba, pyarrow.parquet"),
-            ("`ftproc --help`, process", [*ftproc, "--help"], "import click"),
-        ):
-            ours, theirs = _paired(command, [sys.executable, "-c", reference])
-            yield name, f"{ours:.2f} s", f"{ours / theirs:.2f}", f"`python -c '{reference}'`"
+def _readings(flight: Simulation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Missing readings are interpolated: not every library can do without one."""
+    time_s, z = flight.log.time_s, flight.log.measurement
+    filled = np.column_stack([np.interp(time_s, time_s[ok], c[ok]) for c in z.T for ok in [np.isfinite(c)]])
+    return time_s - time_s[0], filled, np.ones_like(filled)
 
 
-def _best(call: Callable[[], object], times: int) -> float:
-    call()
-    taken = []
-    for _ in range(times):
-        began = time.perf_counter()
-        call()
-        taken.append(time.perf_counter() - began)
-    return min(taken)
+def _compare(one: forward.FilterRun, other: forward.FilterRun) -> None:
+    """Two runs that are compared in speed must do the same."""
+    for name, left, right in zip(one._fields, one, other, strict=True):
+        np.testing.assert_allclose(left, right, rtol=1e-9, atol=1e-9, err_msg=name)
 
 
-def _paired(ours: Sequence[str], theirs: Sequence[str]) -> tuple[float, float]:
-    """Median seconds of two commands run in turn."""
-    taken: tuple[list[float], list[float]] = ([], [])
-    for _ in range(6):
-        for command, found in zip((ours, theirs), taken, strict=True):
-            began = time.perf_counter()
-            subprocess.run(command, check=True, capture_output=True)
-            found.append(time.perf_counter() - began)
-    return float(np.median(taken[0][1:])), float(np.median(taken[1][1:]))
+def _peers(
+    readings: tuple[np.ndarray, ...], model: forward.Model, start: forward.Start, flight: Simulation
+) -> Iterator[tuple[str, ...]]:
+    """Against filterpy, also with all the computing of a command: screening, tuning, editing, network. The bound on the
+    kernel with its gate is not met by a whole command; both are shown."""
+    head = tuple(part[:PEER_SAMPLES] for part in readings)
+    ours: dict[str, tuple[Callable[[], object], int]] = {
+        PLAIN: (lambda: forward.filter_log(*readings, model, [start]), len(readings[0])),  # type: ignore[arg-type]
+        GATED: (
+            lambda: gate.filter_and_edit(*readings[:2], np.ones_like(readings[1]), model, [start], gate.GateSettings()),
+            len(readings[0]),
+        ),
+    }
+    for name, settings in (
+        ("`--editing forward --noise --jerk`, computing", FilterSettings(
+            editing="forward", noise=flight.sigma, jerk_psd_m2ps5=JERK)),
+        ("`filter`, computing", FilterSettings()),
+        ("`filter --smooth`, computing", FilterSettings(smooth=True)),
+    ):  # fmt: skip
+        ours[name] = (lambda settings=settings: pipeline.filter_log(flight.log, settings), len(flight.log))  # type: ignore[misc]
+    expected = forward.filter_log(*head, model, [start]).state[-1, :3]  # type: ignore[arg-type]
+    calls = {name: call for name, (call, _) in ours.items()}
+    samples = {name: count for name, (_, count) in ours.items()}
+    for name, prepare in peers.installed().items():
+        calls[name] = prepare(*head[:2], model, start)
+        samples[name] = PEER_SAMPLES
+        assert np.linalg.norm(calls[name]()[:3] - expected) < 1.0, f"{name} filters something else"
+    taken = {name: each.seconds / samples[name] for name, each in measuring.calls(calls, 3).items()}
+    if "filterpy" not in taken:
+        return
+    for name, each in taken.items():
+        faster = taken["filterpy"] / each
+        yield name, _us(each), f"{faster:.3g} x faster", "filterpy UKF", ">= 300 x" if name == GATED else ""
 
 
-def _filterpy(time_s: np.ndarray, z: np.ndarray, model: forward.Model, start: forward.Start) -> None:
-    """The same filter as filterpy's users would write it."""
-    from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
-
-    def move(x: np.ndarray, dt: float) -> np.ndarray:
-        return np.r_[x[:3] + dt * x[3:6] + dt * dt / 2 * x[6:], x[3:6] + dt * x[6:], x[6:]]
-
-    def measure(x: np.ndarray) -> np.ndarray:
-        ground = np.hypot(x[0], x[1])
-        return np.array([np.hypot(ground, x[2]), np.arctan2(x[1], x[0]), np.arctan2(x[2], ground)])
-
-    points = MerweScaledSigmaPoints(9, alpha=1.0, beta=0.0, kappa=0.0)
-    ukf = UnscentedKalmanFilter(9, 3, 0.05, measure, move, points)
-    ukf.x, ukf.P, ukf.R = start.state.copy(), start.covariance.copy(), np.diag(model.noise_variance)
-    for k in range(len(time_s)):
-        if k:
-            ukf.predict(dt=time_s[k] - time_s[k - 1])
-        if np.isfinite(z[k]).all():
-            ukf.update(z[k])
+def _us(seconds: float) -> str:
+    return f"{1e6 * seconds:.3g} us"

@@ -237,3 +237,11 @@ def test_wrong_usage_that_only_the_log_shows(run, flight):
     result = run("filter", "kept.csv", "--keep-columns")
     assert result.code == 2
     assert 'the log\'s column "x_m" has the name of an output column' in result.err
+
+
+def test_jobs_and_scheduler_exclude_each_other(run):
+    result = run("filter", "a.csv", "b.csv", "--jobs", 2, "--scheduler", "tcp://127.0.0.1:1")
+    assert (result.code, result.out) == (2, "")
+    assert result.err == (
+        "ftproc: --jobs is for processes on this machine, --scheduler for a cluster; give one of the two.\n"
+    )

@@ -145,7 +145,17 @@ def test_the_command_s_defaults_are_those_of_the_settings():
 
 
 def test_every_filter_option_can_be_kept_in_a_file():
-    about_the_run = {"output", "jobs", "summary", "list_methods", "config", "write_config", "debug", "report"}
+    about_the_run = {
+        "output",
+        "jobs",
+        "scheduler",
+        "summary",
+        "list_methods",
+        "config",
+        "write_config",
+        "debug",
+        "report",
+    }
     options = {p.name for p in command.params if isinstance(p, click.Option)} - about_the_run
     assert options <= {key.option for _, _, key in every()}
 
