@@ -33,7 +33,7 @@ def scatter(scaled: FloatArray) -> dict[str, Any]:
 def vagueness(innovation_sigma: FloatArray, used: NDArray[np.bool_], noise_sigma: float) -> float | None:
     """By how much predictions are vaguer than readings (median over the used ones): a gate of C sigmas lets pass what
     is C times so many noise sigmas off."""
-    return float(np.median(innovation_sigma[used]) / noise_sigma) if used.any() else None
+    return float(np.median(innovation_sigma[used]) / noise_sigma) if used.any() and 0 < noise_sigma < np.inf else None
 
 
 def blind_stretches(time_s: FloatArray, sigma_m: FloatArray) -> list[dict[str, float]]:

@@ -21,6 +21,7 @@ from ftproc.records import FloatArray
 
 SCHEMA = 1
 _KEY = "ftproc-correction"  # one key only: safetensors writes several in no fixed order
+_LARGEST = 64 << 20  # bytes; a model has thousands
 _TENSORS = ("w1", "b1", "w2", "b2", "precision")
 
 
@@ -92,22 +93,22 @@ def from_bytes(content: bytes, name: str) -> Model:
         tensors = parse(content)
         length = int.from_bytes(content[:8], "little")
         metadata = json.loads(content[8 : 8 + length]).get("__metadata__", {})
-    except (SafetensorError, ValueError) as cause:
+    except (SafetensorError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as cause:
         raise ModelError(f"{name}: not a correction model; `ftproc train` writes one") from cause
     if _KEY not in metadata:
         raise ModelError(f"{name}: a safetensors file, but not a correction model; `ftproc train` writes one")
     try:
         header = json.loads(metadata[_KEY])
         schema = header["schema"]
-    except (ValueError, KeyError, TypeError) as cause:
+    except (ValueError, KeyError, TypeError, RecursionError) as cause:
         raise ModelError(f"{name}: the model's header is damaged; train it again") from cause
     if schema != SCHEMA:
         raise ModelError(f"{name}: a model of schema {schema}, this version reads {SCHEMA}; train it again")
     try:
         model = _assemble(header, tensors, name)
-    except (ValueError, KeyError, TypeError, AttributeError) as cause:
+        _check(model, header, name)
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as cause:
         raise ModelError(f"{name}: the model's header is damaged ({cause}); train it again") from cause
-    _check(model, header, name)
     return model
 
 
@@ -170,12 +171,19 @@ def save(model: Model, path: Path | str) -> None:
 
 def load(path: Path | str) -> Model:
     """Read a model. Raises ModelError, in a sentence, for whatever is not one."""
+    from ftproc.files.tables import is_ordinary
+
     try:
-        content = Path(path).read_bytes()
+        if not is_ordinary(Path(path)):
+            raise ModelError(f"{path}: not an ordinary file (a pipe or a device); give a model `ftproc train` wrote")
+        with Path(path).open("rb") as stream:
+            content = stream.read(_LARGEST + 1)
     except FileNotFoundError as cause:
         raise ModelError(f"{path}: there is no such file; `ftproc train` writes a model") from cause
     except OSError as cause:
         raise ModelError(f"{path}: cannot be read ({cause.strerror}); give a model `ftproc train` wrote") from cause
+    if len(content) > _LARGEST:
+        raise ModelError(f"{path}: far too large for a correction model; give one that `ftproc train` wrote")
     return from_bytes(content, str(path))
 
 
