@@ -12,6 +12,7 @@ from ftproc import batch, geodesy
 from ftproc.batch import Outcome, Recipe
 from ftproc.cli import outputs
 from ftproc.cli.progress import Progress
+from ftproc.errors import printable
 from ftproc.files import schema, units
 from ftproc.methods import registry
 from ftproc.settings import FilterSettings
@@ -77,7 +78,8 @@ def _show(outcome: Outcome, summary: str, debug: bool) -> None:
     elif summary == "text":
         on_stdout = outcome.task.output == "-"
         place = "" if on_stdout else f"\n  -> {outcome.task.output}"
-        click.echo(outcome.text + place, err=on_stdout)
+        lines = (outcome.text + place).split("\n")
+        click.echo("\n".join(map(printable, lines)), err=on_stdout)
 
 
 def _show_json(done: Sequence[Outcome]) -> None:
