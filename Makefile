@@ -45,7 +45,7 @@ $(foreach log,$(logs),$(if $(word 2,$(log-of-$(call stem,$(log)))),\
 $(if $(logs),,$(error LOGS: there is no log among "$(LOGS)"))
 endif
 
-.PHONY: help run test samples model bench reproduce clean install FORCE
+.PHONY: help run test trust samples model bench reproduce clean install FORCE
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /make \1	/p' Makefile | expand -t 16
@@ -125,6 +125,9 @@ samples: $(warmed) ## make sample_data/ anew (fixed seeds: the same bytes)
 
 model: $(warmed) ## train the packaged model anew (MODEL_FLAGS)
 	$(ftproc) train $(MODEL_FLAGS) -o ftproc/correction/default.safetensors
+
+trust: $(developer) $(warmed) ## the table of reliability: bad files, faults, long runs, fuzz (some ten minutes)
+	$(bin)/python -m tests.trust
 
 bench: $(developer) $(warmed) ## measure accuracy and speed
 	$(bin)/python -m tests.bench

@@ -179,7 +179,7 @@ def failure(error: BaseException, source: str | None = None) -> Failure:
     about = f"{source}: " if source else ""
     if isinstance(error, FtprocError):
         return Failure(str(error), error.exit_code, trace)
-    if isinstance(error, MemoryError):
+    if isinstance(error, MemoryError) or "Resource temporarily unavailable" in str(error):
         return Failure(f"{about}there is not enough memory for it. Use fewer --jobs, or split the log.", 1, trace)
     if isinstance(error, RuntimeError) and "no locator available" in str(error):
         cure = "Set NUMBA_CACHE_DIR to a directory that can be written to."

@@ -43,8 +43,8 @@ def nis_bounds(freedom: FloatArray) -> tuple[FloatArray, FloatArray]:
 def vagueness(innovation_sigma: FloatArray, used: NDArray[np.bool_], noise_sigma: float) -> float | None:
     """By how much predictions are vaguer than readings (median over the used ones): a gate of C sigmas lets pass what
     is C times so many noise sigmas off."""
-    typical = float(np.median(innovation_sigma[used]) / noise_sigma) if used.any() else np.nan
-    return typical if np.isfinite(typical) else None
+    typical = float(np.median(innovation_sigma[used])) if used.any() else np.nan
+    return typical / noise_sigma if np.isfinite(typical) and 0 < noise_sigma < np.inf else None
 
 
 def blind_stretches(time_s: FloatArray, sigma_m: FloatArray) -> list[dict[str, float]]:

@@ -6,6 +6,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 
+def printable(text: str) -> str:
+    """`text` with control characters, and bytes of file names that are no UTF-8, written out as `\\x1b`.
+
+    Names come from files that others made: they must not move the cursor, change colours or reverse the line.
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
 class FtprocError(Exception):
     """Root of all errors that carry a plain sentence for the user.
 
@@ -13,6 +21,9 @@ class FtprocError(Exception):
     """
 
     exit_code = 1
+
+    def __init__(self, sentence: str) -> None:
+        super().__init__(printable(sentence))
 
 
 class FtprocWarning(UserWarning):

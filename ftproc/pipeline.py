@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ftproc import __version__
+from ftproc import __version__, plausible
 from ftproc.core.geometry import from_cartesian
 from ftproc.errors import InputError, UsageError
 from ftproc.files.conventions import CONVENTION, in_words
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 EDITING = ("two-pass", "forward", "none")
 ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of a component that the log says too little about
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # stands in for a component that is missing throughout
+FARTHEST = 1e12  # m, rad: a wilder reading is no more of an outlier, but its square would overflow
 FEWEST_PARTICLES = 20
 FEWEST_READINGS = 8  # of a component, for its noise to be found from them
 PACKAGED_MODEL = Path(__file__).parent / "correction" / "default.safetensors"
@@ -121,12 +122,9 @@ def _check(settings: FilterSettings) -> None:
 
 def _readings(log: MeasurementLog) -> tuple[Readings, list[int]]:
     """What the methods see, and the components that are missing throughout (a constant stands in for those)."""
-    if len(log) == 0:
-        raise InputError(f"{log.name}: no row has a time, so there is nothing to filter")
-    measurement = log.measurement.copy()
+    plausible.check(log)
+    measurement = np.clip(log.measurement, -FARTHEST, FARTHEST)
     count = np.isfinite(measurement).sum(0)
-    if not count.any():
-        raise InputError(f"{log.name}: range, azimuth and elevation are missing in every row")
     absent = [c for c in range(3) if count[c] == 0]
     assumed = np.where(count < FEWEST_READINGS, ASSUMED_SIGMA, np.nan)
     for c in absent:

@@ -70,9 +70,10 @@ def test_a_bad_model_is_told_before_any_log_is_touched(tasks, tmp_path):
 
 
 def test_a_worker_that_dies_takes_only_its_own_log_with_it(tmp_path):
-    """A named pipe nobody writes to holds a worker until it is killed, as the system does when memory is short."""
+    """A named pipe nobody reads from holds a worker until it is killed, as the system does when memory is short."""
     stuck, good = tmp_path / "stuck.csv", tmp_path / "good.csv"
-    os.mkfifo(stuck)
+    os.mkfifo(tmp_path / "a.csv")
+    logs.write(simulate("zuo2021").log, stuck)
     logs.write(simulate("zuo2021").log, good)
     done = threading.Event()
 

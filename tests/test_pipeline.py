@@ -208,11 +208,15 @@ def empty():
 
 
 def test_refuses_a_log_without_rows_or_readings():
-    with pytest.raises(InputError, match=r"^empty\.csv: no row has a time, so there is nothing to filter$"):
+    with pytest.raises(
+        InputError, match=r"^empty\.csv: no row has a time, so there is nothing to filter; check the time column\.$"
+    ):
         pipeline.filter_log(empty())
     log, _ = tiny(5)
     nothing = replace(log, name="x.csv", measurement=np.full((5, 3), np.nan))
-    with pytest.raises(InputError, match=r"^x\.csv: range, azimuth and elevation are missing in every row$"):
+    with pytest.raises(
+        InputError, match=r"^x\.csv: range, azimuth and elevation are missing in every row; check the columns"
+    ):
         pipeline.filter_log(nothing)
 
 

@@ -14,7 +14,7 @@ from ftproc.batch import Outcome, Recipe
 from ftproc.cli import outputs, reports
 from ftproc.cli.progress import Progress
 from ftproc.cli.stations import ALL
-from ftproc.errors import UsageError
+from ftproc.errors import UsageError, printable
 from ftproc.files import conventions, maps
 from ftproc.methods import registry
 from ftproc.report import Entry
@@ -91,7 +91,8 @@ def _show(outcome: Outcome, summary: str, debug: bool) -> None:
         on_stdout = outcome.task.output == "-"
         places = [place for place in (outcome.task.output, outcome.task.report) if place not in (None, "-")]
         lines = [outcome.text, line("time", f"{outcome.elapsed_s:.2f} s"), *(f"  -> {place}" for place in places)]
-        click.echo("\n".join(lines), err=on_stdout)
+        text = "\n".join(lines)
+        click.echo("\n".join(map(printable, text.split("\n"))), err=on_stdout)
 
 
 def _entry(outcome: Outcome) -> Entry:

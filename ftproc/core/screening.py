@@ -152,7 +152,7 @@ def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
     steps = np.diff(np.unique(values))
     steps = steps[steps > 1e-12 * np.abs(values).max()]
     step = float(steps.min()) if len(steps) else np.inf
-    chance = step / (2 * np.sqrt(np.pi) * sigma)
+    chance = step / (2 * np.sqrt(np.pi) * sigma) if np.isfinite(sigma) else np.inf
     if chance >= 1:
         return found
     repeats_needed = max(np.log(STUCK_ODDS / len(seen)) / np.log(max(chance, 1e-300)), SHORTEST_STUCK - 1)

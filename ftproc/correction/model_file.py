@@ -19,6 +19,7 @@ from ftproc.correction.verdict import Verdict
 from ftproc.errors import ModelError
 
 _KEY = "ftproc-correction"  # one key only: safetensors writes several in no fixed order
+_LARGEST = 64 << 20  # bytes; a model has thousands
 _TENSORS = (*Weights._fields, "precision")
 
 
@@ -66,14 +67,14 @@ def from_bytes(content: bytes, name: str) -> Model:
         tensors = parse(content)
         length = int.from_bytes(content[:8], "little")
         metadata = json.loads(content[8 : 8 + length]).get("__metadata__", {})
-    except (SafetensorError, ValueError) as cause:
+    except (SafetensorError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as cause:
         raise ModelError(f"{name}: not a correction model; `ftproc train` writes one") from cause
     if _KEY not in metadata:
         raise ModelError(f"{name}: a safetensors file, but not a correction model; `ftproc train` writes one")
     try:
         header = json.loads(metadata[_KEY])
         schema = header["schema"]
-    except (ValueError, KeyError, TypeError) as cause:
+    except (ValueError, KeyError, TypeError, RecursionError) as cause:
         raise ModelError(f"{name}: the model's header is damaged; train it again") from cause
     if schema != SCHEMA:
         raise ModelError(f"{name}: a model of schema {schema}, this version reads {SCHEMA}; train it again")
@@ -83,7 +84,7 @@ def from_bytes(content: bytes, name: str) -> Model:
             raise ValueError(f"its stages are {', '.join(found) or 'none'}")
         stages = {key: _stage(found[key], tensors, key, name) for key in STAGES if key in found}
         return Model(stages, dict(header["settings"]))
-    except (ValueError, KeyError, TypeError, AttributeError) as cause:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as cause:
         raise ModelError(f"{name}: the model's header is damaged ({cause}); train it again") from cause
 
 
@@ -146,10 +147,17 @@ def save(model: Model, path: Path | str) -> None:
 
 def load(path: Path | str) -> Model:
     """Read a model. Raises ModelError, in a sentence, for whatever is not one."""
+    from ftproc.files.tables import is_ordinary
+
     try:
-        content = Path(path).read_bytes()
+        if not is_ordinary(Path(path)):
+            raise ModelError(f"{path}: not an ordinary file (a pipe or a device); give a model `ftproc train` wrote")
+        with Path(path).open("rb") as stream:
+            content = stream.read(_LARGEST + 1)
     except FileNotFoundError as cause:
         raise ModelError(f"{path}: there is no such file; `ftproc train` writes a model") from cause
     except OSError as cause:
         raise ModelError(f"{path}: cannot be read ({cause.strerror}); give a model `ftproc train` wrote") from cause
+    if len(content) > _LARGEST:
+        raise ModelError(f"{path}: far too large for a correction model; give one that `ftproc train` wrote")
     return from_bytes(content, str(path))

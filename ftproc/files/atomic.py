@@ -50,7 +50,7 @@ def replacing(target: Target) -> Iterator[BinaryIO]:
     """
     try:
         check_target(target)
-        path = Path(target).resolve()
+        path = _resolved(Path(target))
         if path.exists() and not path.is_file():
             with path.open("wb") as stream:
                 yield stream
@@ -92,11 +92,21 @@ def _sync_directory(directory: Path) -> None:
             os.close(descriptor)
 
 
+def _resolved(path: Path) -> Path:
+    """The file behind all links. OSError for a link to itself, which some versions of Python tell otherwise."""
+    try:
+        return path.resolve()
+    except RuntimeError as error:
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from error
+
+
 def _same_file(one: Path, other: Path) -> bool:
     try:
         return one.samefile(other)
     except OSError:  # at least one is not there yet; then the resolved names tell
-        return one.resolve() == other.resolve()
+        with contextlib.suppress(OSError):
+            return _resolved(one) == _resolved(other)
+        return False
 
 
 def _plain(path: Path, error: OSError) -> OutputError:
@@ -110,6 +120,7 @@ def _plain(path: Path, error: OSError) -> OutputError:
         errno.EROFS: f"{directory} cannot be written to (read-only); choose another place.",
         errno.ENOSPC: "the disk is full; nothing was written. Make room or choose another place.",
         errno.EDQUOT: "the disk quota is used up; nothing was written. Make room or choose another place.",
+        errno.ELOOP: "this is a symbolic link to itself; delete it, or give another name.",
         errno.EFBIG: "the file is larger than the system allows; nothing was written. Choose another place.",
     }
     reason = reasons.get(error.errno or 0, f"cannot be written ({error.strerror or error}).")

@@ -13,8 +13,8 @@ from .csvtext import MISSING_WORDS, row_named
 if TYPE_CHECKING:
     import pyarrow as pa
 
-_POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?")
+_POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
 
 #: For a cell: None when it is all right, else what it is not and (perhaps empty) the cure.
 Check = Callable[[str], tuple[str, str] | None]

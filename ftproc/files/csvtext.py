@@ -67,7 +67,7 @@ class CsvText(NamedTuple):
         except pa.ArrowInvalid as error:
             self._refuse_ragged()
             reason = str(error).splitlines()[0][:200]
-            raise InputError(f"{self.source}: cannot be read as CSV ({reason}).") from error
+            raise InputError(f"{self.source}: cannot be read as CSV ({reason}). Save it as CSV anew.") from error
 
     def _parse(self, numeric: Sequence[int], others: Sequence[int], wanted: pa.DataType) -> pa.Table:
         import pyarrow as pa
@@ -99,12 +99,14 @@ class CsvText(NamedTuple):
         """Raise InputError for the first row with a wrong number of cells, read slowly in plain Python."""
         text = io.TextIOWrapper(io.BytesIO(self.body), encoding="utf-8", errors="replace", newline="")
         rows = (cells for cells in csv.reader(text, delimiter=self.delimiter) if cells)
+        row = -1
         try:
             for row, cells in enumerate(rows):
                 if len(cells) != len(self.names) or (self.open_quotation and _spans_lines(cells)):
                     raise InputError(self._ragged(row, cells))
         except csv.Error as error:
-            raise InputError(f"{self.source}: cannot be read as CSV ({error}).") from error
+            place = f"{self.source}: {row_named(row + 1)}"
+            raise InputError(f"{place} cannot be read as CSV ({error}). Correct the row or delete it.") from error
 
     def _ragged(self, row: int, cells: list[str]) -> str:
         expected = len(self.names)
@@ -150,7 +152,12 @@ def _names(source: str, header: bytes) -> tuple[list[str], str]:
             "save the file as UTF-8 (iconv -f LATIN1 -t UTF-8)."
         ) from error
     delimiter = max(",;\t", key=line.count)  # the first of them when none is there
-    names = [name.strip() for name in next(csv.reader([line], delimiter=delimiter))]
+    try:
+        names = [name.strip() for name in next(csv.reader([line], delimiter=delimiter))]
+    except csv.Error as error:
+        raise InputError(
+            f"{source}: the header line cannot be read as CSV ({error}); correct it, or delete what stands before it."
+        ) from error
     if len(names) == 1 and re.search(r"\S[ |]+\S", names[0]):
         raise InputError(
             f'{source}: the header line "{line[:80]}" has no separator; '

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -88,9 +89,9 @@ def write(log: MeasurementLog, target: Target) -> None:
 
 
 def _check_others(opened: tables.OpenTable, others: list[int]) -> None:
-    names = [opened.names[position] for position in others]
-    for name in names:
-        if names.count(name) > 1:
+    counts = Counter(opened.names[position] for position in others)
+    for name, count in counts.items():
+        if count > 1:
             raise InputError(
                 f'{opened.source}: column "{name}" is there twice, so both cannot be kept; rename one, '
                 "or leave --keep-columns out."
@@ -161,9 +162,11 @@ def _in_time_order(source: str, quantities: Mapping[str, FloatArray], extra: pa.
             measurement[:, index] = quantities[component]
     timed = np.flatnonzero(~np.isnan(time))
     if not timed.size:
-        raise InputError(f"{source}: no row has a time; there is nothing to process.")
+        raise InputError(f"{source}: no row has a time, so there is nothing to process; fill the times in.")
     if np.isnan(measurement[timed]).all():
-        raise InputError(f"{source}: no row has a range, azimuth or elevation; there is nothing to process.")
+        raise InputError(
+            f"{source}: no row has a range, azimuth or elevation, so there is nothing to process; check the columns."
+        )
     late = int(np.count_nonzero(time[timed] < np.maximum.accumulate(time[timed])))
     row = timed[np.argsort(time[timed], kind="stable")] if late else timed
     everything = len(row) == len(time) and not late
@@ -175,6 +178,6 @@ def _in_time_order(source: str, quantities: Mapping[str, FloatArray], extra: pa.
         rows_in_file=len(time),
         rows_without_time=tuple(np.flatnonzero(np.isnan(time)).tolist()),
         rows_out_of_order=late,
-        duplicate_times=int(np.count_nonzero(np.diff(time[row]) == 0)),
+        duplicate_times=int(np.count_nonzero(time[row][1:] == time[row][:-1])),
         extra=extra if extra is None or everything else extra.take(row),
     )

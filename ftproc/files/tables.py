@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gzip
+import io
+import stat
 import sys
 import zlib
 from collections.abc import Callable, Mapping, Sequence
@@ -21,6 +23,12 @@ Source: TypeAlias = "str | Path | pa.Table | pd.DataFrame"
 
 SUFFIXES = (".csv", ".csv.gz", ".parquet", ".feather")
 _GZIP_MAGIC = b"\x1f\x8b"
+
+#: What a packed file may grow to, lest a few bytes fill the memory: real readings shrink to a half, not to a 200th.
+_MOST_GROWTH = 200
+_ALWAYS_ALLOWED = 64 << 20  # bytes
+#: Of text on standard input, which may never end.
+MOST_ON_STDIN = 4 << 30
 
 
 @dataclass(frozen=True)
@@ -48,7 +56,7 @@ def open_table(source: Source) -> OpenTable:
     if not isinstance(source, str | Path):
         return _in_memory(source)
     if str(source) == "-":
-        return _csv("<stdin>", sys.stdin.buffer.read())
+        return _csv("<stdin>", _stdin())
     name, path = str(source), Path(source)
     kind = kind_of(path)
     if kind is None:
@@ -68,6 +76,8 @@ def kind_of(path: Path) -> str | None:
 
 def _read(path: Path, limit: int = -1) -> bytes:
     try:
+        if not is_ordinary(path):
+            raise InputError(f"{path}: not an ordinary file (a pipe or a device); give it as - on standard input.")
         with path.open("rb") as stream:
             data = stream.read(limit)
     except FileNotFoundError as error:
@@ -77,10 +87,30 @@ def _read(path: Path, limit: int = -1) -> bytes:
     except PermissionError as error:
         raise InputError(f"{path}: no permission to read it.") from error
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error}).") from error
+        raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the file.") from error
     if not data:
         raise InputError(f"{path}: the file is empty; expected a header line and rows.")
     return data
+
+
+def is_ordinary(path: Path) -> bool:
+    """Whether it can be read to an end without waiting for anybody. A directory is left to `open`'s own complaint."""
+    mode = path.stat().st_mode
+    return stat.S_ISREG(mode) or stat.S_ISDIR(mode)
+
+
+def _stdin() -> bytes:
+    data = sys.stdin.buffer.read(MOST_ON_STDIN + 1)
+    if len(data) > MOST_ON_STDIN:
+        raise InputError(
+            f"<stdin>: more than {MOST_ON_STDIN >> 20} MiB without an end; give a Parquet file, or split it."
+        )
+    return data
+
+
+def most_bytes(packed: int) -> int:
+    """What a file of so many packed bytes may become in memory."""
+    return max(_ALWAYS_ALLOWED, _MOST_GROWTH * packed)
 
 
 def _csv(name: str, data: bytes, must_be_gzip: bool = False) -> OpenTable:
@@ -91,12 +121,19 @@ def _csv(name: str, data: bytes, must_be_gzip: bool = False) -> OpenTable:
 
 
 def _gunzip(name: str, data: bytes) -> bytes:
+    most = most_bytes(len(data))
     try:
-        return gzip.decompress(data)
+        text = gzip.GzipFile(fileobj=io.BytesIO(data)).read(most + 1)
     except EOFError as error:
         raise InputError(f"{name}: the gzip file is cut short; copy it again.") from error
     except (gzip.BadGzipFile, zlib.error) as error:
         raise InputError(f"{name}: not a gzip file, or a damaged one ({error}); copy it again.") from error
+    if len(text) > most:
+        raise InputError(
+            f"{name}: unpacks to more than {_MOST_GROWTH} times its packed size, which no log does. "
+            "If it is one all the same, unpack it first (gunzip)."
+        )
+    return text
 
 
 def _parquet(name: str, path: Path) -> OpenTable:
@@ -109,13 +146,21 @@ def _parquet(name: str, path: Path) -> OpenTable:
 
     def load(numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
         chosen = [schema.names[position] for position in (*numeric, *others)]
+        if 8 * described.num_rows * len(numeric) > most_bytes(path.stat().st_size):
+            raise InputError(
+                f"{name}: it says that it holds {described.num_rows} rows in so small a file, which no log does; "
+                "write it anew."
+            )
         try:
-            return pq.read_table(path, columns=chosen, partitioning=None).select(chosen)
+            return pq.read_table(path, columns=chosen, partitioning=None, page_checksum_verification=True).select(
+                chosen
+            )
         except (pa.ArrowException, OSError) as error:
             raise damaged(error) from error
 
     try:
-        schema = pq.read_schema(path)
+        described = pq.read_metadata(path)
+        schema = described.schema.to_arrow_schema()
     except (pa.ArrowException, OSError) as error:
         raise damaged(error) from error
     return OpenTable(name, list(schema.names), load, metadata=schema.metadata or {})

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..records import FloatArray
-from . import arrow
+from . import arrow, rollover
 from .cells import Origin, as_text, first_bad, has_comma, instant, not_a_number
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 _DAY_S = 86400
+_MOST_TICKS = 2**63 - 1
 _PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 
 
@@ -44,21 +45,24 @@ def seconds(
     Timestamps (UTC where they name no zone) become seconds since 00:00 UTC of the day of the earliest one. So
     float64 keeps better than 0.1 microsecond for a week, the order of the rows does not matter, and all logs
     of one day share their origin.
-    Raises InputError for the first cell that is neither a finite number nor a timestamp.
+    Raises InputError for the first cell that is neither a finite number nor a timestamp, and for numbers that begin
+    again at midnight.
     """
     import pyarrow as pa
 
     kind = column.type
     if pa.types.is_timestamp(kind) or pa.types.is_date(kind):
-        return _since_midnight(column)
+        return _since_midnight(column, origin)
     if pa.types.is_duration(kind):
         return _ticks_to_seconds(column.cast(pa.int64()), kind.unit), ""
     if _plain_numbers(column) is None:
         text = as_text(column)
         if _parsed(text, origin.decimal_comma) is None:
-            return _since_midnight(_timestamps(text, origin))
+            return _since_midnight(_timestamps(text, origin), origin)
         column = text
-    return to_si(numbers(column, origin)), ""
+    time = to_si(numbers(column, origin))
+    rollover.refuse(origin, time)
+    return time, ""
 
 
 def _plain_numbers(column: pa.ChunkedArray) -> FloatArray | None:
@@ -115,7 +119,7 @@ def _refuse_infinite(values: FloatArray, origin: Origin) -> None:
         raise origin.bad(row, f"{values[row]:g}", "finite")
 
 
-def _since_midnight(column: pa.ChunkedArray) -> tuple[FloatArray, str]:
+def _since_midnight(column: pa.ChunkedArray, origin: Origin) -> tuple[FloatArray, str]:
     import pyarrow as pa
     import pyarrow.compute as pc
 
@@ -123,8 +127,12 @@ def _since_midnight(column: pa.ChunkedArray) -> tuple[FloatArray, str]:
         column = column.cast(pa.timestamp("ms"))
     per_day = _DAY_S * _PER_SECOND[column.type.unit]
     ticks = column.cast(pa.int64())
-    earliest = pc.min(ticks).as_py() or 0  # None when every cell is missing
+    earliest, latest = (found or 0 for found in pc.min_max(ticks).as_py().values())  # None when every cell is missing
     day = earliest // per_day
+    if day * per_day < -_MOST_TICKS or latest - day * per_day > _MOST_TICKS:
+        raise origin.bad(
+            ticks.to_pylist().index(earliest), f"{earliest} {column.type.unit}", "a time of the others' age"
+        )
     midnight = f"{np.datetime64(day, 'D')}T00:00:00Z"
     return _ticks_to_seconds(pc.subtract(ticks, day * per_day), column.type.unit), midnight
 

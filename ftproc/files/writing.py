@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import gzip
 import io
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _ROWS_AT_ONCE = 65536  # of CSV text held in memory
+_NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
+_BEGINNING = r"^[=+\-@\t\r]"
 _GZIP_LEVEL = 4  # numbers hardly get smaller above it, only slower
 
 
@@ -94,19 +97,29 @@ def _csv_pieces(table: pa.Table) -> Iterator[bytes]:
     import pyarrow.csv
 
     header = io.StringIO()
-    csv.writer(header, lineterminator="\n").writerow(table.column_names)
+    csv.writer(header, lineterminator="\n").writerow(map(no_formula, table.column_names))
     yield header.getvalue().encode()
     options = pyarrow.csv.WriteOptions(include_header=False, batch_size=_ROWS_AT_ONCE)
     for start in range(0, table.num_rows, _ROWS_AT_ONCE):
         sink = pa.BufferOutputStream()
         try:
-            pyarrow.csv.write_csv(_nan_to_null(table.slice(start, _ROWS_AT_ONCE)), sink, options)
+            pyarrow.csv.write_csv(_for_csv(table.slice(start, _ROWS_AT_ONCE)), sink, options)
         except pa.ArrowException as error:  # a kept column of lists, say
             raise OutputError(f"This cannot be written as CSV ({error}); give the output the name .parquet.") from error
         yield cast(bytes, sink.getvalue().to_pybytes())
 
 
-def _nan_to_null(table: pa.Table) -> pa.Table:
+def no_formula(text: str) -> str:
+    """`text` for a CSV cell: with an apostrophe before what a spreadsheet would take for a formula and run.
+
+    That is text that begins with = + - @, a tab or a carriage return, and is no number; numbers stay numbers.
+    """
+    risky = re.match(_BEGINNING, text) and not re.fullmatch(_NUMBER, text, re.ASCII)
+    return f"'{text}" if risky else text
+
+
+def _for_csv(table: pa.Table) -> pa.Table:
+    """NaN as empty cells, formulas as text."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
@@ -114,4 +127,11 @@ def _nan_to_null(table: pa.Table) -> pa.Table:
         if pa.types.is_floating(field.type):
             column = table.column(index)
             table = table.set_column(index, field.name, pc.if_else(pc.is_nan(column), None, column))
+        elif pa.types.is_string(field.type) or pa.types.is_large_string(field.type):
+            column = table.column(index)
+            number = pc.match_substring_regex(column, rf"^{_NUMBER}$")
+            risky = pc.and_not(pc.match_substring_regex(column, _BEGINNING), number)
+            if pc.any(risky).as_py():
+                marked = pc.binary_join_element_wise(pa.scalar("'", field.type), column, pa.scalar("", field.type))
+                table = table.set_column(index, field.name, pc.if_else(risky, marked, column))
     return table

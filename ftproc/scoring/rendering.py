@@ -10,6 +10,7 @@ from pathlib import PurePath
 from typing import Any
 
 from ftproc.errors import UsageError
+from ftproc.files.writing import no_formula
 from ftproc.scoring import comparison
 from ftproc.scoring.figures import Score
 
@@ -80,7 +81,7 @@ def _csv(scores: Sequence[Score]) -> str:
     out = io.StringIO()
     writer = csv.DictWriter(out, names, lineterminator="\n")
     writer.writeheader()
-    writer.writerows(rows)
+    writer.writerows({k: no_formula(v) if isinstance(v, str) else v for k, v in row.items()} for row in rows)
     return out.getvalue()
 
 

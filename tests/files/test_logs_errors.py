@@ -99,8 +99,11 @@ def test_what_looks_like_something_else_is_explained(make: Make, text: str | byt
         ("\ufeff\r\n\n", "the file is empty"),
         ("t,R\n", "there are column names but no rows."),
         ("t,R\r\n\r\n\n", "there are column names but no rows."),
-        ("t,R\n,1\n,2\n", "no row has a time; there is nothing to process."),
-        ("t,R\n1,\n,5\n", "no row has a range, azimuth or elevation; there is nothing to process."),
+        ("t,R\n,1\n,2\n", "no row has a time, so there is nothing to process; fill the times in."),
+        (
+            "t,R\n1,\n,5\n",
+            "no row has a range, azimuth or elevation, so there is nothing to process; check the columns.",
+        ),
         ("time_s range_m\n0 1\n", 'the header line "time_s range_m" has no separator; separate the cells with commas'),
         ("a,b\n0,1\n", "no time column (expected time_s or time or t). Its columns are: a, b."),
         ("t,R\n".encode("utf-16"), "this is UTF-16 text; save it as UTF-8 (iconv -f UTF-16 -t UTF-8)."),
@@ -169,7 +172,7 @@ def test_no_permission_and_other_faults_of_the_system(make: Make, monkeypatch: p
     monkeypatch.setattr(Path, "open", fail(PermissionError(13, "Permission denied")))
     assert "no permission to read it." in refused(path)
     monkeypatch.setattr(Path, "open", fail(OSError(5, "Input/output error")))
-    assert "cannot be read (Input/output error)." in refused(path)
+    assert "cannot be read (Input/output error); check the file." in refused(path)
 
 
 @pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root may read everything")

@@ -1,0 +1,59 @@
+"""`make trust`: everything that is to show that nothing is lost and nobody is let in, as one table."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from tests.faults import batches
+
+from . import corpus, fuzz, long_runs
+
+KILLS, FLIGHTS, SAMPLES, FUZZ_S = 50, 200, 1_000_000, 60.0
+
+
+def main() -> int:
+    """Print the table; 1 when anything is not as it must be."""
+    counts, lines = corpus.run()
+    tried = counts.total()
+    fuzzed, wrong = fuzz.run(FUZZ_S)
+    kills, lost = _kills()
+    faults = subprocess.run([sys.executable, "-m", "pytest", "-q", "tests/faults"], check=False, capture_output=True)
+    astray = long_runs.many(FLIGHTS)
+    endless = long_runs.endless(SAMPLES)
+    tracebacks = counts["wrong"] + counts["known"] + len(wrong)
+    for line in [*lines, *wrong, *lost]:
+        print(line, file=sys.stderr)
+    for row in (
+        ("what", "count"),
+        ("---", "---"),
+        ("bad files tried", tried),
+        ("refused in a plain sentence", counts["refused"]),
+        ("read correctly all the same", counts["right"]),
+        ("mutated files tried", fuzzed),
+        ("tracebacks, warnings, hangs, wrong results", tracebacks),
+        ("runs killed at a random moment", kills),
+        ("outputs lost or half-written", len(lost)),
+        ("other faults injected", "all survived" if faults.returncode == 0 else "NOT all survived"),
+        ("flights with 20 % outliers and patches", astray.flights),
+        ("of these astray (20 sigma for 2 s)", astray.astray),
+        ("divergences unreported", astray.unreported),
+        (f"{SAMPLES:,} samples, sigmas finite and positive", endless),
+    ):
+        print(f"| {row[0]} | {row[1]} |")
+    return int(bool(counts["wrong"] or wrong or lost or faults.returncode or astray.unreported or endless != "ok"))
+
+
+def _kills() -> tuple[int, list[str]]:
+    with tempfile.TemporaryDirectory() as directory:
+        names = batches.fill(Path(directory))
+        try:
+            return len(batches.killed(Path(directory), names, KILLS)), []
+        except AssertionError as error:
+            return KILLS, [str(error)]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

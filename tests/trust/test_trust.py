@@ -1,0 +1,43 @@
+"""A little of what `make trust` does at length, and that its judges see."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ftproc import pipeline
+from ftproc.simulation import simulate
+
+from . import fuzz, long_runs
+
+
+def test_a_short_fuzz() -> None:
+    tried, wrong = fuzz.run(2.0)
+    assert tried > 100
+    assert wrong == []
+
+
+def test_mutations_are_the_seed_s() -> None:
+    one, two = (fuzz.mutated(b"time_s,range_m\n0,1\n", random.Random(4)) for _ in range(2))
+    assert one == two != b"time_s,range_m\n0,1\n"
+
+
+def test_flights_full_of_outliers_do_not_go_astray_unsaid() -> None:
+    assert long_runs.many(5).unreported == 0
+
+
+def test_a_longer_run() -> None:
+    assert long_runs.endless(60_000) == "ok"
+
+
+@pytest.mark.parametrize(("begin", "end", "expected"), [(100, 141, True), (100, 115, False), (0, 0, False)])
+def test_who_is_astray(begin: int, end: int, expected: bool) -> None:
+    flight = simulate("manoeuvre", seed=2, duration_s=60.0, dt_s=0.1, outliers="none")
+    found = pipeline.filter_log(flight.log)
+    state = found.state.copy()
+    state[begin:end, 0] += 1e5
+    assert long_runs.is_astray(replace(found, state=state), flight.truth) is expected
+    assert np.isfinite(state).all()
