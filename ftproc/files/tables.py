@@ -161,9 +161,10 @@ def _parquet(name: str, path: Path) -> OpenTable:
     try:
         described = pq.read_metadata(path)
         schema = described.schema.to_arrow_schema()
-    except (pa.ArrowException, OSError) as error:
+        names = list(schema.names)
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise damaged(error) from error
-    return OpenTable(name, list(schema.names), load, metadata=schema.metadata or {})
+    return OpenTable(name, names, load, metadata=schema.metadata or {})
 
 
 def _feather(name: str, data: bytes) -> OpenTable:

@@ -149,7 +149,7 @@ def test_a_worker_that_crashes_takes_only_its_log_with_it(flight: Path, tmp_path
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted(tmp_path: Path, number: signal.Signals) -> None:
-    names = batches.fill(tmp_path, 9)
+    names = batches.fill(tmp_path, 60)
     with subprocess.Popen(
         batches.command(names), cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:
