@@ -67,8 +67,9 @@ def apply(log: MeasurementLog, station: Station) -> MeasurementLog:
 
 def _doubts(measurement: FloatArray, station: Station) -> list[str]:
     """Forgotten options that no check can prove, from the readings as they are."""
-    with np.errstate(over="ignore"):
-        azimuth, elevation = (np.degrees(column[np.isfinite(column)]) for column in measurement.T[1:])
+    wild = 1e6  # rad, which no doubt rests on
+    angles = np.clip(measurement.T[1:], -wild, wild)
+    azimuth, elevation = (np.degrees(column[np.isfinite(column)]) for column in angles)
     doubts = []
     if azimuth.size and azimuth.min() > -1 and 370 < np.quantile(azimuth, 0.99) <= 400:
         doubts.append("the azimuth runs from 0 to 400 deg: if they are gon, say --units azimuth=gon")

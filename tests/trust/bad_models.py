@@ -90,14 +90,20 @@ def containers() -> Iterator[Case]:
         yield Case("model", f"flipped at {place}", written(bytes(flipped), NAME), either=True)
 
 
+def _at(header: dict[str, Any], inside: tuple[str, ...]) -> dict[str, Any]:
+    for key in inside:
+        header = header[key]
+    return header
+
+
 def headers() -> Iterator[Case]:
     """Headers with an entry left out, or of another kind, size or value."""
-    keys = parts()[1]
-    for key in keys:
-        gone = rewritten(lambda t, h, key=key: h.pop(key))
+    for path in [(key,) for key in parts()[1]] + [("stages", "filter", key) for key in parts()[1]["stages"]["filter"]]:
+        key, inside = path[-1], path[:-1]
+        gone = rewritten(lambda t, h, key=key, inside=inside: _at(h, inside).pop(key))
         yield Case("model", f"without {key}", written(gone, NAME), ("train it again",))
         for value in (None, "x", [], {}, [["a"]], -1, 1e400, 10**400, True, [[1], [1, 2]], {"a": {"b": []}}, "NaN"):
-            changed = rewritten(lambda t, h, key=key, value=value: h.update({key: value}))
+            changed = rewritten(lambda t, h, key=key, inside=inside, value=value: _at(h, inside).update({key: value}))
             yield Case("model", f"{key} {str(value)[:12]}", written(changed, NAME), either=True)
     for tensor in parts()[0]:
         for label, change in (
@@ -108,17 +114,19 @@ def headers() -> Iterator[Case]:
             ("flat", lambda t, h, k=tensor: t.update({k: np.append(t[k].ravel(), 1.0)})),
             ("larger", lambda t, h, k=tensor: t.update({k: np.zeros((40, 41))})),
         ):
+            if label in ("NaN", "infinite") and not parts()[0][tensor].size:
+                continue  # nothing there to spoil
             yield Case("model", f"{tensor} {label}", written(rewritten(change), NAME), ("train it again",))
         huge = rewritten(lambda t, h, k=tensor: t.update({k: np.sign(t[k]) * 1e300}))
         yield Case("model", f"{tensor} huge", written(huge, NAME), either=True)
     for features in ("other", "", "window2", 7):
-        changed = rewritten(lambda t, h, f=features: h.update(features=f))
+        changed = rewritten(lambda t, h, f=features: h["stages"]["filter"].update(features=f))
         yield Case(
             "model", f"for features {features!r}", written(changed, NAME), ("made for the feature set", "known are")
         )
     deep = serialise({"a": np.ones(1)}, metadata={KEY: "[" * 100_000 + "]" * 100_000})
     yield Case("model", "deep entry", written(bytes(deep), NAME), ("damaged", "train it again"))
-    coloured = rewritten(lambda t, h: h.update(features="\x1b[31m\x07"))
+    coloured = rewritten(lambda t, h: h["stages"]["filter"].update(features="\x1b[31m\x07"))
     yield Case("model", "control characters", written(coloured, NAME), ("made for the feature set",))
 
 
