@@ -44,14 +44,8 @@ def is_astray(found: Trajectory, truth: Truth) -> bool:
 
 
 def says_something(found: Trajectory) -> bool:
-    """Whether the summary tells the user to look, or that the sigmas are too small."""
-    s = found.metadata["summary"]
-    parts = s["components"].values()
-    rejected = [(p["isolated"] + p["patch"]) / max(p["isolated"] + p["patch"] + p["good"], 1) for p in parts]
-    return bool(
-        s["hardly_observable"] or s["reacquired"] or s["slow_noise"] or s["editing_settled"] is False
-        or max(rejected) > 0.35 or any(p["verdict"] == "overconfident" for p in parts)
-    )  # fmt: skip
+    """Whether the summary's verdict is another than to trust it."""
+    return bool(found.metadata["summary"]["trust"]["verdict"] != "trust")
 
 
 def endless(samples: int = 1_000_000) -> str:
