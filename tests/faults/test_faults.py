@@ -95,6 +95,7 @@ def test_two_processes_write_the_same_target(flight: Path, tmp_path: Path) -> No
     assert sorted(path.name for path in tmp_path.iterdir()) == ["flight.csv", "out.csv", "out.json"]
 
 
+@pytest.mark.skipif("FTPROC_TRUST" not in os.environ, reason="hangs on what memory the machine has; make trust runs it")
 def test_out_of_memory_is_said(flight: Path, tmp_path: Path) -> None:
     """A limit that the program's own start fits into, and a log that does not."""
     long = tmp_path / "long.csv"
