@@ -17,7 +17,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ftproc.errors import FtprocError, FtprocWarning
+from ftproc.errors import FtprocError, FtprocWarning, interruption
 from ftproc.settings import FilterSettings, Station
 
 if TYPE_CHECKING:
@@ -119,7 +119,8 @@ def _crew(
 
 
 def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
-    """Read, filter and write one log. Whatever goes wrong with it is in the outcome; only a closed pipe is raised."""
+    """Read, filter and write one log. Whatever goes wrong with it is in the outcome; only a closed pipe and
+    an interruption are raised."""
     from ftproc import geodesy, pipeline, report, summary, warm
     from ftproc.files import logs, trajectories
     from ftproc.methods import registry
@@ -143,6 +144,8 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
     except BrokenPipeError:
         raise
     except Exception as error:
+        if stop := interruption(error):
+            raise stop from None
         return Outcome(task, failure=failure(error, task.log))
 
 

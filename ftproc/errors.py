@@ -55,3 +55,15 @@ def nearest(word: str, known: Iterable[str]) -> str:
     by_lower = {name.lower(): name for name in known}
     close = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
     return f'; did you mean "{by_lower[close[0]]}"?' if close else ""
+
+
+def interruption(error: BaseException) -> BaseException | None:
+    """The KeyboardInterrupt or SystemExit that an error stands for, if it does.
+
+    A signal that arrives while a compiled kernel hands back its result comes out of it as a SystemError, which names
+    the interruption as its cause.
+    """
+    cause: BaseException | None = error
+    while isinstance(cause, Exception):
+        cause = cause.__cause__
+    return cause

@@ -116,3 +116,16 @@ def test_ctrl_c_stops_all_workers_and_leaves_only_whole_files(tmp_path):
     written = [path.name for path in (tmp_path / "out").iterdir()]
     assert 0 < len(written) < 60
     assert all(name.endswith(".trajectory.parquet") and not name.startswith(".") for name in written)
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt(), SystemExit(143)])
+def test_an_interruption_inside_a_kernel_is_no_failure_of_the_log(tasks, monkeypatch, stop):
+    """A kernel that a signal finds handing back its result raises SystemError because of it."""
+
+    def interrupted(*_: object) -> None:
+        raise SystemError("CPUDispatcher returned a result with an exception set") from stop
+
+    monkeypatch.setattr("ftproc.pipeline.filter_log", interrupted)
+    with pytest.raises(type(stop)) as raised:
+        list(batch.run(tasks("out")[:1], Recipe()))
+    assert raised.value is stop

@@ -12,6 +12,7 @@ import click
 
 from ftproc import __version__
 from ftproc.cli.command import CONTEXT, DEBUG, debug_option, write_examples
+from ftproc.errors import interruption
 
 COMMANDS = ("simulate", "train", "filter", "score")
 
@@ -58,7 +59,10 @@ class Program(click.Group):
             code = super().main(given, prog_name or "ftproc", **extra)
             sys.stdout.flush()  # a full disk behind a redirection shows here at the latest
         except (Exception, KeyboardInterrupt) as error:
-            code = _report(error, DEBUG in given)  # the error may have come before it was parsed
+            stop = interruption(error)
+            if isinstance(stop, SystemExit):
+                raise stop from None
+            code = _report(stop or error, DEBUG in given)  # the error may have come before it was parsed
         sys.exit(code if isinstance(code, int) else 0)
 
 

@@ -142,14 +142,20 @@ def test_errors_of_the_system(error, sentence):
     assert batch.failure(error, "log.csv").message == sentence
 
 
-def test_interrupted(run, here, monkeypatch):
+@pytest.mark.parametrize("inside_a_kernel", [False, True])
+@pytest.mark.parametrize(
+    ("stop", "code", "said"), [(KeyboardInterrupt(), 130, "ftproc: interrupted"), (SystemExit(143), 143, "")]
+)
+def test_interrupted(run, here, monkeypatch, inside_a_kernel, stop, code, said):
     def interrupt(*args, **kwargs):
-        raise KeyboardInterrupt
+        if inside_a_kernel:
+            raise SystemError("CPUDispatcher returned a result with an exception set") from stop
+        raise stop
 
     monkeypatch.setattr("ftproc.files.trajectories.read", interrupt)
     result = run("score", "x.csv")
-    assert result.code == 130
-    assert result.err.strip() == "ftproc: interrupted"
+    assert result.code == code
+    assert result.err.strip() == said
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
