@@ -33,12 +33,13 @@ SHORT_LOG, MOST = 8000, 0.5  # samples, and share that stands out: then all of i
 
 
 def follow_flight(record: Record, decision: Decision) -> Decision:
-    """Give the model a jerk profile, and make the decisions again where it stands out or readings are suspicious."""
+    """Give the model the likeliest jerk profile, and make the decisions again where it stands out or readings are
+    suspicious."""
     profile = tuning.fit_profile(*record.log, decision.weight, decision.starts, decision.model, LOOK_STEPS)
     if not profile.correlation.any():  # else the level was found from thinned readings, which no patch dominates
         decision, profile = _look_again(record, decision, profile)
     profile = tuning.fit_profile(*record.log, decision.weight, decision.starts, profile, FINAL_STEPS)
-    return decision._replace(model=tuning.with_allowance(profile))
+    return decision._replace(model=profile)
 
 
 def _look_again(record: Record, decision: Decision, profile: Model) -> tuple[Decision, Model]:

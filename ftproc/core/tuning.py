@@ -33,7 +33,8 @@ KNOT_SECONDS = 4.0  # ... but never less than so many seconds,
 MAX_KNOTS = 4000  # nor more than so many knots
 WALK_PRECISION = 1.0  # of the random walk of ln(jerk) from knot to knot
 ALLOWANCE = 1.4  # on the likeliest jerk: too little makes sigmas dishonest, a little too much costs hardly anything
-CALMEST = 3e-4  # m^2/s^5 along any axis: no aircraft flies more smoothly than the air it is in
+CALMEST = 3e-4  # m^2/s^5 along any axis: no aircraft flies more smoothly than the air it is in; for the smoother,
+CALMEST_SMOOTHED = 1e-5  # which averages the air's motion over longer and has no lag to fear, less is enough
 VERTICAL_PRECISION = 0.5  # with which ln(vertical / horizontal jerk) is drawn to zero
 HORIZONTAL = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.0])
 VERTICAL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -162,6 +163,6 @@ def fit_profile(
     return unpack(ascent.minimise(cost, theta, curvature, low, high, steps, tolerance=0.1 * knots**0.5))
 
 
-def with_allowance(model: Model) -> Model:
-    """The model with a little more jerk than is likeliest, and nowhere less than there is in the air."""
-    return model._replace(jerk=np.maximum(ALLOWANCE * model.jerk, CALMEST * ISOTROPIC))
+def with_allowance(model: Model, calmest: float) -> Model:
+    """The model with a little more jerk than is likeliest, and nowhere less than `calmest`, m^2/s^5."""
+    return model._replace(jerk=np.maximum(ALLOWANCE * model.jerk, calmest * ISOTROPIC))

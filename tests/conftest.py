@@ -1,0 +1,16 @@
+"""What all tests need of the process they run in."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+
+import pytest
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _hears_interruptions() -> Iterator[None]:
+    """A shell makes its background jobs deaf to Ctrl-C, and so would be the programs that the tests start and stop."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
