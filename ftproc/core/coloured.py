@@ -13,6 +13,7 @@ and the jerk density by the likelihood of every m-th sample, thinned until neigh
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ INDEPENDENT = 0.1  # correlation left between the samples that remain after thin
 FEWEST = 60  # samples that must remain
 FEWEST_PAIRS = 200  # neighbours, for their correlation to be asked for
 ITERATIONS = 8
+BLOCKS = 9  # stretches of a log whose correlations are compared
 
 
 def moments(smoothed: SmootherRun, weight: FloatArray, noise_variance: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -39,27 +41,46 @@ def moments(smoothed: SmootherRun, weight: FloatArray, noise_variance: FloatArra
 
     noise_variance: (3,) R that the smoother was given.
     """
-    used = weight > 0
-    share = noise_variance / smoothed.residual_variance  # of the reading in its own smoothed residual
-    residual = np.where(used, smoothed.residual * share, np.nan)
-    lost = np.where(used, noise_variance * np.maximum(1 - share, 0.0), np.nan)
-    variance, correlation = np.empty(3), np.zeros(3)
-    for c in range(3):
-        r, a = residual[:, c], lost[:, c]
-        both = used[1:, c] & used[:-1, c]
-        if both.sum() < FEWEST_PAIRS:
-            variance[c] = noise_variance[c]
-            continue
-        variance[c] = np.nanmean(r * r + a)
-        pairs = r[1:] * r[:-1] + np.sqrt(a[1:] * a[:-1])
-        correlation[c] = pairs[both].mean() / variance[c]
+    variance, correlation = noise_variance.copy(), np.zeros(3)
+    for c, (square, product) in enumerate(_products(smoothed, weight, noise_variance)):
+        if len(product) >= FEWEST_PAIRS:
+            variance[c] = square.mean()
+            correlation[c] = product.mean() / variance[c]
     return variance, correlation
 
 
-def is_correlated(correlation: FloatArray, weight: FloatArray) -> bool:
-    """Whether some component's noise is correlated beyond doubt."""
-    count = np.maximum((weight > 0).sum(0), 1)
-    return bool((correlation > np.maximum(LEAST, LEAST_IN_SIGMAS / np.sqrt(count))).any())
+def is_correlated(smoothed: SmootherRun, weight: FloatArray, noise_variance: FloatArray) -> bool:
+    """Whether some component's noise is correlated beyond doubt.
+
+    By the median of the correlations of BLOCKS stretches of the log: a patch that the smoother has followed looks like
+    correlated noise, but only where it is."""
+    for square, product in _products(smoothed, weight, noise_variance):
+        if len(product) < FEWEST_PAIRS:
+            continue
+        typical = np.median(
+            [
+                pairs.mean() / alone.mean()
+                for pairs, alone in zip(np.array_split(product, BLOCKS), np.array_split(square, BLOCKS), strict=True)
+            ]
+        )
+        if typical > max(LEAST, LEAST_IN_SIGMAS / math.sqrt(len(square))):
+            return True
+    return False
+
+
+def _products(
+    smoothed: SmootherRun, weight: FloatArray, noise_variance: FloatArray
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Of each component, what estimates sigma^2 at each reading used, and rho sigma^2 at each pair of neighbours."""
+    used = weight > 0
+    share = noise_variance / smoothed.residual_variance  # of the reading in its own smoothed residual
+    residual = smoothed.residual * share
+    lost = noise_variance * np.maximum(1 - share, 0.0)
+    for c in range(3):
+        both = used[1:, c] & used[:-1, c]
+        r, a = residual[:, c], lost[:, c]
+        square = (r * r + a)[used[:, c]]
+        yield square, (r[1:] * r[:-1] + np.sqrt(a[1:] * a[:-1]))[both]
 
 
 def fit_coloured(

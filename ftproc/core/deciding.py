@@ -66,14 +66,9 @@ def decide(record: Record, begun: Decision, tune_first: bool) -> Decision:
     """Tune, smooth and classify by turns until the decisions stand still."""
     time_s, measurement = record[:2]
     weight, model, starts, rates = begun.weight, begun.model, begun.starts, begun.rates.copy()
-    rounds, settled, asked, is_coloured, slow_noise = 0, False, False, False, begun.slow_noise
+    rounds, settled = 0, False
     while rounds < MAX_ROUNDS and not settled:
-        tuning_round = rounds < TUNING_ROUNDS and (tune_first or rounds > 0) and not model.correlation.any()
-        if is_coloured and not model.correlation.any():
-            model = coloured.fit_coloured(time_s, measurement, weight, starts, model, record.known, record.fix_jerk)
-            is_coloured = False  # once is enough; the decisions go on with it
-            slow_noise = not model.correlation.any()
-        elif tuning_round:
+        if rounds < TUNING_ROUNDS and (tune_first or rounds > 0) and not model.correlation.any():
             model = tuning.fit_level(
                 time_s, measurement, weight, starts, model, record.known, record.fix_jerk, record.sigma
             )
@@ -85,13 +80,22 @@ def decide(record: Record, begun: Decision, tune_first: bool) -> Decision:
         settled = int((decided != weight).sum()) <= STILL * weight.size and (rounds > 0 or not tune_first)
         weight = decided
         rounds += 1
-        if (settled or rounds == TUNING_ROUNDS) and not (asked or model.correlation.any()):
-            asked = True
-            correlation = coloured.moments(smoothed, weight, model.noise_variance)[1]
-            is_coloured = coloured.is_correlated(correlation, weight)
-            settled = settled and not is_coloured
         starts = begin_all(time_s, measurement, weight, model.noise_variance, float(model.jerk[0, 0]))
-    return Decision(weight, model, starts, rates, begun.rounds + rounds, settled, slow_noise)
+    return Decision(weight, model, starts, rates, begun.rounds + rounds, settled)
+
+
+def allow_for_colour(record: Record, decision: Decision) -> Decision:
+    """The decisions made again with correlated noise, if the noise is correlated; where it is so slowly that it cannot
+    be told from motion, the decision says so."""
+    weight, model, starts = decision.weight, decision.model, decision.starts
+    smoothed = smooth_log(*record.log, weight, model, starts, residuals_only=True)
+    if not coloured.is_correlated(smoothed, weight, model.noise_variance):
+        return decision
+    level = tuning.median_level(model)
+    model = coloured.fit_coloured(*record.log, weight, starts, level, record.known, record.fix_jerk)
+    if not model.correlation.any():
+        return decision._replace(slow_noise=True)
+    return decide(record, decision._replace(model=model), tune_first=False)
 
 
 def _keep_most(decided: FloatArray, screened: FloatArray) -> FloatArray:

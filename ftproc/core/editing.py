@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core import bridges, indicators, screening, tuning
-from ftproc.core.deciding import Decision, Record, decide
+from ftproc.core.deciding import Decision, Record, allow_for_colour, decide
 from ftproc.core.forward import Model, Start
 from ftproc.core.geometry import unwrap
 from ftproc.core.motion import isotropic
-from ftproc.core.second_look import follow_flight
+from ftproc.core.second_look import look_again
 from ftproc.core.smoother import SmootherRun, smooth_log
 from ftproc.core.start import begin_all
 
@@ -26,6 +26,7 @@ SHORT_WINDOW = 11  # samples: sees jumps, and hardly anything else
 WINDOWS = (31, 75)  # samples: the short one follows manoeuvres, the long one sees through patches
 FIRST_JERK = 1.0  # m^2/s^5, where the search begins
 FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
+PROFILE_STEPS = 4  # of the search for the jerk profile, once the decisions are made
 START_INFLATION = 2.0  # on the covariance of a smoothed state that starts a filter over the same record
 
 
@@ -100,11 +101,14 @@ def edit(
     rates = np.tile(np.array(indicators.START_RATES), (3, 1))
     starts = begin_all(time_s, measurement, record.screened, model.noise_variance, jerk_psd)
     decision = decide(record, Decision(record.screened, model, starts, rates), tune_first=True)
+    if jerk_psd is None:
+        decision = look_again(record, decision)
+    decision = allow_for_colour(record, decision)
     for_filter = for_smoother = decision.model
     if jerk_psd is None:
-        decision = follow_flight(record, decision)
-        for_filter = tuning.with_allowance(decision.model, tuning.CALMEST)
-        for_smoother = tuning.with_allowance(decision.model, tuning.CALMEST_SMOOTHED)
+        profile = tuning.fit_profile(*record.log, decision.weight, decision.starts, decision.model, PROFILE_STEPS)
+        for_filter = tuning.with_allowance(profile, tuning.CALMEST)
+        for_smoother = tuning.with_allowance(profile, tuning.CALMEST_SMOOTHED)
     smoothed = smooth_log(time_s, measurement, decision.weight, for_smoother, decision.starts)
     d = decision
     return Edited(d.weight, for_filter, d.starts, smoothed, d.rates, d.rounds, d.settled, d.slow_noise)

@@ -25,25 +25,17 @@ FloatArray = NDArray[np.float64]
 
 LOOKS = 6
 LEAST_KEPT = 0.8  # of the readings of a component that were good before the first look
-LOOK_STEPS, FINAL_STEPS = 3, 4  # of the search for the jerk profile
+LOOK_STEPS = 3  # of the search for the jerk profile
 STANDS_OUT = 8.0  # times the median of the jerk profile
 AROUND = 200  # samples on each side of what stands out that are decided with it
 LONGEST_SPAN = 3000  # samples that are decided together
 SHORT_LOG, MOST = 8000, 0.5  # samples, and share that stands out: then all of it is looked at again, and noise as well
 
 
-def follow_flight(record: Record, decision: Decision) -> Decision:
-    """Give the model the likeliest jerk profile, and make the decisions again where it stands out or readings are
-    suspicious."""
+def look_again(record: Record, decision: Decision) -> Decision:
+    """Give the model a jerk profile, and make the decisions again where it stands out or readings are suspicious."""
     profile = tuning.fit_profile(*record.log, decision.weight, decision.starts, decision.model, LOOK_STEPS)
-    if not profile.correlation.any():  # else the level was found from thinned readings, which no patch dominates
-        decision, profile = _look_again(record, decision, profile)
-    profile = tuning.fit_profile(*record.log, decision.weight, decision.starts, profile, FINAL_STEPS)
-    return decision._replace(model=profile)
-
-
-def _look_again(record: Record, decision: Decision, profile: Model) -> tuple[Decision, Model]:
-    calm = _calm(profile)
+    calm = tuning.median_level(profile)
     suspects = _suspects(record, decision, calm, profile)
     marked = suspects.any(1) | _stands_out(record.time_s, profile)
     for island in swaps.islands(record.time_s, decision.weight, record.possible):
@@ -60,12 +52,12 @@ def _look_again(record: Record, decision: Decision, profile: Model) -> tuple[Dec
         except ValueError:  # a component says too little hereabouts
             continue
         begun = Decision(weight[span], calm, starts, decision.rates)
-        weight[span] = _look_until_settled(part, begun, None)[0].weight
+        weight[span] = _look_until_settled(part, begun, None).weight
     starts = begin_all(*record.log, weight, calm.noise_variance, float(calm.jerk[0, 0]))
-    return decision._replace(weight=weight, starts=starts), profile
+    return decision._replace(weight=weight, starts=starts, model=profile)
 
 
-def _look_until_settled(record: Record, decision: Decision, profile: Model | None) -> tuple[Decision, Model]:
+def _look_until_settled(record: Record, decision: Decision, profile: Model | None) -> Decision:
     """Look again from the calm level on until nothing changes, or LOOKS times.
 
     A look that rejects much of what was good is not believed: where the smallest noise that explains the readings
@@ -75,7 +67,7 @@ def _look_until_settled(record: Record, decision: Decision, profile: Model | Non
     for _ in range(LOOKS):
         if profile is None:
             profile = tuning.fit_profile(*record.log, decision.weight, decision.starts, decision.model, LOOK_STEPS)
-        calm = _calm(profile)
+        calm = tuning.median_level(profile)
         suspects = _suspects(record, decision, calm, profile)
         whole = swaps.Neighbourhood(*record.log, record.possible, calm, decision.rates, record.gate)
         weight = swaps.try_opposites(whole, np.where(suspects, 0.0, decision.weight))
@@ -87,13 +79,7 @@ def _look_until_settled(record: Record, decision: Decision, profile: Model | Non
         decision, profile = again, None
     if profile is None:
         profile = tuning.fit_profile(*record.log, decision.weight, decision.starts, decision.model, LOOK_STEPS)
-    return decision, profile
-
-
-def _calm(profile: Model) -> Model:
-    """The model with the profile's median for all of the flight."""
-    level = float(np.median(profile.jerk[:, 0]))
-    return profile._replace(jerk=level * profile.jerk[:1] / profile.jerk[0, 0], knot_s=np.inf)
+    return decision._replace(model=profile)
 
 
 def _stands_out(time_s: FloatArray, profile: Model) -> NDArray[np.bool_]:

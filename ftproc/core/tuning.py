@@ -163,6 +163,12 @@ def fit_profile(
     return unpack(ascent.minimise(cost, theta, curvature, low, high, steps, tolerance=0.1 * knots**0.5))
 
 
+def median_level(model: Model) -> Model:
+    """The model with the median of its jerk profile for all of the flight."""
+    level = float(np.median(model.jerk[:, 0]))
+    return model._replace(jerk=level * model.jerk[:1] / model.jerk[0, 0], knot_s=np.inf)
+
+
 def with_allowance(model: Model, calmest: float) -> Model:
     """The model with a little more jerk than is likeliest, and nowhere less than `calmest`, m^2/s^5."""
     return model._replace(jerk=np.maximum(ALLOWANCE * model.jerk, calmest * ISOTROPIC))

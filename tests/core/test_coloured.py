@@ -76,10 +76,35 @@ def test_short_record_is_not_judged():
     np.testing.assert_array_equal(correlation, 0)
 
 
+def markov(correlation, n):
+    """(n, 3) noise of unit variance, each component with a correlation of its own."""
+    noise = np.random.default_rng(4).standard_normal((n, 3))
+    for k in range(1, n):
+        noise[k] = correlation * noise[k - 1] + np.sqrt(1 - correlation**2) * noise[k]
+    return noise
+
+
+def smoothed(noise):
+    """The run of a smoother that takes such noise for white, its weights and the noise variances it was given."""
+    a = matched(1, len(noise), q=1e-3)
+    z = from_cartesian(a.truth[:, :3]) + SIGMA * noise
+    return smooth_log(a.time, z, a.weight, a.model, a.starts), a.weight, a.model.noise_variance
+
+
 @pytest.mark.parametrize(
     ("correlation", "n", "verdict"),
-    [((0.0, 0.0, 0.0), 1000, False), ((0.1, 0.1, 0.1), 10**6, False), ((0.0, 0.3, 0.0), 1000, True),
-     ((0.3, 0.3, 0.3), 100, False), ((-0.9, -0.9, -0.9), 1000, False)],
+    [((0.0, 0.0, 0.0), 1000, False), ((0.1, 0.1, 0.1), 20_000, False), ((0.0, 0.4, 0.0), 1000, True),
+     ((0.4, 0.4, 0.4), 150, False), ((-0.7, -0.7, -0.7), 1000, False)],
 )  # fmt: skip
 def test_correlation_must_be_large_and_beyond_doubt(correlation, n, verdict):
-    assert coloured.is_correlated(np.array(correlation), np.ones((n, 3))) == verdict
+    assert coloured.is_correlated(*smoothed(markov(np.array(correlation), n))) == verdict
+
+
+def test_patches_are_no_correlated_noise():
+    """Three of them, that nobody has found, make the correlation of the whole log large, but not that of most of it."""
+    noise = markov(0.0, 2000)
+    for begin in (300, 900, 1500):
+        noise[begin : begin + 40] += 4.0
+    run = smoothed(noise)
+    assert coloured.moments(*run)[1].min() > 1.5 * coloured.LEAST
+    assert not coloured.is_correlated(*run)
