@@ -33,10 +33,10 @@ START_INFLATION = 2.0  # on the covariance of a smoothed state that starts a fil
 class Edited(NamedTuple):
     """The decisions and what they rest on.
 
-    weight: (n, 3) 1 good, 0 rejected or missing. model: noise and jerk profile for a filter. starts: for the next
-    pass. smoothed: the smoother's run, with less jerk where the flight is calm. rates: (3, 3) learnt outlier rates per
-    component. rounds: how many passes it took; settled: whether the decisions stood still. slow_noise: the
-    noise is correlated, but so slowly that it cannot be told from motion; the sigmas are then too small.
+    weight: (n, 3) 1 good, 0 rejected or missing. model: noise and jerk profile. starts: for the next pass.
+    smoothed: the smoother's run with these. rates: (3, 3) learnt outlier rates per component.
+    rounds: how many passes it took; settled: whether the decisions stood still. slow_noise: the noise is correlated,
+    but so slowly that it cannot be told from motion; the sigmas are then too small.
     """
 
     weight: FloatArray
@@ -104,14 +104,12 @@ def edit(
     if jerk_psd is None:
         decision = look_again(record, decision)
     decision = allow_for_colour(record, decision)
-    for_filter = for_smoother = decision.model
     if jerk_psd is None:
         profile = tuning.fit_profile(*record.log, decision.weight, decision.starts, decision.model, PROFILE_STEPS)
-        for_filter = tuning.with_allowance(profile, tuning.CALMEST)
-        for_smoother = tuning.with_allowance(profile, tuning.CALMEST_SMOOTHED)
-    smoothed = smooth_log(time_s, measurement, decision.weight, for_smoother, decision.starts)
+        decision = decision._replace(model=tuning.with_allowance(profile))
+    smoothed = smooth_log(time_s, measurement, decision.weight, decision.model, decision.starts)
     d = decision
-    return Edited(d.weight, for_filter, d.starts, smoothed, d.rates, d.rounds, d.settled, d.slow_noise)
+    return Edited(d.weight, d.model, d.starts, smoothed, d.rates, d.rounds, d.settled, d.slow_noise)
 
 
 def smoothed_starts(smoothed: SmootherRun) -> list[Start]:
