@@ -1,37 +1,130 @@
 "use strict";
-// Draws the figures one after the other, and again in the width of the paper for printing.
+// Unpacks the library, draws the figures one after the other, thins crowded marks to what the screen can tell apart (all
+// of them are there when one zooms in), and draws again in the width of the paper for printing.
 (function () {
   const PAPER = 680; // CSS pixels between the margins of an A4 or Letter page
   const LOWER = 0.7; // of the height, so that two figures share a page
+  const COLUMNS = 400; // of a figure; in each the lowest and the highest mark of a kind are drawn
   const config = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
   const places = Array.from(document.querySelectorAll("figure"));
 
-  function draw(index) {
-    if (index === places.length) {
-      document.body.dataset.drawn = "yes";
-      return;
+  function bytes(base64) {
+    const text = atob(base64);
+    const found = new Uint8Array(text.length);
+    for (let i = 0; i < text.length; i++) found[i] = text.charCodeAt(i);
+    return found;
+  }
+
+  async function unpack() {
+    const packed = new Blob([bytes(document.getElementById("library").textContent)]);
+    const script = document.createElement("script");
+    script.textContent = await new Response(packed.stream().pipeThrough(new DecompressionStream("gzip"))).text();
+    document.body.append(script);
+  }
+
+  function nextFrame() {
+    return new Promise(function (done) { requestAnimationFrame(function () { setTimeout(done); }); });
+  }
+
+  function array(packed) {
+    const kind = { f4: Float32Array, f8: Float64Array }[packed && packed.dtype];
+    return kind ? new kind(bytes(packed.bdata).buffer) : packed;
+  }
+
+  // Indices, in order, of the lowest and the highest mark of each column between two times; of few marks all.
+  function extremes(x, y, from, to) {
+    const inside = [];
+    for (let i = 0; i < x.length; i++) if (x[i] >= from && x[i] <= to) inside.push(i);
+    if (inside.length <= 2 * COLUMNS) return inside;
+    const found = new Set();
+    let column = -1, low, high;
+    for (const i of [...inside, null]) {
+      const its = i === null ? COLUMNS : Math.floor((COLUMNS * (x[i] - from)) / (to - from));
+      if (its !== column) {
+        if (column >= 0) found.add(Math.min(low, high)).add(Math.max(low, high));
+        column = its;
+        low = high = i;
+      } else if (i !== null) {
+        if (y[i] < y[low]) low = i;
+        if (y[i] > y[high]) high = i;
+      }
     }
-    const place = places[index];
+    return Array.from(found);
+  }
+
+  function shown(all, range) {
+    const chosen = extremes(all.x, all.y, Number(range[0]), Number(range[1]));
+    const part = {};
+    for (const name in all) part[name] = chosen.map(function (i) { return all[name][i]; });
+    return part;
+  }
+
+  // Crowded marks, by the index of their trace; what is drawn of them at first is put in their place.
+  function thin(figure) {
+    const crowded = new Map();
+    figure.data.forEach(function (trace, index) {
+      if (trace.mode !== "markers" || !figure.layout.xaxis || !figure.layout.xaxis.range) return;
+      if (trace.type === "scattergl") trace.type = "scatter"; // so few marks are drawn sooner than a context is made
+      const all = { x: array(trace.x), y: array(trace.y) };
+      if (all.x.length <= 2 * COLUMNS) return;
+      if (trace.customdata) all.customdata = array(trace.customdata);
+      crowded.set(index, all);
+      Object.assign(trace, shown(all, figure.layout.xaxis.range));
+    });
+    return crowded;
+  }
+
+  async function draw(place) {
     const data = document.querySelector('script[data-figure="' + place.id + '"]');
     const figure = JSON.parse(data.textContent);
-    Plotly.newPlot(place, figure.data, figure.layout, config).then(function () {
-      requestAnimationFrame(function () { draw(index + 1); });
+    const crowded = thin(figure);
+    await Plotly.newPlot(place, figure.data, figure.layout, config);
+    if (!crowded.size) return;
+    place.on("plotly_relayout", function (changed) {
+      if (!Object.keys(changed).some(function (name) { return /^xaxis\d*\./.test(name); })) return;
+      const parts = Array.from(crowded.values(), function (all) { return shown(all, place._fullLayout.xaxis.range); });
+      const update = {};
+      for (const name of ["x", "y", "customdata"]) update[name] = parts.map(function (part) { return part[name]; });
+      Plotly.restyle(place, update, Array.from(crowded.keys()));
     });
+  }
+
+  async function drawAll() {
+    if (!window.DecompressionStream) {
+      places.forEach(function (place) { place.textContent = "This browser is too old for the figures: it takes one of 2023 or newer."; });
+    } else {
+      await unpack();
+      const inSpace = function (place) { return place.id === "track"; }; // takes longest, so it comes last
+      for (const place of [...places.filter(function (place) { return !inSpace(place); }), ...places.filter(inSpace)]) {
+        await draw(place);
+        await nextFrame();
+      }
+    }
+    document.body.dataset.drawn = "yes";
+  }
+
+  function resize(place, size) {
+    place.style.height = size.height + "px";
+    if (place.data) Plotly.relayout(place, size);
   }
 
   addEventListener("beforeprint", function () {
     places.forEach(function (place) {
-      const height = LOWER * parseInt(place.dataset.height, 10);
-      place.style.height = height + "px";
-      Plotly.relayout(place, { width: PAPER / place.parentNode.querySelectorAll("figure").length, height: height, autosize: false });
+      const width = PAPER / place.parentNode.querySelectorAll("figure").length;
+      resize(place, { width: width, height: LOWER * parseInt(place.dataset.height, 10), autosize: false });
     });
   });
   addEventListener("afterprint", function () {
     places.forEach(function (place) {
-      const height = parseInt(place.dataset.height, 10);
-      place.style.height = height + "px";
-      Plotly.relayout(place, { width: null, height: height, autosize: true });
+      resize(place, { width: null, height: parseInt(place.dataset.height, 10), autosize: true });
     });
   });
-  draw(0);
+  // A document that is open inside the page holds up its load event until all is drawn: who prints then has all.
+  const hold = document.body.appendChild(document.createElement("iframe"));
+  hold.hidden = true;
+  hold.contentDocument.open();
+  drawAll().finally(function () {
+    hold.contentDocument.close();
+    hold.remove();
+  });
 })();

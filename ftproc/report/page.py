@@ -7,11 +7,12 @@ slips through all the same does not run: the page allows scripts only by their S
 from __future__ import annotations
 
 import base64
+import gzip
 import hashlib
 import html
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ftproc.records import Trajectory, Truth
 from ftproc.report import tables
@@ -50,8 +51,8 @@ def page(trajectory: Trajectory, truth: Truth | None = None) -> str:
 
 def document(title: str, body: str, drawn: bool = False) -> str:
     """A page around its body (HTML). drawn: it has figures."""
-    scripts = [_plotly(), _text("page.js")] if drawn else []
-    allowed = " ".join([*(f"'sha256-{_sha256(script)}'" for script in scripts), "'unsafe-eval'"]) if drawn else "'none'"
+    library, script = (_plotly(), _text("page.js")) if drawn else (None, "")
+    allowed = f"'sha256-{library.sha256}' 'sha256-{_sha256(script)}' 'unsafe-eval'" if library else "'none'"
     policy = f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:"
     return "\n".join(
         [
@@ -63,7 +64,8 @@ def document(title: str, body: str, drawn: bool = False) -> str:
             f"<title>{html.escape(title)}</title>",
             f"<style>\n{_text('page.css')}</style></head>",
             f"<body><main>\n{body}\n</main>",
-            *(f"<script>{script}</script>" for script in scripts),
+            *([f'<script type="application/gzip" id="library">{library.packed}</script>'] if library else []),
+            *([f"<script>{script}</script>"] if script else []),
             "</body></html>\n",
         ]
     )
@@ -98,9 +100,16 @@ def _text(file: str) -> str:
     return (_HERE / file).read_text(encoding="utf-8")
 
 
+class _Library(NamedTuple):
+    """packed: the script, gzipped, in base64; 2 of 5 MB. sha256: of the script, for the page to allow it."""
+
+    packed: str
+    sha256: str
+
+
 @cache
-def _plotly() -> str:
+def _plotly() -> _Library:
     from plotly.offline import get_plotlyjs
 
     text: str = get_plotlyjs()
-    return text
+    return _Library(base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode(), _sha256(text))

@@ -10,7 +10,7 @@ from ftproc.records import FloatArray, IntArray
 from ftproc.summary import GAP_INTERVALS
 
 COLUMNS = 1000  # pixel columns of a wide figure; at most two points are drawn in each
-MOST_MARKED = 100_000  # flagged readings that are all drawn
+MOST_MARKED = 200_000  # flagged readings that are all in the page, which is then below 8 MB
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
-"""`python -m tests.bench [accuracy] [methods] [correction] [speed] [scale]`: the tables of the README, as Markdown on
-standard output and in out/bench.md."""
+"""`python -m tests.bench [accuracy] [methods] [correction] [speed] [scale] [pages]`: the tables of the README, as
+Markdown on standard output and in out/bench.md."""
 
 from __future__ import annotations
 
@@ -8,9 +8,16 @@ from collections.abc import Iterable, Sequence
 from itertools import chain
 from pathlib import Path
 
-from tests.bench import accuracy, correction, methods, scale, speed
+from tests.bench import accuracy, correction, methods, pages, scale, speed
 
-TABLES = {"accuracy": accuracy, "methods": methods, "correction": correction, "speed": speed, "scale": scale}
+TABLES = {
+    "accuracy": accuracy,
+    "methods": methods,
+    "correction": correction,
+    "speed": speed,
+    "scale": scale,
+    "pages": pages,
+}
 KEPT = Path("out/bench.md")
 
 

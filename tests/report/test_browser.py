@@ -5,11 +5,14 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from ftproc import report
+from ftproc.records import ISOLATED
+from ftproc.report.page import _text
 from tests.report.browser import NEEDED, Opened, browser
-from tests.report.flights import angles_only, filtered, flight, hostile
+from tests.report.flights import filtered, flight, hostile
 
 pytestmark = [NEEDED, pytest.mark.filterwarnings("default")]  # of playwright's own
 
@@ -95,12 +98,40 @@ def test_hostile_names_do_nothing(show):
     assert opened.page.locator("figure .main-svg, figure canvas").count() > 0
 
 
-def test_a_crowded_page_leaves_its_marks_to_the_graphics_card(show, monkeypatch):
+def test_crowded_marks_are_thinned_and_all_there_when_one_zooms_in(context, tmp_path, monkeypatch):
+    """In the page are all; what is drawn is few, without the graphics card, and reaches as far up and down."""
     monkeypatch.setattr("ftproc.report.drawing.MANY_MARKS", 10)
-    opened = show(angles_only())
+    monkeypatch.setattr("ftproc.report.page._text", lambda file: _text(file).replace("COLUMNS = 400", "COLUMNS = 4"))
+    made = filtered()
+    report.write(made, tmp_path / "page.html")
+    opened = Opened(context, tmp_path / "page.html")
     assert opened.complaints == []
-    kinds = opened.page.evaluate("() => document.getElementById('readings')._fullData.map(t => t.type)")
-    assert "scattergl" in kinds
+    marks = (
+        "() => document.getElementById('readings')._fullData.filter(t => t.mode === 'markers' && t.xaxis === 'x' &&"
+        " t.name === 'isolated outlier').map(t => [t.type, Array.from(t.x), Array.from(t.y)])"
+    )
+    times = made.time_s[made.outlier[:, 0] == ISOLATED]
+    ((kind, x, y),) = opened.page.evaluate(marks)
+    figure = made.plot("readings")
+    every = next(trace for trace in figure.data if trace.name == "isolated outlier")
+    assert kind == "scatter"
+    assert 4 <= len(x) <= 8 < len(times)
+    assert (min(y), max(y)) == (min(every.y), max(every.y))
+    low, high = times[3] - 0.01, times[6] + 0.01
+    opened.page.evaluate(f"() => Plotly.relayout('readings', {{'xaxis2.range': [{low}, {high}]}})")
+    opened.page.wait_for_function(f"() => ({marks})()[0][1].length === 4", timeout=5000)
+    np.testing.assert_array_equal(opened.page.evaluate(marks)[0][1], times[3:7])
+    opened.page.evaluate("() => Plotly.relayout('readings', {'xaxis.range': [0, 40]})")
+    opened.page.wait_for_function(f"() => ({marks})()[0][1].length === {len(x)}", timeout=5000)
+
+
+def test_printing_at_once_prints_all_figures(context, tmp_path):
+    """The page counts as loaded when all is drawn, so a printer that waits for that, and no longer, has all."""
+    report.write(filtered(), tmp_path / "page.html")
+    page = context.new_page()
+    page.goto((tmp_path / "page.html").as_uri(), wait_until="load")
+    assert page.locator("figure .main-svg").count() >= 7
+    assert page.evaluate("document.body.dataset.drawn") == "yes"
 
 
 def test_what_slips_through_does_not_run(context, tmp_path, monkeypatch):
