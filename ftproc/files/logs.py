@@ -126,11 +126,13 @@ def _check_units(
             continue
         column = found[quantity]
         assumed = column.unit
-        typical = float(np.median(angles)) * assumed.divide / assumed.multiply
+        half, most = np.quantile(angles, [0.5, 0.99]) * assumed.divide / assumed.multiply
+        # Degrees end at 360; what is beyond 400 is wild and says nothing.
+        typical = most if quantity == "azimuth" and 370 < most <= 400 else half
         other = _likely_unit(quantity, typical, limit / (2 if quantity == "azimuth" else 1))  # one turn, straight up
         named = f"--columns {quantity}={column.name} " if column.unit_in_name else ""
         raise InputError(
-            f'{source}: half of column "{column.name}" lies beyond {typical:.4g} {assumed.name}, which is no '
+            f'{source}: half of column "{column.name}" lies beyond {half:.4g} {assumed.name}, which is no '
             f"{what}: it looks like {other[1]}; use {named}--units {quantity}={other[0]}"
             f"{_and_the_other_angle(quantity, found, other[0])}. "
             f"If {assumed.name} is right, say {named}--units {quantity}={assumed.name}."
@@ -138,7 +140,7 @@ def _check_units(
 
 
 def _likely_unit(quantity: str, typical: float, limit: float) -> tuple[str, str]:
-    words = {"deg": "degrees", "grad": "gradians", "mil": "mils"}
+    words = {"deg": "degrees", "grad": "gradians (gon)", "mil": "mils"}
     for name, word in words.items():
         unit = UNITS[quantity][name]
         if typical * unit.multiply / unit.divide <= limit:

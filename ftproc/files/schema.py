@@ -207,7 +207,8 @@ def _check_complete(source: str, names: Sequence[str], found: Mapping[str, Colum
     hint = nearest(CANONICAL[wanted], [name for name in names if name not in columns.values()]) or "."
     raise InputError(
         f"{source}: {what} (expected {CANONICAL[wanted]} or {' or '.join(ALIASES[wanted])}){hint} "
-        f"Its columns are: {listed(names)}. Name the right one with --columns {wanted}=NAME."
+        f"Its columns are: {listed(names)}. "
+        f"Name the right ones with --columns {','.join(f'{q}=NAME' for q in QUANTITIES if q not in found)}."
     )
 
 

@@ -105,7 +105,11 @@ def test_what_looks_like_something_else_is_explained(make: Make, text: str | byt
             "no row has a range, azimuth or elevation, so there is nothing to process; check the columns.",
         ),
         ("time_s range_m\n0 1\n", 'the header line "time_s range_m" has no separator; separate the cells with commas'),
-        ("a,b\n0,1\n", "no time column (expected time_s or time or t). Its columns are: a, b."),
+        (
+            "a,b\n0,1\n",
+            "no time column (expected time_s or time or t). Its columns are: a, b. Name the right ones with "
+            "--columns time=NAME,range=NAME,elevation=NAME.",
+        ),
         ("t,R\n".encode("utf-16"), "this is UTF-16 text; save it as UTF-8 (iconv -f UTF-16 -t UTF-8)."),
         ("t,R\n".encode("utf-16-be"), "this is not text in UTF-8 (it has NUL bytes)"),
         ("t,R,Höhe\n0,1,2\n".encode("latin-1"), "the header line is not UTF-8 (Latin-1 or Windows text?)"),
@@ -125,7 +129,12 @@ def test_text_that_is_no_log(make: Make, text: str | bytes, expected: str) -> No
             "t,A,E\n0,1,45\n",
             '"E" lies beyond 45 rad, which is no elevation: it looks like degrees; use --units elevation=deg',
         ),
-        ("t,A\n0,380\n", "it looks like gradians; use --units azimuth=grad"),
+        ("t,A\n0,380\n", "it looks like gradians (gon); use --units azimuth=grad"),
+        (
+            "t,A\n0,100\n1,200\n2,390\n",
+            'half of column "A" lies beyond 200 rad, which is no azimuth: it looks like grad',
+        ),
+        ("t,A\n0,100\n1,200\n2,350\n", "it looks like degrees"),
         ("t,A\n0,3200\n", "it looks like mils; use --units azimuth=mil"),
         ("t,el_deg\n0,800\n", "lies beyond 800 deg, which is no elevation: it looks like mils"),
         ("t,A\n0,1e9\n", "it looks like another unit; use --units azimuth=UNIT"),
