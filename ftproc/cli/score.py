@@ -56,7 +56,7 @@ def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: 
     from ftproc.cli import reports
     from ftproc.errors import InputError
     from ftproc.files import trajectories as trajectory_files
-    from ftproc.scoring import render, score
+    from ftproc.scoring import axes, render, score
 
     reports.check(report)
     places, index = reports.plan(trajectories, report, truths)
@@ -67,6 +67,8 @@ def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: 
             truth = _truth(truths[number % len(truths)], known) if truths else None
             trajectory = trajectory_files.read(name)
             scores.append(score(trajectory, truth))
+            if truth is not None and (doubt := axes.remark(trajectory, truth)):
+                click.echo(f"ftproc: {doubt}", err=True)
             if place is not None:
                 pages.write(trajectory, place, truth)
                 entries.append(pages.Entry(name, place, _summary(trajectory)))

@@ -73,6 +73,7 @@ LAYOUT: dict[str, Any] = {
         "y": 1,
         "yanchor": "bottom",
         "itemsizing": "constant",
+        "itemwidth": 44,  # px: room for a dash and a half
         "bgcolor": "rgba(0,0,0,0)",
     },
     "hovermode": "closest",

@@ -109,8 +109,10 @@ def _list(texts: Sequence[str]) -> str:
 
 
 def _spoken(value: Any) -> str:
-    if value is None:
+    if value is None or value == "" or value == []:
         return "-"
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {_spoken(part)}" for key, part in value.items() if part not in (None, []))
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 
+import pandas as pd
 import pytest
 
 from tests.cli.conftest import Result
@@ -33,6 +34,16 @@ def test_json_has_the_promised_keys(run, clean):
     for key in ("rmse_seed_m", "rmse_3d_m", "rmse_x_m", "rmse_v_mps", "max_error_m"):
         assert found[key] >= 0
     assert found["outliers"]["range"].keys() >= {"precision", "recall", "f1"}
+
+
+def test_axes_exchanged_are_told(run, clean):
+    truth = pd.read_csv("flight.truth.csv")
+    exchanged = {"x_m": "y_m", "y_m": "x_m", "vx_mps": "vy_mps", "vy_mps": "vx_mps"}
+    truth.rename(columns=exchanged).to_csv("east.csv", index=False)
+    told = run("score", clean, "--truth", "east.csv")
+    assert told.code == 0
+    assert f"ftproc: east.csv fits {clean} far better with x and y exchanged" in told.err
+    assert run("score", clean, "--truth", "flight.truth.csv").err == ""
 
 
 def test_several_with_one_truth_or_one_each(run, clean):
