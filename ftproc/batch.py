@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ftproc.errors import FtprocError, FtprocWarning, interruption
+from ftproc.records import joined
 from ftproc.settings import FilterSettings, Station
 
 if TYPE_CHECKING:
@@ -133,14 +134,19 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
         settings = replace(recipe.settings, method=task.method or recipe.settings.method)
         named = None if task.method is None else registry.named(task.method)
         model = model_named(recipe.model) if named is None else model_for(named, recipe.model)
+        filtering = pipeline.Filtering(log, settings, model)
         with warm.announced(say), _passed_on(task.log, say):
-            trajectory = pipeline.filter_log(log, settings, model)
-        trajectory = geodesy.located(trajectory, settings)
-        trajectories.write(trajectory, task.at(task.output))
-        if task.report is not None:
-            report.write(trajectory, task.at(task.report))
+            parts = (geodesy.located(part, settings) for part in filtering.parts())
+            if task.report is None:
+                trajectories.write_parts(parts, filtering.metadata, task.at(task.output))
+            else:
+                trajectory = joined(list(parts))
+                trajectory = replace(trajectory, metadata={**trajectory.metadata, **filtering.metadata()})
+                trajectories.write(trajectory, task.at(task.output))
+                report.write(trajectory, task.at(task.report))
+        metadata = filtering.metadata()
         elapsed_s = time.perf_counter() - began
-        return Outcome(task, summary.text(trajectory), summary.as_dict(trajectory), elapsed_s=elapsed_s)
+        return Outcome(task, summary.text(metadata), summary.as_dict(metadata), elapsed_s=elapsed_s)
     except BrokenPipeError:
         raise
     except Exception as error:

@@ -19,6 +19,7 @@ from typing import Any
 import ftproc
 from ftproc.batch import NO_MODEL, Begin, Failure, Outcome, Recipe, Task, failure, filter_one, model_named
 from ftproc.errors import UsageError
+from ftproc.methods.side_by_side import use
 
 PATIENCE_S = 10.0  # for a scheduler to answer, and for a first worker to be there
 _START = "Start one with `dask worker {0} --nthreads 1`, and more where there is more to do."
@@ -94,6 +95,7 @@ def _work(task: Task, recipe: Recipe, version: str) -> Outcome:
 
         message = f"{task.log}: {_differs(get_worker().address, ftproc.__version__, version)}"
         return Outcome(task, failure=Failure(message, 1, ""))
+    use(1)  # Dask has begun as many tasks on this machine as it should do at a time
     return filter_one(task, recipe)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.records import FloatArray
 
@@ -16,13 +15,13 @@ BLIND = 10.0  # times the median position sigma
 MOST_BLIND = 20  # stretches that are listed
 
 
-def scatter(scaled: FloatArray) -> dict[str, Any]:
-    """Root mean square of the used innovations over their sigmas (n,), NaN where not used; with the bounds within
-    which 99 % of honest filters lie (chi-square, normal approximation), but at least 20 % wide, and the verdict."""
-    count = int(np.isfinite(scaled).sum())
+def scatter(squares: float, count: int) -> dict[str, Any]:
+    """Root mean square of the used innovations over their sigmas, from the sum of squares of so many; with the bounds
+    within which 99 % of honest filters lie (chi-square, normal approximation), but at least 20 % wide, and the verdict.
+    """
     if not count:
         return {"innovation_ratio": None, "innovation_bounds": None, "verdict": "not observable"}
-    ratio = float(np.sqrt(np.nanmean(scaled**2)))
+    ratio = float(np.sqrt(squares / count))
     spread = NORMAL_99 * np.sqrt(2 / count)
     low = min(float(np.sqrt(max(1 - spread, 0.0))), 1 - LEAST_WIDTH)
     high = max(float(np.sqrt(1 + spread)), 1 + LEAST_WIDTH)
@@ -40,10 +39,10 @@ def nis_bounds(freedom: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.minimum(low, freedom * (1 - LEAST_WIDTH) ** 2), np.maximum(high, freedom * (1 + LEAST_WIDTH) ** 2)
 
 
-def vagueness(innovation_sigma: FloatArray, used: NDArray[np.bool_], noise_sigma: float) -> float | None:
-    """By how much predictions are vaguer than readings (median over the used ones): a gate of C sigmas lets pass what
-    is C times so many noise sigmas off."""
-    typical = float(np.median(innovation_sigma[used])) if used.any() else np.nan
+def vagueness(innovation_sigma: FloatArray, noise_sigma: float) -> float | None:
+    """By how much predictions are vaguer than readings, median over the used ones (m,): a gate of C sigmas lets pass
+    what is C times so many noise sigmas off."""
+    typical = float(np.median(innovation_sigma)) if len(innovation_sigma) else np.nan
     return typical / noise_sigma if np.isfinite(typical) and 0 < noise_sigma < np.inf else None
 
 

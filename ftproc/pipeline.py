@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ftproc import __version__, plausible
+from ftproc import plausible, provenance
 from ftproc.core.geometry import from_cartesian
 from ftproc.errors import InputError, UsageError
-from ftproc.files.conventions import CONVENTION, in_words
 from ftproc.methods import registry
-from ftproc.methods.estimate import Estimate, Readings
-from ftproc.records import COMPONENTS, MISSING, Diagnostics, FloatArray, MeasurementLog, Trajectory, Truth
+from ftproc.methods.estimate import Estimate, Part, Recording
+from ftproc.records import COMPONENTS, MISSING, Diagnostics, FloatArray, MeasurementLog, Trajectory, Truth, joined
 from ftproc.settings import FilterSettings, TrainSettings
-from ftproc.summary import summarise
+from ftproc.tally import Tally
 
 if TYPE_CHECKING:
     from ftproc.core.forward import FilterRun
     from ftproc.core.smoother import SmootherRun
     from ftproc.correction.model import Model
     from ftproc.correction.samples import Flight
-    from ftproc.methods.registry import Method
 
 EDITING = ("two-pass", "forward", "none")
 ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of a component that the log says too little about
-ASSUMED_READING = (10_000.0, 0.0, 0.0)  # stands in for a component that is missing throughout
-FARTHEST = 1e12  # m, rad: a wilder reading is no more of an outlier, but its square would overflow
 FEWEST_PARTICLES = 20
 FEWEST_READINGS = 8  # of a component, for its noise to be found from them
 PACKAGED_MODEL = Path(__file__).parent / "correction" / "default.safetensors"
@@ -50,37 +46,79 @@ def filter_log(log: MeasurementLog, settings: FilterSettings | None = None, mode
     model: the network's correction; None for none. Sigmas, labels and everything else are in the Trajectory.
     Raises InputError when the log cannot be processed, UsageError for settings that make no sense.
     """
-    settings = settings or FilterSettings()
-    method = registry.named(settings.method)
-    _check(settings)
-    if (why := registry.obstacle(method, settings.smooth, None if model is None else model.made_for)) is not None:
-        raise UsageError(why)
-    readings, absent = _readings(log)
-    try:
-        estimate = method.run(readings, settings)
-    except ValueError as cause:
-        raise InputError(_no_start(log, cause)) from cause
-    best = estimate.run if estimate.smoothed is None else estimate.smoothed
-    state, sigma = best.state.copy(), best.sigma[:, :6].copy()
-    correction, outside = np.zeros((len(log), 6)), 0.0
-    if model is not None and method.corrected and not absent:
-        correction, outside = _corrected(estimate, model)
+    filtering = Filtering(log, settings or FilterSettings(), model)
+    parts = list(filtering.parts())
+    return replace(joined(parts), metadata=filtering.metadata())
+
+
+class Filtering:
+    """One log on its way through the filter. `parts` makes its trajectory, a stretch at a time; `metadata` is what
+    holds for all of it, and is known when the last part is. Errors as in `filter_log`."""
+
+    def __init__(self, log: MeasurementLog, settings: FilterSettings, model: Model | None) -> None:
+        self.log, self.settings, self.model = log, settings, model
+        self.method = registry.named(settings.method)
+        _check(settings)
+        if (
+            why := registry.obstacle(self.method, settings.smooth, None if model is None else model.made_for)
+        ) is not None:
+            raise UsageError(why)
+        self.record = _record(log)
+        self.tally = Tally(log, self.record.absent)
+        self._metadata: dict[str, Any] = {}
+
+    def parts(self) -> Iterator[Trajectory]:
+        """The rows of the log in their order, in stretches; of the metadata they have only the frame."""
+        parts = self.method.parts(self.record, self.settings)
+        while True:
+            try:
+                part = next(parts)
+            except StopIteration:
+                return
+            except ValueError as cause:
+                raise InputError(_no_start(self.log, cause)) from cause
+            yield self._trajectory(part)
+
+    def metadata(self) -> dict[str, Any]:
+        """Settings, noise, model and summary: everything needed to make the trajectory again, and to judge it."""
+        if self._metadata:
+            return self._metadata
+        summary = self.tally.figures()
+        summary["correction_lost_by_smoothing"] = bool(
+            self.model
+            and self.method.corrected
+            and self.settings.smooth
+            and self.model.filter.helps
+            and self.model.smoother is None
+        )
+        self._metadata = provenance.describe(self.log, self.method, self.settings, self.tally, self.model, summary)
+        return self._metadata
+
+    def _trajectory(self, part: Part) -> Trajectory:
+        """What is meant of a part as a trajectory, and counted."""
+        absent = list(self.record.absent)
+        correction, outside = np.zeros((len(part.estimate.label), 6)), 0.0
+        if self.model is not None and self.method.corrected and not absent:
+            correction, outside = _corrected(part.estimate, self.model)
+        correction, estimate = correction[part.low : part.high], part.estimate.rows(part.low, part.high)
+        rows = slice(part.first + part.low, part.first + part.high)
+        best = estimate.run if estimate.smoothed is None else estimate.smoothed
+        state, sigma = best.state.copy(), best.sigma[:, :6].copy()
         state[:, :6] += correction
-    cleaned = from_cartesian(state[:, :3]) if estimate.cleaned is None else estimate.cleaned
-    if absent:  # the stand-in made the filter run; what rests on it must not leave the house
-        state[:], sigma[:] = np.nan, np.nan
-        cleaned[:, absent] = np.nan
-        estimate.label[:, absent] = MISSING
-    elif np.isinf(state).any() or (estimate.cleaned is None and np.isnan(state).any()):
-        raise InputError(f"{log.name}: {method.name} diverged; give --noise and --jerk, or check the log's units")
-    summary = summarise(log, estimate, absent, correction, outside)
-    summary["correction_lost_by_smoothing"] = bool(
-        model and method.corrected and settings.smooth and model.filter.helps and model.smoother is None
-    )
-    return Trajectory(
-        log.name, log.row, log.time_s, cleaned, state, sigma, estimate.label, best.nis, correction,
-        _provenance(log, method, settings, estimate, model, summary), log.extra, _diagnostics(log, estimate),
-    )  # fmt: skip
+        cleaned = from_cartesian(state[:, :3]) if estimate.cleaned is None else estimate.cleaned
+        if absent:  # the stand-in made the filter run; what rests on it must not leave the house
+            state[:], sigma[:] = np.nan, np.nan
+            cleaned[:, absent] = np.nan
+            estimate.label[:, absent] = MISSING
+        elif np.isinf(state).any() or (estimate.cleaned is None and np.isnan(state).any()):
+            name = self.method.name
+            raise InputError(f"{self.log.name}: {name} diverged; give --noise and --jerk, or check the log's units")
+        log = self.log.stretch(rows)
+        self.tally.add(log.time_s, estimate, correction, outside)
+        return Trajectory(
+            log.name, log.row, log.time_s, cleaned, state, sigma, estimate.label, best.nis, correction,
+            metadata={"frame": log.frame}, extra=log.extra, diagnostics=_diagnostics(log.measurement, estimate),
+        )  # fmt: skip
 
 
 def _corrected(estimate: Estimate, model: Model) -> tuple[FloatArray, float]:
@@ -99,13 +137,13 @@ def _smoothed(run: FilterRun, smoothed: SmootherRun) -> FilterRun:
     return run._replace(state=smoothed.state, sigma=smoothed.sigma, los_sigma=smoothed.los_sigma)
 
 
-def _diagnostics(log: MeasurementLog, estimate: Estimate) -> Diagnostics:
-    missing = ~np.isfinite(log.measurement)  # also what a stand-in was filtered for
+def _diagnostics(reading: FloatArray, estimate: Estimate) -> Diagnostics:
+    missing = ~np.isfinite(reading)  # also what a stand-in was filtered for
     if estimate.smoothed is None:
         residual, sigma = estimate.run.innovation, estimate.run.innovation_sigma
-        return Diagnostics(log.measurement, np.where(missing, np.nan, residual), sigma, "innovation")
+        return Diagnostics(reading, np.where(missing, np.nan, residual), sigma, "innovation")
     residual, sigma = estimate.smoothed.residual, np.sqrt(estimate.smoothed.residual_variance)
-    return Diagnostics(log.measurement, np.where(missing, np.nan, residual), sigma, "leave-one-out residual")
+    return Diagnostics(reading, np.where(missing, np.nan, residual), sigma, "leave-one-out residual")
 
 
 def _check(settings: FilterSettings) -> None:
@@ -120,16 +158,11 @@ def _check(settings: FilterSettings) -> None:
             raise UsageError(f"{name} must be a positive number, not {value}")
 
 
-def _readings(log: MeasurementLog) -> tuple[Readings, list[int]]:
-    """What the methods see, and the components that are missing throughout (a constant stands in for those)."""
-    plausible.check(log)
-    measurement = np.clip(log.measurement, -FARTHEST, FARTHEST)
-    count = np.isfinite(measurement).sum(0)
-    absent = [c for c in range(3) if count[c] == 0]
+def _record(log: MeasurementLog) -> Recording:
+    """What the methods see."""
+    count = plausible.check(log)
     assumed = np.where(count < FEWEST_READINGS, ASSUMED_SIGMA, np.nan)
-    for c in absent:
-        measurement[:, c] = ASSUMED_READING[c]
-    return Readings(log.time_s - log.time_s[0], np.ascontiguousarray(measurement), assumed), absent
+    return Recording(log.time_s, log.measurement, assumed, tuple(np.flatnonzero(count == 0).tolist()))
 
 
 def _no_start(log: MeasurementLog, cause: ValueError) -> str:
@@ -140,54 +173,6 @@ def _no_start(log: MeasurementLog, cause: ValueError) -> str:
         f"{log.name}: no {COMPONENTS[component]} reading agrees with its neighbours, so there is no first state; "
         f"check the column and its unit, or leave it out"
     )
-
-
-def _provenance(
-    log: MeasurementLog,
-    method: Method,
-    settings: FilterSettings,
-    estimate: Estimate,
-    model: Model | None,
-    summary: Mapping[str, Any],
-) -> dict[str, Any]:
-    """Everything needed to make the trajectory again."""
-    from ftproc.correction.model_file import sha256
-
-    sigma = np.sqrt(estimate.model.reading_variance)
-    motion = estimate.model.jerk if np.isfinite(estimate.model.jerk).all() else None
-    return {
-        "program": "ftproc",
-        "version": __version__,
-        "method": method.name,
-        "sees": method.sees(settings),
-        "log": log.name,
-        "frame": log.frame,
-        "convention": CONVENTION[log.frame],
-        "station": {**asdict(log.station), "in_words": in_words(log.station)},
-        "epoch": log.epoch,
-        "settings": {
-            "editing": method.editing(settings),
-            "smooth": settings.smooth,
-            "gate": settings.gate,
-            "max_patch_s": settings.max_patch_s,
-            "gain_form": settings.gain_form,
-            "site": settings.site,
-            "geoid_m": settings.geoid_m,
-            "ecef": settings.ecef,
-            "noise_given": settings.noise is not None and None not in settings.noise,
-            **({"particles": settings.particles, "seed": settings.seed} if method.random else {}),
-            "jerk_given": settings.jerk_psd_m2ps5 is not None,
-            "noise_range_m": float(sigma[0]),
-            "noise_azimuth_rad": float(sigma[1]),
-            "noise_elevation_rad": float(sigma[2]),
-            "noise_correlation": [float(r) for r in estimate.model.correlation],
-            "jerk_psd_m2ps5": None if motion is None else [float(q) for q in motion[:, 0]],
-            "jerk_vertical_ratio": None if motion is None else float(motion[0, 5] / motion[0, 0]),
-            "jerk_knot_s": float(estimate.model.knot_s) if motion is not None and len(motion) > 1 else None,
-        },
-        "model_sha256": None if model is None else sha256(model),
-        "summary": dict(summary),
-    }
 
 
 def train_flights(
@@ -230,12 +215,12 @@ def known_flights(
     for number, (log, truth) in enumerate(pairs):
         if progress:
             progress("filtering", number, len(pairs))
-        readings, absent = _readings(log)
-        if absent:
-            names = " and ".join(COMPONENTS[c] for c in absent)
+        record = _record(log)
+        if record.absent:
+            names = " and ".join(COMPONENTS[c] for c in record.absent)
             raise InputError(f"{log.name}: {names} missing throughout; training needs all three components")
         try:
-            estimate = method.run(readings, settings)
+            estimate = method.run(record.whole(), settings)
         except ValueError as cause:
             raise InputError(_no_start(log, cause)) from cause
         known = match(log.time_s, truth)

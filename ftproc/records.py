@@ -5,9 +5,10 @@ Components are always in the order range, azimuth, elevation; axes in the order 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+import mmap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,13 @@ class MeasurementLog:
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+    def stretch(self, rows: slice) -> MeasurementLog:
+        """Some of its rows, in memory; what is known of the whole log stays as it is."""
+        arrays = (np.array(self.time_s[rows]), np.array(self.measurement[rows]), np.array(self.row[rows]))
+        forget(self.time_s, self.measurement, self.row)
+        extra = None if self.extra is None else self.extra.slice(rows.start, rows.stop - rows.start)
+        return replace(self, time_s=arrays[0], measurement=arrays[1], row=arrays[2], extra=extra)
 
 
 @dataclass(frozen=True)
@@ -136,3 +144,41 @@ class Trajectory:
         from ftproc.report import plot
 
         return plot(self, what)
+
+
+Stretch = TypeVar("Stretch", Diagnostics, Trajectory)
+
+
+def forget(*arrays: NDArray[Any]) -> None:
+    """Give back the memory that reading arrays took which lie on a disk; they stay as they are."""
+    for array in arrays:
+        mapped = getattr(array, "_mmap", None)
+        if mapped is not None and hasattr(mmap, "MADV_DONTNEED"):
+            mapped.madvise(mmap.MADV_DONTNEED)
+
+
+def chunks(n: int, rows: int = 1 << 20) -> Iterator[slice]:
+    """Slices of so many rows that cover n of them."""
+    for low in range(0, n, rows):
+        yield slice(low, min(low + rows, n))
+
+
+def joined(parts: Sequence[Trajectory]) -> Trajectory:
+    """Stretches of one trajectory, one behind the other; the metadata are those of the first."""
+    if len(parts) == 1:
+        return parts[0]
+    extra = None
+    if parts[0].extra is not None:
+        import pyarrow as pa
+
+        extra = pa.concat_tables([part.extra for part in parts])
+    made = [part.diagnostics for part in parts if part.diagnostics is not None]
+    whole = _end_to_end(made, "reading", "residual", "residual_sigma") if len(made) == len(parts) else None
+    arrays = ("row", "time_s", "measurement", "state", "sigma", "outlier", "nis", "correction")
+    return replace(_end_to_end(parts, *arrays), diagnostics=whole, extra=extra)
+
+
+def _end_to_end(parts: Sequence[Stretch], *names: str) -> Stretch:
+    """The first of some records, with the arrays of these names of all of them."""
+    arrays: Any = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return replace(parts[0], **arrays)

@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any
 
 from ftproc.batch import Begin, Failure, Outcome, Recipe, Say, Task, filter_one
+from ftproc.methods.side_by_side import available, use
 from ftproc.warm import COMPILING
 
 _DIED = "its worker process died (out of memory, or killed). Use fewer --jobs, or split the log."
@@ -55,7 +56,7 @@ def _outcome(future: Future[Outcome], alone: Callable[[], Outcome]) -> Outcome:
 
 
 def _pool(context: Any, jobs: int, recipe: Recipe, shared: _Shared) -> ProcessPoolExecutor:
-    given = (recipe, shared.stop, shared.said, shared.say)
+    given = (recipe, max(available() // jobs, 1), shared.stop, shared.said, shared.say)
     return ProcessPoolExecutor(jobs, mp_context=context, initializer=_prepare, initargs=given)
 
 
@@ -73,11 +74,12 @@ _say: Say | None
 _stop: Any
 
 
-def _prepare(recipe: Recipe, stop: Any, said: Any, say: Say | None) -> None:
-    """In the worker, before its first task."""
+def _prepare(recipe: Recipe, threads: int, stop: Any, said: Any, say: Say | None) -> None:
+    """In the worker, before its first task. Together the workers use no more threads than there are processors."""
     global _recipe, _say, _stop
     _recipe, _stop = recipe, stop
     _say = None if say is None else _once(say, said)
+    use(threads)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an idle worker waits for the parent to end it
 
 

@@ -54,7 +54,7 @@ def test_any_number_of_workers_gives_the_same_in_the_same_order(tasks, tmp_path)
 
 
 def test_unexpected_errors_stay_with_their_log(tasks, monkeypatch):
-    monkeypatch.setattr("ftproc.pipeline.filter_log", lambda *args: 1 / 0)
+    monkeypatch.setattr("ftproc.pipeline.Filtering", lambda *args: 1 / 0)
     outcomes = list(batch.run(tasks("one"), Recipe()))
     found = [outcome.failure for outcome in outcomes]
     assert all(failure is not None and failure.exit_code == 1 for failure in found)
@@ -125,7 +125,7 @@ def test_an_interruption_inside_a_kernel_is_no_failure_of_the_log(tasks, monkeyp
     def interrupted(*_: object) -> None:
         raise SystemError("CPUDispatcher returned a result with an exception set") from stop
 
-    monkeypatch.setattr("ftproc.pipeline.filter_log", interrupted)
+    monkeypatch.setattr("ftproc.pipeline.Filtering", interrupted)
     with pytest.raises(type(stop)) as raised:
         list(batch.run(tasks("out")[:1], Recipe()))
     assert raised.value is stop

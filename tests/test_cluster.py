@@ -202,7 +202,8 @@ def _tasks(names: list[str], directory: str) -> list[Task]:
 
 
 def _contents(directory: str) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in Path(directory).iterdir()}
+    """Its outputs; the hidden file that a killed worker was writing is none."""
+    return {path.name: path.read_bytes() for path in Path(directory).glob("[!.]*")}
 
 
 def _until(found: Callable[[], T | None]) -> T:

@@ -113,12 +113,12 @@ def test_a_model_without_a_network_for_the_smoother_leaves_it_alone_and_says_so(
     model = Model({"filter": constant("instrument", 1e-4, bound=1e9)})
     smoothed = pipeline.filter_log(flight.log, FilterSettings(smooth=True), model)
     assert not smoothed.correction.any()
-    assert "corrects the filter only" in text(smoothed)
+    assert "corrects the filter only" in text(smoothed.metadata)
     for trajectory in (
         pipeline.filter_log(flight.log, model=model),
         pipeline.filter_log(flight.log, FilterSettings(smooth=True), pipeline.default_model()),
     ):
-        assert "corrects the filter only" not in text(trajectory)
+        assert "corrects the filter only" not in text(trajectory.metadata)
 
 
 def test_metadata_is_complete_and_serialisable(flight):

@@ -71,7 +71,7 @@ def test_noise_shown_is_that_of_a_reading_even_if_correlated():
     part = figures(trajectory)["components"]["range"]
     assert part["noise_m"] == pytest.approx(flight.sigma[0], rel=0.2)
     assert part["noise_correlation"] == pytest.approx(np.exp(-0.2), abs=0.06)
-    assert "the noise is correlated from sample to sample (up to 0.8" in summary.text(trajectory)
+    assert "the noise is correlated from sample to sample (up to 0.8" in summary.text(trajectory.metadata)
 
 
 def test_consistent_filter_is_called_so(dirty):
@@ -93,14 +93,14 @@ def test_verdict_on_a_given_noise(factor, verdict):
 
 
 def test_summary_is_json(dirty):
-    text = json.dumps(summary.as_dict(dirty[1]), allow_nan=False)
+    text = json.dumps(summary.as_dict(dirty[1].metadata), allow_nan=False)
     again = json.loads(text)
     assert list(again)[:2] == ["log", "method"]
     assert again["rows"] == len(dirty[1])
 
 
 def test_text_has_a_line_for_each_component(dirty):
-    lines = summary.text(dirty[1]).splitlines()
+    lines = summary.text(dirty[1].metadata).splitlines()
     assert lines[0].startswith(f"{dirty[0].log.name}: {len(dirty[1])} rows, 60 s, filtered by ga-bpnn-ukf (two-pass")
     for c, name in enumerate(COMPONENTS):
         (line,) = [line for line in lines if line.startswith(f"  {name} ")]
@@ -121,14 +121,14 @@ def test_text_has_a_line_for_each_component(dirty):
 
 def test_lines_stand_under_each_other(dirty):
     """Names to the left, what they say from one column on; the table's columns end together."""
-    _, header, *table = summary.text(dirty[1]).splitlines()[:5]
+    _, header, *table = summary.text(dirty[1].metadata).splitlines()[:5]
     assert len({len(line) for line in (header, *table)}) == 1
-    rest = summary.text(dirty[1]).splitlines()[5:]
+    rest = summary.text(dirty[1].metadata).splitlines()[5:]
     assert {line[13] != " " and line[11:13] == "  " for line in rest} == {True}
 
 
 def test_text_says_whether_to_trust(dirty):
-    verdict = summary.text(dirty[1]).splitlines()[-1]
+    verdict = summary.text(dirty[1].metadata).splitlines()[-1]
     assert verdict == (
         "  verdict    Trust it: readings are no farther off than the sigmas say, and nothing else is in doubt."
     )
@@ -138,7 +138,7 @@ def test_text_says_whether_to_trust(dirty):
 def test_text_tells_what_was_odd_about_the_rows():
     flight = simulate("cruise", seed=3, duration_s=20.0, outliers="none")
     log = replace(flight.log, rows_without_time=(17, 40), rows_out_of_order=3, rows_in_file=len(flight.log) + 2)
-    text = summary.text(pipeline.filter_log(log, FilterSettings(smooth=True)))
+    text = summary.text(pipeline.filter_log(log, FilterSettings(smooth=True)).metadata)
     assert "  rows       2 rows have no time (first: row 17)" in text
     assert "  rows       3 rows out of time order, sorted" in text
     assert "smoothed by" in text
@@ -150,7 +150,7 @@ def test_text_names_what_is_not_observable():
     z = flight.log.measurement.copy()
     z[:, [0, 2]] = np.nan
     trajectory = pipeline.filter_log(replace(flight.log, measurement=z))
-    text = summary.text(trajectory)
+    text = summary.text(trajectory.metadata)
     assert "range and elevation missing throughout: position and velocity are not observable and left empty" in text
     parts = figures(trajectory)["components"]
     assert parts["range"]["noise_m"] is None
@@ -169,7 +169,7 @@ def test_text_reports_reacquisition_and_correction():
     times = figures(trajectory)["reacquired"]
     assert times >= 1
     often = "once" if times == 1 else f"{times} times"
-    assert f"the track was taken up anew {often} (lost" in summary.text(trajectory)
+    assert f"the track was taken up anew {often} (lost" in summary.text(trajectory.metadata)
     corrected = replace(
         trajectory,
         metadata={
@@ -177,13 +177,14 @@ def test_text_reports_reacquisition_and_correction():
             "summary": {**figures(trajectory), "correction_largest_m": 1.25, "correction_outside_training": 0.125},
         },
     )
-    assert "network correction up to 1.25 m; 12.5 % of samples outside its training got none" in summary.text(corrected)
+    said = summary.text(corrected.metadata)
+    assert "network correction up to 1.25 m; 12.5 % of samples outside its training got none" in said
     unsettled = replace(
         trajectory, metadata={**trajectory.metadata, "summary": {**figures(trajectory), "editing_settled": False}}
     )
-    assert "did not settle" in summary.text(unsettled)
+    assert "did not settle" in summary.text(unsettled.metadata)
     slow = replace(trajectory, metadata={**trajectory.metadata, "summary": {**figures(trajectory), "slow_noise": True}})
-    assert "correlated so slowly that it passes for motion: the sigmas are too small" in summary.text(slow)
+    assert "correlated so slowly that it passes for motion: the sigmas are too small" in summary.text(slow.metadata)
 
 
 def test_single_row():
@@ -193,4 +194,4 @@ def test_single_row():
     )  # fmt: skip
     s = figures(pipeline.filter_log(log))
     assert (s["rows"], s["duration_s"], s["interval_s"], s["gaps"], s["longest_gap_s"]) == (1, 0.0, 0.0, 0, 0.0)
-    assert ": 1 row, 0 s" in summary.text(pipeline.filter_log(log))
+    assert ": 1 row, 0 s" in summary.text(pipeline.filter_log(log).metadata)

@@ -82,7 +82,7 @@ def test_several_reasons_stand_below_each_other():
     flight = simulate("manoeuvre", seed=3, duration_s=30.0)
     noise = (0.3, 1e-5, 1e-5)
     trajectory = pipeline.filter_log(flight.log, FilterSettings(editing="none", noise=noise, jerk_psd_m2ps5=1.0))
-    lines = summary.text(trajectory).splitlines()
+    lines = summary.text(trajectory.metadata).splitlines()
     at = lines.index("  verdict    Do not trust it:")
     assert [line.split()[1] for line in lines[at + 1 :]] == ["range", "azimuth", "elevation"]
     assert all(line.startswith("             - ") for line in lines[at + 1 :])

@@ -84,26 +84,33 @@ def stuck_readings(measurement: FloatArray, sigma: FloatArray) -> NDArray[np.boo
 
 
 def edit(
-    time_s: FloatArray, measurement: FloatArray, given_sigma: FloatArray, jerk_psd: float | None, gate: float
+    time_s: FloatArray,
+    measurement: FloatArray,
+    given_sigma: FloatArray,
+    jerk_psd: float | None,
+    gate: float,
+    told: Model | None = None,
 ) -> Edited:
-    """Edit a whole log. time_s (n,), measurement (n, 3).
+    """Edit a whole log, or a segment of a long one. time_s (n,), measurement (n, 3).
 
     given_sigma: (3,) noise 1-sigma m, rad, rad, NaN where it is to be found; jerk_psd m^2/s^5 likewise None.
-    gate: sigmas beyond which a lone reading is called an outlier.
+    gate: sigmas beyond which a lone reading is called an outlier. told: of a segment, the noise of the log that it is
+    part of (taken as it is) and the log's usual jerk (to begin with).
     Raises ValueError when a component has no reading that agrees with its neighbours.
     """
     screened, sigma = screen(time_s, measurement)
     possible = np.isfinite(measurement) & ~stuck_readings(measurement, sigma)
-    known = np.isfinite(given_sigma)
+    known = np.isfinite(given_sigma) | (told is not None)
     record = Record(time_s, measurement, possible, screened * possible, sigma, known, jerk_psd is not None, gate)
     first_jerk = FIRST_JERK if jerk_psd is None else jerk_psd
-    model = Model(np.where(known, given_sigma, sigma) ** 2, isotropic(first_jerk))
+    model = told or Model(np.where(known, given_sigma, sigma) ** 2, isotropic(first_jerk))
     rates = np.tile(np.array(indicators.START_RATES), (3, 1))
     starts = begin_all(time_s, measurement, record.screened, model.noise_variance, jerk_psd)
     decision = decide(record, Decision(record.screened, model, starts, rates), tune_first=True)
     if jerk_psd is None:
         decision = look_again(record, decision)
-    decision = allow_for_colour(record, decision)
+    if told is None:
+        decision = allow_for_colour(record, decision)
     if jerk_psd is None:
         profile = tuning.fit_profile(*record.log, decision.weight, decision.starts, decision.model, PROFILE_STEPS)
         decision = decision._replace(model=tuning.with_allowance(profile))

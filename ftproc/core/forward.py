@@ -66,6 +66,10 @@ class FilterRun(NamedTuple):
     since_start: IntArray
     log_likelihood: float
 
+    def rows(self, low: int, high: int) -> FilterRun:
+        """Of the samples [low, high) alone; the likelihood stays that of the whole run."""
+        return FilterRun._make([*(each[low:high] for each in self[:-1]), self.log_likelihood])
+
 
 def empty_run(time_s: FloatArray) -> FilterRun:
     """A run of the right shapes for the kernels to fill."""

@@ -238,16 +238,74 @@ def filter_and_edit(
     was found to contradict); starts: at the beginning and after gaps; samples before the first are extrapolated.
     """
     run = empty_run(time_s)
-    begun: list[Start] = []
-    likelihood = 0.0
-    for start, stop in zip(starts, [s.sample for s in starts[1:]] + [len(time_s)], strict=True):
-        likelihood += _follow(start, stop, time_s, measurement, allowed, model, settings, run, begun)
+    _, begun, likelihood = go_on(None, 0, len(time_s), time_s, measurement, allowed, model, starts, settings, run)
     lead_in(measurement, model, starts[0], run)
     return run._replace(log_likelihood=likelihood), begun
 
 
+class Track(NamedTuple):
+    """The recursion between two samples; its arrays are changed in place.
+
+    start: the sample at which it began. retry: the first at which it may be called lost. state (9,), covariance (9, 9).
+    memory: (3, 5) of each component, see `_decide`.
+    """
+
+    start: int
+    retry: int
+    state: FloatArray
+    covariance: FloatArray
+    memory: FloatArray
+
+    @classmethod
+    def at(cls, start: Start, retry: int) -> Track:
+        """A track that begins."""
+        memory = np.zeros((3, 5))
+        memory[:, 3] = np.nan
+        return cls(start.sample, retry, start.state.copy(), start.covariance.copy(), memory)
+
+    def shifted(self, samples: int) -> Track:
+        """The track with samples counted from a later one."""
+        return self._replace(start=self.start - samples, retry=self.retry - samples)
+
+
+def go_on(
+    track: Track | None,
+    first: int,
+    stop: int,
+    time_s: FloatArray,
+    measurement: FloatArray,
+    allowed: FloatArray,
+    model: Model,
+    starts: list[Start],
+    settings: GateSettings,
+    run: FilterRun,
+) -> tuple[Track, list[Start], float]:
+    """Filter samples [first, stop), going on with a track (None: the first start makes one) and beginning anew at each
+    start; fills the run. Returns the track at the end, the starts made, and the log-likelihood."""
+    likelihood = 0.0
+    begun: list[Start] = []
+    for start, low, high in _stretches(track, starts, first, stop):
+        if start is not None:
+            begun.append(start)
+            track = Track.at(start, start.sample)
+        assert track is not None
+        track, gained = _follow(track, low, high, time_s, measurement, allowed, model, settings, run, begun)
+        likelihood += gained
+    assert track is not None
+    return track, begun, likelihood
+
+
+def _stretches(track: Track | None, starts: list[Start], first: int, stop: int) -> list[tuple[Start | None, int, int]]:
+    """Where each track goes: the start that it begins with, or None for the one that goes on, and its samples."""
+    begins = [(start, start.sample) for start in starts]
+    going = [(None, first)] if track is not None else []
+    edges = [*going, *begins]
+    return [(s, low, high) for (s, low), high in zip(edges, [e[1] for e in edges[1:]] + [stop], strict=True)]
+
+
 def _follow(
-    start: Start,
+    track: Track,
+    first: int,
     stop: int,
     time_s: FloatArray,
     measurement: FloatArray,
@@ -256,28 +314,27 @@ def _follow(
     settings: GateSettings,
     run: FilterRun,
     begun: list[Start],
-) -> float:
-    """Filter from a start up to sample `stop`, re-acquiring when the track is lost; the log-likelihood."""
-    likelihood, first, retry = 0.0, start.sample, start.sample
-    begun.append(start)
-    track = np.zeros((3, 5))
-    track[:, 3] = np.nan
-    x, p = start.state.copy(), start.covariance.copy()
+) -> tuple[Track, float]:
+    """Filter [first, stop), re-acquiring when the track is lost; the track at the end and the log-likelihood."""
+    likelihood = 0.0
     while first < stop:
         lost, gained = run_gated(
-            first, stop, begun[-1].sample, time_s, measurement, model.noise_variance, model.jerk, model.knot_s,
-            settings.gate, settings.longest_patch_s, settings.gain_form, retry, allowed, x, p, track, run,
+            first, stop, track.start, time_s, measurement, model.noise_variance, model.jerk, model.knot_s,
+            settings.gate, settings.longest_patch_s, settings.gain_form, track.retry, allowed, track.state,
+            track.covariance, track.memory, run,
         )  # fmt: skip
         likelihood += gained
-        first, retry = lost + 1, lost + RETRY_SAMPLES
-        again = reacquire(time_s, measurement, model.noise_variance, lost) if lost < stop else None
-        if again is not None:
+        if lost == stop:
+            break
+        first = lost + 1
+        again = reacquire(time_s, measurement, model.noise_variance, lost)
+        if again is None:
+            track = track._replace(retry=lost + RETRY_SAMPLES)
+        else:
             begun.append(again)
-            x, p = again.state.copy(), again.covariance.copy()
-            track[:] = 0.0
-            track[:, 3] = np.nan
+            track = Track.at(again, lost + RETRY_SAMPLES)
             first = lost  # the sample is filtered again, from the new state
-    return likelihood
+    return track, likelihood
 
 
 def reacquire(time_s: FloatArray, measurement: FloatArray, noise_variance: FloatArray, sample: int) -> Start | None:

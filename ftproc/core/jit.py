@@ -19,8 +19,8 @@ HOW: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "reassoc
 
 
 def kernel(function: F) -> F:
-    """Compile a function that Python calls; to a type checker it stays what it was."""
-    compiled: Any = njit(cache=True, **HOW)(function)
+    """Compile a function that Python calls, while other threads go on; to a type checker it stays what it was."""
+    compiled: Any = njit(cache=True, nogil=True, **HOW)(function)
     return cast(F, compiled)
 
 

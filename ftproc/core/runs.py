@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.jit import kernel
+from ftproc.core.screening import median
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -42,13 +43,23 @@ def suspicious(time_s: FloatArray, residual: FloatArray, variance: FloatArray, w
         interval = float(np.median(np.diff(time_s[used])))
         longest = LONGEST if interval <= 0 else int(np.clip(LONGEST_S / interval, SHORTEST, LONGEST))
         total = np.r_[0.0, np.cumsum(residual[used, c] / variance[used, c])]
-        every = max(len(used) // SCALE_SAMPLES, 1)
-        scale = np.full(longest + 1, np.inf)
-        for length in range(SHORTEST, longest + 1):
-            sums = (total[length:] - total[:-length])[::every]
-            scale[length] = max(1.4826 * float(np.median(np.abs(sums))), 1e-300)
-        found[used, c] = _scan(total, scale)
+        found[used, c] = _scan(total, _scales(total, longest))
     return found
+
+
+@kernel
+def _scales(total: FloatArray, longest: int) -> FloatArray:
+    """(longest + 1,) robust 1-sigma of the sums over runs of each length, from SCALE_SAMPLES of them or a few more."""
+    m = len(total) - 1
+    every = max(m // SCALE_SAMPLES, 1)
+    scale, sums = np.full(longest + 1, np.inf), np.empty(m)
+    for length in range(SHORTEST, longest + 1):
+        n = 0
+        for begin in range(0, m + 1 - length, every):
+            sums[n] = abs(total[begin + length] - total[begin])
+            n += 1
+        scale[length] = max(1.4826 * median(sums, n), 1e-300)
+    return scale
 
 
 @kernel

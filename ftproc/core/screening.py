@@ -25,14 +25,15 @@ MOST_STUCK = 0.2  # share of a component
 
 
 @part
-def _wrapped(value: float, angular: bool) -> float:
+def wrapped(value: float, angular: bool) -> float:
+    """An angle in [-pi, pi), and anything else as it is."""
     if angular and not -math.pi <= value < math.pi:
         return value - 2 * math.pi * math.floor((value + math.pi) / (2 * math.pi))
     return value
 
 
 @part
-def _median(values: FloatArray, n: int) -> float:
+def median(values: FloatArray, n: int) -> float:
     """Upper median of the first n values, which are reordered (Hoare's selection)."""
     k = n // 2
     low, high = 0, n - 1
@@ -78,8 +79,8 @@ def _best_parabola(
                 break
         if t[a] == t[b] or t[b] == t[c] or t[a] == t[c]:
             continue
-        zb = _wrapped(z[b] - z[a], angular)
-        zc = _wrapped(z[c] - z[a], angular)
+        zb = wrapped(z[b] - z[a], angular)
+        zc = wrapped(z[c] - z[a], angular)
         tb, tc = t[b] - t[a], t[c] - t[a]
         q = (zc / tc - zb / tb) / (tc - tb)
         v = zb / tb - q * tb
@@ -87,16 +88,15 @@ def _best_parabola(
         failing, i = 0, 0
         while i < n and failing < n - n // 2:
             d = t[i] - t[a]
-            work[i] = abs(_wrapped(z[i] - z[a] - d * (v + q * d), angular))
+            work[i] = abs(wrapped(z[i] - z[a] - d * (v + q * d), angular))
             failing += work[i] >= best
             i += 1
         if failing < n - n // 2:
-            median = _median(work, n)
-            best = median
+            best = median(work, n)
             slope, bend, origin, base = v, q, t[a], z[a]
     for i in range(n):
         d = t[i] - origin
-        residual[i] = _wrapped(z[i] - base - d * (slope + bend * d), angular)
+        residual[i] = wrapped(z[i] - base - d * (slope + bend * d), angular)
     return 1.4826 * (1 + 5 / (n - 3)) * best
 
 

@@ -33,7 +33,7 @@ from ftproc.core.jit import kernel
 
 FloatArray = NDArray[np.float64]
 
-BLOCK = 256
+BLOCK = 1024
 
 
 class SmootherRun(NamedTuple):
@@ -56,6 +56,10 @@ class SmootherRun(NamedTuple):
     noise_score: FloatArray
     jerk_score: FloatArray
     heads: list[Start]
+
+    def rows(self, low: int, high: int) -> SmootherRun:
+        """Of the samples [low, high) alone; likelihood, scores and heads stay those of the whole run."""
+        return SmootherRun._make([*(each[low:high] for each in self[:6]), *self[6:]])
 
 
 @kernel
@@ -88,10 +92,11 @@ def _sweep(
     factor, b, c, s = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
     q, z_hat, used = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
     blocks = (last - first + BLOCK - 1) // BLOCK
+    size = min(last - first, BLOCK)
     saved_x, saved_p = np.empty((blocks, 9)), np.empty((blocks, 9, 9))
-    xs, ps = np.empty((BLOCK, 9)), np.empty((BLOCK, 9, 9))
-    hs, es, cs = np.empty((BLOCK, 3, 3)), np.empty((BLOCK, 3)), np.empty((BLOCK, 3))
-    s_invs, gains, pxzs = np.empty((BLOCK, 3, 3)), np.empty((BLOCK, 9, 3)), np.empty((BLOCK, 9, 3))
+    xs, ps = np.empty((size, 9)), np.empty((size, 9, 9))
+    hs, es, cs = np.empty((size, 3, 3)), np.empty((size, 3)), np.empty((size, 3))
+    s_invs, gains, pxzs = np.empty((size, 3, 3)), np.empty((size, 9, 3)), np.empty((size, 9, 3))
     r, n, smoothed = np.zeros(9), np.zeros((9, 9)), np.zeros((9, 9))
     u, m, nk, pn = np.zeros(3), np.zeros((3, 3)), np.zeros((9, 3)), np.zeros((9, 9))  # scratch
     likelihood = 0.0

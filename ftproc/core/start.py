@@ -54,33 +54,45 @@ def begin_all(
     """
     starts = [begin(time_s, measurement, weight, noise_variance)]
     good = (weight > 0) & np.isfinite(measurement)
-    gaps = _gaps(time_s, good)
+    interval_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
+    gaps = gaps_of(time_s, good, longest_without(interval_s))
     edges = [*sorted(gaps), len(time_s)]
     for low, high in itertools.pairwise(edges):
         if low <= starts[-1].sample or (good[low:high].sum(0) < FEWEST_READINGS).any():
             continue
-        if jerk_psd is not None:
-            slant = float(np.median(measurement[low:high, 0][good[low:high, 0]]))
-            duration_s, widest = gaps[low]
-            if np.sqrt(jerk_psd * duration_s**5 / 20) <= widest * slant:
-                continue
-        starts.append(first_state(time_s, measurement, weight, noise_variance, low, low, high))
+        if jerk_psd is None or too_long(gaps[low], measurement[low:high, 0][good[low:high, 0]], jerk_psd):
+            starts.append(first_state(time_s, measurement, weight, noise_variance, low, low, high))
     return starts
 
 
-def _gaps(time_s: FloatArray, good: NDArray[np.bool_]) -> dict[int, tuple[float, float]]:
+def too_long(gap: tuple[float, float], range_m: FloatArray, jerk_psd: float) -> bool:
+    """Whether a filter that came through a gap (see `gaps_of`) would linearise about a wrong place; range_m: (m,)
+    good ranges after it."""
+    duration_s, widest = gap
+    return bool(np.sqrt(jerk_psd * duration_s**5 / 20) > widest * float(np.median(range_m)))
+
+
+def longest_without(interval_s: float) -> float:
+    """Seconds without readings that are no gap yet, at a median interval."""
+    return max(GAP_INTERVALS * interval_s, GAP_S)
+
+
+def gaps_of(
+    time_s: FloatArray, good: NDArray[np.bool_], longest_s: float, last_good_s: FloatArray | None = None
+) -> dict[int, tuple[float, float]]:
     """The first sample after each gap, with the gap's length in s and how vague (in ranges) the position may be by
-    its end: gaps between samples, and those in which one component has no good reading. good (n, 3)."""
+    its end: gaps between samples, and those in which one component has no good reading. good (n, 3).
+
+    last_good_s: (3,) when each component was seen before the first sample; NaN for never."""
     interval = np.diff(time_s)
-    if not len(interval):
-        return {}
-    longest = max(GAP_INTERVALS * float(np.median(interval)), GAP_S)
-    found = {int(k) + 1: (float(interval[k]), WIDEST_BRIDGE) for k in np.flatnonzero(interval > longest)}
+    found = {int(k) + 1: (float(interval[k]), WIDEST_BRIDGE) for k in np.flatnonzero(interval > longest_s)}
     for c in range(3):
         seen = np.flatnonzero(good[:, c])
-        blind = np.diff(time_s[seen])
-        for k in np.flatnonzero(blind > longest):
-            found.setdefault(int(seen[k + 1]), (float(blind[k]), WIDEST_BLIND_BRIDGE))
+        if not seen.size:
+            continue
+        blind = np.diff(time_s[seen], prepend=time_s[seen[0]] if last_good_s is None else last_good_s[c])
+        for k in np.flatnonzero(blind > longest_s):
+            found.setdefault(int(seen[k]), (float(blind[k]), WIDEST_BLIND_BRIDGE))
     return found
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core import ascent
+from ftproc.core import ascent, merging
 from ftproc.core.forward import Model, Start
 from ftproc.core.smoother import score_log
 from ftproc.core.start import begin_all
@@ -143,6 +143,11 @@ def fit_profile(
     interval = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
     knot_s = max(KNOT_SECONDS, KNOT_SAMPLES * interval, span / MAX_KNOTS)
     knots = max(math.ceil(span / knot_s), 1)
+
+    slant = float(np.nanmedian(measurement[:, 0]))
+    merged = merging.how_many(time_s, slant, begun, knot_s)
+    if merged > 1:
+        time_s, measurement, weight, starts = merging.merge(time_s, measurement, weight, starts, merged)
 
     def unpack(theta: FloatArray) -> Model:
         return begun._replace(jerk=shaped(theta[:knots], theta[knots]), knot_s=knot_s)

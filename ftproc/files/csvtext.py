@@ -9,7 +9,8 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import InputError
@@ -22,6 +23,8 @@ MISSING_WORDS = (
     *("", "NaN", "nan", "NAN", "-NaN", "-nan", "NA", "N/A", "n/a", "#NA", "#N/A", "#N/A N/A", "<NA>"),
     *("NULL", "Null", "null", "None", "none", "1.#IND", "-1.#IND", "1.#QNAN", "-1.#QNAN"),
 )
+
+_BLOCK = 8 << 20  # bytes that are parsed at once of a large file
 
 _MAGIC = {
     b"\xff\xfe": "is UTF-16 text; save it as UTF-8 (iconv -f UTF-16 -t UTF-8)",
@@ -44,6 +47,7 @@ class CsvText(NamedTuple):
     delimiter: str
     body: memoryview  # the bytes after the header line
     open_quotation: bool  # an odd number of quotation marks: one may swallow all rows after it
+    begins: int = 0  # the byte after the header line
 
     def load(self, numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
         """Columns `numeric`, then `others`, by position.
@@ -136,7 +140,33 @@ def split(source: str, data: bytes) -> CsvText:
         raise InputError(f"{source}: the file is empty; expected a header line and rows.")
     names, delimiter = _names(source, header)
     odd = data.count(b'"', found.end()) % 2 == 1
-    return CsvText(source, names, delimiter, memoryview(data)[found.end() :], odd)
+    return CsvText(source, names, delimiter, memoryview(data)[found.end() :], odd, found.end())
+
+
+def in_blocks(path: Path, head: CsvText) -> Iterator[CsvText]:
+    """The rows of a file in blocks that end with a line; `head` is what its beginning was split into.
+
+    Raises InputError where rows and lines may not be the same.
+    """
+    with path.open("rb") as stream:
+        stream.seek(head.begins)
+        rest = b""
+        while data := stream.read(_BLOCK):
+            data = rest + data
+            end = data.rfind(b"\n") + 1
+            rest = data[end:]
+            if len(rest) > _BLOCK:
+                raise InputError(f"{head.source}: a line of more than {_BLOCK >> 20} MiB is no row of a log.")
+            yield from _block(head, memoryview(data)[:end])
+        yield from _block(head, memoryview(rest))
+
+
+def _block(head: CsvText, body: memoryview) -> Iterator[CsvText]:
+    if not re.search(rb"[^\r\n]", body):
+        return
+    if b'"' in bytes(body):
+        raise InputError(f"{head.source}: quotation marks, in which a line may end.")
+    yield head._replace(body=body, open_quotation=False)
 
 
 def _spans_lines(cells: list[str]) -> bool:

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from ..errors import InputError
 from ..records import COMPONENTS, FloatArray, MeasurementLog
 from ..settings import Station
-from . import arrow, cells, conventions, schema, tables, values, writing
+from . import arrow, cells, conventions, large, schema, tables, values, writing
 from .atomic import Target
 from .units import QUANTITIES, UNITS, parse_units
 
@@ -60,20 +61,36 @@ def read(
     wanted = [column.position for column in found.values()]
     others = [place for place in range(len(opened.names)) if keep_columns and place not in wanted]
     _check_others(opened, others)
+    if not others and (blocks := opened.blocks(wanted)) is not None:
+        read_so = large.read(opened.source, blocks, partial(_converted, opened, found), station)
+        if read_so is not None:
+            log, quantities, sample = read_so
+            _check_units(opened.source, quantities, found, station.elevation_from)
+            remarks = schema.remarks(opened.names, found, bool(log.epoch))
+            understood = conventions.apply(replace(sample, remarks=remarks), station)
+            return replace(log, frame=understood.frame, station=station, remarks=understood.remarks)
     table = opened.load(wanted, others)
     if table.num_rows == 0:
         raise InputError(f"{opened.source}: there are column names but no rows.")
-    time_s, epoch = _time(table.column(0), found["time"], opened)
-    quantities = {"time": time_s} | {
-        quantity: _quantity(table.column(index), column, opened)
-        for index, (quantity, column) in enumerate(found.items())
-        if quantity != "time"
-    }
+    quantities, epoch = _converted(opened, found, table)
     _check_units(opened.source, quantities, found, station.elevation_from)
     extra = table.select(list(range(len(wanted), table.num_columns))) if others else None
     log = _in_time_order(opened.source, quantities, extra)
     log = replace(log, epoch=epoch, remarks=schema.remarks(opened.names, found, bool(epoch)))
     return conventions.apply(log, station)
+
+
+def _converted(
+    opened: tables.OpenTable, found: Mapping[str, schema.Column], table: pa.Table
+) -> tuple[dict[str, FloatArray], str]:
+    """The quantities in SI units, time first, and the midnight that the times count from (or "")."""
+    time_s, epoch = _time(table.column(0), found["time"], opened)
+    others = {
+        quantity: _quantity(table.column(index), column, opened)
+        for index, (quantity, column) in enumerate(found.items())
+        if quantity != "time"
+    }
+    return {"time": time_s} | others, epoch
 
 
 def write(log: MeasurementLog, target: Target) -> None:

@@ -7,13 +7,14 @@ import io
 import stat
 import sys
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ..errors import InputError
 from . import csvtext
+from .large import Blocks
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,8 +28,15 @@ _GZIP_MAGIC = b"\x1f\x8b"
 #: What a packed file may grow to, lest a few bytes fill the memory: real readings shrink to a half, not to a 200th.
 _MOST_GROWTH = 200
 _ALWAYS_ALLOWED = 64 << 20  # bytes
+#: Bytes of a CSV file, or of what is read of a Parquet file, from which on it is read in blocks ...
+LARGE = 32 << 20
+_HEAD, _BATCH_ROWS = 1 << 20, 1 << 18  # ... bytes that are sure to have the header; rows of a Parquet block
 #: Of text on standard input, which may never end.
 MOST_ON_STDIN = 4 << 30
+
+
+def _not_large(numeric: Sequence[int]) -> Blocks | None:
+    return None
 
 
 @dataclass(frozen=True)
@@ -37,7 +45,8 @@ class OpenTable:
 
     source: what the user called it, for messages. names: its columns in file order, possibly with repeats.
     load: (numeric positions, other positions) -> table with these columns; see `CsvText.load`.
-    decimal_comma: numbers may have decimal commas. metadata: key-value pairs of a Parquet file.
+    decimal_comma: numbers may have decimal commas. metadata: key-value pairs of a Parquet file. blocks: numeric
+    positions -> these columns block by block, when the file is so large that they should be read so, else None.
     """
 
     source: str
@@ -45,6 +54,7 @@ class OpenTable:
     load: Callable[[Sequence[int], Sequence[int]], pa.Table]
     decimal_comma: bool = False
     metadata: Mapping[bytes, bytes] = field(default_factory=dict)
+    blocks: Callable[[Sequence[int]], Blocks | None] = field(default=_not_large)
 
 
 def open_table(source: Source) -> OpenTable:
@@ -66,6 +76,8 @@ def open_table(source: Source) -> OpenTable:
         return _parquet(name, path)
     if kind == ".feather":
         return _feather(name, _read(path))
+    if kind == ".csv" and _read(path, limit=2) != _GZIP_MAGIC and path.stat().st_size > LARGE:
+        return _large_csv(name, path)
     return _csv(name, _read(path), must_be_gzip=kind == ".csv.gz")
 
 
@@ -120,6 +132,21 @@ def _csv(name: str, data: bytes, must_be_gzip: bool = False) -> OpenTable:
     return OpenTable(name, text.names, text.load, decimal_comma=text.delimiter == ";")
 
 
+def _large_csv(name: str, path: Path) -> OpenTable:
+    """The header from the file's beginning; the rest only when it is asked for, as a whole or in blocks."""
+    head = csvtext.split(name, _read(path, limit=_HEAD))
+
+    def load(numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
+        return csvtext.split(name, _read(path)).load(numeric, others)
+
+    def blocks(numeric: Sequence[int]) -> Blocks:
+        size = path.stat().st_size
+        rows = max(bytes(head.body).count(b"\n"), 1) * size // _HEAD
+        return Blocks((text.load(numeric, ()) for text in csvtext.in_blocks(path, head)), rows)
+
+    return OpenTable(name, head.names, load, head.delimiter == ";", blocks=blocks)
+
+
 def _gunzip(name: str, data: bytes) -> bytes:
     most = most_bytes(len(data))
     try:
@@ -164,7 +191,22 @@ def _parquet(name: str, path: Path) -> OpenTable:
         names = list(schema.names)
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise damaged(error) from error
-    return OpenTable(name, names, load, metadata=schema.metadata or {})
+
+    def blocks(numeric: Sequence[int]) -> Blocks | None:
+        chosen = [schema.names[position] for position in numeric]
+        if 8 * described.num_rows * len(chosen) <= LARGE or len(set(schema.names)) < len(schema.names):
+            return None
+        return Blocks(batches(chosen), described.num_rows)
+
+    def batches(chosen: list[str]) -> Iterator[pa.Table]:
+        try:
+            with pq.ParquetFile(path, page_checksum_verification=True) as file:
+                for batch in file.iter_batches(_BATCH_ROWS, columns=chosen):
+                    yield pa.Table.from_batches([batch]).select(chosen)
+        except (pa.ArrowException, OSError) as error:
+            raise damaged(error) from error
+
+    return OpenTable(name, names, load, metadata=schema.metadata or {}, blocks=blocks)
 
 
 def _feather(name: str, data: bytes) -> OpenTable:

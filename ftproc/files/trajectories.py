@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
-from ..records import COMPONENTS, FlagArray, FloatArray, Trajectory
+from ..records import COMPONENTS, FlagArray, FloatArray, Trajectory, joined
 from . import arrow, atomic, columns, maps, schema, tables, writing
 from .atomic import Target
 from .columns import ACCELERATION, OUTLIER, POSITION, VELOCITY
@@ -72,10 +74,45 @@ def write(trajectory: Trajectory, target: Target) -> None:
             stream.write(whole)
         else:
             writing.write_stream(to_table(trajectory), stream, writing.kind_of(target))
-        # The sidecar is in place before the file it belongs to: whoever waits for the file finds both.
-        _sync_if_file(stream)
-        with atomic.replacing(beside) as text:
-            text.write(_to_json(trajectory.metadata, indent=2) + b"\n")
+        _write_beside(beside, stream, trajectory.metadata)
+
+
+def write_parts(parts: Iterable[Trajectory], metadata: Callable[[], Mapping[str, Any]], target: Target) -> None:
+    """Write a trajectory that comes in stretches, holding one of them in memory; raises as `write`.
+
+    metadata: is asked for when the last stretch has come. Feather and maps, which have their metadata or their bounds
+    in front, are put together in memory, and so is standard output: nothing of a failed run goes there.
+    """
+    stretches = iter(parts)
+    begun = list(itertools.islice(stretches, 2))
+    if len(begun) == 1 or not _streamed(begun[0], target):
+        whole = joined([*begun, *stretches])
+        write(replace(whole, metadata={**whole.metadata, **metadata()}), target)
+        return
+    beside, known = sidecar(target), begun[0].metadata
+    with atomic.replacing(target) as stream:
+        with writing.growing(stream, writing.kind_of(target)) as file:
+            for stretch in itertools.chain(begun, stretches):
+                file.add(to_table(stretch).replace_schema_metadata(None))
+            told = {**known, **metadata()}
+            file.tell({METADATA_KEY: _to_json(told, indent=None)})
+        if beside is not None:
+            _write_beside(beside, stream, told)
+
+
+def _streamed(stretch: Trajectory, target: Target) -> bool:
+    """Whether a file can grow; further columns must be of numbers, as other types are told in front."""
+    import pyarrow as pa
+
+    plain = stretch.extra is None or all(pa.types.is_float64(kind) for kind in stretch.extra.schema.types)
+    return plain and maps.kind_of(target) is None and str(target) != "-" and writing.can_grow(writing.kind_of(target))
+
+
+def _write_beside(beside: Path, stream: BinaryIO, metadata: Mapping[str, Any]) -> None:
+    """The sidecar is in place before the file it belongs to: whoever waits for the file finds both."""
+    _sync_if_file(stream)
+    with atomic.replacing(beside) as text:
+        text.write(_to_json(metadata, indent=2) + b"\n")
 
 
 def kind_of(path: Path) -> str | None:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import gzip
 import io
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, cast
+from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, cast
 
 from ..errors import OutputError, UsageError
 from . import atomic, tables
@@ -70,6 +71,79 @@ def write_stream(table: pa.Table, stream: BinaryIO, kind: str) -> None:
         stream.writelines(_csv_pieces(table))
 
 
+def can_grow(kind: str) -> bool:
+    """Whether `growing` writes that kind of file."""
+    import pyarrow.parquet as pq
+
+    return kind in (".csv", ".csv.gz") or (kind == ".parquet" and hasattr(pq.ParquetWriter, "add_key_value_metadata"))
+
+
+class Growing(Protocol):
+    """A file that is written table by table."""
+
+    def add(self, table: pa.Table) -> None:
+        """Write these rows behind the others; the columns are always the same."""
+
+    def tell(self, metadata: Mapping[bytes, bytes]) -> None:
+        """Key-value pairs for the file; CSV has no place for them."""
+
+
+@contextlib.contextmanager
+def growing(stream: BinaryIO, kind: str) -> Iterator[Growing]:
+    """A file of numbers on an open stream; see `can_grow`."""
+    if kind == ".parquet":
+        parquet = _Parquet(stream)
+        try:
+            yield parquet
+            parquet.close()
+        finally:
+            parquet.give_up()
+    elif kind == ".csv.gz":
+        with gzip.GzipFile("", "wb", _GZIP_LEVEL, stream, mtime=0) as packed:
+            yield _Csv(packed)
+    else:
+        yield _Csv(stream)
+
+
+class _Csv:
+    def __init__(self, stream: BinaryIO | gzip.GzipFile) -> None:
+        self.stream, self.header = stream, True
+
+    def add(self, table: pa.Table) -> None:
+        self.stream.writelines(_csv_pieces(table, self.header))
+        self.header = False
+
+    def tell(self, metadata: Mapping[bytes, bytes]) -> None:
+        pass
+
+
+class _Parquet:
+    def __init__(self, stream: BinaryIO) -> None:
+        self.stream, self.file = stream, cast(Any, None)
+
+    def add(self, table: pa.Table) -> None:
+        import pyarrow.parquet as pq
+
+        if self.file is None:
+            # Arrow's own description of the columns would hide key-value pairs that are told at the end.
+            how = {"compression": "snappy", "use_dictionary": _words(table), "store_schema": False}
+            self.file = pq.ParquetWriter(self.stream, table.schema, **how)
+        self.file.write_table(table)
+
+    def tell(self, metadata: Mapping[bytes, bytes]) -> None:
+        self.file.add_key_value_metadata(metadata)
+
+    def close(self) -> None:
+        self.file.close()
+
+    def give_up(self) -> None:
+        """Of a file that was not closed, lest it be tried once more when nobody listens."""
+        if self.file is not None and self.file.is_open:
+            with contextlib.suppress(Exception):
+                self.file.close()
+            self.file.is_open = False
+
+
 def with_extra(table: pa.Table, extra: pa.Table | None) -> pa.Table:
     """`table` with the columns of `extra` behind its own.
 
@@ -92,13 +166,14 @@ def _words(table: pa.Table) -> list[str]:
     return [field.name for field in table.schema if not pa.types.is_floating(field.type)]
 
 
-def _csv_pieces(table: pa.Table) -> Iterator[bytes]:
+def _csv_pieces(table: pa.Table, with_header: bool = True) -> Iterator[bytes]:
     import pyarrow as pa
     import pyarrow.csv
 
-    header = io.StringIO()
-    csv.writer(header, lineterminator="\n").writerow(map(no_formula, table.column_names))
-    yield header.getvalue().encode()
+    if with_header:
+        header = io.StringIO()
+        csv.writer(header, lineterminator="\n").writerow(map(no_formula, table.column_names))
+        yield header.getvalue().encode()
     options = pyarrow.csv.WriteOptions(include_header=False, batch_size=_ROWS_AT_ONCE)
     for start in range(0, table.num_rows, _ROWS_AT_ONCE):
         sink = pa.BufferOutputStream()

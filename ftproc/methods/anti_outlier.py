@@ -1,128 +1,139 @@
-"""The main method's filter: the anti-outlier UKF (Zuo et al. 2021 section 2.3), recursive or in two passes.
+"""The main method's filter: the anti-outlier UKF (Zuo et al. 2021 section 2.3), recursive or in two passes, over logs
+of any length in memory that does not grow with them. The network's correction (section 2.2) works on its output and is
+added by the pipeline.
 
-The network's correction (section 2.2) works on its output and is added by the pipeline.
+Two-pass editing looks at the record on both sides of a sample, but what lies far away says nothing of it: a long log
+is a number of short ones that overlap, of which the middles are kept, and which are worked on side by side. Noise
+belongs to the instrument and is found once, from spans that are spread over the log. Recursive editing sees only the
+past, and goes on from one stretch to the next (`recursive`).
 """
 
 from __future__ import annotations
 
-import contextlib
+import itertools
+from collections.abc import Iterator
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core import editing, forward, gate, indicators, tuning
-from ftproc.core.forward import FilterRun, Model, Start
-from ftproc.core.motion import isotropic
-from ftproc.core.smoother import smooth_log
-from ftproc.core.start import begin_all
-from ftproc.methods.estimate import Estimate, Readings
-from ftproc.records import MISSING, FlagArray, FloatArray
+from ftproc.core import editing, forward, tuning
+from ftproc.core.forward import Model
+from ftproc.methods import preparing, recursive, side_by_side
+from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
 from ftproc.settings import FilterSettings
 
-HEAD = 256  # samples at the beginning of a log that a recursive filter is given time to look at
-LONGEST_ISOLATED = 2  # readings rejected in a row; more make a patch
-DEFAULT_PATCH_S = 4.0
-DEFAULT_PATCH_SAMPLES = 32  # the longest patch expected is the longer of the two
+LONGEST_WHOLE = 60_000  # samples of a log that is edited as a whole
+KEPT = 40_000  # samples of a segment, without its margins,
+KEPT_MARGINS = 12  # or so many times its margin
+MARGIN_S, LEAST_MARGIN, MOST_MARGIN = 60.0, 1_000, 10_000  # s and samples on each side of a segment
+SPANS, SPAN = 6, 2_000  # in which the noise is looked for, and the samples of each
 
 
 def estimate(readings: Readings, settings: FilterSettings) -> Estimate:
-    """Filter, edit and (if asked) smooth a log by the way of editing that the settings name."""
+    """Filter, edit and (if asked) smooth a log as a whole, by the way of editing that the settings name."""
     if settings.editing == "two-pass":
-        return _two_pass(readings, settings)
+        return two_pass(readings, settings)
     if settings.editing == "forward":
-        return _recursive(readings, settings)
-    return unedited(readings, settings)
+        return recursive.estimate(readings, settings)
+    return preparing.unedited(readings, settings)
 
 
-def unedited(readings: Readings, settings: FilterSettings, extended: bool = False) -> Estimate:
-    """The plain UKF (or EKF): every reading is used. Noise and jerk come from the readings that screening trusts."""
-    model, starts, _ = prepare(readings, settings)
-    weight = np.isfinite(readings.measurement).astype(float)
-    run = forward.filter_log(*readings[:2], weight, model, starts, extended)
-    return finished(readings, settings, run, weight, weight, model, starts)
+def parts(record: Recording, settings: FilterSettings) -> Iterator[Part]:
+    """The estimate of a log, a stretch at a time. Raises ValueError where there is no first state."""
+    if settings.editing == "forward" and not settings.smooth:
+        stretches = recursive.parts(record, settings)
+        yield from stretches if len(record) <= recursive.BLOCK else side_by_side.ahead(stretches)
+    elif settings.editing == "two-pass" and len(record) > LONGEST_WHOLE:
+        told = usual(record, settings)
+        work = partial(_segment, record, settings, told)
+        yield from side_by_side.in_order(work, segments(record))
+    else:
+        yield Part(estimate(record.whole(), settings), 0, 0, len(record))
 
 
-def finished(
-    readings: Readings,
-    settings: FilterSettings,
-    run: FilterRun,
-    weight: FloatArray,
-    kept: FloatArray,
-    model: Model,
-    starts: list[Start],
-) -> Estimate:
-    """What a recursive filter found, with the smoother over the same weights (n, 3) if it was asked for.
-
-    kept: (n, 3) zero for the readings that are called outliers.
-    """
-    smoothed = smooth_log(*readings[:2], weight, model, starts) if settings.smooth else None
-    return Estimate(run, labels(kept, readings), model, smoothed, _anew(starts))
-
-
-def trusted(readings: Readings, settings: FilterSettings) -> tuple[FloatArray, FloatArray]:
-    """(n, 3) weights, zero for readings not to be believed before a filter has run, and (3,) noise 1-sigma.
-
-    Only the head of the log is edited with all of itself in view, because a recursion cannot repair a wrong start;
-    further on the weights are those of the screening, and serve to find noise and jerk.
-    """
-    time_s, measurement, _ = readings
-    weight, sigma = editing.screen(time_s, measurement)
-    given = given_sigma(readings, settings)
-    with contextlib.suppress(ValueError):  # too little in the head: the screening has to do
-        head = editing.edit(time_s[:HEAD], measurement[:HEAD], given, settings.jerk_psd_m2ps5, settings.gate)
-        weight[:HEAD] = head.weight
-        if len(time_s) <= HEAD:
-            sigma = np.sqrt(head.model.noise_variance)
-    return weight, np.where(np.isfinite(given), given, sigma)
-
-
-def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[Start], FloatArray]:
-    """Noise and jerk level, starts and weights (n, 3) of a log, without deciding on its outliers."""
-    time_s, measurement, _ = readings
-    weight, sigma = trusted(readings, settings)
-    given = given_sigma(readings, settings)
-    guess = Model(sigma**2, isotropic(settings.jerk_psd_m2ps5 or 1.0))
-    starts = begin_all(time_s, measurement, weight, guess.noise_variance, settings.jerk_psd_m2ps5)
-    fixed = np.isfinite(given)
-    model = tuning.fit_level(time_s, measurement, weight, starts, guess, fixed, settings.jerk_psd_m2ps5 is not None)
-    return model, begin_all(time_s, measurement, weight, model.noise_variance, float(model.jerk[0, 0])), weight
-
-
-def _two_pass(readings: Readings, settings: FilterSettings) -> Estimate:
-    edited = editing.edit(*readings[:2], given_sigma(readings, settings), settings.jerk_psd_m2ps5, settings.gate)
+def two_pass(readings: Readings, settings: FilterSettings, told: Usual | None = None) -> Estimate:
+    """Editing with the whole record in view. told: of a segment, what is usual in the log, see `editing.edit`."""
+    given = preparing.given_sigma(readings, settings)
+    edited = editing.edit(*readings[:2], given, settings.jerk_psd_m2ps5, settings.gate, told and told.model)
     starts = editing.smoothed_starts(edited.smoothed)
     run = forward.filter_log(*readings[:2], edited.weight, edited.model, starts)
     smoothed = edited.smoothed if settings.smooth else None
-    label = labels(edited.weight, readings)
-    return Estimate(run, label, edited.model, smoothed, _anew(starts), edited.settled, edited.slow_noise)
+    slow = edited.slow_noise if told is None else told.slow_noise
+    label = preparing.labels(edited.weight, readings.measurement)
+    return Estimate(run, label, edited.model, smoothed, preparing.anew(starts), edited.settled, slow)
 
 
-def _anew(starts: list[Start]) -> tuple[int, ...]:
-    return tuple(start.sample for start in starts[1:])
+class Usual(NamedTuple):
+    """What spans of a log say of all of it: noise and usual jerk, and whether the noise passes for motion."""
+
+    model: Model
+    slow_noise: bool
 
 
-def _recursive(readings: Readings, settings: FilterSettings) -> Estimate:
-    time_s, measurement, _ = readings
-    model, starts, edited = prepare(readings, settings)
-    allowed = np.ones_like(measurement)
-    allowed[:HEAD] = edited[:HEAD]
-    longest = settings.max_patch_s
-    if longest is None:
-        interval = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
-        longest = max(DEFAULT_PATCH_S, DEFAULT_PATCH_SAMPLES * interval)
-    how = gate.GateSettings(settings.gate, longest, settings.gain_form)
-    run, begun = gate.filter_and_edit(time_s, measurement, allowed, model, starts, how)
-    kept = np.where(run.weight > gate.rejection_weight(settings.gate), 1.0, 0.0)
-    return finished(readings, settings, run, kept, kept, model, begun)
+def usual(record: Recording, settings: FilterSettings) -> Usual | None:
+    """The medians of what spans spread over a log say by themselves; None if none says anything."""
+    firsts = np.linspace(0, len(record) - SPAN, SPANS).astype(int)
+    found = [e for e in side_by_side.in_order(partial(_span, record, settings), firsts) if e is not None]
+    if not found:
+        return None
+    correlation = np.median([edited.model.correlation for edited in found], 0)
+    variance = np.median([edited.model.reading_variance for edited in found], 0)
+    levels = np.array([tuning.median_level(edited.model).jerk for edited in found])
+    jerk = np.exp(np.median(np.log(levels[:, 0, [0, 5]]), 0))
+    model = Model(
+        variance * (1 + correlation) / (1 - correlation),
+        jerk[0] * tuning.HORIZONTAL[None] + jerk[1] * tuning.VERTICAL[None],
+        correlation=correlation,
+    )
+    return Usual(model, bool(np.median([edited.slow_noise for edited in found]) > 0.5))
 
 
-def given_sigma(readings: Readings, settings: FilterSettings) -> FloatArray:
-    """(3,) noise 1-sigma that need not be found: the user's, else what is assumed; NaN where the log tells."""
-    stated = np.array(settings.noise or (None, None, None), float)  # None becomes NaN
-    return np.where(np.isnan(stated), readings.assumed_sigma, stated)
+def _span(record: Recording, settings: FilterSettings, first: int) -> editing.Edited | None:
+    readings = record.part(slice(first, first + SPAN))
+    given = preparing.given_sigma(readings, settings)
+    try:
+        return editing.edit(*readings[:2], given, settings.jerk_psd_m2ps5, settings.gate)
+    except ValueError:  # a component says too little in this span
+        return None
 
 
-def labels(weight: FloatArray, readings: Readings) -> FlagArray:
-    """(n, 3) good, isolated, patch or missing from weights (n, 3), zero where rejected."""
-    label = indicators.label_runs(weight, readings.measurement, LONGEST_ISOLATED).astype(np.uint8)
-    label[~np.isfinite(readings.measurement)] = MISSING
-    return label
+def segments(record: Recording) -> list[tuple[int, int]]:
+    """First and one past the last sample of what is kept of each segment, all about as long."""
+    kept = max(KEPT, KEPT_MARGINS * margin_of(record))
+    count = max(round(len(record) / kept), 1)
+    edges = np.linspace(0, len(record), count + 1).astype(int)
+    return [(int(low), int(high)) for low, high in itertools.pairwise(edges)]
+
+
+def _segment(record: Recording, settings: FilterSettings, told: Usual | None, span: tuple[int, int]) -> Part:
+    """The estimate of samples [low, high) of a log, made with the readings around them in view.
+
+    Where these do not say where the track is (a component is missing for long), it is looked for ever farther away.
+    """
+    low, high = span
+    margin = margin_of(record)
+    while True:
+        first, last = max(low - margin, 0), min(high + margin, len(record))
+        whole = last - first == len(record)
+        try:
+            estimate = two_pass(record.part(slice(first, last)), settings, told)
+        except ValueError:
+            if whole:
+                raise
+        else:
+            if first == 0 or _begins(estimate) <= low - first:
+                return Part(estimate, first, low - first, high - first)
+        margin *= 4
+
+
+def margin_of(record: Recording) -> int:
+    """Samples that a segment is longer on each side than what is kept of it."""
+    interval_s = typical_interval(record.time_s)
+    wanted = MARGIN_S / interval_s if interval_s > 0 else MOST_MARGIN
+    return int(np.clip(wanted, LEAST_MARGIN, MOST_MARGIN))
+
+
+def _begins(estimate: Estimate) -> int:
+    """The sample of the first start; those before it were extrapolated."""
+    return max(int(np.argmax(estimate.run.since_start > 0)) - 1, 0)

@@ -10,8 +10,8 @@ import numpy as np
 
 from ftproc.core.forward import FilterRun, Model, empty_run
 from ftproc.core.geometry import line_of_sight_axes, to_cartesian, wrap
-from ftproc.methods.anti_outlier import labels, trusted
 from ftproc.methods.estimate import Estimate, Readings
+from ftproc.methods.preparing import labels, trusted
 from ftproc.records import FloatArray
 from ftproc.settings import FilterSettings
 
@@ -100,4 +100,4 @@ def estimate(readings: Readings, log: Log, found: Cleaned) -> Estimate:
         since_start=np.arange(n), log_likelihood=np.nan,
     )  # fmt: skip
     model = Model(log.sigma**2, np.full((1, 6), np.nan))
-    return Estimate(run, labels(found.weight, readings), model, cleaned=cleaned)
+    return Estimate(run, labels(found.weight, readings.measurement), model, cleaned=cleaned)

@@ -6,8 +6,8 @@ import numpy as np
 
 from ftproc.core.converted import run_converted
 from ftproc.core.forward import FilterRun, run_spans
-from ftproc.methods.anti_outlier import finished, prepare
 from ftproc.methods.estimate import Estimate, Readings
+from ftproc.methods.preparing import finished, prepare
 from ftproc.records import FloatArray
 from ftproc.settings import FilterSettings
 

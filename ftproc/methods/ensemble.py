@@ -10,7 +10,7 @@ import numpy as np
 from ftproc.core import ensemble_run
 from ftproc.core.forward import FilterRun
 from ftproc.errors import FtprocWarning
-from ftproc.methods import anti_outlier
+from ftproc.methods import preparing
 from ftproc.methods.estimate import Estimate, Readings
 from ftproc.records import FloatArray
 from ftproc.settings import FilterSettings
@@ -31,7 +31,7 @@ def estimate(readings: Readings, settings: FilterSettings, method: str) -> Estim
     more than an hour.
     """
     _warn(method, len(readings.time_s), settings.particles)
-    model, starts, _ = anti_outlier.prepare(readings, settings)
+    model, starts, _ = preparing.prepare(readings, settings)
     longest = settings.max_patch_s
     if longest is None:
         interval = float(np.median(np.diff(readings.time_s))) if len(readings.time_s) > 1 else 0.0
@@ -40,7 +40,7 @@ def estimate(readings: Readings, settings: FilterSettings, method: str) -> Estim
         method, *readings[:2], model, starts, settings.particles, longest, np.random.default_rng(settings.seed)
     )
     anew = tuple(start.sample for start in begun[1:])
-    return Estimate(run, anti_outlier.labels(_kept(run), readings), model, None, anew)
+    return Estimate(run, preparing.labels(_kept(run), readings.measurement), model, None, anew)
 
 
 def _kept(run: FilterRun) -> FloatArray:

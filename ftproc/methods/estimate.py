@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
+
+import numpy as np
 
 from ftproc.core.forward import FilterRun, Model
 from ftproc.core.smoother import SmootherRun
-from ftproc.records import FlagArray, FloatArray
+from ftproc.records import FlagArray, FloatArray, forget
+
+ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: stands in for a component that is missing throughout
+FARTHEST = 1e12  # m, rad: a wilder reading is no more of an outlier, but its square would overflow
+MOST_INTERVALS = 250_000  # between neighbours, for a typical one to be found among them
 
 
 class Readings(NamedTuple):
@@ -17,6 +24,35 @@ class Readings(NamedTuple):
     time_s: FloatArray
     measurement: FloatArray
     assumed_sigma: FloatArray
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A whole log, of which the methods ask for one stretch at a time; its arrays may lie on a disk.
+
+    time_s: (n,). measurement: (n, 3). assumed_sigma: as in `Readings`. absent: components that are missing throughout.
+    """
+
+    time_s: FloatArray
+    measurement: FloatArray
+    assumed_sigma: FloatArray
+    absent: tuple[int, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def part(self, rows: slice) -> Readings:
+        """The readings of a stretch, with times from the log's beginning."""
+        measurement = np.clip(self.measurement[rows], -FARTHEST, FARTHEST)
+        for c in self.absent:
+            measurement[:, c] = ASSUMED_READING[c]
+        time_s = np.asarray(self.time_s[rows]) - float(self.time_s[0])
+        forget(self.time_s, self.measurement)
+        return Readings(time_s, np.ascontiguousarray(measurement), self.assumed_sigma)
+
+    def whole(self) -> Readings:
+        """The readings of all of it."""
+        return self.part(slice(0, len(self)))
 
 
 class Estimate(NamedTuple):
@@ -37,3 +73,38 @@ class Estimate(NamedTuple):
     settled: bool | None = None
     slow_noise: bool = False
     cleaned: FloatArray | None = None
+
+    def rows(self, low: int, high: int) -> Estimate:
+        """Of the samples [low, high) alone."""
+        if (low, high) == (0, len(self.label)):
+            return self
+        return self._replace(
+            run=self.run.rows(low, high),
+            label=self.label[low:high],
+            smoothed=None if self.smoothed is None else self.smoothed.rows(low, high),
+            reacquired=tuple(k - low for k in self.reacquired if low <= k < high),
+            cleaned=None if self.cleaned is None else self.cleaned[low:high],
+        )
+
+
+class Part(NamedTuple):
+    """An estimate of some of a log's samples, with more on both sides of those that are meant.
+
+    first: the sample of the log with which the estimate begins. low, high: the samples that are meant are [low, high).
+    """
+
+    estimate: Estimate
+    first: int
+    low: int
+    high: int
+
+
+def typical_interval(time_s: FloatArray) -> float:
+    """The median time between neighbours, s; of a very long log (n,) only every so many are looked at."""
+    n = len(time_s)
+    if n < 2:
+        return 0.0
+    every = 1 + (n - 2) // MOST_INTERVALS
+    intervals = np.asarray(time_s[1::every]) - np.asarray(time_s[: n - 1 : every])
+    forget(time_s)
+    return float(np.median(intervals))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
@@ -14,9 +14,10 @@ from ftproc.records import EDITED, PAST, WHOLE
 from ftproc.settings import FilterSettings
 
 if TYPE_CHECKING:
-    from ftproc.methods.estimate import Estimate, Readings
+    from ftproc.methods.estimate import Estimate, Part, Readings, Recording
 
 Run = Callable[["Readings", FilterSettings], "Estimate"]
+Parts = Callable[["Recording", FilterSettings], Iterator["Part"]]
 
 MAIN = FilterSettings.method
 
@@ -27,7 +28,7 @@ class Method:
     default of the main method, looks at the whole record to decide what is an outlier). corrected: the network
     works on its output; own_model: only one trained for this very method. smooths: --smooth can be had. needs: a
     module that must be installed, and the extra that brings it. random: it draws random numbers, so --particles and
-    --seed matter."""
+    --seed matter. in_parts: how a log of any length is filtered in stretches; without, it is filtered as a whole."""
 
     name: str
     title: str
@@ -40,6 +41,13 @@ class Method:
     smooths: bool = True
     needs: tuple[str, str] | None = None
     random: bool = False
+    in_parts: Parts | None = None
+
+    def parts(self, record: Recording, settings: FilterSettings) -> Iterator[Part]:
+        """The estimate of a log, in stretches one behind the other. Raises ValueError as `run`."""
+        if self.in_parts is not None:
+            return self.in_parts(record, settings)
+        return _all_at_once(self.run, record, settings)
 
     def editing(self, settings: FilterSettings) -> str:
         """How outliers are found: the settings' way in the main method, else by the method's own means or not."""
@@ -68,19 +76,31 @@ def _from(module: str, function: str = "estimate", **how: Any) -> Run:
     return run
 
 
+def _all_at_once(run: Run, record: Recording, settings: FilterSettings) -> Iterator[Part]:
+    from ftproc.methods.estimate import Part
+
+    yield Part(run(record.whole(), settings), 0, 0, len(record))
+
+
+def _in_parts(record: Recording, settings: FilterSettings) -> Iterator[Part]:
+    from ftproc.methods import anti_outlier
+
+    return anti_outlier.parts(record, settings)
+
+
 METHODS: dict[str, Method] = {
     m.name: m
     for m in (
         Method("ga-bpnn-ukf", "anti-outlier UKF with network correction", "Zuo et al. 2021, section 2.3",
-               True, True, True, _from("anti_outlier")),
+               True, True, True, _from("anti_outlier"), in_parts=_in_parts),
         Method("ga-bpnn-ukf-plain", "UKF with network correction, no editing", "Zuo et al. 2021, section 2.2",
-               True, False, True, _from("anti_outlier", "unedited")),
+               True, False, True, _from("preparing", "unedited")),
         Method("ukf", "unscented Kalman filter", "Julier and Uhlmann 2004",
-               True, False, False, _from("anti_outlier", "unedited")),
+               True, False, False, _from("preparing", "unedited")),
         Method("ekf", "extended Kalman filter", "Zuo et al. 2021, eq. 4",
-               True, False, False, _from("anti_outlier", "unedited", extended=True)),
+               True, False, False, _from("preparing", "unedited", extended=True)),
         Method("bpnn-ekf", "EKF with a network trained from a random start", "Feng, Xu and Shi 2017",
-               True, False, True, _from("anti_outlier", "unedited", extended=True), own_model=True),
+               True, False, True, _from("preparing", "unedited", extended=True), own_model=True),
         Method("kf", "linear Kalman filter on converted measurements", "Lerro and Bar-Shalom 1993",
                True, False, False, _from("converted"), smooths=False),
         Method("imm-ukf", "interacting models of calm flight and manoeuvres", "Zhang, Li and He 2012",

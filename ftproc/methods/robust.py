@@ -7,8 +7,8 @@ import numpy as np
 
 from ftproc.core import robust
 from ftproc.core.forward import FilterRun, run_spans
-from ftproc.methods.anti_outlier import finished, prepare
 from ftproc.methods.estimate import Estimate, Readings
+from ftproc.methods.preparing import finished, prepare
 from ftproc.records import FloatArray
 from ftproc.settings import FilterSettings
 

@@ -18,6 +18,7 @@ HEADER = ("what", "time", "ratio", "to", "bound", "peak memory")
 ROUNDS = 3
 LARGE = 10**6
 DT_S = 0.05
+MANY, MANY_ROWS = 64, 20_000
 SIZES = [10**3, 10**4, 10**5, LARGE]  # rows; FTPROC_BENCH_ROWS=1e7 adds that many
 FLOOR = "read CSV, write 30 Parquet columns"
 FORWARD = "`filter --editing forward --noise --jerk`"
@@ -42,6 +43,7 @@ def rows() -> Iterator[tuple[str, ...]]:
         sizes = [*SIZES, *(int(float(n)) for n in os.environ.get("FTPROC_BENCH_ROWS", "").split())]
         sigma = {n: _make(folder, n) for n in [*sizes, 5000]}
         yield from _startup(folder)
+        yield _side_by_side(folder)
         for way in WAYS:
             yield from _over_sizes(folder, way, sizes, sigma)
 
@@ -69,13 +71,27 @@ def _startup(folder: Path) -> Iterator[tuple[str, ...]]:
         yield _row(name, taken[name], taken[reference], f"`python -c '{reference}'`", bound)
 
 
+def _side_by_side(folder: Path) -> tuple[str, ...]:
+    """Many logs in two processes against one."""
+    logs_of = folder / "many"
+    logs_of.mkdir()
+    first = logs_of / "0.csv"
+    logs.write(simulate("manoeuvre", seed=1, duration_s=MANY_ROWS * DT_S, dt_s=DT_S).log, first)
+    for k in range(1, MANY):
+        (logs_of / f"{k}.csv").hardlink_to(first)
+    program = [sys.executable, "-c", "from ftproc.cli.main import main; main()", "filter", *map(str, logs_of.iterdir())]
+    program += ["-o", str(folder / "out"), "--summary", "none", "--jobs"]
+    taken = measuring.processes({jobs: [*program, jobs] for jobs in ("1", "2")}, 0)
+    return _row(f"{MANY} logs of {MANY_ROWS:,} rows, `--jobs 2`", taken["2"], taken["1"], "`--jobs 1`", "<= 0.6")
+
+
 def _over_sizes(folder: Path, way: str, sizes: list[int], sigma: dict[int, str]) -> Iterator[tuple[str, ...]]:
-    """Tuning and smoothing a million rows takes minutes, so that is done once."""
+    """What is larger than a million rows is done once."""
     per_row = 0.0
     for n in sizes:
         floor = [sys.executable, "-c", _FLOOR, str(folder / f"{n}.csv"), str(folder / "out.parquet")]
-        rounds = 0 if n >= LARGE and way != FORWARD else ROUNDS if n <= LARGE else 0
-        taken = measuring.processes({FLOOR: floor, way: _filter(folder, n, way, sigma[n])}, rounds)
+        commands = {FLOOR: floor, way: _filter(folder, n, way, sigma[n])}
+        taken = measuring.processes(commands, ROUNDS if n <= LARGE else 0)
         yield _row(f"{n:.0e} rows, {way}", taken[way], taken[FLOOR], FLOOR, BOUNDS[way] if n == LARGE else "")
         cost = taken[way].seconds / n
         per_row = cost if n == 10**5 else per_row

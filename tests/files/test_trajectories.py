@@ -1,7 +1,9 @@
 """Trajectories: columns, types, metadata, round trip."""
 
 import errno
+import gzip
 import io
+import itertools
 import json
 import os
 import sys
@@ -302,3 +304,55 @@ def test_a_damaged_feather_file(tmp_path: Path) -> None:
             InputError, match=r"out\.feather: no Feather file \(version 2\), or one cut short or damaged;"
         ):
             trajectories.read(path)
+
+
+def pieces(trajectory, edges):
+    """Stretches of a trajectory as a long log's come: with the frame as their only metadata."""
+    arrays = ("row", "time_s", "measurement", "state", "sigma", "outlier", "nis", "correction")
+    for low, high in itertools.pairwise(edges):
+        part = {name: getattr(trajectory, name)[low:high] for name in arrays}
+        extra = None if trajectory.extra is None else trajectory.extra.slice(low, high - low)
+        yield replace(trajectory, **part, extra=extra, metadata={"frame": "local"})
+
+
+@pytest.mark.parametrize("name", ["out.parquet", "out.csv", "out.csv.gz", "out.feather"])
+@pytest.mark.parametrize("extra", [None, pa.table({"lat_deg": np.arange(90.0)}), pa.table({"word": ["a"] * 90})])
+def test_stretches_make_the_file_of_the_whole(tmp_path, name, extra):
+    whole = replace(some(90), extra=extra)
+    told = []
+
+    def metadata():
+        told.append(1)
+        return whole.metadata
+
+    trajectories.write_parts(pieces(whole, [0, 30, 31, 90]), metadata, tmp_path / name)
+    trajectories.write(replace(whole, metadata={"frame": "local", **whole.metadata}), tmp_path / f"whole-{name}")
+    one, other = (trajectories.read(tmp_path / n) for n in (name, f"whole-{name}"))
+    for field in ("row", "time_s", "measurement", "state", "sigma", "outlier", "nis", "correction"):
+        np.testing.assert_array_equal(getattr(one, field), getattr(other, field))
+    assert one.metadata == other.metadata
+    assert one.extra == other.extra
+    assert told
+    if name != "out.feather":
+        table = tables_of(tmp_path / name), tables_of(tmp_path / f"whole-{name}")
+        assert table[0] == table[1]
+
+
+def tables_of(path):
+    if path.suffix == ".parquet":
+        found = pq.read_table(path)
+        return found.schema, found.schema.metadata[b"ftproc"]
+    return (gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()), b""
+
+
+@pytest.mark.parametrize("name", ["out.parquet", "out.csv", "-"])
+def test_stretch_that_fails_leaves_nothing(tmp_path, capfdbinary, name):
+    def failing():
+        yield from pieces(some(90), [0, 30, 60])
+        raise InputError("the third is bad")
+
+    target = name if name == "-" else tmp_path / name
+    with pytest.raises(InputError, match="the third is bad"):
+        trajectories.write_parts(failing(), dict, target)
+    assert list(tmp_path.iterdir()) == []
+    assert capfdbinary.readouterr().out == b""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc.core import forward
-from ftproc.methods import anti_outlier
+from ftproc.methods import anti_outlier, preparing
 from ftproc.methods.estimate import Readings
 from ftproc.records import GOOD, ISOLATED, MISSING, PATCH
 from ftproc.settings import FilterSettings
@@ -39,7 +39,7 @@ def test_editing_is_nearly_as_good_as_a_clean_log(dirty, clean, editing):
     edited = anti_outlier.estimate(readings(dirty), settings)
     reference = anti_outlier.estimate(readings(clean), settings)
     assert error(edited.run, dirty) < 1.2 * error(reference.run, clean)
-    assert error(edited.run, dirty) < 0.3 * error(anti_outlier.unedited(readings(dirty), settings).run, dirty)
+    assert error(edited.run, dirty) < 0.3 * error(preparing.unedited(readings(dirty), settings).run, dirty)
 
 
 @pytest.mark.parametrize("editing", ["two-pass", "forward", "none"])
@@ -83,14 +83,14 @@ def test_given_noise_and_jerk_are_used(clean):
 
 def test_assumed_noise_is_used_where_the_log_cannot_tell(clean):
     assumed = readings(clean)._replace(assumed_sigma=np.array([np.nan, 0.5, np.nan]))
-    found = anti_outlier.unedited(assumed, FilterSettings())
+    found = preparing.unedited(assumed, FilterSettings())
     assert np.sqrt(found.model.noise_variance[1]) == pytest.approx(0.5)
     assert np.sqrt(found.model.noise_variance[0]) == pytest.approx(clean.sigma[0], rel=0.1)
 
 
 def test_ekf_and_ukf_agree_on_an_easy_flight(clean):
-    plain = anti_outlier.unedited(readings(clean), FilterSettings())
-    extended = anti_outlier.unedited(readings(clean), FilterSettings(), extended=True)
+    plain = preparing.unedited(readings(clean), FilterSettings())
+    extended = preparing.unedited(readings(clean), FilterSettings(), extended=True)
     assert not np.array_equal(plain.run.state, extended.run.state)
     assert error(extended.run, clean) == pytest.approx(error(plain.run, clean), rel=0.05)
 

@@ -126,7 +126,7 @@ def test_long_work_is_said_and_hours_are_refused(monkeypatch):
     def begin(*_):
         raise Begun
 
-    monkeypatch.setattr(ensemble.anti_outlier, "prepare", begin)
+    monkeypatch.setattr(ensemble.preparing, "prepare", begin)
 
     def tried(rows, particles):
         readings = Readings(np.arange(float(rows)), np.ones((rows, 3)), np.full(3, np.nan))

@@ -1,0 +1,158 @@
+"""Logs too large to be held in memory: read block by block into unnamed temporary files, of which stretches are mapped
+as they are needed."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from datetime import datetime
+from typing import IO, TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..records import COMPONENTS, FloatArray, IntArray, MeasurementLog
+from ..settings import Station
+from . import conventions
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+SAMPLE_ROWS = 100_000  # for what is judged by the whole of a log, such as its units
+
+#: A block's quantities in SI units, and the midnight that its times count from (or "").
+Convert = Callable[["pa.Table"], tuple[dict[str, FloatArray], str]]
+
+
+class Blocks(NamedTuple):
+    """tables: the log's columns, block by block in file order. rows: roughly how many there are in all."""
+
+    tables: Iterator[pa.Table]
+    rows: int
+
+
+class Sampled(NamedTuple):
+    """A log whose arrays lie on a disk, and some of its rows: quantities as they were read, and the log of them."""
+
+    log: MeasurementLog
+    quantities: dict[str, FloatArray]
+    sample: MeasurementLog
+
+
+def read(source: str, blocks: Blocks, convert: Convert, station: Station) -> Sampled | None:
+    """The log, or None where it must be read as a whole: its rows are not in time order, or something is wrong with
+    it that only the whole of it can name. Raises InputError when there is no room for the temporary files."""
+    with _Spool() as spool:
+        return _into(spool, source, blocks, convert, station)
+
+
+def _into(spool: _Spool, source: str, blocks: Blocks, convert: Convert, station: Station) -> Sampled | None:
+    every = 1 + blocks.rows // SAMPLE_ROWS
+    sampled: list[dict[str, FloatArray]] = []
+    times = _Times()
+    try:
+        for table in blocks.tables:
+            quantities, epoch = convert(table)
+            quantities["time"] = times.continued(quantities["time"], epoch)
+            spool.add(*_canonical(source, quantities, station))
+            sampled.append({name: values[::every] for name, values in quantities.items()})
+    except (InputError, _OutOfOrder):
+        return None
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+            raise
+        place = tempfile.gettempdir()
+        raise InputError(
+            f"{source}: so large a log is read by way of {place}, which is full; make room there, or name another "
+            "directory with TMPDIR."
+        ) from error
+    if not spool.rows:
+        return None
+    time_s, measurement, row = spool.arrays()
+    log = MeasurementLog(
+        source, time_s, measurement, row, rows_in_file=spool.rows_in_file,
+        rows_without_time=tuple(spool.without_time), duplicate_times=times.duplicates, epoch=times.epoch,
+    )  # fmt: skip
+    some = {name: np.concatenate([each[name] for each in sampled]) for name in sampled[0]}
+    return Sampled(log, some, _as_log(source, some))
+
+
+def _canonical(
+    source: str, quantities: Mapping[str, FloatArray], station: Station
+) -> tuple[FloatArray, FloatArray, IntArray, int]:
+    """Times, readings by the convention, and row numbers of the rows that have a time; and the number of all."""
+    block = _as_log(source, quantities)
+    timed = np.flatnonzero(~np.isnan(block.time_s))
+    if len(timed) < len(block):
+        block = replace(block, time_s=block.time_s[timed], measurement=block.measurement[timed])
+    understood = conventions.apply(block, station)
+    return understood.time_s, understood.measurement, timed, len(quantities["time"])
+
+
+def _as_log(source: str, quantities: Mapping[str, FloatArray]) -> MeasurementLog:
+    time_s = quantities["time"]
+    columns = [quantities.get(component, np.full(len(time_s), np.nan)) for component in COMPONENTS]
+    return MeasurementLog(source, time_s, np.column_stack(columns), np.arange(len(time_s)))
+
+
+class _OutOfOrder(Exception):
+    pass
+
+
+class _Times:
+    """The times of one log, which must not fall from block to block."""
+
+    def __init__(self) -> None:
+        self.epoch, self.last_s, self.duplicates = "", -np.inf, 0
+
+    def continued(self, time_s: FloatArray, epoch: str) -> FloatArray:
+        """Times of the next block, counted as those of the first; `epoch` is what they count from."""
+        if self.last_s == -np.inf:
+            self.epoch = epoch
+        if bool(epoch) != bool(self.epoch):
+            raise _OutOfOrder
+        if epoch:
+            time_s = time_s + (datetime.fromisoformat(epoch) - datetime.fromisoformat(self.epoch)).total_seconds()
+        known = time_s[~np.isnan(time_s)]
+        if known.size:
+            steps = np.diff(known, prepend=self.last_s)
+            if steps.min() < 0:
+                raise _OutOfOrder
+            self.duplicates += int(np.count_nonzero(steps == 0))
+            self.last_s = float(known[-1])
+        return time_s
+
+
+class _Spool(contextlib.ExitStack):
+    """Temporary files without a name, that grow. What was mapped of them outlives them."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.files: list[IO[bytes]] = [self.enter_context(tempfile.TemporaryFile()) for _ in range(3)]  # noqa: SIM115 (it is one)
+        self.rows, self.rows_in_file = 0, 0
+        self.without_time: list[int] = []
+
+    def add(self, time_s: FloatArray, measurement: FloatArray, timed: IntArray, rows: int) -> None:
+        for file, values in zip(self.files, (time_s, measurement, timed + self.rows_in_file), strict=True):
+            file.write(np.ascontiguousarray(values).data)
+        if len(timed) < rows:
+            absent = np.ones(rows, bool)
+            absent[timed] = False
+            self.without_time += (np.flatnonzero(absent) + self.rows_in_file).tolist()
+        self.rows += len(timed)
+        self.rows_in_file += rows
+
+    def arrays(self) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Times (n,), readings (n, 3) and row numbers (n,), mapped."""
+        for file in self.files:
+            file.flush()
+        shapes: tuple[tuple[Any, tuple[int, ...]], ...] = (
+            (np.float64, (self.rows,)), (np.float64, (self.rows, 3)), (np.int64, (self.rows,)),
+        )  # fmt: skip
+        time_s, measurement, row = (
+            np.memmap(file, kind, "r", shape=shape) for file, (kind, shape) in zip(self.files, shapes, strict=True)
+        )
+        return time_s, measurement, row
