@@ -171,13 +171,16 @@ def _parquet(name: str, path: Path) -> OpenTable:
         reason = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
         return InputError(f"{name}: no Parquet file, or one cut short or damaged; copy it again ({reason}).")
 
-    def load(numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
-        chosen = [schema.names[position] for position in (*numeric, *others)]
-        if 8 * described.num_rows * len(numeric) > most_bytes(path.stat().st_size):
+    def refuse_bomb(columns: int) -> None:
+        if 8 * described.num_rows * columns > most_bytes(path.stat().st_size):
             raise InputError(
                 f"{name}: it says that it holds {described.num_rows} rows in so small a file, which no log does; "
                 "write it anew."
             )
+
+    def load(numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
+        chosen = [schema.names[position] for position in (*numeric, *others)]
+        refuse_bomb(len(numeric))
         try:
             return pq.read_table(path, columns=chosen, partitioning=None, page_checksum_verification=True).select(
                 chosen
@@ -196,6 +199,7 @@ def _parquet(name: str, path: Path) -> OpenTable:
         chosen = [schema.names[position] for position in numeric]
         if 8 * described.num_rows * len(chosen) <= LARGE or len(set(schema.names)) < len(schema.names):
             return None
+        refuse_bomb(len(chosen))
         return Blocks(batches(chosen), described.num_rows)
 
     def batches(chosen: list[str]) -> Iterator[pa.Table]:
