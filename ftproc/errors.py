@@ -48,12 +48,15 @@ class UsageError(FtprocError):
     exit_code = 2
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
-    """`; did you mean "..."?` for the known word most like `word`, or an empty string when none is."""
+def nearest(word: str, known: Iterable[str], alike: float = 0.6) -> str:
+    """`; did you mean "..."?` for the known word most like `word`, or an empty string when none is.
+
+    alike: the least likeness (difflib's ratio) that counts.
+    """
     import difflib
 
     by_lower = {name.lower(): name for name in known}
-    close = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
+    close = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=alike)
     return f'; did you mean "{by_lower[close[0]]}"?' if close else ""
 
 

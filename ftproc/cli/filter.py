@@ -18,14 +18,11 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
 
 @click.command(cls=Command, short_help="Dirty logs in, clean trajectories out.", examples=_EXAMPLES)
 @click.argument("logs", nargs=-1, type=options.FILE, metavar="LOG...")
-@click.option(
-    "-o",
-    "--output",
-    type=options.FILE,
-    metavar="OUT",
-    help="File (.parquet, .feather, .csv, .csv.gz; with a site also .kml, .geojson, .czml), - for CSV on stdout, or a "
+@options.output(
+    "File (.parquet, .feather, .csv, .csv.gz; with a site also .kml, .geojson, .czml), - for CSV on stdout, or a "
     "directory, which is made when absent; several logs need a directory. "
     "[default: STEM.trajectory.parquet or .csv, like the log, in the current directory]",
+    "OUT",
 )
 @options.tracker
 @click.option(

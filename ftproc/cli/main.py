@@ -12,11 +12,13 @@ import click
 
 from ftproc import __version__
 from ftproc.cli.command import CONTEXT, DEBUG, debug_option, write_examples
-from ftproc.errors import interruption
+from ftproc.errors import interruption, nearest
 
 COMMANDS = ("simulate", "train", "filter", "score")
 
 INTERRUPTED, TERMINATED = 130, 143  # what a shell reports for Ctrl-C and for `kill`
+
+_ALIKE = 0.65  # options: their dashes alone make any two somewhat like each other
 
 _EXAMPLES = """
 ftproc simulate --scenario zuo2021-outliers -o flight.csv --truth flight.truth.csv
@@ -43,8 +45,6 @@ class Program(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         name = args[0]
         if name not in COMMANDS and not name.startswith("-") and not ctx.resilient_parsing:
-            from ftproc.errors import nearest
-
             ctx.fail(f'There is no command "{name}"{nearest(name, COMMANDS) or "."}')
         return super().resolve_command(ctx, args)
 
@@ -92,7 +92,11 @@ def _report(error: BaseException, debug: bool) -> int:
 def _usage(error: click.ClickException) -> str:
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else "ftproc"
-    message = error.format_message().strip()
+    if isinstance(error, click.NoSuchOption) and context is not None:  # click names all that are somewhat like it
+        known = [name for p in context.command.get_params(context) for name in (*p.opts, *p.secondary_opts)]
+        message = f"There is no option {error.option_name}{nearest(error.option_name, known, _ALIKE)}"
+    else:
+        message = error.format_message().strip()
     return f"{path}: {message}{'' if message.endswith(('.', '?')) else '.'} See {path} -h."
 
 

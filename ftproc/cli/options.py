@@ -117,6 +117,23 @@ def noise(kind: Callable[[Any], Any], default: str | None, text: str) -> Callabl
     return click.option("--noise", type=kind, default=default, metavar="R,A,E", help=f"{what}{text}")
 
 
+def output(what: str, metavar: str, required: bool = False) -> Callable[[F], F]:
+    """`-o`, which names one file or directory: a second one is refused, not taken for the first."""
+
+    def only(ctx: click.Context, parameter: click.Parameter, given: tuple[str, ...]) -> str | None:
+        if len(given) > 1:
+            raise click.UsageError(
+                f"-o is given {len(given)} times ({', '.join(given)}), and a run writes one kind of file; "
+                "run it once for each.",
+                ctx,
+            )
+        return given[0] if given else None
+
+    return click.option(
+        "-o", "--output", type=FILE, multiple=True, callback=only, metavar=metavar, required=required, help=what
+    )
+
+
 def report(what: str) -> Callable[[F], F]:
     text = (
         f"Write an HTML page that shows {what}; it opens in any browser, without a network. FILE.html for one, or a "

@@ -45,14 +45,7 @@ def _scenarios_and_grammar() -> str:
     "north: write the azimuth as a survey does, clockwise from north, from 0 to a full turn. The truth's x is then "
     "north, y east and z up."
 )
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=options.FILE,
-    metavar="LOG",
-    help="The log to write: .csv, .csv.gz, .parquet, .feather, or - for CSV on stdout.",
-)
+@options.output("The log to write: .csv, .csv.gz, .parquet, .feather, or - for CSV on stdout.", "LOG", required=True)
 @click.option(
     "--truth", type=options.FILE, metavar="TRUTH", help="Where to write what really happened: states and outlier flags."
 )

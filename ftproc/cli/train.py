@@ -42,7 +42,7 @@ def _number(name: str, least: int, default: int, text: str) -> Callable[[options
 @click.option("--config", type=options.FILE, metavar="FILE", help="The station file that tells how to read the logs.")
 @options.scenario(False, "Learn from simulated flights instead; the names are in `ftproc simulate -h`.")
 @_number("flights", 1, TrainSettings.flights, "How many flights to simulate.")
-@click.option("-o", "--output", type=options.FILE, metavar="MODEL", help="The model file to write (safetensors).")
+@options.output("The model file to write (safetensors).", "MODEL")
 @options.seed("Another network, search and set of simulated flights for each")
 @click.option(
     "--features",
