@@ -64,7 +64,8 @@ def _observability(s: Mapping[str, Any]) -> Iterator[Remark]:
     blind = s["hardly_observable"]
     if blind:
         worst = max(blind, key=lambda part: part["sigma_m"])
-        when = f"from {worst['from_s']:.6g} to {worst['to_s']:.6g} s"
+        first, last = (f"{worst[end]:.6g}" for end in ("from_s", "to_s"))
+        when = f"at {first} s" if first == last else f"from {first} to {last} s"
         text = f"the position is hardly observable: 1 sigma up to {worst['sigma_m']:.3g} m"
         many = f"in {len(blind)} stretches {text}, most of all {when}"
         yield Remark(CAREFUL, f"{when} {text}" if len(blind) == 1 else many)

@@ -50,6 +50,10 @@ OFF = {"innovation_ratio": 1.5, "innovation_bounds": [0.8, 1.2], "verdict": "ove
         ({"slow_noise": True}, {}, "do not trust", "correlated so slowly that it passes for motion"),
         ({"slow_noise": True, "not_observable": ["elevation"]}, {}, "be careful", "elevation missing throughout"),
         ({"hardly_observable": BLIND[:1]}, {}, "be careful", "from 3 to 5 s the position is hardly observable"),
+        (
+            {"hardly_observable": [{**BLIND[0], "to_s": 3.0}]}, {}, "be careful",
+            "at 3 s the position is hardly observable",
+        ),
         ({"hardly_observable": BLIND}, {}, "be careful", "in 2 stretches the position is hardly observable: 1 sigma up "
                                                          "to 90 m, most of all from 7 to 8 s"),
         ({"editing_settled": False}, {}, "be careful", "did not settle"),

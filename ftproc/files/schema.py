@@ -26,7 +26,7 @@ ABSENT = "none"
 _NOT_UNITS = frozenset(
     [
         *("rate", "dot", "sigma", "std", "err", "error", "bias", "res", "residual", "flag", "valid"),
-        *("ok", "quality", "raw", "id", "status", "type", "gate", "true", "ref"),
+        *("ok", "quality", "raw", "id", "status", "type", "gate", "true", "ref", "mps2"),
     ]
 )
 
@@ -204,6 +204,8 @@ def _check_complete(source: str, names: Sequence[str], found: Mapping[str, Colum
         )
     wanted = "time" if "time" not in found else "range"
     what = "no time column" if wanted == "time" else "neither range nor azimuth nor elevation"
+    if wanted == "range" and {"x_m", "y_m", "z_m"} <= set(names):
+        what = f"a truth or a trajectory by its x_m, y_m, z_m, for `ftproc score`, not a log: it has {what}"
     hint = nearest(CANONICAL[wanted], [name for name in names if name not in columns.values()]) or "."
     raise InputError(
         f"{source}: {what} (expected {CANONICAL[wanted]} or {' or '.join(ALIASES[wanted])}){hint} "

@@ -82,6 +82,11 @@ def test_a_log_without_time_lists_its_columns_and_the_nearest_one() -> None:
     assert "--columns time=NAME" in sentence
 
 
+def test_a_truth_is_not_taken_for_a_log_with_a_strange_azimuth() -> None:
+    sentence = refused(["time_s", "x_m", "y_m", "z_m", "ax_mps2", "ay_mps2", "az_mps2"])
+    assert "a truth or a trajectory by its x_m, y_m, z_m, for `ftproc score`, not a log" in sentence
+
+
 def test_a_long_list_of_columns_is_cut() -> None:
     sentence = refused([f"c{index}" for index in range(50)])
     assert "c19 and 30 more" in sentence
