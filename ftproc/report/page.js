@@ -4,6 +4,7 @@
 (function () {
   const PAPER = 680; // CSS pixels between the margins of an A4 or Letter page
   const LOWER = 0.7; // of the height, so that two figures share a page
+  const BROAD = 1.4; // width over height from which all of the space is seen with its labels
   const COLUMNS = 400; // of a figure; in each the lowest and the highest mark of a kind are drawn
   const config = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
   const places = Array.from(document.querySelectorAll("figure"));
@@ -74,10 +75,20 @@
     return crowded;
   }
 
+  // How many times farther the eye must be for a place of this size.
+  function distance(width, height) { return Math.max(1, (BROAD * height) / width); }
+
+  function moved(eye, factor) { return { x: factor * eye.x, y: factor * eye.y, z: factor * eye.z }; }
+
   async function draw(place) {
     const data = document.querySelector('script[data-figure="' + place.id + '"]');
     const figure = JSON.parse(data.textContent);
     const crowded = thin(figure);
+    const camera = figure.layout.scene && figure.layout.scene.camera;
+    if (camera) {
+      place.away = distance(place.clientWidth, place.clientHeight);
+      camera.eye = moved(camera.eye, place.away);
+    }
     await Plotly.newPlot(place, figure.data, figure.layout, config);
     if (!crowded.size) return;
     place.on("plotly_relayout", function (changed) {
@@ -105,7 +116,14 @@
 
   function resize(place, size) {
     place.style.height = size.height + "px";
-    if (place.data) Plotly.relayout(place, size);
+    if (!place.data) return;
+    const scene = place.layout.scene;
+    if (scene) {
+      const before = place.away;
+      place.away = distance(size.width || place.clientWidth, size.height);
+      size = { ...size, "scene.camera.eye": moved(scene.camera.eye, place.away / before) };
+    }
+    Plotly.relayout(place, size);
   }
 
   addEventListener("beforeprint", function () {

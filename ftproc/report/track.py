@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 COLUMNS = 2000  # in each of which the extremes of x, y and z are drawn
 FLATTEST = 0.2  # height over width of the figure in space; a flatter flight is drawn higher, and that is said
+LOW = 0.4  # up to so high a figure has room for few numbers
 NEAR = 1.0  # a station so many widths of the flight away, or nearer, is drawn too
 HEIGHT = 460
 FILLING = 1.3  # diagonal of the flight against the distance of the eye
@@ -46,12 +47,14 @@ def track(view: View) -> Drawn:
             marker={"color": style.BLACK, "symbol": symbol, "size": 4},
         )  # fmt: skip
     axes = {f"{a}axis": {"title": {"text": names[a]}, "gridcolor": style.GRID, "exponentformat": "none",
-                         "separatethousands": True, "nticks": 5, "showspikes": False} for a in "xyz"}  # fmt: skip
+                         "separatethousands": True, "nticks": 5 if length > LOW else 3, "showspikes": False}
+            for a, length in zip("xyz", share, strict=True)}  # fmt: skip
     scene = {**axes, "aspectmode": "manual", "aspectratio": dict(zip("xyz", scale * share, strict=True)),
              "camera": {"eye": {"x": -1.1, "y": -1.3, "z": 0.8}, "center": {"x": 0, "y": 0, "z": -0.12}}}  # fmt: skip
     figure.update_layout(**{**style.LAYOUT, "margin": {"l": 0, "r": 0, "t": 30, "b": 0}}, scene=scene, height=HEIGHT)
     raised = share[2] * widest / size[2] if size[2] > 0 else 1.0
-    note = "Equal scales." if raised < 1.01 else f"Heights are drawn {raised:.2g} times larger than x and y."
+    much = float(f"{raised:.2g}")
+    note = "Equal scales." if raised < 1.01 else f"Heights are drawn {much:g} times larger than x and y."
     return Drawn(figure, f"In space: {note[0].lower()}{note[1:]} Drag to turn it.")
 
 

@@ -57,6 +57,13 @@ def test_nothing_sticks_out_of_a_laptop_window(usual):
     assert wide <= 1366
 
 
+def test_nothing_sticks_out_of_a_telephone(context, show):
+    page = show(filtered(), flight().truth).page
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.wait_for_function("() => document.documentElement.scrollWidth <= 390", timeout=5000)
+    page.close()
+
+
 @pytest.mark.parametrize("name", ["readings", "residuals", "nis", "sigmas", "motion", "errors"])
 def test_axis_titles_and_labels_do_not_stand_on_each_other(usual, name):
     """Boxes of all texts of a figure, taken from the browser; none overlaps another or leaves the figure."""
@@ -148,11 +155,15 @@ def test_what_slips_through_does_not_run(context, tmp_path, monkeypatch):
 
 def test_printing_fits_the_paper_and_gives_the_window_back(usual):
     page = usual.page
+    eye = "() => document.getElementById('track')._fullLayout.scene.camera.eye"
+    near = page.evaluate(eye)
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     page.wait_for_function("() => document.getElementById('readings')._fullLayout.width === 680", timeout=5000)
     assert page.evaluate("() => document.getElementById('ground')._fullLayout.width") == 340
+    assert page.evaluate(eye)["x"] < 1.1 * near["x"] < 0  # farther off, so that no label is cut
     page.evaluate("dispatchEvent(new Event('afterprint'))")
     page.wait_for_function("() => document.getElementById('readings')._fullLayout.width > 1000", timeout=5000)
+    assert page.evaluate(eye) == pytest.approx(near)
     paper = page.pdf(format="A4", prefer_css_page_size=True)
     pages = paper.count(b"/Type /Page\n") or len(re.findall(rb"/Type\s*/Page\b", paper))
     assert 3 <= pages <= 8

@@ -142,7 +142,7 @@ def test_track_says_how_much_higher_it_is_drawn():
     ratio = found.figure.layout.scene.aspectratio
     size = np.ptp(flat.state[:, :3], axis=0)
     raised = (ratio.z / size[2]) / (ratio.y / size[1])
-    assert f"heights are drawn {raised:.2g} times larger" in found.note
+    assert f"heights are drawn {float(f'{raised:.2g}'):g} times larger" in found.note
     tall = replace(filtered(), state=filtered().state * [1, 1, 9, 1, 1, 1, 1, 1, 1])
     ratio, size = drawn(tall, "track").figure.layout.scene.aspectratio, np.ptp(tall.state[:, :3], axis=0)
     assert ratio.z / size[2] == pytest.approx(ratio.y / size[1])
