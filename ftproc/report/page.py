@@ -10,6 +10,7 @@ import base64
 import gzip
 import hashlib
 import html
+import re
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -24,6 +25,13 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 _HERE = Path(__file__).parent
+
+#: What plotly puts around its script for module loaders: functions in each other, for each of which a browser would
+#: read all 5 MB once more.
+_WRAPPER = re.compile(
+    r"\(\s*function\(root, factory\) \{.*?\(\) => \{\n(.*)\nwindow\.Plotly = Plotly;\s*return Plotly;\s*\}\)\);\s*\Z",
+    re.DOTALL,
+)
 
 #: The sections with figures: title, names of figures; those of one section stand side by side.
 _SECTIONS = (
@@ -111,5 +119,5 @@ class _Library(NamedTuple):
 def _plotly() -> _Library:
     from plotly.offline import get_plotlyjs
 
-    text: str = get_plotlyjs()
+    text = _WRAPPER.sub(lambda found: found[1], get_plotlyjs())
     return _Library(base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode(), _sha256(text))

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from ftproc import report
-from ftproc.report.page import _figure, document, page
+from ftproc.report.page import _WRAPPER, _figure, document, page
 from tests.report.flights import HOSTILE, angles_only, filtered, flight, hostile, one_row, position_only
 
 
@@ -52,6 +52,15 @@ def scripts(text):
 @pytest.fixture(scope="module")
 def text():
     return page(filtered())
+
+
+def test_plotly_is_read_once_without_its_wrapper():
+    """As plotly 6.0 to 7.1 wrap it; what is wrapped otherwise stays as it is."""
+    before = "/** licence */\n(\n function(root, factory) {\n root.x = factory();\n}\n} (this, () => {\n"
+    after = "\nwindow.Plotly = Plotly;\nreturn Plotly;\n}));"
+    script = '"use strict";var Plotly=(()=>{return 1})();\n'
+    assert _WRAPPER.sub(lambda found: found[1], before + script + after) == "/** licence */\n" + script
+    assert _WRAPPER.sub(lambda found: found[1], script + after) == script + after
 
 
 def test_one_plotly_and_no_other_address(text):
