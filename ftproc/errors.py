@@ -3,6 +3,7 @@ was expected, and how to cure it."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 
@@ -14,6 +15,26 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
+_BEGINNING, _END = 700, 400  # letters of a sentence that are shown when it has more
+_LONGEST_NAME = 200  # in such a sentence; an escaped control character counts as four or more
+
+
+def _shortened(sentence: str) -> str:
+    """At most 1105 letters. A name in a file may be as long as the file: it loses its middle before anything else does,
+    for where it is, what is wrong and the cure stand around it."""
+    if len(sentence) <= _BEGINNING + _END:
+        return sentence
+    sentence = re.sub(r'"[^"]+"|\S+', _clipped, sentence)
+    if len(sentence) <= _BEGINNING + _END:
+        return sentence
+    return f"{sentence[:_BEGINNING]} ... {sentence[-_END:]}"
+
+
+def _clipped(name: re.Match[str]) -> str:
+    half = _LONGEST_NAME // 2
+    return name[0] if len(name[0]) <= _LONGEST_NAME else f"{name[0][:half]}...{name[0][-half:]}"
+
+
 class FtprocError(Exception):
     """Root of all errors that carry a plain sentence for the user.
 
@@ -23,7 +44,7 @@ class FtprocError(Exception):
     exit_code = 1
 
     def __init__(self, sentence: str) -> None:
-        super().__init__(printable(sentence))
+        super().__init__(_shortened(printable(sentence)))
 
 
 class FtprocWarning(UserWarning):

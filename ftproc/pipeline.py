@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 EDITING = ("two-pass", "forward", "none")
 ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of a component that the log says too little about
+SMALLEST = 1e-30  # of what is given for noise, jerk level, gate: its square and its inverse can be reckoned with
 FEWEST_PARTICLES = 20
 FEWEST_READINGS = 8  # of a component, for its noise to be found from them
 PACKAGED_MODEL = Path(__file__).parent / "correction" / "default.safetensors"
@@ -154,8 +155,8 @@ def _check(settings: FilterSettings) -> None:
     numbers: list[tuple[str, float | None]] = [("noise", v) for v in settings.noise or ()]
     numbers += [("jerk", settings.jerk_psd_m2ps5), ("gate", settings.gate), ("max-patch", settings.max_patch_s)]
     for name, value in numbers:
-        if value is not None and not (np.isfinite(value) and value > 0):
-            raise UsageError(f"{name} must be a positive number, not {value}")
+        if value is not None and not SMALLEST <= value <= 1 / SMALLEST:
+            raise UsageError(f"{name} must be a positive number, from {SMALLEST:g} to {1 / SMALLEST:g}, not {value}")
 
 
 def _record(log: MeasurementLog) -> Recording:

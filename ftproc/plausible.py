@@ -47,7 +47,8 @@ def _check_times(log: MeasurementLog) -> None:
 
 def _check_ranges(name: str, ranges: FloatArray) -> None:
     known = ranges[np.isfinite(ranges)]
-    typical = float(np.median(known)) if known.size else 1.0
+    within = np.clip(known, -2 * FARTHEST_M, 2 * FARTHEST_M)  # the middle of two huge ones would overflow
+    typical = float(np.median(within)) if known.size else 1.0
     if 0 < typical <= FARTHEST_M:
         return
     what = "zero" if typical == 0 else "negative" if typical < 0 else f"beyond {FARTHEST_M:g} m"

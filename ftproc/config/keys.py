@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from ftproc.config.kinds import Kind, flag, method, number, positive, text, whole, words
+from ftproc.config.kinds import Kind, file_name, flag, method, number, positive, text, whole, words
 from ftproc.files.units import UNITS
 from ftproc.records import COMPONENTS
 from ftproc.settings import Air, FilterSettings
@@ -100,7 +100,7 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
     },
     "filter": {
         "method": Key("method", method, FilterSettings.method, "see --list-methods", default=FilterSettings.method),
-        "model": Key("model", text, "packaged", _MODEL, default="packaged"),
+        "model": Key("model", file_name, "packaged", _MODEL, default="packaged"),
         "smooth": Key("smooth", flag, False, "the best estimate of trajectory", default=False),
         "editing": Key(
             "editing", words("two-pass", "forward", "none"), "two-pass", "how outliers are found", default="two-pass"

@@ -11,6 +11,8 @@ from ftproc.errors import nearest
 #: The value as it is kept, or a ValueError that says what was expected.
 Kind = Callable[[object], Any]
 
+_LARGEST = 2**53
+
 
 def number(low: float = -math.inf, high: float = math.inf) -> Kind:
     """A finite number from low to high; above zero when low is the smallest float above it."""
@@ -24,9 +26,13 @@ def number(low: float = -math.inf, high: float = math.inf) -> Kind:
     def kind(value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise ValueError(expected)
-        if not (math.isfinite(value) and low <= value <= high):
+        try:
+            found = float(value)
+        except OverflowError as error:  # a whole number of more than 308 digits
+            raise ValueError(expected) from error
+        if not (math.isfinite(found) and low <= found <= high):
             raise ValueError(expected)
-        return float(value)
+        return found
 
     return kind
 
@@ -36,11 +42,13 @@ def positive() -> Kind:
 
 
 def whole(low: int) -> Kind:
-    """A whole number from low on."""
+    """A whole number from low on, which a float can hold as well: station files are written with those."""
 
     def kind(value: object) -> int:
-        if isinstance(value, bool) or not isinstance(value, int | float) or value < low or value % 1 != 0:
+        if isinstance(value, bool) or not isinstance(value, int | float) or value % 1 != 0 or value < low:
             raise ValueError(f"a whole number from {low}")
+        if value > _LARGEST:
+            raise ValueError(f"a whole number from {low} to {_LARGEST}")
         return int(value)
 
     return kind
@@ -64,6 +72,13 @@ def text(value: object) -> str:
     return value
 
 
+def file_name(value: object) -> str:
+    """What a file can be called."""
+    if "\0" in text(value):
+        raise ValueError("the name of a file, which has no NUL")
+    return str(value)
+
+
 def flag(value: object) -> bool:
     """true or false."""
     if not isinstance(value, bool):
@@ -75,7 +90,7 @@ def method(value: object) -> str:
     """The name of a method."""
     from ftproc.methods import registry
 
-    if value not in registry.METHODS:
+    if not isinstance(value, str) or value not in registry.METHODS:
         hint = nearest(str(value), registry.METHODS)
         raise ValueError("the name of a method, see --list-methods" + hint.removesuffix("?"))
     return str(value)

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from ftproc.config.keys import KEYS, Key, every
 from ftproc.errors import UsageError, nearest
+from ftproc.files.tables import is_ordinary
 from ftproc.files.units import UNITS
 
 #: What a file without any key amounts to, for the options that consist of parts.
 _NO_PARTS = {"site": None, "noise": None, "bias": 0.0}
+_LARGEST = 1 << 16  # bytes; a station file with every key has 4000
+_LONGEST_LINE = 5000  # bytes; the time that a name with dots takes goes with the square of their number
 _WORDS_FOR_MODELS = ("packaged", "none")
 
 
@@ -19,17 +23,31 @@ def load(path: str | Path) -> dict[str, Any]:
     """The options that a station file sets, such as {"site": (48.1, 11.3, 612.0), "smooth": True}; lengths in m, angles
     in rad. Raises UsageError, naming file and key, for what cannot be read or is not understood."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = _bytes(Path(path)).decode("utf-8-sig")
     except FileNotFoundError as error:
         raise UsageError(f"{path}: there is no such file. ftproc filter --write-config > {path} makes one.") from error
     except UnicodeDecodeError as error:
         raise UsageError(f"{path}: this is not UTF-8 text; save it as UTF-8.") from error
     except OSError as error:
-        raise UsageError(f"{path}: cannot be read ({(error.strerror or str(error)).lower()}).") from error
+        reason = (error.strerror or str(error)).lower()
+        raise UsageError(f"{path}: cannot be read ({reason}); name a station file.") from error
     options = parse(text, str(path))
     if options.get("model", "none") not in _WORDS_FOR_MODELS:
         options["model"] = str(Path(path).parent / options["model"])
     return options
+
+
+def _bytes(path: Path) -> bytes:
+    if not is_ordinary(path):
+        raise UsageError(f"{path}: not an ordinary file (a pipe or a device); name a station file.")
+    with path.open("rb") as stream:
+        content = stream.read(_LARGEST + 1)
+    if len(content) > _LARGEST:
+        raise UsageError(f"{path}: far too large for a station file; ftproc filter --write-config prints one.")
+    for number, line in enumerate(content.splitlines(), 1):
+        if len(line) > _LONGEST_LINE:
+            raise UsageError(f"{path}: line {number} is far too long for a station file; delete or split it.")
+    return content
 
 
 def parse(text: str, name: str) -> dict[str, Any]:
@@ -38,8 +56,10 @@ def parse(text: str, name: str) -> dict[str, Any]:
 
     try:
         found = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise UsageError(f"{name}: this is not TOML: {error}.") from error
+    except ValueError as error:  # also of numbers with thousands of digits
+        raise UsageError(f"{name}: this is not TOML: {error}. Correct it there.") from error
+    except RecursionError as error:
+        raise UsageError(f"{name}: this is not TOML of any use: it nests too deeply. Delete what does.") from error
     values: dict[tuple[str, str], Any] = {}
     for section, keys in found.items():
         _check_section(name, section, keys)
@@ -47,7 +67,7 @@ def parse(text: str, name: str) -> dict[str, Any]:
             key_name, to_si = _known(name, section, written)
             if (section, key_name) in values:
                 raise UsageError(f"{name}: [{section}] has {key_name} in two units; leave one out.")
-            values[section, key_name] = to_si(_checked(name, section, written, KEYS[section][key_name], value))
+            values[section, key_name] = _checked(name, section, written, KEYS[section][key_name], value, to_si)
     return _options(name, values)
 
 
@@ -61,10 +81,11 @@ def _check_section(name: str, section: str, keys: object) -> None:
         raise UsageError(f'{name}: "{section}" stands outside of its section; write it below [{"] or [".join(homes)}].')
     kind = "section" if isinstance(keys, Mapping) else "key"
     sections = ", ".join(f"[{known}]" for known in KEYS)
-    raise UsageError(f'{name}: there is no {kind} "{section}"{nearest(section, KEYS) or "."} The sections: {sections}.')
+    hint = nearest(section, KEYS) or "."
+    raise UsageError(f'{name}: there is no {kind} "{section}"{hint} The sections: {sections}.')
 
 
-def _known(name: str, section: str, written: str) -> tuple[str, Any]:
+def _known(name: str, section: str, written: str) -> tuple[str, Callable[[Any], Any]]:
     """The key that is written so, and what brings its value to SI."""
     keys = KEYS[section]
     stem, _, unit = written.rpartition("_")
@@ -83,18 +104,20 @@ def _known(name: str, section: str, written: str) -> tuple[str, Any]:
         )
     all_names = [form for known, its in keys.items() for form in _spelt(known, its)]
     short = ", ".join(f"{known}_UNIT" if its.quantity else known for known, its in keys.items())
-    raise UsageError(
-        f'{name}: [{section}] has no key "{written}"{nearest(written, all_names) or "."} Its keys are: {short}.'
-    )
+    hint = nearest(written, all_names) or "."
+    raise UsageError(f'{name}: [{section}] has no key "{written}"{hint} Its keys are: {short}.')
 
 
 def _spelt(name: str, key: Key) -> Iterable[str]:
     return [f"{name}_{unit}" for unit in key.units] or [name]
 
 
-def _checked(name: str, section: str, written: str, key: Key, value: object) -> Any:
+def _checked(name: str, section: str, written: str, key: Key, value: object, to_si: Callable[[Any], Any]) -> Any:
     try:
-        return key.kind(value)
+        found = to_si(key.kind(value))
+        if isinstance(found, float) and math.isinf(found):
+            raise ValueError("a smaller number")
+        return found
     except ValueError as error:
         shown = f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else value
         words = str(error).replace('"', "").split(" or ") if isinstance(value, str) else []

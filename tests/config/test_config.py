@@ -189,7 +189,8 @@ def test_a_model_lies_beside_its_file(tmp_path, monkeypatch):
         ("[range]\ncolumn = ''", '[range] column = "": expected a text in quotes.'),
         ("[refraction]\npressure_hpa = 101325", "[refraction] pressure_hpa = 101325: expected a number from 300 to "
          "1100."),
-        ("[range\n", "this is not TOML: Expected ']' at the end of a table declaration (at line 1, column 7)."),
+        ("[range\n", "this is not TOML: Expected ']' at the end of a table declaration (at line 1, column 7). "
+         "Correct it there."),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said(text, sentence):
@@ -201,7 +202,7 @@ def test_what_is_wrong_is_said(text, sentence):
 def test_files_that_cannot_be_read(tmp_path):
     for name, sentence in {
         "none.toml": "there is no such file. ftproc filter --write-config > {} makes one.",
-        "": "cannot be read (is a directory).",
+        "": "cannot be read (is a directory); name a station file.",
         "latin.toml": "this is not UTF-8 text; save it as UTF-8.",
     }.items():
         (tmp_path / "latin.toml").write_bytes(b"# \xe9t\xe9\n")

@@ -130,31 +130,36 @@ def headers() -> Iterator[Case]:
     yield Case("model", "control characters", written(coloured, NAME), ("made for the feature set",))
 
 
+def put(how: Callable[[Path], object], name: str = NAME) -> Callable[[Path], Path]:
+    """A file of this name, made so."""
+
+    def make(d: Path) -> Path:
+        how(d / name)
+        return d / name
+
+    return make
+
+
 def places() -> Iterator[Case]:
     """A name behind which there is no ordinary file."""
-
-    def put(how: Callable[[Path], object]) -> Callable[[Path], Path]:
-        def make(d: Path) -> Path:
-            how(d / NAME)
-            return d / NAME
-
-        return make
-
-    zero = os.devnull.replace("null", "zero")
-    for label, how in (
-        ("no file", lambda p: None),
-        ("a directory", Path.mkdir),
-        ("a named pipe", os.mkfifo),
-        ("a link to itself", lambda p: p.symlink_to(NAME)),
-        ("an endless device", lambda p: p.symlink_to(zero)),
-        ("a file of 2 GB", lambda p: _sparse(p, 2 << 30)),
-    ):
+    for label, how in NO_FILES:
         yield Case("model", label, put(how), ("`ftproc train`",))
 
 
 def _sparse(path: Path, size: int) -> None:
     with path.open("wb") as stream:
         stream.truncate(size)
+
+
+#: What may be found under a name instead of an ordinary file.
+NO_FILES: tuple[tuple[str, Callable[[Path], object]], ...] = (
+    ("no file", lambda p: None),
+    ("a directory", Path.mkdir),
+    ("a named pipe", os.mkfifo),
+    ("a link to itself", lambda p: p.symlink_to(p.name)),
+    ("an endless device", lambda p: p.symlink_to(os.devnull.replace("null", "zero"))),
+    ("a file of 2 GB", lambda p: _sparse(p, 2 << 30)),
+)
 
 
 def all_cases() -> Iterator[Case]:

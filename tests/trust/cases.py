@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ftproc import pipeline
+from ftproc import config, pipeline
+from ftproc.batch import Recipe
 from ftproc.correction import model, model_file
 from ftproc.errors import FtprocError
 from ftproc.files import logs, truth
@@ -35,7 +36,7 @@ Check = Callable[[Any], bool]
 class Case:
     """One bad (or merely odd) file.
 
-    kind: log, model or truth. says: words of the sentence that refuses it; None: it is to be read, and `check`
+    kind: log, model, truth or station. says: words of the sentence that refuses it; None: it is to be read, and `check`
     holds for the record; `either`: refused in whatever sentence, or read so that `check` holds (a flipped bit may hit
     anything). known: what is still wrong with it, and where.
     """
@@ -122,18 +123,20 @@ def judge(case: Case, directory: Path) -> str:
             warnings.simplefilter("error")
             found = _READ[case.kind](path, case.options)
     except FtprocError as error:
-        _judge_sentence(case, path, str(error))
+        sentence = str(error)
+        assert case.either or case.says is not None, f"was to be read, but: {sentence}"
+        for words in case.says or ():
+            assert words in sentence, f'"{words}" is not in: {sentence}'
+        judge_sentence(path.name, sentence)
         return "refused"
     assert case.says is None or case.either, f"was to be refused with {case.says}"
     assert case.check(found), "was not read correctly"
     return "right"
 
 
-def _judge_sentence(case: Case, path: Path, sentence: str) -> None:
-    assert case.either or case.says is not None, f"was to be read, but: {sentence}"
-    assert path.name in sentence, f"does not name the file: {sentence}"
-    for words in case.says or ():
-        assert words in sentence, f'"{words}" is not in: {sentence}'
+def judge_sentence(name: str, sentence: str) -> None:
+    """AssertionError unless it names the file of this name, is plain and tells a cure."""
+    assert name in sentence, f"does not name the file: {sentence}"
     assert "internal error" not in sentence, sentence
     assert sentence.isprintable(), f"holds control characters: {sentence!r}"
     assert len(sentence) < LONGEST_SENTENCE, f"is too long: {sentence}"
@@ -143,7 +146,8 @@ def _judge_sentence(case: Case, path: Path, sentence: str) -> None:
 _CURES = (
     *("correct", "copy", "save", "say", "use", "give", "name", "write", "complete", "delete", "rename", "separate"),
     *("put", "fill", "unpack", "train", "convert", "check", "expected", "supported", "choose", "leave", "split"),
-    *("count", "add", "sort", "there is no such file"),
+    *("count", "add", "sort", "there is no such file", "did you mean", "needs all", "must end in"),
+    *("its keys are", "the sections: "),
 )
 
 
@@ -174,7 +178,24 @@ def _model(path: Path, options: dict[str, Any]) -> model.Model:
     return found
 
 
-_READ: dict[str, Callable[[Path, dict[str, Any]], Any]] = {"log": _log, "truth": _truth, "model": _model}
+def _station(path: Path, options: dict[str, Any]) -> Recipe:
+    """Read it; and filter the flight by it, which may be refused but must do no harm."""
+    found = config.recipe(config.load(path))
+    log = path.with_name("flight.csv")
+    log.write_text(text())
+    with contextlib.suppress(FtprocError):
+        given = {**found.reading(), "columns": None, "units": None}
+        named = None if found.model == "none" else pipeline.default_model()
+        judge_trajectory(pipeline.filter_log(logs.read(log, **given), found.settings, named))
+    return found
+
+
+_READ: dict[str, Callable[[Path, dict[str, Any]], Any]] = {
+    "log": _log,
+    "truth": _truth,
+    "model": _model,
+    "station": _station,
+}
 
 
 def judge_trajectory(trajectory: Trajectory) -> None:

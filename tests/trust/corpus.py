@@ -1,4 +1,4 @@
-"""All cases, and what became of them. New kinds of files (settings, say) join here: a module with `all_cases`."""
+"""All cases, and what became of them. New kinds of files join here: a module with `all_cases`."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from . import bad_files, bad_logs, bad_models, bad_truths
+from . import bad_files, bad_logs, bad_models, bad_stations, bad_truths
 from .cases import Case, judge
 
-TABLES = (bad_logs, bad_files, bad_models, bad_truths)
+TABLES = (bad_logs, bad_files, bad_models, bad_truths, bad_stations)
 
 
 def all_cases() -> Iterator[Case]:
