@@ -140,6 +140,41 @@ def test_outliers_far_away_change_nothing_near(seed: int) -> None:
     assert (np.abs(found.state[near, :6] - expected.state[near, :6]) / expected.sigma[near]).max() < 2.0
 
 
+@pytest.mark.parametrize("outliers", ["none", "the scenario's"])
+@few
+@given(seeds, st.integers(0, 10**6), st.integers(0, 2), st.floats(10.0, 1000.0))
+def test_an_outlier_moves_the_estimate_by_less_than_its_sigma(
+    outliers: str, seed: int, row: int, component: int, sigmas: float
+) -> None:
+    """One wild reading, from 10 sigma on: no position or velocity moves by more than the sigma said of it.
+
+    Where patches already hold most of the record, one more reading may decide which of two stories is believed; then
+    the verdict must be another than to trust it.
+    """
+    log = simulate("manoeuvre", duration_s=15.0, seed=seed, outliers="none").log if outliers == "none" else flight(seed)
+    assert FIXED.noise is not None
+    size = sigmas * (FIXED.noise[component] or 0.0)
+    wild = log.measurement.copy()
+    wild[row % len(log), component] += size if row % 2 else -size
+    found, expected = smoothed(table(replace(log, measurement=wild))), smoothed(table(log))
+    moved = (np.abs(found.state[:, :6] - expected.state[:, :6]) / found.sigma).max()
+    assert moved < 1.0 or (outliers != "none" and found.metadata["summary"]["trust"]["verdict"] != "trust")
+
+
+@few
+@given(seeds, st.integers(2, 5), st.integers(0, 2))
+def test_more_readings_make_no_sigma_larger(seed: int, every: int, component: int) -> None:
+    """A log without outliers against itself with readings taken out; 0.1 % is what they tell about the geometry."""
+    log = simulate("manoeuvre", duration_s=15.0, seed=seed, outliers="none").log
+    fewer = log.measurement.copy()
+    fewer[::every, component] = np.nan
+    unedited = replace(FIXED, editing="none")
+    with_all = smoothed(table(log), unedited)
+    with_fewer = smoothed(table(replace(log, measurement=fewer)), unedited)
+    assert (with_all.sigma / with_fewer.sigma).max() < 1.001
+    assert (with_all.sigma < with_fewer.sigma).any()
+
+
 finite = st.floats(-1e300, 1e300, allow_nan=False)
 reading = st.one_of(finite, st.just(np.nan), st.floats(-10.0, 10.0))
 
