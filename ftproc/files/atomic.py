@@ -93,11 +93,14 @@ def _sync_directory(directory: Path) -> None:
 
 
 def _resolved(path: Path) -> Path:
-    """The file behind all links. OSError for a link to itself, which some versions of Python tell otherwise."""
+    """The file behind all links. OSError for a link to itself, which versions of Python tell otherwise, or not."""
     try:
-        return path.resolve()
+        found = path.resolve()
     except RuntimeError as error:
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from error
+    if found.is_symlink():
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
+    return found
 
 
 def _same_file(one: Path, other: Path) -> bool:
