@@ -168,8 +168,9 @@ def _parquet(name: str, path: Path) -> OpenTable:
     import pyarrow.parquet as pq
 
     def damaged(error: Exception) -> InputError:
-        reason = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
-        return InputError(f"{name}: no Parquet file, or one cut short or damaged; copy it again ({reason}).")
+        return InputError(
+            f"{name}: no Parquet file, or one cut short or damaged; copy it again ({_first_line(error)})."
+        )
 
     def refuse_bomb(columns: int) -> None:
         if 8 * described.num_rows * columns > most_bytes(path.stat().st_size):
@@ -182,9 +183,9 @@ def _parquet(name: str, path: Path) -> OpenTable:
         chosen = [schema.names[position] for position in (*numeric, *others)]
         refuse_bomb(len(numeric))
         try:
-            return pq.read_table(path, columns=chosen, partitioning=None, page_checksum_verification=True).select(
-                chosen
-            )
+            table = pq.read_table(path, columns=chosen, partitioning=None, page_checksum_verification=True)
+            table.validate(full=True)  # text that is not UTF-8 would break whoever looks at it
+            return table.select(chosen)
         except (pa.ArrowException, OSError) as error:
             raise damaged(error) from error
 
@@ -217,13 +218,24 @@ def _feather(name: str, data: bytes) -> OpenTable:
     import pyarrow as pa
 
     try:
-        table = pa.ipc.open_file(pa.py_buffer(data)).read_all()
-    except (pa.ArrowException, OSError) as error:
-        reason = str(error).splitlines()[0][:200]
+        reader = pa.ipc.open_file(pa.py_buffer(data))
+        batches: list[pa.RecordBatch] = []
+        room = most_bytes(len(data))
+        for number in range(reader.num_record_batches):
+            batches.append(reader.get_batch(number))
+            batches[-1].validate(full=True)  # a damaged length would be read past the end of the memory
+            room -= batches[-1].nbytes
+            if room < 0:
+                raise InputError(f"{name}: unpacks to more than {_MOST_GROWTH} times its packed size; write it anew.")
+        return replace(_in_memory(pa.Table.from_batches(batches, reader.schema)), source=name)
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise InputError(
-            f"{name}: no Feather file (version 2), or one cut short or damaged; copy it again ({reason})."
+            f"{name}: no Feather file (version 2), or one cut short or damaged; copy it again ({_first_line(error)})."
         ) from error
-    return replace(_in_memory(table), source=name)
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).splitlines()[0][:200] if str(error) else type(error).__name__
 
 
 def _in_memory(table: Any) -> OpenTable:

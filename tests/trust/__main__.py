@@ -9,8 +9,9 @@ import tempfile
 from pathlib import Path
 
 from tests.faults import batches
+from tests.fuzz import mutation
 
-from . import corpus, fuzz, long_runs
+from . import corpus, long_runs
 
 KILLS, FLIGHTS, SAMPLES, FUZZ_S = 50, 200, 1_000_000, 60.0
 
@@ -19,7 +20,7 @@ def main() -> int:
     """Print the table; 1 when anything is not as it must be."""
     counts, lines = corpus.run()
     tried = counts.total()
-    fuzzed, wrong = fuzz.run(FUZZ_S)
+    fuzzed, wrong = mutation.run(FUZZ_S)
     kills, lost = _kills()
     faults = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "tests/faults"],

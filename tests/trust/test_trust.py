@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 from dataclasses import replace
 
 import numpy as np
@@ -11,18 +10,7 @@ import pytest
 from ftproc import pipeline
 from ftproc.simulation import simulate
 
-from . import fuzz, long_runs
-
-
-def test_a_short_fuzz() -> None:
-    tried, wrong = fuzz.run(2.0)
-    assert tried > 100
-    assert wrong == []
-
-
-def test_mutations_are_the_seed_s() -> None:
-    one, two = (fuzz.mutated(b"time_s,range_m\n0,1\n", random.Random(4)) for _ in range(2))
-    assert one == two != b"time_s,range_m\n0,1\n"
+from . import long_runs
 
 
 def test_flights_full_of_outliers_do_not_go_astray_unsaid() -> None:

@@ -1,20 +1,15 @@
-"""A short fuzz of the readers from fixed seeds: good files, mutated byte by byte and piece by piece."""
+"""A short fuzz from fixed seeds in plain Python: small files, mutated byte by byte and piece by piece."""
 
 from __future__ import annotations
 
-import contextlib
 import random
 import tempfile
 import time
-import warnings
-from collections.abc import Callable
 from pathlib import Path
 
-from ftproc.correction import model_file
-from ftproc.errors import FtprocError
-from ftproc.files import logs, truth
+from tests.trust import cases
 
-from . import bad_files, bad_models, bad_truths, cases
+from .targets import all_targets, judge, seeds
 
 _PIECES = (
     b",",
@@ -54,24 +49,17 @@ def mutated(content: bytes, draw: random.Random) -> bytes:
 def run(seconds: float, seed: int = 0) -> tuple[int, list[str]]:
     """How many inputs were tried, and a line for each that came out as something else than a result or a sentence."""
     draw, tried, wrong = random.Random(seed), 0, []
-    seeds: list[tuple[str, bytes, Callable[[Path], object]]] = [
-        ("f.csv", cases.text().encode(), logs.read),
-        ("f.csv", cases.text(separator=";").replace(".", ",").encode(), logs.read),
-        ("f.parquet", bad_files.packed(bad_files.columns(), write_page_checksum=True), logs.read),
-        ("f.csv", bad_truths.text().encode(), truth.read),
-        ("f.safetensors", bad_models.good(), model_file.load),
-    ]
+    found = {name: (target, seeds(target)) for name, target in all_targets().items()}
     until = time.monotonic() + seconds
     with tempfile.TemporaryDirectory() as directory:
         while time.monotonic() < until:
-            name, content, read = draw.choice(seeds)
-            path = Path(directory) / name
-            path.write_bytes(mutated(content, draw))
+            name = draw.choice(sorted(found))
+            target, contents = found[name]
+            content = mutated(draw.choice(contents), draw)
             tried += 1
             try:
-                with cases.in_time(), warnings.catch_warnings(), contextlib.suppress(FtprocError):
-                    warnings.simplefilter("error")
-                    read(path)
+                with cases.in_time():
+                    judge(target, content, Path(directory))
             except Exception as error:
                 wrong.append(f"{name}, input {tried} of seed {seed}: {type(error).__name__}: {error}")
     return tried, wrong

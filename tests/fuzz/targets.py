@@ -1,0 +1,169 @@
+"""What is fuzzed: a target takes the bytes of a file and raises for whatever is neither a result nor a plain sentence.
+
+Two drivers feed them: `mutation` (plain Python, a little of it in every `make test`) and `python -m tests.fuzz`
+(coverage-guided, `make fuzz`). What the latter found worth keeping lies in `corpus/` and is replayed by the tests.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from ftproc import config
+from ftproc.correction import model, model_file
+from ftproc.errors import FtprocError
+from ftproc.files import logs, trajectories, truth
+from tests.trust import bad_files, bad_logs, bad_models, bad_stations, bad_truths, cases
+
+from . import kernel
+
+_LONGEST_NAME = 100
+_LARGEST_SEED = 30_000  # bytes; from small inputs a fuzzer learns faster
+
+
+@dataclass(frozen=True)
+class Target:
+    """check: reads the file at a path, raising FtprocError to refuse it, anything else when the product is wrong.
+
+    suffix: of the file's name. tables: of the corpus of bad files, whose small cases of this kind and suffix are where
+    a fuzzer starts; with what `more` gives.
+    """
+
+    suffix: str
+    kind: str
+    check: Callable[[Path], None]
+    tables: tuple[Callable[[], Iterator[cases.Case]], ...] = ()
+    more: Callable[[], Iterator[bytes]] = lambda: iter(())
+
+
+def judge(target: Target, content: bytes, directory: Path) -> None:
+    """One input. Warnings count as wrong; a refusal must be one plain sentence that names the file."""
+    path = directory / f"f{target.suffix}"
+    path.write_bytes(content)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            target.check(path)
+    except FtprocError as error:
+        cases.judge_sentence(path.name, str(error))
+
+
+def seeds(target: Target) -> list[bytes]:
+    """Small files to begin with, good and bad."""
+    found = [_small_files(table) for table in target.tables]
+    bad = [content for files in found for kind, name, content in files
+           if kind == target.kind and name.endswith(target.suffix)]  # fmt: skip
+    return [*target.more(), *bad]
+
+
+@cache
+def _small_files(table: Callable[[], Iterator[cases.Case]]) -> list[tuple[str, str, bytes]]:
+    """Kind, name and content of each case that is a small file."""
+    found = []
+    for case in table():
+        with tempfile.TemporaryDirectory() as directory:
+            path = case.make(Path(directory))
+            if len(path.name) < _LONGEST_NAME and path.is_file() and path.stat().st_size <= _LARGEST_SEED:
+                found.append((case.kind, path.name, path.read_bytes()))
+    return found
+
+
+def _log(path: Path) -> None:
+    """What can be read comes back bit for bit when it was written; keeping the other columns changes no number."""
+    log = logs.read(path)
+    assert len(log) > 0
+    assert np.isfinite(log.time_s).all()
+    assert (log.time_s[1:] >= log.time_s[:-1]).all()
+    assert not np.isinf(log.measurement).any()
+    again = path.with_name("again.parquet")
+    logs.write(log, again)
+    with contextlib.suppress(FtprocError):  # rows without a time are gone, by which the unit of an angle may be judged
+        same(logs.read(again), log, "time_s", "measurement")
+    same(logs.read(path, keep_columns=True), log, "time_s", "measurement")
+
+
+def _truth(path: Path) -> None:
+    found = truth.read(path)
+    again = path.with_name("again.parquet")
+    truth.write(found, again)
+    same(truth.read(again), found, "time_s", "position_m", "velocity_mps", "outlier")
+
+
+def _trajectory(path: Path) -> None:
+    found = trajectories.read(path)
+    again = path.with_name("again.parquet")
+    trajectories.write(found, again)
+    same(trajectories.read(again), found, "row", "time_s", "measurement", "state", "sigma", "outlier", "nis")
+
+
+def same(found: Any, expected: Any, *names: str) -> None:
+    """AssertionError unless these attributes of two records are equal, NaN and all."""
+    for name in names:
+        a, b = getattr(found, name), getattr(expected, name)
+        assert a is b or np.array_equal(a, b, equal_nan=True), f"{name} does not come back"
+
+
+def _station(path: Path) -> None:
+    """What is understood can be written, and then says the same."""
+    options = config.load(path)
+    config.recipe(options)
+    again = config.parse(config.dump(options), path.name)
+    if "model" in options:
+        again["model"] = options["model"]  # written with its whole path
+    config.recipe(again)
+
+
+def _model(path: Path) -> None:
+    found = model_file.load(path)
+    content = model_file.to_bytes(found)
+    assert model_file.to_bytes(model_file.from_bytes(content, "again")) == content
+    model.card(found)
+
+
+def _parquets() -> Iterator[bytes]:
+    few = {name: column[:5] for name, column in bad_files.columns().items()}
+    yield bad_files.packed(few, write_page_checksum=True)
+    yield bad_files.packed(few, compression="none", use_dictionary=False, write_statistics=False)
+
+
+def _feathers() -> Iterator[bytes]:
+    few = {name: column[:5] for name, column in bad_files.columns(note=np.full(40, "a")).items()}
+    for codec in (None, "lz4", "zstd"):
+        sink = pa.BufferOutputStream()
+        table = pa.table(few)
+        with pa.ipc.new_file(sink, table.schema, options=pa.ipc.IpcWriteOptions(compression=codec)) as stream:
+            stream.write_table(table, max_chunksize=3)
+        yield sink.getvalue().to_pybytes()
+
+
+def _trajectories() -> Iterator[bytes]:
+    for line in (",".join(trajectories.COLUMNS), "time_s,x_m,y_m,z_m,outlier_range,nis,note"):
+        yield (line + "\n" + "\n".join(",".join("1" for _ in line.split(",")) for _ in range(3)) + "\n").encode()
+
+
+_TEXTS = (bad_logs.all_cases, bad_files.all_cases)
+
+
+@cache
+def all_targets() -> dict[str, Target]:
+    """By the names that `make fuzz` has for them."""
+    return {
+        "csv": Target(".csv", "log", _log, _TEXTS),
+        "gzip": Target(".csv.gz", "log", _log, _TEXTS),
+        "parquet": Target(".parquet", "log", _log, (bad_files.all_cases,), _parquets),
+        "feather": Target(".feather", "log", _log, (bad_files.all_cases,), _feathers),
+        "truth": Target(".csv", "truth", _truth, (bad_truths.all_cases,)),
+        "trajectory": Target(".csv", "trajectory", _trajectory, (), _trajectories),
+        "station": Target(".toml", "station", _station, (bad_stations.all_cases,)),
+        "model": Target(".safetensors", "model", _model, (bad_models.all_cases,)),
+        "kernel": Target(".bin", "readings", kernel.check, (), kernel.seeds),
+    }
