@@ -6,6 +6,9 @@ LOGS = sample_data/*.csv sample_data/*.csv.gz sample_data/*.parquet
 OUT = out
 FLAGS =
 MODEL_FLAGS = --scenario family --flights 60 --seed 2021
+FUZZ = csv gzip parquet feather truth trajectory station model kernel
+FUZZ_SECONDS = 600
+OLDEST = tests/files tests/config tests/correction tests/test_pipeline.py tests/test_readme.py
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -18,6 +21,7 @@ bin := $(VENV)/bin
 ftproc := $(bin)/ftproc
 installed := $(VENV)/.installed
 developer := $(VENV)/.installed-dev
+oldest := $(VENV)-oldest/.installed
 warmed := $(VENV)/.warmed
 
 # --- the logs ---------------------------------------------------------------------------------------------------
@@ -45,7 +49,7 @@ $(foreach log,$(logs),$(if $(word 2,$(log-of-$(call stem,$(log)))),\
 $(if $(logs),,$(error LOGS: there is no log among "$(LOGS)"))
 endif
 
-.PHONY: help run test trust samples model bench reproduce clean install FORCE
+.PHONY: help run test trust fuzz oldest audit samples model bench reproduce clean install FORCE
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /make \1	/p' Makefile | expand -t 16
@@ -128,6 +132,27 @@ model: $(warmed) ## train the packaged model anew (MODEL_FLAGS)
 
 trust: $(developer) $(warmed) ## the table of reliability: bad files, faults, long runs, fuzz (some ten minutes)
 	$(bin)/python -m tests.trust
+
+fuzz: $(developer) $(warmed) ## fuzz the readers and the filter (FUZZ) for FUZZ_SECONDS each; findings go to out/fuzz
+	@$(bin)/python -m pip install --quiet --disable-pip-version-check -e '.[fuzz]'
+	@found=0; for target in $(FUZZ); do echo "fuzzing $$target"; \
+	  $(bin)/python -m tests.fuzz $$target $(FUZZ_SECONDS) || found=1; done; exit $$found
+
+oldest: $(oldest) ## the tests OLDEST with the oldest versions that are supported (Python 3.11)
+	NUMBA_CACHE_DIR=$(abspath $(VENV)-oldest/compiled) $(VENV)-oldest/bin/python -m pytest -q -p no:cacheprovider $(OLDEST)
+
+$(oldest): pyproject.toml tests/requirements-oldest.txt
+	@echo 'installing the oldest supported versions in $(VENV)-oldest'
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \
+	  { echo 'The oldest versions need Python 3.11: make oldest PYTHON=/path/to/python3.11' >&2; exit 1; }
+	@$(PYTHON) -m venv $(VENV)-oldest
+	@$(VENV)-oldest/bin/python -m pip install --quiet --disable-pip-version-check \
+	  -c tests/requirements-oldest.txt -e '.[geo,formats,report,wavelet]' pytest hypothesis
+	@touch $@
+
+audit: $(developer) ## whether a vulnerability of one of the tested versions is known to PyPI
+	@$(bin)/python -m pip install --quiet --disable-pip-version-check -e '.[audit]'
+	@$(bin)/python -m tests.trust.audit
 
 bench: $(developer) $(warmed) ## measure accuracy and speed
 	$(bin)/python -m tests.bench

@@ -25,7 +25,7 @@ def require_pymap3d() -> Any:
     try:
         import pymap3d
     except ImportError as error:
-        raise UsageError('--site needs pymap3d, which is not installed: pip install "pymap3d>=3.0".') from error
+        raise UsageError('--site needs pymap3d, which is not installed: pip install "pymap3d>=3.0.1".') from error
     return pymap3d
 
 

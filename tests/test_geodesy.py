@@ -71,7 +71,7 @@ def test_a_kept_column_of_the_same_name():
 
 def test_without_pymap3d(monkeypatch):
     monkeypatch.setitem(sys.modules, "pymap3d", None)
-    with pytest.raises(UsageError, match=r'--site needs pymap3d, which is not installed: pip install "pymap3d>=3.0"'):
+    with pytest.raises(UsageError, match=r'--site needs pymap3d, which is not installed: pip install "pymap3d>=3.0.1"'):
         geodesy.require_pymap3d()
 
 

@@ -29,12 +29,12 @@ def test_python_section_runs(tmp_path, monkeypatch, capsys):
 
 
 def test_files_tables_and_frames_give_the_same(tmp_path):
-    import pandas as pd
     import pyarrow.csv
 
     file = tmp_path / "flight.csv"
     logs.write(ftproc.simulate("zuo2021-outliers", seed=3).log, file)
-    found = [ftproc.filter_log(source) for source in (file, pd.read_csv(file), pyarrow.csv.read_csv(file))]
+    table = pyarrow.csv.read_csv(file)  # older pandas reads a CSV file to the last bit but one
+    found = [ftproc.filter_log(source) for source in (file, table.to_pandas(), table)]
     for other in found[1:]:
         np.testing.assert_array_equal(other.state, found[0].state)
         np.testing.assert_array_equal(other.outlier, found[0].outlier)

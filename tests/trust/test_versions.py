@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-import re
+import json
 import tomllib
 from pathlib import Path
+from typing import Any
+
+from tests.fuzz import targets
+
+from . import audit
 
 ROOT = Path(__file__).parents[2]
+OF_THE_USER = ("cluster", "geo", "formats", "report", "wavelet")
 
 
 def listed(name: str) -> dict[str, str]:
@@ -14,14 +20,43 @@ def listed(name: str) -> dict[str, str]:
     return dict(line.split("==") for line in lines if "==" in line)
 
 
-def test_the_oldest_versions_are_those_of_pyproject() -> None:
+def bounds() -> dict[str, str]:
+    """What a user's installation may need, and from which version on."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    bounds = dict(re.split(">=", need) for need in project["dependencies"])
+    extras = [need for extra in OF_THE_USER for need in project["optional-dependencies"][extra]]
+    return dict(need.split(">=") for need in [*project["dependencies"], *extras])
+
+
+def test_the_oldest_versions_are_those_of_pyproject() -> None:
     oldest = listed("requirements-oldest.txt")
-    for name, bound in bounds.items():
+    assert set(oldest) == set(bounds())
+    for name, bound in bounds().items():
         assert f"{oldest[name]}.".startswith(f"{bound}."), name
 
 
 def test_the_tested_versions_name_every_dependency() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert {need.partition(">=")[0] for need in project["dependencies"]} <= set(listed("requirements-tested.txt"))
+    assert set(bounds()) <= set(listed("requirements-tested.txt"))
+
+
+def test_make_fuzz_knows_every_target() -> None:
+    (line,) = [line for line in (ROOT / "Makefile").read_text().splitlines() if line.startswith("FUZZ = ")]
+    assert sorted(line.removeprefix("FUZZ = ").split()) == sorted(targets.all_targets())
+
+
+def answer(*packages: dict[str, Any]) -> str:
+    return json.dumps({"dependencies": packages, "fixes": []})
+
+
+def test_an_audit_is_believed_only_when_it_was_one() -> None:
+    good: dict[str, Any] = {"name": "numpy", "version": "2.4.6", "vulns": []}
+    bad = {"name": "pillow", "version": "9.0", "vulns": [{"id": "CVE-1", "fix_versions": ["9.1"]}]}
+    unknown = {"name": "ruff", "skip_reason": "Dependency not found on PyPI and could not be audited"}
+    assert audit.verdict(answer(good)) == (["1 of 1 packages audited, 0 vulnerabilities known."], 0)
+    lines, code = audit.verdict(answer(good, bad))
+    assert (lines[0], code) == ("pillow 9.0: CVE-1, mended in 9.1", 1)
+    lines, code = audit.verdict(answer(good, unknown))
+    assert lines[0].startswith("1 of 2 packages audited, 0")
+    assert "NOT audited" in lines[1]
+    assert lines[1].endswith("answer: ruff.")
+    assert code == 0
+    assert audit.verdict("", "a\nno network\n") == (["NOT audited: pip-audit had no answer (no network)."], 0)
