@@ -29,3 +29,11 @@ def test_who_is_astray(begin: int, end: int, expected: bool) -> None:
     state[begin:end, 0] += 1e5
     assert long_runs.is_astray(replace(found, state=state), flight.truth) is expected
     assert np.isfinite(state).all()
+
+
+def test_who_drifts() -> None:
+    flight = simulate("manoeuvre", seed=2, duration_s=150.0, dt_s=0.1, outliers="none")
+    found = pipeline.filter_log(flight.log)
+    assert long_runs.drift(found, found) == 0
+    moved = replace(found, state=found.state + np.r_[np.zeros(3), 2.0, np.zeros(5)])
+    assert long_runs.drift(found, moved) > long_runs.MOST_DRIFT
