@@ -25,7 +25,7 @@ def to_numpy(column: pa.ChunkedArray) -> FloatArray:
 def _chunk(chunk: pa.Array) -> FloatArray:
     validity, data = chunk.buffers()
     place = slice(chunk.offset, chunk.offset + len(chunk))
-    values: FloatArray = np.frombuffer(data, np.float64)[place]
+    values: FloatArray = np.frombuffer(data, np.float64, len(chunk), 8 * chunk.offset)  # a file's may be longer
     if not chunk.null_count:
         return values
     present = np.unpackbits(np.frombuffer(validity, np.uint8), bitorder="little")[place]
