@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -11,7 +9,7 @@ from pathlib import Path
 from tests.faults import batches
 from tests.fuzz import mutation
 
-from . import corpus, long_runs
+from . import corpus, elsewhere, long_runs
 
 KILLS, FLIGHTS, SAMPLES, FUZZ_S = 50, 200, 1_000_000, 60.0
 
@@ -22,14 +20,12 @@ def main() -> int:
     tried = counts.total()
     fuzzed, wrong = mutation.run(FUZZ_S)
     kills, lost = _kills()
-    faults = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "tests/faults"],
-        check=False, capture_output=True, env={**os.environ, "FTPROC_TRUST": "1"},
-    )  # fmt: skip
+    faults = elsewhere.run(*elsewhere.FAULTS, FTPROC_TRUST="1")
+    plain = elsewhere.run(*elsewhere.PLAIN, NUMBA_DISABLE_JIT="1")
     astray = long_runs.many(FLIGHTS)
     endless = long_runs.endless(SAMPLES)
     tracebacks = counts["wrong"] + counts["known"] + len(wrong)
-    for line in [*lines, *wrong, *lost]:
+    for line in filter(None, [*lines, *wrong, *lost, faults.failures, plain.failures]):
         print(line, file=sys.stderr)
     for row in (
         ("what", "count"),
@@ -41,14 +37,18 @@ def main() -> int:
         ("tracebacks, warnings, hangs, wrong results", tracebacks),
         ("runs killed at a random moment", kills),
         ("outputs lost or half-written", len(lost)),
-        ("other faults injected", "all survived" if faults.returncode == 0 else "NOT all survived"),
+        ("other faults injected", faults.passed + faults.failed),
+        ("of these not survived", faults.failed),
         ("flights with 20 % outliers and patches", astray.flights),
         ("of these astray (20 sigma for 2 s)", astray.astray),
         ("divergences unreported", astray.unreported),
-        (f"{SAMPLES:,} samples, sigmas finite and positive", endless),
+        (f"{SAMPLES:,} samples, sigmas finite and positive, as when begun anew", endless),
+        ("tests of the kernels with the compiler off", plain.passed + plain.failed),
+        ("of these failed", plain.failed),
     ):
         print(f"| {row[0]} | {row[1]} |")
-    return int(bool(counts["wrong"] or wrong or lost or faults.returncode or astray.unreported or endless != "ok"))
+    right = faults.all_passed and plain.all_passed and endless == "ok"
+    return int(bool(counts["wrong"] or wrong or lost or astray.unreported or not right))
 
 
 def _kills() -> tuple[int, list[str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from ftproc import pipeline
 from ftproc.simulation import simulate
 
-from . import long_runs
+from . import elsewhere, long_runs
 
 
 def test_flights_full_of_outliers_do_not_go_astray_unsaid() -> None:
@@ -37,3 +38,16 @@ def test_who_drifts() -> None:
     assert long_runs.drift(found, found) == 0
     moved = replace(found, state=found.state + np.r_[np.zeros(3), 2.0, np.zeros(5)])
     assert long_runs.drift(found, moved) > long_runs.MOST_DRIFT
+
+
+def test_failures_elsewhere_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / "test_it.py"
+    path.write_text("import os\ndef test_a(): pass\ndef test_b(): assert os.environ['WORD'] == 'x'\n")
+    one = elsewhere.run(str(path), WORD="x")
+    assert (one.passed, one.failed, one.all_passed, one.failures) == (2, 0, True, "")
+    other = elsewhere.run(str(path), WORD="y")
+    assert (other.passed, other.failed, other.all_passed) == (1, 1, False)
+    assert "test_b" in other.failures
+    assert not elsewhere.run(str(tmp_path / "none")).all_passed
+    path.write_text("import nothing_of_this_name\n")
+    assert elsewhere.run(str(path)).failed == 1

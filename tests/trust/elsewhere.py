@@ -1,0 +1,44 @@
+"""Tests of the suite that count in the table of `make trust`, each in a process of its own."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from typing import NamedTuple
+
+#: What happens to a run from outside: also to the workers and the scheduler of a cluster.
+FAULTS = ("tests/faults", "tests/test_cluster.py")
+
+#: Kernels against plain Python and against each other, those that take seconds when they are not compiled.
+PLAIN = tuple(f"tests/core/test_{name}.py" for name in
+              ("geometry", "motion", "ukf", "ekf", "bridges", "ascent", "forward", "channels", "imm", "indicators",
+               "refraction", "screening", "swaps"))  # fmt: skip
+
+
+class Count(NamedTuple):
+    """Of some tests."""
+
+    passed: int
+    failed: int
+    failures: str
+
+    @property
+    def all_passed(self) -> bool:
+        """And there were some."""
+        return self.passed > 0 and self.failed == 0
+
+
+def run(*files: str, **environment: str) -> Count:
+    """Run the tests of these files; a run that breaks off counts as one failure more."""
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *files],
+        check=False, capture_output=True, text=True, env={**os.environ, **environment},
+    )  # fmt: skip
+    last = done.stdout.strip().rpartition("\n")[2]
+    passed, failed, errors = (
+        sum(map(int, re.findall(rf"(\d+) {word}", last))) for word in ("passed", "failed", "error")
+    )
+    broken = done.returncode != 0 and failed + errors == 0
+    return Count(passed, failed + errors + broken, "" if done.returncode == 0 else done.stdout + done.stderr)
