@@ -2,6 +2,8 @@
 
 DIRECTORY (out/fuzz) takes the inputs that reached something new, in TARGET/, and what is wrong, as TARGET-crash-*.
 It goes on where it stopped. What is worth keeping belongs in corpus/TARGET/, which the tests replay.
+
+With NUMBA_DISABLE_JIT=1 the kernels run as Python: their branches guide the search, but one log takes seconds.
 """
 
 from __future__ import annotations
@@ -22,10 +24,7 @@ def main() -> None:
     """Ends the process: with 0 when the time is over and nothing was found."""
     name, seconds = sys.argv[1], sys.argv[2]
     out = Path(sys.argv[3] if len(sys.argv) > 3 else "out/fuzz")
-    compiled = _KERNELS
-    if name == "kernel":  # numba compiles no instrumented function, so here they run as Python
-        os.environ["NUMBA_DISABLE_JIT"] = "1"
-        compiled = []
+    compiled = [] if os.environ.get("NUMBA_DISABLE_JIT") == "1" else _KERNELS  # numba compiles what is not instrumented
     with atheris.instrument_imports(include=["ftproc", "tomllib"], exclude=compiled):
         import tomllib  # noqa: F401
 
