@@ -11,7 +11,7 @@ from tests.fuzz import mutation
 
 from . import corpus, elsewhere, long_runs
 
-KILLS, FLIGHTS, SAMPLES, FUZZ_S = 50, 200, 1_000_000, 60.0
+KILLS, FLIGHTS, SAMPLES, FUZZ_S = 50, 200, 10_000_000, 60.0
 
 
 def main() -> int:
