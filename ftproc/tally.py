@@ -75,12 +75,10 @@ class Tally:
             self.longest_gap_s = max(self.longest_gap_s, float(gaps.max()))
 
     def _add_sigmas(self, time_s: FloatArray, sigma_m: FloatArray) -> None:
-        if self.every == 1:
-            chosen = np.arange(len(time_s))
-        else:
-            size = (sigma_m**2).sum(1)
-            begins = np.arange(0, len(time_s), self.every)
-            chosen = np.array([low + int(np.argmax(size[low : low + self.every])) for low in begins])
+        groups = -(-len(time_s) // self.every)
+        size = np.zeros(groups * self.every)
+        size[: len(time_s)] = (sigma_m**2).sum(1)
+        chosen = self.every * np.arange(groups) + size.reshape(groups, self.every).argmax(1)
         self.times.append(time_s[chosen])
         self.sigmas.append(sigma_m[chosen])
 

@@ -21,6 +21,7 @@ IntArray = NDArray[np.int64]
 
 SHARE = 0.5  # of the filter's memory, that is merged
 MOST = 16  # readings
+WILD = 0.9  # share of the flight that is no wilder than what the memory is reckoned for
 ROUNDING = 0.01  # of a reading: times are rounded, and must not decide where the number comes out even
 
 
@@ -30,7 +31,7 @@ def how_many(time_s: FloatArray, range_m: float, model: Model, knot_s: float) ->
     if interval <= 0:
         return 1
     noise = float((model.noise_variance * np.array([1.0, range_m**2, range_m**2])).min())
-    memory = (noise * interval / float(model.jerk[:, 0].max())) ** (1 / 6)
+    memory = (noise * interval / float(np.quantile(model.jerk[:, 0], WILD))) ** (1 / 6)
     wanted = SHARE * min(memory, knot_s / 10) / interval
     return int(np.clip(wanted + ROUNDING, 1, MOST))
 
