@@ -219,6 +219,8 @@ def _feather(name: str, data: bytes) -> OpenTable:
 
     try:
         reader = pa.ipc.open_file(pa.py_buffer(data))
+        for field in reader.schema:
+            _check_kind(name, field)
         batches: list[pa.RecordBatch] = []
         room = most_bytes(len(data))
         for number in range(reader.num_record_batches):
@@ -231,6 +233,17 @@ def _feather(name: str, data: bytes) -> OpenTable:
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise InputError(
             f"{name}: no Feather file (version 2), or one cut short or damaged; copy it again ({_first_line(error)})."
+        ) from error
+
+
+def _check_kind(name: str, field: pa.Field) -> None:
+    import pyarrow as pa
+
+    try:
+        pa.nulls(0, field.type)
+    except (KeyError, pa.ArrowException) as error:  # such as intervals of months, which pyarrow cannot hand over
+        raise InputError(
+            f'{name}: column "{field.name}" is of the kind {field.type}, which is not understood; convert or delete it.'
         ) from error
 
 
