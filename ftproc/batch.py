@@ -184,6 +184,8 @@ def _passed_on(source: str, say: Say | None) -> Iterator[None]:
 
 def failure(error: BaseException, source: str | None = None) -> Failure:
     """An error in a plain sentence or two, naming `source` where the error does not do so itself."""
+    if isinstance(error, MemoryError):
+        traceback.clear_frames(error.__traceback__)  # what filled the memory, or the next log would find no room either
     trace = "".join(traceback.format_exception(error))
     about = f"{source}: " if source else ""
     if isinstance(error, FtprocError):

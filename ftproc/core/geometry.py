@@ -28,7 +28,8 @@ def to_cartesian(measurement: FloatArray) -> FloatArray:
 
 def from_cartesian(position: FloatArray) -> FloatArray:
     """(..., 3) x, y, z in m -> (..., 3) range m, azimuth rad in [-pi, pi], elevation rad."""
-    x, y, z = np.moveaxis(np.asarray(position, float), -1, 0)
+    # Contiguous, for some versions of numpy round an arctan2 of strided memory by where it lies.
+    x, y, z = np.ascontiguousarray(np.moveaxis(np.asarray(position, float), -1, 0))
     ground = np.hypot(x, y)
     return np.stack([np.hypot(ground, z), np.arctan2(y, x), np.arctan2(z, ground)], -1)
 

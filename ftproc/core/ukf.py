@@ -31,10 +31,10 @@ TWO_PI = 2 * math.pi
 
 @part
 def wrap_angle(angle: float) -> float:
-    """Angle in rad brought into [-pi, pi); cheap for the usual case of no wrap at all."""
-    if -math.pi <= angle < math.pi:
-        return angle
-    return angle - TWO_PI * math.floor((angle + math.pi) / TWO_PI)
+    """Angle in rad brought into [-pi, pi), NaN left as it is; cheap for the usual case of no wrap at all."""
+    if angle < -math.pi or angle >= math.pi:
+        return angle - TWO_PI * math.floor((angle + math.pi) / TWO_PI)
+    return angle
 
 
 @part

@@ -13,8 +13,8 @@ FAULTS = ("tests/faults", "tests/test_cluster.py")
 
 #: Kernels against plain Python and against each other, those that take seconds when they are not compiled.
 PLAIN = tuple(f"tests/core/test_{name}.py" for name in
-              ("geometry", "motion", "ukf", "ekf", "bridges", "ascent", "forward", "channels", "imm", "indicators",
-               "refraction", "screening", "swaps"))  # fmt: skip
+              ("geometry", "motion", "ukf", "ekf", "bridges", "ascent", "forward", "gate", "channels", "imm",
+               "indicators", "refraction", "screening", "swaps"))  # fmt: skip
 
 
 class Count(NamedTuple):
