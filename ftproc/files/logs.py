@@ -157,7 +157,7 @@ def _check_units(
 
 
 def _likely_unit(quantity: str, typical: float, limit: float) -> tuple[str, str]:
-    words = {"deg": "degrees", "grad": "gradians (gon)", "mil": "mils"}
+    words = {"deg": "degrees (or gon)", "grad": "gradians (gon)", "mil": "mils"}
     for name, word in words.items():
         unit = UNITS[quantity][name]
         if typical * unit.multiply / unit.divide <= limit:

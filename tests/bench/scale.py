@@ -8,7 +8,10 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from ftproc.files import logs
+from ftproc.records import MeasurementLog
 from ftproc.simulation import simulate
 from tests.bench import measuring
 from tests.bench.measuring import Taken
@@ -49,10 +52,19 @@ def rows() -> Iterator[tuple[str, ...]]:
 
 
 def _make(folder: Path, n: int) -> str:
-    """A log of about n rows (some are dropped as gaps); its noise as `--noise` takes it."""
-    flight = simulate("manoeuvre", seed=1, duration_s=n * DT_S, dt_s=DT_S)
-    logs.write(flight.log, folder / f"{n}.csv")
+    """A log of about n rows (some are dropped as gaps); its noise as `--noise` takes it. More than a million are
+    flown to and fro."""
+    flight = simulate("manoeuvre", seed=1, duration_s=min(n, LARGE) * DT_S, dt_s=DT_S)
+    logs.write(to_and_fro(flight.log, n // LARGE) if n > LARGE else flight.log, folder / f"{n}.csv")
     return ",".join(f"{s:.6g}" for s in flight.sigma)
+
+
+def to_and_fro(log: MeasurementLog, times: int) -> MeasurementLog:
+    """The flight of a log so many times, every second time backward."""
+    since, lasts = log.time_s - log.time_s[0], log.time_s[-1] - log.time_s[0] + DT_S
+    time_s = [k * lasts + (since if k % 2 == 0 else since[-1] - since[::-1]) for k in range(times)]
+    measurement = [log.measurement[:: 1 if k % 2 == 0 else -1] for k in range(times)]
+    return MeasurementLog(log.name, np.concatenate(time_s), np.concatenate(measurement), np.arange(times * len(log)))
 
 
 def _filter(folder: Path, n: int, way: str, sigma: str) -> list[str]:

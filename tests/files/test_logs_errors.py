@@ -124,10 +124,13 @@ def test_text_that_is_no_log(make: Make, text: str | bytes, expected: str) -> No
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("t,A,E\n0,180,0.1\n", "it looks like degrees; use --units azimuth=deg (and elevation=deg if that is so too)."),
+        (
+            "t,A,E\n0,180,0.1\n",
+            "it looks like degrees (or gon); use --units azimuth=deg (and elevation=deg if that is so too).",
+        ),
         (
             "t,A,E\n0,1,45\n",
-            '"E" lies beyond 45 rad, which is no elevation: it looks like degrees; use --units elevation=deg',
+            '"E" lies beyond 45 rad, which is no elevation: it looks like degrees (or gon); use --units elevation=deg',
         ),
         ("t,A\n0,380\n", "it looks like gradians (gon); use --units azimuth=grad"),
         (
