@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ftproc.errors import FtprocError, FtprocWarning, interruption
+from ftproc.files import remote
 from ftproc.records import joined
 from ftproc.settings import FilterSettings, Station
 
@@ -44,7 +45,7 @@ class Task:
 
     def at(self, name: str) -> str:
         """Where the file of that name is for whoever does the task."""
-        return str(Path(self.place, name)) if self.place else name
+        return str(Path(self.place, name)) if self.place and not remote.is_uri(name) else name
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 
 from ftproc.errors import InputError
 from ftproc.files.csvtext import row_named
-from ftproc.records import FloatArray, IntArray, MeasurementLog, chunks, forget
+from ftproc.records import FloatArray, IntArray, MeasurementLog, chunks, forget, thinned
 
 FARTHEST_M = 1e12  # half of all ranges beyond: a mistaken column or unit
 SHORTEST_S = 1e-6  # a log of several times that lasts less: a mistaken unit
@@ -28,8 +28,7 @@ def check(log: MeasurementLog) -> IntArray:
             f"{log.name}: range, azimuth and elevation are missing in every row; check the columns and their names."
         )
     _check_times(log)
-    every = 1 + (len(log) - 1) // MOST_RANGES
-    _check_ranges(log.name, np.array(log.measurement[::every, 0]))
+    _check_ranges(log.name, thinned(log.measurement[:, 0], MOST_RANGES))
     return count
 
 

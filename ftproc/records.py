@@ -146,6 +146,17 @@ class Trajectory:
         return plot(self, what)
 
 
+def thinned(array: FloatArray, most: int) -> FloatArray:
+    """Every so many rows of an array (n, ...), so that there are at most `most`; of one on a disk little is held in
+    memory at a time."""
+    every = 1 + max(len(array) - 1, 0) // most
+    found = []
+    for rows in chunks(len(array), every * max((1 << 20) // every, 1)):
+        found.append(np.array(array[rows][::every]))
+        forget(array)
+    return np.concatenate(found) if found else np.array(array)
+
+
 Stretch = TypeVar("Stretch", Diagnostics, Trajectory)
 
 

@@ -11,7 +11,8 @@ TRUST, CAREFUL, NO = "trust", "be careful", "do not trust"
 LEVELS = (TRUST, CAREFUL, NO)  # from good to bad
 FEWEST_GOOD = 20  # readings of a component, for its sigmas to be judged at all
 FAR_OFF = 2.0  # innovations so many times larger than the filter says: its sigmas mean nothing
-MANY_REJECTED, TOO_MANY_REJECTED = 0.3, 0.5  # share of the readings of a component
+MANY_REJECTED, TOO_MANY_REJECTED = 0.25, 0.5  # share of the readings of a component; of flights with a third of all
+# readings wild a fifth goes astray, and hardly any of these shows fewer than a quarter
 
 _OPENING = {TRUST: "Trust it", CAREFUL: "Be careful", NO: "Do not trust it"}
 _ALL_WELL = "readings are no farther off than the sigmas say, and nothing else is in doubt"

@@ -62,7 +62,7 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     "--scheduler",
     metavar="ADDRESS",
     help="Let the workers of a Dask cluster do it: the address of its scheduler, such as tcp://10.0.0.1:8786. Logs and "
-    "outputs must lie where all workers see them under the same name.",
+    "outputs must lie where all workers see them under the same name, or be URIs such as s3://bucket/flight.csv.",
 )
 @click.option(
     "--summary",
@@ -86,9 +86,9 @@ def command(
 ) -> None:
     """Find the outliers of LOGs, and estimate where the target was, how fast, and how sure that is.
 
-    A LOG is a .csv, .csv.gz, .parquet or .feather file with time, range, azimuth and elevation, or - for CSV on
-    standard input. Noise and manoeuvre level are found from the log itself. A bad log does not stop the others; the
-    exit code is then 1.
+    A LOG is a .csv, .csv.gz, .parquet or .feather file (or a URI of one) with time, range, azimuth and elevation, or -
+    for CSV on standard input. Noise and manoeuvre level are found from the log itself. A bad log does not stop the
+    others; the exit code is then 1.
     """
     if list_methods:
         from ftproc.methods import registry

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ftproc.batch import Task
 from ftproc.errors import OutputError, UsageError
-from ftproc.files import atomic, tables, trajectories
+from ftproc.files import atomic, remote, tables, trajectories
 
 #: What a trajectory's name ends in, by what the log's name ends in.
 _SUFFIX = {".csv": ".csv", ".csv.gz": ".csv", ".parquet": ".parquet", ".feather": ".feather"}
@@ -24,25 +24,25 @@ def plan(
     if "-" in logs and len(logs) > 1:
         raise UsageError("- stands for one log on standard input; it cannot be mixed with other logs.")
     if output is None:
-        directory: Path | None = Path()
+        directory: str | None = "."
         if methods:
             raise UsageError("--method all writes several trajectories: name a directory with -o.")
     else:
         directory = _directory(output, several=len(logs) > 1 or bool(methods))
     tasks = [_task(log, output, directory, method) for log in logs for method in (methods or (None,))]
     _check(tasks, [*logs, *inputs])
-    if directory is not None:
-        make(directory)
+    if directory is not None and not remote.is_uri(directory):
+        make(Path(directory))
     for task in tasks:
         atomic.check_target(task.output)
     return tasks
 
 
-def _directory(output: str, several: bool) -> Path | None:
+def _directory(output: str, several: bool) -> str | None:
     """The directory that `-o` names, or None when it names a file or standard output."""
     path = Path(output)
-    if output != "-" and (path.is_dir() or output.endswith("/")):
-        return path
+    if output != "-" and (output.endswith("/") or path.is_dir()):
+        return output
     if output == "-" or trajectories.kind_of(path) is not None:
         if several:
             raise UsageError(f"-o {output}: there are several trajectories to write; name a directory.")
@@ -51,10 +51,10 @@ def _directory(output: str, several: bool) -> Path | None:
         raise UsageError(
             f"-o {output}: end the name in {', '.join(trajectories.SUFFIXES)}, or in / if it is a directory."
         )
-    return path
+    return output
 
 
-def _task(log: str, output: str | None, directory: Path | None, method: str | None) -> Task:
+def _task(log: str, output: str | None, directory: str | None, method: str | None) -> Task:
     if output is not None and directory is None:
         return Task(log, output, method)
     if log == "-" and output is None:
@@ -63,7 +63,7 @@ def _task(log: str, output: str | None, directory: Path | None, method: str | No
     kind = tables.kind_of(Path(name)) or ".csv"
     stem = name[: -len(kind)] if tables.kind_of(Path(name)) else Path(name).stem
     middle = f".{method}" if method else ""
-    return Task(log, str((directory or Path()) / f"{stem}{middle}.trajectory{_SUFFIX[kind]}"), method)
+    return Task(log, remote.within(directory or ".", f"{stem}{middle}.trajectory{_SUFFIX[kind]}"), method)
 
 
 def _check(tasks: Sequence[Task], inputs: Sequence[str]) -> None:

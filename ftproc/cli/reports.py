@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ftproc.cli import outputs
 from ftproc.errors import UsageError
-from ftproc.files import atomic, tables, trajectories
+from ftproc.files import atomic, remote, tables, trajectories
 from ftproc.report import Entry, require_plotly
 
 INDEX = "index.html"
@@ -29,6 +29,8 @@ def plan(names: Sequence[str], given: str | None, inputs: Sequence[str] = ()) ->
     """
     if given is None:
         return [None] * len(names), None
+    if remote.is_uri(given):
+        raise UsageError(f"{_OPTION} {given}: pages are written on this machine; name a file or directory of it.")
     directory = _directory(given, several=len(names) > 1)
     pages = [given] if directory is None else [str(directory / _page(name)) for name in names]
     index = None if directory is None else str(directory / INDEX)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from ..errors import OutputError
+from . import remote
 
 Target = str | Path
 
@@ -21,16 +22,17 @@ def refuse_overwriting(target: Target, inputs: Iterable[Target], option: str = "
     `-` (a standard stream) is never a file. option: the one that names the target.
     """
     for given in inputs:
-        if "-" not in (str(target), str(given)) and _same_file(Path(target), Path(given)):
+        if "-" not in (str(target), str(given)) and _same(target, given):
             raise OutputError(
                 f"{target}: this is the input {given}, which is never overwritten. Give another name with {option}."
             )
 
 
 def check_target(target: Target) -> None:
-    """Raise OutputError at once, before any work is done, when `target` is a directory or stands in none."""
-    path = Path(target)
-    if str(target) == "-":
+    """Raise OutputError at once, before any work is done, when `target` is a directory or stands in none. Of a URI
+    that is on another machine nothing is known before."""
+    path = remote.local(target)
+    if path is None or str(target) == "-":
         return
     if path.is_dir():
         raise _plain(path, IsADirectoryError(errno.EISDIR, ""))
@@ -46,18 +48,24 @@ def replacing(target: Target) -> Iterator[BinaryIO]:
     The bytes go to a hidden file beside the target, are flushed to the disk, and are renamed into place; when
     anything fails the hidden file is removed and an earlier target is left as it was. A symbolic link stays
     one: the file behind it is replaced. A device or named pipe cannot be replaced and is written to directly.
-    Raises OutputError with a plain sentence for every OSError.
+    What a URI names on another machine is stored when it is whole. Raises OutputError with a plain sentence for every
+    OSError.
     """
+    near = remote.local(target)
+    if near is None:
+        with remote.storing(str(target)) as stream:
+            yield stream
+        return
     try:
-        check_target(target)
-        path = _resolved(Path(target))
+        check_target(near)
+        path = _resolved(near)
         if path.exists() and not path.is_file():
             with path.open("wb") as stream:
                 yield stream
         else:
             yield from _beside(path)
     except OSError as error:
-        raise _plain(Path(target), error) from error
+        raise _plain(near, error) from error
 
 
 def sync(stream: BinaryIO) -> None:
@@ -101,6 +109,13 @@ def _resolved(path: Path) -> Path:
     if found.is_symlink():
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
     return found
+
+
+def _same(target: Target, given: Target) -> bool:
+    one, other = remote.local(target), remote.local(given)
+    if one is None or other is None:
+        return str(target) == str(given)
+    return _same_file(one, other)
 
 
 def _same_file(one: Path, other: Path) -> bool:

@@ -58,7 +58,7 @@ def _into(spool: _Spool, source: str, blocks: Blocks, convert: Convert, station:
             quantities, epoch = convert(table)
             quantities["time"] = times.continued(quantities["time"], epoch)
             spool.add(*_canonical(source, quantities, station))
-            sampled.append({name: values[::every] for name, values in quantities.items()})
+            sampled.append({name: values[::every].copy() for name, values in quantities.items()})
     except (InputError, _OutOfOrder):
         return None
     except OSError as error:

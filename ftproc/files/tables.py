@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import gzip
 import io
+import shutil
 import stat
 import sys
+import tempfile
+import weakref
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ..errors import InputError
-from . import csvtext
+from . import csvtext, remote
 from .large import Blocks
 
 if TYPE_CHECKING:
@@ -60,6 +63,7 @@ class OpenTable:
 def open_table(source: Source) -> OpenTable:
     """Open a .csv, .csv.gz, .parquet or .feather file, `-` (CSV on standard input, even gzipped), or a table in memory.
 
+    A file may be named by a URI (see `remote`); then the copy that is read lasts as long as what is returned.
     Raises InputError with a plain sentence when there is no such file, it cannot be read, is damaged or
     empty.
     """
@@ -67,7 +71,20 @@ def open_table(source: Source) -> OpenTable:
         return _in_memory(source)
     if str(source) == "-":
         return _csv("<stdin>", _stdin())
-    name, path = str(source), Path(source)
+    name, path = str(source), remote.local(source)
+    if path is not None:
+        return _open(name, path)
+    directory = tempfile.mkdtemp()
+    try:
+        opened = _open(name, remote.fetch(name, Path(directory)))
+    except BaseException:
+        shutil.rmtree(directory, ignore_errors=True)
+        raise
+    weakref.finalize(opened, shutil.rmtree, directory, ignore_errors=True)
+    return opened
+
+
+def _open(name: str, path: Path) -> OpenTable:
     kind = kind_of(path)
     if kind is None:
         raise InputError(f"{name}: this kind of file is not understood; supported are {', '.join(SUFFIXES)}.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,8 +12,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
+from ..errors import InputError
 from ..records import COMPONENTS, FlagArray, FloatArray, Trajectory, joined
-from . import arrow, atomic, columns, maps, schema, tables, writing
+from . import arrow, atomic, columns, maps, remote, schema, tables, writing
 from .atomic import Target
 from .columns import ACCELERATION, OUTLIER, POSITION, VELOCITY
 
@@ -108,7 +110,7 @@ def _streamed(stretch: Trajectory, target: Target) -> bool:
     return plain and maps.kind_of(target) is None and str(target) != "-" and writing.can_grow(writing.kind_of(target))
 
 
-def _write_beside(beside: Path, stream: BinaryIO, metadata: Mapping[str, Any]) -> None:
+def _write_beside(beside: Target, stream: BinaryIO, metadata: Mapping[str, Any]) -> None:
     """The sidecar is in place before the file it belongs to: whoever waits for the file finds both."""
     _sync_if_file(stream)
     with atomic.replacing(beside) as text:
@@ -120,12 +122,14 @@ def kind_of(path: Path) -> str | None:
     return tables.kind_of(path) or maps.kind_of(path)
 
 
-def sidecar(target: Target) -> Path | None:
+def sidecar(target: Target) -> Target | None:
     """`out.json` for `out.csv`, `out.kml` and such; None for Parquet, Feather and `-`, which need or have none."""
     path = Path(target)
     kind = None if str(target) == "-" else kind_of(path)
     if kind in (None, ".parquet", ".feather"):
         return None
+    if remote.is_uri(target):
+        return str(target)[: -len(str(kind))] + ".json"
     return path.with_name(path.name[: -len(str(kind))] + ".json")
 
 
@@ -177,11 +181,19 @@ def _metadata(source: tables.Source, opened: tables.OpenTable) -> dict[str, Any]
     beside = sidecar(source) if isinstance(source, str | Path) else None
     try:
         if beside is not None:
-            text = beside.read_bytes()
+            text = _bytes(beside)
         found = json.loads(text)
-    except (OSError, ValueError):
+    except (OSError, ValueError, InputError):
         return {}
     return found if isinstance(found, dict) else {}
+
+
+def _bytes(source: Target) -> bytes:
+    path = remote.local(source)
+    if path is not None:
+        return path.read_bytes()
+    with tempfile.TemporaryDirectory() as directory:
+        return remote.fetch(str(source), Path(directory)).read_bytes()
 
 
 def _to_json(metadata: Mapping[str, Any], indent: int | None) -> bytes:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ftproc.core.forward import FilterRun, Model
 from ftproc.core.smoother import SmootherRun
-from ftproc.records import FlagArray, FloatArray, forget
+from ftproc.records import FlagArray, FloatArray, forget, thinned
 
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: stands in for a component that is missing throughout
 FARTHEST = 1e12  # m, rad: a wilder reading is no more of an outlier, but its square would overflow
@@ -101,10 +101,6 @@ class Part(NamedTuple):
 
 def typical_interval(time_s: FloatArray) -> float:
     """The median time between neighbours, s; of a very long log (n,) only every so many are looked at."""
-    n = len(time_s)
-    if n < 2:
+    if len(time_s) < 2:
         return 0.0
-    every = 1 + (n - 2) // MOST_INTERVALS
-    intervals = np.asarray(time_s[1::every]) - np.asarray(time_s[: n - 1 : every])
-    forget(time_s)
-    return float(np.median(intervals))
+    return float(np.median(thinned(time_s[1:], MOST_INTERVALS) - thinned(time_s[:-1], MOST_INTERVALS)))

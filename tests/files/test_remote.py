@@ -1,0 +1,147 @@
+"""Files by URI: fsspec's memory stands for a bucket, file:// is this machine's disk."""
+
+from __future__ import annotations
+
+import gc
+import tempfile
+from pathlib import Path
+
+import fsspec
+import numpy as np
+import pytest
+
+from ftproc import batch
+from ftproc.batch import Recipe, Task
+from ftproc.cli import outputs
+from ftproc.errors import InputError, OutputError, UsageError
+from ftproc.files import atomic, logs, remote, tables, trajectories
+from tests.simulated import simulate
+
+
+@pytest.fixture
+def bucket():
+    """Files in memory, by the name of a bucket that is empty before and after."""
+    files = fsspec.filesystem("memory")
+    files.store.clear()
+    yield files
+    files.store.clear()
+
+
+@pytest.fixture
+def temporary(tmp_path, monkeypatch):
+    """Where temporary files lie; whatever is left there at the end is a leak."""
+    place = tmp_path / "temporary"
+    place.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(place))
+    yield place
+    gc.collect()
+    assert list(place.iterdir()) == []
+
+
+@pytest.fixture
+def flight(tmp_path):
+    log = simulate("cruise", seed=1, duration_s=30.0).log
+    logs.write(log, tmp_path / "flight.csv")
+    return log, tmp_path / "flight.csv"
+
+
+@pytest.mark.parametrize(
+    ("name", "known", "path"),
+    [
+        ("s3://bucket/flight.csv", True, None),
+        ("GS://bucket/flight.csv", True, None),
+        ("file:///tmp/a%20b.csv", True, Path("/tmp/a b.csv")),
+        ("flight.csv", False, Path("flight.csv")),
+        ("C:\\logs\\flight.csv", False, Path("C:\\logs\\flight.csv")),
+        ("a:b//c.csv", False, Path("a:b//c.csv")),
+    ],
+)
+def test_which_names_are_uris(name, known, path):
+    assert remote.is_uri(name) == known
+    assert remote.local(name) == path
+
+
+@pytest.mark.parametrize("large", [False, True])
+@pytest.mark.parametrize("kind", ["csv", "csv.gz", "parquet", "feather"])
+def test_log_from_a_bucket_is_the_log(bucket, temporary, tmp_path, flight, monkeypatch, kind, large):
+    log, _ = flight
+    path = tmp_path / f"log.{kind}"
+    logs.write(log, path)
+    bucket.pipe(f"/bucket/log.{kind}", path.read_bytes())
+    if large:
+        monkeypatch.setattr(tables, "LARGE", 100)
+    found = logs.read(f"memory://bucket/log.{kind}")
+    assert found.name == f"memory://bucket/log.{kind}"
+    np.testing.assert_array_equal(found.measurement, log.measurement)
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_trajectory_in_a_bucket_is_that_on_the_disk(bucket, temporary, tmp_path, flight, kind):
+    bucket.pipe("/bucket/flight.csv", flight[1].read_bytes())
+    near, far = tmp_path / f"out.{kind}", f"memory://bucket/made/out.{kind}"
+    for task in (Task("memory://bucket/flight.csv", str(near)), Task("memory://bucket/flight.csv", far, place="/work")):
+        assert batch.filter_one(task, Recipe()).failure is None
+    assert bucket.cat(f"/bucket/made/out.{kind}") == near.read_bytes()
+    found = trajectories.read(far)
+    assert found.metadata["log"] == "memory://bucket/flight.csv"
+    assert len(found) == len(flight[0])
+
+
+def test_file_uri_is_a_path(tmp_path, flight):
+    uri = f"file://{tmp_path}/out.parquet"
+    assert batch.filter_one(Task(f"file://{flight[1]}", uri), Recipe()).failure is None
+    assert len(trajectories.read(tmp_path / "out.parquet")) == len(flight[0])
+    with pytest.raises(OutputError, match="never overwritten"):
+        atomic.refuse_overwriting(f"file://{flight[1]}", [flight[1]])
+
+
+def test_what_is_not_there_or_unknown_is_said(bucket, temporary):
+    with pytest.raises(InputError, match=r"memory://bucket/none.csv: there is no such file"):
+        logs.read("memory://bucket/none.csv")
+    with pytest.raises(
+        InputError, match=r'nowhere://bucket/a.csv: what "nowhere" is, neither pyarrow nor fsspec knows'
+    ):
+        logs.read("nowhere://bucket/a.csv")
+    with pytest.raises(OutputError, match='what "nowhere" is'), atomic.replacing("nowhere://bucket/a.csv") as stream:
+        stream.write(b"1")
+
+
+def test_failed_output_is_not_stored(bucket, temporary):
+    def half():
+        with atomic.replacing("memory://bucket/out.csv") as stream:
+            stream.write(b"half")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        half()
+    assert not bucket.exists("/bucket/out.csv")
+
+
+def test_storage_that_refuses_is_said(bucket, temporary, monkeypatch):
+    def refuse(*args, **how):
+        raise PermissionError("403 Forbidden\nand a long page")
+
+    monkeypatch.setattr(type(bucket), "_open", refuse)
+    with (
+        pytest.raises(OutputError, match=r"out.csv: cannot be written \(403 Forbidden\); check"),
+        atomic.replacing("memory://bucket/out.csv") as stream,
+    ):
+        stream.write(b"1")
+
+
+def test_outputs_by_uri_are_planned(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    tasks = outputs.plan(["s3://in/a.csv", "s3://in/b.parquet"], "s3://out/clean/")
+    assert [t.output for t in tasks] == ["s3://out/clean/a.trajectory.csv", "s3://out/clean/b.trajectory.parquet"]
+    assert outputs.plan(["s3://in/a.csv"], None)[0].output == "a.trajectory.csv"
+    with pytest.raises(OutputError, match="never overwritten"):
+        outputs.plan(["s3://in/a.csv"], "s3://in/a.csv")
+    assert trajectories.sidecar("s3://out/a.csv") == "s3://out/a.json"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_pages_are_written_on_this_machine(tmp_path):
+    from ftproc.cli import reports
+
+    with pytest.raises(UsageError, match="pages are written on this machine"):
+        reports.plan(["out.parquet"], "s3://bucket/pages/")
