@@ -6,7 +6,6 @@ import gc
 import tempfile
 from pathlib import Path
 
-import fsspec
 import numpy as np
 import pytest
 
@@ -16,6 +15,8 @@ from ftproc.cli import outputs
 from ftproc.errors import InputError, OutputError, UsageError
 from ftproc.files import atomic, logs, remote, tables, trajectories
 from tests.simulated import simulate
+
+fsspec = pytest.importorskip("fsspec")
 
 
 @pytest.fixture
