@@ -6,7 +6,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import datetime
 from typing import IO, TYPE_CHECKING, Any, NamedTuple
@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..records import COMPONENTS, FloatArray, IntArray, MeasurementLog
 from ..settings import Station
 from . import conventions
+from .tables import Blocks
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -25,13 +26,6 @@ SAMPLE_ROWS = 100_000  # for what is judged by the whole of a log, such as its u
 
 #: A block's quantities in SI units, and the midnight that its times count from (or "").
 Convert = Callable[["pa.Table"], tuple[dict[str, FloatArray], str]]
-
-
-class Blocks(NamedTuple):
-    """tables: the log's columns, block by block in file order. rows: roughly how many there are in all."""
-
-    tables: Iterator[pa.Table]
-    rows: int
 
 
 class Sampled(NamedTuple):

@@ -13,11 +13,10 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from ..errors import InputError
 from . import csvtext, remote
-from .large import Blocks
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,6 +35,13 @@ LARGE = 32 << 20
 _HEAD, _BATCH_ROWS = 1 << 20, 1 << 18  # ... bytes that are sure to have the header; rows of a Parquet block
 #: Of text on standard input, which may never end.
 MOST_ON_STDIN = 4 << 30
+
+
+class Blocks(NamedTuple):
+    """tables: columns of a file, block by block in its order. rows: roughly how many there are in all."""
+
+    tables: Iterator[pa.Table]
+    rows: int
 
 
 def _not_large(numeric: Sequence[int]) -> Blocks | None:
