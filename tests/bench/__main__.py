@@ -1,5 +1,5 @@
-"""`python -m tests.bench [accuracy] [methods] [correction] [speed] [scale] [pages]`: the tables of the README, as
-Markdown on standard output and in out/bench.md."""
+"""`python -m tests.bench [accuracy] [methods] [correction] [speed] [scale] [pages]
+[training]`: the tables of the README, as Markdown on standard output and in out/bench.md."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from itertools import chain
 from pathlib import Path
 
-from tests.bench import accuracy, correction, methods, pages, scale, speed
+from tests.bench import accuracy, correction, methods, pages, scale, speed, training
 
 TABLES = {
     "accuracy": accuracy,
@@ -17,6 +17,7 @@ TABLES = {
     "speed": speed,
     "scale": scale,
     "pages": pages,
+    "training": training,
 }
 KEPT = Path("out/bench.md")
 
