@@ -128,6 +128,8 @@ def run_span(
     factor, b, h, c = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
     z_hat, e, used = np.zeros(3), np.zeros(3), np.zeros(3)
     pxz, gain, s, s_inv = np.zeros((9, 3)), np.zeros((9, 3)), np.zeros((3, 3)), np.zeros((3, 3))
+    state, covariance = x, p
+    x, p = motion.own(state, covariance)
     likelihood = 0.0
     for k in range(first, last):
         if k > first:
@@ -153,6 +155,7 @@ def run_span(
             run.nis[k] = nis
             likelihood += gained
         store(k, first, x, p, run)
+    motion.hand_over(x, p, state, covariance)
     return likelihood
 
 

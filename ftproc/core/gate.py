@@ -170,7 +170,9 @@ def run_gated(
     z_hat, e, used = np.zeros(3), np.zeros(3), np.zeros(3)
     pxz, gain, s, s_inv = np.zeros((9, 3)), np.zeros((9, 3)), np.zeros((3, 3)), np.zeros((3, 3))
     full, zero = FULL_AT * gate, ZERO_AT * gate
-    likelihood = 0.0
+    state, covariance = x, p
+    x, p = motion.own(state, covariance)
+    likelihood, lost = 0.0, last
     for k in range(first, last):
         if k > start:
             piece = motion.knot_index(time[k], time[0], knot_s, jerk.shape[0])
@@ -205,8 +207,10 @@ def run_gated(
         line_of_sight_sigma(x, p, run.los_sigma[k])
         run.since_start[k] = k - start
         if k >= retry and (_wild(x) or (not inside and _overdue(track, time[k], longest_patch_s))):
-            return k, likelihood
-    return last, likelihood
+            lost = k
+            break
+    motion.hand_over(x, p, state, covariance)
+    return lost, likelihood
 
 
 @part

@@ -47,6 +47,24 @@ def noise_coefficients(interval: float, out: FloatArray) -> None:
 
 
 @part
+def own(state: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Copies of a state (9,) and its covariance (9, 9) for a kernel to work on: made here, their sizes are known to the
+    compiler, which is worth a fifth of the time."""
+    x, p = np.empty(9), np.empty((9, 9))
+    hand_over(state, covariance, x, p)
+    return x, p
+
+
+@part
+def hand_over(x: FloatArray, p: FloatArray, state: FloatArray, covariance: FloatArray) -> None:
+    """Copy x, P into a state and a covariance."""
+    for i in range(9):
+        state[i] = x[i]
+        for j in range(9):
+            covariance[i, j] = p[i, j]
+
+
+@part
 def predict(x: FloatArray, p: FloatArray, interval: float, jerk: FloatArray, c: FloatArray) -> None:
     """x <- Phi x and P <- Phi P Phi' + Q in place; c is scratch (3, 3).
 

@@ -99,6 +99,7 @@ def _sweep(
     s_invs, gains, pxzs = np.empty((size, 3, 3)), np.empty((size, 9, 3)), np.empty((size, 9, 3))
     r, n, smoothed = np.zeros(9), np.zeros((9, 9)), np.zeros((9, 9))
     u, m, nk, pn = np.zeros(3), np.zeros((3, 3)), np.zeros((9, 3)), np.zeros((9, 9))  # scratch
+    x, p = motion.own(start_x, start_p)
     likelihood = 0.0
     for round_ in range(2 * blocks):
         forward_only = round_ < blocks
@@ -106,14 +107,12 @@ def _sweep(
         low = first + block * BLOCK
         high = min(low + BLOCK, last)
         if forward_only:
-            if block == 0:
-                x, p = start_x.copy(), start_p.copy()
             saved_x[block] = x
             saved_p[block] = p
             if block == blocks - 1:
                 continue  # its filtering is done on the way back
         else:
-            x, p = saved_x[block].copy(), saved_p[block].copy()
+            motion.hand_over(saved_x[block], saved_p[block], x, p)
         for k in range(low, high):
             j = k - low
             if k > first:
