@@ -59,10 +59,12 @@ def storing(uri: str) -> Iterator[BinaryIO]:
             target = _begun(files, path)
             try:
                 shutil.copyfileobj(whole, target, _AT_ONCE)
-            except BaseException:
-                target.abort()
+                target.close()
+            except BaseException:  # what was begun cannot be called off, only taken away
+                with contextlib.suppress(Exception):
+                    target.close()
+                    files.delete_file(path)
                 raise
-            target.close()
 
 
 def _begun(files: Any, path: str) -> Any:

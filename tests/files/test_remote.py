@@ -118,6 +118,20 @@ def test_failed_output_is_not_stored(bucket, temporary):
     assert not bucket.exists("/bucket/out.csv")
 
 
+def test_half_an_output_is_taken_away(bucket, temporary, monkeypatch):
+    def half(source, target, length):
+        target.write(source.read(2))
+        raise OSError("the network is gone")
+
+    monkeypatch.setattr("ftproc.files.remote.shutil.copyfileobj", half)
+    with (
+        pytest.raises(OutputError, match=r"cannot be written \(the network is gone\); check"),
+        atomic.replacing("memory://bucket/out.csv") as stream,
+    ):
+        stream.write(b"whole")
+    assert not bucket.exists("/bucket/out.csv")
+
+
 def test_storage_that_refuses_is_said(bucket, temporary, monkeypatch):
     def refuse(*args, **how):
         raise PermissionError("403 Forbidden\nand a long page")

@@ -119,6 +119,9 @@ def test_segment_without_a_component_looks_farther(flight, in_segments):
     good = np.r_[0:1800, 5200 : len(log)]
     away = np.abs(cut.state[good, :3] - whole.state[good, :3]) / whole.sigma[good, :3]
     assert np.median(away) < 0.3
+    part = anti_outlier._segment(record(log), FilterSettings(), None, (3768, 4710))
+    assert part.first < 1900
+    assert (part.estimate.run.since_start[part.low : part.high] > 0).all()
 
 
 def test_noise_given_is_taken(flight, in_segments):
