@@ -50,16 +50,21 @@ def parts(record: Recording, settings: FilterSettings, block: int = BLOCK) -> It
         kept = _kept(run, settings)
         label = preparing.labels(kept, readings.measurement[:high])
         anew += [first + start.sample for start in (begun if first + low else begun[1:])]
-        end = high if first + high == len(record) else high - _unsure(kept)
+        end = high if first + high == len(record) else high - _unsure(kept, readings.measurement[:high])
         found = Estimate(run, label, model, reacquired=tuple(sample - first for sample in anew))
         yield Part(found, first, done - first, end)
         done = first + end
 
 
-def _unsure(kept: FloatArray) -> int:
-    """How many samples at the end wait for the next stretch to tell how long a run of outliers is."""
-    sure = np.flatnonzero(kept[-HISTORY // 2 :].all(1))
-    return min(HISTORY // 2, len(kept)) - 1 - int(sure[-1]) if sure.size else 0
+def _unsure(kept: FloatArray, measurement: FloatArray) -> int:
+    """How many samples at the end wait for the next stretch to tell how long a run of outliers is; both (n, 3)."""
+    looked_at = min(HISTORY // 2, len(kept))
+    sure = looked_at
+    for used, reading in zip(kept[-looked_at:].T, measurement[-looked_at:].T, strict=True):
+        good, bad = np.flatnonzero(used > 0), np.flatnonzero(np.isfinite(reading) & (used == 0))
+        if good.size and bad.size and bad[-1] > good[-1]:
+            sure = min(sure, int(good[-1]) + 1)
+    return looked_at - sure
 
 
 def estimate(readings: Readings, settings: FilterSettings) -> Estimate:

@@ -52,6 +52,18 @@ def test_recursion_in_blocks_is_the_recursion_bit_for_bit(flight, given, block):
     assert anew
 
 
+def test_run_of_outliers_over_a_seam_has_one_label_also_where_another_component_is_missing(flight):
+    log = replace(flight.log, measurement=flight.log.measurement.copy())
+    log.measurement[1000:, 2] = np.nan
+    # Two lie before the seam, and what makes it a patch behind it.
+    log.measurement[1198:1205, 0] += [800, -900, 1200, -700, 1000, -800, 900]
+    settings = FilterSettings(editing="forward", noise=(5.0, 1e-4, 1e-4), jerk_psd_m2ps5=10.0)
+    one = kept(recursive.parts(record(log), settings, len(log)))
+    many = kept(recursive.parts(record(log), settings, 300))
+    np.testing.assert_array_equal(many["label"], one["label"])
+    assert (one["label"][1198:1203, 0] == 2).all()
+
+
 def test_start_later_than_the_first_block(flight):
     log = replace(flight.log, measurement=flight.log.measurement.copy())
     log.measurement[:900, 0] = np.nan
