@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ftproc.core import ensemble, particles
 from ftproc.core.forward import FilterRun, Model, Start, empty_run, lead_in
-from ftproc.core.gate import RETRY_SAMPLES, reacquire
 from ftproc.core.geometry import line_of_sight_axes
+from ftproc.core.tracking import RETRY_SAMPLES, reacquire
 from ftproc.core.ukf import MIN_RANGE_M
 
 FloatArray = NDArray[np.float64]

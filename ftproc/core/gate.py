@@ -10,7 +10,7 @@ filled in here:
 * A patch begins with a jump of the raw reading (or far outside) and ends with a jump back; a smooth departure inside
   the outer gate is a manoeuvre. During a patch m = 0: the substitute is the prediction itself, and P stays honest.
 * A component that stays outside for longer than the longest patch means that the track is lost, not the reading:
-  the caller starts anew (`run_gated` stops there).
+  the caller starts anew (`run_gated` stops there, see `tracking`).
 """
 
 from __future__ import annotations
@@ -21,10 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core import motion, screening, ukf
-from ftproc.core.forward import FilterRun, Model, Start, empty_run, lead_in, line_of_sight_sigma
+from ftproc.core import motion, ukf
+from ftproc.core.forward import FilterRun, line_of_sight_sigma
 from ftproc.core.jit import kernel, part
-from ftproc.core.start import first_state
 
 FloatArray = NDArray[np.float64]
 
@@ -33,9 +32,6 @@ ZERO_AT = 1.5  # of the gate C: no weight from k1 = 6 sigma on
 JUMP = 4.0  # sigmas of a difference of two readings that make a jump
 SETTLE = 2  # samples within the gate, after the jump back, that end a patch
 FLOOR = 1e-3  # weights below it are zero
-REACQUIRE_SAMPLES = 15
-INLIERS = 0.8  # share of them that must fit a parabola in every component
-RETRY_SAMPLES = 3
 MAX_SPEED_MPS = 2e4
 MAX_ACCELERATION_MPS2 = 2e3
 
@@ -226,131 +222,3 @@ def _wild(x: FloatArray) -> bool:
     speed2 = x[3] * x[3] + x[4] * x[4] + x[5] * x[5]
     acceleration2 = x[6] * x[6] + x[7] * x[7] + x[8] * x[8]
     return not (speed2 < MAX_SPEED_MPS**2 and acceleration2 < MAX_ACCELERATION_MPS2**2)
-
-
-def filter_and_edit(
-    time_s: FloatArray,
-    measurement: FloatArray,
-    allowed: FloatArray,
-    model: Model,
-    starts: list[Start],
-    settings: GateSettings,
-) -> tuple[FilterRun, list[Start]]:
-    """The recursive filter with recursive editing over a whole log, and every start it made.
-
-    time_s (n,), measurement (n, 3); allowed (n, 3): zero bars a reading from the outset (those that the first state
-    was found to contradict); starts: at the beginning and after gaps; samples before the first are extrapolated.
-    """
-    run = empty_run(time_s)
-    _, begun, likelihood = go_on(None, 0, len(time_s), time_s, measurement, allowed, model, starts, settings, run)
-    lead_in(measurement, model, starts[0], run)
-    return run._replace(log_likelihood=likelihood), begun
-
-
-class Track(NamedTuple):
-    """The recursion between two samples; its arrays are changed in place.
-
-    start: the sample at which it began. retry: the first at which it may be called lost. state (9,), covariance (9, 9).
-    memory: (3, 5) of each component, see `_decide`.
-    """
-
-    start: int
-    retry: int
-    state: FloatArray
-    covariance: FloatArray
-    memory: FloatArray
-
-    @classmethod
-    def at(cls, start: Start, retry: int) -> Track:
-        """A track that begins."""
-        memory = np.zeros((3, 5))
-        memory[:, 3] = np.nan
-        return cls(start.sample, retry, start.state.copy(), start.covariance.copy(), memory)
-
-    def shifted(self, samples: int) -> Track:
-        """The track with samples counted from a later one."""
-        return self._replace(start=self.start - samples, retry=self.retry - samples)
-
-
-def go_on(
-    track: Track | None,
-    first: int,
-    stop: int,
-    time_s: FloatArray,
-    measurement: FloatArray,
-    allowed: FloatArray,
-    model: Model,
-    starts: list[Start],
-    settings: GateSettings,
-    run: FilterRun,
-) -> tuple[Track, list[Start], float]:
-    """Filter samples [first, stop), going on with a track (None: the first start makes one) and beginning anew at each
-    start; fills the run. Returns the track at the end, the starts made, and the log-likelihood."""
-    likelihood = 0.0
-    begun: list[Start] = []
-    for start, low, high in _stretches(track, starts, first, stop):
-        if start is not None:
-            begun.append(start)
-            track = Track.at(start, start.sample)
-        assert track is not None
-        track, gained = _follow(track, low, high, time_s, measurement, allowed, model, settings, run, begun)
-        likelihood += gained
-    assert track is not None
-    return track, begun, likelihood
-
-
-def _stretches(track: Track | None, starts: list[Start], first: int, stop: int) -> list[tuple[Start | None, int, int]]:
-    """Where each track goes: the start that it begins with, or None for the one that goes on, and its samples."""
-    begins = [(start, start.sample) for start in starts]
-    going = [(None, first)] if track is not None else []
-    edges = [*going, *begins]
-    return [(s, low, high) for (s, low), high in zip(edges, [e[1] for e in edges[1:]] + [stop], strict=True)]
-
-
-def _follow(
-    track: Track,
-    first: int,
-    stop: int,
-    time_s: FloatArray,
-    measurement: FloatArray,
-    allowed: FloatArray,
-    model: Model,
-    settings: GateSettings,
-    run: FilterRun,
-    begun: list[Start],
-) -> tuple[Track, float]:
-    """Filter [first, stop), re-acquiring when the track is lost; the track at the end and the log-likelihood."""
-    likelihood = 0.0
-    while first < stop:
-        lost, gained = run_gated(
-            first, stop, track.start, time_s, measurement, model.noise_variance, model.jerk, model.knot_s,
-            settings.gate, settings.longest_patch_s, settings.gain_form, track.retry, allowed, track.state,
-            track.covariance, track.memory, run,
-        )  # fmt: skip
-        likelihood += gained
-        if lost == stop:
-            break
-        first = lost + 1
-        again = reacquire(time_s, measurement, model.noise_variance, lost)
-        if again is None:
-            track = track._replace(retry=lost + RETRY_SAMPLES)
-        else:
-            begun.append(again)
-            track = Track.at(again, lost + RETRY_SAMPLES)
-            first = lost  # the sample is filtered again, from the new state
-    return track, likelihood
-
-
-def reacquire(time_s: FloatArray, measurement: FloatArray, noise_variance: FloatArray, sample: int) -> Start | None:
-    """A new start at `sample` from the raw readings just before it, if each component's agree with each other."""
-    low = max(0, sample + 1 - REACQUIRE_SAMPLES)
-    weight = np.zeros_like(measurement)
-    for c in range(3):
-        channel = np.ascontiguousarray(measurement[low : sample + 1, c])
-        seen = np.isfinite(channel)
-        votes, scales = screening.screen_component(time_s[low : sample + 1], channel, REACQUIRE_SAMPLES, c == 1)
-        fits = seen & (votes <= 0.5)
-        if seen.sum() < 5 or fits.sum() < INLIERS * seen.sum() or scales.min() > 3 * np.sqrt(noise_variance[c]):
-            return None
-        weight[low : sample + 1, c] = fits
-    return first_state(time_s, measurement, weight, noise_variance, sample, low, sample + 1)

@@ -27,7 +27,6 @@ LONGEST_WHOLE = 60_000  # samples of a log that is edited as a whole
 KEPT = 40_000  # samples of a segment, without its margins,
 KEPT_MARGINS = 12  # or so many times its margin
 MARGIN_S, LEAST_MARGIN, MOST_MARGIN = 60.0, 1_000, 10_000  # s and samples on each side of a segment
-SPANS, SPAN = 6, 2_000  # in which the noise is looked for, and the samples of each
 
 
 def estimate(readings: Readings, settings: FilterSettings) -> Estimate:
@@ -73,8 +72,7 @@ class Usual(NamedTuple):
 
 def usual(record: Recording, settings: FilterSettings) -> Usual | None:
     """The medians of what spans spread over a log say by themselves; None if none says anything."""
-    firsts = np.linspace(0, len(record) - SPAN, SPANS).astype(int)
-    found = [e for e in side_by_side.in_order(partial(_span, record, settings), firsts) if e is not None]
+    found = [e for e in side_by_side.in_order(partial(_span, record, settings), record.spans()) if e is not None]
     if not found:
         return None
     correlation = np.median([edited.model.correlation for edited in found], 0)
@@ -89,8 +87,8 @@ def usual(record: Recording, settings: FilterSettings) -> Usual | None:
     return Usual(model, bool(np.median([edited.slow_noise for edited in found]) > 0.5))
 
 
-def _span(record: Recording, settings: FilterSettings, first: int) -> editing.Edited | None:
-    readings = record.part(slice(first, first + SPAN))
+def _span(record: Recording, settings: FilterSettings, rows: slice) -> editing.Edited | None:
+    readings = record.part(rows)
     given = preparing.given_sigma(readings, settings)
     try:
         return editing.edit(*readings[:2], given, settings.jerk_psd_m2ps5, settings.gate)

@@ -13,6 +13,7 @@ from ftproc.records import FlagArray, FloatArray, forget, thinned
 
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: stands in for a component that is missing throughout
 FARTHEST = 1e12  # m, rad: a wilder reading is no more of an outlier, but its square would overflow
+SPANS, SPAN = 6, 2_000
 MOST_INTERVALS = 250_000  # between neighbours, for a typical one to be found among them
 
 
@@ -49,6 +50,10 @@ class Recording:
         time_s = np.asarray(self.time_s[rows]) - float(self.time_s[0])
         forget(self.time_s, self.measurement)
         return Readings(time_s, np.ascontiguousarray(measurement), self.assumed_sigma)
+
+    def spans(self) -> list[slice]:
+        """SPANS stretches of SPAN samples, spread evenly: what noise and usual jerk of a long log are found from."""
+        return [slice(first, first + SPAN) for first in np.linspace(0, len(self) - SPAN, SPANS).astype(int)]
 
     def whole(self) -> Readings:
         """The readings of all of it."""

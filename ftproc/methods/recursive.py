@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core import editing, gate, start
+from ftproc.core import editing, gate, start, tracking
 from ftproc.core.forward import FilterRun, Model, Start, empty_run, lead_in
 from ftproc.core.motion import isotropic
 from ftproc.methods import preparing
-from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
+from ftproc.methods.estimate import SPAN, SPANS, Estimate, Part, Readings, Recording, typical_interval
 from ftproc.methods.preparing import HEAD
 from ftproc.records import FloatArray
 from ftproc.settings import FilterSettings
@@ -24,7 +24,6 @@ HISTORY = 256  # samples before it that go with it: the network looks back
 AHEAD = 256  # samples after a gap that a new start is found from
 DEFAULT_PATCH_S = 4.0
 DEFAULT_PATCH_SAMPLES = 32  # the longest patch expected is the longer of the two
-SPANS, SPAN = 6, 2_000  # of a long log, from which noise and jerk are found
 
 
 class Stretch(NamedTuple):
@@ -87,7 +86,7 @@ def _stretches(record: Recording, settings: FilterSettings, model: Model, block:
     longest_s = start.longest_without(typical_interval(record.time_s))
     weight, begin = _beginning(record, settings, model)
     edges = [0, *range(max(block, begin.sample + 1), n, block), n]
-    track: gate.Track | None = None
+    track: tracking.Track | None = None
     last_good_s = np.full(3, np.nan)
     history = empty_run(np.empty(0))
     for low, high in itertools.pairwise(edges):
@@ -102,7 +101,7 @@ def _stretches(record: Recording, settings: FilterSettings, model: Model, block:
         if low == 0:
             starts = [begin, *(anew for anew in starts if anew.sample > begin.sample)]
         run = _prolonged(history, readings.time_s[:stop])
-        track, begun, _ = gate.go_on(track, here, stop, *readings[:2], allowed, model, starts, how, run)
+        track, begun, _ = tracking.go_on(track, here, stop, *readings[:2], allowed, model, starts, how, run)
         if low == 0:
             lead_in(readings.measurement, model, begin, run)
         yield Stretch(readings, run, begun, first, here, stop)
@@ -175,11 +174,10 @@ def _model(record: Recording, settings: FilterSettings) -> Model:
 
 
 def _excerpt(record: Recording) -> Readings:
-    """SPANS spans spread evenly over a long log, else all of it."""
-    n = len(record)
-    if n <= SPANS * SPAN:
+    """Spans spread evenly over a long log, else all of it."""
+    if len(record) <= SPANS * SPAN:
         return record.whole()
-    spans = [record.part(slice(first, first + SPAN)) for first in np.linspace(0, n - SPAN, SPANS).astype(int)]
+    spans = [record.part(rows) for rows in record.spans()]
     time_s, measurement = (np.concatenate([span[k] for span in spans]) for k in (0, 1))
     return Readings(time_s, measurement, record.assumed_sigma)
 

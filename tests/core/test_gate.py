@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core import forward, gate
+from ftproc.core import forward, gate, tracking
 from ftproc.core.forward import Start
 from ftproc.core.geometry import from_cartesian, wrap
 from tests import naive
@@ -15,7 +15,7 @@ from tests.core.tracks import SIGMA, matched, position_error
 def edit(a, z=None, starts=None, allowed=None, **settings):
     """The run, and the samples at which the filter began anew."""
     z, allowed, starts = a.z if z is None else z, a.weight if allowed is None else allowed, starts or a.starts
-    run, begun = gate.filter_and_edit(a.time, z, allowed, a.model, starts, gate.GateSettings(**settings))
+    run, begun = tracking.filter_and_edit(a.time, z, allowed, a.model, starts, gate.GateSettings(**settings))
     assert begun[0] is starts[0]
     return run, [start.sample for start in begun[1:]]
 
