@@ -7,7 +7,6 @@ import contextlib
 import errno
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from datetime import datetime
 from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
@@ -51,7 +50,7 @@ def _into(spool: _Spool, source: str, blocks: Blocks, convert: Convert, station:
         for table in blocks.tables:
             quantities, epoch = convert(table)
             quantities["time"] = times.continued(quantities["time"], epoch)
-            spool.add(*_canonical(source, quantities, station))
+            spool.add(conventions.apply(_timed(source, quantities), station), len(table))
             sampled.append({name: values[::every].copy() for name, values in quantities.items()})
     except (InputError, _OutOfOrder):
         return None
@@ -63,7 +62,7 @@ def _into(spool: _Spool, source: str, blocks: Blocks, convert: Convert, station:
             f"{source}: so large a log is read by way of {place}, which is full; make room there, or name another "
             "directory with TMPDIR."
         ) from error
-    if not spool.rows:
+    if not spool.read_something:
         return None
     time_s, measurement, row = spool.arrays()
     log = MeasurementLog(
@@ -71,25 +70,18 @@ def _into(spool: _Spool, source: str, blocks: Blocks, convert: Convert, station:
         rows_without_time=tuple(spool.without_time), duplicate_times=times.duplicates, epoch=times.epoch,
     )  # fmt: skip
     some = {name: np.concatenate([each[name] for each in sampled]) for name in sampled[0]}
-    return Sampled(log, some, _as_log(source, some))
+    return Sampled(log, some, _timed(source, some))
 
 
-def _canonical(
-    source: str, quantities: Mapping[str, FloatArray], station: Station
-) -> tuple[FloatArray, FloatArray, IntArray, int]:
-    """Times, readings by the convention, and row numbers of the rows that have a time; and the number of all."""
-    block = _as_log(source, quantities)
-    timed = np.flatnonzero(~np.isnan(block.time_s))
-    if len(timed) < len(block):
-        block = replace(block, time_s=block.time_s[timed], measurement=block.measurement[timed])
-    understood = conventions.apply(block, station)
-    return understood.time_s, understood.measurement, timed, len(quantities["time"])
-
-
-def _as_log(source: str, quantities: Mapping[str, FloatArray]) -> MeasurementLog:
+def _timed(source: str, quantities: Mapping[str, FloatArray]) -> MeasurementLog:
+    """The rows that have a time."""
     time_s = quantities["time"]
+    row = np.flatnonzero(~np.isnan(time_s))
     columns = [quantities.get(component, np.full(len(time_s), np.nan)) for component in COMPONENTS]
-    return MeasurementLog(source, time_s, np.column_stack(columns), np.arange(len(time_s)))
+    measurement = np.column_stack(columns)
+    if len(row) < len(time_s):
+        time_s, measurement = time_s[row], measurement[row]
+    return MeasurementLog(source, time_s, measurement, row)
 
 
 class _OutOfOrder(Exception):
@@ -126,18 +118,22 @@ class _Spool(contextlib.ExitStack):
     def __init__(self) -> None:
         super().__init__()
         self.files: list[IO[bytes]] = [self.enter_context(tempfile.TemporaryFile()) for _ in range(3)]  # noqa: SIM115 (it is one)
-        self.rows, self.rows_in_file = 0, 0
+        self.rows, self.rows_in_file, self.read_something = 0, 0, False
         self.without_time: list[int] = []
 
-    def add(self, time_s: FloatArray, measurement: FloatArray, timed: IntArray, rows: int) -> None:
-        for file, values in zip(self.files, (time_s, measurement, timed + self.rows_in_file), strict=True):
+    def add(self, block: MeasurementLog, rows: int) -> None:
+        """The next `rows` of the file, of which `block` has those with a time."""
+        for file, values in zip(
+            self.files, (block.time_s, block.measurement, block.row + self.rows_in_file), strict=True
+        ):
             file.write(np.ascontiguousarray(values).data)
-        if len(timed) < rows:
+        if len(block) < rows:
             absent = np.ones(rows, bool)
-            absent[timed] = False
+            absent[block.row] = False
             self.without_time += (np.flatnonzero(absent) + self.rows_in_file).tolist()
-        self.rows += len(timed)
+        self.rows += len(block)
         self.rows_in_file += rows
+        self.read_something = self.read_something or not bool(np.isnan(block.measurement).all())
 
     def arrays(self) -> tuple[FloatArray, FloatArray, IntArray]:
         """Times (n,), readings (n, 3) and row numbers (n,), mapped."""

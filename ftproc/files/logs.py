@@ -61,7 +61,8 @@ def read(
     wanted = [column.position for column in found.values()]
     others = [place for place in range(len(opened.names)) if keep_columns and place not in wanted]
     _check_others(opened, others)
-    if not others and (blocks := opened.blocks(wanted)) is not None:
+    in_blocks = not others and station.refraction is None  # which needs the distance where none was read
+    if in_blocks and (blocks := opened.blocks(wanted)) is not None:
         read_so = large.read(opened.source, blocks, partial(_converted, opened, found), station)
         if read_so is not None:
             log, quantities, sample = read_so

@@ -230,6 +230,7 @@ def _parquet(name: str, path: Path) -> OpenTable:
         try:
             with pq.ParquetFile(path, page_checksum_verification=True) as file:
                 for batch in file.iter_batches(_BATCH_ROWS, columns=chosen):
+                    batch.validate(full=True)
                     yield pa.Table.from_batches([batch]).select(chosen)
         except (pa.ArrowException, OSError) as error:
             raise damaged(error) from error

@@ -13,7 +13,7 @@ import pytest
 
 from ftproc.errors import InputError
 from ftproc.files import csvtext, large, logs, tables
-from ftproc.settings import Station
+from ftproc.settings import Air, Station
 
 ROWS = 3000
 
@@ -164,3 +164,37 @@ def test_file_that_only_says_it_is_large(tmp_path, in_blocks):
     path.write_text(",".join(columns()) + "\n" * 3000)
     with pytest.raises(InputError, match="no rows"):
         logs.read(path)
+
+
+def test_no_reading_at_all_is_told(tmp_path, in_blocks):
+    path = tmp_path / "log.csv"
+    path.write_text(text(columns(), {k: f"{k},,," for k in range(ROWS)}))
+    with pytest.raises(InputError, match="no row has a range, azimuth or elevation"):
+        logs.read(path)
+
+
+def test_text_in_parquet_that_is_not_utf_8_is_told(tmp_path, in_blocks):
+    table = columns()
+    table["azimuth_deg"] = pa.array([b"\x81"] * ROWS).view(pa.string())
+    path = tmp_path / "log.parquet"
+    pq.write_table(pa.table(table), path)
+    with pytest.raises(InputError, match="damaged"):
+        logs.read(path)
+
+
+def test_doubts_do_not_rest_on_rows_without_time(tmp_path, in_blocks, monkeypatch):
+    path = tmp_path / "log.csv"
+    path.write_text(text(columns(), {k: ",9000,5,85" for k in range(0, ROWS, 2)} | {1: "10.1,9000,5,85"}))
+    cut, whole = both(path, monkeypatch)
+    same(cut, whole)
+    assert not cut.remarks
+
+
+def test_ray_is_bent_by_the_distance_read_far_away(tmp_path, in_blocks, monkeypatch):
+    """A long stretch without ranges lies between two that have them, blocks away."""
+    path = tmp_path / "log.csv"
+    path.write_text(text(columns(), {k: f"{10 + 0.1 * k:.9g},,5,5" for k in range(1000, 2500)}))
+    station = Station(refraction=Air())
+    log = logs.read(path, station=station)
+    monkeypatch.setattr(tables, "LARGE", 1 << 40)
+    same(log, logs.read(path, station=station))

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pyarrow as pa
@@ -21,7 +22,8 @@ import pyarrow as pa
 from ftproc import config
 from ftproc.correction import model, model_file
 from ftproc.errors import FtprocError
-from ftproc.files import logs, trajectories, truth
+from ftproc.files import csvtext, logs, tables, trajectories, truth
+from ftproc.records import MeasurementLog
 from tests.trust import bad_files, bad_logs, bad_models, bad_stations, bad_truths, cases
 
 from . import kernel
@@ -79,6 +81,7 @@ def _small_files(table: Callable[[], Iterator[cases.Case]]) -> list[tuple[str, s
 
 def _log(path: Path) -> None:
     """What can be read comes back bit for bit when it was written; keeping the other columns changes no number."""
+    _in_blocks(path)
     log = logs.read(path)
     assert len(log) > 0
     assert np.isfinite(log.time_s).all()
@@ -89,6 +92,28 @@ def _log(path: Path) -> None:
     with contextlib.suppress(FtprocError):  # rows without a time are gone, by which the unit of an angle may be judged
         same(logs.read(again), log, "time_s", "measurement")
     same(logs.read(path, keep_columns=True), log, "time_s", "measurement")
+
+
+_CHECKED = ("time_s", "measurement", "row", "rows_in_file", "rows_without_time", "rows_out_of_order",
+            "duplicate_times", "epoch", "frame", "remarks")  # fmt: skip
+
+
+def _in_blocks(path: Path) -> None:
+    """A log is the same, and refused in the same words, whether it is read as a whole or as a large one is."""
+    whole = _read_or_refused(path)
+    with mock.patch.multiple(tables, LARGE=0, _BATCH_ROWS=3), mock.patch.object(csvtext, "_BLOCK", 64):
+        in_blocks = _read_or_refused(path)
+    if isinstance(whole, str) or isinstance(in_blocks, str):
+        assert in_blocks == whole
+    else:
+        same(in_blocks, whole, *_CHECKED)
+
+
+def _read_or_refused(path: Path) -> MeasurementLog | str:
+    try:
+        return logs.read(path)
+    except FtprocError as error:
+        return str(error)
 
 
 def _truth(path: Path) -> None:
@@ -109,7 +134,8 @@ def same(found: Any, expected: Any, *names: str) -> None:
     """AssertionError unless these attributes of two records are equal, NaN and all."""
     for name in names:
         a, b = getattr(found, name), getattr(expected, name)
-        assert a is b or np.array_equal(a, b, equal_nan=True), f"{name} does not come back"
+        equal = np.array_equal(a, b, equal_nan=True) if isinstance(a, np.ndarray) else a == b
+        assert equal, f"{name} does not come back"
 
 
 def _station(path: Path) -> None:
