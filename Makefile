@@ -6,7 +6,7 @@ LOGS = sample_data/*.csv sample_data/*.csv.gz sample_data/*.parquet
 OUT = out
 FLAGS =
 MODEL_FLAGS = --scenario family --flights 60 --seed 2021
-FUZZ = csv gzip parquet feather truth trajectory station model kernel
+FUZZ = csv gzip parquet feather truth trajectory station model header kernel
 FUZZ_SECONDS = 600
 OLDEST = tests/files tests/config tests/correction tests/test_pipeline.py tests/test_readme.py
 

@@ -7,6 +7,7 @@ Two drivers feed them: `mutation` (plain Python, a little of it in every `make t
 from __future__ import annotations
 
 import contextlib
+import json
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator
@@ -18,8 +19,9 @@ from unittest import mock
 
 import numpy as np
 import pyarrow as pa
+from safetensors.numpy import save as serialise
 
-from ftproc import config
+from ftproc import config, pipeline
 from ftproc.correction import model, model_file
 from ftproc.errors import FtprocError
 from ftproc.files import csvtext, logs, tables, trajectories, truth
@@ -149,10 +151,31 @@ def _station(path: Path) -> None:
 
 
 def _model(path: Path) -> None:
-    found = model_file.load(path)
+    _sound(model_file.load(path))
+
+
+def _header(path: Path) -> None:
+    """The text is what a model says of itself, around the tensors of the packaged one."""
+    text = path.read_bytes().decode("utf-8", "replace")
+    content = bytes(serialise(bad_models.parts()[0], metadata={bad_models.KEY: text}))
+    _sound(model_file.from_bytes(content, path.name))
+
+
+def _sound(found: model.Model) -> None:
+    """It comes back bit for bit, can be described, and does no harm to a flight."""
     content = model_file.to_bytes(found)
     assert model_file.to_bytes(model_file.from_bytes(content, "again")) == content
     model.card(found)
+    with contextlib.suppress(FtprocError):  # trained for another method
+        cases.judge_trajectory(pipeline.filter_log(cases.flight().log, None, found))
+
+
+def _headers() -> Iterator[bytes]:
+    whole = bad_models.parts()[1]
+    yield json.dumps(whole).encode()
+    for stage in whole["stages"].values():
+        stage["verdict"] = None
+    yield json.dumps(whole).encode()
 
 
 def _parquets() -> Iterator[bytes]:
@@ -191,5 +214,6 @@ def all_targets() -> dict[str, Target]:
         "trajectory": Target(".csv", "trajectory", _trajectory, (), _trajectories),
         "station": Target(".toml", "station", _station, (bad_stations.all_cases,)),
         "model": Target(".safetensors", "model", _model, (bad_models.all_cases,)),
+        "header": Target(".json", "header", _header, (), _headers),
         "kernel": Target(".bin", "readings", kernel.check, (), kernel.seeds),
     }
