@@ -26,6 +26,7 @@ FloatArray = NDArray[np.float64]
 SPREAD = 3.0  # sqrt(n + lambda) with n = 9, alpha = 1, kappa = 0
 MAX_SPREAD_IN_RANGES = 0.3  # of the sigma points about the state
 MIN_RANGE_M = 1.0  # below this the direction of the target has no meaning
+ROUNDING = 1e-15  # of a number, below which its last digits say nothing
 TWO_PI = 2 * math.pi
 
 
@@ -259,3 +260,6 @@ def _restore_joseph(
                 v += (spread - residue[i, k]) * gain[j, k]
             p[i, j] = v
             p[j, i] = v
+    for i in range(9):  # what is left of a variance is not known better than what was taken from it
+        taken = gain[i, 0] * pxz[i, 0] + gain[i, 1] * pxz[i, 1] + gain[i, 2] * pxz[i, 2]
+        p[i, i] = max(p[i, i], ROUNDING * abs(taken))

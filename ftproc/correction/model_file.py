@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -72,7 +73,7 @@ def from_bytes(content: bytes, name: str) -> Model:
     if _KEY not in metadata:
         raise ModelError(f"{name}: a safetensors file, but not a correction model; `ftproc train` writes one")
     try:
-        header = json.loads(metadata[_KEY])
+        header = json.loads(metadata[_KEY], parse_float=_finite, parse_constant=_finite)
         schema = header["schema"]
     except (ValueError, KeyError, TypeError, RecursionError) as cause:
         raise ModelError(f"{name}: the model's header is damaged; train it again") from cause
@@ -86,6 +87,13 @@ def from_bytes(content: bytes, name: str) -> Model:
         return Model(stages, dict(header["settings"]))
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as cause:
         raise ModelError(f"{name}: the model's header is damaged ({cause}); train it again") from cause
+
+
+def _finite(text: str) -> float:
+    """A number of the header; what is none, or too large for one, cannot be written again."""
+    if not math.isfinite(number := float(text)):
+        raise ValueError(f"{text} is no finite number")
+    return number
 
 
 def _stage(header: Mapping[str, Any], tensors: Mapping[str, Any], key: str, name: str) -> Stage:

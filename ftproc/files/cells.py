@@ -52,10 +52,20 @@ def as_text(column: pa.ChunkedArray) -> pa.ChunkedArray:
             cells = [None if cell is None else cell.decode("utf-8", "replace") for cell in column.to_pylist()]
             column = pa.chunked_array([pa.array(cells, pa.string())])
     elif not (types.is_string(column.type) or types.is_large_string(column.type)):
-        cells = [None if cell is None else str(cell) for cell in column.to_pylist()]
+        cells = [None if cell is None else str(cell) for cell in _in_python(column)]
         column = pa.chunked_array([pa.array(cells, pa.string())])
     trimmed = pc.utf8_trim_whitespace(column)
     return pc.if_else(pc.is_in(trimmed, pa.array(MISSING_WORDS, trimmed.type)), None, trimmed)
+
+
+def _in_python(column: pa.ChunkedArray) -> list[object]:
+    import pyarrow as pa
+
+    try:
+        return list(column.to_pylist())
+    except (OverflowError, ValueError):  # a time beyond Python's calendar
+        ticks = column.cast(pa.int64()).to_pylist()
+        return [None if tick is None else f"{tick} as {column.type}" for tick in ticks]
 
 
 def has_comma(text: pa.ChunkedArray) -> bool:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _DAY_S = 86400
 _MOST_TICKS = 2**63 - 1
+_FIRST_DAY, _LAST_DAY = (int(np.datetime64(day).astype(int)) for day in ("0001-01-01", "9999-12-31"))
 _PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 
 
@@ -129,6 +130,10 @@ def _since_midnight(column: pa.ChunkedArray, origin: Origin) -> tuple[FloatArray
     ticks = column.cast(pa.int64())
     earliest, latest = (found or 0 for found in pc.min_max(ticks).as_py().values())  # None when every cell is missing
     day = earliest // per_day
+    for tick in (earliest, latest):
+        if not _FIRST_DAY <= tick // per_day <= _LAST_DAY:
+            said = f"{tick} {column.type.unit} from 1970 on"
+            raise origin.bad(ticks.to_pylist().index(tick), said, "a time between the years 1 and 9999")
     if day * per_day < -_MOST_TICKS or latest - day * per_day > _MOST_TICKS:
         raise origin.bad(
             ticks.to_pylist().index(earliest), f"{earliest} {column.type.unit}", "a time of the others' age"

@@ -247,3 +247,18 @@ def test_options_that_are_not_understood(make: Make) -> None:
         assert expected in str(caught.value)
         assert isinstance(caught.value, FtprocError)
         assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize("name", ["time", "azimuth_rad"])
+def test_a_time_beyond_the_calendar_is_told_wherever_it_stands(name):
+    far = pa.array([5, 2**43], pa.timestamp("s"))
+    table = pa.table({"time": pa.array([5, 6], pa.timestamp("s")), "range_m": [1.0, 2.0], "azimuth_rad": [0.0, 0.0]})
+    with pytest.raises(InputError, match=r"row [01] .the first data row is 0., column") as error:
+        logs.read(table.set_column(table.column_names.index(name), name, far))
+    assert ("between the years 1 and 9999" in str(error.value)) == (name == "time")
+
+
+def test_times_that_are_ages_apart_are_told():
+    ends = pa.array([-(2**63) + 10**15, 2**63 - 10**15], pa.timestamp("ns"))
+    with pytest.raises(InputError, match=r"is not a time of the others' age"):
+        logs.read(pa.table({"time": ends, "range_m": [1.0, 2.0]}))
