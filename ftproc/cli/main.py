@@ -63,6 +63,7 @@ class Program(click.Group):
             if isinstance(stop, SystemExit):
                 raise stop from None
             code = _report(stop or error, DEBUG in given)  # the error may have come before it was parsed
+            _empty_stdout()
         sys.exit(code if isinstance(code, int) else 0)
 
 
@@ -80,7 +81,6 @@ def _report(error: BaseException, debug: bool) -> int:
         click.echo(_usage(error), err=True)
         return error.exit_code
     if isinstance(error, BrokenPipeError):  # whoever read our output has seen enough
-        _silence_stdout()
         return 1
     from ftproc.batch import failure
 
@@ -100,11 +100,15 @@ def _usage(error: click.ClickException) -> str:
     return f"{path}: {message}{'' if message.endswith(('.', '?')) else '.'} See {path} -h."
 
 
-def _silence_stdout() -> None:
-    """Python flushes standard output once more at exit, and would complain again."""
+def _empty_stdout() -> None:
+    """What is left for a standard output that takes no more is thrown away: Python would try again at exit, and
+    complain."""
     import os
 
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _terminated(signum: int, frame: object) -> None:
