@@ -25,6 +25,7 @@ FloatArray = NDArray[np.float64]
 
 LOOKS = 6
 LEAST_KEPT = 0.8  # of the readings of a component that were good before the first look
+OTHER_LEVEL = 2.5  # times the jerk level at which an opposite was tried, before it is tried again
 LOOK_STEPS = 3  # of the search for the jerk profile
 STANDS_OUT = 8.0  # times the median of the jerk profile
 AROUND = 200  # samples on each side of what stands out that are decided with it
@@ -64,13 +65,18 @@ def _look_until_settled(record: Record, decision: Decision, profile: Model | Non
     left is taken for theirs, ever fewer are left.
     """
     first = decision.weight
+    tried: set[swaps.Island] = set()
+    tried_at = np.inf
     for _ in range(LOOKS):
         if profile is None:
             profile = tuning.fit_profile(*record.log, decision.weight, decision.starts, decision.model, LOOK_STEPS)
         calm = tuning.median_level(profile)
+        level = float(calm.jerk[0, 0])
+        if not tried_at / OTHER_LEVEL < level < tried_at * OTHER_LEVEL:
+            tried, tried_at = set(), level
         suspects = _suspects(record, decision, calm, profile)
         whole = swaps.Neighbourhood(*record.log, record.possible, calm, decision.rates, record.gate)
-        weight = swaps.try_opposites(whole, np.where(suspects, 0.0, decision.weight))
+        weight = swaps.try_opposites(whole, np.where(suspects, 0.0, decision.weight), tried)
         if not _stands_out(record.time_s, profile).any() and (weight == decision.weight).all():
             break
         again = decide(record, decision._replace(weight=weight, model=calm), tune_first=False)

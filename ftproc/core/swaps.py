@@ -2,20 +2,22 @@
 
 A filter that has followed a patch calls the good readings on both sides of it bad, and the decisions stand still
 there, because each supports the others. Where a short stretch of used readings lies between two rejected runs, or
-between one and a gap, the decisions are made again from the opposite on, over the neighbourhood alone, and the
-likelier outcome is kept.
+between one and a gap, the decisions are made again from other beginnings, over the neighbourhood alone, and the
+likeliest outcome is kept.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core import indicators
+from ftproc.core import indicators, patches
 from ftproc.core.forward import Model
+from ftproc.core.patches import SHORTEST_RUN
 from ftproc.core.runs import runs_of
 from ftproc.core.smoother import SmootherRun, smooth_log
 from ftproc.core.start import begin_all
@@ -23,13 +25,16 @@ from ftproc.core.start import begin_all
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-SHORTEST_RUN = 3  # rejected readings on each side
-LONGEST = 48  # used readings between them
+LONGEST = 48  # used readings between two rejected runs
 GAP_INTERVALS = 8.0  # median intervals without a reading, which a patch may end at
 AROUND = 80  # samples on each side that the comparison looks at
 ROUNDS = 5
-MARGIN = 5.0  # by which the log-probability of the opposite must be better
+MARGIN = 5.0  # by which the log-probability of another decision must be better
 MOST = 100  # comparisons in one look
+STEPS = 14  # of filling a hole, or of taking out what stands out most
+FITS = 2.5  # sigmas off at which a reading is taken into a hole
+SURE, ALMOST = 1.5, 1.3  # times the noise, or the smallest sigma in the hole: where the track is known well enough
+APART = 6  # samples between readings that are taken out at once
 
 
 class Neighbourhood(NamedTuple):
@@ -44,6 +49,7 @@ class Neighbourhood(NamedTuple):
     gate: float
 
     def part(self, near: slice) -> Neighbourhood:
+        """The readings of a slice."""
         return self._replace(time_s=self.time_s[near], measurement=self.measurement[near], possible=self.possible[near])
 
 
@@ -57,24 +63,35 @@ class Island(NamedTuple):
     end: int
     last: int
 
+    def shifted(self, samples: int) -> Island:
+        """With samples counted from a later one."""
+        return Island(self.component, *(place - samples for place in self[1:]))
 
-def try_opposites(log: Neighbourhood, weight: FloatArray) -> FloatArray:
-    """The decisions (n, 3), with better ones in their place where the opposite is likelier."""
+
+class Step(NamedTuple):
+    """Decisions (n, 3), and the log-probability of the readings and of the decisions themselves."""
+
+    weight: FloatArray
+    likelihood: float
+
+
+def try_opposites(log: Neighbourhood, weight: FloatArray, tried: set[Island]) -> FloatArray:
+    """The decisions (n, 3), with better ones in their place where others are likelier. tried: islands that were looked
+    at before, and now are again only if they have changed; those looked at are put in."""
     result = weight.copy()
-    for component, first, begin, end, last in islands(log.time_s, weight, log.possible)[:MOST]:
-        low = max(first - AROUND, 0)
-        near = slice(low, last + AROUND)
-        opposite = result[near].copy()
-        opposite[first - low : last - low, component] = 1.0
-        opposite[begin - low : end - low, component] = 0.0
+    new = [island for island in islands(log.time_s, weight, log.possible) if island not in tried]
+    for island in new[:MOST]:
+        tried.add(island)
+        low = max(island.first - AROUND, 0)
+        near = slice(low, island.last + AROUND)
         part = log.part(near)
         try:
-            steps = [*_decisions(part, result[near]), *_decisions(part, opposite * part.possible)]
+            steps = [*_decisions(part, result[near]), *_others(part, result[near], island.shifted(low))]
         except ValueError:  # a component says too little hereabouts
             continue
-        decided, likeliest = max(steps, key=lambda step: step[1])
-        if likeliest > steps[0][1] + MARGIN:
-            result[near] = decided
+        likeliest = max(steps, key=lambda step: step.likelihood)
+        if likeliest.likelihood > steps[0].likelihood + MARGIN:
+            result[near] = likeliest.weight
     return result
 
 
@@ -103,15 +120,25 @@ def _inside(place: int, runs: IntArray) -> bool:
     return bool(((runs[:, 0] <= place) & (place <= runs[:, 1])).any())
 
 
-def _decisions(log: Neighbourhood, weight: FloatArray) -> list[tuple[FloatArray, float]]:
-    """The decisions from `weight` on until they stand still, each with the log-probability of the readings and of the
-    decisions themselves."""
+def _others(log: Neighbourhood, weight: FloatArray, island: Island) -> Iterator[Step]:
+    """Decisions that begin with the opposite, and such as begin with nothing known of the component there."""
+    component, first, begin, end, last = island
+    opposite = weight.copy()
+    opposite[first:last, component] = 1.0
+    opposite[begin:end, component] = 0.0
+    steps = _without_the_worst(log, opposite * log.possible)
+    yield from steps
+    yield from _decisions(log, max(steps, key=lambda step: step.likelihood).weight)
+    yield from _filled(log, weight, component, slice(first, last))
+
+
+def _decisions(log: Neighbourhood, weight: FloatArray) -> list[Step]:
+    """The decisions from `weight` on until they stand still."""
     steps = []
-    noise = log.model.noise_variance
     for _ in range(ROUNDS):
-        starts = begin_all(log.time_s, log.measurement, weight, noise, float(log.model.jerk[0, 0]))
-        smoothed = smooth_log(log.time_s, log.measurement, weight, log.model, starts, residuals_only=True)
-        steps.append((weight, smoothed.log_likelihood + _rejections(log, weight, smoothed)))
+        step, smoothed = _step(log, weight)
+        steps.append(step)
+        noise = log.model.noise_variance
         good = indicators.classify(smoothed.residual, smoothed.residual_variance, noise, log.rates.copy(), log.gate)
         decided = ((good > 0.5) & log.possible).astype(float)
         if (decided == weight).all():
@@ -120,18 +147,63 @@ def _decisions(log: Neighbourhood, weight: FloatArray) -> list[tuple[FloatArray,
     return steps
 
 
+def _without_the_worst(log: Neighbourhood, weight: FloatArray) -> list[Step]:
+    """The decisions with ever fewer readings, the worst of each surroundings first: beside a wild one, good ones look
+    bad."""
+    steps = []
+    for _ in range(STEPS):
+        step, smoothed = _step(log, weight)
+        steps.append(step)
+        off = np.where(weight > 0, np.abs(smoothed.residual) / np.sqrt(smoothed.residual_variance), 0.0)
+        weight = weight.copy()
+        for c in range(3):
+            beyond = np.flatnonzero(off[:, c] > log.gate)
+            for k in beyond[np.argsort(-off[beyond, c])]:
+                if off[k, c] > 0:
+                    weight[k, c] = 0.0
+                    off[max(k - APART, 0) : k + APART + 1, c] = 0.0
+        if (weight == step.weight).all():
+            break
+    return steps
+
+
+def _filled(log: Neighbourhood, weight: FloatArray, component: int, hole: slice) -> list[Step]:
+    """The decisions when a component's readings in a hole are taken in from its edges on, where they fit the track."""
+    steps = []
+    weight = weight.copy()
+    weight[hole, component] = 0.0
+    inside = np.zeros(len(weight), bool)
+    inside[hole] = log.possible[hole, component]
+    noise = float(np.sqrt(log.model.noise_variance[component]))
+    for _ in range(STEPS):
+        step, smoothed = _step(log, weight)
+        steps.append(step)
+        out = np.flatnonzero(inside & (weight[:, component] <= 0))
+        sigma = np.sqrt(smoothed.residual_variance[out, component])
+        fits = np.abs(smoothed.residual[out, component]) < FITS * sigma
+        if not fits.any():
+            break
+        known = sigma <= max(SURE * noise, ALMOST * sigma[fits].min())
+        weight = weight.copy()
+        weight[out[fits & known], component] = 1.0
+    return steps
+
+
+def _step(log: Neighbourhood, weight: FloatArray) -> tuple[Step, SmootherRun]:
+    """How likely the decisions are, and what the readings used say of each other."""
+    noise = log.model.noise_variance
+    starts = begin_all(log.time_s, log.measurement, weight, noise, float(log.model.jerk[0, 0]))
+    smoothed = smooth_log(log.time_s, log.measurement, weight, log.model, starts, residuals_only=True)
+    return Step(weight, smoothed.log_likelihood + _rejections(log, weight, smoothed)), smoothed
+
+
 def _rejections(log: Neighbourhood, weight: FloatArray, smoothed: SmootherRun) -> float:
     """Log-probability of the rejected readings, and of there being such."""
     total = 0.0
     for c in range(3):
         seen = np.flatnonzero(log.possible[:, c])
-        bad = weight[seen, c] <= 0
-        residual, variance = smoothed.residual[seen[bad], c], smoothed.residual_variance[seen[bad], c]
-        wide = variance + indicators.WIDE**2 * log.model.noise_variance[c]
-        total -= 0.5 * float((np.log(wide) + residual**2 / wide).sum())
-        isolated, begins, stays = np.log(log.rates[c])
-        begin, end = runs_of(bad).T
-        length = end - begin
-        lone = length < SHORTEST_RUN
-        total += float(np.where(lone, length * isolated, begins + length * stays).sum())
+        total += patches.log_probability(
+            log.time_s[seen], smoothed.residual[seen, c], smoothed.residual_variance[seen, c], weight[seen, c],
+            float(np.sqrt(log.model.noise_variance[c])), log.rates[c],
+        )  # fmt: skip
     return total

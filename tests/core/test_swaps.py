@@ -28,19 +28,66 @@ def followed(component=0, begin=190, end=215, flank=8, sigmas=12.0):
 @pytest.mark.parametrize("component", range(3))
 def test_patch_that_was_followed_is_given_up(component):
     log, wrong, right = followed(component)
-    found = swaps.try_opposites(log, wrong)
+    found = swaps.try_opposites(log, wrong, set())
     np.testing.assert_array_equal(found[190:215, component], 0.0)
     assert (found == right).mean() > 0.998
 
 
 @pytest.mark.parametrize("component", range(3))
+def test_far_patch_beside_wild_readings_is_given_up(component):
+    """What stands between the decisions and the opposite: single outliers among the good readings that were rejected,
+    and a patch of unrelated ones next to them."""
+    log, wrong, right = followed(component, begin=190, end=215, flank=25, sigmas=150.0)
+    noise = np.sqrt(log.model.noise_variance[component])
+    for wild in (170, 178, 221, 233):
+        log.measurement[wild, component] += 60 * noise
+        right[wild, component] = wrong[wild, component] = 0.0
+    log.measurement[240:250, component] += noise * np.array([70, -40, 55, -80, 30, 90, -60, 45, -75, 65])
+    right[240:250, component] = wrong[240:250, component] = 0.0
+    found = swaps.try_opposites(log, wrong, set())
+    np.testing.assert_array_equal(found[165:255, component], right[165:255, component])
+
+
+def test_islands_are_tried_once():
+    log, wrong, _ = followed()
+    tried = set(swaps.islands(log.time_s, wrong, log.possible))
+    np.testing.assert_array_equal(swaps.try_opposites(log, wrong, tried), wrong)
+    (again,) = tried
+    tried = {again._replace(end=again.end - 1)}
+    assert (swaps.try_opposites(log, wrong, tried) != wrong).any()
+    assert again in tried
+
+
+def test_the_worst_go_first_and_take_no_good_ones_with_them():
+    log, _, right = followed(0)
+    all_in = right.copy()
+    log.measurement[100, 0] += 30 * np.sqrt(log.model.noise_variance[0])
+    steps = swaps._without_the_worst(log, all_in)
+    assert steps[1].weight[100, 0] == 0.0
+    assert steps[1].weight[95:106, 0].sum() == 10
+    right[100, 0] = 0.0
+    np.testing.assert_array_equal(steps[-1].weight, right)
+
+
+@pytest.mark.parametrize("component", range(3))
+def test_hole_is_filled_from_its_edges_and_not_with_the_patch(component):
+    log, wrong, right = followed(component, sigmas=40.0)
+    steps = swaps._filled(log, wrong, component, slice(182, 223))
+    assert (steps[0].weight[182:223, component] == 0).all()
+    amounts = [step.weight[:, component].sum() for step in steps]
+    assert amounts == sorted(amounts)
+    np.testing.assert_array_equal(steps[-1].weight[190:215, component], 0.0)
+    assert (steps[-1].weight == right).mean() > 0.998
+
+
+@pytest.mark.parametrize("component", range(3))
 def test_right_decisions_stay(component):
     log, _, right = followed(component)
-    np.testing.assert_array_equal(swaps.try_opposites(log, right), right)
+    np.testing.assert_array_equal(swaps.try_opposites(log, right, set()), right)
     two = right.copy()  # good readings between two real patches are no patch
     two[225:235, component] = 0.0
     log.measurement[225:235, component] += 20 * np.sqrt(log.model.noise_variance[component])
-    np.testing.assert_array_equal(swaps.try_opposites(log, two), two)
+    np.testing.assert_array_equal(swaps.try_opposites(log, two, set()), two)
 
 
 def test_islands_lie_between_two_rejected_runs():
@@ -83,4 +130,4 @@ def test_neighbourhood_that_says_too_little_is_left():
     log.measurement[:, 2] = np.nan
     log = log._replace(possible=np.isfinite(log.measurement))
     wrong = wrong * log.possible
-    np.testing.assert_array_equal(swaps.try_opposites(log, wrong), wrong)
+    np.testing.assert_array_equal(swaps.try_opposites(log, wrong, set()), wrong)

@@ -7,7 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ftproc import pipeline
+from ftproc.records import MISSING
+from ftproc.settings import FilterSettings
+from ftproc.simulation import simulate
 from tests.methods.flights import PATHS, TIME, held, measured, rms, run, turned
+from tests.trust.long_runs import is_astray
 
 SETTINGS = [
     {},
@@ -130,3 +135,17 @@ def test_gap_of_minutes(path, seconds, smooth):
     assert rms(trajectory, position, AFTER) < 8
     assert (trajectory.outlier > 0).mean() < 0.05
     assert (trajectory.sigma > 0).all()
+
+
+@pytest.mark.parametrize("seed", [84, 107, 121, 159])
+def test_patches_are_not_followed(seed):
+    """Flights with an eighth of each component in patches, some of them at the record's ends: in each, the track once
+    went along with a patch and the readings on both sides of it were rejected."""
+    patches = "isolated=0.01:6-300,offset=2:8-30:8-200,ramp=1:10-30:20-200,burst=1:8-20:10-100,nan=0.01"
+    flight = simulate("manoeuvre", seed=seed, duration_s=60.0, dt_s=0.1, outliers=patches)
+    found = pipeline.filter_log(flight.log, FilterSettings(smooth=True))
+    assert not is_astray(found, flight.truth)
+    bad = flight.truth.outlier > 0
+    called = (found.outlier > 0) & (found.outlier < MISSING)
+    assert (called & ~bad).sum() < 0.01 * bad.size
+    assert (bad & ~called & np.isfinite(flight.log.measurement)).sum() < 0.05 * bad.sum()
