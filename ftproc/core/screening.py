@@ -19,6 +19,9 @@ FloatArray = NDArray[np.float64]
 TRIALS = 32  # triples per window: one is clean with probability 0.9996 when 40 % of the samples are bad
 CUT = 4.5  # sigmas from the parabola
 JUMP_VOTES = 0.2  # share of short windows that must find a reading off, at a jump
+APART = (
+    64  # numbers between scratch arrays: where they might overlap, compiled loops take another way, and round otherwise
+)
 SHORTEST_STUCK = 3  # equal readings in a row
 STUCK_ODDS = 1e-3  # expected number of chance runs in a log that would be called stuck
 MOST_STUCK = 0.2  # share of a component
@@ -115,20 +118,21 @@ def screen_component(time: FloatArray, z: FloatArray, window: int, angular: bool
         return votes, np.zeros(0)
     count = (m - window + stride - 1) // stride + 1
     scales = np.empty(count)
-    t, y = np.empty(window), np.empty(window)
-    residuals, work = np.empty((count, window)), np.empty(window)
+    t, y, work = np.empty(window + APART), np.empty(window + APART), np.empty(window + APART)
+    margin = APART // window + 1
+    residuals = np.empty((margin + count + margin, window))
     for w in range(count):
         low = min(w * stride, m - window)
         for i in range(window):
             t[i], y[i] = time[seen[low + i]], z[seen[low + i]]
-        scales[w] = _best_parabola(t, y, window, angular, w + 1, residuals[w], work)
+        scales[w] = _best_parabola(t, y, window, angular, w + 1, residuals[margin + w], work)
     typical = np.median(scales)
     for w in range(count):
         low = min(w * stride, m - window)
         limit = CUT * max(scales[w], 0.7 * typical)
         for i in range(window):
             looks[seen[low + i]] += 1
-            if abs(residuals[w, i]) > limit:
+            if abs(residuals[margin + w, i]) > limit:
                 votes[seen[low + i]] += 1
     for k in range(len(z)):
         if looks[k] > 0:

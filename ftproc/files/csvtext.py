@@ -150,13 +150,17 @@ def in_blocks(path: Path, head: CsvText) -> Iterator[CsvText]:
     """
     with path.open("rb") as stream:
         stream.seek(head.begins)
-        rest = b""
+        rest, marks = b"", set()
         while data := stream.read(_BLOCK):
             data = rest + data
             end = data.rfind(b"\n") + 1
             rest = data[end:]
             if len(rest) > _BLOCK:
                 raise InputError(f"{head.source}: a line of more than {_BLOCK >> 20} MiB is no row of a log.")
+            if head.delimiter == ";":  # what a point means hangs on whether there is a comma anywhere
+                marks |= {mark for mark in (b",", b".") if mark in data}
+                if len(marks) > 1:
+                    raise InputError(f"{head.source}: decimal commas and points.")
             yield from _block(head, memoryview(data)[:end])
         yield from _block(head, memoryview(rest))
 

@@ -204,3 +204,19 @@ def test_sample_and_hold_is_not_stuck():
 @pytest.mark.parametrize("z", [[], [1.0], [1.0, 1.0], [np.nan] * 5, [2.0] * 50])
 def test_stuck_of_next_to_nothing(z):
     assert not stuck(np.array(z), 1.0).any()
+
+
+def test_the_outcome_does_not_hang_on_where_in_memory_the_scratch_lies():
+    """Three of five readings lie on the best parabola to the last digit, so that how the others' residuals are rounded
+    decides about them; compiled loops over arrays that lie close together round in another way."""
+    time, reading = (
+        np.array([0, 0, 0, 13.600000000000001, 23.200000000000003]),
+        np.array([5000.0, 4804.0, 5000.0, 30855.0, 30855.0]),
+    )
+    draw, found = np.random.default_rng(0), set()
+    for _ in range(3000):
+        left_behind = [np.ones(size) for size in draw.integers(1, 40, draw.integers(1, 30))]
+        del left_behind
+        votes, scales = screen_component(time.copy(), reading.copy(), 11, False)
+        found.add(votes.tobytes() + scales.tobytes())
+    assert len(found) == 1

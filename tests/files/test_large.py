@@ -198,3 +198,20 @@ def test_ray_is_bent_by_the_distance_read_far_away(tmp_path, in_blocks, monkeypa
     log = logs.read(path, station=station)
     monkeypatch.setattr(tables, "LARGE", 1 << 40)
     same(log, logs.read(path, station=station))
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_decimal_commas_anywhere_tell_what_a_point_means(tmp_path, in_blocks, monkeypatch, first):
+    monkeypatch.setattr(csvtext, "_BLOCK", 64)
+    lines = text(columns(40)).replace(",", ";").splitlines()
+    half = [line if (k < 20) == first else line.replace(".", ",") for k, line in enumerate(lines[1:])]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([lines[0], *half[:20], *[""] * 200, *half[20:]]) + "\n")  # no block has both
+    with pytest.raises(InputError, match="is not a number"):
+        logs.read(path)
+
+
+def test_decimal_commas_are_read_in_blocks(tmp_path, in_blocks, monkeypatch):
+    path = tmp_path / "log.csv"
+    path.write_text(text(columns()).replace(",", ";").replace(".", ","))
+    same(*both(path, monkeypatch))
