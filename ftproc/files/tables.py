@@ -209,7 +209,7 @@ def _parquet(name: str, path: Path) -> OpenTable:
             table = pq.read_table(path, columns=chosen, partitioning=None, page_checksum_verification=True)
             table.validate(full=True)  # text that is not UTF-8 would break whoever looks at it
             return table.select(chosen)
-        except (pa.ArrowException, OSError) as error:
+        except (pa.ArrowException, OSError, KeyError) as error:
             raise damaged(error) from error
 
     try:
@@ -232,7 +232,7 @@ def _parquet(name: str, path: Path) -> OpenTable:
                 for batch in file.iter_batches(_BATCH_ROWS, columns=chosen):
                     batch.validate(full=True)
                     yield pa.Table.from_batches([batch]).select(chosen)
-        except (pa.ArrowException, OSError) as error:
+        except (pa.ArrowException, OSError, KeyError) as error:
             raise damaged(error) from error
 
     return OpenTable(name, names, load, metadata=schema.metadata or {}, blocks=blocks)
