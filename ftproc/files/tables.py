@@ -261,14 +261,25 @@ def _feather(name: str, data: bytes) -> OpenTable:
 
 
 def _check_kind(name: str, field: pa.Field) -> None:
-    import pyarrow as pa
-
-    try:
-        pa.nulls(0, field.type)
-    except (KeyError, pa.ArrowException) as error:  # such as intervals of months, which pyarrow cannot hand over
+    if not _is_understood(field.type):  # such as unions and intervals of months, on which pyarrow breaks down
         raise InputError(
             f'{name}: column "{field.name}" is of the kind {field.type}, which is not understood; convert or delete it.'
-        ) from error
+        )
+
+
+def _is_understood(kind: pa.DataType) -> bool:
+    """Whether a column is of numbers, texts or times, or of lists and records of them."""
+    import pyarrow as pa
+
+    t = pa.types
+    if t.is_dictionary(kind):
+        return _is_understood(kind.value_type)
+    if t.is_nested(kind):
+        return not t.is_union(kind) and all(_is_understood(kind.field(k).type) for k in range(kind.num_fields))
+    known = (t.is_null, t.is_boolean, t.is_integer, t.is_floating, t.is_decimal, t.is_date, t.is_time, t.is_timestamp)
+    texts = (t.is_string, t.is_large_string, t.is_binary, t.is_large_binary, t.is_fixed_size_binary)
+    views = (getattr(t, name) for name in ("is_string_view", "is_binary_view") if hasattr(t, name))  # since pyarrow 16
+    return any(test(kind) for test in (*known, t.is_duration, *texts, *views))
 
 
 def _first_line(error: Exception) -> str:
