@@ -9,8 +9,9 @@ import numpy as np
 
 from ..errors import InputError, nearest
 from ..records import FlagArray, FloatArray
-from . import cells, tables, values
+from . import cells, values
 from .csvtext import row_named
+from .opened import OpenTable
 from .schema import listed
 
 if TYPE_CHECKING:
@@ -22,9 +23,7 @@ ACCELERATION = ("ax_mps2", "ay_mps2", "az_mps2")
 OUTLIER = ("outlier_range", "outlier_azimuth", "outlier_elevation")
 
 
-def load(
-    opened: tables.OpenTable, names: Sequence[str], others: Sequence[str] = ()
-) -> tuple[dict[str, FloatArray], pa.Table]:
+def load(opened: OpenTable, names: Sequence[str], others: Sequence[str] = ()) -> tuple[dict[str, FloatArray], pa.Table]:
     """Columns `names` as float64 (n,), NaN where missing, and a table of `others`.
 
     A timestamp `time_s` becomes seconds as in a log. Raises InputError for a column that is absent or there
@@ -40,7 +39,7 @@ def load(
     return found, table.select(list(range(len(names), table.num_columns)))
 
 
-def require_present(opened: tables.OpenTable, column: FloatArray, name: str) -> None:
+def require_present(opened: OpenTable, column: FloatArray, name: str) -> None:
     """Raise InputError for the first NaN in `column`, called `name`."""
     missing = np.isnan(column)
     if missing.any():
@@ -50,7 +49,7 @@ def require_present(opened: tables.OpenTable, column: FloatArray, name: str) -> 
         )
 
 
-def flags(opened: tables.OpenTable, column: FloatArray, name: str, highest: int) -> FlagArray:
+def flags(opened: OpenTable, column: FloatArray, name: str, highest: int) -> FlagArray:
     """`column` as uint8, a missing cell as 0. Raises InputError for what is no whole number 0..highest."""
     numbers = np.nan_to_num(column)
     wrong = (numbers != np.floor(numbers)) | (numbers < 0) | (numbers > highest)
@@ -63,7 +62,7 @@ def flags(opened: tables.OpenTable, column: FloatArray, name: str, highest: int)
     return numbers.astype(np.uint8)
 
 
-def _numbers(column: pa.ChunkedArray, name: str, opened: tables.OpenTable) -> FloatArray:
+def _numbers(column: pa.ChunkedArray, name: str, opened: OpenTable) -> FloatArray:
     expected = "seconds or an ISO-8601 timestamp" if name == "time_s" else "a number"
     origin = cells.Origin(opened.source, name, expected, opened.decimal_comma, cure="Correct the cell.")
     if name == "time_s":
@@ -71,7 +70,7 @@ def _numbers(column: pa.ChunkedArray, name: str, opened: tables.OpenTable) -> Fl
     return values.numbers(column, origin)
 
 
-def _require_once(opened: tables.OpenTable, name: str, wanted: Sequence[str]) -> None:
+def _require_once(opened: OpenTable, name: str, wanted: Sequence[str]) -> None:
     if name not in opened.names:
         free = [other for other in opened.names if other not in wanted]
         raise InputError(

@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..records import COMPONENTS, FloatArray, IntArray, MeasurementLog
 from ..settings import Station
 from . import conventions
-from .tables import Blocks
+from .opened import Blocks
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -104,10 +104,10 @@ class _Times:
             time_s = time_s + (datetime.fromisoformat(epoch) - datetime.fromisoformat(self.epoch)).total_seconds()
         known = time_s[~np.isnan(time_s)]
         if known.size:
-            steps = np.diff(known, prepend=self.last_s)
-            if steps.min() < 0:
+            before = np.r_[self.last_s, known[:-1]]
+            if (known < before).any():
                 raise _OutOfOrder
-            self.duplicates += int(np.count_nonzero(steps == 0))
+            self.duplicates += int(np.count_nonzero(known == before))
             self.last_s = float(known[-1])
         return time_s
 

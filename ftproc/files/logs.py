@@ -16,6 +16,7 @@ from ..records import COMPONENTS, FloatArray, MeasurementLog
 from ..settings import Station
 from . import arrow, cells, conventions, large, schema, tables, values, writing
 from .atomic import Target
+from .opened import OpenTable
 from .units import QUANTITIES, UNITS, parse_units
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ def read(
 
 
 def _converted(
-    opened: tables.OpenTable, found: Mapping[str, schema.Column], table: pa.Table
+    opened: OpenTable, found: Mapping[str, schema.Column], table: pa.Table
 ) -> tuple[dict[str, FloatArray], str]:
     """The quantities in SI units, time first, and the midnight that the times count from (or "")."""
     time_s, epoch = _time(table.column(0), found["time"], opened)
@@ -106,7 +107,7 @@ def write(log: MeasurementLog, target: Target) -> None:
     writing.write_table(writing.with_extra(table, log.extra), target)
 
 
-def _check_others(opened: tables.OpenTable, others: list[int]) -> None:
+def _check_others(opened: OpenTable, others: list[int]) -> None:
     counts = Counter(opened.names[position] for position in others)
     for name, count in counts.items():
         if count > 1:
@@ -116,14 +117,14 @@ def _check_others(opened: tables.OpenTable, others: list[int]) -> None:
             )
 
 
-def _time(column: pa.ChunkedArray, found: schema.Column, opened: tables.OpenTable) -> tuple[FloatArray, str]:
+def _time(column: pa.ChunkedArray, found: schema.Column, opened: OpenTable) -> tuple[FloatArray, str]:
     expected = f"a time in {found.unit.name} or an ISO-8601 timestamp"
     return values.seconds(
         column, cells.Origin(opened.source, found.name, expected, opened.decimal_comma), found.unit.to_si
     )
 
 
-def _quantity(column: pa.ChunkedArray, found: schema.Column, opened: tables.OpenTable) -> FloatArray:
+def _quantity(column: pa.ChunkedArray, found: schema.Column, opened: OpenTable) -> FloatArray:
     article = "an" if found.quantity in ("azimuth", "elevation") else "a"
     origin = cells.Origin(
         opened.source, found.name, f"{article} {found.quantity} in {found.unit.name}", opened.decimal_comma

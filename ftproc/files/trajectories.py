@@ -17,6 +17,7 @@ from ..records import COMPONENTS, FlagArray, FloatArray, Trajectory, joined
 from . import arrow, atomic, columns, maps, remote, schema, tables, writing
 from .atomic import Target
 from .columns import ACCELERATION, OUTLIER, POSITION, VELOCITY
+from .opened import OpenTable
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -167,7 +168,7 @@ def read(source: tables.Source) -> Trajectory:
     )
 
 
-def _flags(opened: tables.OpenTable, found: Mapping[str, FloatArray], length: int) -> FlagArray:
+def _flags(opened: OpenTable, found: Mapping[str, FloatArray], length: int) -> FlagArray:
     outlier = np.zeros((length, len(OUTLIER)), np.uint8)
     for index, name in enumerate(OUTLIER):
         if name in found:
@@ -175,7 +176,7 @@ def _flags(opened: tables.OpenTable, found: Mapping[str, FloatArray], length: in
     return outlier
 
 
-def _metadata(source: tables.Source, opened: tables.OpenTable) -> dict[str, Any]:
+def _metadata(source: tables.Source, opened: OpenTable) -> dict[str, Any]:
     """From the Parquet file or the CSV's sidecar; empty where there is none or it is of another make."""
     text = opened.metadata.get(METADATA_KEY, b"")
     beside = sidecar(source) if isinstance(source, str | Path) else None

@@ -10,6 +10,7 @@ from ..records import FlagArray, FloatArray, IntArray, Truth
 from . import arrow, columns, tables, writing
 from .atomic import Target
 from .columns import ACCELERATION, OUTLIER, POSITION, VELOCITY
+from .opened import OpenTable
 
 
 def read(source: tables.Source) -> Truth:
@@ -55,7 +56,7 @@ def write(truth: Truth, target: Target) -> None:
     writing.write_table(arrow.table(arrays), target)
 
 
-def _whole_group(opened: tables.OpenTable, names: Sequence[str]) -> Sequence[str]:
+def _whole_group(opened: OpenTable, names: Sequence[str]) -> Sequence[str]:
     """All three axes when the file has any of them: one that is missing is then missed by its name."""
     return names if any(name in opened.names for name in names) else ()
 
@@ -64,7 +65,7 @@ def _stacked(found: Mapping[str, FloatArray], names: Sequence[str], order: IntAr
     return np.column_stack([found[name] for name in names])[order]
 
 
-def _flags(opened: tables.OpenTable, found: Mapping[str, FloatArray], order: IntArray) -> FlagArray:
+def _flags(opened: OpenTable, found: Mapping[str, FloatArray], order: IntArray) -> FlagArray:
     outlier = np.zeros((len(order), len(OUTLIER)), np.uint8)
     for index, name in enumerate(OUTLIER):
         if name in found:

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from ftproc.errors import InputError
-from ftproc.files import csvtext, large, logs, tables
+from ftproc.files import columnar, csvtext, large, logs, opened, tables
 from ftproc.settings import Air, Station
 
 ROWS = 3000
@@ -21,9 +21,9 @@ ROWS = 3000
 @pytest.fixture
 def in_blocks(monkeypatch):
     """Every file counts as large."""
-    monkeypatch.setattr(tables, "LARGE", 100)
+    monkeypatch.setattr(opened, "LARGE", 100)
     monkeypatch.setattr(tables, "_HEAD", 2000)
-    monkeypatch.setattr(tables, "_BATCH_ROWS", 700)
+    monkeypatch.setattr(columnar, "_BATCH_ROWS", 700)
     monkeypatch.setattr(csvtext, "_BLOCK", 20_000)
 
 
@@ -58,7 +58,7 @@ def both(path, monkeypatch, **how):
     """The log read in blocks, and at once."""
     cut = logs.read(path, **how)
     assert isinstance(cut.time_s, np.memmap)
-    monkeypatch.setattr(tables, "LARGE", 1 << 40)
+    monkeypatch.setattr(opened, "LARGE", 1 << 40)
     return cut, logs.read(path, **how)
 
 
@@ -196,7 +196,7 @@ def test_ray_is_bent_by_the_distance_read_far_away(tmp_path, in_blocks, monkeypa
     path.write_text(text(columns(), {k: f"{10 + 0.1 * k:.9g},,5,5" for k in range(1000, 2500)}))
     station = Station(refraction=Air())
     log = logs.read(path, station=station)
-    monkeypatch.setattr(tables, "LARGE", 1 << 40)
+    monkeypatch.setattr(opened, "LARGE", 1 << 40)
     same(log, logs.read(path, station=station))
 
 

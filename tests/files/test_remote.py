@@ -13,7 +13,7 @@ from ftproc import batch
 from ftproc.batch import Recipe, Task
 from ftproc.cli import outputs
 from ftproc.errors import InputError, OutputError, UsageError
-from ftproc.files import atomic, logs, remote, tables, trajectories
+from ftproc.files import atomic, logs, opened, remote, trajectories
 from tests.simulated import simulate
 
 fsspec = pytest.importorskip("fsspec")
@@ -70,7 +70,7 @@ def test_log_from_a_bucket_is_the_log(bucket, temporary, tmp_path, flight, monke
     logs.write(log, path)
     bucket.pipe(f"/bucket/log.{kind}", path.read_bytes())
     if large:
-        monkeypatch.setattr(tables, "LARGE", 100)
+        monkeypatch.setattr(opened, "LARGE", 100)
     found = logs.read(f"memory://bucket/log.{kind}")
     assert found.name == f"memory://bucket/log.{kind}"
     np.testing.assert_array_equal(found.measurement, log.measurement)

@@ -24,7 +24,7 @@ from safetensors.numpy import save as serialise
 from ftproc import config, pipeline
 from ftproc.correction import model, model_file
 from ftproc.errors import FtprocError
-from ftproc.files import csvtext, logs, tables, trajectories, truth
+from ftproc.files import columnar, csvtext, logs, opened, trajectories, truth
 from ftproc.records import MeasurementLog
 from tests.trust import bad_files, bad_logs, bad_models, bad_stations, bad_truths, cases
 
@@ -103,7 +103,8 @@ _CHECKED = ("time_s", "measurement", "row", "rows_in_file", "rows_without_time",
 def _in_blocks(path: Path) -> None:
     """A log is the same, and refused in the same words, whether it is read as a whole or as a large one is."""
     whole = _read_or_refused(path)
-    with mock.patch.multiple(tables, LARGE=0, _BATCH_ROWS=3), mock.patch.object(csvtext, "_BLOCK", 64):
+    large, small = mock.patch.object(opened, "LARGE", 0), mock.patch.object(columnar, "_BATCH_ROWS", 3)
+    with large, small, mock.patch.object(csvtext, "_BLOCK", 64):
         in_blocks = _read_or_refused(path)
     if isinstance(whole, str) or isinstance(in_blocks, str):
         assert in_blocks == whole
