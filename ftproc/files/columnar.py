@@ -58,13 +58,17 @@ def parquet(name: str, path: Path) -> OpenTable:
         return Blocks(batches(chosen), described.num_rows)
 
     def batches(chosen: list[str]) -> Iterator[pa.Table]:
+        rows = 0
         try:
             with pq.ParquetFile(path, page_checksum_verification=True) as file:
                 for batch in file.iter_batches(_BATCH_ROWS, columns=chosen):
                     batch.validate(full=True)
+                    rows += len(batch)
                     yield pa.Table.from_batches([batch]).select(chosen)
         except (pa.ArrowException, OSError, KeyError) as error:
             raise damaged(error) from error
+        if rows < described.num_rows:  # of a stream that ends early, the last batches are merely missing
+            raise damaged(EOFError(f"{rows} rows where it says {described.num_rows}"))
 
     return OpenTable(name, names, load, metadata=schema.metadata or {}, blocks=blocks)
 
