@@ -97,6 +97,13 @@ def _best_parabola(
         if failing < n - n // 2:
             best = median(work, n)
             slope, bend, origin, base = v, q, t[a], z[a]
+    if best == math.inf:  # readings of one or two instants: a constant
+        for i in range(n):
+            work[i] = wrapped(z[i] - z[0], angular)
+        base = z[0] + median(work, n)
+        for i in range(n):
+            work[i] = abs(wrapped(z[i] - base, angular))
+        best = median(work, n)
     for i in range(n):
         d = t[i] - origin
         residual[i] = wrapped(z[i] - base - d * (slope + bend * d), angular)

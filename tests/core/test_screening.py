@@ -220,3 +220,14 @@ def test_the_outcome_does_not_hang_on_where_in_memory_the_scratch_lies():
         votes, scales = screen_component(time.copy(), reading.copy(), 11, False)
         found.add(votes.tobytes() + scales.tobytes())
     assert len(found) == 1
+
+
+@pytest.mark.parametrize("angular", [False, True])
+def test_readings_of_one_instant_scatter_about_their_median(angular):
+    reading = np.pi + 1e-3 * np.random.default_rng(1).standard_normal(11)
+    reading[4] += 0.5
+    votes, (scale,) = screen_component(np.full(11, 7.0), wrap(reading) if angular else reading, 11, angular)
+    off = np.abs(reading - np.median(reading))
+    assert scale == pytest.approx(1.4826 * (1 + 5 / 8) * np.median(off), rel=1e-9)
+    assert votes[4] == 1.0
+    assert (np.delete(votes, 4) == 0).all()
