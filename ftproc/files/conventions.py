@@ -49,7 +49,8 @@ def apply(log: MeasurementLog, station: Station) -> MeasurementLog:
     brought into one turn. Raises UsageError as `check`.
     """
     check(station)
-    measurement, time_s = log.measurement - station.bias, log.time_s
+    with np.errstate(invalid="ignore"):  # a NaN that signals is missing like any other
+        measurement, time_s = log.measurement - station.bias, log.time_s
     if _reversed(station):
         measurement[:, 1] = -measurement[:, 1]
     if station.azimuth_zero_rad:  # adding nothing would make +0.0 of -0.0, and every bit is to come back
