@@ -37,7 +37,7 @@ def estimate(
             smoothed[i, j] = v
             smoothed[j, i] = v
         # Rounding may eat a variance that the record has all but determined; it cannot be below that rounding.
-        sigma[i] = math.sqrt(max(smoothed[i, i], 1e-14 * p[i, i]))
+        sigma[i] = math.sqrt(max(smoothed[i, i], 1e-14 * abs(p[i, i])))
     line_of_sight_sigma(state, smoothed, los)
 
 

@@ -141,11 +141,15 @@ def _check_units(
         limit = _PLAUSIBLE_MEDIAN[what]
         angles = np.abs(quantities.get(quantity, np.empty(0)))
         angles = angles[~np.isnan(angles)]
-        if not angles.size or found[quantity].unit_stated_by_user or np.median(angles) <= limit:
+        if not angles.size or found[quantity].unit_stated_by_user:
+            continue
+        with np.errstate(over="ignore"):  # what overflows is no angle either
+            half, most = np.quantile(angles, [0.5, 0.99]).tolist()
+        if half <= limit:
             continue
         column = found[quantity]
         assumed = column.unit
-        half, most = np.quantile(angles, [0.5, 0.99]) * assumed.divide / assumed.multiply
+        half, most = (value * assumed.divide / assumed.multiply for value in (half, most))
         # Degrees end at 360; what is beyond 400 is wild and says nothing.
         typical = most if quantity == "azimuth" and 370 < most <= 400 else half
         other = _likely_unit(quantity, typical, limit / (2 if quantity == "azimuth" else 1))  # one turn, straight up
