@@ -19,9 +19,7 @@ FloatArray = NDArray[np.float64]
 TRIALS = 32  # triples per window: one is clean with probability 0.9996 when 40 % of the samples are bad
 CUT = 4.5  # sigmas from the parabola
 JUMP_VOTES = 0.2  # share of short windows that must find a reading off, at a jump
-APART = (
-    64  # numbers between scratch arrays: where they might overlap, compiled loops take another way, and round otherwise
-)
+APART = 64  # numbers between scratch arrays: where they might overlap, compiled loops round otherwise
 SHORTEST_STUCK = 3  # equal readings in a row
 STUCK_ODDS = 1e-3  # expected number of chance runs in a log that would be called stuck
 MOST_STUCK = 0.2  # share of a component

@@ -33,14 +33,20 @@ def parquet(name: str, path: Path) -> OpenTable:
                 "write it anew."
             )
 
+    def refuse_loss(rows: int) -> None:
+        """Of a file that ends early, the last rows are merely missing."""
+        if rows != described.num_rows:
+            raise EOFError(f"{rows} rows where it says {described.num_rows}")
+
     def load(numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
         chosen = [schema.names[position] for position in (*numeric, *others)]
         refuse_bomb(len(numeric))
         try:
             table = pq.read_table(path, columns=chosen, partitioning=None, page_checksum_verification=True)
             table.validate(full=True)  # text that is not UTF-8 would break whoever looks at it
+            refuse_loss(table.num_rows)
             return table.select(chosen)
-        except (pa.ArrowException, OSError, KeyError) as error:
+        except (pa.ArrowException, OSError, KeyError, EOFError) as error:
             raise damaged(error) from error
 
     try:
@@ -65,10 +71,9 @@ def parquet(name: str, path: Path) -> OpenTable:
                     batch.validate(full=True)
                     rows += len(batch)
                     yield pa.Table.from_batches([batch]).select(chosen)
-        except (pa.ArrowException, OSError, KeyError) as error:
+            refuse_loss(rows)
+        except (pa.ArrowException, OSError, KeyError, EOFError) as error:
             raise damaged(error) from error
-        if rows < described.num_rows:  # of a stream that ends early, the last batches are merely missing
-            raise damaged(EOFError(f"{rows} rows where it says {described.num_rows}"))
 
     return OpenTable(name, names, load, metadata=schema.metadata or {}, blocks=blocks)
 

@@ -215,3 +215,15 @@ def test_decimal_commas_are_read_in_blocks(tmp_path, in_blocks, monkeypatch):
     path = tmp_path / "log.csv"
     path.write_text(text(columns()).replace(",", ";").replace(".", ","))
     same(*both(path, monkeypatch))
+
+
+def test_rows_that_a_parquet_file_promises_and_has_not_are_told(tmp_path, in_blocks, monkeypatch):
+    path = tmp_path / "log.parquet"
+    pq.write_table(pa.table(columns()), path)
+    whole, batches = pq.read_table, pq.ParquetFile.iter_batches
+    monkeypatch.setattr(pq, "read_table", lambda *args, **how: whole(*args, **how).slice(0, 2900))
+    with pytest.raises(InputError, match="2900 rows where it says 3000"):
+        logs.read(path, keep_columns=True, columns={"elevation": "none"})  # as a whole, for the column that is kept
+    monkeypatch.setattr(pq.ParquetFile, "iter_batches", lambda *args, **how: list(batches(*args, **how))[:-1])
+    with pytest.raises(InputError, match="2900 rows where it says 3000"):
+        logs.read(path)  # in blocks, and then as a whole
