@@ -98,9 +98,9 @@ $(developer): pyproject.toml $(installed)
 	@touch $@
 
 # Compiled kernels are kept; after this the first log does not wait for the compiler.
-$(warmed): $(installed) $(wildcard ftproc/core/*.py)
-	@rm -f ftproc/core/__pycache__/*.nb?
-	@$(bin)/python -m ftproc.warm
+$(warmed): $(installed) $(shell find ftproc/core -name '*.py')
+	@find ftproc/core -name '*.nb?' -delete
+	@$(bin)/python -m ftproc.cli.warm
 	@touch $@
 
 # --- development ------------------------------------------------------------------------------------------------

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from ftproc.api import filter_log, read_log, score, simulate, to_pandas, to_table, train, write_report
+    from ftproc.api import filter_log, plot, read_log, score, simulate, to_pandas, to_table, train, write_report
 
 __all__ = [
-    "__version__", "filter_log", "read_log", "score", "simulate", "to_pandas", "to_table", "train", "write_report",
+    "__version__", "filter_log", "plot", "read_log", "score", "simulate", "to_pandas", "to_table", "train",
+    "write_report",
 ]  # fmt: skip
 
 

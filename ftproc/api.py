@@ -6,13 +6,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ftproc import batch, geodesy, pipeline
-from ftproc.config import load, recipe
+from ftproc import pipeline
+from ftproc.config.reading import load
+from ftproc.config.recipe import Recipe
+from ftproc.correction import model_file
+from ftproc.files.writing import geodesy
 from ftproc.records import MeasurementLog, Trajectory, Truth
-from ftproc.settings import FilterSettings, TrainSettings
+from ftproc.settings import PACKAGED, FilterSettings, TrainSettings
 
 if TYPE_CHECKING:
     import pandas as pd
+    import plotly.graph_objects as go
     import pyarrow as pa
 
     from ftproc.correction.model import Model
@@ -24,9 +28,9 @@ def read_log(source: Any, *, config: str | Path | None = None, **options: Any) -
     """A log from a file (.csv, .csv.gz, .parquet, .feather), a pandas DataFrame or a pyarrow Table.
 
     config: what `--config` takes. options: units, columns, azimuth_from, keep_columns, station; they win over
-    it; see `ftproc.files.logs.read`. Raises InputError, UsageError.
+    it; see `ftproc.files.reading.logs.read`. Raises InputError, UsageError.
     """
-    from ftproc.files import logs
+    from ftproc.files.reading import logs
 
     return logs.read(source, **{**_recipe(config).reading(), **options})
 
@@ -35,7 +39,7 @@ def filter_log(
     log: Any,
     settings: FilterSettings | None = None,
     *,
-    model: Model | str | None = batch.PACKAGED,
+    model: Model | str | None = PACKAGED,
     config: str | Path | None = None,
 ) -> Trajectory:
     """The trajectory of a log (a MeasurementLog, or anything `read_log` takes).
@@ -48,13 +52,13 @@ def filter_log(
     usual = _recipe(config)
     settings = settings or usual.settings
     if isinstance(model, str):
-        model = batch.model_named(usual.model if model == batch.PACKAGED else model)
+        model = model_file.named(usual.model if model == PACKAGED else model)
     read = log if isinstance(log, MeasurementLog) else read_log(log, config=config)
     return geodesy.located(pipeline.filter_log(read, settings, model), settings)
 
 
-def _recipe(config: str | Path | None) -> batch.Recipe:
-    return batch.Recipe() if config is None else recipe(load(config))
+def _recipe(config: str | Path | None) -> Recipe:
+    return Recipe() if config is None else Recipe.of(load(config))
 
 
 def train(
@@ -64,7 +68,7 @@ def train(
 
     filtering: the settings of the filter that it is made for. Raises InputError, UsageError.
     """
-    from ftproc.files import truth as truths
+    from ftproc.files.reading import truth as truths
 
     read = [
         (
@@ -86,8 +90,8 @@ def simulate(scenario: str, **options: Any) -> Simulation:
 def score(trajectory: Any, truth: Any = None) -> Score:
     """How good a trajectory is, by itself and against a truth (records or files). `.as_dict()` gives the figures."""
     from ftproc import scoring
-    from ftproc.files import trajectories
-    from ftproc.files import truth as truths
+    from ftproc.files.reading import trajectories
+    from ftproc.files.reading import truth as truths
 
     found = trajectory if isinstance(trajectory, Trajectory) else trajectories.read(trajectory)
     known = truth if truth is None or isinstance(truth, Truth) else truths.read(truth)
@@ -100,16 +104,29 @@ def write_report(trajectory: Any, target: str | Path, truth: Any = None) -> None
     A trajectory from `filter_log` is shown with its raw readings. Raises OutputError, UsageError (no plotly).
     """
     from ftproc import report
-    from ftproc.files import trajectories
-    from ftproc.files import truth as truths
+    from ftproc.files.reading import trajectories
+    from ftproc.files.reading import truth as truths
 
     found = trajectory if isinstance(trajectory, Trajectory) else trajectories.read(trajectory)
     report.write(found, target, truth if truth is None or isinstance(truth, Truth) else truths.read(truth))
 
 
+def plot(trajectory: Any, what: str = "track") -> go.Figure:
+    """One figure of the report, for a notebook (a trajectory or its file).
+
+    what: track, ground, readings, residuals, nis, sigmas, motion or correction. Raises UsageError for another name,
+    when plotly is missing, or when there is nothing to draw.
+    """
+    from ftproc import report
+    from ftproc.files.reading import trajectories
+
+    found = trajectory if isinstance(trajectory, Trajectory) else trajectories.read(trajectory)
+    return report.plot(found, what)
+
+
 def to_table(trajectory: Trajectory) -> pa.Table:
     """The trajectory as a pyarrow Table, with the columns and the metadata of its Parquet file."""
-    from ftproc.files import trajectories
+    from ftproc.files.writing import trajectories
 
     return trajectories.to_table(trajectory)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 
 def printable(text: str) -> str:
@@ -91,3 +92,34 @@ def interruption(error: BaseException) -> BaseException | None:
     while isinstance(cause, Exception):
         cause = cause.__cause__
     return cause
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why something was not done: a sentence for the user, the exit code it deserves, and the traceback."""
+
+    message: str
+    exit_code: int
+    trace: str
+
+
+def failure(error: BaseException, source: str | None = None) -> Failure:
+    """An error in a plain sentence or two, naming `source` where the error does not do so itself."""
+    import traceback
+
+    if isinstance(error, MemoryError):
+        traceback.clear_frames(error.__traceback__)  # what filled the memory, or the next log would find no room either
+    trace = "".join(traceback.format_exception(error))
+    about = f"{source}: " if source else ""
+    if isinstance(error, FtprocError):
+        return Failure(str(error), error.exit_code, trace)
+    if isinstance(error, MemoryError) or "Resource temporarily unavailable" in str(error):
+        return Failure(f"{about}there is not enough memory for it. Use fewer --jobs, or split the log.", 1, trace)
+    if isinstance(error, RuntimeError) and "no locator available" in str(error):
+        cure = "Set NUMBA_CACHE_DIR to a directory that can be written to."
+        return Failure(f"the compiled kernels cannot be kept anywhere. {cure}", 1, trace)
+    if isinstance(error, OSError) and error.strerror:
+        place = error.filename or source or "standard output"
+        return Failure(f"{place}: {error.strerror.lower()}.", 1, trace)
+    kind = f"{type(error).__name__}: {error}".splitlines()[0][:200]
+    return Failure(f"{about}internal error ({kind}); run again with --debug and report it.", 1, trace)

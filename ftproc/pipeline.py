@@ -4,41 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ftproc import plausible, provenance
-from ftproc.core.geometry import from_cartesian
+from ftproc.core.model.frames import from_cartesian
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import registry
 from ftproc.methods.estimate import Estimate, Part, Recording
+from ftproc.quality import provenance, sanity
+from ftproc.quality.statistics import Tally
 from ftproc.records import COMPONENTS, MISSING, Diagnostics, FloatArray, MeasurementLog, Trajectory, Truth, joined
 from ftproc.settings import FilterSettings, TrainSettings
-from ftproc.tally import Tally
 
 if TYPE_CHECKING:
-    from ftproc.core.forward import FilterRun
-    from ftproc.core.smoother import SmootherRun
+    from ftproc.core.filtering.records import FilterRun
+    from ftproc.core.filtering.smoother import SmootherRun
     from ftproc.correction.model import Model
-    from ftproc.correction.samples import Flight
+    from ftproc.correction.training.samples import Flight
 
 EDITING = ("two-pass", "forward", "none")
 ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of a component that the log says too little about
 SMALLEST = 1e-30  # of what is given for noise, jerk level, gate: its square and its inverse can be reckoned with
 FEWEST_PARTICLES = 20
 FEWEST_READINGS = 8  # of a component, for its noise to be found from them
-PACKAGED_MODEL = Path(__file__).parent / "correction" / "default.safetensors"
-
-
-@cache
-def default_model() -> Model:
-    """The correction that comes with the package. Raises ModelError if its file is damaged."""
-    from ftproc.correction.model_file import load
-
-    return load(PACKAGED_MODEL)
 
 
 def filter_log(log: MeasurementLog, settings: FilterSettings | None = None, model: Model | None = None) -> Trajectory:
@@ -161,7 +150,7 @@ def _check(settings: FilterSettings) -> None:
 
 def _record(log: MeasurementLog) -> Recording:
     """What the methods see."""
-    count = plausible.check(log)
+    count = sanity.check(log)
     assumed = np.where(count < FEWEST_READINGS, ASSUMED_SIGMA, np.nan)
     return Recording(log.time_s, log.measurement, assumed, tuple(np.flatnonzero(count == 0).tolist()))
 
@@ -188,7 +177,7 @@ def train_flights(
     filtering: the settings that the correction is made for. Raises InputError when a log cannot be processed or
     shares no time with its truth, UsageError for a method that takes no correction.
     """
-    from ftproc.correction.stages import train_model
+    from ftproc.correction.training.stages import train_model
 
     told = replace(filtering or FilterSettings(), method=settings.method)
     if registry.named(settings.method).own_model:
@@ -204,7 +193,7 @@ def known_flights(
     progress: Callable[[str, int, int], None] | None = None,
 ) -> dict[str, list[Flight]]:
     """Runs with truth, by the stage (`filter`, `smoother`) they come from. Raises InputError as `train_flights`."""
-    from ftproc.correction.samples import Flight
+    from ftproc.correction.training.samples import Flight
     from ftproc.scoring.matching import match
 
     settings = replace(filtering or FilterSettings(), smooth=True)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from ftproc.settings import Station
 
 if TYPE_CHECKING:
-    import plotly.graph_objects as go
     import pyarrow as pa
 
 FloatArray = NDArray[np.float64]
@@ -137,13 +136,6 @@ class Trajectory:
 
     def __len__(self) -> int:
         return len(self.time_s)
-
-    def plot(self, what: str = "track") -> go.Figure:
-        """One figure of the report, for a notebook: track, ground, readings, residuals, nis, sigmas, motion or
-        correction. Raises UsageError for another name, when plotly is missing, or when there is nothing to draw."""
-        from ftproc.report import plot
-
-        return plot(self, what)
 
 
 def thinned(array: FloatArray, most: int) -> FloatArray:

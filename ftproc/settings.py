@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+PACKAGED, NO_MODEL = "packaged", "none"  # models that are no files
+
 Noise = tuple[float | None, float | None, float | None]
 
 
@@ -19,7 +21,7 @@ class Air:
 class Station:
     """How the readings of an instrument are to be understood, and what is known to be wrong with them."""
 
-    azimuth_from: str = "x"  # x | north: the axis that the azimuth is counted from, see ftproc.files.logs
+    azimuth_from: str = "x"  # x | north: the axis that the azimuth is counted from, see ftproc.files.conventions
     azimuth_sense: str | None = None  # clockwise | anticlockwise from above; None: north clockwise, x anticlockwise
     azimuth_zero_rad: float = 0.0  # what the azimuth is where the instrument reads zero
     elevation_from: str = "horizon"  # horizon | zenith
@@ -60,4 +62,4 @@ class TrainSettings:
     seed: int = 0
     method: str = "ga-bpnn-ukf"  # the filter whose error is learnt
     optimiser: str = "l-bfgs"  # or momentum, as in the paper
-    start: str = "genetic"  # first weights, see ftproc.correction.starts
+    start: str = "genetic"  # first weights, see ftproc.correction.training.starts

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ftproc.core.geometry import from_cartesian, wrap
+from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.records import FloatArray, Trajectory, Truth
 from ftproc.simulation import Simulation, simulate
 

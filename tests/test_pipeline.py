@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from ftproc import __version__, pipeline
-from ftproc.core.geometry import from_cartesian
-from ftproc.correction import apply
+from ftproc.core.model.frames import from_cartesian
+from ftproc.correction import apply, model_file
 from ftproc.correction.apply import Correction
 from ftproc.correction.model import Model
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import registry
+from ftproc.quality.summary import text
 from ftproc.records import MISSING, MeasurementLog, Truth
 from ftproc.settings import FilterSettings
-from ftproc.summary import text
 from tests.correction.test_apply import constant
 from tests.simulated import simulate
 
@@ -70,7 +70,7 @@ def test_correction_is_estimate_minus_plain_filter(flight, monkeypatch):
     added = np.random.default_rng(1).normal(size=(len(flight.log), 6))
     monkeypatch.setattr(apply, "correct", lambda run, model: Correction(added, 0.25))
     plain = pipeline.filter_log(flight.log)
-    corrected = pipeline.filter_log(flight.log, model=pipeline.default_model())
+    corrected = pipeline.filter_log(flight.log, model=model_file.named("packaged"))
     np.testing.assert_array_equal(corrected.correction, added)
     np.testing.assert_allclose(corrected.state[:, :6] - plain.state[:, :6], added, atol=1e-9)
     np.testing.assert_array_equal(corrected.state[:, 6:], plain.state[:, 6:])
@@ -83,9 +83,9 @@ def test_correction_is_estimate_minus_plain_filter(flight, monkeypatch):
 
 def test_packaged_correction_is_bounded_by_the_sigmas(flight):
     plain = pipeline.filter_log(flight.log)
-    corrected = pipeline.filter_log(flight.log, model=pipeline.default_model())
+    corrected = pipeline.filter_log(flight.log, model=model_file.named("packaged"))
     np.testing.assert_allclose(corrected.state[:, :6] - plain.state[:, :6], corrected.correction, atol=1e-9)
-    limit = pipeline.default_model().filter.bound_sigma[:3].max() * np.linalg.norm(plain.sigma[:, :3], axis=1)
+    limit = model_file.named("packaged").filter.bound_sigma[:3].max() * np.linalg.norm(plain.sigma[:, :3], axis=1)
     assert (np.linalg.norm(corrected.correction[:, :3], axis=1) <= 1.001 * limit).all()
 
 
@@ -116,7 +116,7 @@ def test_a_model_without_a_network_for_the_smoother_leaves_it_alone_and_says_so(
     assert "corrects the filter only" in text(smoothed.metadata)
     for trajectory in (
         pipeline.filter_log(flight.log, model=model),
-        pipeline.filter_log(flight.log, FilterSettings(smooth=True), pipeline.default_model()),
+        pipeline.filter_log(flight.log, FilterSettings(smooth=True), model_file.named("packaged")),
     ):
         assert "corrects the filter only" not in text(trajectory.metadata)
 
@@ -126,7 +126,7 @@ def test_metadata_is_complete_and_serialisable(flight):
         editing="forward", gate=5.0, max_patch_s=3.0, noise=(4.0, 2e-4, 3e-4), site=(40.0, 3.0, 7.0)
     )
     log = replace(flight.log, frame="north-east-up")
-    metadata = pipeline.filter_log(log, settings, pipeline.default_model()).metadata
+    metadata = pipeline.filter_log(log, settings, model_file.named("packaged")).metadata
     again = json.loads(json.dumps(dict(metadata), allow_nan=False))
     assert again["program"] == "ftproc"
     assert again["version"] == __version__
@@ -172,7 +172,7 @@ def test_component_missing_throughout(flight, component, smooth):
     z = flight.log.measurement.copy()
     z[:, component] = np.nan
     log = replace(flight.log, measurement=z)
-    trajectory = pipeline.filter_log(log, FilterSettings(smooth=smooth), pipeline.default_model())
+    trajectory = pipeline.filter_log(log, FilterSettings(smooth=smooth), model_file.named("packaged"))
     assert np.isnan(trajectory.state).all()
     assert np.isnan(trajectory.sigma).all()
     assert np.isnan(trajectory.measurement[:, component]).all()
@@ -189,7 +189,7 @@ def test_component_missing_throughout(flight, component, smooth):
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
 def test_tiny_logs(n, settings):
     log, position = tiny(n)
-    trajectory = pipeline.filter_log(log, FilterSettings(**settings), pipeline.default_model())
+    trajectory = pipeline.filter_log(log, FilterSettings(**settings), model_file.named("packaged"))
     assert len(trajectory) == n
     assert (trajectory.sigma > 0).all()
     assert (np.linalg.norm(trajectory.state[:, :3] - position, axis=1) < 60).all()

@@ -18,9 +18,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from ftproc import pipeline
-from ftproc.core.geometry import wrap
+from ftproc.core.model.frames import wrap
+from ftproc.correction import model_file
 from ftproc.errors import FtprocError
-from ftproc.files import logs, trajectories
+from ftproc.files.reading import logs, trajectories
+from ftproc.files.writing.trajectories import write as write_trajectory
 from ftproc.records import MeasurementLog, Trajectory
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
@@ -58,7 +60,7 @@ def test_reading_what_was_written_gives_it_back(tmp_path_factory: pytest.TempPat
     written = smoothed(table(flight(seed)))
     for name in ("a.parquet", "a.csv", "a.csv.gz"):
         path = tmp_path_factory.mktemp("w") / name
-        trajectories.write(written, path)
+        write_trajectory(written, path)
         read = trajectories.read(path)
         for field in ("row", "time_s", "measurement", "state", "sigma", "outlier", "nis", "correction"):
             np.testing.assert_array_equal(getattr(read, field), getattr(written, field), err_msg=field)
@@ -188,7 +190,7 @@ def test_any_finite_input_gives_finite_output_or_a_plain_error(data: st.DataObje
     try:
         with warnings.catch_warnings():  # of divisions in degenerate logs; what counts here is the result
             warnings.simplefilter("ignore", RuntimeWarning)
-            found = pipeline.filter_log(logs.read(source), FilterSettings(smooth=smooth), pipeline.default_model())
+            found = pipeline.filter_log(logs.read(source), FilterSettings(smooth=smooth), model_file.named("packaged"))
     except FtprocError:
         return
     if not found.metadata["summary"]["not_observable"]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import ftproc
-from ftproc.files import logs
+from ftproc.files.writing import flights
 
 README = Path(__file__).parents[1] / "README.md"
 
@@ -16,7 +16,7 @@ README = Path(__file__).parents[1] / "README.md"
 def test_python_section_runs(tmp_path, monkeypatch, capsys):
     (code,) = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
     monkeypatch.chdir(tmp_path)
-    logs.write(ftproc.simulate("zuo2021-outliers", seed=3).log, "flight.csv")
+    flights.write_log(ftproc.simulate("zuo2021-outliers", seed=3).log, "flight.csv")
     made = {}
     exec(compile(code, "README.md", "exec"), made)
     assert list(made["frame"].columns) == made["table"].column_names
@@ -32,7 +32,7 @@ def test_files_tables_and_frames_give_the_same(tmp_path):
     import pyarrow.csv
 
     file = tmp_path / "flight.csv"
-    logs.write(ftproc.simulate("zuo2021-outliers", seed=3).log, file)
+    flights.write_log(ftproc.simulate("zuo2021-outliers", seed=3).log, file)
     table = pyarrow.csv.read_csv(file)  # older pandas reads a CSV file to the last bit but one
     found = [ftproc.filter_log(source) for source in (file, table.to_pandas(), table)]
     for other in found[1:]:
@@ -43,10 +43,10 @@ def test_files_tables_and_frames_give_the_same(tmp_path):
 def test_report_from_records_and_files(tmp_path):
     flight = ftproc.simulate("zuo2021-outliers", seed=3)
     trajectory = ftproc.filter_log(flight.log)
-    from ftproc.files import trajectories, truth
+    from ftproc.files.writing import trajectories
 
     trajectories.write(trajectory, tmp_path / "t.parquet")
-    truth.write(flight.truth, tmp_path / "truth.csv")
+    flights.write_truth(flight.truth, tmp_path / "truth.csv")
     ftproc.write_report(tmp_path / "t.parquet", tmp_path / "read.html", tmp_path / "truth.csv")
     ftproc.write_report(trajectory, tmp_path / "made.html")
     assert 'data-figure="errors"' in (tmp_path / "read.html").read_text()

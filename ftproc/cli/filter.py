@@ -103,11 +103,15 @@ def command(
         return
     if not logs:
         raise click.UsageError("Name at least one log.", ctx)
-    from ftproc.cli.startup import hasten
+    from ftproc.cli.command import hasten
 
     hasten()
     from ftproc.cli import filtering, stations
 
     recipe = stations.recipe(ctx)
-    crew = filtering.Crew(jobs, scheduler)
-    ctx.exit(filtering.run(logs, output, recipe, config, crew, summary=summary, report=report, debug=ctx.meta[DEBUG]))
+    workers = filtering.Workers(jobs, scheduler)
+    ctx.exit(
+        filtering.filter_logs(
+            logs, output, recipe, config, workers, summary=summary, report=report, debug=ctx.meta[DEBUG]
+        )
+    )

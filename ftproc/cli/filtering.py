@@ -9,43 +9,46 @@ from typing import NamedTuple
 
 import click
 
-from ftproc import batch, geodesy
-from ftproc.batch import Outcome, Recipe
-from ftproc.cli import outputs, reports
+from ftproc.batch import plan, run
+from ftproc.batch.tasks import Outcome, model_for
 from ftproc.cli.progress import Progress
 from ftproc.cli.stations import ALL
+from ftproc.config.recipe import Recipe
 from ftproc.errors import UsageError, printable
-from ftproc.files import conventions, maps
+from ftproc.files import conventions
+from ftproc.files.writing import geodesy, maps
 from ftproc.methods import registry
-from ftproc.report import Entry
-from ftproc.summary import line
+from ftproc.quality.summary import line
+from ftproc.report.style import require_plotly
+from ftproc.settings import NO_MODEL, PACKAGED
 
 
-class Crew(NamedTuple):
+class Workers(NamedTuple):
     """Who does the work: `jobs` processes, or the cluster of a scheduler."""
 
     jobs: int = 1
     scheduler: str | None = None
 
 
-def run(
-    logs: Sequence[str], output: str | None, recipe: Recipe, config: str | None, crew: Crew, *,
+def filter_logs(
+    logs: Sequence[str], output: str | None, recipe: Recipe, config: str | None, workers: Workers, *,
     summary: str, report: str | None, debug: bool,
 ) -> int:  # fmt: skip
     """Filter the logs and print what became of them; the exit code. Raises FtprocError for wrong usage.
 
     config: where the recipe is from, not to be written over.
     """
-    if crew.scheduler is not None and crew.jobs > 1:
+    if workers.scheduler is not None and workers.jobs > 1:
         raise UsageError("--jobs is for processes on this machine, --scheduler for a cluster; give one of the two.")
-    reports.check(report)
+    if report is not None:
+        require_plotly()
     methods = _applicable(recipe) if recipe.settings.method == ALL else None
     named = (name for name in (recipe.model, config) if isinstance(name, str))
-    inputs = [name for name in named if name not in (batch.PACKAGED, batch.NO_MODEL)]
-    tasks = outputs.plan(logs, output, methods, inputs)
+    inputs = [name for name in named if name not in (PACKAGED, NO_MODEL)]
+    tasks = plan.tasks(logs, output, methods, inputs)
     for task in tasks:
         maps.check(task.output, recipe.settings.site)
-    pages, index = reports.plan([task.output for task in tasks], report, [*logs, *inputs])
+    pages, index = plan.pages([task.output for task in tasks], report, [*logs, *inputs])
     tasks = [replace(task, report=page) for task, page in zip(tasks, pages, strict=True)]
     if readings := conventions.in_words(recipe.station):
         _tell(f"readings: {', '.join(readings)}")
@@ -53,12 +56,13 @@ def run(
         _tell(f"positions on the earth: {geodesy.axes(conventions.FRAMES[recipe.station.azimuth_from])}, z is up")
     done: list[Outcome] = []
     with Progress() as progress:
-        for outcome in batch.run(tasks, recipe, crew.jobs, _tell, crew.scheduler):
+        for outcome in run.run(tasks, recipe, workers.jobs, _tell, workers.scheduler):
             done.append(outcome)
             progress.clear()
             _show(outcome, summary, debug)
             progress("filtering", len(done), len(tasks))
-    reports.write_index([_entry(outcome) for outcome in done], index)
+    if index is not None:
+        _write_index(done, index)
     if summary == "json":
         _show_json(done)
     failures = [outcome.failure.exit_code for outcome in done if outcome.failure is not None]
@@ -69,7 +73,7 @@ def _applicable(recipe: Recipe) -> list[str]:
     """Every method that can be run so; says why the others are left out."""
     found = []
     for method in registry.METHODS.values():
-        model = batch.model_for(method, recipe.model)
+        model = model_for(method, recipe.model)
         why = registry.obstacle(method, recipe.settings.smooth, None if model is None else model.made_for)
         if why is None:
             found.append(method.name)
@@ -95,10 +99,12 @@ def _show(outcome: Outcome, summary: str, debug: bool) -> None:
         click.echo("\n".join(map(printable, text.split("\n"))), err=on_stdout)
 
 
-def _entry(outcome: Outcome) -> Entry:
-    if outcome.failure is not None:
-        return Entry(outcome.task.log, None, {}, outcome.failure.message)
-    return Entry(outcome.task.log, outcome.task.report, outcome.summary)
+def _write_index(done: Sequence[Outcome], index: str) -> None:
+    """The page that lists what became of every log."""
+    from ftproc.report.index import Entry, write
+
+    why = [None if o.failure is None else o.failure.message for o in done]
+    write([Entry(o.task.log, o.task.report, o.summary, text) for o, text in zip(done, why, strict=True)], index)
 
 
 def _written(outcome: Outcome) -> dict[str, str]:

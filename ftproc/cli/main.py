@@ -12,7 +12,7 @@ import click
 
 from ftproc import __version__
 from ftproc.cli.command import CONTEXT, DEBUG, debug_option, write_examples
-from ftproc.errors import interruption, nearest
+from ftproc.errors import failure, interruption, nearest
 
 COMMANDS = ("simulate", "train", "filter", "score")
 
@@ -82,8 +82,6 @@ def _report(error: BaseException, debug: bool) -> int:
         return error.exit_code
     if isinstance(error, BrokenPipeError):  # whoever read our output has seen enough
         return 1
-    from ftproc.batch import failure
-
     found = failure(error)
     click.echo(f"ftproc: {found.message}", err=True)
     return found.exit_code

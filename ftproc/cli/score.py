@@ -53,13 +53,16 @@ def command(trajectories: tuple[str, ...], truths: tuple[str, ...], form: str, r
 def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: str | None) -> int:
     """Score one after the other, print the scores, and write the pages; the exit code."""
     from ftproc import report as pages
-    from ftproc.cli import reports
+    from ftproc.batch import plan
     from ftproc.errors import InputError
-    from ftproc.files import trajectories as trajectory_files
+    from ftproc.files.reading import trajectories as trajectory_files
+    from ftproc.report.index import Entry, write
+    from ftproc.report.style import require_plotly
     from ftproc.scoring import axes, render, score
 
-    reports.check(report)
-    places, index = reports.plan(trajectories, report, truths)
+    if report is not None:
+        require_plotly()
+    places, index = plan.pages(trajectories, report, truths)
     scores, entries, failed = [], [], False
     known: dict[str, Truth] = {}
     for number, (name, place) in enumerate(zip(trajectories, places, strict=True)):
@@ -71,12 +74,13 @@ def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: 
                 click.echo(f"ftproc: {doubt}", err=True)
             if place is not None:
                 pages.write(trajectory, place, truth)
-                entries.append(pages.Entry(name, place, _summary(trajectory)))
+                entries.append(Entry(name, place, _summary(trajectory)))
         except InputError as error:
             click.echo(f"ftproc: {error}", err=True)
-            entries.append(pages.Entry(name, None, {}, str(error)))
+            entries.append(Entry(name, None, {}, str(error)))
             failed = True
-    reports.write_index(entries, index)
+    if index is not None:
+        write(entries, index)
     if scores:
         click.echo(render(scores, form), nl=False)
     return int(failed)
@@ -87,7 +91,7 @@ def _summary(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def _truth(name: str, known: dict[str, Truth]) -> Truth:
-    from ftproc.files import truth as truth_files
+    from ftproc.files.reading import truth as truth_files
 
     if name not in known:
         known[name] = truth_files.read(name)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
 from ftproc.cli import options
 from ftproc.cli.command import Command
+from ftproc.errors import UsageError
 
 _EXAMPLES = """
 ftproc simulate --scenario zuo2021-outliers --seed 3 -o flight.csv --truth flight.truth.csv
@@ -62,9 +65,29 @@ def command(
     truth: str | None,
 ) -> None:
     """Make a log as dirty as a real one, with its truth."""
-    from ftproc.cli import simulated_files
+    from ftproc.files.units import parse_units
+    from ftproc.files.writing import flights
     from ftproc.simulation import simulate
 
-    simulated_files.check(output, truth)
+    _check(output, truth)
+    parse_units(units)  # what is wrong with them is said before any work
     flight = simulate(scenario, seed=seed, duration_s=duration, dt_s=dt, noise=noise, outliers=outliers)
-    simulated_files.write(flight, output, truth, units, azimuth_from)
+    if truth is not None:  # first, so that who waits for the log finds both
+        flights.write_truth(flight.truth, truth)
+    flights.write_log(flight.log, output, units, azimuth_from)
+
+
+def _check(output: str, truth: str | None) -> None:
+    """Raise UsageError or OutputError before any work when the two cannot both be written."""
+    from ftproc.files.writing import atomic, tables
+
+    for target in (output, truth):
+        if target is not None:
+            tables.kind_of(target)
+            atomic.check_target(target)
+    if truth is not None and (output == truth or _resolved(output) == _resolved(truth)):
+        raise UsageError(f"-o and --truth are both {output}; give the truth a place of its own.")
+
+
+def _resolved(target: str) -> str:
+    return target if target == "-" else str(Path(target).resolve())

@@ -7,10 +7,10 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from ftproc import config
-from ftproc.batch import Recipe
+from ftproc.config import reading, writing
+from ftproc.config.recipe import Recipe
 from ftproc.errors import UsageError
-from ftproc.files.schema import parse_columns
+from ftproc.files.reading.schema import parse_columns
 from ftproc.files.units import parse_units
 from ftproc.methods import registry
 
@@ -19,7 +19,7 @@ ALL = "all"  # --method all
 
 def recipe(ctx: click.Context) -> Recipe:
     """What `filter` is to do with every log. Raises UsageError for what is wrong whatever the log."""
-    return config.recipe(_options(ctx))
+    return Recipe.of(_options(ctx))
 
 
 def as_file(ctx: click.Context) -> str:
@@ -27,12 +27,12 @@ def as_file(ctx: click.Context) -> str:
     options = _options(ctx)
     if options.get("method") == ALL:
         raise UsageError("--method all cannot be kept in a station file; name one method.")
-    return config.dump(options)
+    return writing.dump(options)
 
 
 def _options(ctx: click.Context) -> dict[str, Any]:
     given = {name: value for name, value in ctx.params.items() if _said(ctx, name)}
-    found = config.load(given["config"]) if "config" in given else {}
+    found = reading.load(given["config"]) if "config" in given else {}
     options = {**found, **given}
     for name, parse in (("units", parse_units), ("columns", parse_columns)):  # the file's of other quantities stay
         if name in options:

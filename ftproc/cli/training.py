@@ -7,12 +7,14 @@ from collections.abc import Sequence
 import click
 import numpy as np
 
-from ftproc import api, pipeline, warm
+from ftproc import api, pipeline
 from ftproc.cli.progress import Progress
-from ftproc.correction import model, model_file, stages, study
+from ftproc.core import compiled
+from ftproc.correction import model, model_file
+from ftproc.correction.training import stages, study
 from ftproc.errors import UsageError
-from ftproc.files import atomic
-from ftproc.files import truth as truth_files
+from ftproc.files.reading import truth as truth_files
+from ftproc.files.writing import atomic
 from ftproc.records import MeasurementLog, Truth
 from ftproc.settings import FilterSettings, Noise, TrainSettings
 from ftproc.simulation import simulate
@@ -51,7 +53,7 @@ def run(
         atomic.check_target(output)
     settings = TrainSettings(features, hidden, population, generations, epochs, len(logs) or flights, seed, method)
     filtering = FilterSettings(method=method, editing=editing, noise=noise, jerk_psd_m2ps5=jerk)
-    with Progress() as progress, warm.announced(lambda text: click.echo(f"ftproc: {text}", err=True)):
+    with Progress() as progress, compiled.announced(lambda text: click.echo(f"ftproc: {text}", err=True)):
         pairs = (
             _read(logs, truths, config, units, columns)
             if scenario is None

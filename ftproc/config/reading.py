@@ -9,7 +9,7 @@ from typing import Any
 
 from ftproc.config.keys import KEYS, Key, every
 from ftproc.errors import UsageError, nearest
-from ftproc.files.tables import is_ordinary
+from ftproc.files.reading.tables import is_ordinary
 from ftproc.files.units import UNITS
 
 #: What a file without any key amounts to, for the options that consist of parts.

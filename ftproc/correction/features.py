@@ -11,7 +11,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.geometry import line_of_sight_axes
+from ftproc.core.model.frames import line_of_sight_axes
 from ftproc.correction import los
 from ftproc.records import FloatArray, IntArray
 
@@ -22,7 +22,7 @@ BoolArray = NDArray[np.bool_]
 
 
 class Record(Protocol):
-    """What is needed of a run of n samples, of the filter (see `ftproc.core.forward`) or smoothed; angles in rad.
+    """What is needed of a run of n samples, of the filter (see `core.filtering.records`) or smoothed; angles in rad.
 
     time_s (n,); state (n, 9) updated and predicted (n, 9) one-step predicted x y z m, v m/s, a m/s2;
     innovation (n, 3), NaN where missing; innovation_sigma (n, 3) sqrt(S_ii); weight (n, 3) in [0, 1], 0 where

@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +19,26 @@ from ftproc.correction.model import FILTER, SCHEMA, STAGES, Model, Stage
 from ftproc.correction.network import Weights
 from ftproc.correction.verdict import Verdict
 from ftproc.errors import ModelError
+from ftproc.settings import NO_MODEL, PACKAGED
 
 _KEY = "ftproc-correction"  # one key only: safetensors writes several in no fixed order
 _LARGEST = 64 << 20  # bytes; a model has thousands
 _TENSORS = (*Weights._fields, "precision")
+
+
+_PACKAGED_FILE = Path(__file__).parent / "default.safetensors"
+
+
+def named(name: str | Model) -> Model | None:
+    """`packaged`, `none` or a file -> the correction; one that was loaded is what it is. Raises ModelError."""
+    if name == NO_MODEL:
+        return None
+    return _loaded(name) if isinstance(name, str) else name
+
+
+@cache
+def _loaded(name: str) -> Model:
+    return load(_PACKAGED_FILE if name == PACKAGED else name)
 
 
 def to_bytes(model: Model) -> bytes:
@@ -146,7 +163,7 @@ def _check(stage: Stage, header: Mapping[str, Any], name: str) -> None:
 
 def save(model: Model, path: Path | str) -> None:
     """Write the model; it appears whole or not at all. Raises OutputError."""
-    from ftproc.files.atomic import replacing
+    from ftproc.files.writing.atomic import replacing
 
     content = to_bytes(model)
     with replacing(path) as stream:
@@ -155,7 +172,7 @@ def save(model: Model, path: Path | str) -> None:
 
 def load(path: Path | str) -> Model:
     """Read a model. Raises ModelError, in a sentence, for whatever is not one."""
-    from ftproc.files.tables import is_ordinary
+    from ftproc.files.reading.tables import is_ordinary
 
     try:
         if not is_ordinary(Path(path)):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..records import FloatArray
+from ftproc.records import FloatArray
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -13,9 +13,9 @@ from typing import cast
 
 import numpy as np
 
-from ..errors import UsageError
-from ..records import FloatArray, MeasurementLog
-from ..settings import Air, Station
+from ftproc.errors import UsageError
+from ftproc.records import FloatArray, MeasurementLog
+from ftproc.settings import Air, Station
 
 #: What the azimuth is counted from -> the frame of the log, and the sense in which that frame counts.
 FRAMES = {"x": "local", "north": "north-east-up"}
@@ -87,7 +87,7 @@ def _reversed(station: Station) -> bool:
 
 def _bent(measurement: FloatArray, air: Air) -> FloatArray:
     """(n,) observed minus true elevation; a target whose range is never read counts as outside the air."""
-    from ..core import refraction
+    from ftproc.core.model import refraction
 
     distance, elevation = _distance(measurement[:, 0]), measurement[:, 2]
     seen = np.isfinite(elevation)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, cast
 from urllib.parse import unquote, urlsplit
 
-from ..errors import FtprocError, InputError, OutputError
+from ftproc.errors import FtprocError, InputError, OutputError
 
 _SCHEME = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
 _AT_ONCE = 16 << 20  # bytes

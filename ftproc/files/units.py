@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from ..errors import UsageError, nearest
-from ..records import COMPONENTS, FloatArray
+from ftproc.errors import UsageError, nearest
+from ftproc.records import COMPONENTS, FloatArray
 
 #: What a log is made of, in the order of its canonical columns.
 QUANTITIES = ("time", *COMPONENTS)

@@ -17,9 +17,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core import editing, forward, tuning
-from ftproc.core.forward import Model
-from ftproc.methods import preparing, recursive, side_by_side
+from ftproc.core import threads
+from ftproc.core.editing import two_pass
+from ftproc.core.filtering import forward
+from ftproc.core.filtering.records import Model
+from ftproc.core.identification import likelihood
+from ftproc.methods import preparing, recursive
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
 from ftproc.settings import FilterSettings
 
@@ -32,7 +35,7 @@ MARGIN_S, LEAST_MARGIN, MOST_MARGIN = 60.0, 1_000, 10_000  # s and samples on ea
 def estimate(readings: Readings, settings: FilterSettings) -> Estimate:
     """Filter, edit and (if asked) smooth a log as a whole, by the way of editing that the settings name."""
     if settings.editing == "two-pass":
-        return two_pass(readings, settings)
+        return edited_twice(readings, settings)
     if settings.editing == "forward":
         return recursive.estimate(readings, settings)
     return preparing.unedited(readings, settings)
@@ -42,20 +45,21 @@ def parts(record: Recording, settings: FilterSettings) -> Iterator[Part]:
     """The estimate of a log, a stretch at a time. Raises ValueError where there is no first state."""
     if settings.editing == "forward" and not settings.smooth:
         stretches = recursive.parts(record, settings)
-        yield from stretches if len(record) <= recursive.BLOCK else side_by_side.ahead(stretches)
+        yield from stretches if len(record) <= recursive.BLOCK else threads.ahead(stretches)
     elif settings.editing == "two-pass" and len(record) > LONGEST_WHOLE:
         told = usual(record, settings)
         work = partial(_segment, record, settings, told)
-        yield from side_by_side.in_order(work, segments(record))
+        yield from threads.in_order(work, segments(record))
     else:
         yield Part(estimate(record.whole(), settings), 0, 0, len(record))
 
 
-def two_pass(readings: Readings, settings: FilterSettings, told: Usual | None = None) -> Estimate:
-    """Editing with the whole record in view. told: of a segment, what is usual in the log, see `editing.edit`."""
+def edited_twice(readings: Readings, settings: FilterSettings, told: Usual | None = None) -> Estimate:
+    """Editing with the whole record in view. told: of a segment, what is usual in the log, see
+    `core.editing.two_pass`."""
     given = preparing.given_sigma(readings, settings)
-    edited = editing.edit(*readings[:2], given, settings.jerk_psd_m2ps5, settings.gate, told and told.model)
-    starts = editing.smoothed_starts(edited.smoothed)
+    edited = two_pass.edit(*readings[:2], given, settings.jerk_psd_m2ps5, settings.gate, told and told.model)
+    starts = two_pass.smoothed_starts(edited.smoothed)
     run = forward.filter_log(*readings[:2], edited.weight, edited.model, starts)
     smoothed = edited.smoothed if settings.smooth else None
     slow = edited.slow_noise if told is None else told.slow_noise
@@ -72,26 +76,26 @@ class Usual(NamedTuple):
 
 def usual(record: Recording, settings: FilterSettings) -> Usual | None:
     """The medians of what spans spread over a log say by themselves; None if none says anything."""
-    found = [e for e in side_by_side.in_order(partial(_span, record, settings), record.spans()) if e is not None]
+    found = [e for e in threads.in_order(partial(_span, record, settings), record.spans()) if e is not None]
     if not found:
         return None
     correlation = np.median([edited.model.correlation for edited in found], 0)
     variance = np.median([edited.model.reading_variance for edited in found], 0)
-    levels = np.array([tuning.median_level(edited.model).jerk for edited in found])
+    levels = np.array([likelihood.median_level(edited.model).jerk for edited in found])
     jerk = np.exp(np.median(np.log(levels[:, 0, [0, 5]]), 0))
     model = Model(
         variance * (1 + correlation) / (1 - correlation),
-        jerk[0] * tuning.HORIZONTAL[None] + jerk[1] * tuning.VERTICAL[None],
+        jerk[0] * likelihood.HORIZONTAL[None] + jerk[1] * likelihood.VERTICAL[None],
         correlation=correlation,
     )
     return Usual(model, bool(np.median([edited.slow_noise for edited in found]) > 0.5))
 
 
-def _span(record: Recording, settings: FilterSettings, rows: slice) -> editing.Edited | None:
+def _span(record: Recording, settings: FilterSettings, rows: slice) -> two_pass.Edited | None:
     readings = record.part(rows)
     given = preparing.given_sigma(readings, settings)
     try:
-        return editing.edit(*readings[:2], given, settings.jerk_psd_m2ps5, settings.gate)
+        return two_pass.edit(*readings[:2], given, settings.jerk_psd_m2ps5, settings.gate)
     except ValueError:  # a component says too little in this span
         return None
 
@@ -115,7 +119,7 @@ def _segment(record: Recording, settings: FilterSettings, told: Usual | None, sp
         first, last = max(low - margin, 0), min(high + margin, len(record))
         whole = last - first == len(record)
         try:
-            estimate = two_pass(record.part(slice(first, last)), settings, told)
+            estimate = edited_twice(record.part(slice(first, last)), settings, told)
         except ValueError:
             if whole:
                 raise

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core.forward import FilterRun, Model, empty_run
-from ftproc.core.geometry import line_of_sight_axes, to_cartesian, wrap
+from ftproc.core.filtering.records import FilterRun, Model, empty_run
+from ftproc.core.model.frames import line_of_sight_axes, to_cartesian, wrap
 from ftproc.methods.estimate import Estimate, Readings
 from ftproc.methods.preparing import labels, trusted
 from ftproc.records import FloatArray

@@ -1,11 +1,12 @@
-"""The linear Kalman filter on readings converted to positions; see `ftproc.core.converted`."""
+"""The linear Kalman filter on readings converted to positions; see `ftproc.core.comparators.converted`."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ftproc.core.converted import run_converted
-from ftproc.core.forward import FilterRun, run_spans
+from ftproc.core.comparators.converted import run_converted
+from ftproc.core.filtering.forward import run_spans
+from ftproc.core.filtering.records import FilterRun
 from ftproc.methods.estimate import Estimate, Readings
 from ftproc.methods.preparing import finished, prepare
 from ftproc.records import FloatArray

@@ -7,8 +7,8 @@ import warnings
 
 import numpy as np
 
-from ftproc.core import ensemble_run
-from ftproc.core.forward import FilterRun
+from ftproc.core.comparators import ensemble_run
+from ftproc.core.filtering.records import FilterRun
 from ftproc.errors import FtprocWarning
 from ftproc.methods import preparing
 from ftproc.methods.estimate import Estimate, Readings

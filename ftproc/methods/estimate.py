@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core.forward import FilterRun, Model
-from ftproc.core.smoother import SmootherRun
+from ftproc.core.filtering.records import FilterRun, Model
+from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.records import FlagArray, FloatArray, forget, thinned
 
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: stands in for a component that is missing throughout

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ftproc.core.forward import FilterRun, run_spans
-from ftproc.core.imm import run_imm
+from ftproc.core.comparators.imm import run_imm
+from ftproc.core.filtering.forward import run_spans
+from ftproc.core.filtering.records import FilterRun
 from ftproc.methods.estimate import Estimate, Readings
 from ftproc.methods.preparing import finished, prepare
 from ftproc.records import FloatArray

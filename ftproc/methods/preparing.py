@@ -6,11 +6,13 @@ import contextlib
 
 import numpy as np
 
-from ftproc.core import editing, forward, indicators, tuning
-from ftproc.core.forward import FilterRun, Model, Start
-from ftproc.core.motion import isotropic
-from ftproc.core.smoother import smooth_log
-from ftproc.core.start import begin_all
+from ftproc.core.editing import outlier_chain, two_pass
+from ftproc.core.filtering import forward
+from ftproc.core.filtering.initialization import begin_all
+from ftproc.core.filtering.records import FilterRun, Model, Start
+from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.identification import likelihood
+from ftproc.core.model.motion import isotropic
 from ftproc.methods.estimate import Estimate, Readings, Recording
 from ftproc.records import MISSING, FlagArray, FloatArray
 from ftproc.settings import FilterSettings
@@ -51,10 +53,10 @@ def trusted(readings: Readings, settings: FilterSettings) -> tuple[FloatArray, F
     further on the weights are those of the screening, and serve to find noise and jerk.
     """
     time_s, measurement, _ = readings
-    weight, sigma = editing.screen(time_s, measurement)
+    weight, sigma = two_pass.screen(time_s, measurement)
     given = given_sigma(readings, settings)
     with contextlib.suppress(ValueError):  # too little in the head: the screening has to do
-        head = editing.edit(time_s[:HEAD], measurement[:HEAD], given, settings.jerk_psd_m2ps5, settings.gate)
+        head = two_pass.edit(time_s[:HEAD], measurement[:HEAD], given, settings.jerk_psd_m2ps5, settings.gate)
         weight[:HEAD] = head.weight
         if len(time_s) <= HEAD:
             sigma = np.sqrt(head.model.noise_variance)
@@ -69,7 +71,7 @@ def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[S
     guess = Model(sigma**2, isotropic(settings.jerk_psd_m2ps5 or 1.0))
     starts = begin_all(time_s, measurement, weight, guess.noise_variance, settings.jerk_psd_m2ps5)
     fixed = np.isfinite(given)
-    model = tuning.fit_level(time_s, measurement, weight, starts, guess, fixed, settings.jerk_psd_m2ps5 is not None)
+    model = likelihood.fit_level(time_s, measurement, weight, starts, guess, fixed, settings.jerk_psd_m2ps5 is not None)
     return model, begin_all(time_s, measurement, weight, model.noise_variance, float(model.jerk[0, 0])), weight
 
 
@@ -86,6 +88,6 @@ def given_sigma(readings: Readings | Recording, settings: FilterSettings) -> Flo
 
 def labels(weight: FloatArray, measurement: FloatArray) -> FlagArray:
     """(n, 3) good, isolated, patch or missing from weights (n, 3), zero where rejected."""
-    label = indicators.label_runs(weight, measurement, LONGEST_ISOLATED).astype(np.uint8)
+    label = outlier_chain.label_runs(weight, measurement, LONGEST_ISOLATED).astype(np.uint8)
     label[~np.isfinite(measurement)] = MISSING
     return label

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ftproc.core import channels as kernels
+from ftproc.core.comparators import channels as kernels
 from ftproc.methods import channels
 from ftproc.methods.channels import AZIMUTH, Cleaned
 from ftproc.methods.estimate import Estimate, Readings

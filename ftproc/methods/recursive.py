@@ -10,9 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core import editing, gate, start, tracking
-from ftproc.core.forward import FilterRun, Model, Start, empty_run, lead_in
-from ftproc.core.motion import isotropic
+from ftproc.core.editing import gate, track, two_pass
+from ftproc.core.filtering import initialization
+from ftproc.core.filtering.forward import lead_in
+from ftproc.core.filtering.records import FilterRun, Model, Start, empty_run
+from ftproc.core.model.motion import isotropic
 from ftproc.methods import preparing
 from ftproc.methods.estimate import SPAN, SPANS, Estimate, Part, Readings, Recording, typical_interval
 from ftproc.methods.preparing import HEAD
@@ -83,10 +85,10 @@ def _kept(run: FilterRun, settings: FilterSettings) -> FloatArray:
 def _stretches(record: Recording, settings: FilterSettings, model: Model, block: int) -> Iterator[Stretch]:
     n = len(record)
     how = gate.GateSettings(settings.gate, _longest_patch_s(record, settings), settings.gain_form)
-    longest_s = start.longest_without(typical_interval(record.time_s))
+    longest_s = initialization.longest_without(typical_interval(record.time_s))
     weight, begin = _beginning(record, settings, model)
     edges = [0, *range(max(block, begin.sample + 1), n, block), n]
-    track: tracking.Track | None = None
+    going: track.Track | None = None
     last_good_s = np.full(3, np.nan)
     history = empty_run(np.empty(0))
     for low, high in itertools.pairwise(edges):
@@ -101,14 +103,14 @@ def _stretches(record: Recording, settings: FilterSettings, model: Model, block:
         if low == 0:
             starts = [begin, *(anew for anew in starts if anew.sample > begin.sample)]
         run = _prolonged(history, readings.time_s[:stop])
-        track, begun, _ = tracking.go_on(track, here, stop, *readings[:2], allowed, model, starts, how, run)
+        going, begun, _ = track.go_on(going, here, stop, *readings[:2], allowed, model, starts, how, run)
         if low == 0:
             lead_in(readings.measurement, model, begin, run)
         yield Stretch(readings, run, begun, first, here, stop)
         last_good_s = _last_good_s(readings.time_s, good, here, stop, last_good_s)
         kept = min(HISTORY, stop)
         history = FilterRun._make([*(each[stop - kept :].copy() for each in run[:-1]), 0.0])
-        track = track.shifted(stop - kept)
+        going = going.shifted(stop - kept)
 
 
 def _prolonged(history: FilterRun, time_s: FloatArray) -> FilterRun:
@@ -143,21 +145,23 @@ def _after_gaps(
     before = max(low - 1, 0)  # an interval may end with the first sample
     seen = good[before:].copy()
     seen[: low - before] = False
-    gaps = start.gaps_of(time_s[before:], seen, longest_s, last_good_s)
+    gaps = initialization.gaps_of(time_s[before:], seen, longest_s, last_good_s)
     begins = sorted(before + k for k in gaps)
     starts = []
     for k, following in itertools.pairwise([*begins, len(time_s)]):
         if k >= high:
             break
         window = slice(k, min(following, k + AHEAD))
-        weight, _ = editing.screen(time_s[window], measurement[window])
+        weight, _ = two_pass.screen(time_s[window], measurement[window])
         usable = (weight > 0) & good[window]
-        if (usable.sum(0) < start.FEWEST_READINGS).any():
+        if (usable.sum(0) < initialization.FEWEST_READINGS).any():
             continue
-        if start.too_long(gaps[k - before], measurement[window, 0][usable[:, 0]], float(model.jerk[0, 0])):
+        if initialization.too_long(gaps[k - before], measurement[window, 0][usable[:, 0]], float(model.jerk[0, 0])):
             around = np.zeros(measurement.shape)
             around[window] = usable
-            starts.append(start.first_state(time_s, measurement, around, model.noise_variance, k, k, window.stop))
+            starts.append(
+                initialization.first_state(time_s, measurement, around, model.noise_variance, k, k, window.stop)
+            )
     return starts
 
 
@@ -196,7 +200,7 @@ def _beginning(record: Recording, settings: FilterSettings, model: Model) -> tup
         readings = record.part(slice(0, looked_at))
         weight, _ = preparing.trusted(readings, settings)
         try:
-            return weight, start.begin(*readings[:2], weight, model.noise_variance)
+            return weight, initialization.begin(*readings[:2], weight, model.noise_variance)
         except ValueError:
             if looked_at >= len(record):
                 raise

@@ -1,12 +1,13 @@
 """UKFs that weigh readings down instead of editing them: Huber, Student t, maximum correntropy. One kernel, three
-weights; see `ftproc.core.robust`."""
+weights; see `ftproc.core.comparators.robust`."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ftproc.core import robust
-from ftproc.core.forward import FilterRun, run_spans
+from ftproc.core.comparators import robust
+from ftproc.core.filtering.forward import run_spans
+from ftproc.core.filtering.records import FilterRun
 from ftproc.methods.estimate import Estimate, Readings
 from ftproc.methods.preparing import finished, prepare
 from ftproc.records import FloatArray

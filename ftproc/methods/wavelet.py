@@ -12,8 +12,8 @@ import itertools
 
 import numpy as np
 
-from ftproc.core.adaptive import adaptive_kalman
-from ftproc.core.geometry import unwrap
+from ftproc.core.comparators.adaptive import adaptive_kalman
+from ftproc.core.model.frames import unwrap
 from ftproc.methods import channels
 from ftproc.methods.channels import AZIMUTH, Cleaned
 from ftproc.methods.estimate import Estimate, Readings

@@ -9,35 +9,17 @@ plotly draws; it is an extra (`report`) and is loaded when first used.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 from ftproc.errors import UsageError
-from ftproc.files import atomic
+from ftproc.files.writing import atomic
+from ftproc.report.style import require_plotly
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-    from ftproc.files.atomic import Target
+    from ftproc.files.layout import Target
     from ftproc.records import Trajectory, Truth
-
-
-class Entry(NamedTuple):
-    """A log, its page beside the index (None when it has none), its summary (may be empty), why it failed."""
-
-    log: str
-    page: str | None
-    summary: Mapping[str, Any]
-    failure: str | None = None
-
-
-def require_plotly() -> Any:
-    """The module plotly.graph_objects. Raises UsageError when it is not installed."""
-    try:
-        import plotly.graph_objects
-    except ImportError as error:
-        raise UsageError('reports need plotly, which is not installed: pip install "plotly>=6.0".') from error
-    return plotly.graph_objects
 
 
 def write(trajectory: Trajectory, target: Target, truth: Truth | None = None) -> None:

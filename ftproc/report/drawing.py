@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ftproc.records import FloatArray, IntArray
-from ftproc.report import require_plotly, style
+from ftproc.report import style
+from ftproc.report.style import require_plotly
 from ftproc.report.thinning import Timeline
 
 if TYPE_CHECKING:

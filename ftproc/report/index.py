@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import PurePath
+from typing import Any, NamedTuple
 from urllib.parse import quote
 
-from ftproc import trust
-from ftproc.files import atomic
-from ftproc.files.atomic import Target
+from ftproc.files.layout import Target
+from ftproc.files.writing import atomic
+from ftproc.quality import verdict
+from ftproc.quality.summary import counted
 from ftproc.records import COMPONENTS
-from ftproc.report import Entry, tables
+from ftproc.report import tables
 from ftproc.report.page import document
 from ftproc.report.style import GREY, VERDICT
-from ftproc.summary import counted
 
 _HEADER = ("log", "method", "verdict", "rows", "duration", "outliers R, A, E", "why")
+
+
+class Entry(NamedTuple):
+    """A log, its page beside the index (None when it has none), its summary (may be empty), why it failed."""
+
+    log: str
+    page: str | None
+    summary: Mapping[str, Any]
+    failure: str | None = None
 
 
 def write(entries: Sequence[Entry], target: Target) -> None:
@@ -37,7 +47,7 @@ def _cells(entry: Entry) -> tuple[str, ...]:
     if entry.failure is not None or "trust" not in s:
         return (name, "", _badge("failed" if entry.failure else "unknown", GREY), "", "", "", entry.failure or "")
     said = s["trust"]
-    rates = ", ".join(f"{100 * trust.outlier_share(s['components'][name]):.1f} %" for name in COMPONENTS)
+    rates = ", ".join(f"{100 * verdict.outlier_share(s['components'][name]):.1f} %" for name in COMPONENTS)
     badge = _badge(said["verdict"], VERDICT[said["verdict"]])
     why = "; ".join(said["reasons"])
     return (

@@ -48,7 +48,7 @@ _SECTIONS = (
 def page(trajectory: Trajectory, truth: Truth | None = None) -> str:
     """The whole page as HTML text."""
     shown = view(trajectory, truth)
-    parts = [tables.heading(shown), tables.verdict(shown), tables.summary(shown)]
+    parts = [tables.heading(shown), tables.banner(shown), tables.summary(shown)]
     if truth is not None:
         parts.append(_section("Against the truth", [("errors", ERRORS(shown))], tables.score(shown)))
     for title, names in _SECTIONS:

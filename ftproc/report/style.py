@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ftproc.errors import UsageError
+from ftproc.quality.verdict import CAREFUL, NO, TRUST
 from ftproc.records import ISOLATED, MISSING, PATCH
-from ftproc.trust import CAREFUL, NO, TRUST
 
 BLUE, ORANGE, GREEN, SKY = "#0072B2", "#E69F00", "#009E73", "#56B4E9"
 VERMILLION, PURPLE, GREY, BLACK = "#D55E00", "#AA4499", "#8C8C8C", "#222222"
@@ -84,3 +85,12 @@ LAYOUT: dict[str, Any] = {
 def axis(**changes: Any) -> dict[str, Any]:
     """An axis of a plane figure."""
     return {**_AXIS, **changes}
+
+
+def require_plotly() -> Any:
+    """The module plotly.graph_objects. Raises UsageError when it is not installed."""
+    try:
+        import plotly.graph_objects
+    except ImportError as error:
+        raise UsageError('reports need plotly, which is not installed: pip install "plotly>=6.0".') from error
+    return plotly.graph_objects

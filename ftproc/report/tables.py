@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
-from ftproc import summary as figures
-from ftproc import trust
+from ftproc.quality import summary as figures
+from ftproc.quality import verdict
 from ftproc.records import COMPONENTS, Trajectory
 from ftproc.report.style import GREY, VERDICT
 from ftproc.report.view import View
@@ -38,15 +38,15 @@ def heading(view: View) -> str:
     return f'<h1>{html.escape(name(view.trajectory))}</h1><p class="sub">{html.escape(" · ".join(parts))}</p>'
 
 
-def verdict(view: View) -> str:
+def banner(view: View) -> str:
     """Whether to trust it, in a sentence, with a colour that says the same."""
     said = view.summary.get("trust")
     if not said:
         return _banner(GREY, "This file does not say how it was made, so it cannot be judged by itself.", [])
     reasons = said["reasons"]
     if len(reasons) < 2:
-        return _banner(VERDICT[said["verdict"]], trust.sentence(said), [])
-    return _banner(VERDICT[said["verdict"]], f"{trust.opening(said)}:", reasons)
+        return _banner(VERDICT[said["verdict"]], verdict.sentence(said), [])
+    return _banner(VERDICT[said["verdict"]], f"{verdict.opening(said)}:", reasons)
 
 
 def _banner(colour: str, sentence: str, reasons: Sequence[str]) -> str:

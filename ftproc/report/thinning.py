@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ftproc.quality.statistics import GAP_INTERVALS
 from ftproc.records import FloatArray, IntArray
-from ftproc.tally import GAP_INTERVALS
 
 COLUMNS = 1000  # pixel columns of a wide figure; at most two points are drawn in each
 MOST_MARKED = 200_000  # flagged readings that are all in the page, which is then below 8 MB

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ftproc import consistency
+from ftproc.quality import consistency
 from ftproc.records import FloatArray
-from ftproc.report import drawing, require_plotly, style
+from ftproc.report import drawing, style
 from ftproc.report.drawing import DASHES, Drawn
+from ftproc.report.style import require_plotly
 from ftproc.report.view import View, load_factor, speed
 
 if TYPE_CHECKING:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ftproc.records import FloatArray
-from ftproc.report import require_plotly, style
+from ftproc.report import style
 from ftproc.report.drawing import Drawn
+from ftproc.report.style import require_plotly
 from ftproc.report.thinning import Timeline
 from ftproc.report.view import View
 

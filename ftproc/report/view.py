@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ftproc.core.geometry import unwrap, wrap
+from ftproc.core.model.frames import unwrap, wrap
 from ftproc.records import Diagnostics, FloatArray, Trajectory, Truth
 from ftproc.report.style import COMPONENT
 from ftproc.report.thinning import Timeline

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.geometry import from_cartesian, wrap
+from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.records import COMPONENTS, ISOLATED, PATCH, FlagArray, FloatArray, Trajectory, Truth
 from ftproc.scoring.matching import match
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ftproc.core.geometry import from_cartesian
+from ftproc.core.model.frames import from_cartesian
 from ftproc.simulation.aircraft import Airframe, fly, follow
 from ftproc.simulation.flight import GRAVITY_MPS2, Flight, constant_acceleration, gusts, integrate, smoothed
 

@@ -7,7 +7,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from ftproc.core.geometry import from_cartesian, to_cartesian, wrap
+from ftproc.core.model.frames import from_cartesian, to_cartesian, wrap
 from ftproc.records import FloatArray
 
 REFRACTION_SCALE_HEIGHT_M = 8000.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ftproc.core import particles
+from ftproc.core.comparators import particles
 from tests.acceptance.reproduce import alignment, misalignment
 from tests.acceptance.reproduce.aligning import align
 from tests.acceptance.reproduce.drive import DT, HZ, angles, attitude_of, drive, metres, moved, navigate

@@ -17,7 +17,7 @@ import numpy as np
 from ftproc import pipeline
 from ftproc.correction.apply import correct
 from ftproc.correction.model import Stage
-from ftproc.correction.training import train
+from ftproc.correction.training.train import train
 from ftproc.settings import FilterSettings, TrainSettings
 from ftproc.simulation import simulate
 

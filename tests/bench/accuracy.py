@@ -7,8 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from ftproc import pipeline, scoring
-from ftproc.core import forward, motion
-from ftproc.core.smoother import smooth_log
+from ftproc.core.filtering import forward
+from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.model import motion
+from ftproc.correction import model_file
 from ftproc.settings import FilterSettings
 from ftproc.simulation import Simulation, simulate
 
@@ -19,7 +21,7 @@ JERK_GRID = 10.0 ** np.arange(-4.0, 4.1, 0.5)  # m^2/s^5
 
 def rows() -> Iterator[tuple[str, ...]]:
     """One row per scenario, medians over the seeds."""
-    model = pipeline.default_model()
+    model = model_file.named("packaged")
     for scenario in SCENARIOS:
         figures = np.array([_flight(simulate(scenario, seed=seed), model) for seed in SEEDS])
         clean = np.isnan(figures).all(0)

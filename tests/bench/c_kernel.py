@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.forward import FilterRun, Model, Start, empty_run
+from ftproc.core.filtering.records import FilterRun, Model, Start, empty_run
 
 SOURCE = Path(__file__).with_name("ukf.c")
 Array = NDArray[np.float64]

@@ -11,8 +11,8 @@ import numpy as np
 from ftproc import pipeline
 from ftproc.correction.apply import correct
 from ftproc.correction.model import Model
-from ftproc.correction.samples import Flight
-from ftproc.correction.stages import train_model
+from ftproc.correction.training.samples import Flight
+from ftproc.correction.training.stages import train_model
 from ftproc.records import FloatArray
 from ftproc.settings import FilterSettings, TrainSettings
 from ftproc.simulation import InstrumentErrors, Simulation, simulate

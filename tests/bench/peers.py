@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.forward import Model, Start
+from ftproc.core.filtering.records import Model, Start
 
 Array = NDArray[np.float64]
 Run = Callable[[], Array]  # the last state (9,), in the order position, velocity, acceleration

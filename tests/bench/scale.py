@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ftproc.files import logs
+from ftproc.files.writing import flights
 from ftproc.records import MeasurementLog
 from ftproc.simulation import simulate
 from tests.bench import measuring
@@ -55,7 +55,7 @@ def _make(folder: Path, n: int) -> str:
     """A log of about n rows (some are dropped as gaps); its noise as `--noise` takes it. More than a million are
     flown to and fro."""
     flight = simulate("manoeuvre", seed=1, duration_s=min(n, LARGE) * DT_S, dt_s=DT_S)
-    logs.write(to_and_fro(flight.log, n // LARGE) if n > LARGE else flight.log, folder / f"{n}.csv")
+    flights.write_log(to_and_fro(flight.log, n // LARGE) if n > LARGE else flight.log, folder / f"{n}.csv")
     return ",".join(f"{s:.6g}" for s in flight.sigma)
 
 
@@ -88,7 +88,7 @@ def _side_by_side(folder: Path) -> tuple[str, ...]:
     logs_of = folder / "many"
     logs_of.mkdir()
     first = logs_of / "0.csv"
-    logs.write(simulate("manoeuvre", seed=1, duration_s=MANY_ROWS * DT_S, dt_s=DT_S).log, first)
+    flights.write_log(simulate("manoeuvre", seed=1, duration_s=MANY_ROWS * DT_S, dt_s=DT_S).log, first)
     for k in range(1, MANY):
         (logs_of / f"{k}.csv").hardlink_to(first)
     program = [sys.executable, "-c", "from ftproc.cli.main import main; main()", "filter", *map(str, logs_of.iterdir())]

@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from ftproc import pipeline
-from ftproc.core import forward, gate, motion, tracking
-from ftproc.core.smoother import smooth_log
+from ftproc.core.editing import gate, track
+from ftproc.core.filtering import forward
+from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.model import motion
 from ftproc.settings import FilterSettings
 from ftproc.simulation import Simulation, simulate
 from tests.bench import c_kernel, measuring, peers
@@ -31,7 +33,7 @@ def rows() -> Iterator[tuple[str, ...]]:
     n = len(time_s)
     kernels: dict[str, Callable[[], object]] = {
         PLAIN: lambda: forward.filter_log(*readings, model, [start]),
-        GATED: lambda: tracking.filter_and_edit(time_s, z, np.ones_like(z), model, [start], gate.GateSettings()),
+        GATED: lambda: track.filter_and_edit(time_s, z, np.ones_like(z), model, [start], gate.GateSettings()),
         "forward pass and smoother": lambda: smooth_log(*readings, model, [start]),
     }
     with tempfile.TemporaryDirectory() as folder:
@@ -77,7 +79,7 @@ def _peers(
     ours: dict[str, tuple[Callable[[], object], int]] = {
         PLAIN: (lambda: forward.filter_log(*readings, model, [start]), len(readings[0])),  # type: ignore[arg-type]
         GATED: (
-            lambda: tracking.filter_and_edit(
+            lambda: track.filter_and_edit(
                 *readings[:2], np.ones_like(readings[1]), model, [start], gate.GateSettings()
             ),
             len(readings[0]),

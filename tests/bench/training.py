@@ -9,7 +9,7 @@ import numpy as np
 
 from ftproc.correction import network
 from ftproc.correction.network import Shape
-from ftproc.correction.training import train
+from ftproc.correction.training.train import train
 from ftproc.records import FloatArray
 from ftproc.settings import TrainSettings
 from tests.bench import measuring

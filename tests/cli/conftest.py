@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from ftproc.cli.main import cli
-from ftproc.warm import warm
+from ftproc.cli.warm import warm
 
 BIN = Path(sys.prefix) / "bin"
 

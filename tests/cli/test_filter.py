@@ -11,7 +11,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from ftproc.files import trajectories
+from ftproc.files.reading import trajectories
 from ftproc.methods import registry
 from tests.cli.conftest import Result
 

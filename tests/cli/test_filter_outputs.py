@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from ftproc.cli import outputs
+from ftproc.batch import plan
 from ftproc.errors import OutputError, UsageError
 
 WRITTEN = ".trajectory"
 
 
 def where(*logs: str, output: str | None = None, methods: list[str] | None = None) -> list[str]:
-    return [task.output for task in outputs.plan(logs, output, methods)]
+    return [task.output for task in plan.tasks(logs, output, methods)]
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_several_logs(here):
 )
 def test_wrong_usage(here, logs, output, sentence):
     with pytest.raises(UsageError, match=r".*") as caught:
-        outputs.plan(logs, output)
+        plan.tasks(logs, output)
     assert sentence in str(caught.value)
     assert list(here.iterdir()) == []
 
@@ -74,7 +74,7 @@ def test_wrong_usage(here, logs, output, sentence):
 def test_all_methods_need_a_directory(here):
     for output in (None, "a.csv", "-"):
         with pytest.raises(UsageError, match="name a directory"):
-            outputs.plan(["log.csv"], output, ["ukf", "ekf"])
+            plan.tasks(["log.csv"], output, ["ukf", "ekf"])
 
 
 def test_a_place_that_cannot_be(here):
@@ -85,7 +85,7 @@ def test_a_place_that_cannot_be(here):
         "none/a.csv": "none/a.csv: there is no directory none; create it first",
     }.items():
         with pytest.raises(OutputError, match=sentence):
-            outputs.plan(["log.csv"], output)
+            plan.tasks(["log.csv"], output)
 
 
 @pytest.mark.parametrize("output", ["flight.csv", "./flight.csv", "symbolic.csv", "hard.csv"])

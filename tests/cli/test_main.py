@@ -13,10 +13,11 @@ from pathlib import Path
 import click
 import pytest
 
-from ftproc import __version__, batch
-from ftproc.cli import reference
+from ftproc import __version__
 from ftproc.cli.main import COMMANDS, cli
+from ftproc.errors import failure
 from tests.cli.conftest import BIN
+from tests.docs import reference
 
 
 def commands() -> list[click.Command]:
@@ -120,7 +121,7 @@ def test_an_unexpected_error_is_a_sentence_too(run, here, monkeypatch):
         raise ZeroDivisionError("division by zero")
 
     monkeypatch.setattr("ftproc.scoring.render", broken)
-    monkeypatch.setattr("ftproc.files.trajectories.read", lambda name: None)
+    monkeypatch.setattr("ftproc.files.reading.trajectories.read", lambda name: None)
     monkeypatch.setattr("ftproc.scoring.score", lambda trajectory, truth: None)
     result = run("score", "x.csv")
     assert result.code == 1
@@ -142,7 +143,7 @@ def test_an_unexpected_error_is_a_sentence_too(run, here, monkeypatch):
     ],
 )
 def test_errors_of_the_system(error, sentence):
-    assert batch.failure(error, "log.csv").message == sentence
+    assert failure(error, "log.csv").message == sentence
 
 
 @pytest.mark.parametrize("inside_a_kernel", [False, True])
@@ -155,7 +156,7 @@ def test_interrupted(run, here, monkeypatch, inside_a_kernel, stop, code, said):
             raise SystemError("CPUDispatcher returned a result with an exception set") from stop
         raise stop
 
-    monkeypatch.setattr("ftproc.files.trajectories.read", interrupt)
+    monkeypatch.setattr("ftproc.files.reading.trajectories.read", interrupt)
     result = run("score", "x.csv")
     assert result.code == code
     assert result.err.strip() == said
@@ -230,8 +231,8 @@ def test_the_shell_s_part_of_completion(shell):
 
 
 def test_the_reference_is_current():
-    """python -m ftproc.cli.reference > ftproc/cli/README.md"""
-    kept = Path(reference.__file__).with_name("README.md").read_text()
+    """python -m tests.docs.reference > ftproc/cli/README.md"""
+    kept = (Path(reference.__file__).parents[2] / "ftproc" / "cli" / "README.md").read_text()
     assert kept.split() == reference.text().split()  # line breaks may differ from one version of click to another
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from ftproc.files import logs, trajectories, truth
+from ftproc.files.reading import logs, trajectories, truth
 from tests.cli.conftest import Result
 
 PROJECT = Path(__file__).parents[2]

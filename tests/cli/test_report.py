@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from ftproc.cli import reports
+from ftproc.batch import plan
 from ftproc.errors import OutputError, UsageError
 
 
@@ -92,7 +92,7 @@ def test_score_of_several(run, clean, flight):
     ],
 )
 def test_places(here, names, given, expected):
-    assert reports.plan(names, given) == expected
+    assert plan.pages(names, given) == expected
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_refused(here, names, given, kind, sentence):
     (here / "log.html").write_text("")
     (here / "file").write_text("")
     with pytest.raises(kind) as caught:
-        reports.plan(names, given, ["log.html"])
+        plan.pages(names, given, ["log.html"])
     assert sentence in str(caught.value)
 
 

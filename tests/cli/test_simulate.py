@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from ftproc.files import logs, truth
+from ftproc.files.reading import logs, truth
 
 
 def simulate(run, *args):

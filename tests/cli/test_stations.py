@@ -12,11 +12,11 @@ import pytest
 
 import ftproc
 from ftproc import config
-from ftproc.batch import Recipe
+from ftproc.batch.run import Recipe
 from ftproc.cli import stations
 from ftproc.cli.filter import command
 from ftproc.config.keys import every
-from ftproc.files import logs, trajectories
+from ftproc.files.reading import logs, trajectories
 from ftproc.settings import FilterSettings
 
 TUNED = ("--noise", "3,0.0002,0.0002", "--jerk", "1")  # finding these magnifies rounding
@@ -141,7 +141,7 @@ def test_the_command_s_defaults_are_those_of_the_settings():
     ctx = command.make_context("filter", ["x.csv"])
     keys = {key.option for _, _, key in every()}
     given = {name: value for name, value in ctx.params.items() if name in keys}
-    assert config.recipe(given) == Recipe() == stations.recipe(ctx)
+    assert config.Recipe.of(given) == Recipe() == stations.recipe(ctx)
 
 
 def test_every_filter_option_can_be_kept_in_a_file():

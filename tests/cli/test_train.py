@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas
 import pytest
 
-from ftproc.correction import study
+from ftproc.correction.training import study
 from tests.cli.conftest import Result
 
 SMALL = ("--population", 6, "--generations", 2, "--epochs", 5, "--hidden", 4)
@@ -83,7 +83,7 @@ def test_ctrl_c_leaves_no_file(run, here, monkeypatch):
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("ftproc.correction.training.judge", interrupt)
+    monkeypatch.setattr("ftproc.correction.training.train.judge", interrupt)
     result = run("train", "--scenario", "radar", "--flights", 3, *SMALL, "-o", "m.safetensors")
     assert result.code != 0
     assert list(here.iterdir()) == []

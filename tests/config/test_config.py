@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ftproc import config
-from ftproc.batch import Recipe
+from ftproc.batch.run import Recipe
 from ftproc.config.keys import KEYS, every
 from ftproc.errors import UsageError
 from ftproc.settings import Air, FilterSettings, Station
@@ -66,7 +66,7 @@ def test_every_key_is_understood():
             for section, keys in tomllib.loads(FULL).items() for key in keys}  # fmt: skip
     unsaid = {(section, name) for section, name, _ in every()} - said
     assert unsaid == {("azimuth", "column"), ("azimuth", "unit"), ("azimuth", "sigma"), ("elevation", "unit")}
-    found = config.recipe(config.parse(FULL, "s.toml"))
+    found = config.Recipe.of(config.parse(FULL, "s.toml"))
     assert found.settings == FilterSettings(
         "ukf", "forward", True, (3.048, None, pytest.approx(20 * math.pi / 648000)), 5.0, 3.5, 9.0, 150, 7, True,
         (48.0, 11.5, 612.0), True, 46.2,
@@ -81,7 +81,7 @@ def test_every_key_is_understood():
 
 
 def test_an_empty_file_is_the_usual():
-    assert config.recipe(config.parse("", "s.toml")) == Recipe()
+    assert config.Recipe.of(config.parse("", "s.toml")) == Recipe()
     assert config.parse(config.dump({}), "s.toml") == {}
 
 
@@ -91,7 +91,7 @@ def test_defaults_that_a_comment_shows_are_the_real_ones():
     lines = [line.removeprefix("# ") if line.startswith(usual) else line for line in config.dump({}).splitlines()]
     said = config.parse("\n".join(lines), "s.toml")
     assert {"method", "gate", "editing", "model", "azimuth_from", "temperature_c", "pressure_hpa"} <= set(said)
-    assert config.recipe(said) == Recipe()
+    assert config.Recipe.of(said) == Recipe()
 
 
 def test_every_example_can_be_used():

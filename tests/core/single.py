@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ftproc.core import ukf
+from ftproc.core.filtering import ukf
+from ftproc.core.model.measurement import innovate
 from tests import naive
 from tests.core.tracks import covariance
 
@@ -23,7 +24,7 @@ def update(x, p, z, noise, weight):
     x, p = x.copy(), p.copy()
     z_hat, c, pxz, h = transform(x, p)
     e, s, s_inv, gain = np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((9, 3))
-    ukf.innovate(z, z_hat, e)
+    innovate(z, z_hat, e)
     used = np.where(np.isfinite(e), weight, 0.0)
     return x, p, *ukf.update(x, p, pxz, c, h, e, noise, used, s, s_inv, gain)
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core.forward import Model, Start
-from ftproc.core.geometry import from_cartesian, wrap
+from ftproc.core.filtering.records import Model, Start
+from ftproc.core.model.frames import from_cartesian, wrap
 from tests import naive
 
 PATTERNS = [(r, a, e) for r in (0, 1) for a in (0, 1) for e in (0, 1)]

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ftproc.core.geometry import line_of_sight_axes
+from ftproc.core.model.frames import line_of_sight_axes
 from ftproc.correction.features import Record
-from ftproc.correction.samples import Flight
+from ftproc.correction.training.samples import Flight
 from ftproc.records import FloatArray, IntArray
 
 SIGMA = np.array([2.0, 1.0, 1.5, 0.8, 0.5, 0.6])  # m, m/s along the line of sight

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ftproc.core.geometry import line_of_sight_axes
+from ftproc.core.model.frames import line_of_sight_axes
 from ftproc.correction import apply, los
 from ftproc.correction.apply import correct
 from ftproc.correction.envelope import Envelope, Normaliser
@@ -15,8 +15,7 @@ from ftproc.correction.feature_sets import FEATURES, named
 from ftproc.correction.features import SETTLING
 from ftproc.correction.model import Stage
 from ftproc.correction.network import Weights
-
-from . import fake
+from tests.correction import fake
 
 
 def constant(name: str, says: float, gain: float = 1.0, bound: float = 2.0) -> Stage:

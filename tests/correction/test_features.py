@@ -9,14 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ftproc.core.geometry import line_of_sight_axes, to_cartesian
+from ftproc.core.model.frames import line_of_sight_axes, to_cartesian
 from ftproc.correction import los
 from ftproc.correction.feature_sets import FEATURES, named
 from ftproc.correction.features import SETTLING, Features, Place
 from ftproc.errors import UsageError
 from ftproc.simulation.instrument import InstrumentErrors, systematic
-
-from . import fake
+from tests.correction import fake
 
 coordinate = st.floats(-2e5, 2e5)
 

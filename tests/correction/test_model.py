@@ -15,11 +15,10 @@ from safetensors.numpy import save as serialise
 from ftproc.correction.apply import correct
 from ftproc.correction.model import Model, card
 from ftproc.correction.model_file import from_bytes, load, save, sha256, to_bytes
-from ftproc.correction.training import train
+from ftproc.correction.training.train import train
 from ftproc.errors import ModelError, OutputError
 from ftproc.settings import TrainSettings
-
-from . import fake
+from tests.correction import fake
 
 KEY = "ftproc-correction"
 

@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from ftproc.correction import descent, network
-from ftproc.correction.descent import Samples
+from ftproc.correction import network
 from ftproc.correction.network import Shape
+from ftproc.correction.training import descent
+from ftproc.correction.training.descent import Samples
 
 SHAPES = [Shape(9, 12, 9), Shape(1, 1, 1), Shape(32, 5, 6), Shape(2, 7, 3), Shape(7, 4, 3, direct=True)]
 

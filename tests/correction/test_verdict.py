@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ftproc.correction.judging import judge
-from ftproc.correction.samples import Piece, Split
+from ftproc.correction.training.judging import judge
+from ftproc.correction.training.samples import Piece, Split
 from ftproc.correction.verdict import ComponentVerdict, Ratio, Verdict
-
-from . import fake
-from .test_apply import constant
+from tests.correction import fake
+from tests.correction.test_apply import constant
 
 PLAIN = Verdict(
     "flight",

@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ftproc.files import logs, trajectories
+from ftproc.files.reading import logs, trajectories
 from ftproc.simulation import simulate
 
 PROGRAM = str(Path(sys.prefix) / "bin" / "ftproc")
@@ -25,7 +25,7 @@ def fill(directory: Path, flights: int = FLIGHTS) -> list[str]:
     """Logs of 30 s at 10 Hz; their names."""
     names = [f"{number}.csv" for number in range(flights)]
     for number, name in enumerate(names):
-        logs.write(simulate("manoeuvre", duration_s=30.0, seed=number).log, directory / name)
+        flights.write_log(simulate("manoeuvre", duration_s=30.0, seed=number).log, directory / name)
     return names
 
 

@@ -14,14 +14,15 @@ from pathlib import Path
 
 import pytest
 
-from ftproc import batch
-from ftproc.batch import Recipe, Task
-from ftproc.files import logs, trajectories
+from ftproc.batch.run import run as run_batch
+from ftproc.batch.tasks import Task
+from ftproc.cli.warm import warm
+from ftproc.config.recipe import Recipe
+from ftproc.files.reading import logs, trajectories
+from ftproc.files.writing import flights
 from ftproc.simulation import simulate
-from ftproc.warm import warm
-
-from . import batches
-from .batches import PROGRAM, run
+from tests.faults import batches
+from tests.faults.batches import PROGRAM, run
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -32,7 +33,7 @@ def _compiled() -> None:
 @pytest.fixture
 def flight(tmp_path: Path) -> Path:
     path = tmp_path / "flight.csv"
-    logs.write(simulate("zuo2021", seed=3).log, path)
+    flights.write_log(simulate("zuo2021", seed=3).log, path)
     return path
 
 
@@ -138,7 +139,7 @@ def test_a_worker_that_crashes_takes_only_its_log_with_it(flight: Path, tmp_path
     killer = threading.Thread(target=kill_whoever_waits)
     killer.start()
     try:
-        first, second = batch.run(tasks, Recipe(), jobs=2)
+        first, second = run_batch(tasks, Recipe(), jobs=2)
     finally:
         done.set()
         killer.join()

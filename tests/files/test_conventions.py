@@ -9,10 +9,11 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from ftproc.core import refraction
-from ftproc.core.geometry import to_cartesian
+from ftproc.core.model import refraction
+from ftproc.core.model.frames import to_cartesian
 from ftproc.errors import InputError, UsageError
-from ftproc.files import conventions, logs
+from ftproc.files import conventions
+from ftproc.files.reading import logs
 from ftproc.records import MeasurementLog
 from ftproc.settings import Air, Station
 

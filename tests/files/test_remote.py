@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ftproc import batch
-from ftproc.batch import Recipe, Task
-from ftproc.cli import outputs
+from ftproc.batch import plan, run
+from ftproc.batch.tasks import Task
+from ftproc.config.recipe import Recipe
 from ftproc.errors import InputError, OutputError, UsageError
-from ftproc.files import atomic, logs, opened, remote, trajectories
+from ftproc.files import layout, remote
+from ftproc.files.reading import header, logs, trajectories
+from ftproc.files.writing import atomic, flights
 from tests.simulated import simulate
 
 fsspec = pytest.importorskip("fsspec")
@@ -42,7 +44,7 @@ def temporary(tmp_path, monkeypatch):
 @pytest.fixture
 def flight(tmp_path):
     log = simulate("cruise", seed=1, duration_s=30.0).log
-    logs.write(log, tmp_path / "flight.csv")
+    flights.write_log(log, tmp_path / "flight.csv")
     return log, tmp_path / "flight.csv"
 
 
@@ -67,10 +69,10 @@ def test_which_names_are_uris(name, known, path):
 def test_log_from_a_bucket_is_the_log(bucket, temporary, tmp_path, flight, monkeypatch, kind, large):
     log, _ = flight
     path = tmp_path / f"log.{kind}"
-    logs.write(log, path)
+    flights.write_log(log, path)
     bucket.pipe(f"/bucket/log.{kind}", path.read_bytes())
     if large:
-        monkeypatch.setattr(opened, "LARGE", 100)
+        monkeypatch.setattr(header, "LARGE", 100)
     found = logs.read(f"memory://bucket/log.{kind}")
     assert found.name == f"memory://bucket/log.{kind}"
     np.testing.assert_array_equal(found.measurement, log.measurement)
@@ -81,7 +83,7 @@ def test_trajectory_in_a_bucket_is_that_on_the_disk(bucket, temporary, tmp_path,
     bucket.pipe("/bucket/flight.csv", flight[1].read_bytes())
     near, far = tmp_path / f"out.{kind}", f"memory://bucket/made/out.{kind}"
     for task in (Task("memory://bucket/flight.csv", str(near)), Task("memory://bucket/flight.csv", far, place="/work")):
-        assert batch.filter_one(task, Recipe()).failure is None
+        assert run.filter_one(task, Recipe()).failure is None
     assert bucket.cat(f"/bucket/made/out.{kind}") == near.read_bytes()
     found = trajectories.read(far)
     assert found.metadata["log"] == "memory://bucket/flight.csv"
@@ -90,7 +92,7 @@ def test_trajectory_in_a_bucket_is_that_on_the_disk(bucket, temporary, tmp_path,
 
 def test_file_uri_is_a_path(tmp_path, flight):
     uri = f"file://{tmp_path}/out.parquet"
-    assert batch.filter_one(Task(f"file://{flight[1]}", uri), Recipe()).failure is None
+    assert run.filter_one(Task(f"file://{flight[1]}", uri), Recipe()).failure is None
     assert len(trajectories.read(tmp_path / "out.parquet")) == len(flight[0])
     with pytest.raises(OutputError, match="never overwritten"):
         atomic.refuse_overwriting(f"file://{flight[1]}", [flight[1]])
@@ -146,17 +148,16 @@ def test_storage_that_refuses_is_said(bucket, temporary, monkeypatch):
 
 def test_outputs_by_uri_are_planned(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    tasks = outputs.plan(["s3://in/a.csv", "s3://in/b.parquet"], "s3://out/clean/")
+    tasks = plan.plan(["s3://in/a.csv", "s3://in/b.parquet"], "s3://out/clean/")
     assert [t.output for t in tasks] == ["s3://out/clean/a.trajectory.csv", "s3://out/clean/b.trajectory.parquet"]
-    assert outputs.plan(["s3://in/a.csv"], None)[0].output == "a.trajectory.csv"
+    assert plan.plan(["s3://in/a.csv"], None)[0].output == "a.trajectory.csv"
     with pytest.raises(OutputError, match="never overwritten"):
-        outputs.plan(["s3://in/a.csv"], "s3://in/a.csv")
-    assert trajectories.sidecar("s3://out/a.csv") == "s3://out/a.json"
+        plan.plan(["s3://in/a.csv"], "s3://in/a.csv")
+    assert layout.sidecar("s3://out/a.csv") == "s3://out/a.json"
     assert list(tmp_path.iterdir()) == []
 
 
 def test_pages_are_written_on_this_machine(tmp_path):
-    from ftproc.cli import reports
 
     with pytest.raises(UsageError, match="pages are written on this machine"):
-        reports.plan(["out.parquet"], "s3://bucket/pages/")
+        plan.pages(["out.parquet"], "s3://bucket/pages/")

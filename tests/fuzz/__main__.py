@@ -28,7 +28,7 @@ def main() -> None:
     with atheris.instrument_imports(include=["ftproc", "tomllib"], exclude=compiled):
         import tomllib  # noqa: F401
 
-        from . import targets
+        from tests.fuzz import targets
     target = targets.all_targets()[name]
     found, seeds, kept = out / name, out / f"{name}-seeds", _HERE / "corpus" / name
     for directory in (found, seeds):

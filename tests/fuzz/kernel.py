@@ -16,6 +16,7 @@ from unittest import mock
 import numpy as np
 
 from ftproc import pipeline
+from ftproc.correction import model_file
 from ftproc.methods import recursive
 from ftproc.records import MeasurementLog
 from ftproc.settings import FilterSettings
@@ -32,7 +33,7 @@ def check(path: Path) -> None:
     if (log := decoded(content, path.name)) is None:
         return
     settings = _settings(content)
-    model = pipeline.default_model() if content[0] & 8 else None
+    model = model_file.named("packaged") if content[0] & 8 else None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # where the compiler is off, of what numba does in silence
         found = pipeline.filter_log(log, settings, model)

@@ -7,9 +7,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from tests.fuzz.targets import all_targets, judge, seeds
 from tests.trust import cases
-
-from .targets import all_targets, judge, seeds
 
 _PIECES = (
     b",",

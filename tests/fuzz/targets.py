@@ -24,11 +24,13 @@ from safetensors.numpy import save as serialise
 from ftproc import config, pipeline
 from ftproc.correction import model, model_file
 from ftproc.errors import FtprocError
-from ftproc.files import columnar, csvtext, logs, opened, trajectories, truth
+from ftproc.files import layout
+from ftproc.files.reading import columnar, csvtext, header, logs, trajectories, truth
+from ftproc.files.writing import flights
+from ftproc.files.writing.trajectories import write as write_trajectory
 from ftproc.records import MeasurementLog
+from tests.fuzz import kernel
 from tests.trust import bad_files, bad_logs, bad_models, bad_stations, bad_truths, cases
-
-from . import kernel
 
 _LONGEST_NAME = 100
 _LARGEST_SEED = 30_000  # bytes; from small inputs a fuzzer learns faster
@@ -90,7 +92,7 @@ def _log(path: Path) -> None:
     assert (log.time_s[1:] >= log.time_s[:-1]).all()
     assert not np.isinf(log.measurement).any()
     again = path.with_name("again.parquet")
-    logs.write(log, again)
+    flights.write_log(log, again)
     with contextlib.suppress(FtprocError):  # rows without a time are gone, by which the unit of an angle may be judged
         same(logs.read(again), log, "time_s", "measurement")
     same(logs.read(path, keep_columns=True), log, "time_s", "measurement")
@@ -103,7 +105,7 @@ _CHECKED = ("time_s", "measurement", "row", "rows_in_file", "rows_without_time",
 def _in_blocks(path: Path) -> None:
     """A log is the same, and refused in the same words, whether it is read as a whole or as a large one is."""
     whole = _read_or_refused(path)
-    large, small = mock.patch.object(opened, "LARGE", 0), mock.patch.object(columnar, "_BATCH_ROWS", 3)
+    large, small = mock.patch.object(header, "LARGE", 0), mock.patch.object(columnar, "_BATCH_ROWS", 3)
     with large, small, mock.patch.object(csvtext, "_BLOCK", 64):
         in_blocks = _read_or_refused(path)
     if isinstance(whole, str) or isinstance(in_blocks, str):
@@ -122,14 +124,14 @@ def _read_or_refused(path: Path) -> MeasurementLog | str:
 def _truth(path: Path) -> None:
     found = truth.read(path)
     again = path.with_name("again.parquet")
-    truth.write(found, again)
+    flights.write_truth(found, again)
     same(truth.read(again), found, "time_s", "position_m", "velocity_mps", "outlier")
 
 
 def _trajectory(path: Path) -> None:
     found = trajectories.read(path)
     again = path.with_name("again.parquet")
-    trajectories.write(found, again)
+    write_trajectory(found, again)
     same(trajectories.read(again), found, "row", "time_s", "measurement", "state", "sigma", "outlier", "nis")
 
 
@@ -144,11 +146,11 @@ def same(found: Any, expected: Any, *names: str) -> None:
 def _station(path: Path) -> None:
     """What is understood can be written, and then says the same."""
     options = config.load(path)
-    config.recipe(options)
+    config.Recipe.of(options)
     again = config.parse(config.dump(options), path.name)
     if "model" in options:
         again["model"] = options["model"]  # written with its whole path
-    config.recipe(again)
+    config.Recipe.of(again)
 
 
 def _model(path: Path) -> None:
@@ -196,7 +198,7 @@ def _feathers() -> Iterator[bytes]:
 
 
 def _trajectories() -> Iterator[bytes]:
-    for line in (",".join(trajectories.COLUMNS), "time_s,x_m,y_m,z_m,outlier_range,nis,note"):
+    for line in (",".join(layout.TRAJECTORY), "time_s,x_m,y_m,z_m,outlier_range,nis,note"):
         yield (line + "\n" + "\n".join(",".join("1" for _ in line.split(",")) for _ in range(3)) + "\n").encode()
 
 

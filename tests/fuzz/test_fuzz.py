@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from ftproc import pipeline
-from ftproc.core import backward
+from ftproc.core.filtering import backward
+from tests.fuzz import kernel, mutation, targets
 from tests.trust import cases
-
-from . import kernel, mutation, targets
 
 CORPUS = Path(__file__).parent / "corpus"
 NAMES = sorted(targets.all_targets())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ftproc.core.geometry import from_cartesian, wrap
+from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.pipeline import filter_log
 from ftproc.records import MeasurementLog
 from ftproc.settings import FilterSettings

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core import forward
+from ftproc.core.filtering import forward
 from ftproc.methods import anti_outlier, preparing
 from ftproc.methods.estimate import Readings
 from ftproc.records import GOOD, ISOLATED, MISSING, PATCH

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ftproc import pipeline
-from ftproc.core import particles
+from ftproc.core.comparators import particles
 from ftproc.errors import FtprocWarning, InputError, UsageError
 from ftproc.methods import ensemble
 from ftproc.methods.estimate import Readings

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from ftproc import pipeline
-from ftproc.methods import anti_outlier, recursive, side_by_side
+from ftproc.core import threads
+from ftproc.methods import anti_outlier, recursive
 from ftproc.methods.estimate import Recording
 from ftproc.settings import FilterSettings
 from tests.simulated import simulate
@@ -111,10 +112,10 @@ def test_segments_tell_what_the_whole_tells(in_segments, smooth):
 def test_segments_are_the_same_in_any_number_of_threads(flight, in_segments):
     in_segments(3000, 2000, 300)
     found = []
-    for threads in (1, 2, 5):
-        side_by_side.use(threads)
+    for count in (1, 2, 5):
+        threads.use(count)
         found.append(pipeline.filter_log(flight.log))
-    side_by_side.use(None)
+    threads.use(None)
     for other in found[1:]:
         np.testing.assert_array_equal(other.state, found[0].state)
         assert other.metadata == found[0].metadata

@@ -119,7 +119,7 @@ def test_crowded_marks_are_thinned_and_all_there_when_one_zooms_in(context, tmp_
     )
     times = made.time_s[made.outlier[:, 0] == ISOLATED]
     ((kind, x, y),) = opened.page.evaluate(marks)
-    figure = made.plot("readings")
+    figure = report.plot(made, "readings")
     every = next(trace for trace in figure.data if trace.name == "isolated outlier")
     assert kind == "scatter"
     assert 4 <= len(x) <= 8 < len(times)

@@ -168,12 +168,12 @@ def test_errors_stand_inside_three_published_sigmas():
 def test_plot_in_a_notebook():
     import plotly.graph_objects as go
 
-    assert isinstance(filtered().plot(), go.Figure)
-    assert filtered().plot("sigmas").layout.yaxis.type == "log"
+    assert isinstance(plot(filtered()), go.Figure)
+    assert plot(filtered(), "sigmas").layout.yaxis.type == "log"
     with pytest.raises(UsageError, match="there is no figure 'map'; there are track, ground, readings"):
-        filtered().plot("map")
+        plot(filtered(), "map")
     with pytest.raises(UsageError, match="There is no position to draw"):
-        angles_only().plot()
+        plot(angles_only())
 
 
 def test_without_plotly(monkeypatch):

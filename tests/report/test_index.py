@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ftproc.report import Entry, index
+from ftproc.report import index
+from ftproc.report.index import Entry
 from tests.report.flights import HOSTILE, filtered, one_row
 
 SUMMARY = {"method": "ukf", **filtered().metadata["summary"]}

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from tests.faults import batches
 from tests.fuzz import mutation
-
-from . import corpus, elsewhere, long_runs
+from tests.trust import corpus, elsewhere, long_runs
 
 KILLS, FLIGHTS, SAMPLES, FUZZ_S = 50, 200, 10_000_000, 60.0
 

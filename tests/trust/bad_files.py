@@ -12,8 +12,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from . import cases
-from .cases import Case, flight, same, text, written
+from tests.trust import cases
+from tests.trust.cases import Case, flight, same, text, written
 
 NAME = "log.parquet"
 _FLIPS = 60

@@ -11,9 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ftproc.records import MeasurementLog
-
-from . import cases
-from .cases import HEADER, Case, flight, rows, same, same_but, text, with_cell, with_column, written
+from tests.trust import cases
+from tests.trust.cases import HEADER, Case, flight, rows, same, same_but, text, with_cell, with_column, written
 
 COLUMNS = HEADER.split(",")
 _ROW = 17  # where the bad cell is

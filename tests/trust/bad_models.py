@@ -14,9 +14,8 @@ import numpy as np
 from safetensors.numpy import load as parse
 from safetensors.numpy import save as serialise
 
-from ftproc.pipeline import PACKAGED_MODEL
-
-from .cases import Case, written
+from ftproc.correction import model_file
+from tests.trust.cases import Case, written
 
 KEY = "ftproc-correction"
 NAME = "m.safetensors"
@@ -26,7 +25,7 @@ _FLIPS = 60
 @cache
 def good() -> bytes:
     """The packaged model's file."""
-    return PACKAGED_MODEL.read_bytes()
+    return (Path(model_file.__file__).parent / "default.safetensors").read_bytes()
 
 
 def parts() -> tuple[dict[str, Any], dict[str, Any]]:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import codecs
 from collections.abc import Iterator
 
-from ftproc.batch import Recipe
+from ftproc.batch.run import Recipe
 from ftproc.config.keys import every
 from tests.config.test_config import FULL
-
-from . import bad_models
-from .cases import Case, written
+from tests.trust import bad_models
+from tests.trust.cases import Case, written
 
 NAME = "s.toml"
 _CUTS = 30

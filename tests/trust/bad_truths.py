@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .cases import Case, flight, written
+from tests.trust.cases import Case, flight, written
 
 COLUMNS = ("time_s", "x_m", "y_m", "z_m", "outlier_range")
 NAME = "t.csv"

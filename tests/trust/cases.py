@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from ftproc import config, pipeline
-from ftproc.batch import Recipe
+from ftproc.batch.run import Recipe
 from ftproc.correction import model, model_file
 from ftproc.errors import FtprocError
-from ftproc.files import logs, truth
+from ftproc.files.reading import logs, truth
 from ftproc.records import MeasurementLog, Trajectory, Truth
 from ftproc.simulation import Simulation, simulate
 
@@ -159,7 +159,7 @@ def _log(path: Path, options: dict[str, Any]) -> MeasurementLog:
     """Read it; and when it is not the flight itself, filter it too: whatever was let in must not do harm later."""
     log = logs.read(path, **options)
     if not same(log):
-        judge_trajectory(pipeline.filter_log(log, None, pipeline.default_model()))
+        judge_trajectory(pipeline.filter_log(log, None, model_file.named("packaged")))
     return log
 
 
@@ -180,12 +180,12 @@ def _model(path: Path, options: dict[str, Any]) -> model.Model:
 
 def _station(path: Path, options: dict[str, Any]) -> Recipe:
     """Read it; and filter the flight by it, which may be refused but must do no harm."""
-    found = config.recipe(config.load(path))
+    found = config.Recipe.of(config.load(path))
     log = path.with_name("flight.csv")
     log.write_text(text())
     with contextlib.suppress(FtprocError):
         given = {**found.reading(), "columns": None, "units": None}
-        named = None if found.model == "none" else pipeline.default_model()
+        named = None if found.model == "none" else model_file.named("packaged")
         judge_trajectory(pipeline.filter_log(logs.read(log, **given), found.settings, named))
     return found
 

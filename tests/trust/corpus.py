@@ -7,8 +7,8 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from . import bad_files, bad_logs, bad_models, bad_stations, bad_truths
-from .cases import Case, judge
+from tests.trust import bad_files, bad_logs, bad_models, bad_stations, bad_truths
+from tests.trust.cases import Case, judge
 
 TABLES = (bad_logs, bad_files, bad_models, bad_truths, bad_stations)
 

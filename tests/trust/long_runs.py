@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ftproc import pipeline
-from ftproc.core.geometry import from_cartesian, wrap
+from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.records import FloatArray, MeasurementLog, Trajectory, Truth, joined
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate

@@ -14,8 +14,7 @@ from typing import Any
 import pytest
 
 from ftproc.errors import InputError, printable
-
-from . import bad_logs, cases, corpus
+from tests.trust import bad_logs, cases, corpus
 
 MANY = 300
 MOST_MEMORY_KB = 3 << 20
@@ -96,7 +95,7 @@ def test_whole_processes(name: str, tmp_path: Path) -> None:
 
 
 def test_standard_input_without_an_end(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    from ftproc.files import tables
+    from ftproc.files.reading import tables
 
     endless = tmp_path / "endless"
     endless.write_bytes(b"0,1\n" * 1000)

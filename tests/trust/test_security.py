@@ -12,11 +12,10 @@ import pytest
 from click.testing import CliRunner
 
 import ftproc
-from ftproc.cli import outputs
+from ftproc.batch import plan
 from ftproc.cli.main import cli
-from ftproc.files import writing
-
-from . import cases
+from ftproc.files.writing import tables
+from tests.trust import cases
 
 PACKAGE = Path(ftproc.__file__).parent
 
@@ -81,12 +80,12 @@ def test_text_is_no_formula_and_numbers_stay_numbers(kind: pa.DataType) -> None:
         {"=name": pa.array([*FORMULAS, *HARMLESS, None], kind), "n": [-1.5] * (len(FORMULAS + HARMLESS) + 1)}
     )
     sink = io.BytesIO()
-    writing.write_stream(table, sink, ".csv")
+    tables.write_stream(table, sink, ".csv")
     found = list(csv.reader(io.StringIO(sink.getvalue().decode(), newline="")))
     assert found[0] == ["'=name", "n"]
     assert [row[0] for row in found[1:]] == [f"'{text}" for text in FORMULAS] + [*HARMLESS, ""]
     assert {row[1] for row in found[1:]} == {"-1.5"}
-    assert [writing.no_formula(text) for text in HARMLESS] == HARMLESS
+    assert [tables.no_formula(text) for text in HARMLESS] == HARMLESS
 
 
 def test_kept_columns_and_scores_are_no_formulas(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -105,7 +104,7 @@ def test_kept_columns_and_scores_are_no_formulas(tmp_path: Path, monkeypatch: py
 
 @pytest.mark.parametrize("log", ["../a.csv", "../../../../etc/a.csv", "/etc/..csv", "x/../../b.parquet", "..", "."])
 def test_outputs_stay_in_the_directory_asked_for(log: str, tmp_path: Path) -> None:
-    for task in outputs.plan([log], f"{tmp_path}/out/"):
+    for task in plan.plan([log], f"{tmp_path}/out/"):
         assert Path(task.output).resolve().parent == (tmp_path / "out").resolve()
 
 

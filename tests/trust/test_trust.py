@@ -10,8 +10,7 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.simulation import simulate
-
-from . import elsewhere, long_runs
+from tests.trust import elsewhere, long_runs
 
 
 def test_flights_full_of_outliers_do_not_go_astray_unsaid() -> None:

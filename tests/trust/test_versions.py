@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.fuzz import targets
-
-from . import audit
+from tests.trust import audit
 
 ROOT = Path(__file__).parents[2]
 OF_THE_USER = ("cluster", "geo", "formats", "report", "wavelet")

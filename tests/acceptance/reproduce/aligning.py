@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.random import Generator
 
-from ftproc.core import ensemble
-from ftproc.core.ensemble import Analysis, FloatArray, Forecast
+from ftproc.core.comparators import ensemble
+from ftproc.core.comparators.ensemble import Analysis, FloatArray, Forecast
 from tests.acceptance.reproduce import misalignment as errors
 from tests.acceptance.reproduce.drive import DT, HZ, Drive, angles, attitude_of, metres, moved, navigate
 

@@ -13,8 +13,8 @@ from functools import partial
 
 import numpy as np
 
-from ftproc.core import particles
-from ftproc.core.fuzzy import chi_square_tail
+from ftproc.core.comparators import particles
+from ftproc.core.comparators.fuzzy import chi_square_tail
 from tests.acceptance.reproduce import alignment_plots as plots
 from tests.acceptance.reproduce.aligning import OUTLIER_TIMES_S, Run, Update, align
 from tests.acceptance.reproduce.drive import drive

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core.jit import kernel, part
+from ftproc.core.compiled import kernel, part
 
 HZ = 100
 DT = 1 / HZ

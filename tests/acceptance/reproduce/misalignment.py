@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core.ensemble import FloatArray, Sensor
+from ftproc.core.comparators.ensemble import FloatArray, Sensor
 from tests.acceptance.reproduce.drive import DT, EARTH_RATE, SEMI_MAJOR, G
 
 DEGREE = np.pi / 180

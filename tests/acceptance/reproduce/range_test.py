@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core import channels
+from ftproc.core.comparators import channels
 from tests.acceptance.reproduce.page import Page, table
 
 ORDER = 2

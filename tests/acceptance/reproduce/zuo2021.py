@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from ftproc import pipeline, scoring
-from ftproc.core.geometry import from_cartesian, unwrap
+from ftproc.core.model.frames import from_cartesian, unwrap
 from ftproc.correction.model import Model
 from ftproc.records import COMPONENTS, Trajectory
 from ftproc.scoring.figures import average_gradient

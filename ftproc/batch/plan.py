@@ -1,0 +1,143 @@
+"""Where each trajectory and each report goes: the one place that knows the rules of `-o` and `--report`, and that no
+input is written over."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ftproc.batch.tasks import Task
+from ftproc.errors import OutputError, UsageError
+from ftproc.files import layout, remote
+from ftproc.files.writing import atomic
+
+INDEX = "index.html"
+_REPORT = "--report"
+_PAGES = (".html", ".htm")
+#: What a trajectory's name ends in, by what the log's name ends in.
+_SUFFIX = {".csv": ".csv", ".csv.gz": ".csv", ".parquet": ".parquet", ".feather": ".feather"}
+
+
+def tasks(
+    logs: Sequence[str], output: str | None, methods: Sequence[str] | None = None, inputs: Sequence[str] = ()
+) -> list[Task]:
+    """One task per log, or per log and method, its output decided and its directory made.
+
+    methods: names to run each log through, told apart in the output's name. inputs: other files not to be
+    written over. Raises UsageError, OutputError.
+    """
+    if "-" in logs and len(logs) > 1:
+        raise UsageError("- stands for one log on standard input; it cannot be mixed with other logs.")
+    if output is None:
+        directory: str | None = "."
+        if methods:
+            raise UsageError("--method all writes several trajectories: name a directory with -o.")
+    else:
+        directory = _directory(output, several=len(logs) > 1 or bool(methods))
+    planned = [_task(log, output, directory, method) for log in logs for method in (methods or (None,))]
+    _check(planned, [*logs, *inputs])
+    if directory is not None and not remote.is_uri(directory):
+        _make(Path(directory))
+    for task in planned:
+        atomic.check_target(task.output)
+    return planned
+
+
+def _directory(output: str, several: bool) -> str | None:
+    """The directory that `-o` names, or None when it names a file or standard output."""
+    path = Path(output)
+    if output != "-" and (output.endswith("/") or path.is_dir()):
+        return output
+    if output == "-" or layout.table_kind(path) or layout.map_kind(path):
+        if several:
+            raise UsageError(f"-o {output}: there are several trajectories to write; name a directory.")
+        return None
+    if path.suffix and not several:
+        raise UsageError(
+            f"-o {output}: end the name in {', '.join((*layout.TABLES, *layout.MAPS))}, or in / if it is a directory."
+        )
+    return output
+
+
+def _task(log: str, output: str | None, directory: str | None, method: str | None) -> Task:
+    if output is not None and directory is None:
+        return Task(log, output, method)
+    if log == "-" and output is None:
+        return Task(log, "-", method)  # in a pipe, out of a pipe
+    name = "stdin.csv" if log == "-" else Path(log).name
+    kind = layout.table_kind(name) or ".csv"
+    stem = name[: -len(kind)] if layout.table_kind(name) else Path(name).stem
+    middle = f".{method}" if method else ""
+    return Task(log, remote.within(directory or ".", f"{stem}{middle}.trajectory{_SUFFIX[kind]}"), method)
+
+
+def _check(tasks: Sequence[Task], inputs: Sequence[str]) -> None:
+    taken: dict[str, str] = {}
+    for task in tasks:
+        if task.output in taken:
+            raise UsageError(
+                f"{taken[task.output]} and {task.log} would both be written to {task.output}; "
+                "give them different names or filter them one by one."
+            )
+        taken[task.output] = task.log
+        beside = layout.sidecar(task.output)
+        for target in (task.output, *(() if beside is None else (beside,))):
+            atomic.refuse_overwriting(target, inputs)
+
+
+def _make(directory: Path, option: str = "-o") -> None:
+    """Make a directory for outputs if it is not there. Raises OutputError."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:
+        raise OutputError(f"{directory}: this is a file, not a directory; give another name with {option}.") from error
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise OutputError(
+            f"{directory}: the directory cannot be made ({reason}); give another with {option}."
+        ) from error
+
+
+def pages(names: Sequence[str], given: str | None, inputs: Sequence[str] = ()) -> tuple[list[str | None], str | None]:
+    """The page of each trajectory, and the index page if there is one; the directory is made.
+
+    names: the trajectories' files (in `-` is nothing to name a page by, then the log's). given: the option's value.
+    inputs: files that are not to be written over, beside the trajectories. Raises UsageError, OutputError.
+    """
+    if given is None:
+        return [None] * len(names), None
+    if remote.is_uri(given):
+        raise UsageError(f"{_REPORT} {given}: pages are written on this machine; name a file or directory of it.")
+    directory = _page_directory(given, several=len(names) > 1)
+    named = [given] if directory is None else [str(directory / _page(name)) for name in names]
+    index = None if directory is None else str(directory / INDEX)
+    twice = [page for page in named if named.count(page) > 1]
+    if twice:
+        raise UsageError(f"{_REPORT}: {twice[0]} would be the page of two trajectories; report them one by one.")
+    beside = [str(found) for name in names if (found := layout.sidecar(name)) is not None]
+    for target in [*named, *([index] if index else [])]:
+        atomic.refuse_overwriting(target, [*inputs, *names, *beside], _REPORT)
+    if directory is not None:
+        _make(directory, _REPORT)
+    for page in named:
+        atomic.check_target(page)
+    return list(named), index
+
+
+def _page_directory(given: str, several: bool) -> Path | None:
+    path = Path(given)
+    if path.is_dir() or given.endswith("/"):
+        return path
+    if path.suffix.lower() in _PAGES:
+        if several:
+            raise UsageError(f"{_REPORT} {given}: there are several reports to write; name a directory.")
+        return None
+    if given == "-" or path.suffix:
+        raise UsageError(f"{_REPORT} {given}: end the name in .html, or in / if it is a directory.")
+    return path
+
+
+def _page(name: str) -> str:
+    file = "stdin" if name == "-" else Path(name).name
+    kind = layout.table_kind(file) or ""
+    return file[: len(file) - len(kind)].removesuffix(".trajectory") + ".report.html"

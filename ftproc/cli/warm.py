@@ -1,0 +1,51 @@
+"""`python -m ftproc.cli.warm` compiles all kernels beforehand, so that the first `ftproc filter` need not wait."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+from ftproc.core.compiled import announced
+
+
+def warm() -> None:
+    """Run a small log through every path that has kernels of its own."""
+    from dataclasses import replace
+
+    from ftproc import pipeline
+    from ftproc.files.reading import logs
+    from ftproc.methods import registry
+    from ftproc.settings import FilterSettings
+    from ftproc.simulation import simulate
+
+    log = _as_read(simulate("manoeuvre", duration_s=20.0).log, logs.read)
+    paths: list[dict[str, Any]] = [
+        {"smooth": True},
+        {"editing": "forward"},
+        {"editing": "forward", "gain_form": True},
+        *({"method": m.name} for m in registry.METHODS.values() if registry.obstacle(m, False, None) is None),
+    ]
+    for path in paths:
+        pipeline.filter_log(log, replace(FilterSettings(), **path))
+
+
+def _as_read(log: Any, read: Callable[..., Any]) -> Any:
+    """The log as it comes from a file: kernels are compiled for each memory layout of their arrays."""
+    import pyarrow as pa
+
+    names = ("time_s", "range_m", "azimuth_rad", "elevation_rad")
+    return read(pa.table(dict(zip(names, (log.time_s, *log.measurement.T.copy()), strict=True))))
+
+
+def main() -> None:
+    """Fill numba's cache, telling on standard error."""
+    began = time.monotonic()
+    with announced(lambda text: print(text, file=sys.stderr, flush=True)):
+        warm()
+    print(f"the kernels are ready ({time.monotonic() - began:.0f} s)", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

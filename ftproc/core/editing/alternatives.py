@@ -1,0 +1,209 @@
+"""The opposite decision, tried: is it the readings between two patches that are the patch?
+
+A filter that has followed a patch calls the good readings on both sides of it bad, and the decisions stand still
+there, because each supports the others. Where a short stretch of used readings lies between two rejected runs, or
+between one and a gap, the decisions are made again from other beginnings, over the neighbourhood alone, and the
+likeliest outcome is kept.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing import outlier_chain, patch_likelihood
+from ftproc.core.editing.patch_likelihood import SHORTEST_RUN
+from ftproc.core.editing.runs import runs_of
+from ftproc.core.filtering.initialization import begin_all
+from ftproc.core.filtering.records import Model
+from ftproc.core.filtering.smoother import SmootherRun, smooth_log
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+LONGEST = 48  # used readings between two rejected runs
+GAP_INTERVALS = 8.0  # median intervals without a reading, which a patch may end at
+AROUND = 80  # samples on each side that the comparison looks at
+ROUNDS = 5
+MARGIN = 5.0  # by which the log-probability of another decision must be better
+MOST = 100  # comparisons in one look
+STEPS = 14  # of filling a hole, or of taking out what stands out most
+FITS = 2.5  # sigmas off at which a reading is taken into a hole
+SURE, ALMOST = 1.5, 1.3  # times the noise, or the smallest sigma in the hole: where the track is known well enough
+APART = 6  # samples between readings that are taken out at once
+
+
+class Neighbourhood(NamedTuple):
+    """A stretch of the log and what decides in it: time_s (n,), measurement (n, 3), possible (n, 3) the readings that
+    may be good at all, the model (of a single jerk level), rates (3, 3) of outliers, the gate in sigmas."""
+
+    time_s: FloatArray
+    measurement: FloatArray
+    possible: NDArray[np.bool_]
+    model: Model
+    rates: FloatArray
+    gate: float
+
+    def part(self, near: slice) -> Neighbourhood:
+        """The readings of a slice."""
+        return self._replace(time_s=self.time_s[near], measurement=self.measurement[near], possible=self.possible[near])
+
+
+class Island(NamedTuple):
+    """Used readings [begin, end) of a component between rejected runs [first, begin) and [end, last), one of which may
+    be a gap or an end of the log instead."""
+
+    component: int
+    first: int
+    begin: int
+    end: int
+    last: int
+
+    def shifted(self, samples: int) -> Island:
+        """With samples counted from a later one."""
+        return Island(self.component, *(place - samples for place in self[1:]))
+
+
+class Step(NamedTuple):
+    """Decisions (n, 3), and the log-probability of the readings and of the decisions themselves."""
+
+    weight: FloatArray
+    likelihood: float
+
+
+def try_opposites(log: Neighbourhood, weight: FloatArray, tried: set[Island]) -> FloatArray:
+    """The decisions (n, 3), with better ones in their place where others are likelier. tried: islands that were looked
+    at before, and now are again only if they have changed; those looked at are put in."""
+    result = weight.copy()
+    new = [island for island in islands(log.time_s, weight, log.possible) if island not in tried]
+    for island in new[:MOST]:
+        tried.add(island)
+        low = max(island.first - AROUND, 0)
+        near = slice(low, island.last + AROUND)
+        part = log.part(near)
+        try:
+            steps = [*_decisions(part, result[near]), *_others(part, result[near], island.shifted(low))]
+        except ValueError:  # a component says too little hereabouts
+            continue
+        likeliest = max(steps, key=lambda step: step.likelihood)
+        if likeliest.likelihood > steps[0].likelihood + MARGIN:
+            result[near] = likeliest.weight
+    return result
+
+
+def islands(time_s: FloatArray, weight: FloatArray, possible: NDArray[np.bool_]) -> list[Island]:
+    """Where a patch may have been followed. time_s (n,), weight, possible: (n, 3)."""
+    found = []
+    for c in range(3):
+        seen = np.flatnonzero(possible[:, c])
+        if len(seen) < 2:
+            continue
+        bad = runs_of(weight[seen, c] <= 0)
+        bad = bad[bad[:, 1] - bad[:, 0] >= SHORTEST_RUN]
+        interval = np.diff(time_s[seen])
+        gaps = np.flatnonzero(interval > GAP_INTERVALS * np.median(interval)) + 1
+        walls = np.r_[0, gaps, len(seen)]
+        banks = sorted({*map(tuple, bad.tolist()), *((w, w) for w in walls.tolist() if not _inside(w, bad))})
+        for (low, begin), (end, high) in itertools.pairwise(banks):
+            if 0 < end - begin <= LONGEST and low + end < begin + high:
+                outer = int(seen[low]), int(seen[high - 1]) + 1
+                found.append(Island(c, outer[0], int(seen[begin]), int(seen[end - 1]) + 1, outer[1]))
+    return found
+
+
+def _inside(place: int, runs: IntArray) -> bool:
+    """Whether a gap lies in one of the runs (m, 2), or at its edge."""
+    return bool(((runs[:, 0] <= place) & (place <= runs[:, 1])).any())
+
+
+def _others(log: Neighbourhood, weight: FloatArray, island: Island) -> Iterator[Step]:
+    """Decisions that begin with the opposite, and such as begin with nothing known of the component there."""
+    component, first, begin, end, last = island
+    opposite = weight.copy()
+    opposite[first:last, component] = 1.0
+    opposite[begin:end, component] = 0.0
+    steps = _without_the_worst(log, opposite * log.possible)
+    yield from steps
+    yield from _decisions(log, max(steps, key=lambda step: step.likelihood).weight)
+    yield from _filled(log, weight, component, slice(first, last))
+
+
+def _decisions(log: Neighbourhood, weight: FloatArray) -> list[Step]:
+    """The decisions from `weight` on until they stand still."""
+    steps = []
+    for _ in range(ROUNDS):
+        step, smoothed = _step(log, weight)
+        steps.append(step)
+        noise = log.model.noise_variance
+        good = outlier_chain.classify(smoothed.residual, smoothed.residual_variance, noise, log.rates.copy(), log.gate)
+        decided = ((good > 0.5) & log.possible).astype(float)
+        if (decided == weight).all():
+            break
+        weight = decided
+    return steps
+
+
+def _without_the_worst(log: Neighbourhood, weight: FloatArray) -> list[Step]:
+    """The decisions with ever fewer readings, the worst of each surroundings first: beside a wild one, good ones look
+    bad."""
+    steps = []
+    for _ in range(STEPS):
+        step, smoothed = _step(log, weight)
+        steps.append(step)
+        off = np.where(weight > 0, np.abs(smoothed.residual) / np.sqrt(smoothed.residual_variance), 0.0)
+        weight = weight.copy()
+        for c in range(3):
+            beyond = np.flatnonzero(off[:, c] > log.gate)
+            for k in beyond[np.argsort(-off[beyond, c])]:
+                if off[k, c] > 0:
+                    weight[k, c] = 0.0
+                    off[max(k - APART, 0) : k + APART + 1, c] = 0.0
+        if (weight == step.weight).all():
+            break
+    return steps
+
+
+def _filled(log: Neighbourhood, weight: FloatArray, component: int, hole: slice) -> list[Step]:
+    """The decisions when a component's readings in a hole are taken in from its edges on, where they fit the track."""
+    steps = []
+    weight = weight.copy()
+    weight[hole, component] = 0.0
+    inside = np.zeros(len(weight), bool)
+    inside[hole] = log.possible[hole, component]
+    noise = float(np.sqrt(log.model.noise_variance[component]))
+    for _ in range(STEPS):
+        step, smoothed = _step(log, weight)
+        steps.append(step)
+        out = np.flatnonzero(inside & (weight[:, component] <= 0))
+        sigma = np.sqrt(smoothed.residual_variance[out, component])
+        fits = np.abs(smoothed.residual[out, component]) < FITS * sigma
+        if not fits.any():
+            break
+        known = sigma <= max(SURE * noise, ALMOST * sigma[fits].min())
+        weight = weight.copy()
+        weight[out[fits & known], component] = 1.0
+    return steps
+
+
+def _step(log: Neighbourhood, weight: FloatArray) -> tuple[Step, SmootherRun]:
+    """How likely the decisions are, and what the readings used say of each other."""
+    noise = log.model.noise_variance
+    starts = begin_all(log.time_s, log.measurement, weight, noise, float(log.model.jerk[0, 0]))
+    smoothed = smooth_log(log.time_s, log.measurement, weight, log.model, starts, residuals_only=True)
+    return Step(weight, smoothed.log_likelihood + _rejections(log, weight, smoothed)), smoothed
+
+
+def _rejections(log: Neighbourhood, weight: FloatArray, smoothed: SmootherRun) -> float:
+    """Log-probability of the rejected readings, and of there being such."""
+    total = 0.0
+    for c in range(3):
+        seen = np.flatnonzero(log.possible[:, c])
+        total += patch_likelihood.log_probability(
+            log.time_s[seen], smoothed.residual[seen, c], smoothed.residual_variance[seen, c], weight[seen, c],
+            float(np.sqrt(log.model.noise_variance[c])), log.rates[c],
+        )  # fmt: skip
+    return total

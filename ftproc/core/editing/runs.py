@@ -1,0 +1,98 @@
+"""Runs of readings that are off together, each by too little to stand out: found by the sum of their smoothations.
+
+The smoothation u = V^-1 (z - E z) of a reading (de Jong and Penzer 1998) is its leave-one-out residual over the
+variance of that. The sum of u over a run is the score of a common offset of the run's readings: what the rest of
+the record cannot explain by motion adds up, while motion and noise cancel. How large such sums are by chance, for
+each length of run, the log itself tells.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.compiled import kernel
+from ftproc.core.editing.screening import median
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+SHORTEST, LONGEST, LONGEST_S = 2, 48, 6.0  # readings in a run and its seconds: what lasts longer may be a manoeuvre
+SURE = 5.0  # robust sigmas of the sum that make a run suspicious
+SCALE_SAMPLES = 2000  # sums of each length from which their scale is taken
+FEWEST = 100  # readings, for the scale to mean anything
+EDGE, SHARP = 3, 1.5  # readings at each end of a run that must be off by so many sigmas in the mean
+
+
+def runs_of(flag: NDArray[np.bool_]) -> IntArray:
+    """(m, 2) begin and end of each run of true in (n,)."""
+    edges: IntArray = np.flatnonzero(np.diff(np.r_[0, flag.astype(np.int8), 0])).reshape(-1, 2)
+    return edges
+
+
+def suspicious(time_s: FloatArray, residual: FloatArray, variance: FloatArray, weight: FloatArray) -> NDArray[np.bool_]:
+    """(n, 3) readings in runs that are off together.
+
+    time_s (n,). residual, variance: (n, 3) leave-one-out, of the smoother; weight (n, 3), zero for readings not used.
+    """
+    found = np.zeros(residual.shape, bool)
+    for c in range(3):
+        used = np.flatnonzero((weight[:, c] > 0) & np.isfinite(residual[:, c]))
+        if len(used) < FEWEST:
+            continue
+        interval = float(np.median(np.diff(time_s[used])))
+        longest = LONGEST if interval <= 0 else int(np.clip(LONGEST_S / interval, SHORTEST, LONGEST))
+        total = np.r_[0.0, np.cumsum(residual[used, c] / variance[used, c])]
+        found[used, c] = _scan(total, _scales(total, longest))
+    return found
+
+
+@kernel
+def _scales(total: FloatArray, longest: int) -> FloatArray:
+    """(longest + 1,) robust 1-sigma of the sums over runs of each length, from SCALE_SAMPLES of them or a few more."""
+    m = len(total) - 1
+    every = max(m // SCALE_SAMPLES, 1)
+    scale, sums = np.full(longest + 1, np.inf), np.empty(m)
+    for length in range(SHORTEST, longest + 1):
+        n = 0
+        for begin in range(0, m + 1 - length, every):
+            sums[n] = abs(total[begin + length] - total[begin])
+            n += 1
+        scale[length] = max(1.4826 * median(sums, n), 1e-300)
+    return scale
+
+
+@kernel
+def _scan(total: FloatArray, scale: FloatArray) -> NDArray[np.bool_]:
+    """(m,) readings of suspicious runs. total: (m + 1,) sums of u up to each reading; scale: by length of run."""
+    m, longest = len(total) - 1, len(scale) - 1
+    score, end = np.zeros(m), np.zeros(m, np.int64)
+    for begin in range(m):
+        for length in range(SHORTEST, min(longest, m - begin) + 1):
+            size = abs(total[begin + length] - total[begin]) / scale[length]
+            if size > score[begin]:
+                score[begin], end[begin] = size, begin + length
+    found, near = np.zeros(m, np.bool_), np.zeros(m, np.bool_)
+    for begin in np.argsort(-score):  # the worst run first; what lies beside it may be its echo
+        if score[begin] < SURE:
+            break
+        if not near[begin : end[begin]].any():
+            found[begin : end[begin]] = True
+            near[max(begin - longest, 0) : end[begin] + longest] = True
+    return found
+
+
+def confirmed(suspects: NDArray[np.bool_], residual: FloatArray, variance: FloatArray) -> NDArray[np.bool_]:
+    """(n, 3) those suspect runs that are off at once at both ends, as no curve is.
+
+    residual, variance: (n, 3) of the smoother that does not use the suspects.
+    """
+    kept = np.zeros_like(suspects)
+    for c in range(3):
+        for begin, end in runs_of(suspects[:, c]):
+            inside = np.flatnonzero(np.isfinite(residual[begin:end, c])) + begin
+            first, last = (
+                residual[near, c].mean() / np.sqrt(variance[near, c].mean()) for near in (inside[:EDGE], inside[-EDGE:])
+            )
+            kept[begin:end, c] = min(abs(first), abs(last)) > SHARP and first * last > 0
+    return kept & suspects

@@ -1,0 +1,195 @@
+"""A first look at each component by itself, before any filter exists: which samples fit no local parabola?
+
+Least median of squares (Rousseeuw 1984) in overlapping windows: parabolas through random triples of samples, the
+one with the smallest median residual wins. It needs no start value, no noise level and no motion model, and half of
+a window may be bad. Short windows follow manoeuvres; long ones see through long patches.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.compiled import kernel, part
+from ftproc.core.model.measurement import wrapped
+
+FloatArray = NDArray[np.float64]
+
+TRIALS = 32  # triples per window: one is clean with probability 0.9996 when 40 % of the samples are bad
+CUT = 4.5  # sigmas from the parabola
+JUMP_VOTES = 0.2  # share of short windows that must find a reading off, at a jump
+APART = 64  # numbers between scratch arrays: where they might overlap, compiled loops round otherwise
+SHORTEST_STUCK = 3  # equal readings in a row
+STUCK_ODDS = 1e-3  # expected number of chance runs in a log that would be called stuck
+MOST_STUCK = 0.2  # share of a component
+
+
+@part
+def median(values: FloatArray, n: int) -> float:
+    """Upper median of the first n values, which are reordered (Hoare's selection)."""
+    k = n // 2
+    low, high = 0, n - 1
+    while low < high:
+        pivot = values[(low + high) // 2]
+        i, j = low, high
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while values[j] > pivot:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i += 1
+                j -= 1
+        if k <= j:
+            high = j
+        elif k >= i:
+            low = i
+        else:
+            break
+    return float(values[k])
+
+
+@part
+def _best_parabola(
+    t: FloatArray, z: FloatArray, n: int, angular: bool, seed: int, residual: FloatArray, work: FloatArray
+) -> float:
+    """Residuals of the n samples about the least-median parabola; returns its scale (1-sigma of the inliers)."""
+    state = (seed * 7919 + 12345) & 0x7FFFFFFF
+    best = math.inf
+    slope = bend = origin = base = 0.0
+    for _ in range(TRIALS):
+        a = b = c = 0
+        for _attempt in range(8):
+            state = (state * 1103515245 + 12345) & 0x7FFFFFFF
+            a = (state >> 8) % n
+            state = (state * 1103515245 + 12345) & 0x7FFFFFFF
+            b = (state >> 8) % n
+            state = (state * 1103515245 + 12345) & 0x7FFFFFFF
+            c = (state >> 8) % n
+            if t[a] != t[b] and t[b] != t[c] and t[a] != t[c]:
+                break
+        if t[a] == t[b] or t[b] == t[c] or t[a] == t[c]:
+            continue
+        zb = wrapped(z[b] - z[a], angular)
+        zc = wrapped(z[c] - z[a], angular)
+        tb, tc = t[b] - t[a], t[c] - t[a]
+        q = (zc / tc - zb / tb) / (tc - tb)
+        v = zb / tb - q * tb
+        # A median below the best needs more than half of the residuals below it: most trials end early.
+        failing, i = 0, 0
+        while i < n and failing < n - n // 2:
+            d = t[i] - t[a]
+            work[i] = abs(wrapped(z[i] - z[a] - d * (v + q * d), angular))
+            failing += work[i] >= best
+            i += 1
+        if failing < n - n // 2:
+            best = median(work, n)
+            slope, bend, origin, base = v, q, t[a], z[a]
+    if best == math.inf:  # readings of one or two instants: a constant
+        for i in range(n):
+            work[i] = wrapped(z[i] - z[0], angular)
+        base = z[0] + median(work, n)
+        for i in range(n):
+            work[i] = abs(wrapped(z[i] - base, angular))
+        best = median(work, n)
+    for i in range(n):
+        d = t[i] - origin
+        residual[i] = wrapped(z[i] - base - d * (slope + bend * d), angular)
+    return 1.4826 * (1 + 5 / (n - 3)) * best
+
+
+@kernel
+def screen_component(time: FloatArray, z: FloatArray, window: int, angular: bool) -> tuple[FloatArray, FloatArray]:
+    """(n,) share of windows in which each sample lies off the parabola, and (windows,) scale of each window.
+
+    time (n,) s, z (n,) reading with NaN where missing, window: samples per window; windows overlap three-fold.
+    """
+    seen = np.flatnonzero(np.isfinite(z))
+    m = len(seen)
+    votes, looks = np.zeros(len(z)), np.zeros(len(z))
+    window = min(window, m)
+    stride = max(window // 3, 1)
+    if window < 5:
+        return votes, np.zeros(0)
+    count = (m - window + stride - 1) // stride + 1
+    scales = np.empty(count)
+    t, y, work = np.empty(window + APART), np.empty(window + APART), np.empty(window + APART)
+    margin = APART // window + 1
+    residuals = np.empty((margin + count + margin, window))
+    for w in range(count):
+        low = min(w * stride, m - window)
+        for i in range(window):
+            t[i], y[i] = time[seen[low + i]], z[seen[low + i]]
+        scales[w] = _best_parabola(t, y, window, angular, w + 1, residuals[margin + w], work)
+    typical = np.median(scales)
+    for w in range(count):
+        low = min(w * stride, m - window)
+        limit = CUT * max(scales[w], 0.7 * typical)
+        for i in range(window):
+            looks[seen[low + i]] += 1
+            if abs(residuals[margin + w, i]) > limit:
+                votes[seen[low + i]] += 1
+    for k in range(len(z)):
+        if looks[k] > 0:
+            votes[k] /= looks[k]
+    return votes, scales
+
+
+def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
+    """(n,) true where a reading repeats the one before it for so long that noise cannot explain it.
+
+    channel: (n,) one component, NaN where missing; sigma: its noise. Two neighbours of a reading rounded to steps of
+    D agree by chance with probability about D / (2 sqrt(pi) sigma), so a coarse instrument is allowed long runs and
+    a fine one hardly any. The first reading of a run is good. A component of which a fifth is repeats is one that is
+    sampled faster than it measures, not stuck.
+    """
+    found = np.zeros(len(channel), bool)
+    seen = np.flatnonzero(np.isfinite(channel))
+    if len(seen) < SHORTEST_STUCK:
+        return found
+    values = channel[seen]
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > 1e-12 * np.abs(values).max()]
+    step = float(steps.min()) if len(steps) else np.inf
+    chance = step / (2 * np.sqrt(np.pi) * sigma) if np.isfinite(sigma) else np.inf
+    if chance >= 1:
+        return found
+    repeats_needed = max(np.log(STUCK_ODDS / len(seen)) / np.log(max(chance, 1e-300)), SHORTEST_STUCK - 1)
+    begins = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
+    ends = np.r_[begins[1:], len(seen)]
+    for run in np.flatnonzero(ends - begins - 1 >= repeats_needed):
+        found[seen[begins[run] + 1 : ends[run]]] = True
+    if found.sum() > MOST_STUCK * len(seen):
+        found[:] = False
+    return found
+
+
+@kernel
+def bar_runs(channel: FloatArray, votes: FloatArray, near: FloatArray, weight: FloatArray) -> None:
+    """Set the weights (n,) of outvoted readings to zero, if their run begins or ends with a jump; missing readings (NaN
+    in the channel) neither end a run nor belong to it.
+
+    votes: (n,) shares of a long window, near: of a short one, which sees jumps but follows every curve. A long run
+    without a jump at either end is a curve that the parabola of the long window cannot follow.
+    """
+    seen = np.flatnonzero(np.isfinite(channel))
+    n = len(seen)
+    begin = 0
+    while begin < n:
+        if not votes[seen[begin]] > 0.5:
+            begin += 1
+            continue
+        end = begin
+        while end < n and votes[seen[end]] > 0.5:
+            end += 1
+        sharp = end - begin <= 2
+        for edge in (begin, end):
+            for k in range(max(edge - 2, 0), min(edge + 2, n)):
+                sharp = sharp or near[seen[k]] > JUMP_VOTES
+        if sharp:
+            for k in range(begin, end):
+                weight[seen[k]] = 0.0
+        begin = end

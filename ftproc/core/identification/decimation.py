@@ -1,0 +1,99 @@
+"""Neighbouring readings merged into one, where a log is far denser than the filter's memory is long.
+
+A track that wanders with jerk density q, seen with noise sigma every T seconds, is averaged by its filter over about
+(sigma^2 T / q)^(1/6) seconds. The mean of the readings within a fraction of that says as much about noise and motion
+as they do one by one, at a fraction of the cost.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.compiled import kernel
+from ftproc.core.filtering.records import Model, Start
+from ftproc.core.model.measurement import wrapped
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+SHARE = 0.5  # of the filter's memory, that is merged
+MOST = 16  # readings
+WILD = 0.9  # share of the flight that is no wilder than what the memory is reckoned for
+ROUNDING = 0.01  # of a reading: times are rounded, and must not decide where the number comes out even
+
+
+def how_many(time_s: FloatArray, range_m: float, model: Model, knot_s: float) -> int:
+    """Neighbours that may be merged: 1 for a sparse log."""
+    interval = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
+    if interval <= 0:
+        return 1
+    noise = float((model.noise_variance * np.array([1.0, range_m**2, range_m**2])).min())
+    memory = (noise * interval / float(np.quantile(model.jerk[:, 0], WILD))) ** (1 / 6)
+    wanted = SHARE * min(memory, knot_s / 10) / interval
+    return int(np.clip(wanted + ROUNDING, 1, MOST))
+
+
+def merge(
+    time_s: FloatArray, measurement: FloatArray, weight: FloatArray, starts: list[Start], count: int
+) -> tuple[FloatArray, FloatArray, FloatArray, list[Start]]:
+    """A log of one reading in place of `count`, weighing as many as were used; arguments as for `smooth_log`."""
+    interval = float(np.median(np.diff(time_s)))
+    begins = np.zeros(len(time_s), bool)
+    begins[[start.sample for start in starts]] = True
+    time, z, number, group = _means(time_s, measurement, weight, begins, count, 1.5 * count * interval)
+    moved = []
+    for start in starts:
+        sample = int(group[start.sample])
+        late = float(time[sample] - time_s[start.sample])
+        step = np.kron(np.array([[1.0, late, late**2 / 2], [0.0, 1.0, late], [0.0, 0.0, 1.0]]), np.eye(3))
+        moved.append(Start(sample, step @ start.state, step @ start.covariance @ step.T))
+    return time, z, number, moved
+
+
+@kernel
+def _means(
+    time: FloatArray, z: FloatArray, weight: FloatArray, begins: NDArray[np.bool_], count: int, longest: float
+) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
+    """Times (m,), means (m, 3) and numbers (m, 3) of groups, and the group of each sample (n,)."""
+    n = len(time)
+    group = np.zeros(n, np.int64)
+    m, first = 0, 0
+    for k in range(1, n):
+        if k - first >= count or begins[k] or time[k] - time[first] > longest:
+            m, first = m + 1, k
+        group[k] = m
+    m += 1
+    t, size = np.zeros(m), np.zeros(m)
+    for k in range(n):
+        t[group[k]] += time[k]
+        size[group[k]] += 1
+    t /= size
+    mean, number, late, base = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros((m, 3)), np.zeros((m, 3))
+    for k in range(n):
+        g = group[k]
+        for c in range(3):
+            if weight[k, c] > 0 and math.isfinite(z[k, c]):
+                if number[g, c] == 0:
+                    base[g, c] = z[k, c]
+                mean[g, c] += wrapped(z[k, c] - base[g, c], c == 1)
+                late[g, c] += time[k] - t[g]
+                number[g, c] += 1
+    for g in range(m):
+        for c in range(3):
+            if number[g, c] > 0:
+                mean[g, c] = base[g, c] + mean[g, c] / number[g, c]
+                late[g, c] /= number[g, c]
+    merged = mean.copy()
+    for g in range(m):
+        for c in range(3):
+            if number[g, c] == 0:
+                merged[g, c] = math.nan
+            elif late[g, c] != 0.0:  # some of the group is missing: its mean is of another time
+                a, b = max(g - 1, 0), min(g + 1, m - 1)
+                span = t[b] + late[b, c] - t[a] - late[a, c]
+                if number[a, c] > 0 and number[b, c] > 0 and span > 0:
+                    merged[g, c] -= late[g, c] * wrapped(mean[b, c] - mean[a, c], c == 1) / span
+    return t, merged, number, group

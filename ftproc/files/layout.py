@@ -1,0 +1,61 @@
+"""The files that the program itself writes: names of columns, and kinds of file by what a name ends in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from ftproc.files import remote
+from ftproc.files.units import QUANTITIES, si_unit
+from ftproc.records import COMPONENTS
+
+Target = str | Path
+
+#: Columns of a log, by quantity: `time_s`, `range_m`, `azimuth_rad`, `elevation_rad`.
+CANONICAL: Mapping[str, str] = {quantity: f"{quantity}_{si_unit(quantity).name}" for quantity in QUANTITIES}
+
+POSITION = ("x_m", "y_m", "z_m")
+VELOCITY = ("vx_mps", "vy_mps", "vz_mps")
+ACCELERATION = ("ax_mps2", "ay_mps2", "az_mps2")
+OUTLIER = ("outlier_range", "outlier_azimuth", "outlier_elevation")
+MEASUREMENT = tuple(CANONICAL[component] for component in COMPONENTS)
+STATE = (*POSITION, *VELOCITY, *ACCELERATION)
+SIGMA = tuple(f"sigma_{name}" for name in (*POSITION, *VELOCITY))
+CORRECTION = tuple(f"correction_{name}" for name in (*POSITION, *VELOCITY))
+
+#: Every column a trajectory always has, in the order in which it is written.
+TRAJECTORY = ("row", "time_s", *MEASUREMENT, *STATE, *SIGMA, *OUTLIER, "nis", *CORRECTION)
+
+#: Key of the metadata in a Parquet file.
+METADATA_KEY = b"ftproc"
+
+#: What the names of tables and of maps may end in.
+TABLES = (".csv", ".csv.gz", ".parquet", ".feather")
+MAPS = (".kml", ".geojson", ".czml")
+
+
+def table_kind(name: Target) -> str | None:
+    """The one of TABLES that `name` ends in, whatever its case, or None."""
+    return _ending(name, TABLES)
+
+
+def map_kind(name: Target) -> str | None:
+    """The one of MAPS that `name` ends in, whatever its case, or None."""
+    return _ending(name, MAPS)
+
+
+def _ending(name: Target, kinds: tuple[str, ...]) -> str | None:
+    file = Path(name).name.lower()
+    return next((kind for kind in kinds if file.endswith(kind)), None)
+
+
+def sidecar(trajectory: Target) -> Target | None:
+    """Where the metadata of a trajectory stand: `out.json` for `out.csv`, `out.kml` and such; None for Parquet, Feather
+    and `-`, which need or have none."""
+    kind = None if str(trajectory) == "-" else table_kind(trajectory) or map_kind(trajectory)
+    if kind in (None, ".parquet", ".feather"):
+        return None
+    if remote.is_uri(trajectory):
+        return str(trajectory)[: -len(str(kind))] + ".json"
+    path = Path(trajectory)
+    return path.with_name(path.name[: -len(str(kind))] + ".json")

@@ -1,0 +1,144 @@
+"""Outputs appear whole or not at all, and never on top of an input."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import secrets
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from ftproc.errors import OutputError
+from ftproc.files import remote
+from ftproc.files.layout import Target
+
+
+def refuse_overwriting(target: Target, inputs: Iterable[Target], option: str = "-o") -> None:
+    """Raise OutputError when `target` is one of `inputs`, by whatever path, symbolic or hard link.
+
+    `-` (a standard stream) is never a file. option: the one that names the target.
+    """
+    for given in inputs:
+        if "-" not in (str(target), str(given)) and _same(target, given):
+            raise OutputError(
+                f"{target}: this is the input {given}, which is never overwritten. Give another name with {option}."
+            )
+
+
+def check_target(target: Target) -> None:
+    """Raise OutputError at once, before any work is done, when `target` is a directory or stands in none. Of a URI
+    that is on another machine nothing is known before."""
+    path = remote.local(target)
+    if path is None or str(target) == "-":
+        return
+    if path.is_dir():
+        raise _plain(path, IsADirectoryError(errno.EISDIR, ""))
+    directory = path.absolute().parent
+    if not directory.is_dir():
+        raise _plain(path, OSError(errno.ENOTDIR if directory.exists() else errno.ENOENT, ""))
+
+
+@contextlib.contextmanager
+def replacing(target: Target) -> Iterator[BinaryIO]:
+    """A binary stream whose content becomes the file `target` when the block ends well, and only then.
+
+    The bytes go to a hidden file beside the target, are flushed to the disk, and are renamed into place; when
+    anything fails the hidden file is removed and an earlier target is left as it was. A symbolic link stays
+    one: the file behind it is replaced. A device or named pipe cannot be replaced and is written to directly.
+    What a URI names on another machine is stored when it is whole. Raises OutputError with a plain sentence for every
+    OSError.
+    """
+    near = remote.local(target)
+    if near is None:
+        with remote.storing(str(target)) as stream:
+            yield stream
+        return
+    try:
+        check_target(near)
+        path = _resolved(near)
+        if path.exists() and not path.is_file():
+            with path.open("wb") as stream:
+                yield stream
+        else:
+            yield from _beside(path)
+    except OSError as error:
+        raise _plain(near, error) from error
+
+
+def sync(stream: BinaryIO) -> None:
+    """Force what was written to `stream` on to the disk (a full disk shows here at the latest)."""
+    stream.flush()
+    os.fsync(stream.fileno())
+
+
+def _beside(path: Path) -> Iterator[BinaryIO]:
+    temporary = path.with_name(f".{path.name[:200]}.{secrets.token_hex(4)}.tmp")
+    # O_EXCL: never through a link someone left there. 0o666: the user's umask decides, as for any new file.
+    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    try:
+        with os.fdopen(descriptor, "wb") as stream:
+            yield stream
+            sync(stream)
+        temporary.replace(path)
+    except BaseException:  # also Ctrl-C
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+        raise
+    _sync_directory(path.parent)
+
+
+def _sync_directory(directory: Path) -> None:
+    """Make the new name outlive a power cut, where the system lets directories be opened at all."""
+    with contextlib.suppress(OSError):
+        descriptor = os.open(directory, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _resolved(path: Path) -> Path:
+    """The file behind all links. OSError for a link to itself, which versions of Python tell otherwise, or not."""
+    try:
+        found = path.resolve()
+    except RuntimeError as error:
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from error
+    if found.is_symlink():
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
+    return found
+
+
+def _same(target: Target, given: Target) -> bool:
+    one, other = remote.local(target), remote.local(given)
+    if one is None or other is None:
+        return str(target) == str(given)
+    return _same_file(one, other)
+
+
+def _same_file(one: Path, other: Path) -> bool:
+    try:
+        return one.samefile(other)
+    except OSError:  # at least one is not there yet; then the resolved names tell
+        with contextlib.suppress(OSError):
+            return _resolved(one) == _resolved(other)
+        return False
+
+
+def _plain(path: Path, error: OSError) -> OutputError:
+    directory = path.parent
+    reasons = {
+        errno.ENOENT: f"there is no directory {directory}; create it first (mkdir -p {directory}).",
+        errno.ENOTDIR: f"{directory} is not a directory; choose another place.",
+        errno.EISDIR: "this is a directory; give the name of a file in it.",
+        errno.EACCES: f"no permission to write in {directory}; choose another place.",
+        errno.EPERM: f"no permission to write in {directory}; choose another place.",
+        errno.EROFS: f"{directory} cannot be written to (read-only); choose another place.",
+        errno.ENOSPC: "the disk is full; nothing was written. Make room or choose another place.",
+        errno.EDQUOT: "the disk quota is used up; nothing was written. Make room or choose another place.",
+        errno.ELOOP: "this is a symbolic link to itself; delete it, or give another name.",
+        errno.EFBIG: "the file is larger than the system allows; nothing was written. Choose another place.",
+    }
+    reason = reasons.get(error.errno or 0, f"cannot be written ({error.strerror or error}).")
+    return OutputError(f"{path}: {reason}")

@@ -1,0 +1,62 @@
+"""Flights out: a log, in the units asked for, and its truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ftproc.files import arrow
+from ftproc.files.layout import ACCELERATION, OUTLIER, POSITION, VELOCITY, Target
+from ftproc.files.units import QUANTITIES, UNITS, parse_units, si_unit
+from ftproc.files.writing import tables
+from ftproc.records import FlagArray, FloatArray, MeasurementLog, Truth
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+def write_log(
+    log: MeasurementLog, target: Target, units: str | Mapping[str, str] | None = None, azimuth_from: str = "x"
+) -> None:
+    """Write `log` to a .csv, .csv.gz, .parquet or .feather file or `-` (CSV on stdout).
+
+    units: of the quantities whose columns are not to be in SI, such as `range=km`; they show in the columns' names.
+    azimuth_from: `north` writes azimuths from 0 to a full turn, as a survey does. In SI every float64 reads back bit
+    for bit; a missing reading is an empty cell (NaN in Parquet). Raises OutputError, UsageError.
+    """
+    tables.write_table(tables.with_extra(log_table(log, parse_units(units), azimuth_from), log.extra), target)
+
+
+def log_table(log: MeasurementLog, units: Mapping[str, str], azimuth_from: str) -> pa.Table:
+    """The log with its units in the column names, such as `range_km`; SI where `units` says nothing."""
+    arrays = {}
+    for index, quantity in enumerate(QUANTITIES):
+        values = log.time_s if index == 0 else log.measurement[:, index - 1]
+        if quantity == "azimuth" and azimuth_from == "north":
+            values = np.mod(values, 2 * math.pi)
+            values = np.where(values >= 2 * math.pi, 0.0, values)  # what rounding makes of a tiny negative angle
+        unit = UNITS[quantity][units.get(quantity, si_unit(quantity).name)]
+        arrays[f"{quantity}_{unit.name}"] = np.ascontiguousarray(values * unit.divide / unit.multiply)
+    return arrow.table(arrays)
+
+
+def write_truth(truth: Truth, target: Target) -> None:
+    """Write `truth` to a .csv, .csv.gz, .parquet or .feather file or `-` (CSV on stdout), bit for bit.
+
+    Raises OutputError.
+    """
+    groups = (
+        (POSITION, truth.position_m),
+        (VELOCITY, truth.velocity_mps),
+        (ACCELERATION, truth.acceleration_mps2),
+    )
+    arrays: dict[str, FloatArray | FlagArray] = {"time_s": truth.time_s}
+    for names, group in groups:
+        if group is not None:
+            arrays.update(zip(names, np.ascontiguousarray(group.T), strict=True))
+    if truth.outlier is not None:
+        arrays.update(zip(OUTLIER, np.ascontiguousarray(truth.outlier.T), strict=True))
+    tables.write_table(arrow.table(arrays), target)

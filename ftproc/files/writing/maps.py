@@ -1,0 +1,184 @@
+"""Trajectories for the map: KML, GeoJSON and CZML. They hold the places, not the columns, and are not read back.
+
+Heights: GeoJSON (RFC 7946) and CZML count them from the WGS-84 ellipsoid, as `height_m` does. KML counts them from
+the geoid, the sea's level; where the geoid's height at the station is known it is taken off, else the file says so.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import itertools
+import json
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from ftproc.errors import InputError, UsageError
+from ftproc.files import layout
+from ftproc.files.layout import Target
+from ftproc.records import FloatArray, Trajectory
+
+_DEGREES, _METRES = 9, 4  # decimals: a tenth of a millimetre
+_SOME_DAY = "2000-01-01T00:00:00Z"  # stands for a day that the log does not tell; CZML cannot do without
+_XML = '<?xml version="1.0" encoding="UTF-8"?>'
+_NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
+
+
+class Track(NamedTuple):
+    """What a map needs. place: (n, 3) longitude deg, latitude deg, height m, of samples with an estimate; pieces:
+    where it is without gaps, of two places or more. site: the station's (longitude, latitude, height)."""
+
+    name: str
+    about: str
+    time_s: FloatArray
+    place: FloatArray
+    pieces: list[slice]
+    site: tuple[float, float, float]
+    geoid_m: float | None
+    epoch: str
+
+
+def check(target: Target, site: object) -> None:
+    """Raise UsageError when `target` is a map and either the station or the library for it is missing."""
+    kind = layout.map_kind(target)
+    if kind is None:
+        return
+    if site is None:
+        raise UsageError(
+            f"{target}: a {kind} map needs the station: give --site LAT,LON,HEIGHT, or [site] in the --config file."
+        )
+    if kind in _LIBRARIES:
+        _library(kind)
+
+
+def as_bytes(trajectory: Trajectory, kind: str) -> bytes:
+    """The text of the map. Raises UsageError as `check`, InputError when no place was estimated."""
+    return _WRITERS[kind](_track(trajectory, kind)).encode()
+
+
+def _track(trajectory: Trajectory, kind: str) -> Track:
+    metadata = trajectory.metadata
+    settings = cast(Mapping[str, Any], metadata.get("settings", {}))
+    extra, site = trajectory.extra, settings.get("site")
+    check(f"out{kind}", site if extra is not None and "lat_deg" in extra.column_names else None)
+    assert extra is not None
+    assert site is not None
+    columns = [np.asarray(extra.column(name)) for name in ("lon_deg", "lat_deg", "height_m")]
+    place = np.column_stack([*(np.round(c, _DEGREES) for c in columns[:2]), np.round(columns[2], _METRES)])
+    there = np.isfinite(place).all(1)
+    if not there.any():
+        raise InputError(f"{trajectory.name}: no position could be estimated, so there is nothing to draw on a map.")
+    way = "smoothed" if settings.get("smooth") else "filtered"
+    return Track(
+        _NOT_XML.sub("?", Path(trajectory.name).name),
+        f"{way} by {metadata['method']}, ftproc {metadata['version']}",
+        trajectory.time_s[there], place[there], _pieces(place, there), (site[1], site[0], site[2]),
+        settings.get("geoid_m"), str(metadata.get("epoch", "")),
+    )  # fmt: skip
+
+
+def _pieces(place: FloatArray, there: Any) -> list[slice]:
+    """Runs without a gap, cut where the longitude jumps from one side of 180 degrees to the other."""
+    row = np.flatnonzero(there)
+    jump = np.abs(np.diff(place[row, 0])) > 180
+    ends = np.flatnonzero((np.diff(row) > 1) | jump) + 1
+    bounds = [0, *ends.tolist(), len(row)]
+    return [slice(a, b) for a, b in itertools.pairwise(bounds) if b - a > 1]
+
+
+def _geojson(track: Track) -> str:
+    lines = [track.place[piece].tolist() for piece in track.pieces]
+    times = [track.time_s[piece].tolist() for piece in track.pieces]
+    station = {"type": "Point", "coordinates": list(track.site)}
+    features = [
+        _feature(station, {"name": "station"}),
+        _feature(
+            {"type": "MultiLineString", "coordinates": lines},
+            {"name": track.name, "about": track.about, "epoch": track.epoch or None, "time_s": times},
+        ),
+    ]
+    return json.dumps({"type": "FeatureCollection", "features": features}, ensure_ascii=False) + "\n"
+
+
+def _feature(geometry: dict[str, Any], properties: dict[str, Any]) -> dict[str, Any]:
+    return {"type": "Feature", "geometry": geometry, "properties": properties}
+
+
+def _kml(track: Track) -> str:
+    simplekml = _library(".kml")
+    simplekml.Kml.resetidcounter()  # same trajectory, same bytes
+    lessened = track.geoid_m or 0.0
+    places = np.round(track.place - (0.0, 0.0, lessened), _DEGREES)
+    known = f"Heights are above the geoid, which is {lessened:g} m above the ellipsoid here."
+    unknown = (
+        "Heights are above the WGS-84 ellipsoid. A viewer counts them from the geoid (sea level), so they are off by "
+        "its height at the station; give it as geoid_m under [site] of a station file."
+    )
+    about = f"{track.about}. {known if track.geoid_m is not None else unknown}"
+    document = simplekml.Kml(name=track.name)
+    longitude, latitude, height = track.site
+    document.newpoint(name="station", coords=[(longitude, latitude, height - lessened)], altitudemode="absolute")
+    lines = document.newmultigeometry(name=track.name, description=about)
+    for piece in track.pieces:
+        lines.newlinestring(coords=places[piece].tolist(), altitudemode="absolute")
+    if track.epoch:
+        moving = document.newgxtrack(name=f"{track.name} in time", altitudemode="absolute")
+        moving.newwhen(_instants(track))
+        moving.newgxcoord(places.tolist())
+    # Without indents, for which simplekml would parse all of it again.
+    return f"{_XML}\n{document.kml(format=False)}\n"
+
+
+def _instants(track: Track) -> list[str]:
+    start = dt.datetime.fromisoformat(track.epoch)
+    return [
+        f"{(start + dt.timedelta(seconds=t)).isoformat(timespec='microseconds')[:26]}Z" for t in track.time_s.tolist()
+    ]
+
+
+def _czml(track: Track) -> str:
+    czml3 = _library(".czml")
+    properties = czml3.properties
+    epoch, time_s = track.epoch or _SOME_DAY, track.time_s - (0.0 if track.epoch else track.time_s[0])
+    start = dt.datetime.fromisoformat(epoch)
+    first, last = (start + dt.timedelta(seconds=float(t)) for t in (time_s[0], time_s[-1]))
+    while_there = czml3.types.TimeInterval(start=first, end=last)
+    day = "" if track.epoch else " The log does not tell its day: its first sample is put at 2000-01-01."
+    samples = np.column_stack([time_s, track.place]).ravel().tolist()
+    colour = properties.Color(rgba=[255, 200, 0, 255])
+    packets = [
+        czml3.Packet(
+            id="document", name=track.name, version="1.0",
+            clock=czml3.types.IntervalValue(start=first, end=last, value=properties.Clock(currentTime=first)),
+        ),
+        czml3.Packet(
+            id="station", name="station", point=properties.Point(pixelSize=8, color=colour),
+            position=properties.Position(cartographicDegrees=list(track.site)),
+        ),
+        czml3.Packet(
+            id="target", name=track.name, description=f"{track.about}.{day}", availability=while_there,
+            position=properties.Position(epoch=epoch, cartographicDegrees=samples),
+            point=properties.Point(pixelSize=6, color=colour),
+            path=properties.Path(show=True),
+        ),
+    ]  # fmt: skip
+    return f"{czml3.Document(packets=packets).to_json()}\n"
+
+
+def _library(kind: str) -> Any:
+    import importlib
+
+    name, requirement = _LIBRARIES[kind]
+    try:
+        if name == "czml3":
+            importlib.import_module("czml3.properties")
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise UsageError(f'{kind} files need {name}, which is not installed: pip install "{requirement}".') from error
+
+
+_LIBRARIES = {".kml": ("simplekml", "simplekml>=1.3.6"), ".czml": ("czml3", "czml3>=4")}
+_WRITERS: Mapping[str, Callable[[Track], str]] = {".kml": _kml, ".geojson": _geojson, ".czml": _czml}

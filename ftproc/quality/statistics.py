@@ -1,0 +1,168 @@
+"""The figures of a run's summary, gathered part by part, so that a log of any length needs little memory."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ftproc.methods.estimate import typical_interval
+from ftproc.quality import consistency, verdict
+from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, FlagArray, FloatArray, MeasurementLog
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ftproc.methods.estimate import Estimate
+
+UNITS = ("m", "rad", "rad")
+GAP_INTERVALS = 3.0  # median intervals that make a gap
+MOST_KEPT = 250_000  # samples whose sigmas are kept; of more, the worst of every few
+_LABELS = {"good": GOOD, "isolated": ISOLATED, "patch": PATCH, "missing": MISSING}
+
+
+class Tally:
+    """Counts of one log, to which its parts are added in their order."""
+
+    def __init__(self, log: MeasurementLog, absent: Sequence[int]) -> None:
+        self.log, self.absent = log, absent
+        self.every = 1 + (len(log) - 1) // MOST_KEPT
+        self.interval_s = typical_interval(log.time_s)
+        self.components = [_Component() for _ in COMPONENTS]
+        self.gaps, self.longest_gap_s, self.last_time = 0, 0.0, np.nan
+        self.nis_sum, self.nis_count, self.used, self.rows_used = 0.0, 0, 0, 0
+        self.times: list[FloatArray] = []
+        self.sigmas: list[FloatArray] = []
+        self.levels: list[FloatArray] = []
+        self.reacquired, self.slow_noise = 0, False
+        self.settled: bool | None = None
+        self.largest_m, self.outside, self.rows, self.parts = 0.0, 0.0, 0, 0
+
+    def add(self, time_s: FloatArray, estimate: Estimate, correction: FloatArray, outside: float) -> None:
+        """Count a part: time_s (n,), its estimate, correction (n, 6), and the share outside the network's training."""
+        run = estimate.run
+        best_sigma = (run if estimate.smoothed is None else estimate.smoothed).sigma
+        used = run.weight > 0
+        with np.errstate(invalid="ignore", divide="ignore"):
+            squares = np.square(run.innovation / run.innovation_sigma)
+        for c, component in enumerate(self.components):
+            seen = used[:, c] & (c not in self.absent)
+            component.add(time_s, estimate.label[:, c], squares[seen, c], run.innovation_sigma[:, c], seen, self.every)
+        self._add_gaps(time_s)
+        finite = np.isfinite(run.nis)
+        self.nis_sum += float(run.nis[finite].sum())
+        self.nis_count += int(finite.sum())
+        self.used += int(used.sum())
+        self.rows_used += int(used.any(1).sum())
+        self._add_sigmas(time_s, best_sigma[:, :3])
+        self.levels.append(estimate.model.jerk[:, [0, 3, 5]].mean(1))
+        self.model = estimate.model
+        self.reacquired += len(estimate.reacquired)
+        if estimate.settled is not None:
+            self.settled = estimate.settled and self.settled is not False
+        self.slow_noise |= estimate.slow_noise
+        if len(correction):
+            self.largest_m = max(self.largest_m, float(np.linalg.norm(correction[:, :3], axis=1).max()))
+        self.outside += outside * len(time_s)
+        self.rows += len(time_s)
+        self.parts += 1
+
+    def _add_gaps(self, time_s: FloatArray) -> None:
+        interval = np.diff(time_s, prepend=self.last_time) if self.rows else np.diff(time_s)
+        self.last_time = float(time_s[-1])
+        if self.interval_s > 0 and (gaps := interval[interval > GAP_INTERVALS * self.interval_s]).size:
+            self.gaps += len(gaps)
+            self.longest_gap_s = max(self.longest_gap_s, float(gaps.max()))
+
+    def _add_sigmas(self, time_s: FloatArray, sigma_m: FloatArray) -> None:
+        groups = -(-len(time_s) // self.every)
+        size = np.zeros(groups * self.every)
+        size[: len(time_s)] = (sigma_m**2).sum(1)
+        chosen = self.every * np.arange(groups) + size.reshape(groups, self.every).argmax(1)
+        self.times.append(time_s[chosen])
+        self.sigmas.append(sigma_m[chosen])
+
+    def figures(self) -> dict[str, Any]:
+        """The figures of the summary, JSON-serialisable; units are in the names."""
+        log, absent, model = self.log, self.absent, self.model
+        components: dict[str, Any] = {}
+        for c, name in enumerate(COMPONENTS):
+            noise = float(np.sqrt(model.reading_variance[c]))
+            components[name] = {
+                **self.components[c].counts(),
+                f"noise_{UNITS[c]}": noise if c not in absent else None,
+                "noise_correlation": float(model.correlation[c]),
+                **self.components[c].consistency(noise),
+            }
+        levels = np.concatenate(self.levels)
+        jerk = {"lowest": float(levels.min()), "median": float(np.median(levels)), "highest": float(levels.max())}
+        time_s, sigma_m = np.concatenate(self.times), np.concatenate(self.sigmas)
+        figures = {
+            "rows": len(log),
+            "rows_in_file": log.rows_in_file,
+            "rows_without_time": len(log.rows_without_time),
+            "first_row_without_time": log.rows_without_time[0] if log.rows_without_time else None,
+            "rows_out_of_order": log.rows_out_of_order,
+            "duplicate_times": log.duplicate_times,
+            "remarks": list(log.remarks),
+            "duration_s": float(log.time_s[-1] - log.time_s[0]),
+            "interval_s": self.interval_s,
+            "gaps": self.gaps,
+            "longest_gap_s": self.longest_gap_s,
+            "components": components,
+            "not_observable": [COMPONENTS[c] for c in absent],
+            "jerk_psd_m2ps5": jerk if np.isfinite(levels).all() else None,
+            "nis_mean": self.nis_sum / self.nis_count if self.nis_count else None,
+            "components_used_mean": float(self.used / max(self.rows_used, 1)),
+            "hardly_observable": [] if absent else consistency.blind_stretches(time_s, sigma_m),
+            "reacquired": self.reacquired,
+            "editing_settled": self.settled,
+            "slow_noise": self.slow_noise,
+            "correction_largest_m": self.largest_m,
+            "correction_outside_training": self.outside / max(self.rows, 1),
+        }
+        return figures | {"trust": verdict.verdict(verdict.remarks(figures))}
+
+
+class _Component:
+    """What is counted of range, azimuth or elevation."""
+
+    def __init__(self) -> None:
+        self.labels = np.zeros(4, int)
+        self.longest_s, self.patch_from = 0.0, np.nan  # the longest patch, and when one began that may go on
+        self.squares, self.count = 0.0, 0
+        self.innovation_sigma: list[FloatArray] = []
+
+    def add(
+        self, time_s: FloatArray, label: FlagArray, squares: FloatArray, sigma: FloatArray, seen: Any, every: int
+    ) -> None:
+        self.labels += np.bincount(label, minlength=4)
+        self._add_patches(time_s, label)
+        self.squares += float(squares.sum())
+        self.count += len(squares)
+        self.innovation_sigma.append(sigma[::every][seen[::every]])
+
+    def _add_patches(self, time_s: FloatArray, label: FlagArray) -> None:
+        """Missing readings inside a patch do not end it, nor does the end of a part."""
+        there = np.flatnonzero(label != MISSING)
+        if not there.size:
+            return
+        inside = np.r_[False, label[there] == PATCH, False]
+        edges = np.flatnonzero(inside[1:] != inside[:-1]).reshape(-1, 2)
+        begins, ends = time_s[there[edges[:, 0]]], time_s[there[edges[:, 1] - 1]]
+        if len(edges) and edges[0, 0] == 0 and np.isfinite(self.patch_from):
+            begins[0] = self.patch_from
+        self.longest_s = max(self.longest_s, float((ends - begins).max(initial=0.0)))
+        self.patch_from = begins[-1] if len(edges) and edges[-1, 1] == len(there) else np.nan
+
+    def counts(self) -> dict[str, Any]:
+        return {name: int(self.labels[label]) for name, label in _LABELS.items()} | {
+            "longest_patch_s": self.longest_s,
+        }
+
+    def consistency(self, noise_sigma: float) -> dict[str, Any]:
+        sigmas = np.concatenate(self.innovation_sigma)
+        return {
+            "prediction_vagueness": consistency.vagueness(sigmas, noise_sigma),
+            **consistency.scatter(self.squares, self.count),
+        }

@@ -1,0 +1,99 @@
+"""What a user wants to know at a glance: how much was edited, what noise was found, whether to trust the result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ftproc.quality import verdict
+from ftproc.quality.statistics import UNITS
+from ftproc.records import COMPONENTS
+
+
+def as_dict(metadata: Mapping[str, Any]) -> dict[str, Any]:
+    """The summary in a trajectory's metadata, with the log's name and the method in front."""
+    return {"log": metadata["log"], "method": metadata["method"], **metadata["summary"]}
+
+
+def text(metadata: Mapping[str, Any]) -> str:
+    """The summary in a trajectory's metadata: at most a screen for the terminal, in plain text."""
+    s, settings = metadata["summary"], metadata["settings"]
+    way = "smoothed" if settings["smooth"] else "filtered"
+    lines = [f"{metadata['log']}: {counted(s['rows'], 'row')}, {s['duration_s']:.6g} s, {way} by "
+             f"{metadata['method']} ({settings['editing']} editing)"]  # fmt: skip
+    lines += _table(s["components"])
+    told = facts(s)
+    reasons = s["trust"]["reasons"]
+    told += [("note", text) for text in notes(s)]
+    if len(reasons) < 2:
+        told.append(("verdict", verdict.sentence(s["trust"])))
+    else:
+        told += [("verdict", f"{verdict.opening(s['trust'])}:"), *(("", f"- {reason}") for reason in reasons)]
+    return "\n".join([*lines, *(line(name, what) for name, what in told)])
+
+
+def counted(number: int, what: str) -> str:
+    """1 row, 2 rows."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def line(name: str, what: str) -> str:
+    """A named line of the text."""
+    return f"  {name:{_NAME}}  {what}"
+
+
+HEADER = ("", "good", "isolated", "patch", "missing", "outliers", "longest patch", "noise (1 sigma)", "sigmas")
+_NAME = len("elevation")
+
+
+def _table(components: Mapping[str, Any]) -> list[str]:
+    rows = [HEADER, *(component_cells(name, components[name]) for name in COMPONENTS)]
+    widths = [max(len(r[i]) for r in rows) for i in range(len(HEADER))]
+    return [
+        "  ".join(["  " + r[0].ljust(widths[0]), *(v.rjust(w) for v, w in zip(r[1:], widths[1:], strict=True))])
+        for r in rows
+    ]
+
+
+def component_cells(name: str, part: Mapping[str, Any]) -> tuple[str, ...]:
+    """One component's line of the table, under HEADER."""
+    c = COMPONENTS.index(name)
+    noise = part[f"noise_{UNITS[c]}"]
+    spoken = "-" if noise is None else f"{noise:.3g} m" if c == 0 else f"{1e3 * noise:.3g} mrad"
+    counts = (str(part[k]) for k in ("good", "isolated", "patch", "missing"))
+    share = f"{100 * verdict.outlier_share(part):.2f} %"
+    return (name, *counts, share, f"{part['longest_patch_s']:.3g} s", spoken, part["verdict"])
+
+
+def facts(s: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What there is to say of every run: name and text."""
+    found = [("gaps", f"{s['gaps']}, the longest {s['longest_gap_s']:.4g} s" if s["gaps"] else "none")]
+    found += [("rows", line) for line in _oddities(s)]
+    jerk = s["jerk_psd_m2ps5"]
+    if jerk is not None:
+        found.append(
+            ("jerk", f"density {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.3g} to {jerk['highest']:.3g})")
+        )
+    if s["nis_mean"] is not None:
+        found.append(("NIS", f"{s['nis_mean']:.2f} on average, {s['components_used_mean']:.2f} expected"))
+    return found
+
+
+def notes(s: Mapping[str, Any]) -> list[str]:
+    """The remarks on a run that are not the reasons of its verdict."""
+    return [remark.text for remark in verdict.remarks(s) if remark.text not in s["trust"]["reasons"]]
+
+
+def _oddities(s: Mapping[str, Any]) -> list[str]:
+    """What was odd about the rows of the log, and how its columns were understood."""
+    found = list(s["remarks"])
+    if s["rows_without_time"]:
+        have = "has" if s["rows_without_time"] == 1 else "have"
+        lost = counted(s["rows_without_time"], "row")
+        found.append(f"{lost} {have} no time (first: row {s['first_row_without_time']})")
+    if s["rows_out_of_order"]:
+        found.append(f"{counted(s['rows_out_of_order'], 'row')} out of time order, sorted")
+    if s["duplicate_times"]:
+        share = "shares" if s["duplicate_times"] == 1 else "share"
+        found.append(f"{counted(s['duplicate_times'], 'row')} {share} the time of the row before")
+    return found

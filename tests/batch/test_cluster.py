@@ -1,0 +1,215 @@
+"""A real scheduler and two worker processes on loopback: the same bytes as local, also when one of them dies."""
+
+from __future__ import annotations
+
+import logging
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import NamedTuple, TypeVar
+
+import pytest
+
+from ftproc.batch import cluster, run
+from ftproc.batch.tasks import Task
+from ftproc.cli.warm import warm
+from ftproc.config.recipe import Recipe
+from ftproc.correction import model_file
+from ftproc.errors import UsageError
+from ftproc.files.writing.flights import write_log
+from ftproc.simulation import simulate
+
+T = TypeVar("T")
+FTPROC = Path(sys.prefix) / "bin" / "ftproc"
+PATIENCE_S = 60.0
+
+
+class Cluster(NamedTuple):
+    address: str
+    scheduler: subprocess.Popen[bytes]
+    workers: list[subprocess.Popen[bytes]]
+
+
+@pytest.fixture(scope="module")
+def two_workers(tmp_path_factory) -> Iterator[Cluster]:
+    """A scheduler on a free port and two workers of one thread each, in a directory of their own."""
+    folder = tmp_path_factory.mktemp("cluster")
+    warm()
+    common = ["--host", "127.0.0.1", "--no-dashboard"]
+    worker = ["--scheduler-file", "scheduler.json", "--nthreads", "1", "--no-nanny", "--memory-limit", "0"]
+    worker += ["--death-timeout", "60", "--local-directory", str(folder)]
+    begun = [_start(folder, "dask_scheduler", "--port", "0", "--scheduler-file", "scheduler.json", *common)]
+    try:
+        begun += [_start(folder, "dask_worker", *worker, *common) for _ in range(2)]
+        _until((folder / "scheduler.json").exists)
+        from distributed import Client
+
+        with Client(scheduler_file=str(folder / "scheduler.json"), set_as_default=False) as client:
+            client.wait_for_workers(2, timeout=PATIENCE_S)
+            address = client.scheduler.address
+        yield Cluster(address, begun[0], begun[1:])
+    finally:
+        for process in begun:
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def flights(tmp_path, monkeypatch) -> list[str]:
+    """Six short logs in the current directory, the third of which is none."""
+    monkeypatch.chdir(tmp_path)
+    for number in range(6):
+        write_log(simulate("zuo2021-outliers", seed=number).log, f"{number}.csv")
+    Path("2.csv").write_text("no log\n1\n")
+    return [f"{number}.csv" for number in range(6)]
+
+
+def test_the_cluster_gives_what_this_process_gives(two_workers, flights, monkeypatch):
+    """Names are relative to where the user stands, and a model is the user's, not one that a worker remembers."""
+    model_file.save(model_file.named("packaged"), Path("mine.safetensors"))
+    recipe = Recipe(model="mine.safetensors")
+    alone = list(run.run(_tasks(flights, "alone"), recipe))
+    shared = list(run.run(_tasks(flights, "shared"), recipe, scheduler=two_workers.address))
+    assert [outcome.failure is None for outcome in shared] == [True, True, False, True, True, True]
+    assert [outcome.text for outcome in shared] == [outcome.text for outcome in alone]
+    assert [outcome.summary for outcome in shared] == [outcome.summary for outcome in alone]
+    assert [outcome.task.log for outcome in shared] == flights
+    assert shared[2].failure is not None
+    assert "2.csv: the header line" in shared[2].failure.message
+    assert _contents("shared") == _contents("alone")
+    assert len(_contents("alone")) == 10  # each with its sidecar
+
+
+def test_a_cluster_reads_no_standard_input(two_workers):
+    with pytest.raises(UsageError, match="a cluster reads and writes files only"):
+        next(run.run([Task("-", "-")], Recipe(), scheduler=two_workers.address))
+
+
+def test_a_worker_with_another_version_is_named(two_workers, flights, monkeypatch):
+    monkeypatch.setattr("ftproc.__version__", "9.9")
+    with pytest.raises(UsageError, match=r"the worker tcp://127.0.0.1:\d+ has ftproc 0.1.0, this is ftproc 9.9; .*pip"):
+        next(run.run(_tasks(flights, "none"), Recipe(), scheduler=two_workers.address))
+    monkeypatch.setattr(cluster, "_check_workers", lambda client, address: None)  # it joins after they were asked
+    (late,) = run.run(_tasks(flights[:1], "late"), Recipe(), scheduler=two_workers.address)
+    assert late.failure is not None
+    assert late.failure.message.startswith("0.csv: the worker tcp://127.0.0.1:")
+    assert "has ftproc 0.1.0, this is ftproc 9.9" in late.failure.message
+    assert not _contents("none")
+    assert not _contents("late")
+
+
+def test_the_log_of_a_worker_that_dies_is_done_by_the_other(two_workers, flights):
+    """One is killed as soon as a first trajectory is there, while both have logs to do."""
+    write_log(simulate("zuo2021-outliers", seed=2).log, "2.csv")
+    expected = list(run.run(_tasks(flights, "alone"), Recipe()))
+    command = [FTPROC, "filter", *flights, "-o", "shared/", "--scheduler", two_workers.address]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            _until(lambda: list(Path("shared").glob("[!.]*.csv")))
+            two_workers.workers[0].kill()
+            left = len(flights) - len(list(Path("shared").glob("[!.]*.csv")))
+            two_workers.workers[0].wait()
+            out, err = process.communicate(timeout=PATIENCE_S)
+        finally:
+            process.kill()
+    assert left > 0
+    assert (process.returncode, err) == (0, "")
+    assert out.count("-> shared/") == 6
+    assert all(outcome.failure is None for outcome in expected)
+    assert _contents("shared") == _contents("alone")
+
+
+def test_all_workers_dead_says_so(two_workers, flights, monkeypatch):
+    for worker in two_workers.workers:
+        worker.kill()
+        worker.wait()
+    monkeypatch.setattr(cluster, "PATIENCE_S", 0.5)
+    with pytest.raises(UsageError, match=r"it has no workers. Start one with `dask worker tcp://127.0.0.1:\d+ "):
+        next(run.run(_tasks(flights, "none"), Recipe(), scheduler=two_workers.address))
+
+
+def test_the_scheduler_goes_away(two_workers, flights, monkeypatch):
+    """After the last test it has no workers, so the log waits when it is killed."""
+    monkeypatch.setattr(cluster, "PATIENCE_S", 0.5)
+    monkeypatch.setattr(cluster, "_check_workers", lambda client, address: two_workers.scheduler.kill())
+    (outcome,) = run.run(_tasks(flights[:1], "none"), Recipe(), scheduler=two_workers.address)
+    assert outcome.failure is not None
+    expected = f"0.csv: the scheduler {two_workers.address} went away before it was done; run again."
+    assert outcome.failure.message == expected
+
+
+def test_what_dask_logs_is_not_shown(capsys):
+    """Such as that a result was lost with its worker: it is got anew."""
+    cluster.require_distributed()
+    logger = logging.getLogger("distributed.client")
+    handler = logging.StreamHandler(sys.stderr)
+    logger.addHandler(handler)
+    try:
+        with cluster._quiet():
+            logger.error("inside")
+        logger.error("after")
+    finally:
+        logger.removeHandler(handler)
+    err = capsys.readouterr().err
+    assert "inside" not in err
+    assert "after" in err
+
+
+def test_a_log_that_kills_every_worker_is_named():
+    import distributed
+
+    class Future:
+        def result(self) -> None:
+            raise distributed.KilledWorker("task", SimpleNamespace(address="tcp://there:2"), 3)
+
+        def release(self) -> None:
+            pass
+
+    outcome = cluster._outcome(distributed, Future(), Task("a.csv", "b.csv"), "tcp://there:1")
+    assert outcome.failure is not None
+    assert outcome.failure.message.startswith("a.csv: every worker that took it died (out of memory, or killed).")
+    assert "KilledWorker" in outcome.failure.trace
+
+
+def test_no_scheduler_answers(flights, monkeypatch):
+    monkeypatch.setattr(cluster, "PATIENCE_S", 0.3)
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))  # and never listens
+        address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
+        for given in (address, "nonsense://here", "no address at all"):
+            with pytest.raises(UsageError, match=f"--scheduler {given}: no Dask scheduler answers there within 0.3 s"):
+                next(run.run(_tasks(flights, "none"), Recipe(), scheduler=given))
+
+
+def test_without_distributed(flights, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(UsageError, match=r"--scheduler needs distributed, which is not installed: pip install"):
+        next(run.run(_tasks(flights, "none"), Recipe(), scheduler="tcp://127.0.0.1:1"))
+
+
+def _start(folder: Path, module: str, *args: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", f"distributed.cli.{module}", *args]
+    return subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def _tasks(names: list[str], directory: str) -> list[Task]:
+    Path(directory).mkdir(exist_ok=True)
+    return [Task(name, f"{directory}/{name.replace('.csv', '.trajectory.csv')}") for name in names]
+
+
+def _contents(directory: str) -> dict[str, bytes]:
+    """Its outputs; the hidden file that a killed worker was writing is none."""
+    return {path.name: path.read_bytes() for path in Path(directory).glob("[!.]*")}
+
+
+def _until(found: Callable[[], T | None]) -> T:
+    """What `found` gives as soon as it is true."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not (value := found()):
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.02)
+    return value

@@ -1,0 +1,132 @@
+"""Many logs: isolation, order, and the same bytes from any number of workers."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from ftproc.batch import run
+from ftproc.batch.tasks import Task
+from ftproc.config.recipe import Recipe
+from ftproc.errors import ModelError
+from ftproc.files.writing import flights
+from ftproc.simulation import simulate
+
+
+@pytest.fixture
+def tasks(tmp_path):
+    """Four flights and, second, a log that is none."""
+    made = []
+    for number in range(5):
+        log = tmp_path / f"{number}.csv"
+        if number == 1:
+            log.write_text("no log\n1\n")
+        else:
+            flights.write_log(simulate("zuo2021-outliers", seed=number).log, log)
+        made.append(log)
+
+    def into(directory: str) -> list[Task]:
+        (tmp_path / directory).mkdir()
+        return [Task(str(log), str(tmp_path / directory / f"{log.stem}.parquet")) for log in made]
+
+    return into
+
+
+def test_any_number_of_workers_gives_the_same_in_the_same_order(tasks, tmp_path):
+    alone = list(run.run(tasks("one"), Recipe()))
+    together = list(run.run(tasks("three"), Recipe(), jobs=3))
+    assert [outcome.failure is None for outcome in alone] == [True, False, True, True, True]
+    assert [outcome.text for outcome in alone] == [outcome.text for outcome in together]
+    assert [outcome.summary for outcome in alone] == [outcome.summary for outcome in together]
+    assert alone[1].failure is not None
+    assert together[1].failure is not None
+    assert alone[1].failure.message == together[1].failure.message
+    for file in (tmp_path / "one").iterdir():
+        assert file.read_bytes() == (tmp_path / "three" / file.name).read_bytes()
+    assert len(list((tmp_path / "three").iterdir())) == 4
+
+
+def test_unexpected_errors_stay_with_their_log(tasks, monkeypatch):
+    monkeypatch.setattr("ftproc.pipeline.Filtering", lambda *args: 1 / 0)
+    outcomes = list(run.run(tasks("one"), Recipe()))
+    found = [outcome.failure for outcome in outcomes]
+    assert all(failure is not None and failure.exit_code == 1 for failure in found)
+    assert found[0] is not None
+    assert "internal error (ZeroDivisionError: division by zero)" in found[0].message
+    assert found[0].message.startswith(outcomes[0].task.log)
+    assert "Traceback" in found[0].trace
+
+
+def test_a_bad_model_is_told_before_any_log_is_touched(tasks, tmp_path):
+    with pytest.raises(ModelError, match="there is no such file"):
+        next(run.run(tasks("one"), Recipe(model=str(tmp_path / "none"))))
+
+
+def test_a_worker_that_dies_takes_only_its_own_log_with_it(tmp_path):
+    """A named pipe nobody reads from holds a worker until it is killed, as the system does when memory is short."""
+    stuck, good = tmp_path / "stuck.csv", tmp_path / "good.csv"
+    os.mkfifo(tmp_path / "a.csv")
+    flights.write_log(simulate("zuo2021").log, stuck)
+    flights.write_log(simulate("zuo2021").log, good)
+    done = threading.Event()
+
+    def kill_whoever_waits() -> None:
+        while not done.wait(4.0):
+            for child in multiprocessing.active_children():
+                child.kill()
+
+    killer = threading.Thread(target=kill_whoever_waits)
+    killer.start()
+    try:
+        tasks = [Task(str(stuck), str(tmp_path / "a.csv")), Task(str(good), str(tmp_path / "b.csv"))]
+        first, second = run.run(tasks, Recipe(), jobs=2)
+    finally:
+        done.set()
+        killer.join()
+    assert first.failure is not None
+    assert first.failure.message.startswith(f"{stuck}: its worker process died")
+    assert second.failure is None
+    assert (tmp_path / "b.csv").exists()
+
+
+def test_ctrl_c_stops_all_workers_and_leaves_only_whole_files(tmp_path):
+    for number in range(60):
+        flights.write_log(simulate("manoeuvre", duration_s=60.0, seed=number).log, tmp_path / f"{number}.parquet")
+    program = str(Path(sys.prefix) / "bin" / "ftproc")
+    names = [f"{number}.parquet" for number in range(60)]
+    command = [program, "filter", *names, "--jobs", "2", "-o", "out"]
+    with subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        deadline = time.monotonic() + 60
+        while not list(tmp_path.glob("out/*.parquet")) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all of the group
+        err = process.communicate(timeout=60)[1]
+    assert process.returncode == 130
+    assert err.strip().endswith("ftproc: interrupted")
+    assert "Traceback" not in err
+    written = [path.name for path in (tmp_path / "out").iterdir()]
+    assert 0 < len(written) < 60
+    assert all(name.endswith(".trajectory.parquet") and not name.startswith(".") for name in written)
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt(), SystemExit(143)])
+def test_an_interruption_inside_a_kernel_is_no_failure_of_the_log(tasks, monkeypatch, stop):
+    """A kernel that a signal finds handing back its result raises SystemError because of it."""
+
+    def interrupted(*_: object) -> None:
+        raise SystemError("CPUDispatcher returned a result with an exception set") from stop
+
+    monkeypatch.setattr("ftproc.pipeline.Filtering", interrupted)
+    with pytest.raises(type(stop)) as raised:
+        list(run.run(tasks("out")[:1], Recipe()))
+    assert raised.value is stop

@@ -1,0 +1,245 @@
+"""Editing of single components, with the numbers of the papers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.core.comparators import channels
+
+TIME = np.arange(60.0)
+RNG = np.random.default_rng(0)
+
+
+def gate(z, threshold=0.06, check_first=False, time=TIME, angular=False):
+    z = np.asarray(z, float)
+    return channels.gate(time[: len(z)], z, threshold, 1.0, angular, check_first)
+
+
+# --- the simple gate ----------------------------------------------------------------------------------------------
+
+
+def test_gate_drops_what_jumps_and_keeps_what_follows():
+    np.testing.assert_array_equal(gate([1, 1.05, 3, 1.1, np.nan, 1.15]), [1, 1, 0, 1, 0, 1])
+
+
+def test_a_wrong_first_reading_locks_the_gate_but_not_the_improved_one():
+    z = [5.0] + [1.0 + 0.01 * k for k in range(20)]
+    assert gate(z).sum() == 1
+    np.testing.assert_array_equal(gate(z, check_first=True), [0, 0] + [1] * 19)
+
+
+def test_improved_gate_drops_pairs_until_two_agree():
+    np.testing.assert_array_equal(gate([9, 1, 7, 1, 1, 1.01, 1.02], check_first=True), [0, 0, 0, 0, 1, 1, 1])
+
+
+def test_alternating_outliers_cost_the_improved_gate_good_readings():
+    z = np.where(np.arange(20) % 2, 5.0 + np.arange(20), 1.0)
+    assert gate(z, check_first=True).sum() == 0
+    assert gate(z).sum() == 10
+
+
+def test_threshold_grows_with_the_gap_and_azimuth_is_taken_the_short_way():
+    gap = np.array([0.0, 1.0, 4.0])
+    assert gate([0, 0.05, 0.2], time=gap).sum() == 3
+    assert gate([0, 0.05, 0.24], time=gap).sum() == 2
+    assert gate([3.12, -3.14], angular=True).sum() == 2
+    assert gate([3.12, -3.14]).sum() == 1
+
+
+# --- the line through four points ---------------------------------------------------------------------------------
+
+
+def line(z, threshold=0.6, time=TIME, angular=False):
+    z = np.asarray(z, float)
+    return channels.four_point_line(time[: len(z)], z, threshold, 1.0, angular)
+
+
+def test_weights_of_the_last_four_are_minus_half_nought_half_one():
+    for i, weight in enumerate((-0.5, 0.0, 0.5, 1.0)):
+        z = np.append(np.eye(4)[i], 1e9)
+        assert line(z, threshold=1.5)[0][4] == pytest.approx(weight, abs=1e-12)
+
+
+@pytest.mark.parametrize("run", [1, 2])
+def test_line_bridges_one_or_two_outliers_exactly(run):
+    z = 3 + 2 * TIME[:30]
+    truth = z.copy()
+    z[10 : 10 + run] += 50
+    value, weight = line(z)
+    np.testing.assert_allclose(value, truth, atol=1e-9)
+    np.testing.assert_array_equal(np.flatnonzero(weight == 0), np.arange(10, 10 + run))
+
+
+def test_three_outliers_in_a_row_are_believed():
+    """The paper's own limit."""
+    z = 3 + 0.1 * TIME[:30]
+    z[10:13] += 50
+    value, weight = line(z)
+    assert weight[12] == 1
+    assert abs(value[12] - z[12]) < 1e-9
+
+
+def test_line_uses_the_real_times_and_steps_over_missing_readings():
+    time = np.cumsum(RNG.uniform(0.3, 2.0, 40))
+    z = 5 - 3 * time
+    truth = z.copy()
+    z[20], z[25] = 100, np.nan
+    value, weight = line(z, time=time)
+    np.testing.assert_allclose(np.delete(value, 25), np.delete(truth, 25), atol=1e-9)
+    assert np.isnan(value[25])
+    assert (weight[20], weight[25]) == (0, 0)
+
+
+def test_line_follows_an_azimuth_across_the_cut():
+    turning = 3.0 + 0.02 * TIME
+    z = (turning + np.pi) % (2 * np.pi) - np.pi
+    z[30] = 1.0
+    value, weight = line(z, threshold=0.1, angular=True)
+    np.testing.assert_allclose(value, turning, atol=1e-9)
+    assert weight.sum() == 59
+
+
+# --- the anti-outlier Kalman filter -------------------------------------------------------------------------------
+
+
+def kalman(z, x0, own_only=False, small_gain=0.002, gate=4.0):
+    """With the paper's Q = 0.006, R = 0.002, P0 = 0.01."""
+    z = np.asarray(z, float)
+    m = z.shape[1]
+    return channels.outlier_kalman(
+        TIME[: len(z)], z, np.zeros(m, np.int64), np.asarray(x0, float), np.full(m, 0.01), np.full(m, 0.002),
+        np.full(m, 0.006), 1.0, gate, small_gain, own_only,
+    )  # fmt: skip
+
+
+def test_from_the_papers_wrong_start_the_gate_opens_at_the_eighth_recursion():
+    value, _, _, _, weight = kalman(np.tile([110.712, 33.917], (20, 1)), (109.99, 32.95))
+    opened = int(np.argmax(weight.all(1))) + 1
+    assert opened == 8
+    np.testing.assert_allclose(value[-1], (110.712, 33.917), atol=1e-3)
+
+
+def test_scaled_gain_has_its_own_covariance():
+    """P - K'H P - P H'K'' + K' S K'' in plain numbers, one component off."""
+    z = np.array([[0.0, 0.0], [0.01, 5.0], [0.02, 0.0]])
+    value, variance, _, sigma, weight = kalman(z, (0, 0))
+    x, p = np.zeros(2), np.full(2, 0.01)
+    for k in range(3):
+        p = p + 0.006
+        s = p + 0.002
+        e = z[k] - x
+        gain = p / s * (0.002 if (np.abs(e) > 4 * np.sqrt(s)).any() else 1.0)
+        x, p = x + gain * e, (1 - gain) ** 2 * p + gain**2 * 0.002
+        np.testing.assert_allclose(value[k], x, atol=1e-12)
+        np.testing.assert_allclose(variance[k], p, rtol=1e-12)
+        np.testing.assert_allclose(sigma[k], np.sqrt(s), rtol=1e-12)
+    np.testing.assert_array_equal(weight, [[1, 1], [1, 0], [1, 1]])
+
+
+def test_improved_filter_leaves_the_good_component_its_gain():
+    z = np.array([[0.0, 0.0], [0.2, 5.0]])
+    joint, own = (kalman(z, (0, 0), own_only)[0][1] for own_only in (False, True))
+    assert abs(joint[0]) < 1e-3
+    assert own[0] > 0.15
+    assert abs(own[1]) < 0.02
+
+
+@pytest.mark.parametrize("run", [1, 3, 6])
+def test_improved_filter_survives_six_outliers_in_a_row(run):
+    z = np.tile([110.712, 33.917], (40, 1)) + 0.01 * RNG.standard_normal((40, 2))
+    z[15 : 15 + run, 0] += 1.0
+    value, _, _, _, weight = kalman(z, z[0], own_only=True)
+    assert np.abs(value[1:] - (110.712, 33.917)).max() < 0.05
+    np.testing.assert_array_equal(np.flatnonzero(weight[:, 0] == 0), np.arange(15, 15 + run))
+
+
+def test_missing_reading_leaves_the_value_and_widens_it():
+    z = np.array([[0.0, 0.0], [np.nan, 0.1], [0.0, np.nan]])
+    value, variance, innovation, _, weight = kalman(z, (0, 0))
+    assert value[1, 0] == value[0, 0]
+    assert variance[1, 0] == pytest.approx(variance[0, 0] + 0.006)
+    assert np.isnan(innovation[1, 0])
+    assert weight[1, 0] == 0
+
+
+# --- repaired by a window -----------------------------------------------------------------------------------------
+
+
+def walk(z, kind=channels.WALK, threshold=5.0, noise=1.0, gained=1.0, time=TIME, angular=False):
+    z = np.asarray(z, float)
+    return channels.repaired_walk(time[: len(z)], z, kind, threshold, noise, gained, 1.0, angular)
+
+
+@pytest.mark.parametrize("run", [1, 5, 16])
+@pytest.mark.parametrize("kind", [channels.WALK, channels.RELIABLE, channels.RELIABLE_LITERAL])
+def test_repaired_value_of_a_line_is_exact_for_up_to_sixteen_in_a_row(run, kind):
+    z = 300 + 0.5 * TIME
+    truth = z.copy()
+    z[28 : 28 + run] = 1500
+    *_, weight, repaired = walk(z, kind, threshold=300)
+    np.testing.assert_allclose(repaired, truth, atol=1e-9)
+    np.testing.assert_array_equal(np.flatnonzero(weight == 0), np.arange(28, 28 + run))
+
+
+def test_seventeenth_in_a_row_begins_anew():
+    z = 300 + 0.5 * TIME
+    z[28:50] = 1500
+    *_, weight, repaired = walk(z, threshold=300)
+    assert not weight[28:44].any()
+    assert weight[44] == 1
+    assert repaired[44] == 1500
+
+
+def test_weights_of_the_ten_point_extrapolation():
+    expected = [-0.2, -0.133, -0.067, 0, 0.067, 0.133, 0.2, 0.267, 0.333, 0.4]
+    for i, weight in enumerate(expected):
+        *_, repaired = walk(np.append(np.eye(10)[i], np.nan), threshold=5)
+        assert repaired[10] == pytest.approx(weight, abs=1e-3)
+
+
+def test_literal_reliable_filter_gives_back_its_input():
+    z = 300 + np.cumsum(RNG.standard_normal(60))
+    value, *_ = walk(z, channels.RELIABLE_LITERAL, threshold=50)
+    np.testing.assert_array_equal(value, z)
+
+
+def test_regularised_reliable_filter_smooths_but_less_than_it_follows():
+    truth = 377.8 - 15 * np.cos(0.083 * TIME)
+    z = truth + 3 * RNG.standard_normal(60)
+    value, *_ = walk(z, channels.RELIABLE, threshold=50, noise=9.0)
+    error, raw = (np.sqrt(np.mean((v - truth)[10:] ** 2)) for v in (value, z))
+    assert error < 0.95 * raw
+    assert np.sqrt(np.mean((value - z) ** 2)) < 1.5
+
+
+def test_walk_is_the_scalar_kalman_filter():
+    time = np.cumsum(RNG.uniform(0.5, 2, 60))
+    z = np.cumsum(RNG.standard_normal(60))
+    value, variance, innovation, sigma, _, _ = walk(z, threshold=1e3, noise=2.0, gained=0.7, time=time)
+    x, p = z[0], 2.0
+    p = p * 2 / (p + 2)
+    for k in range(1, 60):
+        p += 0.7 * (time[k] - time[k - 1])
+        assert innovation[k] == pytest.approx(z[k] - x)
+        assert sigma[k] == pytest.approx(np.sqrt(p + 2))
+        gain = p / (p + 2)
+        x, p = x + gain * (z[k] - x), (1 - gain) * p
+        assert (value[k], variance[k]) == pytest.approx((x, p))
+
+
+def test_missing_readings_are_repaired_until_they_are_too_many():
+    z = 10 + 2 * TIME
+    truth = z.copy()
+    z[20:50] = np.nan
+    *_, weight, repaired = walk(z, threshold=50)
+    np.testing.assert_allclose(repaired[20:36], truth[20:36], atol=1e-9)
+    assert np.isnan(repaired[36:50]).all()
+    assert weight[50] == 1
+    assert repaired[50] == truth[50]
+
+
+def test_walk_follows_an_azimuth_across_the_cut():
+    turning = 3.0 + 0.02 * TIME
+    value, *_ = walk((turning + np.pi) % (2 * np.pi) - np.pi, threshold=0.5, noise=1e-6, gained=1e-3, angular=True)
+    np.testing.assert_allclose(value, turning, atol=2e-3)

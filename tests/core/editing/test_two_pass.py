@@ -1,0 +1,185 @@
+"""Two-pass editing on simulated flights whose outliers are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.core.editing import decisions, reassessment, two_pass
+from ftproc.core.filtering.initialization import first_state
+from tests.core.tracks import matched, position_error
+from tests.simulated import codes, deviation, simulate
+
+UNKNOWN = np.full(3, np.nan)
+
+
+def edit(flight, gate=4.0):
+    return two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN, None, gate)
+
+
+def flags(flight, edited):
+    """(n, 3) rejected readings, tampered readings off by 8 sigmas and more, good readings."""
+    seen = np.isfinite(flight.log.measurement)
+    bad = codes(flight) > 0
+    large = bad & seen & (np.abs(deviation(flight)) >= 8 * np.array(flight.sigma))
+    return seen & (edited.weight == 0), large, seen & ~bad
+
+
+def inside(flight, edited):
+    """Share of samples whose position lies within 3 of its sigmas along every axis."""
+    error = np.abs(edited.smoothed.state[:, :3] - flight.truth.position_m)
+    return (error < 3 * edited.smoothed.sigma[:, :3]).all(1).mean()
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("scenario", ["manoeuvre-clean", "calibration"])
+def test_clean_flight_is_left_alone(scenario, seed):
+    flight = simulate(scenario, seed=seed, duration_s=60.0)
+    edited = edit(flight)
+    assert (edited.weight == 0).mean() < 0.001
+    np.testing.assert_allclose(np.sqrt(edited.model.noise_variance), flight.sigma, rtol=0.1)
+    assert edited.settled
+    assert inside(flight, edited) > 0.95
+
+
+DIRT = {
+    "isolated": "isolated=0.05:8-300",
+    "a fifth": "isolated=0.2:8-300",
+    "patches": "isolated=0.01:8-200,offset=2:4-25:8-100,ramp=1:6-25:30-200",
+    "all at once": "all.offset=2:5-20:10-100",
+    "stuck and burst": "stuck=1:5-20,burst=1:5-20:20-100",
+    "bad start": "start=6:15-300",
+    "heavy tails": "isolated=0.03:8-200,tails=8",
+    "irregular": "isolated=0.03:8-200,jitter=0.3,duplicates=10,gap=2:3-8,nan=0.05,nanrun=2:4-20",
+}
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("dirt", DIRT)
+def test_outliers_of_8_sigmas_are_found(dirt, seed):
+    flight = simulate("cruise", seed=seed, duration_s=100.0, outliers=DIRT[dirt])
+    edited = edit(flight)
+    rejected, large, good = flags(flight, edited)
+    assert large.sum() > 15
+    assert rejected[large].mean() >= (0.9 if dirt == "stuck and burst" else 0.98)
+    assert rejected[good].mean() < 0.01
+    np.testing.assert_allclose(np.sqrt(edited.model.noise_variance), flight.sigma, rtol=0.1)
+    assert inside(flight, edited) > 0.9
+
+
+@pytest.mark.parametrize("scenario", ["overhead", "radar"])
+def test_other_flights(scenario):
+    flight = simulate(scenario, seed=1)
+    rejected, large, good = flags(flight, edited := edit(flight))
+    assert rejected[large].mean() > 0.98
+    assert rejected[good].mean() < 0.005
+    assert inside(flight, edited) > 0.93
+
+
+def test_rounded_readings_are_kept():
+    flight = simulate("cruise", seed=1, duration_s=60.0, outliers="range.round=2m,azimuth.round=0.2mrad")
+    rejected, _, good = flags(flight, edited := edit(flight))
+    assert rejected[good].mean() < 0.002
+    assert edited.settled
+
+
+def test_gate_decides_how_much_is_kept():
+    flight = simulate("cruise", seed=2, duration_s=100.0, outliers="isolated=0.1:3-8")
+    kept = [edit(flight, gate).weight.sum() for gate in (4.0, 5.0, 6.0)]
+    assert kept[0] < kept[1] <= kept[2]
+
+
+def test_narrow_gate_keeps_less_than_the_usual_one():
+    flight = simulate("cruise", seed=2, duration_s=100.0, outliers="isolated=0.1:3-8")
+    assert edit(flight, 3.0).weight.sum() < edit(flight, 4.0).weight.sum()
+
+
+def test_given_noise_and_jerk_are_kept():
+    flight = simulate("cruise", seed=3, duration_s=60.0)
+    given = np.array([7.0, np.nan, 4e-4])
+    edited = two_pass.edit(flight.log.time_s, flight.log.measurement, given, 12.0, 4.0)
+    np.testing.assert_allclose(edited.model.noise_variance[[0, 2]], given[[0, 2]] ** 2)
+    np.testing.assert_allclose(edited.model.jerk, [[12.0, 0, 0, 12.0, 0, 12.0]])
+    assert edited.model.noise_variance[1] != pytest.approx(12.0)
+
+
+def test_component_that_agrees_nowhere_is_named():
+    a = matched(1, 50)
+    a.z[:, 1] = np.nan
+    with pytest.raises(ValueError, match=r"^1$"):
+        two_pass.edit(a.time, a.z, UNKNOWN, None, 4.0)
+
+
+def test_missing_readings_have_no_weight_and_decisions_are_all_or_nothing():
+    flight = simulate("manoeuvre", seed=0, duration_s=40.0)
+    edited = edit(flight)
+    assert not edited.weight[~np.isfinite(flight.log.measurement)].any()
+    assert set(np.unique(edited.weight)) <= {0.0, 1.0}
+    assert edited.rounds <= decisions.MAX_ROUNDS
+
+
+def test_smoothed_start_is_the_head_with_a_wider_covariance():
+    flight = simulate("cruise", seed=4, duration_s=30.0)
+    edited = edit(flight)
+    (start,), (head,) = two_pass.smoothed_starts(edited.smoothed), edited.smoothed.heads
+    assert start.sample == head.sample
+    np.testing.assert_array_equal(start.state, head.state)
+    np.testing.assert_allclose(start.covariance, two_pass.START_INFLATION * head.covariance)
+    assert np.linalg.eigvalsh(start.covariance[:3, :3]).min() > 0
+
+
+def test_screening_trusts_most_of_a_clean_log_and_tells_its_noise():
+    a = matched(2, 600, q=1e-2)
+    weight, sigma = two_pass.screen(a.time, a.z)
+    assert weight.mean() > 0.95
+    np.testing.assert_allclose(sigma**2, a.model.noise_variance, rtol=0.6)
+
+
+def test_first_state_from_the_edited_log_is_near_the_truth():
+    flight = simulate("cruise", seed=5, duration_s=30.0, outliers="start=6:15-300")
+    edited = edit(flight)
+    start = first_state(
+        flight.log.time_s, flight.log.measurement, edited.weight, edited.model.noise_variance, 0, 0, 200
+    )  # fmt: skip
+    error = position_error(start.state[None], flight.truth.position_m[:1])[0]
+    assert error < 3 * np.sqrt(np.trace(start.covariance[:3, :3]))
+
+
+def test_second_look_finds_the_patch_that_made_the_jerk_jump(monkeypatch):
+    """A ramp in elevation at the very beginning; without the second look it passes for a manoeuvre."""
+    spec = "isolated=0.03:6-300,offset=2:8-30:8-200,ramp=1:10-30:20-200,burst=1:8-20:10-100,nan=0.01,gap=1:2-4"
+    flight = simulate("manoeuvre", seed=7, duration_s=75.0, outliers=spec)
+
+    def rms():
+        error = edit(flight).smoothed.state[:, :3] - flight.truth.position_m
+        return np.sqrt((error**2).sum(1).mean())
+
+    looked_twice = rms()
+    monkeypatch.setattr(two_pass, "look_again", lambda record, decision: decision)
+    assert looked_twice < 0.7
+    assert rms() > 3 * looked_twice
+
+
+def test_long_log_is_looked_at_again_in_spans_only(monkeypatch):
+    """The same outliers are found as with all of it looked at, though hardly any of it is."""
+    spec = "isolated=0.03:6-300,range.patch=12:15-40:4-7"
+    flight = simulate("manoeuvre", seed=5, duration_s=500.0, outliers=spec)
+    assert len(flight.log) > reassessment.SHORT_LOG
+    spans = []
+    whole = reassessment._look_until_settled
+
+    def spy(record, decision, profile):
+        spans.append(len(record.time_s))
+        return whole(record, decision, profile)
+
+    monkeypatch.setattr(reassessment, "_look_until_settled", spy)
+    in_spans = edit(flight)
+    assert 0 < sum(spans) < len(flight.log)
+    assert max(spans) <= 1.5 * reassessment.LONGEST_SPAN
+    monkeypatch.setattr(reassessment, "SHORT_LOG", 10**6)
+    monkeypatch.setattr(reassessment, "MOST", 0.0)
+    entire = edit(flight)
+    assert (in_spans.weight != entire.weight).mean() < 0.002
+    rejected, large, good = flags(flight, in_spans)
+    assert rejected[large].mean() > 0.98
+    assert rejected[good].mean() < 0.002

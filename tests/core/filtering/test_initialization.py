@@ -1,0 +1,222 @@
+"""The first state from the first readings that agree with each other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.core.editing import two_pass
+from ftproc.core.filtering.initialization import begin, begin_all, first_state
+from ftproc.core.model.frames import from_cartesian, wrap
+from tests.core.tracks import SIGMA, matched
+from tests.simulated import simulate
+
+NOISE = SIGMA**2
+
+
+def straight(n=60, dt=0.1, position=(3000.0, -2000.0, 900.0), velocity=(-120.0, 60.0, 15.0), noise=0.0, seed=0):
+    """time, readings and true states (n, 6) of a straight flight."""
+    time = dt * np.arange(n)
+    p = np.array(position) + time[:, None] * np.array(velocity)
+    z = from_cartesian(p) + noise * SIGMA * np.random.default_rng(seed).standard_normal((n, 3))
+    z[:, 1] = wrap(z[:, 1])
+    return time, z, np.hstack([p, np.tile(velocity, (n, 1))])
+
+
+def seen(z):
+    return np.isfinite(z).astype(float)
+
+
+def inside(start, truth, sigmas=1.0):
+    """Whether the start holds the true position and velocity (6,) within so many of its own sigmas."""
+    return (np.abs(start.state[:6] - truth) <= sigmas * np.sqrt(np.diag(start.covariance))[:6]).all()
+
+
+@pytest.mark.parametrize(
+    ("position", "velocity"),
+    [
+        ((3000.0, -2000.0, 900.0), (-120.0, 60.0, 15.0)),
+        ((-4000.0, 3.0, 500.0), (10.0, -80.0, 0.0)),
+        ((2e4, 2e4, 300.0), (0.0, 0.0, 0.0)),
+        ((0.0, -6000.0, -50.0), (250.0, 0.0, 20.0)),
+    ],
+)
+def test_straight_lines_are_recovered(position, velocity):
+    time, z, truth = straight(position=position, velocity=velocity)
+    start = begin(time, z, seen(z), NOISE)
+    assert start.sample == 0
+    assert not start.state[6:].any()
+    slant = np.linalg.norm(position)
+    np.testing.assert_allclose(start.state[:3], position, atol=2e-3 * slant)
+    np.testing.assert_allclose(start.state[3:6], velocity, atol=0.05 * np.linalg.norm(velocity) + 1)
+    assert inside(start, truth[0])
+
+
+def test_near_overhead_the_sigmas_hold_the_truth():
+    time, z, truth = straight(position=(500.0, 0.0, 8000.0), velocity=(100.0, 200.0, 0.0))
+    assert inside(begin(time, z, seen(z), NOISE), truth[0])
+
+
+def test_sigmas_hold_the_truth_of_noisy_and_curved_flights():
+    held = [
+        inside(begin(*straight(noise=1.0, seed=s)[:2], np.ones((60, 3)), NOISE), straight()[2][0]) for s in range(50)
+    ]
+    assert all(held)
+    for seed in range(20):
+        a = matched(seed, 60, q=100.0)
+        assert inside(begin(a.time, a.z, a.weight, NOISE), a.truth[0, :6])
+
+
+def test_covariance_is_positive_definite_and_symmetric():
+    time, z, _ = straight(noise=1.0)
+    p = begin(time, z, seen(z), NOISE).covariance
+    np.testing.assert_allclose(p, p.T, rtol=1e-12, atol=1e-9)
+    assert np.linalg.eigvalsh(p).min() > 0
+
+
+def test_wrong_first_samples_are_reached_back_over():
+    time, z, truth = straight(noise=1.0)
+    z[:8] += 500 * SIGMA
+    weight = seen(z)
+    weight[:8] = 0.0
+    start = begin(time, z, weight, NOISE)
+    assert start.sample == 0
+    assert inside(start, truth[0])
+
+
+def test_far_reach_back_is_not_made():
+    """When a component is first seen after more than 3 s, the filter begins there."""
+    time, z, truth = straight(n=120)
+    weight = seen(z)
+    weight[:50, 2] = 0.0
+    start = begin(time, z, weight, NOISE)
+    assert start.sample == 50
+    assert inside(start, truth[50])
+
+
+def test_components_need_not_come_at_the_same_instants():
+    time, z, truth = straight(n=90, noise=1.0)
+    for c in range(3):
+        z[np.arange(90) % 3 != c, c] = np.nan
+    start = begin(time, z, seen(z), NOISE)
+    assert inside(start, truth[start.sample])
+    np.testing.assert_allclose(start.state[3:6], truth[0, 3:], atol=15)
+
+
+def test_single_sample():
+    z = from_cartesian(np.array([[3000.0, 400.0, 500.0]]))
+    start = begin(np.zeros(1), z, np.ones((1, 3)), NOISE)
+    np.testing.assert_allclose(start.state[:3], [3000, 400, 500], rtol=1e-12)
+    assert not start.state[3:].any()
+    assert np.sqrt(np.diag(start.covariance))[3:6].min() >= 1000.0  # nothing is known of the velocity
+    assert np.linalg.eigvalsh(start.covariance).min() > 0
+
+
+def test_two_samples_and_one_instant():
+    time, z, truth = straight(n=2, dt=1.0)
+    start = begin(time, z, np.ones((2, 3)), NOISE)
+    assert inside(start, truth[0])
+    np.testing.assert_allclose(start.state[3:6], truth[0, 3:], rtol=0.05, atol=2)
+    same = begin(np.zeros(2), z[[0, 0]], np.ones((2, 3)), NOISE)
+    assert np.isfinite(same.covariance).all()
+
+
+def test_azimuth_across_the_cut():
+    time, z, truth = straight(position=(-5000.0, 10.0, 400.0), velocity=(0.0, -100.0, 0.0))
+    assert np.ptp(z[:15, 1]) > 6
+    start = begin(time, z, seen(z), NOISE)
+    assert inside(start, truth[0])
+    np.testing.assert_allclose(start.state[3:6], truth[0, 3:], atol=2)
+
+
+@pytest.mark.parametrize("component", range(3))
+def test_component_without_a_good_reading_is_named(component):
+    time, z, _ = straight()
+    weight = seen(z)
+    weight[:, component] = 0.0
+    with pytest.raises(ValueError, match=rf"^{component}$"):
+        begin(time, z, weight, NOISE)
+    with pytest.raises(ValueError, match=rf"^{component}$"):
+        first_state(time, z, weight, NOISE, 10, 0, 20)
+
+
+def test_first_state_uses_its_span_only():
+    time, z, truth = straight(n=100)
+    spoiled = z.copy()
+    spoiled[:40] += 1.0
+    spoiled[60:] -= 1.0
+    one = first_state(time, z, seen(z), NOISE, 50, 40, 60)
+    other = first_state(time, spoiled, seen(z), NOISE, 50, 40, 60)
+    np.testing.assert_array_equal(one.state, other.state)
+    assert one.sample == 50
+    assert inside(one, truth[50])
+
+
+def test_position_is_never_so_vague_that_it_may_lie_behind_the_station():
+    z = from_cartesian(np.array([[40.0, 30.0, 10.0]]))
+    start = begin(np.zeros(1), z, np.ones((1, 3)), np.array([1e4, 1.0, 1.0]))
+    assert np.sqrt(np.linalg.eigvalsh(start.covariance[:3, :3]).max()) < 0.5 * 51
+
+
+def interrupted(gap, n=80, after=60):
+    """A straight flight with a gap of so many seconds after n samples."""
+    time = 0.1 * np.arange(n + after)
+    time[n:] += gap
+    p = np.array([6000.0, -2000.0, 900.0]) + time[:, None] * np.array([-60.0, 30.0, 0.0])
+    z = from_cartesian(p) + SIGMA * np.random.default_rng(3).standard_normal((n + after, 3))
+    z[:, 1] = wrap(z[:, 1])
+    return time, z, np.hstack([p, np.tile([-60.0, 30.0, 0.0], (n + after, 1))])
+
+
+@pytest.mark.parametrize(
+    ("gap", "jerk", "anew"),
+    [(0.0, None, False), (4.0, None, False), (30.0, None, True), (30.0, 1e-3, False), (30.0, 10.0, True),
+     (300.0, 1e-3, True)],
+)  # fmt: skip
+def test_record_begins_anew_after_a_gap_too_long_to_bridge(gap, jerk, anew):
+    """The position is vague by sqrt(q gap^5 / 20); without a jerk level every gap of more than 5 s counts."""
+    time, z, truth = interrupted(gap)
+    starts = begin_all(time, z, seen(z), NOISE, jerk)
+    assert [start.sample for start in starts] == ([0, 80] if anew else [0])
+    for start in starts:
+        assert inside(start, truth[start.sample])
+
+
+def test_too_few_readings_after_a_gap_are_no_start():
+    time, z, _ = interrupted(300.0, after=5)
+    assert len(begin_all(time, z, seen(z), NOISE, None)) == 1
+    time, z, _ = interrupted(300.0)
+    z[84:, 1] = np.nan
+    assert len(begin_all(time, z, seen(z), NOISE, None)) == 1
+
+
+def test_start_after_a_gap_rests_on_its_own_side_only():
+    time, z, _ = interrupted(300.0)
+    spoiled = z.copy()
+    spoiled[:80] += 0.05
+    one, other = (begin_all(time, readings, seen(z), NOISE, None)[1] for readings in (z, spoiled))
+    np.testing.assert_array_equal(one.state, other.state)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "jerk", "anew"), [(4.0, None, False), (20.0, None, True), (20.0, 1e-3, False), (20.0, 100.0, True)]
+)
+@pytest.mark.parametrize("component", range(3))
+def test_record_begins_anew_after_one_component_was_blind_too_long(component, seconds, jerk, anew):
+    """The others hold the track, so the gap may be longer; a filter that comes out of it would be lost."""
+    time, z, truth = interrupted(0.1, n=300, after=100)
+    z[300 - round(seconds / 0.1) : 300, component] = np.nan
+    starts = begin_all(time, z, seen(z), NOISE, jerk)
+    assert [start.sample for start in starts] == ([0, 300] if anew else [0])
+    for start in starts:
+        assert inside(start, truth[start.sample])
+
+
+def test_flight_with_blind_turns_does_not_run_away():
+    """5 g turns seen once a second with patches of half a minute: the patches cannot be bridged, the rest can."""
+    flight = simulate("manoeuvre", seed=15, dt_s=1.0, duration_s=600.0, outliers="patch=3:10-30:10-50")
+    log = flight.log
+    edited = two_pass.edit(log.time_s, log.measurement, np.full(3, np.nan), None, 4.0)
+    error = np.linalg.norm(edited.smoothed.state[:, :3] - flight.truth.position_m, axis=1)
+    assert np.median(error) < 5
+    assert np.quantile(error, 0.9) < 500

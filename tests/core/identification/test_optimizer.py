@@ -1,0 +1,101 @@
+"""The minimiser on functions whose minimum is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.core.identification.optimizer import minimise
+
+FREE = 1e9
+
+
+def solve(function, theta, curvature=None, lower=-FREE, upper=FREE, steps=200, tolerance=1e-14):
+    theta = np.array(theta, float)
+    bounds = np.broadcast_to(lower, theta.shape).astype(float), np.broadcast_to(upper, theta.shape).astype(float)
+    return minimise(
+        function, theta, np.ones_like(theta) if curvature is None else curvature, *bounds, steps, tolerance
+    )  # fmt: skip
+
+
+def quadratic(scale, target):
+    return lambda x: (float(0.5 * scale @ (x - target) ** 2), scale * (x - target))
+
+
+def rosenbrock(x):
+    value = np.sum(100 * (x[1:] - x[:-1] ** 2) ** 2 + (1 - x[:-1]) ** 2)
+    gradient = np.zeros_like(x)
+    gradient[:-1] = -400 * x[:-1] * (x[1:] - x[:-1] ** 2) - 2 * (1 - x[:-1])
+    gradient[1:] += 200 * (x[1:] - x[:-1] ** 2)
+    return float(value), gradient
+
+
+@pytest.mark.parametrize("n", [1, 2, 10, 100])
+def test_quadratic(n):
+    rng = np.random.default_rng(n)
+    target, scale = rng.normal(0, 3, n), 10 ** rng.uniform(-1, 2, n)
+    np.testing.assert_allclose(solve(quadratic(scale, target), np.zeros(n)), target, atol=1e-3)
+
+
+def test_quadratic_with_its_own_curvature_takes_few_steps():
+    target, scale = np.array([0.3, -1.0, 0.7]), np.array([1.0, 1e3, 1e6])
+    np.testing.assert_allclose(
+        solve(quadratic(scale, target), np.zeros(3), curvature=scale, steps=2), target, atol=1e-12
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("begin", [(-1.2, 1.0), (0.0, 0.0), (2.0, -1.0)])
+def test_rosenbrock(begin):
+    np.testing.assert_allclose(solve(rosenbrock, begin), 1.0, atol=1e-5)
+
+
+def test_rosenbrock_in_ten_dimensions():
+    np.testing.assert_allclose(solve(rosenbrock, np.zeros(10), steps=500), 1.0, atol=1e-4)
+
+
+def test_bounds_are_respected_and_reached():
+    tried = []
+
+    def cost(x):
+        tried.append(x.copy())
+        return quadratic(np.array([1.0, 2.0, 3.0]), np.array([5.0, -5.0, 0.5]))(x)
+
+    found = solve(cost, np.zeros(3), lower=-1.7, upper=2.6)
+    np.testing.assert_allclose(found, [2.6, -1.7, 0.5], atol=1e-9)
+    assert np.min(tried) >= -1.7
+    assert np.max(tried) <= 2.6
+
+
+def test_fixed_parameter_stays():
+    found = solve(rosenbrock, (0.5, 0.0), lower=np.array([0.5, -9]), upper=np.array([0.5, 9]))
+    np.testing.assert_allclose(found, [0.5, 0.25], atol=1e-6)
+
+
+def test_leaves_a_bound_it_begins_at():
+    found = solve(quadratic(np.ones(2), np.array([0.5, 2.0])), np.array([0.0, 1.0]), lower=0.0, upper=1.0)
+    np.testing.assert_allclose(found, [0.5, 1.0], atol=1e-9)
+
+
+def test_never_ends_higher_than_it_began():
+    def cliff(x):
+        """Rises steeply beyond 1 and is not a number beyond 2."""
+        value = float(np.exp(8 * x[0]) - 2 * x[0]) if x[0] < 2 else np.nan
+        return value, np.array([8 * np.exp(8 * x[0]) - 2])
+
+    found = solve(cliff, [-3.0])
+    assert found[0] == pytest.approx(np.log(0.25) / 8, abs=1e-4)
+
+
+def test_tolerance_and_steps_stop_it():
+    calls = []
+
+    def cost(x):
+        calls.append(1)
+        return rosenbrock(x)
+
+    solve(cost, (-1.2, 1.0), steps=3)
+    assert 4 <= len(calls) <= 40
+    calls.clear()
+    begin = np.array([1.001, 1.002])
+    np.testing.assert_array_equal(solve(cost, begin, tolerance=1e3), begin)
+    assert len(calls) == 1

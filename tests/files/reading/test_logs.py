@@ -1,0 +1,230 @@
+"""What a log becomes when there is nothing to complain about."""
+
+import io
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from ftproc.files.reading import logs
+from ftproc.files.writing import flights
+from ftproc.records import MeasurementLog
+from tests.files.conftest import Make
+
+HEADER = "time_s,range_m,azimuth_rad,elevation_rad\n"
+NAN = math.nan
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+small_angle = st.floats(-1.5, 1.5)
+
+
+@st.composite
+def some_logs(draw: st.DrawFn) -> MeasurementLog:
+    n = draw(st.integers(1, 30))
+    time = np.sort(draw(hnp.arrays(np.float64, n, elements=finite)))
+    measurement = np.column_stack(
+        [
+            draw(hnp.arrays(np.float64, n, elements=st.one_of(finite, st.just(NAN)))),
+            draw(hnp.arrays(np.float64, (n, 2), elements=st.one_of(small_angle, st.just(NAN)))),
+        ]
+    )
+    measurement[draw(st.integers(0, n - 1)), draw(st.integers(0, 2))] = 0.25
+    return MeasurementLog("a", time, measurement, np.arange(n))
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".csv.gz", ".parquet", ".feather"])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=40)
+@given(log=some_logs())
+def test_every_bit_comes_back(tmp_path: Path, suffix: str, log: MeasurementLog) -> None:
+    path = tmp_path / f"log{suffix}"
+    flights.write_log(log, path)
+    back = logs.read(path)
+    assert back.time_s.tobytes() == log.time_s.tobytes()
+    assert np.array_equal(back.measurement, log.measurement, equal_nan=True)
+    assert np.array_equal(np.signbit(back.measurement), np.signbit(log.measurement) & ~np.isnan(log.measurement))
+    assert back.row.tolist() == list(range(len(log)))
+    assert (back.name, back.rows_in_file, back.frame) == (str(path), len(log), "local")
+
+
+@settings(deadline=None, max_examples=60)
+@given(data=st.data(), n=st.integers(1, 40))
+def test_a_permutation_of_the_rows_changes_only_their_numbers(data: st.DataObject, n: int) -> None:
+    time = np.arange(n) * 0.05
+    table = pa.table({"time_s": time, "range_m": np.arange(n) + 100.0, "azimuth_rad": np.sin(time)})
+    order = np.array(data.draw(st.permutations(range(n))))
+    straight, mixed = logs.read(table), logs.read(table.take(order))
+    assert np.array_equal(mixed.time_s, straight.time_s)
+    assert np.array_equal(mixed.measurement, straight.measurement, equal_nan=True)
+    assert np.array_equal(order[mixed.row], straight.row)
+    late = sum(1 for place in range(n) if order[place] < max(order[: place + 1]))
+    assert (straight.rows_out_of_order, mixed.rows_out_of_order) == (0, late)
+
+
+def test_rows_are_sorted_stably_counted_and_numbered(make: Make) -> None:
+    log = logs.read(make(HEADER + "2,20,0,0\n1,10,0,0\n,99,0,0\n1,11,0,0\n3,30,0,0\nNaN,98,0,0\n1,12,0,0\n"))
+    assert log.time_s.tolist() == [1, 1, 1, 2, 3]
+    assert log.measurement[:, 0].tolist() == [10, 11, 12, 20, 30]
+    assert log.row.tolist() == [1, 3, 6, 0, 4]
+    assert log.row.dtype == np.int64
+    assert log.rows_without_time == (2, 5)
+    assert (log.rows_in_file, log.rows_out_of_order, log.duplicate_times) == (7, 3, 2)
+
+
+def test_many_equal_times_keep_the_order_of_the_file() -> None:
+    time = np.tile([2.0, 1.0, 3.0], 1000)  # long enough for a sort that is not stable to show it
+    log = logs.read(pa.table({"time_s": time, "range_m": np.arange(3000.0)}))
+    assert log.row.tolist() == [*range(1, 3000, 3), *range(0, 3000, 3), *range(2, 3000, 3)]
+    assert log.measurement[:, 0].tolist() == log.row.tolist()
+
+
+@pytest.mark.parametrize("word", ["", " ", "NaN", "nan", "NA", "N/A", "null", "NULL", "None", "-nan", " NaN "])
+def test_words_for_a_missing_reading(make: Make, word: str) -> None:
+    log = logs.read(make(f"{HEADER}0,1,{word},0.5\n1,{word},1.5,0.5\n"))
+    assert np.array_equal(log.measurement, [[1, NAN, 0.5], [NAN, 1.5, 0.5]], equal_nan=True)
+
+
+def test_nan_never_becomes_zero_nor_a_zero_nan(make: Make) -> None:
+    log = logs.read(make(HEADER + "0,0,,0\n1,,0,\n"))
+    assert np.array_equal(log.measurement, [[0, NAN, 0], [NAN, 0, NAN]], equal_nan=True)
+
+
+def test_an_absent_column_is_missing_throughout(make: Make) -> None:
+    log = logs.read(make("time_s,elevation_rad,azimuth_rad\n0,0.5,1\n"))
+    assert np.array_equal(log.measurement, [[NAN, 1, 0.5]], equal_nan=True)
+
+
+def test_wild_readings_stay_for_the_editing_to_judge(make: Make) -> None:
+    log = logs.read(make(HEADER + "0,-5,1,0.1\n1,0,99,0.1\n2,1e12,1,-7\n"))
+    assert log.measurement.tolist() == [[-5, 1, 0.1], [0, 99, 0.1], [1e12, 1, -7]]
+
+
+def test_units_by_suffix_and_by_option(make: Make) -> None:
+    expected = [[1852.0, math.pi / 2, math.pi / 4]]
+    log = logs.read(make("time_ms,range_nmi,az_deg,el_grad\n1500,1,90,50\n"))
+    assert log.time_s.tolist() == [1.5]
+    np.testing.assert_allclose(log.measurement, expected, rtol=1e-15)
+    path = make("T0,RNG,A,E\n1500000,1.852,1600,45\n")
+    log = logs.read(path, units="time=us,range=km,azimuth=mil,elevation=deg", columns="time=T0,range=RNG")
+    assert log.time_s.tolist() == [1.5]
+    np.testing.assert_allclose(log.measurement, expected, rtol=1e-15)
+
+
+def test_azimuth_from_north_names_the_axes_and_leaves_the_angle(make: Make) -> None:
+    path = make(HEADER + "0,1,0.25,0.5\n")
+    assert logs.read(path).frame == "local"
+    log = logs.read(path, azimuth_from="north")
+    assert (log.frame, log.measurement[0, 1]) == ("north-east-up", 0.25)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\ufefft,R,A,E\r\n0.5,1000.25,1,0.5\r\n\r\n1,2e3,,0.25\r\n",
+        "\r\nt , R, A ,E\r0.5,+1000.25,1, 0.5\r1.0, 2000 ,,.25",
+        '"t","R","A","E"\n"0.5","1000.25","1","0.5"\n1,2000,"",0.25\n',
+        "t\tR\tA\tE\n0.5\t1000.25\t1\t0.5\n1\t2000\t\t0.25\n",
+        "t;R;A;E\n0.5;1000.25;1;0.5\n1;2000;;0.25\n",
+        "t;R;A;E\n0,5;1000,25;1;0,5\n1;2000;;0,25\n",
+        "t;R;A;E\n0,5;1000,25;1;0.5\n1;2000;;0.25\n",
+    ],
+)
+def test_csv_of_other_hands_is_read_where_there_is_no_doubt(make: Make, text: str) -> None:
+    log = logs.read(make(text))
+    assert log.time_s.tolist() == [0.5, 1.0]
+    assert np.array_equal(log.measurement, [[1000.25, 1, 0.5], [2000, NAN, 0.25]], equal_nan=True)
+
+
+@pytest.mark.parametrize("zone", ["", "Z", "+00:00"])
+@pytest.mark.parametrize("between", ["T", " "])
+def test_timestamps_count_from_the_midnight_before_the_earliest(make: Make, zone: str, between: str) -> None:
+    moments = [f"2024-06-01{between}00:00:01.5", f"2024-05-31{between}23:59:59.123456", f"2024-06-01{between}12:00:00"]
+    log = logs.read(make("time,R\n" + "".join(f"{moment}{zone},1\n" for moment in moments) + ",1\n"))
+    assert log.time_s.tolist() == [86399.123456, 86401.5, 129600.0]
+    assert (log.row.tolist(), log.rows_without_time) == ([1, 0, 2], (3,))
+
+
+@pytest.mark.parametrize("moment", ["20240531T010000.25Z", "2024-05-31T03:00:00,25+02:00", "2024-05-31 01:00:00,250"])
+def test_other_ways_to_write_iso_8601(make: Make, moment: str) -> None:
+    assert logs.read(make(f"time;R\n{moment};1\n;2\n")).time_s.tolist() == [3600.25]
+
+
+@given(st.lists(st.integers(0, 7 * 86400 * 10**6), min_size=1, max_size=20))
+@settings(deadline=None)
+def test_timestamps_keep_microseconds_for_a_week(ticks: list[int]) -> None:
+    day = 19874 * 86400 * 10**6
+    first = min(ticks) // (86400 * 10**6) * 86400 * 10**6
+    for unit in ("us", "ns"):
+        column = pa.array([day + tick for tick in ticks], pa.timestamp("us")).cast(pa.timestamp(unit, "UTC"))
+        log = logs.read(pa.table({"time": column, "R": [1.0] * len(ticks)}))
+        assert log.time_s.tolist() == sorted((tick - first) / 10**6 for tick in ticks)
+
+
+def test_parquet_types_of_other_hands(tmp_path: Path) -> None:
+    table = pa.table(
+        {
+            "time": pa.array([0, 1500, None], pa.duration("ms")),
+            "R": pa.array([1, None, 3], pa.int16()),
+            "A": pa.array([0.5, 1.5, None], pa.float32()),
+            "E": pa.array(["0.25", " null ", "1e-1"]).dictionary_encode(),
+        }
+    )
+    pq.write_table(table, tmp_path / "log.PARQUET")
+    log = logs.read(tmp_path / "log.PARQUET")
+    assert log.time_s.tolist() == [0, 1.5]
+    assert np.array_equal(log.measurement, [[1, 0.5, 0.25], [NAN, 1.5, NAN]], equal_nan=True)
+    assert log.rows_without_time == (2,)
+
+
+def test_a_data_frame_and_a_table_are_logs_too() -> None:
+    frame = pd.DataFrame({"t": [1, 0, 2], "R": [1.0, None, 3.0], 7: ["a", "b", "c"]}, index=[9, 9, 9])
+    for source in (frame, pa.table({"t": [1, 0, 2], "R": [1.0, None, 3.0]})):
+        log = logs.read(source)
+        assert log.name == "<table>"
+        assert log.row.tolist() == [1, 0, 2]
+        assert np.array_equal(log.measurement[:, 0], [NAN, 1, 3], equal_nan=True)
+    moments = pd.DataFrame({"time": pd.to_datetime(["2024-05-31T01:00:00.25", "NaT"]), "R": ["5", "6"]})
+    assert logs.read(moments).time_s.tolist() == [3600.25]
+
+
+def test_standard_input_is_csv_gzipped_or_not(make: Make, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    log = logs.read(make(HEADER + "0,1,1,1\n"))
+    flights.write_log(log, tmp_path / "log.csv.gz")
+    for path in (tmp_path / "log.csv", tmp_path / "log.csv.gz"):
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(path.read_bytes())))
+        read = logs.read("-")
+        assert (read.name, read.measurement.tolist()) == ("<stdin>", [[1, 1, 1]])
+
+
+def test_other_columns_are_ignored_or_kept_row_for_row(make: Make) -> None:
+    path = make("note,time_s,snr,range_m,R,empty\nc,2,3,30,x,\na,1,1,10,y,\nz,,0,0,y,\n")
+    assert logs.read(path).extra is None
+    log = logs.read(path, keep_columns=True)
+    assert log.extra is not None
+    assert log.extra.to_pydict() == {"note": ["a", "c"], "snr": [1, 3], "R": ["y", "x"], "empty": [None, None]}
+    assert logs.read(make(HEADER + "0,1,1,1\n"), keep_columns=True).extra is None
+
+
+def test_an_ignored_column_may_hold_anything(make: Make) -> None:
+    log = logs.read(make(b't,R,note\n0,1,\xf6\n1,2,5" gun\n2,3,"a, b"\n'))
+    assert log.measurement[:, 0].tolist() == [1, 2, 3]
+
+
+def test_kept_columns_are_written_behind_the_canonical_ones(make: Make, tmp_path: Path) -> None:
+    log = logs.read(make("t,R,note\n0,1.5,a\n"), keep_columns=True)
+    flights.write_log(log, tmp_path / "out.csv")
+    assert (tmp_path / "out.csv").read_text() == HEADER.strip() + ',note\n0,1.5,,,"a"\n'
+
+
+def test_the_arrays_may_be_written_to(make: Make) -> None:
+    log = logs.read(make(HEADER + "0,1,1,1\n1,1,1,1\n"))
+    assert log.time_s.flags.writeable
+    assert log.measurement.flags.writeable
+    assert log.measurement.flags.c_contiguous

@@ -1,0 +1,120 @@
+"""Truths: round trip, order, and what is wrong with one."""
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from ftproc.errors import InputError
+from ftproc.files.reading import truth
+from ftproc.files.writing import flights
+from ftproc.records import Truth
+from tests.files.conftest import Make
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@st.composite
+def some_truths(draw: st.DrawFn) -> Truth:
+    n = draw(st.integers(1, 20))
+    vectors = hnp.arrays(np.float64, (n, 3), elements=finite)
+    return Truth(
+        "a",
+        np.sort(draw(hnp.arrays(np.float64, n, elements=finite))),
+        draw(vectors),
+        draw(st.none() | vectors),
+        draw(st.none() | vectors),
+        draw(st.none() | hnp.arrays(np.uint8, (n, 3), elements=st.integers(0, 3))),
+    )
+
+
+def assert_same(one: np.ndarray | None, other: np.ndarray | None) -> None:
+    assert (one is None) == (other is None)
+    if one is not None and other is not None:
+        assert (one.shape, one.dtype, one.tobytes()) == (other.shape, other.dtype, other.tobytes())
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".csv.gz", ".parquet", ".feather"])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=30)
+@given(original=some_truths())
+def test_every_bit_comes_back(tmp_path: Path, suffix: str, original: Truth) -> None:
+    path = tmp_path / f"truth{suffix}"
+    flights.write_truth(original, path)
+    back = truth.read(path)
+    assert back.name == str(path)
+    for name in ("time_s", "position_m", "velocity_mps", "acceleration_mps2", "outlier"):
+        assert_same(getattr(back, name), getattr(original, name))
+
+
+def test_the_columns_are_named_as_promised(tmp_path: Path) -> None:
+    three = np.ones((1, 3))
+    flights.write_truth(Truth("a", np.zeros(1), three, three, three, np.ones((1, 3), np.uint8)), tmp_path / "t.csv")
+    assert (tmp_path / "t.csv").read_text() == (
+        "time_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,ax_mps2,ay_mps2,az_mps2,outlier_range,outlier_azimuth,"
+        "outlier_elevation\n0,1,1,1,1,1,1,1,1,1,1,1,1\n"
+    )
+
+
+def test_rows_are_put_in_time_order_and_other_columns_ignored(make: Make) -> None:
+    read = truth.read(make("note,z_m,y_m,x_m,time_s,outlier_azimuth\na,3,2,1,5,1\nb,6,5,4,0,\nc,9,8,7,5,2\n"))
+    assert read.time_s.tolist() == [0, 5, 5]
+    assert read.position_m.tolist() == [[4, 5, 6], [1, 2, 3], [7, 8, 9]]
+    assert read.velocity_mps is None
+    assert read.acceleration_mps2 is None
+    assert read.outlier is not None
+    assert read.outlier.tolist() == [[0, 0, 0], [0, 1, 0], [0, 2, 0]]
+
+
+def test_many_equal_times_keep_the_order_of_the_file() -> None:
+    position = np.arange(3000.0)
+    table = pa.table({"time_s": np.tile([2.0, 1.0, 3.0], 1000), "x_m": position, "y_m": position, "z_m": position})
+    expected = [*range(1, 3000, 3), *range(0, 3000, 3), *range(2, 3000, 3)]
+    assert truth.read(table).position_m[:, 0].tolist() == expected
+
+
+def test_timestamps_count_as_in_a_log_of_the_same_day(make: Make) -> None:
+    assert truth.read(make("time_s,x_m,y_m,z_m\n2024-05-31T01:00:00Z,1,2,3\n")).time_s.tolist() == [3600]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            "time_s,x_m,y_m,Z_M\n0,1,2,3\n",
+            'no column "z_m"; did you mean "Z_M"? Its columns are: time_s, x_m, y_m, Z_M. Rename the right',
+        ),
+        ("time,x_m,y_m,z_m\n0,1,2,3\n", 'there is no column "time_s"; did you mean "time"?'),
+        ("time_s,x_m,y_m,z_m,vx_mps\n0,1,2,3,4\n", 'there is no column "vy_mps"'),
+        ("time_s,x_m,y_m,z_m,z_m\n0,1,2,3,4\n", 'column "z_m" is there twice; rename or delete all but one.'),
+        (
+            "time_s,x_m,y_m,z_m\n0,1,2,3\n1,2,,3\n",
+            'row 1 (the first data row is 0), column "y_m": the value is missing. Fill it in',
+        ),
+        ("time_s,x_m,y_m,z_m\n0,1,2,3\n,2,2,3\n", 'column "time_s": the value is missing'),
+        (
+            "time_s,x_m,y_m,z_m\n0,1,2,q\n",
+            'row 0 (the first data row is 0), column "z_m": "q" is not a number; expected a number. Correct the cell.',
+        ),
+        ("time_s,x_m,y_m,z_m\n0,1,2,inf\n", '"inf" is not finite'),
+        ("time_s,x_m,y_m,z_m\n", "there are column names but no rows."),
+        (
+            "time_s,x_m,y_m,z_m,outlier_range\n0,1,2,3,0.5\n",
+            'column "outlier_range": "0.5" is not a flag; expected a whole number from 0 to 255.',
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_truth_is_said(make: Make, text: str, expected: str) -> None:
+    path = make(text)
+    with pytest.raises(InputError) as caught:
+        truth.read(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert expected in str(caught.value)
+
+
+def test_a_truth_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="there is no such file"):
+        truth.read(tmp_path / "none.csv")

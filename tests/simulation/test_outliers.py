@@ -1,0 +1,153 @@
+"""What is injected into a simulated log is what was asked for, and what the truth says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.core.model.frames import from_cartesian, wrap
+from ftproc.simulation import Fault, OutlierSpec, simulate
+from ftproc.simulation.sampling import kept_rows, sample_times, with_duplicates
+from ftproc.simulation.tamper import tamper
+from tests.simulated import codes, deviation, runs
+
+
+@pytest.mark.parametrize(
+    ("spec", "code"),
+    [
+        ("isolated=0.1:20-200", 1),
+        ("offset=3:4-30:8-60", 2),
+        ("ramp=3:4-30:8-60", 3),
+        ("stuck=3:4-30", 4),
+        ("burst=3:4-30:8-60", 5),
+        ("start=6:50", 6),
+        ("zero=0.05", 7),
+        ("all.offset=2", 2),
+        ("all.isolated=0.1", 1),
+    ],
+)
+def test_flags_match_what_was_injected(spec: str, code: int) -> None:
+    flight = simulate("manoeuvre", seed=4, outliers=spec)
+    flag, off = codes(flight), deviation(flight)
+    assert set(np.unique(flag)) == {0, code}
+    assert (off[flag == 0] == 0).all()
+    changed = off != 0
+    assert changed[flag != 0].mean() > 0.99  # the first reading after a stuck start may be equal
+    if spec.startswith("all."):
+        assert ((flag != 0).all(axis=1) == (flag != 0).any(axis=1)).all()
+    else:
+        assert ((flag != 0).all(axis=1) != (flag != 0).any(axis=1)).any() or code == 6
+
+
+@pytest.mark.parametrize("kind", ["offset", "ramp", "stuck", "burst"])
+def test_patches_have_the_length_number_and_shape_said(kind: str) -> None:
+    size = "" if kind == "stuck" else ":8-60"
+    flight = simulate("manoeuvre", seed=6, outliers=f"{kind}=5:4-30{size}")
+    flag, off = codes(flight), deviation(flight)
+    for c, sigma in enumerate(flight.sigma):
+        patches = runs(flag[:, c])
+        assert len(patches) == 5
+        for patch in patches:
+            length = patch.stop - patch.start
+            assert 4 <= length <= 30
+            error = off[patch, c] / sigma
+            if kind == "offset":
+                np.testing.assert_allclose(error, error[0], rtol=1e-6)
+                assert 8 <= abs(error[0]) <= 60
+            elif kind == "ramp":
+                np.testing.assert_allclose(error, error[-1] * np.arange(1, length + 1) / length, atol=1e-6)
+                assert 8 <= abs(error[-1]) <= 60
+            elif kind == "stuck":
+                np.testing.assert_array_equal(flight.log.measurement[patch, c], flight.untampered[patch.start - 1, c])
+            else:
+                assert np.abs(error).max() > 4
+
+
+def test_start_zero_nan_and_rounding() -> None:
+    flight = simulate("manoeuvre", seed=6, outliers="start=6:50,range.zero=0.1,nanrun=2:10,range.round=0.5m")
+    reading, flag, off = flight.log.measurement, codes(flight), deviation(flight)
+    assert (flag[:6] == 6).all()
+    np.testing.assert_allclose(np.abs(off[:6, 1] / flight.sigma[1]), 50, rtol=1e-6)
+    zero = (flag[:, 0] == 7) & ~np.isnan(reading[:, 0])
+    assert zero.sum() > 100
+    assert (reading[zero, 0] == 0).all()
+    assert not (flag[:, 1:] == 7).any()
+    lengths = [run.stop - run.start for run in runs(np.isnan(reading[:, 2]).astype(float))]
+    assert sum(lengths) in range(10, 21)
+    good = (flag[:, 0] == 0) & ~np.isnan(reading[:, 0])
+    np.testing.assert_allclose(reading[good, 0] % 0.5, 0)
+
+
+def test_absolute_sizes() -> None:
+    flight = simulate("manoeuvre", seed=1, outliers="range.isolated=0.2:20-40m,azimuth.isolated=0.2:3mrad")
+    off, hit = np.abs(deviation(flight)), codes(flight) == 1
+    assert ((off[hit[:, 0], 0] >= 20) & (off[hit[:, 0], 0] <= 40)).all()
+    np.testing.assert_allclose(off[hit[:, 1], 1], 3e-3, rtol=1e-6)
+    assert not hit[:, 2].any()
+
+
+def test_sizes_are_log_uniform_with_either_sign() -> None:
+    reading, code = tamper(
+        np.zeros((40000, 3)), (Fault("isolated", rate=0.5, size=(10.0, 1000.0)),), np.ones(3),
+        np.random.default_rng(0),
+    )  # fmt: skip
+    size = reading[code == 1]
+    assert np.mean(size > 0) == pytest.approx(0.5, abs=0.01)
+    assert np.median(np.abs(size)) == pytest.approx(100.0, rel=0.03)
+    assert np.mean(code[:, 0] == 1) == pytest.approx(0.5, abs=0.012)
+
+
+def test_patches_keep_clear_of_each_other_and_what_does_not_fit_is_left_out() -> None:
+    flight = simulate("zuo2021", seed=1, outliers="offset=30:5:10")
+    for c in range(3):
+        patches = runs(codes(flight)[:, c])
+        assert 3 <= len(patches) < 30
+        assert {patch.stop - patch.start for patch in patches} == {5}
+        assert patches[0].start >= 1
+    assert not codes(simulate("zuo2021", duration_s=3.0, outliers="offset=3:40:10")).any()
+
+
+def test_gap_removes_rows_from_log_and_truth() -> None:
+    whole = simulate("manoeuvre", seed=9, outliers="isolated=0.05")
+    flight = simulate("manoeuvre", seed=9, outliers="isolated=0.05,gap=1:5")
+    step = np.diff(flight.log.time_s)
+    assert (step > 0.06).sum() == 1
+    assert step.max() == pytest.approx(5.0, abs=0.101)
+    rows = np.searchsorted(whole.log.time_s, flight.log.time_s)
+    np.testing.assert_array_equal(whole.log.measurement[rows], flight.log.measurement)
+    np.testing.assert_array_equal(codes(whole)[rows], codes(flight))
+
+
+def test_gap_that_does_not_fit_is_left_out() -> None:
+    spec = OutlierSpec(gaps=((3, (100.0, 200.0)),))
+    assert kept_rows(np.arange(61.0), spec, np.random.default_rng(0)).all()
+
+
+def test_duplicates_are_copies_or_second_good_readings() -> None:
+    flight = simulate("manoeuvre", seed=9, outliers="isolated=0.3:50-100,duplicates=400")
+    log, flag = flight.log, codes(flight)
+    second = np.flatnonzero(np.diff(log.time_s) == 0) + 1
+    assert len(second) == log.duplicate_times == 400
+    copy = (log.measurement[second] == log.measurement[second - 1]).all(axis=1)
+    assert 150 < copy.sum() < 250
+    np.testing.assert_array_equal(flag[second[copy]], flag[second[copy] - 1])
+    assert not flag[second[~copy]].any()
+    error = log.measurement[second[~copy]] - from_cartesian(flight.truth.position_m[second[~copy]])
+    error[:, 1] = wrap(error[:, 1])
+    assert (np.abs(error) < 5 * np.array(flight.sigma)).all()
+
+
+def test_with_duplicates_never_asks_for_more_rows_than_there_are() -> None:
+    rows, fresh = with_duplicates(4, 9, np.random.default_rng(0))
+    np.testing.assert_array_equal(rows, [0, 0, 1, 1, 2, 2, 3, 3])
+    assert not fresh[::2].any()
+
+
+def test_jitter_keeps_order_and_ends() -> None:
+    time = sample_times(1000.0, 1.0, 0.45, np.random.default_rng(0))
+    assert (np.diff(time) > 0).all()
+    off = time - np.arange(1001)
+    assert np.abs(off).max() <= 0.45
+    assert off.std() == pytest.approx(0.9 / 12**0.5, rel=0.1)
+    assert time[0] >= 0
+    assert time[-1] <= 1000

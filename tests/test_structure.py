@@ -1,0 +1,125 @@
+"""The plan of the house: which room may call which, how large rooms and files may be, and that each says who lives
+there. Imports are read, not made, so that those inside functions count too."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parent.parent / "ftproc"
+MOST_FILES, MOST_LINES = 14, 300
+
+#: The rooms from the ground up: each may call itself and those before it, no other.
+FLOORS = (
+    ("errors", "settings"),
+    ("records", "__init__"),
+    ("core.compiled", "core.threads"),
+    ("core.model",),
+    ("core.filtering",),
+    ("core.identification",),
+    ("core.editing",),
+    ("core.comparators",),
+    ("files", "simulation"),
+    ("files.reading", "files.writing"),
+    ("scoring",),
+    ("methods", "correction"),
+    ("correction.training",),
+    ("quality",),
+    ("pipeline",),
+    ("config", "report"),
+    ("batch",),
+    ("api",),
+    ("cli",),
+    ("__main__",),
+)
+
+
+def modules() -> list[str]:
+    paths = (path.relative_to(PACKAGE).with_suffix("") for path in PACKAGE.rglob("*.py"))
+    return [".".join(p.parts[:-1] if p.name == "__init__" and len(p.parts) > 1 else p.parts) for p in paths]
+
+
+def source(module: str) -> Path:
+    path = PACKAGE / Path(*module.split("."))
+    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+
+
+def imported(text: str, known: set[str]) -> Iterator[str]:
+    """Modules of the package that a module imports anywhere; names of a type checker only do not count."""
+    tree = ast.parse(text)
+    for branch in [n for n in ast.walk(tree) if isinstance(n, ast.If) and "TYPE_CHECKING" in ast.unparse(n.test)]:
+        branch.body = [ast.Pass()]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (a.name.removeprefix("ftproc.") for a in node.names if a.name.startswith("ftproc."))
+        elif isinstance(node, ast.ImportFrom) and node.module is not None and node.module.split(".")[0] == "ftproc":
+            assert node.level == 0
+            inside = node.module.removeprefix("ftproc").removeprefix(".")
+            for alias in node.names:
+                full = f"{inside}.{alias.name}".removeprefix(".")
+                yield full if full in known else inside or "__init__"
+        else:
+            assert not (isinstance(node, ast.ImportFrom) and node.level), "imports are absolute"
+
+
+def floor(module: str) -> int:
+    """The floor of the innermost room that a module is in."""
+    rooms = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
+    found = [room for room in rooms if module == room or module.startswith(f"{room}.")]
+    assert found, f"ftproc.{module} is in no room of FLOORS"
+    return rooms[max(found, key=len)]
+
+
+def room(module: str) -> str:
+    rooms = [room for rooms in FLOORS for room in rooms if module == room or module.startswith(f"{room}.")]
+    return max(rooms, key=len)
+
+
+def wrong(module: str, text: str, known: set[str]) -> list[str]:
+    """The arrows of a module that go up, or to a neighbour's room on the same floor."""
+    return [
+        other
+        for other in imported(text, known)
+        if floor(other) > floor(module) or (floor(other) == floor(module) and room(other) != room(module))
+    ]
+
+
+@pytest.mark.parametrize("module", [m for m in modules() if m not in ("__init__", "core")])
+def test_no_arrow_goes_up(module: str) -> None:
+    found = wrong(module, source(module).read_text(), set(modules()))
+    assert not found, f"ftproc.{module} imports {found}"
+
+
+def test_an_arrow_turned_round_is_seen() -> None:
+    known = set(modules())
+    assert wrong("core.model.motion", "def f():\n    from ftproc.core.filtering import ukf\n", known)
+    assert wrong("records", "from ftproc import report\n", known)
+    assert wrong("files.writing.maps", "from ftproc.files.reading import tables\n", known)
+    assert not wrong("cli.filter", "from ftproc.core.model import motion\n", known)
+
+
+def test_no_circle() -> None:
+    known = set(modules())
+    arrows = {m: {o for o in imported(source(m).read_text(), known) if o != m} for m in known}
+    arrows["__init__"] = set()  # loads api when it is asked for a name
+    while ends := {m for m, others in arrows.items() if not others & set(arrows)}:
+        for m in ends:
+            del arrows[m]
+    assert not arrows, f"these import each other: {sorted(arrows)}"
+
+
+def test_rooms_and_files_have_a_size_that_can_be_seen_at_once() -> None:
+    for folder in {path.parent for path in PACKAGE.rglob("*.py")}:
+        files = [path.name for path in folder.iterdir() if path.is_file()]
+        assert len(files) <= MOST_FILES, f"{folder} holds {len(files)} files"
+    for path in [*PACKAGE.rglob("*.py"), *Path(__file__).parent.rglob("*.py")]:
+        assert len(path.read_text().splitlines()) <= MOST_LINES + 100 * ("tests" in path.parts), path
+
+
+def test_every_room_says_who_lives_there() -> None:
+    for path in PACKAGE.rglob("__init__.py"):
+        told = ast.get_docstring(ast.parse(path.read_text()))
+        assert told, f"{path} says nothing"
