@@ -1,5 +1,5 @@
-"""The errors a user may see. Every message names the file, the row and the column where there is one, says what
-was expected, and how to cure it."""
+"""The errors that a user may see. Every message names the file, row and column where there is one, what was expected,
+and the cure."""
 
 from __future__ import annotations
 
@@ -9,37 +9,37 @@ from dataclasses import dataclass
 
 
 def printable(text: str) -> str:
-    """`text` with control characters, and bytes of file names that are no UTF-8, written out as `\\x1b`.
+    """`text` with control characters, and bytes of file names that are not UTF-8, escaped as `\\x1b`.
 
-    Names come from files that others made: they must not move the cursor, change colours or reverse the line.
+    Names come from foreign files: they must not move the cursor, change colours or reverse the line.
     """
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
-_BEGINNING, _END = 700, 400  # letters of a sentence that are shown when it has more
-_LONGEST_NAME = 200  # in such a sentence; an escaped control character counts as four or more
+_HEAD, _TAIL = 700, 400  # characters that are shown of a longer sentence
+_MAX_NAME = 200  # characters of a name in such a sentence; an escaped one counts as four or more
 
 
 def _shortened(sentence: str) -> str:
-    """At most 1105 letters. A name in a file may be as long as the file: it loses its middle before anything else does,
-    for where it is, what is wrong and the cure stand around it."""
-    if len(sentence) <= _BEGINNING + _END:
+    """At most 1105 characters. A name may be as long as its file: its middle is cut first, because the place, the fault
+    and the cure stand around it."""
+    if len(sentence) <= _HEAD + _TAIL:
         return sentence
     sentence = re.sub(r'"[^"]+"|\S+', _clipped, sentence)
-    if len(sentence) <= _BEGINNING + _END:
+    if len(sentence) <= _HEAD + _TAIL:
         return sentence
-    return f"{sentence[:_BEGINNING]} ... {sentence[-_END:]}"
+    return f"{sentence[:_HEAD]} ... {sentence[-_TAIL:]}"
 
 
 def _clipped(name: re.Match[str]) -> str:
-    half = _LONGEST_NAME // 2
-    return name[0] if len(name[0]) <= _LONGEST_NAME else f"{name[0][:half]}...{name[0][-half:]}"
+    half = _MAX_NAME // 2
+    return name[0] if len(name[0]) <= _MAX_NAME else f"{name[0][:half]}...{name[0][-half:]}"
 
 
 class FtprocError(Exception):
-    """Root of all errors that carry a plain sentence for the user.
+    """Base of all errors with a message for the user.
 
-    `exit_code` is what the command line returns: 1 for input that cannot be processed.
+    `exit_code` is that of the command line: 1 for input that cannot be processed.
     """
 
     exit_code = 1
@@ -49,7 +49,7 @@ class FtprocError(Exception):
 
 
 class FtprocWarning(UserWarning):
-    """Something the user should know that does not stop the work."""
+    """A remark for the user that does not stop the work."""
 
 
 class InputError(FtprocError):
@@ -57,11 +57,11 @@ class InputError(FtprocError):
 
 
 class ModelError(InputError):
-    """A file is not a correction model, or is one made for something else."""
+    """A file is not a correction model, or is a model for another method or other features."""
 
 
 class OutputError(FtprocError):
-    """A result cannot be written where it was asked for."""
+    """A result cannot be written to its target."""
 
 
 class UsageError(FtprocError):
@@ -71,9 +71,9 @@ class UsageError(FtprocError):
 
 
 def nearest(word: str, known: Iterable[str], alike: float = 0.6) -> str:
-    """`; did you mean "..."?` for the known word most like `word`, or an empty string when none is.
+    """`; did you mean "..."?` for the known word most similar to `word`, or an empty string.
 
-    alike: the least likeness (difflib's ratio) that counts.
+    alike: the smallest similarity (difflib's ratio) that counts.
     """
     import difflib
 
@@ -82,11 +82,20 @@ def nearest(word: str, known: Iterable[str], alike: float = 0.6) -> str:
     return f'; did you mean "{by_lower[close[0]]}"?' if close else ""
 
 
-def interruption(error: BaseException) -> BaseException | None:
-    """The KeyboardInterrupt or SystemExit that an error stands for, if it does.
+def row_named(row: int) -> str:
+    """A row of a file for messages, by the 0-based number that the `row` column of a trajectory has."""
+    return f"row {row} (the first data row is 0)"
 
-    A signal that arrives while a compiled kernel hands back its result comes out of it as a SystemError, which names
-    the interruption as its cause.
+
+def first_line(error: Exception) -> str:
+    """What an error of another library says, short enough for a sentence; its kind if it says nothing."""
+    return str(error).splitlines()[0][:200] if str(error) else type(error).__name__
+
+
+def interruption(error: BaseException) -> BaseException | None:
+    """The KeyboardInterrupt or SystemExit that an error is or is caused by, or None.
+
+    A signal that arrives while a compiled kernel returns is raised as a SystemError with the interruption as its cause.
     """
     cause: BaseException | None = error
     while isinstance(cause, Exception):
@@ -96,7 +105,7 @@ def interruption(error: BaseException) -> BaseException | None:
 
 @dataclass(frozen=True)
 class Failure:
-    """Why something was not done: a sentence for the user, the exit code it deserves, and the traceback."""
+    """Why something was not done: a message for the user, the exit code, and the traceback."""
 
     message: str
     exit_code: int
@@ -104,11 +113,11 @@ class Failure:
 
 
 def failure(error: BaseException, source: str | None = None) -> Failure:
-    """An error in a plain sentence or two, naming `source` where the error does not do so itself."""
+    """The message for any error; it names `source` unless the error names it."""
     import traceback
 
     if isinstance(error, MemoryError):
-        traceback.clear_frames(error.__traceback__)  # what filled the memory, or the next log would find no room either
+        traceback.clear_frames(error.__traceback__)  # frees the memory for the next log
     trace = "".join(traceback.format_exception(error))
     about = f"{source}: " if source else ""
     if isinstance(error, FtprocError):

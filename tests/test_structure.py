@@ -97,7 +97,7 @@ def test_an_arrow_turned_round_is_seen() -> None:
     known = set(modules())
     assert wrong("core.model.motion", "def f():\n    from ftproc.core.filtering import ukf\n", known)
     assert wrong("records", "from ftproc import report\n", known)
-    assert wrong("files.writing.maps", "from ftproc.files.reading import tables\n", known)
+    assert wrong("files.writing.maps", "from ftproc.files.reading import logs\n", known)
     assert not wrong("cli.filter", "from ftproc.core.model import motion\n", known)
 
 

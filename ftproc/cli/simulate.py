@@ -65,7 +65,7 @@ def command(
     truth: str | None,
 ) -> None:
     """Make a log as dirty as a real one, with its truth."""
-    from ftproc.files.units import parse_units
+    from ftproc.files.options import parse_units
     from ftproc.files.writing import flights
     from ftproc.simulation import simulate
 

@@ -10,8 +10,7 @@ from click.core import ParameterSource
 from ftproc.config import reading, writing
 from ftproc.config.recipe import Recipe
 from ftproc.errors import UsageError
-from ftproc.files.reading.schema import parse_columns
-from ftproc.files.units import parse_units
+from ftproc.files.options import parse_columns, parse_units
 from ftproc.methods import registry
 
 ALL = "all"  # --method all

@@ -1,4 +1,4 @@
-"""A station file in: TOML, every key checked -> options by the names that the command line has for them."""
+"""A station file in: TOML, every key checked -> options by their names on the command line."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 
 from ftproc.config.keys import KEYS, Key, every
 from ftproc.errors import UsageError, nearest
-from ftproc.files.reading.tables import is_ordinary
+from ftproc.files.reading.formats.content import is_ordinary
 from ftproc.files.units import UNITS
+from ftproc.settings import NO_MODEL, PACKAGED
 
-#: What a file without any key amounts to, for the options that consist of parts.
+#: Options that consist of three parts -> the value of a part that the file does not set.
 _NO_PARTS = {"site": None, "noise": None, "bias": 0.0}
-_LARGEST = 1 << 16  # bytes; a station file with every key has 4000
-_LONGEST_LINE = 5000  # bytes; the time that a name with dots takes goes with the square of their number
-_WORDS_FOR_MODELS = ("packaged", "none")
+_MAX_SIZE = 1 << 16  # bytes; a station file with every key has 4000
+_MAX_LINE = 5000  # bytes; parsing takes time by the square of the number of dots in a name
 
 
 def load(path: str | Path) -> dict[str, Any]:
@@ -32,7 +32,7 @@ def load(path: str | Path) -> dict[str, Any]:
         reason = (error.strerror or str(error)).lower()
         raise UsageError(f"{path}: cannot be read ({reason}); name a station file.") from error
     options = parse(text, str(path))
-    if options.get("model", "none") not in _WORDS_FOR_MODELS:
+    if options.get("model", NO_MODEL) not in (PACKAGED, NO_MODEL):
         options["model"] = str(Path(path).parent / options["model"])
     return options
 
@@ -41,11 +41,11 @@ def _bytes(path: Path) -> bytes:
     if not is_ordinary(path):
         raise UsageError(f"{path}: not an ordinary file (a pipe or a device); name a station file.")
     with path.open("rb") as stream:
-        content = stream.read(_LARGEST + 1)
-    if len(content) > _LARGEST:
+        content = stream.read(_MAX_SIZE + 1)
+    if len(content) > _MAX_SIZE:
         raise UsageError(f"{path}: far too large for a station file; ftproc filter --write-config prints one.")
     for number, line in enumerate(content.splitlines(), 1):
-        if len(line) > _LONGEST_LINE:
+        if len(line) > _MAX_LINE:
             raise UsageError(f"{path}: line {number} is far too long for a station file; delete or split it.")
     return content
 
@@ -59,12 +59,12 @@ def parse(text: str, name: str) -> dict[str, Any]:
     except ValueError as error:  # also of numbers with thousands of digits
         raise UsageError(f"{name}: this is not TOML: {error}. Correct it there.") from error
     except RecursionError as error:
-        raise UsageError(f"{name}: this is not TOML of any use: it nests too deeply. Delete what does.") from error
+        raise UsageError(f"{name}: this TOML nests too deeply. Delete the nested part.") from error
     values: dict[tuple[str, str], Any] = {}
     for section, keys in found.items():
         _check_section(name, section, keys)
         for written, value in keys.items():
-            key_name, to_si = _known(name, section, written)
+            key_name, to_si = _key_of(name, section, written)
             if (section, key_name) in values:
                 raise UsageError(f"{name}: [{section}] has {key_name} in two units; leave one out.")
             values[section, key_name] = _checked(name, section, written, KEYS[section][key_name], value, to_si)
@@ -85,8 +85,8 @@ def _check_section(name: str, section: str, keys: object) -> None:
     raise UsageError(f'{name}: there is no {kind} "{section}"{hint} The sections: {sections}.')
 
 
-def _known(name: str, section: str, written: str) -> tuple[str, Callable[[Any], Any]]:
-    """The key that is written so, and what brings its value to SI."""
+def _key_of(name: str, section: str, written: str) -> tuple[str, Callable[[Any], Any]]:
+    """The name of the key, and the function that converts its value to SI."""
     keys = KEYS[section]
     stem, _, unit = written.rpartition("_")
     if written in keys and not keys[written].quantity:

@@ -172,7 +172,7 @@ def save(model: Model, path: Path | str) -> None:
 
 def load(path: Path | str) -> Model:
     """Read a model. Raises ModelError, in a sentence, for whatever is not one."""
-    from ftproc.files.reading.tables import is_ordinary
+    from ftproc.files.reading.formats.content import is_ordinary
 
     try:
         if not is_ordinary(Path(path)):

@@ -1,4 +1,4 @@
-"""numpy <-> Arrow by their buffers. pyarrow's own conversions load pandas, which takes longer than a small log."""
+"""numpy <-> Arrow by their buffers. pyarrow's own conversions import pandas, which takes longer than a small log."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def to_numpy(column: pa.ChunkedArray) -> FloatArray:
-    """(n,) float64 of a float64 column, NaN where missing; shares memory with a column of one chunk without gaps."""
+    """(n,) float64 of a float64 column, NaN where missing; shares the memory of one chunk without missing values."""
     parts = [_chunk(chunk) for chunk in column.chunks if len(chunk)]
     if len(parts) == 1:
         return parts[0]
@@ -24,15 +24,15 @@ def to_numpy(column: pa.ChunkedArray) -> FloatArray:
 
 def _chunk(chunk: pa.Array) -> FloatArray:
     validity, data = chunk.buffers()
-    place = slice(chunk.offset, chunk.offset + len(chunk))
-    values: FloatArray = np.frombuffer(data, np.float64, len(chunk), 8 * chunk.offset)  # a file's may be longer
+    rows = slice(chunk.offset, chunk.offset + len(chunk))
+    values: FloatArray = np.frombuffer(data, np.float64, len(chunk), 8 * chunk.offset)  # the buffer may be longer
     if not chunk.null_count:
         return values
-    present = np.unpackbits(np.frombuffer(validity, np.uint8), bitorder="little")[place]
+    present = np.unpackbits(np.frombuffer(validity, np.uint8), bitorder="little")[rows]
     return np.where(present == 1, values, np.nan)
 
 
-def from_numpy(values: NDArray[Any]) -> pa.Array:
+def _from_numpy(values: NDArray[Any]) -> pa.Array:
     """An Arrow array over the memory of a (n,) array of float64, int64 or uint8."""
     import pyarrow as pa
 
@@ -45,4 +45,4 @@ def table(columns: Mapping[str, NDArray[Any]]) -> pa.Table:
     """A table of named (n,) arrays."""
     import pyarrow as pa
 
-    return pa.Table.from_arrays([from_numpy(values) for values in columns.values()], names=list(columns))
+    return pa.Table.from_arrays([_from_numpy(values) for values in columns.values()], names=list(columns))

@@ -1,8 +1,8 @@
-"""The files that the program itself writes: names of columns, and kinds of file by what a name ends in."""
+"""The files that the program writes: names of columns, and kinds of file by the ending of the name."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from ftproc.files import remote
@@ -29,29 +29,30 @@ TRAJECTORY = ("row", "time_s", *MEASUREMENT, *STATE, *SIGMA, *OUTLIER, "nis", *C
 #: Key of the metadata in a Parquet file.
 METADATA_KEY = b"ftproc"
 
-#: What the names of tables and of maps may end in.
+#: Endings of the names of tables and of maps.
 TABLES = (".csv", ".csv.gz", ".parquet", ".feather")
 MAPS = (".kml", ".geojson", ".czml")
 
 
 def table_kind(name: Target) -> str | None:
-    """The one of TABLES that `name` ends in, whatever its case, or None."""
-    return _ending(name, TABLES)
+    """The one of TABLES that `name` ends in, in any case, or None."""
+    return ending(name, TABLES)
 
 
 def map_kind(name: Target) -> str | None:
-    """The one of MAPS that `name` ends in, whatever its case, or None."""
-    return _ending(name, MAPS)
+    """The one of MAPS that `name` ends in, in any case, or None."""
+    return ending(name, MAPS)
 
 
-def _ending(name: Target, kinds: tuple[str, ...]) -> str | None:
+def ending(name: Target, kinds: Iterable[str]) -> str | None:
+    """The one of `kinds`, such as `.csv`, that `name` ends in, in any case, or None."""
     file = Path(name).name.lower()
     return next((kind for kind in kinds if file.endswith(kind)), None)
 
 
 def sidecar(trajectory: Target) -> Target | None:
-    """Where the metadata of a trajectory stand: `out.json` for `out.csv`, `out.kml` and such; None for Parquet, Feather
-    and `-`, which need or have none."""
+    """The file of a trajectory's metadata: `out.json` for `out.csv`, `out.kml` and such; None for Parquet and Feather,
+    which hold their own, and for `-`."""
     kind = None if str(trajectory) == "-" else table_kind(trajectory) or map_kind(trajectory)
     if kind in (None, ".parquet", ".feather"):
         return None

@@ -1,6 +1,6 @@
-"""Files that a URI names, such as s3://bucket/flight.csv: on whatever storage pyarrow or fsspec can reach.
+"""Files named by a URI, such as s3://bucket/flight.csv, on any storage that pyarrow or fsspec supports.
 
-A file is fetched into a temporary one and read there; an output is written into one and stored when it is whole.
+An input is copied into a temporary file and read there; an output is written into one and stored when it is complete.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from pathlib import Path
 from typing import Any, BinaryIO, cast
 from urllib.parse import unquote, urlsplit
 
-from ftproc.errors import FtprocError, InputError, OutputError
+from ftproc.errors import FtprocError, InputError, OutputError, first_line
 
 _SCHEME = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
-_AT_ONCE = 16 << 20  # bytes
+_CHUNK = 16 << 20  # bytes
 
 
 def is_uri(name: object) -> bool:
-    """Whether a name is a URI, and no path."""
+    """Whether a name is a URI rather than a path."""
     return isinstance(name, str) and _SCHEME.match(name) is not None
 
 
 def local(name: object) -> Path | None:
-    """The path that a name means on this machine (also file:///...), or None when it is on another."""
+    """The path of a name on this machine (also of file:///...), or None if it is on another."""
     if not is_uri(name):
         return Path(cast(str, name))
     parts = urlsplit(str(name))
@@ -39,36 +39,36 @@ def within(directory: str, name: str) -> str:
 
 
 def fetch(uri: str, directory: Path) -> Path:
-    """A copy of the file in a directory of this machine. Raises InputError."""
-    with _plainly(uri, InputError):
+    """Copy the file into a directory of this machine. Raises InputError."""
+    with _as_error(uri, InputError):
         files, path = _files(uri, InputError)
         copy = directory / (Path(path).name or "log")
         with files.open_input_stream(path, compression=None) as source, copy.open("wb") as target:
-            shutil.copyfileobj(source, target, _AT_ONCE)
+            shutil.copyfileobj(source, target, _CHUNK)
         return copy
 
 
 @contextlib.contextmanager
 def storing(uri: str) -> Iterator[BinaryIO]:
-    """A binary stream whose content is stored when the block ends well, and only then. Raises OutputError."""
+    """A binary stream whose content is stored if the block succeeds. Raises OutputError."""
     with tempfile.TemporaryFile() as whole:
         yield cast(BinaryIO, whole)
         whole.seek(0)
-        with _plainly(uri, OutputError):
+        with _as_error(uri, OutputError):
             files, path = _files(uri, OutputError)
-            target = _begun(files, path)
+            target = _open_for_writing(files, path)
             try:
-                shutil.copyfileobj(whole, target, _AT_ONCE)
+                shutil.copyfileobj(whole, target, _CHUNK)
                 target.close()
-            except BaseException:  # what was begun cannot be called off, only taken away
+            except BaseException:  # a part that is stored can only be deleted
                 with contextlib.suppress(Exception):
                     target.close()
                     files.delete_file(path)
                 raise
 
 
-def _begun(files: Any, path: str) -> Any:
-    """The file, open for writing; storage with real directories may want that of the file to be made first."""
+def _open_for_writing(files: Any, path: str) -> Any:
+    """The open file; its directory is created where the storage has directories."""
     try:
         return files.open_output_stream(path, compression=None)
     except FileNotFoundError:
@@ -92,20 +92,22 @@ def _files(uri: str, error: type[FtprocError]) -> tuple[Any, str]:
 
         files, path = fsspec.core.url_to_fs(uri)
     except (ImportError, ValueError) as why:
-        raise error(f'{uri}: what "{scheme}" is, neither pyarrow nor fsspec knows here; pip install fsspec and what it '
-                    f"needs for {scheme}, or copy the file to this machine.") from why  # fmt: skip
+        raise error(
+            f'{uri}: neither pyarrow nor fsspec supports "{scheme}" here; pip install fsspec and its package for '
+            f"{scheme}, or copy the file to this machine."
+        ) from why
     return fs.PyFileSystem(fs.FSSpecHandler(files)), path
 
 
 @contextlib.contextmanager
-def _plainly(uri: str, error: type[FtprocError]) -> Iterator[None]:
+def _as_error(uri: str, error: type[FtprocError]) -> Iterator[None]:
+    """Any exception of the storage becomes an `error` that names the URI."""
     try:
         yield
     except FtprocError:
         raise
     except FileNotFoundError as why:
         raise error(f"{uri}: there is no such file or directory; check the name.") from why
-    except Exception as why:  # storage has errors of its own kinds
-        reason = str(why).splitlines()[0][:200] if str(why) else type(why).__name__
-        what = "read" if error is InputError else "written"
+    except Exception as why:  # each storage raises its own errors
+        what, reason = "read" if error is InputError else "written", first_line(why)
         raise error(f"{uri}: cannot be {what} ({reason}); check the name, the network and your permission.") from why

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ftproc.errors import InputError
-from ftproc.files.reading.csvtext import row_named
+from ftproc.errors import InputError, row_named
 from ftproc.records import FloatArray, IntArray, MeasurementLog, chunks, forget, thinned
 
 FARTHEST_M = 1e12  # half of all ranges beyond: a mistaken column or unit

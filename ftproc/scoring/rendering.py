@@ -10,7 +10,7 @@ from pathlib import PurePath
 from typing import Any
 
 from ftproc.errors import UsageError
-from ftproc.files.writing.tables import no_formula
+from ftproc.files.writing.csvtext import no_formula
 from ftproc.scoring import comparison
 from ftproc.scoring.figures import Score
 

@@ -71,8 +71,8 @@ def test_a_station_file_undoes_the_habits_of_its_instrument(run, other_world):
     result = run("filter", "odd.csv", "--config", "s.toml", *TUNED, "-o", "b.csv", "--summary", "none")
     assert (result.code, result.out) == (0, "")
     assert result.err.splitlines() == [
-        "ftproc: readings: range bias of 7.5 m taken off, azimuth bias of 0.785398 mrad taken off, -1000 s added to "
-        "the time, azimuth counted anticlockwise from north, turned round, azimuth zero at 30 deg from north, "
+        "ftproc: readings: range bias of 7.5 m subtracted, azimuth bias of 0.785398 mrad subtracted, -1000 s added to "
+        "the time, azimuth counted anticlockwise from north, reversed, azimuth zero at 30 deg from north, "
         "elevation from zenith angles",
         "ftproc: positions on the earth: x is north, y is east, z is up",
     ]

@@ -1,9 +1,12 @@
-"""Real files in a temporary directory, from text or bytes."""
+"""Real files in a temporary directory, from text or bytes; and what is said of a bad log."""
 
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+from ftproc.errors import InputError
+from ftproc.files.reading import logs
 
 Make = Callable[..., Path]
 
@@ -18,3 +21,13 @@ def make(tmp_path: Path) -> Make:
         return path
 
     return write
+
+
+def refused(path: object, **options: object) -> str:
+    """The message of the refused log, which names it and has one line."""
+    with pytest.raises(InputError) as caught:
+        logs.read(path, **options)  # type: ignore[arg-type]
+    sentence = str(caught.value)
+    assert sentence.startswith(f"{path}: " if isinstance(path, str | Path) else "<table>: ")
+    assert "\n" not in sentence
+    return sentence

@@ -1,4 +1,4 @@
-"""Units and their factors; the text of --units."""
+"""Units and their factors."""
 
 import math
 
@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ftproc.errors import UsageError, nearest
-from ftproc.files.units import QUANTITIES, UNITS, parse_units, si_unit
+from ftproc.files.units import QUANTITIES, UNITS, si_unit
 
 ONE_IN_SI = [
     ("time", "s", 1.0),
@@ -52,34 +51,3 @@ def test_a_turn_is_a_turn_in_every_unit() -> None:
     turns = {"deg": 360.0, "mil": 6400.0, "grad": 400.0, "gon": 400.0, "arcsec": 1_296_000.0, "mrad": 2000 * math.pi}
     for unit, turn in turns.items():
         assert UNITS["azimuth"][unit].to_si(np.array([turn]))[0] == pytest.approx(2 * math.pi, rel=1e-15)
-
-
-def test_units_from_text_and_from_a_mapping_are_the_same() -> None:
-    expected = {"range": "km", "azimuth": "deg", "time": "ms"}
-    assert parse_units("range=km,azimuth=deg,time=ms") == expected
-    assert parse_units(" R = km , Az=deg, t=ms,") == expected
-    assert parse_units({"range": "km", "az": "deg", "time": "ms"}) == expected
-    assert parse_units(None) == parse_units("") == {}
-
-
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ("range=yd", '--units: "yd" is not a unit of range; understood are m, km, ft, nmi, nm'),
-        ("azimuth=dge", 'understood are rad, deg, mrad, mil, grad, gon, mgon, arcsec; did you mean "deg"?'),
-        ("azimuth=m", '--units: "m" is not a unit of azimuth'),
-        ("azimut=deg", '"azimut" is not a quantity of a log; expected time, range, azimuth, elevation; did you mean'),
-        ("km", '--units: "km" is not QUANTITY=NAME, as in range=km,azimuth=deg'),
-        ("range=", '--units: "range=" is not QUANTITY=NAME'),
-        ("range=km,R=m", "--units names range twice"),
-    ],
-)
-def test_what_is_wrong_with_units_is_said(text: str, sentence: str) -> None:
-    with pytest.raises(UsageError) as caught:
-        parse_units(text)
-    assert sentence in str(caught.value)
-
-
-def test_nearest_ignores_case_and_keeps_quiet_when_nothing_is_near() -> None:
-    assert nearest("rng", ["TIME", "RNG_1"]) == '; did you mean "RNG_1"?'
-    assert nearest("range", ["x", "y"]) == ""

@@ -95,15 +95,15 @@ def test_whole_processes(name: str, tmp_path: Path) -> None:
 
 
 def test_standard_input_without_an_end(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    from ftproc.files.reading import tables
+    from ftproc.files.reading.formats import content, tables
 
     endless = tmp_path / "endless"
     endless.write_bytes(b"0,1\n" * 1000)
-    monkeypatch.setattr(tables, "MOST_ON_STDIN", 1000)
+    monkeypatch.setattr(content, "MAX_STDIN", 1000)
     with endless.open() as stream:
         monkeypatch.setattr(sys, "stdin", stream)
         with pytest.raises(InputError, match="without an end; give a Parquet file"):
-            tables.open_table("-")
+            tables.read_header("-")
 
 
 def _filter(directory: Path, args: list[str], preexec_fn: Callable[[], Any]) -> subprocess.CompletedProcess[str]:

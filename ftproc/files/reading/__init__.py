@@ -1,4 +1,4 @@
-"""Files in: formats, columns, units, clocks, up to a checked record; sentences for what is wrong.
+"""Files in: columns, units and times, up to a checked record; messages for what is wrong.
 
-`logs`, `truth` and `trajectories` are the doors. Calls `files`; nothing of `files.writing`.
+`logs`, `truth` and `trajectories` are the entries, `formats` opens the files. Calls `files`, not `files.writing`.
 """

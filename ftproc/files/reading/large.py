@@ -1,5 +1,4 @@
-"""Logs too large to be held in memory: read block by block into unnamed temporary files, of which stretches are mapped
-as they are needed."""
+"""Logs too large for the memory: read block by block into unnamed temporary files, which are mapped."""
 
 from __future__ import annotations
 
@@ -14,36 +13,41 @@ import numpy as np
 
 from ftproc.errors import InputError
 from ftproc.files import conventions
-from ftproc.files.reading.header import Blocks
+from ftproc.files.reading.formats.header import Blocks
 from ftproc.records import COMPONENTS, FloatArray, IntArray, MeasurementLog
 from ftproc.settings import Station
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-SAMPLE_ROWS = 100_000  # for what is judged by the whole of a log, such as its units
+_SAMPLE_ROWS = 100_000  # for checks of the whole log, such as its units
 
-#: A block's quantities in SI units, and the midnight that its times count from (or "").
+#: A block -> its quantities in SI units, and the instant of its time zero (or "").
 Convert = Callable[["pa.Table"], tuple[dict[str, FloatArray], str]]
 
 
-class Sampled(NamedTuple):
-    """A log whose arrays lie on a disk, and some of its rows: quantities as they were read, and the log of them."""
+class Spooled(NamedTuple):
+    """log: its arrays are mapped from disk. sample: quantities of some of its rows in SI units, as they were read."""
 
     log: MeasurementLog
-    quantities: dict[str, FloatArray]
-    sample: MeasurementLog
+    sample: dict[str, FloatArray]
 
 
-def read(source: str, blocks: Blocks, convert: Convert, station: Station) -> Sampled | None:
-    """The log, or None where it must be read as a whole: its rows are not in time order, or something is wrong with
-    it that only the whole of it can name. Raises InputError when there is no room for the temporary files."""
+def read(source: str, blocks: Blocks, convert: Convert, station: Station) -> Spooled | None:
+    """The log in the convention of `station`, or None if it must be read at once: its rows are out of time order, or a
+    fault needs the whole file for its message. Raises InputError if the disk of the temporary files is full."""
     with _Spool() as spool:
         return _into(spool, source, blocks, convert, station)
 
 
-def _into(spool: _Spool, source: str, blocks: Blocks, convert: Convert, station: Station) -> Sampled | None:
-    every = 1 + blocks.rows // SAMPLE_ROWS
+def readings(quantities: Mapping[str, FloatArray]) -> FloatArray:
+    """(n, 3) range, azimuth, elevation; NaN where a quantity is absent."""
+    absent = np.full(len(quantities["time"]), np.nan)
+    return np.column_stack([quantities.get(component, absent) for component in COMPONENTS])
+
+
+def _into(spool: _Spool, source: str, blocks: Blocks, convert: Convert, station: Station) -> Spooled | None:
+    every = 1 + blocks.rows // _SAMPLE_ROWS
     sampled: list[dict[str, FloatArray]] = []
     times = _Times()
     try:
@@ -59,26 +63,23 @@ def _into(spool: _Spool, source: str, blocks: Blocks, convert: Convert, station:
             raise
         place = tempfile.gettempdir()
         raise InputError(
-            f"{source}: so large a log is read by way of {place}, which is full; make room there, or name another "
-            "directory with TMPDIR."
+            f"{source}: a log of this size needs temporary files in {place}, which is full; make room there, or name "
+            "another directory with TMPDIR."
         ) from error
-    if not spool.read_something:
+    if not spool.has_readings:
         return None
     time_s, measurement, row = spool.arrays()
     log = MeasurementLog(
-        source, time_s, measurement, row, rows_in_file=spool.rows_in_file,
-        rows_without_time=tuple(spool.without_time), duplicate_times=times.duplicates, epoch=times.epoch,
+        source, time_s, measurement, row, conventions.FRAMES[station.azimuth_from], spool.rows_in_file,
+        tuple(spool.without_time), duplicate_times=times.duplicates, station=station, epoch=times.epoch,
     )  # fmt: skip
-    some = {name: np.concatenate([each[name] for each in sampled]) for name in sampled[0]}
-    return Sampled(log, some, _timed(source, some))
+    return Spooled(log, {name: np.concatenate([each[name] for each in sampled]) for name in sampled[0]})
 
 
 def _timed(source: str, quantities: Mapping[str, FloatArray]) -> MeasurementLog:
     """The rows that have a time."""
-    time_s = quantities["time"]
+    time_s, measurement = quantities["time"], readings(quantities)
     row = np.flatnonzero(~np.isnan(time_s))
-    columns = [quantities.get(component, np.full(len(time_s), np.nan)) for component in COMPONENTS]
-    measurement = np.column_stack(columns)
     if len(row) < len(time_s):
         time_s, measurement = time_s[row], measurement[row]
     return MeasurementLog(source, time_s, measurement, row)
@@ -89,13 +90,13 @@ class _OutOfOrder(Exception):
 
 
 class _Times:
-    """The times of one log, which must not fall from block to block."""
+    """The times of one log, which must not decrease from block to block."""
 
     def __init__(self) -> None:
         self.epoch, self.last_s, self.duplicates = "", -np.inf, 0
 
     def continued(self, time_s: FloatArray, epoch: str) -> FloatArray:
-        """Times of the next block, counted as those of the first; `epoch` is what they count from."""
+        """Times of the next block, which count from `epoch`, counted from the epoch of the first block."""
         if self.last_s == -np.inf:
             self.epoch = epoch
         if bool(epoch) != bool(self.epoch):
@@ -113,16 +114,16 @@ class _Times:
 
 
 class _Spool(contextlib.ExitStack):
-    """Temporary files without a name, that grow. What was mapped of them outlives them."""
+    """Growing temporary files without a name. Arrays mapped from them stay valid when they are closed."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.files: list[IO[bytes]] = [self.enter_context(tempfile.TemporaryFile()) for _ in range(3)]  # noqa: SIM115 (it is one)
-        self.rows, self.rows_in_file, self.read_something = 0, 0, False
+        self.files: list[IO[bytes]] = [self.enter_context(tempfile.TemporaryFile()) for _ in range(3)]  # noqa: SIM115 (closed by the stack)
+        self.rows, self.rows_in_file, self.has_readings = 0, 0, False
         self.without_time: list[int] = []
 
     def add(self, block: MeasurementLog, rows: int) -> None:
-        """The next `rows` of the file, of which `block` has those with a time."""
+        """The next `rows` rows of the file; `block` has those with a time."""
         for file, values in zip(
             self.files, (block.time_s, block.measurement, block.row + self.rows_in_file), strict=True
         ):
@@ -133,7 +134,7 @@ class _Spool(contextlib.ExitStack):
             self.without_time += (np.flatnonzero(absent) + self.rows_in_file).tolist()
         self.rows += len(block)
         self.rows_in_file += rows
-        self.read_something = self.read_something or not bool(np.isnan(block.measurement).all())
+        self.has_readings = self.has_readings or not bool(np.isnan(block.measurement).all())
 
     def arrays(self) -> tuple[FloatArray, FloatArray, IntArray]:
         """Times (n,), readings (n, 3) and row numbers (n,), mapped."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
@@ -13,17 +12,19 @@ import numpy as np
 
 from ftproc.errors import InputError
 from ftproc.files import conventions
-from ftproc.files.reading import cells, large, schema, tables, values
-from ftproc.files.reading.header import OpenTable
-from ftproc.files.units import UNITS, parse_units
-from ftproc.records import COMPONENTS, FloatArray, MeasurementLog
+from ftproc.files.options import parse_columns, parse_units
+from ftproc.files.reading import large, plausibility, schema
+from ftproc.files.reading.formats import tables
+from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.numbers import Origin, numbers
+from ftproc.files.reading.times import seconds
+from ftproc.records import FloatArray, MeasurementLog
 from ftproc.settings import Station
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-#: Half of all readings beyond these (rad): no flight but a mistaken unit. Single wild readings are for editing.
-_PLAUSIBLE_MEDIAN = {"azimuth": 4 * math.pi, "elevation": math.pi / 2, "zenith angle": math.pi}
+Found = Mapping[str, schema.Column]
 
 
 def read(
@@ -38,141 +39,94 @@ def read(
     """Read and check one log; angles become rad, lengths m, times s, rows come in time order.
 
     source: path of a .csv, .csv.gz, .parquet or .feather file, `-` for CSV on standard input, a pyarrow Table or a
-    pandas DataFrame. units: such as `{"range": "km"}` or `"range=km,azimuth=deg"`, for columns whose name
-    states no unit.
-    columns: such as `{"time": "T0"}` or `"time=T0,range=RNG"`; `none` for a quantity the file has not.
+    pandas DataFrame.
+    units: such as `{"range": "km"}` or `"range=km,azimuth=deg"`, for columns whose name states no unit.
+    columns: such as `{"time": "T0"}` or `"time=T0,range=RNG"`; `none` for a quantity that the file lacks.
     azimuth_from: `x` (A = atan2(y, x), the default) or `north`, which makes the frame `north-east-up`.
     keep_columns: carry the file's other columns through as `extra`.
     station: what else is known of the instrument, see `conventions`.
 
-    Rows are counted from 0, the header not among them, in messages as in `row`; empty lines do not count.
-    Rows without a time are listed and left out; readings of whatever size stay in (a negative range is for
-    the editing to judge). Timestamps become seconds since 00:00 UTC of the day of the earliest one.
+    Rows are counted from 0 without the header, in messages as in `row`; empty lines do not count. Rows without a time
+    are listed and left out. Readings of any size stay in: editing judges outliers, such as a negative range.
+    Timestamps become seconds since 00:00 UTC of the day of the earliest one.
 
-    Raises InputError for a file that cannot be read or is no log, UsageError for options that are not
-    understood.
+    Raises InputError for a file that cannot be read or is no log, UsageError for options that are not understood.
     """
     station = station or Station()
     if azimuth_from is not None:
         station = replace(station, azimuth_from=azimuth_from)
     conventions.check(station)
-    unit_of, column_of = parse_units(units), schema.parse_columns(columns)
-    opened = tables.open_table(source)
-    found = schema.resolve(opened.source, opened.names, unit_of, column_of)
+    unit_of, column_of = parse_units(units), parse_columns(columns)
+    header = tables.read_header(source)
+    found = schema.resolve(header.source, header.names, unit_of, column_of)
     wanted = [column.position for column in found.values()]
-    others = [place for place in range(len(opened.names)) if keep_columns and place not in wanted]
-    _check_others(opened, others)
-    in_blocks = not others and station.refraction is None  # which needs the distance where none was read
-    if in_blocks and (blocks := opened.blocks(wanted)) is not None:
-        read_so = large.read(opened.source, blocks, partial(_converted, opened, found), station)
-        if read_so is not None:
-            log, quantities, sample = read_so
-            _check_units(opened.source, quantities, found, station.elevation_from)
-            remarks = schema.remarks(opened.names, found, bool(log.epoch))
-            understood = conventions.apply(replace(sample, remarks=remarks), station)
-            return replace(log, frame=understood.frame, station=station, remarks=understood.remarks)
-    table = opened.load(wanted, others)
+    others = [place for place in range(len(header.names)) if keep_columns and place not in wanted]
+    _check_others(header, others)
+    if not others and station.refraction is None:  # refraction needs ranges of other blocks
+        log = _in_blocks(header, found, station)
+        if log is not None:
+            return log
+    return _at_once(header, found, station, others)
+
+
+def _in_blocks(header: TableHeader, found: Found, station: Station) -> MeasurementLog | None:
+    """The log of a large file; None if the file is small or must be read at once, see `large`."""
+    blocks = header.blocks([column.position for column in found.values()])
+    if blocks is None:
+        return None
+    spooled = large.read(header.source, blocks, partial(_converted, header, found), station)
+    if spooled is None:
+        return None
+    log, sample = spooled
+    plausibility.check_units(header.source, sample, found, station.elevation_from)
+    readings = large.readings(sample)[~np.isnan(sample["time"])]
+    return replace(log, remarks=_remarks(header, found, log.epoch, readings, station))
+
+
+def _at_once(header: TableHeader, found: Found, station: Station, others: list[int]) -> MeasurementLog:
+    wanted = [column.position for column in found.values()]
+    table = header.load(wanted, others)
     if table.num_rows == 0:
-        raise InputError(f"{opened.source}: there are column names but no rows.")
-    quantities, epoch = _converted(opened, found, table)
-    _check_units(opened.source, quantities, found, station.elevation_from)
+        raise InputError(f"{header.source}: there are column names but no rows.")
+    quantities, epoch = _converted(header, found, table)
+    plausibility.check_units(header.source, quantities, found, station.elevation_from)
     extra = table.select(list(range(len(wanted), table.num_columns))) if others else None
-    log = _in_time_order(opened.source, quantities, extra)
-    log = replace(log, epoch=epoch, remarks=schema.remarks(opened.names, found, bool(epoch)))
+    log = _in_time_order(header.source, quantities, extra)
+    log = replace(log, epoch=epoch, remarks=_remarks(header, found, epoch, log.measurement, station))
     return conventions.apply(log, station)
 
 
-def _converted(
-    opened: OpenTable, found: Mapping[str, schema.Column], table: pa.Table
-) -> tuple[dict[str, FloatArray], str]:
-    """The quantities in SI units, time first, and the midnight that the times count from (or "")."""
-    time_s, epoch = _time(table.column(0), found["time"], opened)
-    others = {
-        quantity: _quantity(table.column(index), column, opened)
-        for index, (quantity, column) in enumerate(found.items())
-        if quantity != "time"
-    }
-    return {"time": time_s} | others, epoch
+def _remarks(header: TableHeader, found: Found, epoch: str, readings: FloatArray, station: Station) -> tuple[str, ...]:
+    return (*schema.remarks(header.names, found, bool(epoch)), *plausibility.doubts(readings, station))
 
 
-def _check_others(opened: OpenTable, others: list[int]) -> None:
-    counts = Counter(opened.names[position] for position in others)
+def _check_others(header: TableHeader, others: list[int]) -> None:
+    counts = Counter(header.names[position] for position in others)
     for name, count in counts.items():
         if count > 1:
             raise InputError(
-                f'{opened.source}: column "{name}" is there twice, so both cannot be kept; rename one, '
+                f'{header.source}: column "{name}" is there twice, so both cannot be kept; rename one, '
                 "or leave --keep-columns out."
             )
 
 
-def _time(column: pa.ChunkedArray, found: schema.Column, opened: OpenTable) -> tuple[FloatArray, str]:
-    expected = f"a time in {found.unit.name} or an ISO-8601 timestamp"
-    return values.seconds(
-        column, cells.Origin(opened.source, found.name, expected, opened.decimal_comma), found.unit.to_si
-    )
-
-
-def _quantity(column: pa.ChunkedArray, found: schema.Column, opened: OpenTable) -> FloatArray:
-    article = "an" if found.quantity in ("azimuth", "elevation") else "a"
-    origin = cells.Origin(
-        opened.source, found.name, f"{article} {found.quantity} in {found.unit.name}", opened.decimal_comma
-    )
-    return found.unit.to_si(values.numbers(column, origin))
-
-
-def _check_units(
-    source: str, quantities: Mapping[str, FloatArray], found: Mapping[str, schema.Column], elevation_from: str
-) -> None:
-    """Raise InputError when the angles cannot be in the unit assumed. A unit the user named is believed."""
-    for quantity in ("azimuth", "elevation"):
-        what = "zenith angle" if (quantity, elevation_from) == ("elevation", "zenith") else quantity
-        limit = _PLAUSIBLE_MEDIAN[what]
-        angles = np.abs(quantities.get(quantity, np.empty(0)))
-        angles = angles[~np.isnan(angles)]
-        if not angles.size or found[quantity].unit_stated_by_user:
-            continue
-        with np.errstate(over="ignore"):  # what overflows is no angle either
-            half, most = np.quantile(angles, [0.5, 0.99]).tolist()
-        if half <= limit:
-            continue
-        column = found[quantity]
-        assumed = column.unit
-        half, most = (value * assumed.divide / assumed.multiply for value in (half, most))
-        # Degrees end at 360; what is beyond 400 is wild and says nothing.
-        typical = most if quantity == "azimuth" and 370 < most <= 400 else half
-        other = _likely_unit(quantity, typical, limit / (2 if quantity == "azimuth" else 1))  # one turn, straight up
-        named = f"--columns {quantity}={column.name} " if column.unit_in_name else ""
-        raise InputError(
-            f'{source}: half of column "{column.name}" lies beyond {half:.4g} {assumed.name}, which is no '
-            f"{what}: it looks like {other[1]}; use {named}--units {quantity}={other[0]}"
-            f"{_and_the_other_angle(quantity, found, other[0])}. "
-            f"If {assumed.name} is right, say {named}--units {quantity}={assumed.name}."
-        )
-
-
-def _likely_unit(quantity: str, typical: float, limit: float) -> tuple[str, str]:
-    words = {"deg": "degrees (or gon)", "grad": "gradians (gon)", "mil": "mils"}
-    for name, word in words.items():
-        unit = UNITS[quantity][name]
-        if typical * unit.multiply / unit.divide <= limit:
-            return name, word
-    return "UNIT", "another unit"
-
-
-def _and_the_other_angle(quantity: str, found: Mapping[str, schema.Column], unit: str) -> str:
-    """An elevation of a few degrees passes for radians, so a wrong azimuth is a reason to look at it too."""
-    other = found.get("elevation" if quantity == "azimuth" else "azimuth")
-    if other is None or other.unit_stated_by_user or other.unit != found[quantity].unit:
-        return ""
-    return f" (and {other.quantity}={unit} if that is so too)"
+def _converted(header: TableHeader, found: Found, table: pa.Table) -> tuple[dict[str, FloatArray], str]:
+    """The quantities in SI units, and the instant of time zero (or "")."""
+    quantities, epoch = {}, ""
+    for index, (quantity, column) in enumerate(found.items()):
+        article = "an" if quantity in ("azimuth", "elevation") else "a"
+        timestamp = " or an ISO-8601 timestamp" if quantity == "time" else ""
+        expected = f"{article} {quantity} in {column.unit.name}{timestamp}"
+        origin = Origin(header.source, column.name, expected, header.decimal_comma)
+        if quantity == "time":
+            quantities[quantity], epoch = seconds(table.column(index), origin, column.unit.to_si)
+        else:
+            quantities[quantity] = column.unit.to_si(numbers(table.column(index), origin))
+    return quantities, epoch
 
 
 def _in_time_order(source: str, quantities: Mapping[str, FloatArray], extra: pa.Table | None) -> MeasurementLog:
-    time = quantities["time"]
-    measurement = np.full((len(time), len(COMPONENTS)), np.nan)
-    for index, component in enumerate(COMPONENTS):
-        if component in quantities:
-            measurement[:, index] = quantities[component]
+    time, measurement = quantities["time"], large.readings(quantities)
     timed = np.flatnonzero(~np.isnan(time))
     if not timed.size:
         raise InputError(f"{source}: no row has a time, so there is nothing to process; fill the times in.")

@@ -2,8 +2,8 @@
 
 The rules, first to last:
 1. a column named by `--columns`;
-2. the canonical name, exactly: `time_s`, `range_m`, `azimuth_rad`, `elevation_rad`. It wins over bare names,
-   so that a temperature `T` or an acceleration `A` beside it does no harm;
+2. the canonical name, exactly: `time_s`, `range_m`, `azimuth_rad`, `elevation_rad`. It has priority over bare names,
+   because these may be something else, such as a temperature `T` or an acceleration `A`;
 3. one column by bare name (`R`, `az`: the unit of `--units`, else SI) or by bare name and unit (`az_deg`, `Az [deg]`).
 Two columns that could be the same quantity are an error, not a guess.
 """
@@ -14,24 +14,14 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from ftproc.errors import InputError, UsageError, nearest
+from ftproc.errors import InputError, nearest
 from ftproc.files.layout import CANONICAL
-from ftproc.files.units import ALIASES, QUANTITIES, UNITS, Unit, pairs, si_unit
-
-#: What `--columns range=none` says: the file has no such quantity, whatever its columns are called.
-ABSENT = "none"
-
-#: Endings that make a column something other than the quantity itself; no unit is looked for in them.
-_NOT_UNITS = frozenset(
-    [
-        *("rate", "dot", "sigma", "std", "err", "error", "bias", "res", "residual", "flag", "valid"),
-        *("ok", "quality", "raw", "id", "status", "type", "gate", "true", "ref", "mps2"),
-    ]
-)
+from ftproc.files.options import ABSENT
+from ftproc.files.units import ALIASES, NOT_UNITS, QUANTITIES, UNITS, Unit, si_unit
 
 
 class Column(NamedTuple):
-    """One column found: where it stands in the file, its unit, and whether the user named that unit."""
+    """The column of a quantity: its position in the file, its unit, and who stated the unit."""
 
     quantity: str
     position: int
@@ -41,27 +31,14 @@ class Column(NamedTuple):
     unit_in_name: bool
 
 
-def parse_columns(given: str | Mapping[str, str] | None) -> dict[str, str]:
-    """The `--columns` option -> {quantity: column name}. Raises UsageError."""
-    found = pairs("--columns", given)
-    if found.get("time") == ABSENT:
-        raise UsageError("--columns: a log cannot do without its time; name the time column.")
-    seen: dict[str, str] = {}
-    for quantity, name in found.items():
-        if name != ABSENT and name in seen:
-            raise UsageError(f'--columns: column "{name}" cannot be both {seen[name]} and {quantity}.')
-        seen[name] = quantity
-    return found
-
-
 def resolve(
     source: str, names: Sequence[str], units: Mapping[str, str], columns: Mapping[str, str]
 ) -> dict[str, Column]:
-    """Which of the columns `names` of file `source` hold the log: {quantity: column}, always with the time.
+    """The columns of the log among `names` of file `source`: {quantity: column}, the time first.
 
     units, columns: as `parse_units` and `parse_columns` return them.
-    Raises InputError when the time or every component is missing, when two columns fit one quantity, when a
-    column of `--columns` is not there, and when a column's name and `--units` contradict each other.
+    Raises InputError if the time or every component is missing, if two columns fit one quantity, if a column of
+    `--columns` is absent, and if a column's name and `--units` contradict each other.
     """
     found: dict[str, Column] = {}
     claimed = set(columns.values())
@@ -79,23 +56,23 @@ def resolve(
 
 
 def remarks(names: Sequence[str], found: Mapping[str, Column], timestamps: bool) -> tuple[str, ...]:
-    """What a user should know of the columns taken: units that nobody stated, and columns that may have been meant.
+    """Remarks for the user: units that are assumed, and unused columns that may hold an absent quantity.
 
     timestamps: the time needs no unit.
     """
-    said = []
+    lines = []
     assumed = [
         f'"{column.name}" in {column.unit.name}'
         for column in found.values()
         if not (column.unit_in_name or column.unit_stated_by_user or (timestamps and column.quantity == "time"))
     ]
     if assumed:
-        said.append(f"no unit is stated, so these are taken to be: {', '.join(assumed)}")
+        lines.append(f"no unit is stated, so these are taken to be: {', '.join(assumed)}")
     absent = [quantity for quantity in QUANTITIES if quantity not in found]
     unused = [name for place, name in enumerate(names) if place not in {column.position for column in found.values()}]
     if absent and unused:
-        said.append(f"no column is taken for {' and '.join(absent)}; not used: {listed(unused)}")
-    return tuple(said)
+        lines.append(f"no column is taken for {' and '.join(absent)}; not used: {listed(unused)}")
+    return tuple(lines)
 
 
 def listed(names: Sequence[str]) -> str:
@@ -168,10 +145,10 @@ def _refuse_twice(source: str, names: Sequence[str], name: str) -> None:
 
 
 def _refuse_unknown_unit(source: str, names: Sequence[str], quantity: str) -> None:
-    """A log without a range may be angles-only; one with `range_yd` is not, and must not be taken for it."""
+    """A log without a range may be angles-only; one with `range_yd` is not."""
     for name in names:
         stem, suffix = _stem_and_suffix(name)
-        if len(stem) > 1 and suffix and stem in ALIASES[quantity] and suffix not in _NOT_UNITS:
+        if len(stem) > 1 and suffix and stem in ALIASES[quantity] and suffix not in NOT_UNITS:
             raise InputError(
                 f'{source}: "{suffix}" in column "{name}" is not a unit of {quantity}; understood are '
                 f"{', '.join(UNITS[quantity])}. Convert the column and rename it, "
@@ -180,7 +157,7 @@ def _refuse_unknown_unit(source: str, names: Sequence[str], quantity: str) -> No
 
 
 def _refuse_zenith(source: str, names: Sequence[str], quantity: str) -> None:
-    """A log with zenith angles is not one without elevations."""
+    """A log with zenith angles does not lack elevations."""
     for name in names:
         if quantity == "elevation" and re.match(r"(zenith|zen|zd)(_|$)", name.lower()):
             raise InputError(
@@ -204,7 +181,7 @@ def _check_complete(source: str, names: Sequence[str], found: Mapping[str, Colum
     wanted = "time" if "time" not in found else "range"
     what = "no time column" if wanted == "time" else "neither range nor azimuth nor elevation"
     if wanted == "range" and {"x_m", "y_m", "z_m"} <= set(names):
-        what = f"a truth or a trajectory by its x_m, y_m, z_m, for `ftproc score`, not a log: it has {what}"
+        what = f"x_m, y_m, z_m are columns of a truth or a trajectory, for `ftproc score`, not of a log: it has {what}"
     hint = nearest(CANONICAL[wanted], [name for name in names if name not in columns.values()]) or "."
     raise InputError(
         f"{source}: {what} (expected {CANONICAL[wanted]} or {' or '.join(ALIASES[wanted])}){hint} "

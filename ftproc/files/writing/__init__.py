@@ -1,4 +1,4 @@
-"""Files out, whole or not at all: trajectories, maps, simulated flights.
+"""Files out, complete or not at all: trajectories, maps, simulated flights.
 
-Calls `files`; nothing of `files.reading`.
+Calls `files`, not `files.reading`.
 """

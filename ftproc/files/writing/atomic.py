@@ -1,4 +1,4 @@
-"""Outputs appear whole or not at all, and never on top of an input."""
+"""Outputs appear complete or not at all, and never replace an input."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ftproc.files.layout import Target
 
 
 def refuse_overwriting(target: Target, inputs: Iterable[Target], option: str = "-o") -> None:
-    """Raise OutputError when `target` is one of `inputs`, by whatever path, symbolic or hard link.
+    """Raise OutputError if `target` is one of `inputs`, by any path, symbolic or hard link.
 
     `-` (a standard stream) is never a file. option: the one that names the target.
     """
@@ -28,27 +28,26 @@ def refuse_overwriting(target: Target, inputs: Iterable[Target], option: str = "
 
 
 def check_target(target: Target) -> None:
-    """Raise OutputError at once, before any work is done, when `target` is a directory or stands in none. Of a URI
-    that is on another machine nothing is known before."""
+    """Raise OutputError, before any work is done, if `target` is a directory or its directory does not exist. A URI on
+    another machine is not checked."""
     path = remote.local(target)
     if path is None or str(target) == "-":
         return
     if path.is_dir():
-        raise _plain(path, IsADirectoryError(errno.EISDIR, ""))
+        raise _output_error(path, IsADirectoryError(errno.EISDIR, ""))
     directory = path.absolute().parent
     if not directory.is_dir():
-        raise _plain(path, OSError(errno.ENOTDIR if directory.exists() else errno.ENOENT, ""))
+        raise _output_error(path, OSError(errno.ENOTDIR if directory.exists() else errno.ENOENT, ""))
 
 
 @contextlib.contextmanager
 def replacing(target: Target) -> Iterator[BinaryIO]:
-    """A binary stream whose content becomes the file `target` when the block ends well, and only then.
+    """A binary stream whose content becomes the file `target` if the block succeeds.
 
-    The bytes go to a hidden file beside the target, are flushed to the disk, and are renamed into place; when
-    anything fails the hidden file is removed and an earlier target is left as it was. A symbolic link stays
-    one: the file behind it is replaced. A device or named pipe cannot be replaced and is written to directly.
-    What a URI names on another machine is stored when it is whole. Raises OutputError with a plain sentence for every
-    OSError.
+    The bytes go to a hidden file beside the target, are flushed to the disk and renamed into place. If anything fails,
+    the hidden file is removed and an earlier target stays unchanged. Of a symbolic link, the file behind it is
+    replaced. A device or named pipe is written to directly. A URI on another machine is stored when it is complete.
+    Raises OutputError for every OSError.
     """
     near = remote.local(target)
     if near is None:
@@ -64,18 +63,18 @@ def replacing(target: Target) -> Iterator[BinaryIO]:
         else:
             yield from _beside(path)
     except OSError as error:
-        raise _plain(near, error) from error
+        raise _output_error(near, error) from error
 
 
 def sync(stream: BinaryIO) -> None:
-    """Force what was written to `stream` on to the disk (a full disk shows here at the latest)."""
+    """Flush `stream` to the disk (a full disk shows here at the latest)."""
     stream.flush()
     os.fsync(stream.fileno())
 
 
 def _beside(path: Path) -> Iterator[BinaryIO]:
     temporary = path.with_name(f".{path.name[:200]}.{secrets.token_hex(4)}.tmp")
-    # O_EXCL: never through a link someone left there. 0o666: the user's umask decides, as for any new file.
+    # O_EXCL: never through an existing link. 0o666: the user's umask decides, as for any new file.
     descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     try:
         with os.fdopen(descriptor, "wb") as stream:
@@ -90,7 +89,7 @@ def _beside(path: Path) -> Iterator[BinaryIO]:
 
 
 def _sync_directory(directory: Path) -> None:
-    """Make the new name outlive a power cut, where the system lets directories be opened at all."""
+    """Make the new name survive a power cut, where the system can open directories."""
     with contextlib.suppress(OSError):
         descriptor = os.open(directory, os.O_RDONLY)
         try:
@@ -100,7 +99,7 @@ def _sync_directory(directory: Path) -> None:
 
 
 def _resolved(path: Path) -> Path:
-    """The file behind all links. OSError for a link to itself, which versions of Python tell otherwise, or not."""
+    """The file behind all links. OSError for a link to itself, also where Python raises another error or none."""
     try:
         found = path.resolve()
     except RuntimeError as error:
@@ -120,13 +119,13 @@ def _same(target: Target, given: Target) -> bool:
 def _same_file(one: Path, other: Path) -> bool:
     try:
         return one.samefile(other)
-    except OSError:  # at least one is not there yet; then the resolved names tell
+    except OSError:  # at least one does not exist yet: compare the resolved names
         with contextlib.suppress(OSError):
             return _resolved(one) == _resolved(other)
         return False
 
 
-def _plain(path: Path, error: OSError) -> OutputError:
+def _output_error(path: Path, error: OSError) -> OutputError:
     directory = path.parent
     reasons = {
         errno.ENOENT: f"there is no directory {directory}; create it first (mkdir -p {directory}).",

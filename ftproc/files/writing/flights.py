@@ -1,4 +1,4 @@
-"""Flights out: a log, in the units asked for, and its truth."""
+"""Simulated flights out: a log, in any units, and its truth."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 
 from ftproc.files import arrow
 from ftproc.files.layout import ACCELERATION, OUTLIER, POSITION, VELOCITY, Target
-from ftproc.files.units import QUANTITIES, UNITS, parse_units, si_unit
+from ftproc.files.options import parse_units
+from ftproc.files.units import QUANTITIES, UNITS, si_unit
 from ftproc.files.writing import tables
 from ftproc.records import FlagArray, FloatArray, MeasurementLog, Truth
 
@@ -23,21 +24,21 @@ def write_log(
 ) -> None:
     """Write `log` to a .csv, .csv.gz, .parquet or .feather file or `-` (CSV on stdout).
 
-    units: of the quantities whose columns are not to be in SI, such as `range=km`; they show in the columns' names.
-    azimuth_from: `north` writes azimuths from 0 to a full turn, as a survey does. In SI every float64 reads back bit
-    for bit; a missing reading is an empty cell (NaN in Parquet). Raises OutputError, UsageError.
+    units: of columns that are not to be in SI, such as `range=km`; column names end in the unit. azimuth_from:
+    `north` writes azimuths from 0 to a full turn, as surveys do. In SI every float64 reads back bit for bit; a missing
+    reading is an empty cell (NaN in Parquet). Raises OutputError, UsageError.
     """
-    tables.write_table(tables.with_extra(log_table(log, parse_units(units), azimuth_from), log.extra), target)
+    tables.write_table(tables.with_extra(_log_table(log, parse_units(units), azimuth_from), log.extra), target)
 
 
-def log_table(log: MeasurementLog, units: Mapping[str, str], azimuth_from: str) -> pa.Table:
-    """The log with its units in the column names, such as `range_km`; SI where `units` says nothing."""
+def _log_table(log: MeasurementLog, units: Mapping[str, str], azimuth_from: str) -> pa.Table:
+    """The log with its units in the column names, such as `range_km`; SI for quantities not in `units`."""
     arrays = {}
     for index, quantity in enumerate(QUANTITIES):
         values = log.time_s if index == 0 else log.measurement[:, index - 1]
         if quantity == "azimuth" and azimuth_from == "north":
             values = np.mod(values, 2 * math.pi)
-            values = np.where(values >= 2 * math.pi, 0.0, values)  # what rounding makes of a tiny negative angle
+            values = np.where(values >= 2 * math.pi, 0.0, values)  # a tiny negative angle, rounded
         unit = UNITS[quantity][units.get(quantity, si_unit(quantity).name)]
         arrays[f"{quantity}_{unit.name}"] = np.ascontiguousarray(values * unit.divide / unit.multiply)
     return arrow.table(arrays)

@@ -1,4 +1,4 @@
-"""Positions on the earth: from the station's local frame to latitude, longitude and height (WGS-84)."""
+"""Positions on the earth: the station's local frame -> latitude, longitude and height, or ECEF (WGS-84)."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 
 from ftproc.errors import UsageError
+from ftproc.files import arrow
+from ftproc.files.writing import tables
 from ftproc.records import FloatArray, Trajectory
 from ftproc.settings import FilterSettings
 
 COLUMNS = ("lat_deg", "lon_deg", "height_m")
 ECEF = ("x_ecef_m", "y_ecef_m", "z_ecef_m", "vx_ecef_mps", "vy_ecef_mps", "vz_ecef_mps")
 
-#: frame of a log -> which local axes point east and north, and how that is said.
+#: Frame of a log -> indices of the axes that point east and north, and the same in words.
 _AXES = {"local": ((0, 1), "x is taken as east, y as north"), "north-east-up": ((1, 0), "x is north, y is east")}
 
 Site = tuple[float, float, float]
@@ -30,12 +32,12 @@ def require_pymap3d() -> Any:
 
 
 def axes(frame: str) -> str:
-    """Which way the local axes are taken to point, in words."""
+    """The directions of the local axes, in words."""
     return _AXES[frame][1]
 
 
 def check(settings: FilterSettings) -> None:
-    """Raise UsageError when places on the earth are asked for and cannot be had."""
+    """Raise UsageError if positions on the earth are asked for and a library or the station is missing."""
     if settings.site is not None:
         require_pymap3d()
     elif settings.ecef:
@@ -43,17 +45,14 @@ def check(settings: FilterSettings) -> None:
 
 
 def located(trajectory: Trajectory, settings: FilterSettings) -> Trajectory:
-    """The trajectory with its places on the earth among its extra columns, NaN where not estimated.
+    """The trajectory with its positions on the earth as extra columns, NaN where not estimated.
 
-    With a site `lat_deg`, `lon_deg`, `height_m` (above the ellipsoid, WGS-84); with `ecef` also earth-centred,
-    earth-fixed positions in m and velocities in m/s. Without a site, as it was.
-    The local z is the normal of the ellipsoid at the station: the deflection of the vertical is not known. In the
-    frame `local` the convention A = atan2(y, x) leaves open where x points: east is taken, as the metadata say under
-    `site_axes`.
-    Raises UsageError when pymap3d is missing or a kept column already has one of the names.
+    With a site: `lat_deg`, `lon_deg`, `height_m` (above the WGS-84 ellipsoid); with `ecef` also earth-centred,
+    earth-fixed positions in m and velocities in m/s. Without a site: unchanged.
+    The local z is the ellipsoid's normal at the station: the deflection of the vertical is not known. In the frame
+    `local` the convention A = atan2(y, x) does not fix x: east is assumed, as the metadata say under `site_axes`.
+    Raises UsageError if pymap3d is missing or a kept column already has one of the names.
     """
-    import pyarrow as pa
-
     check(settings)
     if settings.site is None:
         return trajectory
@@ -61,13 +60,9 @@ def located(trajectory: Trajectory, settings: FilterSettings) -> Trajectory:
     found = dict(zip(COLUMNS, geodetic(trajectory.state[:, :3], frame, settings.site), strict=True))
     if settings.ecef:
         found |= zip(ECEF, earth_centred(trajectory.state[:, :6], frame, settings.site), strict=True)
-    extra = pa.table({}) if trajectory.extra is None else trajectory.extra
-    for name in found:
-        if name in extra.column_names:
-            raise UsageError(f'the log\'s column "{name}" has the name of an output column; leave --keep-columns out.')
-    kept = dict(zip(extra.column_names, extra.columns, strict=True))
-    table = pa.table(kept | {name: pa.array(values) for name, values in found.items()})
-    return replace(trajectory, extra=table, metadata={**trajectory.metadata, "site_axes": axes(frame)})
+    places = arrow.table(found)
+    extra = places if trajectory.extra is None else tables.with_extra(trajectory.extra, places)
+    return replace(trajectory, extra=extra, metadata={**trajectory.metadata, "site_axes": axes(frame)})
 
 
 def geodetic(position: FloatArray, frame: str, site: Site) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -78,7 +73,7 @@ def geodetic(position: FloatArray, frame: str, site: Site) -> tuple[FloatArray, 
 
 
 def earth_centred(state: FloatArray, frame: str, site: Site) -> list[FloatArray]:
-    """x, y, z in m and their velocities in m/s, each (n,), of (n, 6) local states; the earth's frame turns with it."""
+    """x, y, z in m and velocities in m/s, each (n,), in the rotating earth-fixed frame, of (n, 6) local states."""
     pymap3d = require_pymap3d()
     (east, north), up = _AXES[frame][0], 2
     position = pymap3d.enu2ecef(state[:, east], state[:, north], state[:, up], *site)

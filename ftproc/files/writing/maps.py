@@ -1,7 +1,7 @@
-"""Trajectories for the map: KML, GeoJSON and CZML. They hold the places, not the columns, and are not read back.
+"""Trajectories on a map: KML, GeoJSON and CZML. They hold positions only and are not read back.
 
-Heights: GeoJSON (RFC 7946) and CZML count them from the WGS-84 ellipsoid, as `height_m` does. KML counts them from
-the geoid, the sea's level; where the geoid's height at the station is known it is taken off, else the file says so.
+Heights in GeoJSON (RFC 7946) and CZML are above the WGS-84 ellipsoid, as in `height_m`. Heights in KML are above the
+geoid (sea level): the geoid's height at the station is subtracted if known, else the file says so.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from ftproc.files.layout import Target
 from ftproc.records import FloatArray, Trajectory
 
 _DEGREES, _METRES = 9, 4  # decimals: a tenth of a millimetre
-_SOME_DAY = "2000-01-01T00:00:00Z"  # stands for a day that the log does not tell; CZML cannot do without
+_ASSUMED_EPOCH = "2000-01-01T00:00:00Z"  # of a log without a date; CZML needs one
 _XML = '<?xml version="1.0" encoding="UTF-8"?>'
 _NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
 
 
 class Track(NamedTuple):
-    """What a map needs. place: (n, 3) longitude deg, latitude deg, height m, of samples with an estimate; pieces:
-    where it is without gaps, of two places or more. site: the station's (longitude, latitude, height)."""
+    """The content of a map. place: (n, 3) longitude deg, latitude deg, height m, of samples with an estimate. pieces:
+    its runs without gaps, of two places or more. site: longitude, latitude, height of the station."""
 
     name: str
     about: str
@@ -42,7 +42,7 @@ class Track(NamedTuple):
 
 
 def check(target: Target, site: object) -> None:
-    """Raise UsageError when `target` is a map and either the station or the library for it is missing."""
+    """Raise UsageError if `target` is a map and the station or the library for it is missing."""
     kind = layout.map_kind(target)
     if kind is None:
         return
@@ -55,7 +55,7 @@ def check(target: Target, site: object) -> None:
 
 
 def as_bytes(trajectory: Trajectory, kind: str) -> bytes:
-    """The text of the map. Raises UsageError as `check`, InputError when no place was estimated."""
+    """The map as a file. Raises UsageError as `check`, InputError if no position was estimated."""
     return _WRITERS[kind](_track(trajectory, kind)).encode()
 
 
@@ -68,21 +68,21 @@ def _track(trajectory: Trajectory, kind: str) -> Track:
     assert site is not None
     columns = [np.asarray(extra.column(name)) for name in ("lon_deg", "lat_deg", "height_m")]
     place = np.column_stack([*(np.round(c, _DEGREES) for c in columns[:2]), np.round(columns[2], _METRES)])
-    there = np.isfinite(place).all(1)
-    if not there.any():
+    estimated = np.isfinite(place).all(1)
+    if not estimated.any():
         raise InputError(f"{trajectory.name}: no position could be estimated, so there is nothing to draw on a map.")
-    way = "smoothed" if settings.get("smooth") else "filtered"
+    how = "smoothed" if settings.get("smooth") else "filtered"
     return Track(
         _NOT_XML.sub("?", Path(trajectory.name).name),
-        f"{way} by {metadata['method']}, ftproc {metadata['version']}",
-        trajectory.time_s[there], place[there], _pieces(place, there), (site[1], site[0], site[2]),
+        f"{how} by {metadata['method']}, ftproc {metadata['version']}",
+        trajectory.time_s[estimated], place[estimated], _pieces(place, estimated), (site[1], site[0], site[2]),
         settings.get("geoid_m"), str(metadata.get("epoch", "")),
     )  # fmt: skip
 
 
-def _pieces(place: FloatArray, there: Any) -> list[slice]:
-    """Runs without a gap, cut where the longitude jumps from one side of 180 degrees to the other."""
-    row = np.flatnonzero(there)
+def _pieces(place: FloatArray, estimated: Any) -> list[slice]:
+    """Runs without a gap, cut where the longitude jumps across 180 degrees."""
+    row = np.flatnonzero(estimated)
     jump = np.abs(np.diff(place[row, 0])) > 180
     ends = np.flatnonzero((np.diff(row) > 1) | jump) + 1
     bounds = [0, *ends.tolist(), len(row)]
@@ -110,9 +110,9 @@ def _feature(geometry: dict[str, Any], properties: dict[str, Any]) -> dict[str, 
 def _kml(track: Track) -> str:
     simplekml = _library(".kml")
     simplekml.Kml.resetidcounter()  # same trajectory, same bytes
-    lessened = track.geoid_m or 0.0
-    places = np.round(track.place - (0.0, 0.0, lessened), _DEGREES)
-    known = f"Heights are above the geoid, which is {lessened:g} m above the ellipsoid here."
+    geoid = track.geoid_m or 0.0
+    places = np.round(track.place - (0.0, 0.0, geoid), _DEGREES)
+    known = f"Heights are above the geoid, which is {geoid:g} m above the ellipsoid here."
     unknown = (
         "Heights are above the WGS-84 ellipsoid. A viewer counts them from the geoid (sea level), so they are off by "
         "its height at the station; give it as geoid_m under [site] of a station file."
@@ -120,7 +120,7 @@ def _kml(track: Track) -> str:
     about = f"{track.about}. {known if track.geoid_m is not None else unknown}"
     document = simplekml.Kml(name=track.name)
     longitude, latitude, height = track.site
-    document.newpoint(name="station", coords=[(longitude, latitude, height - lessened)], altitudemode="absolute")
+    document.newpoint(name="station", coords=[(longitude, latitude, height - geoid)], altitudemode="absolute")
     lines = document.newmultigeometry(name=track.name, description=about)
     for piece in track.pieces:
         lines.newlinestring(coords=places[piece].tolist(), altitudemode="absolute")
@@ -128,7 +128,7 @@ def _kml(track: Track) -> str:
         moving = document.newgxtrack(name=f"{track.name} in time", altitudemode="absolute")
         moving.newwhen(_instants(track))
         moving.newgxcoord(places.tolist())
-    # Without indents, for which simplekml would parse all of it again.
+    # Without indents, for which simplekml would parse the document again.
     return f"{_XML}\n{document.kml(format=False)}\n"
 
 
@@ -142,11 +142,11 @@ def _instants(track: Track) -> list[str]:
 def _czml(track: Track) -> str:
     czml3 = _library(".czml")
     properties = czml3.properties
-    epoch, time_s = track.epoch or _SOME_DAY, track.time_s - (0.0 if track.epoch else track.time_s[0])
+    epoch, time_s = track.epoch or _ASSUMED_EPOCH, track.time_s - (0.0 if track.epoch else track.time_s[0])
     start = dt.datetime.fromisoformat(epoch)
     first, last = (start + dt.timedelta(seconds=float(t)) for t in (time_s[0], time_s[-1]))
-    while_there = czml3.types.TimeInterval(start=first, end=last)
-    day = "" if track.epoch else " The log does not tell its day: its first sample is put at 2000-01-01."
+    availability = czml3.types.TimeInterval(start=first, end=last)
+    day = "" if track.epoch else " The log has no date: its first sample is placed at 2000-01-01."
     samples = np.column_stack([time_s, track.place]).ravel().tolist()
     colour = properties.Color(rgba=[255, 200, 0, 255])
     packets = [
@@ -159,7 +159,7 @@ def _czml(track: Track) -> str:
             position=properties.Position(cartographicDegrees=list(track.site)),
         ),
         czml3.Packet(
-            id="target", name=track.name, description=f"{track.about}.{day}", availability=while_there,
+            id="target", name=track.name, description=f"{track.about}.{day}", availability=availability,
             position=properties.Position(epoch=epoch, cartographicDegrees=samples),
             point=properties.Point(pixelSize=6, color=colour),
             path=properties.Path(show=True),

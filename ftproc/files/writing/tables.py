@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import gzip
-import io
-import re
 import sys
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, cast
@@ -14,15 +11,12 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, cast
 from ftproc.errors import OutputError, UsageError
 from ftproc.files import layout
 from ftproc.files.layout import Target
-from ftproc.files.writing import atomic
+from ftproc.files.writing import atomic, csvtext
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-_ROWS_AT_ONCE = 65536  # of CSV text held in memory
-_NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
-_BEGINNING = r"^[=+\-@\t\r]"
-_GZIP_LEVEL = 4  # numbers hardly get smaller above it, only slower
+_GZIP_LEVEL = 4  # higher levels only take longer: numbers get no smaller
 
 
 def kind_of(target: Target) -> str:
@@ -36,13 +30,13 @@ def kind_of(target: Target) -> str:
 
 
 def write_table(table: pa.Table, target: Target) -> None:
-    """Write `table` whole or not at all; `-` goes to standard output. Raises OutputError.
+    """Write `table` complete or not at all; `-` goes to standard output. Raises OutputError.
 
-    A closed standard output raises BrokenPipeError, for the caller to judge.
+    A closed standard output raises BrokenPipeError, which the caller handles.
     """
     kind = kind_of(target)
     if str(target) == "-":
-        for piece in _csv_pieces(table):
+        for piece in csvtext.pieces(table):
             sys.stdout.buffer.write(piece)
         sys.stdout.buffer.flush()
         return
@@ -51,24 +45,27 @@ def write_table(table: pa.Table, target: Target) -> None:
 
 
 def write_stream(table: pa.Table, stream: BinaryIO, kind: str) -> None:
-    """Write `table` to an open stream in one of the kinds of file."""
+    """Write `table` to an open stream as a file of that kind."""
     if kind == ".parquet":
         import pyarrow.parquet as pq
 
-        # Readings hardly repeat, so a dictionary only costs time. Of the codecs every reader has, snappy was
-        # fastest.
-        pq.write_table(table, stream, compression="snappy", use_dictionary=_words(table))
+        # A dictionary costs time, and readings rarely repeat. Snappy is the fastest codec that every reader has.
+        pq.write_table(table, stream, compression="snappy", use_dictionary=_not_floating(table))
     elif kind == ".feather":
         import pyarrow as pa
 
         with pa.ipc.new_file(stream, table.schema, options=pa.ipc.IpcWriteOptions(compression="lz4")) as file:
             file.write_table(table)
     elif kind == ".csv.gz":
-        # No name and no time of day inside, or the same log would never give the same bytes.
-        with gzip.GzipFile("", "wb", _GZIP_LEVEL, stream, mtime=0) as packed:
-            packed.writelines(_csv_pieces(table))
+        with _gzip(stream) as packed:
+            packed.writelines(csvtext.pieces(table))
     else:
-        stream.writelines(_csv_pieces(table))
+        stream.writelines(csvtext.pieces(table))
+
+
+def _gzip(stream: BinaryIO) -> gzip.GzipFile:
+    """Without a file name and a time inside, so that the same table gives the same bytes."""
+    return gzip.GzipFile("", "wb", _GZIP_LEVEL, stream, mtime=0)
 
 
 def can_grow(kind: str) -> bool:
@@ -81,11 +78,11 @@ def can_grow(kind: str) -> bool:
 class Growing(Protocol):
     """A file that is written table by table."""
 
-    def add(self, table: pa.Table) -> None:
-        """Write these rows behind the others; the columns are always the same."""
+    def append(self, table: pa.Table) -> None:
+        """Append these rows; the columns are always the same."""
 
-    def tell(self, metadata: Mapping[bytes, bytes]) -> None:
-        """Key-value pairs for the file; CSV has no place for them."""
+    def add_metadata(self, metadata: Mapping[bytes, bytes]) -> None:
+        """Add key-value pairs to the file; CSV cannot hold them."""
 
 
 @contextlib.contextmanager
@@ -97,9 +94,9 @@ def growing(stream: BinaryIO, kind: str) -> Iterator[Growing]:
             yield parquet
             parquet.close()
         finally:
-            parquet.give_up()
+            parquet.abandon()
     elif kind == ".csv.gz":
-        with gzip.GzipFile("", "wb", _GZIP_LEVEL, stream, mtime=0) as packed:
+        with _gzip(stream) as packed:
             yield _Csv(packed)
     else:
         yield _Csv(stream)
@@ -107,13 +104,13 @@ def growing(stream: BinaryIO, kind: str) -> Iterator[Growing]:
 
 class _Csv:
     def __init__(self, stream: BinaryIO | gzip.GzipFile) -> None:
-        self.stream, self.header = stream, True
+        self.stream, self.with_header = stream, True
 
-    def add(self, table: pa.Table) -> None:
-        self.stream.writelines(_csv_pieces(table, self.header))
-        self.header = False
+    def append(self, table: pa.Table) -> None:
+        self.stream.writelines(csvtext.pieces(table, self.with_header))
+        self.with_header = False
 
-    def tell(self, metadata: Mapping[bytes, bytes]) -> None:
+    def add_metadata(self, metadata: Mapping[bytes, bytes]) -> None:
         pass
 
 
@@ -121,23 +118,23 @@ class _Parquet:
     def __init__(self, stream: BinaryIO) -> None:
         self.stream, self.file = stream, cast(Any, None)
 
-    def add(self, table: pa.Table) -> None:
+    def append(self, table: pa.Table) -> None:
         import pyarrow.parquet as pq
 
         if self.file is None:
-            # Arrow's own description of the columns would hide key-value pairs that are told at the end.
-            how = {"compression": "snappy", "use_dictionary": _words(table), "store_schema": False}
+            # With Arrow's schema in the file, readers ignore key-value pairs that are added at the end.
+            how = {"compression": "snappy", "use_dictionary": _not_floating(table), "store_schema": False}
             self.file = pq.ParquetWriter(self.stream, table.schema, **how)
         self.file.write_table(table)
 
-    def tell(self, metadata: Mapping[bytes, bytes]) -> None:
+    def add_metadata(self, metadata: Mapping[bytes, bytes]) -> None:
         self.file.add_key_value_metadata(metadata)
 
     def close(self) -> None:
         self.file.close()
 
-    def give_up(self) -> None:
-        """Of a file that was not closed, lest it be tried once more when nobody listens."""
+    def abandon(self) -> None:
+        """Close a file that was not closed; else its destructor would try and print an error."""
         if self.file is not None and self.file.is_open:
             with contextlib.suppress(Exception):
                 self.file.close()
@@ -145,10 +142,7 @@ class _Parquet:
 
 
 def with_extra(table: pa.Table, extra: pa.Table | None) -> pa.Table:
-    """`table` with the columns of `extra` behind its own.
-
-    Raises UsageError when a name is in both: two columns of one name cannot be told apart in a file.
-    """
+    """`table` followed by the columns of `extra`. Raises UsageError if both have a column of the same name."""
     if extra is None:
         return table
     for name, column in zip(extra.column_names, extra.columns, strict=True):
@@ -160,53 +154,7 @@ def with_extra(table: pa.Table, extra: pa.Table | None) -> pa.Table:
     return table
 
 
-def _words(table: pa.Table) -> list[str]:
+def _not_floating(table: pa.Table) -> list[str]:
     import pyarrow as pa
 
     return [field.name for field in table.schema if not pa.types.is_floating(field.type)]
-
-
-def _csv_pieces(table: pa.Table, with_header: bool = True) -> Iterator[bytes]:
-    import pyarrow as pa
-    import pyarrow.csv
-
-    if with_header:
-        header = io.StringIO()
-        csv.writer(header, lineterminator="\n").writerow(map(no_formula, table.column_names))
-        yield header.getvalue().encode()
-    options = pyarrow.csv.WriteOptions(include_header=False, batch_size=_ROWS_AT_ONCE)
-    for start in range(0, table.num_rows, _ROWS_AT_ONCE):
-        sink = pa.BufferOutputStream()
-        try:
-            pyarrow.csv.write_csv(_for_csv(table.slice(start, _ROWS_AT_ONCE)), sink, options)
-        except pa.ArrowException as error:  # a kept column of lists, say
-            raise OutputError(f"This cannot be written as CSV ({error}); give the output the name .parquet.") from error
-        yield cast(bytes, sink.getvalue().to_pybytes())
-
-
-def no_formula(text: str) -> str:
-    """`text` for a CSV cell: with an apostrophe before what a spreadsheet would take for a formula and run.
-
-    That is text that begins with = + - @, a tab or a carriage return, and is no number; numbers stay numbers.
-    """
-    risky = re.match(_BEGINNING, text) and not re.fullmatch(_NUMBER, text, re.ASCII)
-    return f"'{text}" if risky else text
-
-
-def _for_csv(table: pa.Table) -> pa.Table:
-    """NaN as empty cells, formulas as text."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    for index, field in enumerate(table.schema):
-        if pa.types.is_floating(field.type):
-            column = table.column(index)
-            table = table.set_column(index, field.name, pc.if_else(pc.is_nan(column), None, column))
-        elif pa.types.is_string(field.type) or pa.types.is_large_string(field.type):
-            column = table.column(index)
-            number = pc.match_substring_regex(column, rf"^{_NUMBER}$")
-            risky = pc.and_not(pc.match_substring_regex(column, _BEGINNING), number)
-            if pc.any(risky).as_py():
-                marked = pc.binary_join_element_wise(pa.scalar("'", field.type), column, pa.scalar("", field.type))
-                table = table.set_column(index, field.name, pc.if_else(risky, marked, column))
-    return table

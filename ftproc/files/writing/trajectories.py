@@ -1,4 +1,4 @@
-"""Trajectories out, with everything needed to make them again beside the numbers."""
+"""Trajectories out, with the metadata that are needed to compute them again."""
 
 from __future__ import annotations
 
@@ -23,9 +23,8 @@ if TYPE_CHECKING:
 def to_table(trajectory: Trajectory) -> pa.Table:
     """One Arrow row per time: `row` int64, `outlier_*` uint8, the rest float64 (NaN where not estimated).
 
-    The columns of `trajectory.extra` follow, with their own types; the metadata is JSON under the key
-    `ftproc`.
-    Raises UsageError when an extra column has the name of one of `layout.TRAJECTORY`.
+    The columns of `trajectory.extra` follow, with their own types; the metadata are JSON under the key `ftproc`.
+    Raises UsageError if an extra column has the name of one of `layout.TRAJECTORY`.
     """
     groups: tuple[tuple[Sequence[str], Any], ...] = (
         (layout.MEASUREMENT, trajectory.measurement),
@@ -43,59 +42,60 @@ def to_table(trajectory: Trajectory) -> pa.Table:
 
 
 def write(trajectory: Trajectory, target: Target) -> None:
-    """Write a file of a kind that `layout` names, or CSV on standard output for `-`, whole or not at all.
+    """Write a file of a kind that `layout` names, or CSV on standard output for `-`, complete or not at all.
 
-    Beside a CSV file or a map goes its metadata, see `sidecar`. The same trajectory gives the same bytes.
-    Raises OutputError; BrokenPipeError when standard output is closed; UsageError as `to_table` and `maps.check`.
+    The metadata of a CSV file or a map go into its `sidecar`. The same trajectory gives the same bytes.
+    Raises OutputError; BrokenPipeError if standard output is closed; UsageError as `to_table` and `maps.check`.
     """
     beside = sidecar(target)
     if beside is None:
         tables.write_table(to_table(trajectory), target)
         return
-    drawn = layout.map_kind(target)
-    whole = maps.as_bytes(trajectory, drawn) if drawn else b""
+    map_kind = layout.map_kind(target)
+    drawn = maps.as_bytes(trajectory, map_kind) if map_kind else b""
     with atomic.replacing(target) as stream:
-        if drawn:
-            stream.write(whole)
+        if map_kind:
+            stream.write(drawn)
         else:
             tables.write_stream(to_table(trajectory), stream, tables.kind_of(target))
-        _write_beside(beside, stream, trajectory.metadata)
+        _write_sidecar(beside, stream, trajectory.metadata)
 
 
 def write_parts(parts: Iterable[Trajectory], metadata: Callable[[], Mapping[str, Any]], target: Target) -> None:
-    """Write a trajectory that comes in stretches, holding one of them in memory; raises as `write`.
+    """Write a trajectory that comes in stretches, with one of them in memory at a time; raises as `write`.
 
-    metadata: is asked for when the last stretch has come. Feather and maps, which have their metadata or their bounds
-    in front, are put together in memory, and so is standard output: nothing of a failed run goes there.
+    metadata: called after the last stretch. Feather and maps, whose metadata or bounds are at the start of the file,
+    are built in memory; so is standard output, which gets nothing of a failed run.
     """
     stretches = iter(parts)
-    begun = list(itertools.islice(stretches, 2))
-    if len(begun) == 1 or not _streamed(begun[0], target):
-        whole = joined([*begun, *stretches])
+    first = list(itertools.islice(stretches, 2))
+    if len(first) == 1 or not _can_stream(first[0], target):
+        whole = joined([*first, *stretches])
         write(replace(whole, metadata={**whole.metadata, **metadata()}), target)
         return
-    beside, known = sidecar(target), begun[0].metadata
+    beside = sidecar(target)
     with atomic.replacing(target) as stream:
         with tables.growing(stream, tables.kind_of(target)) as file:
-            for stretch in itertools.chain(begun, stretches):
-                file.add(to_table(stretch).replace_schema_metadata(None))
-            told = {**known, **metadata()}
-            file.tell({METADATA_KEY: _to_json(told, indent=None)})
+            for stretch in itertools.chain(first, stretches):
+                file.append(to_table(stretch).replace_schema_metadata(None))
+            complete = {**first[0].metadata, **metadata()}
+            file.add_metadata({METADATA_KEY: _to_json(complete, indent=None)})
         if beside is not None:
-            _write_beside(beside, stream, told)
+            _write_sidecar(beside, stream, complete)
 
 
-def _streamed(stretch: Trajectory, target: Target) -> bool:
-    """Whether a file can grow; further columns must be of numbers, as other types are told in front."""
+def _can_stream(stretch: Trajectory, target: Target) -> bool:
+    """Whether the file can grow. Extra columns must be float64: a growing Parquet file does not store Arrow types."""
     import pyarrow as pa
 
     plain = stretch.extra is None or all(pa.types.is_float64(kind) for kind in stretch.extra.schema.types)
     return plain and layout.map_kind(target) is None and str(target) != "-" and tables.can_grow(tables.kind_of(target))
 
 
-def _write_beside(beside: Target, stream: BinaryIO, metadata: Mapping[str, Any]) -> None:
-    """The sidecar is in place before the file it belongs to: whoever waits for the file finds both."""
-    _sync_if_file(stream)
+def _write_sidecar(beside: Target, stream: BinaryIO, metadata: Mapping[str, Any]) -> None:
+    """Write the sidecar before its file appears on `stream`, so that a process waiting for the file finds both."""
+    if stream.seekable():  # not a pipe
+        atomic.sync(stream)
     with atomic.replacing(beside) as text:
         text.write(_to_json(metadata, indent=2) + b"\n")
 
@@ -105,7 +105,7 @@ def _to_json(metadata: Mapping[str, Any], indent: int | None) -> bytes:
 
 
 def _plain(value: Any) -> Any:
-    """numpy values, tuples and paths -> what JSON has; NaN and infinity -> null, which JSON has not."""
+    """numpy values, tuples and paths -> JSON types; NaN and infinity, which JSON lacks, -> null."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
@@ -115,8 +115,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and not np.isfinite(value):
         return None
     return str(value) if isinstance(value, Path) else value
-
-
-def _sync_if_file(stream: BinaryIO) -> None:
-    if stream.seekable():
-        atomic.sync(stream)

@@ -12,7 +12,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from ftproc.errors import InputError
-from ftproc.files.reading import columnar, csvtext, header, large, logs, tables
+from ftproc.files.reading import large, logs
+from ftproc.files.reading.formats import columnar, content, csvtext
 from ftproc.settings import Air, Station
 
 ROWS = 3000
@@ -21,8 +22,8 @@ ROWS = 3000
 @pytest.fixture
 def in_blocks(monkeypatch):
     """Every file counts as large."""
-    monkeypatch.setattr(header, "LARGE", 100)
-    monkeypatch.setattr(tables, "_HEAD", 2000)
+    monkeypatch.setattr(content, "LARGE", 100)
+    monkeypatch.setattr(csvtext, "_HEAD", 2000)
     monkeypatch.setattr(columnar, "_BATCH_ROWS", 700)
     monkeypatch.setattr(csvtext, "_BLOCK", 20_000)
 
@@ -58,7 +59,7 @@ def both(path, monkeypatch, **how):
     """The log read in blocks, and at once."""
     cut = logs.read(path, **how)
     assert isinstance(cut.time_s, np.memmap)
-    monkeypatch.setattr(header, "LARGE", 1 << 40)
+    monkeypatch.setattr(content, "LARGE", 1 << 40)
     return cut, logs.read(path, **how)
 
 
@@ -196,7 +197,7 @@ def test_ray_is_bent_by_the_distance_read_far_away(tmp_path, in_blocks, monkeypa
     path.write_text(text(columns(), {k: f"{10 + 0.1 * k:.9g},,5,5" for k in range(1000, 2500)}))
     station = Station(refraction=Air())
     log = logs.read(path, station=station)
-    monkeypatch.setattr(header, "LARGE", 1 << 40)
+    monkeypatch.setattr(content, "LARGE", 1 << 40)
     same(log, logs.read(path, station=station))
 
 

@@ -1,23 +1,20 @@
-"""What a log becomes when there is nothing to complain about."""
+"""Logs as they are read: order, units, missing readings, kept columns."""
 
-import io
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from ftproc.errors import FtprocError, UsageError
 from ftproc.files.reading import logs
 from ftproc.files.writing import flights
 from ftproc.records import MeasurementLog
-from tests.files.conftest import Make
+from tests.files.conftest import Make, refused
 
 HEADER = "time_s,range_m,azimuth_rad,elevation_rad\n"
 NAN = math.nan
@@ -101,7 +98,7 @@ def test_an_absent_column_is_missing_throughout(make: Make) -> None:
     assert np.array_equal(log.measurement, [[NAN, 1, 0.5]], equal_nan=True)
 
 
-def test_wild_readings_stay_for_the_editing_to_judge(make: Make) -> None:
+def test_outliers_stay_for_editing(make: Make) -> None:
     log = logs.read(make(HEADER + "0,-5,1,0.1\n1,0,99,0.1\n2,1e12,1,-7\n"))
     assert log.measurement.tolist() == [[-5, 1, 0.1], [0, 99, 0.1], [1e12, 1, -7]]
 
@@ -124,85 +121,6 @@ def test_azimuth_from_north_names_the_axes_and_leaves_the_angle(make: Make) -> N
     assert (log.frame, log.measurement[0, 1]) == ("north-east-up", 0.25)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "\ufefft,R,A,E\r\n0.5,1000.25,1,0.5\r\n\r\n1,2e3,,0.25\r\n",
-        "\r\nt , R, A ,E\r0.5,+1000.25,1, 0.5\r1.0, 2000 ,,.25",
-        '"t","R","A","E"\n"0.5","1000.25","1","0.5"\n1,2000,"",0.25\n',
-        "t\tR\tA\tE\n0.5\t1000.25\t1\t0.5\n1\t2000\t\t0.25\n",
-        "t;R;A;E\n0.5;1000.25;1;0.5\n1;2000;;0.25\n",
-        "t;R;A;E\n0,5;1000,25;1;0,5\n1;2000;;0,25\n",
-        "t;R;A;E\n0,5;1000,25;1;0.5\n1;2000;;0.25\n",
-    ],
-)
-def test_csv_of_other_hands_is_read_where_there_is_no_doubt(make: Make, text: str) -> None:
-    log = logs.read(make(text))
-    assert log.time_s.tolist() == [0.5, 1.0]
-    assert np.array_equal(log.measurement, [[1000.25, 1, 0.5], [2000, NAN, 0.25]], equal_nan=True)
-
-
-@pytest.mark.parametrize("zone", ["", "Z", "+00:00"])
-@pytest.mark.parametrize("between", ["T", " "])
-def test_timestamps_count_from_the_midnight_before_the_earliest(make: Make, zone: str, between: str) -> None:
-    moments = [f"2024-06-01{between}00:00:01.5", f"2024-05-31{between}23:59:59.123456", f"2024-06-01{between}12:00:00"]
-    log = logs.read(make("time,R\n" + "".join(f"{moment}{zone},1\n" for moment in moments) + ",1\n"))
-    assert log.time_s.tolist() == [86399.123456, 86401.5, 129600.0]
-    assert (log.row.tolist(), log.rows_without_time) == ([1, 0, 2], (3,))
-
-
-@pytest.mark.parametrize("moment", ["20240531T010000.25Z", "2024-05-31T03:00:00,25+02:00", "2024-05-31 01:00:00,250"])
-def test_other_ways_to_write_iso_8601(make: Make, moment: str) -> None:
-    assert logs.read(make(f"time;R\n{moment};1\n;2\n")).time_s.tolist() == [3600.25]
-
-
-@given(st.lists(st.integers(0, 7 * 86400 * 10**6), min_size=1, max_size=20))
-@settings(deadline=None)
-def test_timestamps_keep_microseconds_for_a_week(ticks: list[int]) -> None:
-    day = 19874 * 86400 * 10**6
-    first = min(ticks) // (86400 * 10**6) * 86400 * 10**6
-    for unit in ("us", "ns"):
-        column = pa.array([day + tick for tick in ticks], pa.timestamp("us")).cast(pa.timestamp(unit, "UTC"))
-        log = logs.read(pa.table({"time": column, "R": [1.0] * len(ticks)}))
-        assert log.time_s.tolist() == sorted((tick - first) / 10**6 for tick in ticks)
-
-
-def test_parquet_types_of_other_hands(tmp_path: Path) -> None:
-    table = pa.table(
-        {
-            "time": pa.array([0, 1500, None], pa.duration("ms")),
-            "R": pa.array([1, None, 3], pa.int16()),
-            "A": pa.array([0.5, 1.5, None], pa.float32()),
-            "E": pa.array(["0.25", " null ", "1e-1"]).dictionary_encode(),
-        }
-    )
-    pq.write_table(table, tmp_path / "log.PARQUET")
-    log = logs.read(tmp_path / "log.PARQUET")
-    assert log.time_s.tolist() == [0, 1.5]
-    assert np.array_equal(log.measurement, [[1, 0.5, 0.25], [NAN, 1.5, NAN]], equal_nan=True)
-    assert log.rows_without_time == (2,)
-
-
-def test_a_data_frame_and_a_table_are_logs_too() -> None:
-    frame = pd.DataFrame({"t": [1, 0, 2], "R": [1.0, None, 3.0], 7: ["a", "b", "c"]}, index=[9, 9, 9])
-    for source in (frame, pa.table({"t": [1, 0, 2], "R": [1.0, None, 3.0]})):
-        log = logs.read(source)
-        assert log.name == "<table>"
-        assert log.row.tolist() == [1, 0, 2]
-        assert np.array_equal(log.measurement[:, 0], [NAN, 1, 3], equal_nan=True)
-    moments = pd.DataFrame({"time": pd.to_datetime(["2024-05-31T01:00:00.25", "NaT"]), "R": ["5", "6"]})
-    assert logs.read(moments).time_s.tolist() == [3600.25]
-
-
-def test_standard_input_is_csv_gzipped_or_not(make: Make, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    log = logs.read(make(HEADER + "0,1,1,1\n"))
-    flights.write_log(log, tmp_path / "log.csv.gz")
-    for path in (tmp_path / "log.csv", tmp_path / "log.csv.gz"):
-        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(path.read_bytes())))
-        read = logs.read("-")
-        assert (read.name, read.measurement.tolist()) == ("<stdin>", [[1, 1, 1]])
-
-
 def test_other_columns_are_ignored_or_kept_row_for_row(make: Make) -> None:
     path = make("note,time_s,snr,range_m,R,empty\nc,2,3,30,x,\na,1,1,10,y,\nz,,0,0,y,\n")
     assert logs.read(path).extra is None
@@ -210,11 +128,6 @@ def test_other_columns_are_ignored_or_kept_row_for_row(make: Make) -> None:
     assert log.extra is not None
     assert log.extra.to_pydict() == {"note": ["a", "c"], "snr": [1, 3], "R": ["y", "x"], "empty": [None, None]}
     assert logs.read(make(HEADER + "0,1,1,1\n"), keep_columns=True).extra is None
-
-
-def test_an_ignored_column_may_hold_anything(make: Make) -> None:
-    log = logs.read(make(b't,R,note\n0,1,\xf6\n1,2,5" gun\n2,3,"a, b"\n'))
-    assert log.measurement[:, 0].tolist() == [1, 2, 3]
 
 
 def test_kept_columns_are_written_behind_the_canonical_ones(make: Make, tmp_path: Path) -> None:
@@ -228,3 +141,23 @@ def test_the_arrays_may_be_written_to(make: Make) -> None:
     assert log.time_s.flags.writeable
     assert log.measurement.flags.writeable
     assert log.measurement.flags.c_contiguous
+
+
+def test_options_that_are_not_understood(make: Make) -> None:
+    path = make(HEADER + "0,1,1,1\n")
+    for options, expected in (
+        ({"azimuth_from": "south"}, '--azimuth-from: "south" is not understood; say x or north.'),
+        ({"units": "range=yd"}, '"yd" is not a unit of range'),
+        ({"columns": "range"}, '"range" is not QUANTITY=NAME'),
+    ):
+        with pytest.raises(UsageError) as caught:
+            logs.read(path, **options)  # type: ignore[arg-type]
+        assert expected in str(caught.value)
+        assert isinstance(caught.value, FtprocError)
+        assert caught.value.exit_code == 2
+
+
+def test_kept_columns_must_have_different_names(make: Make) -> None:
+    sentence = refused(make("t,R,n,n\n0,1,2,3\n"), keep_columns=True)
+    assert 'column "n" is there twice, so both cannot be kept' in sentence
+    assert "leave --keep-columns out" in sentence

@@ -4,9 +4,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ftproc.errors import InputError, UsageError
-from ftproc.files.reading.schema import CANONICAL, parse_columns, remarks, resolve
-from ftproc.files.units import ALIASES, UNITS, parse_units
+from ftproc.errors import InputError
+from ftproc.files.layout import CANONICAL
+from ftproc.files.options import parse_units
+from ftproc.files.reading.schema import remarks, resolve
+from ftproc.files.units import ALIASES, UNITS
 
 
 def found(
@@ -84,7 +86,7 @@ def test_a_log_without_time_lists_its_columns_and_the_nearest_one() -> None:
 
 def test_a_truth_is_not_taken_for_a_log_with_a_strange_azimuth() -> None:
     sentence = refused(["time_s", "x_m", "y_m", "z_m", "ax_mps2", "ay_mps2", "az_mps2"])
-    assert "a truth or a trajectory by its x_m, y_m, z_m, for `ftproc score`, not a log" in sentence
+    assert "x_m, y_m, z_m are columns of a truth or a trajectory, for `ftproc score`, not of a log: it has" in sentence
 
 
 def test_a_long_list_of_columns_is_cut() -> None:
@@ -170,27 +172,6 @@ def test_rates_and_sigmas_are_not_taken_for_a_quantity_in_an_unknown_unit() -> N
     names = ["time_s", "range_rate", "range_sigma", "azimuth_rad"]
     assert set(found(names)) == {"time", "azimuth"}
     assert set(found(["time_s", "range_m", "range_yd"])) == {"time", "range"}
-
-
-def test_columns_from_text_and_from_a_mapping_are_the_same() -> None:
-    assert parse_columns("time=T0, R=Slant Range") == {"time": "T0", "range": "Slant Range"}
-    assert parse_columns({"t": "T0", "range": "Slant Range"}) == {"time": "T0", "range": "Slant Range"}
-
-
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ("T0", '--columns: "T0" is not QUANTITY=NAME, as in time=T0,range=RNG'),
-        ("speed=V", '--columns: "speed" is not a quantity of a log; expected time, range, azimuth, elevation'),
-        ("range=X,azimuth=X", '--columns: column "X" cannot be both range and azimuth'),
-        ("time=A,t=B", "--columns names time twice"),
-        ("time=none", "--columns: a log cannot do without its time"),
-    ],
-)
-def test_what_is_wrong_with_columns_is_said(text: str, sentence: str) -> None:
-    with pytest.raises(UsageError) as caught:
-        parse_columns(text)
-    assert sentence in str(caught.value)
 
 
 @pytest.mark.parametrize(

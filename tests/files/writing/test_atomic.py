@@ -50,13 +50,13 @@ def test_a_killed_writer_leaves_the_earlier_file(tmp_path: Path) -> None:
     target = tmp_path / "out.csv"
     target.write_bytes(b"before")
     code = (
-        "import sys, time\nfrom ftproc.files.atomic import replacing\n"
+        "import sys, time\nfrom ftproc.files.writing.atomic import replacing\n"
         "with replacing(sys.argv[1]) as stream:\n"
         "    stream.write(b'half'); stream.flush(); print('written', flush=True); time.sleep(60)\n"
     )
     with subprocess.Popen([sys.executable, "-c", code, str(target)], stdout=subprocess.PIPE) as writer:
         assert writer.stdout is not None
-        writer.stdout.readline()
+        assert writer.stdout.readline() == b"written\n"
         writer.send_signal(signal.SIGKILL)
     assert target.read_bytes() == b"before"
 

@@ -99,7 +99,7 @@ def test_czml(epoch, first):
     np.testing.assert_array_equal(samples[:, 0], first + np.arange(7.0))
     same_place(samples[:, 1:], expected())
     assert target["position"]["epoch"] == (epoch or "2000-01-01T00:00:00Z")
-    assert ("its first sample is put at 2000-01-01" in target["description"]) == (not epoch)
+    assert ("its first sample is placed at 2000-01-01" in target["description"]) == (not epoch)
     start = "2024-05-31T00:01:40" if epoch else "2000-01-01T00:00:00"
     assert document["clock"]["interval"].startswith(start)
     assert station["position"]["cartographicDegrees"] == [11.2803, 48.0812, 612.0]

@@ -1,7 +1,7 @@
-"""CSV bytes -> Arrow table: encoding, header, separator, and sentences for what is wrong with the text.
+"""CSV: encoding, header, separator -> Arrow table; messages for what is wrong with the text.
 
-Separators are comma, semicolon or tab, told by the header line. Lines may end in LF, CRLF or CR; empty lines
-are skipped and not counted as rows, as pandas does. In a semicolon file numbers may have decimal commas.
+The separator is the comma, semicolon or tab that is most frequent in the header line. Lines end in LF, CRLF or CR;
+empty lines are skipped and not counted as rows, as in pandas. In a semicolon file numbers may have decimal commas.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from ftproc.errors import InputError
+from ftproc.errors import InputError, first_line, row_named
+from ftproc.files.reading.formats import content
+from ftproc.files.reading.formats.header import Blocks, TableHeader
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -24,7 +26,8 @@ MISSING_WORDS = (
     *("NULL", "Null", "null", "None", "none", "1.#IND", "-1.#IND", "1.#QNAN", "-1.#QNAN"),
 )
 
-_BLOCK = 8 << 20  # bytes that are parsed at once of a large file
+_HEAD = 1 << 20  # bytes of a large file that contain its header line
+_BLOCK = 8 << 20  # bytes of a large file that are parsed at once
 
 _MAGIC = {
     b"\xff\xfe": "is UTF-16 text; save it as UTF-8 (iconv -f UTF-16 -t UTF-8)",
@@ -34,33 +37,62 @@ _MAGIC = {
 }
 
 
-def row_named(row: int) -> str:
-    """How every message names a row: as the `row` column of a trajectory does, and saying so."""
-    return f"row {row} (the first data row is 0)"
+def csv_file(name: str, path: Path) -> TableHeader:
+    """A .csv file, even gzipped. Of a large one only the header is read now. Raises InputError."""
+    if content.read(name, path, limit=2) != content.GZIP_MAGIC and path.stat().st_size > content.LARGE:
+        return _large_file(name, path)
+    return csv_bytes(name, content.read(name, path))
+
+
+def gzipped_csv(name: str, path: Path) -> TableHeader:
+    """A .csv.gz file. Raises InputError."""
+    return _whole(split(name, content.gunzip(name, content.read(name, path))))
+
+
+def csv_bytes(name: str, data: bytes) -> TableHeader:
+    """The bytes of a CSV file, even gzipped. Raises InputError."""
+    return _whole(split(name, content.gunzip(name, data) if data.startswith(content.GZIP_MAGIC) else data))
+
+
+def _whole(text: CsvText) -> TableHeader:
+    return TableHeader(text.source, text.names, text.load, decimal_comma=text.delimiter == ";")
+
+
+def _large_file(name: str, path: Path) -> TableHeader:
+    head = split(name, content.read(name, path, limit=_HEAD))
+
+    def load(numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
+        return split(name, content.read(name, path)).load(numeric, others)
+
+    def blocks(numeric: Sequence[int]) -> Blocks:
+        size = path.stat().st_size
+        rows = max(bytes(head.body).count(b"\n"), 1) * size // _HEAD
+        return Blocks((text.load(numeric, ()) for text in in_blocks(path, head)), rows)
+
+    return TableHeader(name, head.names, load, head.delimiter == ";", blocks=blocks)
 
 
 class CsvText(NamedTuple):
-    """The text of one CSV file, its header already taken apart."""
+    """The text of one CSV file, its header line parsed."""
 
     source: str
     names: list[str]
     delimiter: str
     body: memoryview  # the bytes after the header line
-    open_quotation: bool  # an odd number of quotation marks: one may swallow all rows after it
-    begins: int = 0  # the byte after the header line
+    odd_quotes: bool  # an odd number of quotation marks: an unclosed one may swallow all rows after it
+    body_offset: int = 0  # of the body in the file, bytes
 
     def load(self, numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
         """Columns `numeric`, then `others`, by position.
 
-        The numeric ones are all float64, or all text when any of them has a cell that is not a number; the
-        types of the others are inferred. Raises InputError naming the first row that has too many or too few
-        cells.
+        The numeric ones are all float64, or all text if any of them has a cell that is not a number; the types of
+        the others are inferred. Raises InputError, naming the first row with too many or too few cells.
         """
         import pyarrow as pa
 
         if not re.search(rb"[^\r\n]", self.body):
             raise InputError(f"{self.source}: there are column names but no rows.")
-        if self.open_quotation:
+        if self.odd_quotes:
             self._refuse_ragged()
         try:
             return self._parse(numeric, others, pa.float64())
@@ -70,8 +102,8 @@ class CsvText(NamedTuple):
             return self._parse(numeric, others, pa.binary())
         except pa.ArrowInvalid as error:
             self._refuse_ragged()
-            reason = str(error).splitlines()[0][:200]
-            raise InputError(f"{self.source}: cannot be read as CSV ({reason}). Save it as CSV anew.") from error
+            reason = first_line(error)
+            raise InputError(f"{self.source}: cannot be read as CSV ({reason}). Save it as CSV again.") from error
 
     def _parse(self, numeric: Sequence[int], others: Sequence[int], wanted: pa.DataType) -> pa.Table:
         import pyarrow as pa
@@ -92,7 +124,7 @@ class CsvText(NamedTuple):
         )
         table = table.rename_columns([self.names[position] for position in chosen])
         for field in list(table.schema)[len(numeric) :]:
-            if pa.types.is_binary(field.type):  # what pyarrow makes of text it cannot decode
+            if pa.types.is_binary(field.type):  # the type that pyarrow infers for text it cannot decode
                 raise InputError(
                     f'{self.source}: column "{field.name}" is not UTF-8 text, so it cannot be kept; '
                     "save the file as UTF-8, or leave --keep-columns out."
@@ -100,13 +132,13 @@ class CsvText(NamedTuple):
         return table
 
     def _refuse_ragged(self) -> None:
-        """Raise InputError for the first row with a wrong number of cells, read slowly in plain Python."""
+        """Raise InputError for the first row with a wrong number of cells, found in plain Python."""
         text = io.TextIOWrapper(io.BytesIO(self.body), encoding="utf-8", errors="replace", newline="")
         rows = (cells for cells in csv.reader(text, delimiter=self.delimiter) if cells)
         row = -1
         try:
             for row, cells in enumerate(rows):
-                if len(cells) != len(self.names) or (self.open_quotation and _spans_lines(cells)):
+                if len(cells) != len(self.names) or (self.odd_quotes and _spans_lines(cells)):
                     raise InputError(self._ragged(row, cells))
         except csv.Error as error:
             place = f"{self.source}: {row_named(row + 1)}"
@@ -127,7 +159,7 @@ class CsvText(NamedTuple):
 
 
 def split(source: str, data: bytes) -> CsvText:
-    """Take the header line off `data`. Raises InputError for what is not UTF-8 text with a header line."""
+    """Parse the header line of `data`. Raises InputError unless it is UTF-8 text with a header line."""
     for magic, reason in _MAGIC.items():
         if data.startswith(magic):
             raise InputError(f"{source}: this {reason}.")
@@ -144,12 +176,12 @@ def split(source: str, data: bytes) -> CsvText:
 
 
 def in_blocks(path: Path, head: CsvText) -> Iterator[CsvText]:
-    """The rows of a file in blocks that end with a line; `head` is what its beginning was split into.
+    """The rows of a file in blocks of whole lines; `head` comes from `split` of its beginning.
 
-    Raises InputError where rows and lines may not be the same.
+    Raises InputError where a row may span lines, or only the whole file can tell what a point means.
     """
     with path.open("rb") as stream:
-        stream.seek(head.begins)
+        stream.seek(head.body_offset)
         rest, marks = b"", set()
         while data := stream.read(_BLOCK):
             data = rest + data
@@ -157,7 +189,7 @@ def in_blocks(path: Path, head: CsvText) -> Iterator[CsvText]:
             rest = data[end:]
             if len(rest) > _BLOCK:
                 raise InputError(f"{head.source}: a line of more than {_BLOCK >> 20} MiB is no row of a log.")
-            if head.delimiter == ";":  # what a point means hangs on whether there is a comma anywhere
+            if head.delimiter == ";":  # points separate thousands if there is a comma anywhere in the file
                 marks |= {mark for mark in (b",", b".") if mark in data}
                 if len(marks) > 1:
                     raise InputError(f"{head.source}: decimal commas and points.")
@@ -170,7 +202,7 @@ def _block(head: CsvText, body: memoryview) -> Iterator[CsvText]:
         return
     if b'"' in bytes(body):
         raise InputError(f"{head.source}: quotation marks, in which a line may end.")
-    yield head._replace(body=body, open_quotation=False)
+    yield head._replace(body=body, odd_quotes=False)
 
 
 def _spans_lines(cells: list[str]) -> bool:
@@ -185,12 +217,12 @@ def _names(source: str, header: bytes) -> tuple[list[str], str]:
             f"{source}: the header line is not UTF-8 (Latin-1 or Windows text?); "
             "save the file as UTF-8 (iconv -f LATIN1 -t UTF-8)."
         ) from error
-    delimiter = max(",;\t", key=line.count)  # the first of them when none is there
+    delimiter = max(",;\t", key=line.count)  # the comma if there is none
     try:
         names = [name.strip() for name in next(csv.reader([line], delimiter=delimiter))]
     except csv.Error as error:
         raise InputError(
-            f"{source}: the header line cannot be read as CSV ({error}); correct it, or delete what stands before it."
+            f"{source}: the header line cannot be read as CSV ({error}); correct it, or delete the lines before it."
         ) from error
     if len(names) == 1 and re.search(r"\S[ |]+\S", names[0]):
         raise InputError(

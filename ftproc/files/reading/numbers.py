@@ -1,0 +1,148 @@
+"""Arrow columns of any type -> float64; messages that name the first cell that is not a number.
+
+Work is done on whole columns; single cells are looked at only to name the wrong one.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ftproc.errors import InputError, row_named
+from ftproc.files import arrow
+from ftproc.files.reading.formats.csvtext import MISSING_WORDS
+from ftproc.records import FloatArray
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
+
+#: For a cell: None if it is right, else what it is not and (perhaps empty) the cure.
+Check = Callable[[str], tuple[str, str] | None]
+
+
+class Origin(NamedTuple):
+    """Where a column comes from, for messages. expected: such as `a range in km`. cure: of a bad cell."""
+
+    source: str
+    column: str
+    expected: str
+    decimal_comma: bool = False
+    cure: str = "Correct the cell, or leave it empty if there was no reading."
+
+    def bad_cell(self, row: int, text: str, why: str, cure: str = "") -> InputError:
+        """The error for the cell in 0-based data row `row`."""
+        return InputError(
+            f'{self.source}: {row_named(row)}, column "{self.column}": '
+            f'"{" ".join(text[:60].split())}" is not {why}; expected {self.expected}. {cure or self.cure}'
+        )
+
+    def first_bad_cell(self, text: pa.ChunkedArray, check: Check) -> InputError:
+        """The error for the first cell that does not pass `check`."""
+        for row, cell in enumerate(text.to_pylist()):
+            found = None if cell is None else check(cell)
+            if found is not None:
+                return self.bad_cell(row, cell, *found)
+        return InputError(f'{self.source}: column "{self.column}" cannot be read; expected {self.expected}.')
+
+
+def numbers(column: pa.ChunkedArray, origin: Origin) -> FloatArray:
+    """(n,) float64, NaN where missing. Raises InputError for the first cell that is no finite number."""
+    values = without_text(column)
+    if values is None:
+        text = as_text(column)
+        values = parsed(text, origin.decimal_comma)
+        if values is None:
+            raise origin.first_bad_cell(text, not_a_number(text, origin.decimal_comma))
+    infinite = np.isinf(values)
+    if infinite.any():
+        row = int(np.argmax(infinite))
+        raise origin.bad_cell(row, f"{values[row]:g}", "finite")
+    return values
+
+
+def without_text(column: pa.ChunkedArray) -> FloatArray | None:
+    """The values of a column of numbers, or None for other types."""
+    import pyarrow as pa
+
+    types, kind = pa.types, column.type
+    tests = (types.is_integer, types.is_floating, types.is_decimal, types.is_null)
+    if types.is_float64(kind):
+        return arrow.to_numpy(column)  # a cast, even to the same type, loads more of pyarrow
+    if not any(test(kind) for test in tests):
+        return None
+    return arrow.to_numpy(column.cast(pa.float64(), safe=False))
+
+
+def parsed(text: pa.ChunkedArray, decimal_comma: bool) -> FloatArray | None:
+    """The values of a column of text, or None if a cell is not a number."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    if decimal_comma and _has_comma(text):
+        # A point in such a column would separate thousands; "?" makes it no number.
+        text = pc.replace_substring(pc.replace_substring(text, ".", "?"), ",", ".")
+    try:
+        return arrow.to_numpy(text.cast(pa.float64()))
+    except pa.ArrowInvalid:
+        return None
+
+
+def as_text(column: pa.ChunkedArray) -> pa.ChunkedArray:
+    """The column as trimmed strings, null where missing."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    types, kind = pa.types, column.type
+    if types.is_dictionary(kind):
+        column = column.cast(kind.value_type)
+    if types.is_binary(column.type) or types.is_large_binary(column.type):
+        try:
+            column = column.cast(pa.string())
+        except pa.ArrowInvalid:  # not UTF-8: bytes that cannot be decoded become the replacement character
+            cells = [None if cell is None else cell.decode("utf-8", "replace") for cell in column.to_pylist()]
+            column = pa.chunked_array([pa.array(cells, pa.string())])
+    elif not (types.is_string(column.type) or types.is_large_string(column.type)):
+        cells = [None if cell is None else str(cell) for cell in _in_python(column)]
+        column = pa.chunked_array([pa.array(cells, pa.string())])
+    trimmed = pc.utf8_trim_whitespace(column)
+    return pc.if_else(pc.is_in(trimmed, pa.array(MISSING_WORDS, trimmed.type)), None, trimmed)
+
+
+def _in_python(column: pa.ChunkedArray) -> list[object]:
+    import pyarrow as pa
+
+    try:
+        return list(column.to_pylist())
+    except (OverflowError, ValueError):  # a time beyond Python's calendar
+        ticks = column.cast(pa.int64()).to_pylist()
+        return [None if tick is None else f"{tick} as {column.type}" for tick in ticks]
+
+
+def not_a_number(text: pa.ChunkedArray, decimal_comma: bool) -> Check:
+    """The check for the cells of `text`. decimal_comma: whether the file may have them."""
+    commas = decimal_comma and _has_comma(text)
+
+    def check(cell: str) -> tuple[str, str] | None:
+        if (_COMMA if commas else _POINT).fullmatch(cell) or cell.lower().lstrip("+-") in ("inf", "infinity"):
+            return None
+        if commas and _POINT.fullmatch(cell):
+            return "a number with a decimal comma, like others of its column", "Write all alike."
+        if _COMMA.fullmatch(cell):
+            return "a number with a decimal point", "Write points, or separate the cells with semicolons."
+        if re.match(r"[+-]?\d{1,2}:\d{2}", cell):
+            return "a number", "A time of day needs its date: 2024-05-31T12:34:56.789Z, or count seconds."
+        return "a number", ""
+
+    return check
+
+
+def _has_comma(text: pa.ChunkedArray) -> bool:
+    import pyarrow.compute as pc
+
+    return bool(pc.any(pc.match_substring(text, ",")).as_py())

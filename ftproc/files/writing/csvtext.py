@@ -1,0 +1,65 @@
+"""Arrow tables -> CSV text: NaN as empty cells, and no cell that a spreadsheet would run as a formula."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, cast
+
+from ftproc.errors import OutputError
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_ROWS_AT_ONCE = 65536  # of text held in memory
+_NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
+_FORMULA = r"^[=+\-@\t\r]"
+
+
+def pieces(table: pa.Table, with_header: bool = True) -> Iterator[bytes]:
+    """The text, some rows at a time. Raises OutputError for a column that CSV cannot hold."""
+    import pyarrow as pa
+    import pyarrow.csv
+
+    if with_header:
+        header = io.StringIO()
+        csv.writer(header, lineterminator="\n").writerow(map(no_formula, table.column_names))
+        yield header.getvalue().encode()
+    options = pyarrow.csv.WriteOptions(include_header=False, batch_size=_ROWS_AT_ONCE)
+    for start in range(0, table.num_rows, _ROWS_AT_ONCE):
+        sink = pa.BufferOutputStream()
+        try:
+            pyarrow.csv.write_csv(_for_csv(table.slice(start, _ROWS_AT_ONCE)), sink, options)
+        except pa.ArrowException as error:  # such as a kept column of lists
+            raise OutputError(f"This cannot be written as CSV ({error}); give the output the name .parquet.") from error
+        yield cast(bytes, sink.getvalue().to_pybytes())
+
+
+def no_formula(text: str) -> str:
+    """`text` for a CSV cell, with an apostrophe in front if a spreadsheet would run it as a formula.
+
+    That is text that starts with = + - @, a tab or a carriage return and is not a number.
+    """
+    risky = re.match(_FORMULA, text) and not re.fullmatch(_NUMBER, text, re.ASCII)
+    return f"'{text}" if risky else text
+
+
+def _for_csv(table: pa.Table) -> pa.Table:
+    """NaN as missing, formulas as text."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    for index, field in enumerate(table.schema):
+        if pa.types.is_floating(field.type):
+            column = table.column(index)
+            table = table.set_column(index, field.name, pc.if_else(pc.is_nan(column), None, column))
+        elif pa.types.is_string(field.type) or pa.types.is_large_string(field.type):
+            column = table.column(index)
+            number = pc.match_substring_regex(column, rf"^{_NUMBER}$")
+            risky = pc.and_not(pc.match_substring_regex(column, _FORMULA), number)
+            if pc.any(risky).as_py():
+                marked = pc.binary_join_element_wise(pa.scalar("'", field.type), column, pa.scalar("", field.type))
+                table = table.set_column(index, field.name, pc.if_else(risky, marked, column))
+    return table

@@ -1,0 +1,99 @@
+"""CSV: text as other programs write it, and what is refused."""
+
+import gzip
+import io
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ftproc.files.reading import logs
+from ftproc.files.writing import flights
+from tests.files.conftest import Make, refused
+
+HEADER = "time_s,range_m,azimuth_rad,elevation_rad\n"
+NAN = np.nan
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\ufefft,R,A,E\r\n0.5,1000.25,1,0.5\r\n\r\n1,2e3,,0.25\r\n",
+        "\r\nt , R, A ,E\r0.5,+1000.25,1, 0.5\r1.0, 2000 ,,.25",
+        '"t","R","A","E"\n"0.5","1000.25","1","0.5"\n1,2000,"",0.25\n',
+        "t\tR\tA\tE\n0.5\t1000.25\t1\t0.5\n1\t2000\t\t0.25\n",
+        "t;R;A;E\n0.5;1000.25;1;0.5\n1;2000;;0.25\n",
+        "t;R;A;E\n0,5;1000,25;1;0,5\n1;2000;;0,25\n",
+        "t;R;A;E\n0,5;1000,25;1;0.5\n1;2000;;0.25\n",
+    ],
+)
+def test_csv_of_other_programs_is_read_where_there_is_no_doubt(make: Make, text: str) -> None:
+    log = logs.read(make(text))
+    assert log.time_s.tolist() == [0.5, 1.0]
+    assert np.array_equal(log.measurement, [[1000.25, 1, 0.5], [2000, NAN, 0.25]], equal_nan=True)
+
+
+def test_standard_input_is_csv_gzipped_or_not(make: Make, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    log = logs.read(make(HEADER + "0,1,1,1\n"))
+    flights.write_log(log, tmp_path / "log.csv.gz")
+    for path in (tmp_path / "log.csv", tmp_path / "log.csv.gz"):
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(path.read_bytes())))
+        read = logs.read("-")
+        assert (read.name, read.measurement.tolist()) == ("<stdin>", [[1, 1, 1]])
+
+
+def test_an_ignored_column_may_hold_anything(make: Make) -> None:
+    log = logs.read(make(b't,R,note\n0,1,\xf6\n1,2,5" gun\n2,3,"a, b"\n'))
+    assert log.measurement[:, 0].tolist() == [1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            "t,R\n0,1\n\n1\n",
+            "row 1 (the first data row is 0) has 1 cell where the header has 2. Complete the row or delete it.",
+        ),
+        ("t,R\n0,1\n1,2,3\n", "row 1 (the first data row is 0) has 3 cells where the header has 2."),
+        ("t,R\n0,1\nx,1\n1,2,3\n", "row 2 (the first data row is 0) has 3 cells"),
+        ('t,R,note\n0,1,a\n1,2,"b\n2,3,c\n3,4,d\n', "row 1 (the first data row is 0) opens a quotation mark"),
+        ('t,R\n0,1\n1,"2\n2,3\n', "row 1 (the first data row is 0) opens a quotation mark and does not close it"),
+        ("", "the file is empty; expected a header line and rows."),
+        ("\ufeff\r\n\n", "the file is empty"),
+        ("t,R\n", "there are column names but no rows."),
+        ("t,R\r\n\r\n\n", "there are column names but no rows."),
+        ("t,R\n,1\n,2\n", "no row has a time, so there is nothing to process; fill the times in."),
+        (
+            "t,R\n1,\n,5\n",
+            "no row has a range, azimuth or elevation, so there is nothing to process; check the columns.",
+        ),
+        ("time_s range_m\n0 1\n", 'the header line "time_s range_m" has no separator; separate the cells with commas'),
+        (
+            "a,b\n0,1\n",
+            "no time column (expected time_s or time or t). Its columns are: a, b. Name the right ones with "
+            "--columns time=NAME,range=NAME,elevation=NAME.",
+        ),
+        ("t,R\n".encode("utf-16"), "this is UTF-16 text; save it as UTF-8 (iconv -f UTF-16 -t UTF-8)."),
+        ("t,R\n".encode("utf-16-be"), "this is not text in UTF-8 (it has NUL bytes)"),
+        ("t,R,Höhe\n0,1,2\n".encode("latin-1"), "the header line is not UTF-8 (Latin-1 or Windows text?)"),
+        (b"PAR1....", "this is a Parquet file; give it the name .parquet."),
+        (b"PK\x03\x04....", "this is a zip archive or an Excel workbook"),
+    ],
+)
+def test_text_that_is_no_log(make: Make, text: str | bytes, expected: str) -> None:
+    assert expected in refused(make(text))
+
+
+def test_a_kept_column_that_is_not_utf8(make: Make) -> None:
+    sentence = refused(make(b"t,R,n\n0,1,\xf6\n"), keep_columns=True)
+    assert 'column "n" is not UTF-8 text, so it cannot be kept' in sentence
+
+
+def test_damaged_gzip(make: Make) -> None:
+    packed = gzip.compress(b"t,R\n" + b"0,1\n" * 1000)
+    assert "the gzip file is cut short; copy it again." in refused(make(packed[:-20], "log.csv.gz"))
+    assert "not a gzip file, or a damaged one" in refused(make("t,R\n0,1\n", "log.csv.gz"))
+    broken = bytearray(packed)
+    broken[15] ^= 0xFF
+    assert "not a gzip file, or a damaged one" in refused(make(bytes(broken), "log.csv.gz"))

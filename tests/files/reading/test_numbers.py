@@ -1,0 +1,79 @@
+"""Cells that are not numbers: the message names the file, the row, the column, the fault and the cure."""
+
+import pandas as pd
+import pyarrow as pa
+import pytest
+
+from tests.files.conftest import Make, refused
+
+HEADER = "time_s,range_m,azimuth_rad,elevation_rad\n"
+CURE = "Correct the cell, or leave it empty if there was no reading."
+
+
+@pytest.mark.parametrize(
+    ("rows", "expected"),
+    [
+        ("0,1,1,1\n\n1,12x4,1,1\n", 'row 1 (the first data row is 0), column "range_m": "12x4" is not a number'),
+        ("0,1,1,1\n,,,\n1,1,1,abc\n", 'row 2 (the first data row is 0), column "elevation_rad": "abc" is not a number'),
+        ("0,1,1,1\n1,1,1.2.3,1\n", "expected an azimuth in rad"),
+        ("0,1,true,1\n", '"true" is not a number'),
+        ("0,1,1_000,1\n", '"1_000" is not a number'),
+        ("0,1,2024-05-31,1\n", '"2024-05-31" is not a number'),
+        (
+            "0,inf,1,1\n",
+            'row 0 (the first data row is 0), column "range_m": "inf" is not finite; expected a range in m',
+        ),
+        ("0,1,1,1\n1,-Infinity,1,x\n", '"-inf" is not finite'),
+        ("0,1e999,1,1\n", '"inf" is not finite'),
+        ("inf,1,1,1\n", 'column "time_s": "inf" is not finite; expected a time in s or an ISO-8601 timestamp'),
+        ("0,1,1,1\nx,1,1,1\n", 'row 1 (the first data row is 0), column "time_s": "x" is not a number'),
+    ],
+)
+def test_a_cell_that_is_no_number(make: Make, rows: str, expected: str) -> None:
+    sentence = refused(make(HEADER + rows))
+    assert expected in sentence
+    assert CURE in sentence
+
+
+def test_a_bad_cell_far_down_a_long_file(make: Make) -> None:
+    rows = "0.25,1000,1,1\n" * 200_000
+    sentence = refused(make(HEADER + rows + "1,?,1,1\n" + rows))
+    assert 'row 200000 (the first data row is 0), column "range_m": "?"' in sentence
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ('t,R\n0,"1,5"\n', '"1,5" is not a number with a decimal point; expected a range in m. Write points'),
+        ("t\tR\n0\t1,5\n", "Write points, or separate the cells with semicolons."),
+        ("t,R\n0,5,1,5\n", "has 4 cells where the header has 2. If these are decimal commas, write decimal points"),
+        (
+            "t;R\n0;999,5\n1;1.000\n",
+            'row 1 (the first data row is 0), column "R": "1.000" is not a number with a decimal comma',
+        ),
+        ("t;R\n0;1.000,5\n", '"1.000,5" is not a number'),
+        ("t,R\n12:34:56.5,1\n", "A time of day needs its date: 2024-05-31T12:34:56.789Z, or count seconds."),
+        (
+            "t,R\n2024-05-31T00:00:00Z,1\nx,2\n",
+            'row 1 (the first data row is 0), column "t": "x" is not a timestamp with time',
+        ),
+        ("t,R\n2024-05-31T00:00:00Z,1\n2024-05-31T00:00:01,2\n", "not a timestamp with time zone like the first one"),
+        ("t,R\n2024-05-31T00:00:00,1\n2024-05-31T00:00:01Z,2\n", "not a timestamp without time zone like the first"),
+        ("t,R\n2024-05-31T00:00:00,1\n17.5,2\n", '"17.5" is not a timestamp'),
+        ("t,R\n2024-13-31T00:00:00,1\n", '"2024-13-31T00:00:00" is not a number; expected a time in s or an ISO-8601'),
+        (b"t,R\n0,1\xb0\n", 'column "R": "1\ufffd" is not a number'),
+    ],
+)
+def test_what_looks_like_something_else_is_explained(make: Make, text: str | bytes, expected: str) -> None:
+    assert expected in refused(make(text))
+
+
+def test_words_in_a_parquet_or_pandas_column() -> None:
+    table = pa.table({"t": [0.0, 1.0, 2.0], "R": ["1", None, "far"]})
+    assert 'row 2 (the first data row is 0), column "R": "far" is not a number' in refused(table)
+    frame = pd.DataFrame({"t": [0.0, 1.0], "R": [1.5, "far"]})
+    assert 'row 1 (the first data row is 0), column "R": "far" is not a number' in refused(frame)
+    assert '"True" is not a number' in refused(pa.table({"t": [0.0], "R": [True]}))
+    assert "is not finite" in refused(pa.table({"t": [0.0, 1.0], "R": [1.0, float("-inf")]}))
+    assert "there are column names but no rows" in refused(frame.iloc[:0])
+    assert "expected a path, a pandas DataFrame or a pyarrow Table, not int." in refused(5)

@@ -1,0 +1,56 @@
+"""The text of --units and --columns."""
+
+from collections.abc import Callable
+
+import pytest
+
+from ftproc.errors import UsageError
+from ftproc.files.options import parse_columns, parse_units
+
+
+def test_units_from_text_and_from_a_mapping_are_the_same() -> None:
+    expected = {"range": "km", "azimuth": "deg", "time": "ms"}
+    assert parse_units("range=km,azimuth=deg,time=ms") == expected
+    assert parse_units(" R = km , Az=deg, t=ms,") == expected
+    assert parse_units({"range": "km", "az": "deg", "time": "ms"}) == expected
+    assert parse_units(None) == parse_units("") == {}
+
+
+def test_columns_from_text_and_from_a_mapping_are_the_same() -> None:
+    assert parse_columns("time=T0, R=Slant Range") == {"time": "T0", "range": "Slant Range"}
+    assert parse_columns({"t": "T0", "range": "Slant Range"}) == {"time": "T0", "range": "Slant Range"}
+
+
+@pytest.mark.parametrize(
+    ("parse", "text", "sentence"),
+    [
+        (parse_units, "range=yd", '--units: "yd" is not a unit of range; understood are m, km, ft, nmi, nm'),
+        (
+            parse_units,
+            "azimuth=dge",
+            'rad, deg, mrad, mil, grad, gon, mgon, arcsec; did you mean "deg',
+        ),
+        (parse_units, "azimuth=m", '--units: "m" is not a unit of azimuth'),
+        (
+            parse_units,
+            "azimut=deg",
+            '; did you mean "azimuth"?',
+        ),
+        (parse_units, "km", '--units: "km" is not QUANTITY=NAME, as in range=km,azimuth=deg'),
+        (parse_units, "range=", '--units: "range=" is not QUANTITY=NAME'),
+        (parse_units, "range=km,R=m", "--units names range twice"),
+        (parse_columns, "T0", '--columns: "T0" is not QUANTITY=NAME, as in time=T0,range=RNG'),
+        (
+            parse_columns,
+            "speed=V",
+            '"speed" is not a quantity of a log; expected time, range, azimuth, elevation',
+        ),
+        (parse_columns, "range=X,azimuth=X", '--columns: column "X" cannot be both range and azimuth'),
+        (parse_columns, "time=A,t=B", "--columns names time twice"),
+        (parse_columns, "time=none", "--columns: a log must have a time"),
+    ],
+)
+def test_what_is_wrong_is_said(parse: Callable[[str], object], text: str, sentence: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        parse(text)
+    assert sentence in str(caught.value)
