@@ -1,4 +1,4 @@
-"""The immutable records that flow from stage to stage: log -> (core) -> trajectory, and the truth beside them.
+"""The immutable records that pass from stage to stage: log -> (core) -> trajectory, and the truth.
 
 Components are always in the order range, azimuth, elevation; axes in the order x, y, z; angles in radians.
 """
@@ -27,8 +27,8 @@ COMPONENTS = ("range", "azimuth", "elevation")
 #: Values of the trajectory's `outlier_*` columns.
 GOOD, ISOLATED, PATCH, MISSING = 0, 1, 2, 3
 
-#: What an estimate rests on, the least first.
-PAST, EDITED, WHOLE = "past readings", "past readings, edited with the whole record in view", "the whole record"
+#: The readings that an estimate depends on, the fewest first.
+PAST, EDITED, WHOLE = "past readings", "past readings, edited with the whole record", "the whole record"
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ class MeasurementLog:
     time_s: (n,) finite, never decreasing; equal times are separate measurements at one instant.
     measurement: (n, 3) slant range m, azimuth rad, elevation rad; NaN where missing.
     row: (n,) 0-based row number in the file the user gave.
-    frame: `local` (x by the log's own convention) or `north-east-up` (azimuth was said to run from north).
-    rows_in_file, rows_without_time, rows_out_of_order, duplicate_times: what was read and what was found.
-    extra: the other columns of the file, row for row with `time_s`; only when they were asked for.
-    station: what was known of the instrument, and is applied already. epoch: the instant of time zero (ISO 8601) or "".
-    remarks: what a user should know of how the file was understood.
+    frame: `local` (x by the log's own convention) or `north-east-up` (azimuth from north).
+    rows_in_file, rows_without_time, rows_out_of_order, duplicate_times: counts and row numbers of what was read.
+    extra: the other columns of the file, row for row with `time_s`; only if they were asked for.
+    station: what is known of the instrument, already applied. epoch: the instant of time zero (ISO 8601) or "".
+    remarks: how the file was understood, for the user.
     """
 
     name: str
@@ -64,7 +64,7 @@ class MeasurementLog:
         return len(self.time_s)
 
     def stretch(self, rows: slice) -> MeasurementLog:
-        """Some of its rows, in memory; what is known of the whole log stays as it is."""
+        """Some of its rows, in memory; counts and remarks of the whole log stay unchanged."""
         arrays = (np.array(self.time_s[rows]), np.array(self.measurement[rows]), np.array(self.row[rows]))
         forget(self.time_s, self.measurement, self.row)
         extra = None if self.extra is None else self.extra.slice(rows.start, rows.stop - rows.start)
@@ -92,12 +92,12 @@ class Truth:
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """What a trajectory was made from and how its filter fared, row for row with it; not part of its file.
+    """Readings and residuals of a trajectory, row for row with it; not part of its file.
 
     reading: (n, 3) raw range m, azimuth rad, elevation rad; NaN where missing.
-    residual: (n, 3) reading minus what the other readings say of it, NaN where missing: the innovation (against all
-    readings before), or after smoothing the leave-one-out residual (against all others).
-    residual_sigma: (n, 3) 1-sigma that the filter expects of it.
+    residual: (n, 3) reading minus its prediction from other readings, NaN where missing: the innovation (from all
+    earlier readings), or after smoothing the leave-one-out residual (from all others).
+    residual_sigma: (n, 3) 1-sigma that the filter expects of the residual.
     """
 
     reading: FloatArray
@@ -115,10 +115,10 @@ class Trajectory:
     state: (n, 9) x y z m, vx vy vz m/s, ax ay az m/s2. NaN where a method does not estimate it.
     sigma: (n, 6) 1-sigma of position m and velocity m/s.
     outlier: (n, 3) GOOD, ISOLATED, PATCH or MISSING per component.
-    nis: (n,) normalised innovation squared of the components used; NaN where none was.
-    correction: (n, 6) what the network added to position m and velocity m/s.
-    metadata: everything needed to make it again (JSON-serialisable), see the README.
-    extra: further columns, row for row. diagnostics: only of a trajectory that was just made, not of one read.
+    nis: (n,) normalised innovation squared of the components used; NaN if none was.
+    correction: (n, 6) correction by the network of position m and velocity m/s.
+    metadata: everything needed to compute it again (JSON-serialisable), see the README.
+    extra: further columns, row for row. diagnostics: only of a computed trajectory, not of one read from a file.
     """
 
     name: str
@@ -139,8 +139,7 @@ class Trajectory:
 
 
 def thinned(array: FloatArray, most: int) -> FloatArray:
-    """Every so many rows of an array (n, ...), so that there are at most `most`; of one on a disk little is held in
-    memory at a time."""
+    """Every k-th row of an array (n, ...), at most `most`; little of a mapped array is in memory at a time."""
     every = 1 + max(len(array) - 1, 0) // most
     found = []
     for rows in chunks(len(array), every * max((1 << 20) // every, 1)):
@@ -153,7 +152,7 @@ Stretch = TypeVar("Stretch", Diagnostics, Trajectory)
 
 
 def forget(*arrays: NDArray[Any]) -> None:
-    """Give back the memory that reading arrays took which lie on a disk; they stay as they are."""
+    """Release the memory of arrays that are mapped from disk; they stay valid."""
     for array in arrays:
         mapped = getattr(array, "_mmap", None)
         if mapped is not None and hasattr(mmap, "MADV_DONTNEED"):
@@ -161,13 +160,13 @@ def forget(*arrays: NDArray[Any]) -> None:
 
 
 def chunks(n: int, rows: int = 1 << 20) -> Iterator[slice]:
-    """Slices of so many rows that cover n of them."""
+    """Slices of `rows` rows that cover n of them."""
     for low in range(0, n, rows):
         yield slice(low, min(low + rows, n))
 
 
 def joined(parts: Sequence[Trajectory]) -> Trajectory:
-    """Stretches of one trajectory, one behind the other; the metadata are those of the first."""
+    """Consecutive stretches of one trajectory as a whole; the metadata are those of the first."""
     if len(parts) == 1:
         return parts[0]
     extra = None
@@ -175,13 +174,13 @@ def joined(parts: Sequence[Trajectory]) -> Trajectory:
         import pyarrow as pa
 
         extra = pa.concat_tables([part.extra for part in parts])
-    made = [part.diagnostics for part in parts if part.diagnostics is not None]
-    whole = _end_to_end(made, "reading", "residual", "residual_sigma") if len(made) == len(parts) else None
+    present = [part.diagnostics for part in parts if part.diagnostics is not None]
+    whole = _concatenated(present, "reading", "residual", "residual_sigma") if len(present) == len(parts) else None
     arrays = ("row", "time_s", "measurement", "state", "sigma", "outlier", "nis", "correction")
-    return replace(_end_to_end(parts, *arrays), diagnostics=whole, extra=extra)
+    return replace(_concatenated(parts, *arrays), diagnostics=whole, extra=extra)
 
 
-def _end_to_end(parts: Sequence[Stretch], *names: str) -> Stretch:
-    """The first of some records, with the arrays of these names of all of them."""
+def _concatenated(parts: Sequence[Stretch], *names: str) -> Stretch:
+    """The first record, with these arrays of all of them."""
     arrays: Any = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
     return replace(parts[0], **arrays)

@@ -1,10 +1,10 @@
-"""Every default a user may change, once. Frozen dataclasses; units in the names or the comment beside them."""
+"""Every default that a user may change. Frozen dataclasses; units in the names or the comments."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-PACKAGED, NO_MODEL = "packaged", "none"  # models that are no files
+PACKAGED, NO_MODEL = "packaged", "none"  # values of `model` that are not files
 
 Noise = tuple[float | None, float | None, float | None]
 
@@ -19,20 +19,20 @@ class Air:
 
 @dataclass(frozen=True)
 class Station:
-    """How the readings of an instrument are to be understood, and what is known to be wrong with them."""
+    """The conventions and the known errors of an instrument's readings."""
 
     azimuth_from: str = "x"  # x | north: the axis that the azimuth is counted from, see ftproc.files.conventions
     azimuth_sense: str | None = None  # clockwise | anticlockwise from above; None: north clockwise, x anticlockwise
-    azimuth_zero_rad: float = 0.0  # what the azimuth is where the instrument reads zero
+    azimuth_zero_rad: float = 0.0  # azimuth where the instrument reads zero
     elevation_from: str = "horizon"  # horizon | zenith
     bias: tuple[float, float, float] = (0.0, 0.0, 0.0)  # reading minus truth: range m, azimuth rad, elevation rad
-    time_offset_s: float = 0.0  # is added to every time
-    refraction: Air | None = None  # bends the elevation of an optical instrument; None: it is corrected already
+    time_offset_s: float = 0.0  # added to every time
+    refraction: Air | None = None  # for the elevation of an optical instrument; None: no correction
 
 
 @dataclass(frozen=True)
 class FilterSettings:
-    """What a user may ask of `filter`; None means: find it from the log."""
+    """Settings of `filter`; None means: estimated from the log."""
 
     method: str = "ga-bpnn-ukf"
     editing: str = "two-pass"  # two-pass | forward | none
@@ -53,13 +53,13 @@ class FilterSettings:
 class TrainSettings:
     """GA-BPNN training: network size, genetic search, back-propagation, hold-out verdict."""
 
-    features: str = "auto"  # what held-out flights choose, or one of ftproc.correction.feature_sets
+    features: str = "auto"  # auto: chosen by held-out flights; or one of ftproc.correction.feature_sets
     hidden: int = 12
     population: int = 40
     generations: int = 60
     epochs: int = 400
     flights: int = 24  # simulated flights when training on a scenario
     seed: int = 0
-    method: str = "ga-bpnn-ukf"  # the filter whose error is learnt
+    method: str = "ga-bpnn-ukf"  # the filter whose error is learned
     optimiser: str = "l-bfgs"  # or momentum, as in the paper
     start: str = "genetic"  # first weights, see ftproc.correction.training.starts

@@ -150,7 +150,7 @@ def test_metadata_is_complete_and_serialisable(flight):
 @pytest.mark.parametrize(
     ("settings", "editing", "sees"),
     [
-        ({}, "two-pass", "past readings, edited with the whole record in view"),
+        ({}, "two-pass", "past readings, edited with the whole record"),
         ({"editing": "forward"}, "forward", "past readings"),
         ({"smooth": True}, "two-pass", "the whole record"),
         ({"method": "ukf"}, "none", "past readings"),

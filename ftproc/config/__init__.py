@@ -1,5 +1,6 @@
-"""Station files: what is known of an instrument and its site, and how its logs are filtered, in one TOML file; and the
-`Recipe` that comes of it. Calls `files` and, for the names of methods, `methods`.
+"""Station files: an instrument, its site and the settings for its logs in one TOML file; and the `Recipe` made from it.
+
+Calls `files` and, for the names of methods, `methods`.
 """
 
 from ftproc.config.reading import load, parse

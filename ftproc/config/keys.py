@@ -1,4 +1,4 @@
-"""Every key of a station file, once: where it stands, what it may be, which option it sets, and what it means."""
+"""Every key of a station file: its section, kind of value, option and meaning."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from ftproc.settings import Air, FilterSettings
 
 
 class Key(NamedTuple):
-    """option: the name of what it sets, as the command line has it; part: of that option, when it has several.
+    """option: the option that it sets, by its name on the command line. part: of an option with several parts.
 
-    example: what a comment shows, in example_unit; also the default where there is one. quantity: of a value with a
-    unit, which the file has in the key's name, such as bias_mrad.
+    example: shown in a comment, in example_unit; the default where there is one. quantity: of a value whose key ends in
+    its unit, such as bias_mrad.
     """
 
     option: str
@@ -33,19 +33,19 @@ class Key(NamedTuple):
 
 
 SECTIONS: Mapping[str, str] = {
-    "site": "Where the station is. Needed for latitudes, earth-centred coordinates and maps.",
-    "time": "The columns of the log, and what is known of the instrument.",
+    "site": "The position of the station, for latitudes, earth-centred coordinates and maps.",
+    "time": "Each quantity: its column in the log, and what is known of the instrument.",
     "range": "",
     "azimuth": "",
     "elevation": "",
-    "refraction": "Light is bent on its way through the air; for optical instruments, not for radars.",
-    "filter": "What the options of the same names say.",
+    "refraction": "Refraction of light in the air, for optical instruments, not for radars.",
+    "filter": "As the options of the same names.",
 }
 
 
 def _column(quantity: str, example: str) -> dict[str, Key]:
     names = tuple(UNITS[quantity])
-    known = "its unit, where the name does not say it: " + ", ".join(names)
+    known = "its unit, if the name does not state it: " + ", ".join(names)
     return {
         "column": Key("columns", text, example, 'name of the column, or "none"', quantity),
         "unit": Key("units", words(*names), names[0], known, quantity),
@@ -55,14 +55,18 @@ def _column(quantity: str, example: str) -> dict[str, Key]:
 def _errors(quantity: str, sigma: float, bias: float) -> dict[str, Key]:
     index, unit = COMPONENTS.index(quantity), "m" if quantity == "range" else "mrad"
     return {
-        "sigma": Key("noise", positive(), sigma, "noise, 1 sigma; left out: from the log", index, quantity, None, unit),
-        "bias": Key("bias", number(), bias, "reading minus truth, taken off every reading", index, quantity, 0.0, unit),
+        "sigma": Key(
+            "noise", positive(), sigma, "noise, 1 sigma; left out: estimated from the log", index, quantity, None, unit
+        ),
+        "bias": Key(
+            "bias", number(), bias, "reading minus truth, subtracted from every reading", index, quantity, 0.0, unit
+        ),
     }
 
 
 _FROM_X = "x: A = atan2(y, x); north: then x is north, y east"
 _SENSE = "seen from above; left out: clockwise from north, anticlockwise from x"
-_GEOID = "of the geoid above the ellipsoid; heights in KML count from the geoid"
+_GEOID = "height of the geoid above the ellipsoid, for KML"
 _MODEL = "packaged, none, or a file beside this one"
 _PATCH = "longest patch of outliers expected (forward editing)"
 
@@ -76,7 +80,7 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
     },
     "time": {
         **_column("time", "UTC"),
-        "offset": Key("time_offset_s", number(), 12.0, "is added to every time", None, "time", 0.0, "ms"),
+        "offset": Key("time_offset_s", number(), 12.0, "added to every time", None, "time", 0.0, "ms"),
     },
     "range": {**_column("range", "RNG"), **_errors("range", 3.0, 2.5)},
     "azimuth": {
@@ -92,7 +96,7 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
         **_errors("elevation", 0.2, 0.1),
     },
     "refraction": {
-        "correct": Key("refraction", flag, False, "take it off the elevation", default=False),
+        "correct": Key("refraction", flag, False, "subtract it from the elevation", default=False),
         "temperature_c": Key("temperature_c", number(-90, 60), Air.temperature_c, "at the station", default=15.0),
         "pressure_hpa": Key(
             "pressure_hpa", number(300, 1100), Air.pressure_hpa, "at the station, not at the sea", default=1013.25
@@ -101,24 +105,24 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
     "filter": {
         "method": Key("method", method, FilterSettings.method, "see --list-methods", default=FilterSettings.method),
         "model": Key("model", file_name, "packaged", _MODEL, default="packaged"),
-        "smooth": Key("smooth", flag, False, "the best estimate of trajectory", default=False),
+        "smooth": Key("smooth", flag, False, "add the fixed-interval smoother", default=False),
         "editing": Key(
             "editing", words("two-pass", "forward", "none"), "two-pass", "how outliers are found", default="two-pass"
         ),
-        "jerk_psd_m2ps5": Key("jerk", positive(), 10.0, "how hard the target manoeuvres; left out: from the log"),
-        "gate": Key("gate", positive(), FilterSettings.gate, "in sigmas", default=FilterSettings.gate),
+        "jerk_psd_m2ps5": Key("jerk", positive(), 10.0, "process noise (jerk PSD); left out: estimated"),
+        "gate": Key("gate", positive(), FilterSettings.gate, "in sigmas of the residual", default=FilterSettings.gate),
         "max_patch_s": Key("max_patch", positive(), 5.0, _PATCH),
         "weight_form": Key("weight_form", words("noise", "gain"), "noise", "in forward editing", default="noise"),
         "particles": Key("particles", whole(20), 100, "of the ensemble and particle filters", default=100),
         "seed": Key("seed", whole(0), 0, "of their random numbers", default=0),
-        "ecef": Key("ecef", flag, False, "earth-centred coordinates too", default=False),
+        "ecef": Key("ecef", flag, False, "add earth-centred coordinates", default=False),
         "keep_columns": Key("keep_columns", flag, False, "carry other columns through", default=False),
     },
 }
 
 
 def every() -> Iterator[tuple[str, str, Key]]:
-    """Section, name and key of all, in the order of the file."""
+    """Section, name and key of all keys, in the order of the file."""
     for section, keys in KEYS.items():
         for name, key in keys.items():
             yield section, name, key

@@ -1,4 +1,4 @@
-"""What a value in a station file may be: each kind takes what TOML gives and says what it expected instead."""
+"""Kinds of values in a station file: each checks a value from TOML and says what it expected."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from ftproc.errors import nearest
 
-#: The value as it is kept, or a ValueError that says what was expected.
+#: The value as the options hold it, or a ValueError that says what was expected.
 Kind = Callable[[object], Any]
 
 _LARGEST = 2**53
@@ -42,7 +42,7 @@ def positive() -> Kind:
 
 
 def whole(low: int) -> Kind:
-    """A whole number from low on, which a float can hold as well: station files are written with those."""
+    """A whole number from low on that a float holds exactly, because TOML may write it as one."""
 
     def kind(value: object) -> int:
         if isinstance(value, bool) or not isinstance(value, int | float) or value % 1 != 0 or value < low:
@@ -55,7 +55,7 @@ def whole(low: int) -> Kind:
 
 
 def words(*known: str) -> Kind:
-    """One of some words."""
+    """One of the known words."""
 
     def kind(value: object) -> str:
         if value not in known:
@@ -73,7 +73,7 @@ def text(value: object) -> str:
 
 
 def file_name(value: object) -> str:
-    """What a file can be called."""
+    """A possible name of a file."""
     if "\0" in text(value):
         raise ValueError("the name of a file, which has no NUL")
     return str(value)

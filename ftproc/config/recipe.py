@@ -1,4 +1,4 @@
-"""What is done with every log of a run: how it is read, the settings, the model."""
+"""The recipe of a run: how its logs are read, the settings, the model."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ if TYPE_CHECKING:
     from ftproc.correction.model import Model
 
 
-#: Options whose names on the command line are shorter than those of the settings.
+#: Option -> setting, where the names differ.
 _SETTINGS = {"jerk": "jerk_psd_m2ps5", "max_patch": "max_patch_s"}
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """What is done with every log. model: `packaged`, `none`, a path, or one that was loaded; the rest as
-    `files.logs.read` takes it."""
+    """What is done with every log. model: `packaged`, `none`, a path or a loaded model. units, columns, station,
+    keep_columns: as in `files.reading.logs.read`."""
 
     settings: FilterSettings = field(default_factory=FilterSettings)
     model: str | Model = PACKAGED
@@ -30,20 +30,20 @@ class Recipe:
 
     @classmethod
     def of(cls, options: Mapping[str, Any]) -> Recipe:
-        """What to do with a log, from options as `reading.load` gives them; what they do not say is as usual."""
-        said = {_SETTINGS.get(name, name): value for name, value in options.items() if value is not None}
-        said["gain_form"] = said.pop("weight_form", "noise") == "gain"
-        air = {name: said[name] for name in ("temperature_c", "pressure_hpa") if name in said}
-        said["refraction"] = Air(**air) if said.pop("refraction", False) else None
-        said["settings"], said["station"] = _picked(FilterSettings, said), _picked(Station, said)
-        found: Recipe = _picked(cls, said)
+        """The recipe from options as `config.load` returns them, with the defaults for the rest."""
+        known = {_SETTINGS.get(name, name): value for name, value in options.items() if value is not None}
+        known["gain_form"] = known.pop("weight_form", "noise") == "gain"
+        air = {name: known[name] for name in ("temperature_c", "pressure_hpa") if name in known}
+        known["refraction"] = Air(**air) if known.pop("refraction", False) else None
+        known["settings"], known["station"] = _picked(FilterSettings, known), _picked(Station, known)
+        found: Recipe = _picked(cls, known)
         return found
 
     def reading(self) -> dict[str, Any]:
-        """What `files.logs.read` is told."""
+        """The arguments for `files.reading.logs.read`."""
         return {name: getattr(self, name) for name in ("units", "columns", "station", "keep_columns")}
 
 
-def _picked(kind: type[Any], said: Mapping[str, Any]) -> Any:
-    """A dataclass of those values that it has fields for."""
-    return kind(**{field.name: said[field.name] for field in fields(kind) if field.name in said})
+def _picked(kind: type[Any], known: Mapping[str, Any]) -> Any:
+    """A dataclass of the values that it has fields for."""
+    return kind(**{field.name: known[field.name] for field in fields(kind) if field.name in known})

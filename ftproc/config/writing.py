@@ -1,4 +1,4 @@
-"""A station file out: every key there is, with what it means; those that say nothing new as comments."""
+"""A station file out: every key with its meaning; those with their default value as comments."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from ftproc.config.keys import KEYS, SECTIONS, Key
+from ftproc.settings import NO_MODEL
 
 _HEAD = """\
 # A station file of ftproc: ftproc filter LOG --config THIS. Options on the command line win over it.
-# Keys with a unit may have any unit that a column may have: bias_m, bias_ft, zero_deg, sigma_mrad, sigma_arcsec, ...
+# A key with a unit may end in any unit that a column may have: bias_m, bias_ft, zero_deg, sigma_mrad, sigma_arcsec, ...
 """
-_COLUMN = 28  # where the comments begin
+_COLUMN = 28  # of the comments
 
 
 def dump(options: Mapping[str, Any]) -> str:
-    """The text of a station file that `parse` makes the same options of again. options: as `load` gives them."""
+    """The text of a station file that `parse` turns into the same options. options: as `load` returns them."""
     parts = [_HEAD]
     for section, keys in KEYS.items():
         about = f"# {SECTIONS[section]}\n" if SECTIONS[section] else ""
@@ -27,7 +28,7 @@ def dump(options: Mapping[str, Any]) -> str:
 
 
 def _value(options: Mapping[str, Any], key: Key) -> Any:
-    """What the options say of a key; None when they say nothing."""
+    """The value that the options have for a key, or None."""
     whole = options.get(key.option)
     if key.part is None or whole is None:
         return whole
@@ -35,11 +36,11 @@ def _value(options: Mapping[str, Any], key: Key) -> Any:
 
 
 def _line(name: str, key: Key, value: Any) -> str:
-    says = value is not None and value != key.default
-    spelt = f"{name}_{key.units[0] if says else key.example_unit}" if key.example_unit else name
-    if key.option == "model" and says and value != "none":
+    is_set = value is not None and value != key.default
+    spelt = f"{name}_{key.units[0] if is_set else key.example_unit}" if key.example_unit else name
+    if key.option == "model" and is_set and value != NO_MODEL:
         value = str(Path(value).resolve())
-    setting = f"{'' if says else '# '}{spelt} = {_toml(value if says else key.example)}"
+    setting = f"{'' if is_set else '# '}{spelt} = {_toml(value if is_set else key.example)}"
     return f"{setting.ljust(_COLUMN)}  # {key.meaning}\n"
 
 

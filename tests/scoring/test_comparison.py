@@ -25,7 +25,7 @@ def test_sorted_by_error_and_apart_by_what_they_see():
     assert text.endswith("\n")
     lines = text.splitlines()
     assert [line.strip().split("  ")[0] for line in lines[1:-1]] == [
-        "from past readings", "gate", "ukf", "from past readings, edited with the whole record in view", "ga-bpnn-ukf",
+        "from past readings", "gate", "ukf", "from past readings, edited with the whole record", "ga-bpnn-ukf",
         "from the whole record", "ukf --smooth", "wavelet-akf",
     ]  # fmt: skip
     assert f"{scores[2].rmse_3d_m:.3g}" in lines[2].split()
