@@ -55,17 +55,17 @@ def _column(quantity: str, example: str) -> dict[str, Key]:
 def _errors(quantity: str, sigma: float, bias: float) -> dict[str, Key]:
     index, unit = COMPONENTS.index(quantity), "m" if quantity == "range" else "mrad"
     return {
-        "sigma": Key(
-            "noise", positive(), sigma, "noise, 1 sigma; left out: estimated from the log", index, quantity, None, unit
-        ),
-        "bias": Key(
-            "bias", number(), bias, "reading minus truth, subtracted from every reading", index, quantity, 0.0, unit
-        ),
+        "sigma": Key("noise", positive(), sigma, _SIGMA, index, quantity, example_unit=unit),
+        "bias": Key("bias", number(), bias, _BIAS, index, quantity, default=0.0, example_unit=unit),
     }
 
 
+_SIGMA = "noise, 1 sigma; left out: estimated from the log"
+_BIAS = "reading minus truth, subtracted from every reading"
 _FROM_X = "x: A = atan2(y, x); north: then x is north, y east"
 _SENSE = "seen from above; left out: clockwise from north, anticlockwise from x"
+_OFFSET = "added to every time"
+_ZERO = "azimuth where it reads zero"
 _GEOID = "height of the geoid above the ellipsoid, for KML"
 _MODEL = "packaged, none, or a file beside this one"
 _PATCH = "longest patch of outliers expected (forward editing)"
@@ -80,14 +80,14 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
     },
     "time": {
         **_column("time", "UTC"),
-        "offset": Key("time_offset_s", number(), 12.0, "added to every time", None, "time", 0.0, "ms"),
+        "offset": Key("time_offset_s", number(), 12.0, _OFFSET, quantity="time", default=0.0, example_unit="ms"),
     },
     "range": {**_column("range", "RNG"), **_errors("range", 3.0, 2.5)},
     "azimuth": {
         **_column("azimuth", "AZ"),
         "from": Key("azimuth_from", words("x", "north"), "x", _FROM_X, default="x"),
         "sense": Key("azimuth_sense", words("clockwise", "anticlockwise"), "clockwise", _SENSE),
-        "zero": Key("azimuth_zero_rad", number(), 14.5, "azimuth where it reads zero", None, "azimuth", 0.0, "deg"),
+        "zero": Key("azimuth_zero_rad", number(), 14.5, _ZERO, quantity="azimuth", default=0.0, example_unit="deg"),
         **_errors("azimuth", 0.2, 0.1),
     },
     "elevation": {

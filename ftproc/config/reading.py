@@ -63,11 +63,12 @@ def parse(text: str, name: str) -> dict[str, Any]:
     values: dict[tuple[str, str], Any] = {}
     for section, keys in found.items():
         _check_section(name, section, keys)
+        place = f"{name}: [{section}]"
         for written, value in keys.items():
-            key_name, to_si = _key_of(name, section, written)
+            key_name, to_si = _key_of(place, KEYS[section], written)
             if (section, key_name) in values:
-                raise UsageError(f"{name}: [{section}] has {key_name} in two units; leave one out.")
-            values[section, key_name] = _checked(name, section, written, KEYS[section][key_name], value, to_si)
+                raise UsageError(f"{place} has {key_name} in two units; leave one out.")
+            values[section, key_name] = _checked(f"{place} {written}", KEYS[section][key_name], value, to_si)
     return _options(name, values)
 
 
@@ -85,9 +86,8 @@ def _check_section(name: str, section: str, keys: object) -> None:
     raise UsageError(f'{name}: there is no {kind} "{section}"{hint} The sections: {sections}.')
 
 
-def _key_of(name: str, section: str, written: str) -> tuple[str, Callable[[Any], Any]]:
-    """The name of the key, and the function that converts its value to SI."""
-    keys = KEYS[section]
+def _key_of(place: str, keys: Mapping[str, Key], written: str) -> tuple[str, Callable[[Any], Any]]:
+    """The name of the key that is `written` with its unit, and the function that converts its value to SI."""
     stem, _, unit = written.rpartition("_")
     if written in keys and not keys[written].quantity:
         return written, lambda value: value
@@ -99,20 +99,20 @@ def _key_of(name: str, section: str, written: str) -> tuple[str, Callable[[Any],
     if bare is not None and bare.quantity:
         first = written if written in keys else stem
         raise UsageError(
-            f'{name}: [{section}] "{written}" must end in its unit: {", ".join(_spelt(first, bare))}'
+            f'{place} "{written}" must end in its unit: {", ".join(_spelt(first, bare))}'
             f"{nearest(written, _spelt(first, bare))}"
         )
     all_names = [form for known, its in keys.items() for form in _spelt(known, its)]
     short = ", ".join(f"{known}_UNIT" if its.quantity else known for known, its in keys.items())
     hint = nearest(written, all_names) or "."
-    raise UsageError(f'{name}: [{section}] has no key "{written}"{hint} Its keys are: {short}.')
+    raise UsageError(f'{place} has no key "{written}"{hint} Its keys are: {short}.')
 
 
 def _spelt(name: str, key: Key) -> Iterable[str]:
     return [f"{name}_{unit}" for unit in key.units] or [name]
 
 
-def _checked(name: str, section: str, written: str, key: Key, value: object, to_si: Callable[[Any], Any]) -> Any:
+def _checked(place: str, key: Key, value: object, to_si: Callable[[Any], Any]) -> Any:
     try:
         found = to_si(key.kind(value))
         if isinstance(found, float) and math.isinf(found):
@@ -121,9 +121,7 @@ def _checked(name: str, section: str, written: str, key: Key, value: object, to_
     except ValueError as error:
         shown = f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else value
         words = str(error).replace('"', "").split(" or ") if isinstance(value, str) else []
-        raise UsageError(
-            f"{name}: [{section}] {written} = {shown}: expected {error}{nearest(str(value), words) or '.'}"
-        ) from error
+        raise UsageError(f"{place} = {shown}: expected {error}{nearest(str(value), words) or '.'}") from error
 
 
 def _options(name: str, values: Mapping[tuple[str, str], Any]) -> dict[str, Any]:
