@@ -1,4 +1,5 @@
-"""Files: `reading` and `writing`, and what both share: names of columns, units, conventions, storage.
+"""Files in (`reading`) and out (`writing`), and what both share: columns (`layout`), `units`, `conventions`, storage.
 
-Calls `records` and, for refraction, `core.model`.
+A new unit or name of a quantity goes to `units`, a new kind of file to `reading.formats` or `writing.tables`, a new
+notation of times to `reading.times`. Calls `records` and, for refraction, `core.model`.
 """

@@ -29,9 +29,11 @@ def pieces(table: pa.Table, with_header: bool = True) -> Iterator[bytes]:
         yield header.getvalue().encode()
     options = pyarrow.csv.WriteOptions(include_header=False, batch_size=_ROWS_AT_ONCE)
     for start in range(0, table.num_rows, _ROWS_AT_ONCE):
+        rows = table.slice(start, _ROWS_AT_ONCE)
         sink = pa.BufferOutputStream()
         try:
-            pyarrow.csv.write_csv(_for_csv(table.slice(start, _ROWS_AT_ONCE)), sink, options)
+            cleaned = pa.Table.from_arrays([_for_csv(column) for column in rows.columns], table.column_names)
+            pyarrow.csv.write_csv(cleaned, sink, options)
         except pa.ArrowException as error:  # such as a kept column of lists
             raise OutputError(f"This cannot be written as CSV ({error}); give the output the name .parquet.") from error
         yield cast(bytes, sink.getvalue().to_pybytes())
@@ -46,20 +48,18 @@ def no_formula(text: str) -> str:
     return f"'{text}" if risky else text
 
 
-def _for_csv(table: pa.Table) -> pa.Table:
+def _for_csv(column: pa.ChunkedArray) -> pa.ChunkedArray:
     """NaN as missing, formulas as text."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
-    for index, field in enumerate(table.schema):
-        if pa.types.is_floating(field.type):
-            column = table.column(index)
-            table = table.set_column(index, field.name, pc.if_else(pc.is_nan(column), None, column))
-        elif pa.types.is_string(field.type) or pa.types.is_large_string(field.type):
-            column = table.column(index)
-            number = pc.match_substring_regex(column, rf"^{_NUMBER}$")
-            risky = pc.and_not(pc.match_substring_regex(column, _FORMULA), number)
-            if pc.any(risky).as_py():
-                marked = pc.binary_join_element_wise(pa.scalar("'", field.type), column, pa.scalar("", field.type))
-                table = table.set_column(index, field.name, pc.if_else(risky, marked, column))
-    return table
+    kind = column.type
+    if pa.types.is_floating(kind):
+        return pc.if_else(pc.is_nan(column), None, column)
+    if pa.types.is_string(kind) or pa.types.is_large_string(kind):
+        number = pc.match_substring_regex(column, rf"^{_NUMBER}$")
+        risky = pc.and_not(pc.match_substring_regex(column, _FORMULA), number)
+        if pc.any(risky).as_py():
+            marked = pc.binary_join_element_wise(pa.scalar("'", kind), column, pa.scalar("", kind))
+            return pc.if_else(risky, marked, column)
+    return column

@@ -143,15 +143,17 @@ class _Parquet:
 
 def with_extra(table: pa.Table, extra: pa.Table | None) -> pa.Table:
     """`table` followed by the columns of `extra`. Raises UsageError if both have a column of the same name."""
+    import pyarrow as pa
+
     if extra is None:
         return table
-    for name, column in zip(extra.column_names, extra.columns, strict=True):
-        if name in table.column_names:
+    names = set(table.column_names)
+    for name in extra.column_names:
+        if name in names:
             raise UsageError(
                 f'the log\'s column "{name}" has the name of an output column; rename it, or leave --keep-columns out.'
             )
-        table = table.append_column(name, column)
-    return table
+    return pa.Table.from_arrays([*table.columns, *extra.columns], [*table.column_names, *extra.column_names])
 
 
 def _not_floating(table: pa.Table) -> list[str]:
