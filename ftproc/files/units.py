@@ -19,6 +19,9 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "elevation": ("elevation", "el", "e"),
 }
 
+#: How names of zenith angles begin, up to the first underscore; they are not elevations.
+ZENITH_NAMES = ("zenith", "zen", "zd")
+
 #: Suffixes that make a column something other than the quantity; they are not unknown units.
 NOT_UNITS = frozenset(
     [

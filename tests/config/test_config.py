@@ -1,4 +1,4 @@
-"""Station files: what they say, what they refuse and in what words, and that what is written reads back the same."""
+"""Station files: every key, the message of every fault, and the round trip."""
 
 from __future__ import annotations
 
@@ -80,13 +80,13 @@ def test_every_key_is_understood():
     assert found.columns == {"time": "UTC", "range": "RNG", "elevation": "none"}
 
 
-def test_an_empty_file_is_the_usual():
+def test_an_empty_file_gives_the_defaults():
     assert config.Recipe.of(config.parse("", "s.toml")) == Recipe()
     assert config.parse(config.dump({}), "s.toml") == {}
 
 
 def test_defaults_that_a_comment_shows_are_the_real_ones():
-    """Uncommented, every key that has a default says what is so anyway."""
+    """Uncommented, every key that has a default sets it."""
     usual = tuple(f"# {name} = " for _, name, key in every() if key.default)
     lines = [line.removeprefix("# ") if line.startswith(usual) else line for line in config.dump({}).splitlines()]
     said = config.parse("\n".join(lines), "s.toml")
@@ -193,7 +193,7 @@ def test_a_model_lies_beside_its_file(tmp_path, monkeypatch):
          "Correct it there."),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said(text, sentence):
+def test_the_fault_of_a_key_is_named(text, sentence):
     with pytest.raises(UsageError) as caught:
         config.parse(text, "s.toml")
     assert str(caught.value) == f"s.toml: {sentence}"

@@ -50,7 +50,7 @@ def test_columns_from_text_and_from_a_mapping_are_the_same() -> None:
         (parse_columns, "time=none", "--columns: a log must have a time"),
     ],
 )
-def test_what_is_wrong_is_said(parse: Callable[[str], object], text: str, sentence: str) -> None:
+def test_the_fault_of_an_option_is_named(parse: Callable[[str], object], text: str, sentence: str) -> None:
     with pytest.raises(UsageError) as caught:
         parse(text)
     assert sentence in str(caught.value)

@@ -99,7 +99,7 @@ def test_file_uri_is_a_path(tmp_path, flight):
         atomic.refuse_overwriting(f"file://{flight[1]}", [flight[1]])
 
 
-def test_what_is_not_there_or_unknown_is_said(bucket, temporary):
+def test_missing_files_and_unknown_schemes_are_named(bucket, temporary):
     with pytest.raises(InputError, match=r"memory://bucket/none.csv: there is no such file"):
         logs.read("memory://bucket/none.csv")
     sentence = 'nowhere://bucket/a.csv: neither pyarrow nor fsspec supports "nowhere" here'
@@ -134,7 +134,7 @@ def test_half_an_output_is_taken_away(bucket, temporary, monkeypatch):
     assert not bucket.exists("/bucket/out.csv")
 
 
-def test_storage_that_refuses_is_said(bucket, temporary, monkeypatch):
+def test_errors_of_the_storage_are_quoted(bucket, temporary, monkeypatch):
     def refuse(*args, **how):
         raise PermissionError("403 Forbidden\nand a long page")
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 from ftproc.errors import InputError, nearest
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
-from ftproc.files.units import ALIASES, NOT_UNITS, QUANTITIES, UNITS, Unit, si_unit
+from ftproc.files.units import ALIASES, NOT_UNITS, QUANTITIES, UNITS, ZENITH_NAMES, Unit, si_unit
 
 
 class Column(NamedTuple):
@@ -159,7 +159,7 @@ def _refuse_unknown_unit(source: str, names: Sequence[str], quantity: str) -> No
 def _refuse_zenith(source: str, names: Sequence[str], quantity: str) -> None:
     """A log with zenith angles does not lack elevations."""
     for name in names:
-        if quantity == "elevation" and re.match(r"(zenith|zen|zd)(_|$)", name.lower()):
+        if quantity == "elevation" and name.lower().partition("_")[0] in ZENITH_NAMES:
             raise InputError(
                 f'{source}: column "{name}" looks like a zenith angle. Say --columns elevation={name} '
                 f"--elevation-from zenith{_or_absent(quantity)}."

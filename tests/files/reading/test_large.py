@@ -1,4 +1,4 @@
-"""Files that are read in blocks give the log that is read at once; what blocks cannot judge is read at once."""
+"""A file read in blocks gives the same log as one read at once; faults that need the whole file are found at once."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def test_unit_is_judged_by_the_whole(tmp_path, in_blocks):
         logs.read(path)
 
 
-def test_damaged_parquet_is_told(tmp_path, in_blocks):
+def test_damaged_parquet_is_refused(tmp_path, in_blocks):
     path = tmp_path / "log.parquet"
     pq.write_table(pa.table(columns()), path)
     data = bytearray(path.read_bytes())
@@ -147,7 +147,7 @@ def test_damaged_parquet_is_told(tmp_path, in_blocks):
         logs.read(path)
 
 
-def test_no_room_for_temporary_files_is_told(tmp_path, in_blocks, monkeypatch):
+def test_no_room_for_temporary_files_is_refused(tmp_path, in_blocks, monkeypatch):
     path = tmp_path / "log.csv"
     path.write_text(text(columns()))
 
@@ -167,14 +167,14 @@ def test_file_that_only_says_it_is_large(tmp_path, in_blocks):
         logs.read(path)
 
 
-def test_no_reading_at_all_is_told(tmp_path, in_blocks):
+def test_no_reading_at_all_is_refused(tmp_path, in_blocks):
     path = tmp_path / "log.csv"
     path.write_text(text(columns(), {k: f"{k},,," for k in range(ROWS)}))
     with pytest.raises(InputError, match="no row has a range, azimuth or elevation"):
         logs.read(path)
 
 
-def test_text_in_parquet_that_is_not_utf_8_is_told(tmp_path, in_blocks):
+def test_text_in_parquet_that_is_not_utf_8_is_refused(tmp_path, in_blocks):
     table = columns()
     table["azimuth_deg"] = pa.array([b"\x81"] * ROWS).view(pa.string())
     path = tmp_path / "log.parquet"
@@ -218,7 +218,7 @@ def test_decimal_commas_are_read_in_blocks(tmp_path, in_blocks, monkeypatch):
     same(*both(path, monkeypatch))
 
 
-def test_rows_that_a_parquet_file_promises_and_has_not_are_told(tmp_path, in_blocks, monkeypatch):
+def test_rows_that_a_parquet_file_claims_but_lacks_are_missed(tmp_path, in_blocks, monkeypatch):
     path = tmp_path / "log.parquet"
     pq.write_table(pa.table(columns()), path)
     whole, batches = pq.read_table, pq.ParquetFile.iter_batches

@@ -42,7 +42,7 @@ def test_a_json_file_of_another_program_is_no_metadata(make: Make, text: str | b
         ("time_s,x_m,y_m,z_m,outlier_range\n0,1,2,3,4\n", '"4" is not a flag; expected a whole number from 0 to 3.'),
     ],
 )
-def test_what_is_wrong_with_a_trajectory_is_said(make: Make, text: str, expected: str) -> None:
+def test_the_fault_of_a_trajectory_is_named(make: Make, text: str, expected: str) -> None:
     path = make(text)
     with pytest.raises(InputError) as caught:
         trajectories.read(path)

@@ -107,14 +107,9 @@ def test_timestamps_count_as_in_a_log_of_the_same_day(make: Make) -> None:
         ),
     ],
 )
-def test_what_is_wrong_with_a_truth_is_said(make: Make, text: str, expected: str) -> None:
+def test_the_fault_of_a_truth_is_named(make: Make, text: str, expected: str) -> None:
     path = make(text)
     with pytest.raises(InputError) as caught:
         truth.read(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert expected in str(caught.value)
-
-
-def test_a_truth_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="there is no such file"):
-        truth.read(tmp_path / "none.csv")

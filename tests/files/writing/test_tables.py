@@ -10,7 +10,7 @@ from ftproc.errors import OutputError
 from ftproc.files.writing import csvtext, tables
 
 
-def test_what_csv_cannot_hold_is_said_and_leaves_no_file(tmp_path: Path) -> None:
+def test_a_column_that_csv_cannot_hold_is_refused_and_leaves_no_file(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"cannot be written as CSV .*give the output the name \.parquet"):
         tables.write_table(pa.table({"a": [[1], [2]]}), tmp_path / "out.csv")
     assert list(tmp_path.iterdir()) == []

@@ -212,13 +212,6 @@ def test_metadata_of_numpy_make_becomes_plain_json(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "out.json").read_text()) == expected
 
 
-def test_where_a_trajectory_cannot_be_written(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match=r"out\.txt: .*end the name in \.csv, \.csv\.gz, \.parquet"):
-        write_trajectory(some(1), tmp_path / "out.txt")
-    with pytest.raises(OutputError, match="there is no directory"):
-        write_trajectory(some(1), tmp_path / "none" / "out.csv")
-
-
 def test_a_sidecar_that_fails_leaves_the_earlier_file(tmp_path: Path) -> None:
     write_trajectory(some(1), tmp_path / "out.csv")
     before = (tmp_path / "out.csv").read_bytes()
