@@ -32,8 +32,8 @@ def codes(flight: Simulation) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 
 def deviation(flight: Simulation) -> FloatArray:
-    """(n, 3) tampered minus untampered reading, angles the short way round."""
-    d = flight.log.measurement - flight.untampered
+    """(n, 3) contaminated minus clean reading, azimuth wrapped."""
+    d = flight.log.measurement - flight.clean
     d[:, 1] = wrap(d[:, 1])
     return d
 

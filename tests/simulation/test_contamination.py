@@ -7,8 +7,8 @@ import pytest
 
 from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.simulation import Fault, OutlierSpec, simulate
+from ftproc.simulation.contamination import contaminate
 from ftproc.simulation.sampling import kept_rows, sample_times, with_duplicates
-from ftproc.simulation.tamper import tamper
 from tests.simulated import codes, deviation, runs
 
 
@@ -58,7 +58,7 @@ def test_patches_have_the_length_number_and_shape_said(kind: str) -> None:
                 np.testing.assert_allclose(error, error[-1] * np.arange(1, length + 1) / length, atol=1e-6)
                 assert 8 <= abs(error[-1]) <= 60
             elif kind == "stuck":
-                np.testing.assert_array_equal(flight.log.measurement[patch, c], flight.untampered[patch.start - 1, c])
+                np.testing.assert_array_equal(flight.log.measurement[patch, c], flight.clean[patch.start - 1, c])
             else:
                 assert np.abs(error).max() > 4
 
@@ -87,7 +87,7 @@ def test_absolute_sizes() -> None:
 
 
 def test_sizes_are_log_uniform_with_either_sign() -> None:
-    reading, code = tamper(
+    reading, code = contaminate(
         np.zeros((40000, 3)), (Fault("isolated", rate=0.5, size=(10.0, 1000.0)),), np.ones(3),
         np.random.default_rng(0),
     )  # fmt: skip
