@@ -174,7 +174,7 @@ def test_mean_error_and_rmse_differ() -> None:
     assert found.max_error_m == pytest.approx(201.0)
 
 
-def test_honest_sigmas_give_nees_three_and_992_in_1000() -> None:
+def test_consistent_sigmas_give_nees_three_and_992_in_1000() -> None:
     truth = simulate("calibration", seed=1, duration_s=600.0, dt_s=0.02, outliers="none").truth
     t = trajectory_for(truth, error_m=4.0)
     found = score(replace(t, sigma=np.full((len(t), 6), 4.0)), truth)
