@@ -40,13 +40,13 @@ def deviation(flight: Simulation) -> FloatArray:
 
 def runs(flag: Iterable[float]) -> list[slice]:
     """Runs of non-zero flags, by walking along."""
-    found, begin = [], None
+    found, start = [], None
     for i, value in enumerate([*flag, 0]):
-        if value and begin is None:
-            begin = i
-        if not value and begin is not None:
-            found.append(slice(begin, i))
-            begin = None
+        if value and start is None:
+            start = i
+        if not value and start is not None:
+            found.append(slice(start, i))
+            start = None
     return found
 
 

@@ -17,13 +17,15 @@ from ftproc.correction.network import Weights
 from tests.correction import fake
 
 
-def constant(name: str, says: float, gain: float = 1.0, bound: float = 2.0) -> Stage:
-    """A stage whose network has the constant output `says`, with an envelope that holds all inputs."""
+def constant(name: str, output: float, gain: float = 1.0, bound: float = 2.0) -> Stage:
+    """A stage whose network has the constant output `output`, with an envelope that holds all inputs."""
     features = named(name)
     d, o = features.input_size, features.output_size
     return Stage(
         features,
-        Weights(np.zeros((2, d)), np.zeros(2), np.zeros((o, 2)), np.full(o, says), np.zeros((o, d * features.direct))),
+        Weights(
+            np.zeros((2, d)), np.zeros(2), np.zeros((o, 2)), np.full(o, output), np.zeros((o, d * features.direct))
+        ),
         Normaliser(np.zeros(d), np.ones(d)),
         Normaliser(np.zeros(o), np.ones(o)),
         Envelope(np.eye(d), 1e12),
@@ -40,12 +42,12 @@ def test_zero_while_coasting_and_settling_and_nowhere_else() -> None:
     assert np.flatnonzero(zero).tolist() == [*range(SETTLING), *range(100, 110)]
 
 
-@pytest.mark.parametrize("says", [0.5, 1.9, 2.1, -40.0])
-def test_the_output_is_applied_within_two_sigmas(says: float) -> None:
+@pytest.mark.parametrize("output", [0.5, 1.9, 2.1, -40.0])
+def test_the_output_is_applied_within_two_sigmas(output: float) -> None:
     filtered = fake.run(np.random.default_rng(1))
-    values = correct(filtered, constant("window", says)).values
+    values = correct(filtered, constant("window", output)).values
     along = LineOfSight.of(filtered, 0, 600).from_cartesian(values) / filtered.los_sigma
-    assert along[SETTLING:] == pytest.approx(np.full((575, 6), np.clip(says, -2, 2)))
+    assert along[SETTLING:] == pytest.approx(np.full((575, 6), np.clip(output, -2, 2)))
 
 
 @pytest.mark.parametrize("name", FEATURES)

@@ -51,12 +51,12 @@ def test_adding_the_wanted_output_gives_the_truth(features: Features) -> None:
     los = LineOfSight.of(flight.run, 0, 600)
     wanted = features.targets(los, flight.error)
     assert wanted.shape == (600, features.output_size)
-    said = np.zeros((600, 6))
-    said[:, : features.output_size] = wanted[:, :6]
-    corrected = flight.run.state[:, :6] + features.to_cartesian(los, said)
+    output = np.zeros((600, 6))
+    output[:, : features.output_size] = wanted[:, :6]
+    corrected = flight.run.state[:, :6] + features.to_cartesian(los, output)
     assert corrected[:, :3] == pytest.approx(flight.truth_position, abs=1e-9)
     assert features.output_size < 6 or corrected[:, 3:] == pytest.approx(flight.truth_velocity, abs=1e-9)
-    assert features.from_cartesian(los, features.to_cartesian(los, said)) == pytest.approx(said)
+    assert features.from_cartesian(los, features.to_cartesian(los, output)) == pytest.approx(output)
     assert features.unit(los).shape == (600, 6)
 
 

@@ -64,9 +64,9 @@ def test_there_and_back(model: Model, tmp_path: Path) -> None:
     assert again.settings == model.settings
     filtered = fake.run(np.random.default_rng(9))
     for stage in ("filter", "smoother"):
-        said = correct(filtered, again.stages[stage]).values
-        assert np.array_equal(said, correct(filtered, model.stages[stage]).values)
-        assert said.any()
+        values = correct(filtered, again.stages[stage]).values
+        assert np.array_equal(values, correct(filtered, model.stages[stage]).values)
+        assert values.any()
     assert [p.name for p in tmp_path.iterdir()] == ["model.safetensors"]
 
 

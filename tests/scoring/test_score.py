@@ -82,9 +82,9 @@ def naive_score(t: Trajectory, truth: Truth) -> dict[str, float]:
     }
 
 
-def naive_detection(said: list[int], injected: list[int]) -> dict[str, float]:
+def naive_detection(flags: list[int], injected: list[int]) -> dict[str, float]:
     tp = fp = fn = tn = 0
-    for flag, code in zip(said, injected, strict=True):
+    for flag, code in zip(flags, injected, strict=True):
         if flag == 3:
             continue
         if flag in (1, 2):

@@ -1,4 +1,4 @@
-"""What is injected into a simulated log is what was asked for, and what the truth says."""
+"""The outliers of a simulated log are those of the specification, and the truth has their codes."""
 
 from __future__ import annotations
 

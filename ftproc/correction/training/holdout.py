@@ -119,7 +119,7 @@ class _Ratios:
         return Ratio(float(np.sqrt(total[0] / total[1])), float(low), float(high))
 
 
-def judge(stage: Stage, flights: Sequence[Flight], parts: Split, rng: np.random.Generator) -> Stage:
+def with_verdict(stage: Stage, flights: Sequence[Flight], parts: Split, rng: np.random.Generator) -> Stage:
     """The stage with its gain and verdict, from the held-out parts of `flights`."""
     validation, test = (_held_out(stage, flights, pieces) for pieces in (parts.validation, parts.test))
     gain, proof = _proven_gain(stage, validation, rng)

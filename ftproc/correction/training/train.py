@@ -19,7 +19,7 @@ from ftproc.correction.network import Shape
 from ftproc.correction.training import Progress, descent, initial_weights, silent
 from ftproc.correction.training.descent import OPTIMISERS, Problem
 from ftproc.correction.training.genetic import GeneticSettings
-from ftproc.correction.training.holdout import judge
+from ftproc.correction.training.holdout import with_verdict
 from ftproc.correction.training.samples import Flight, Samples, Split, overconfidence, samples, split
 from ftproc.errors import InputError, UsageError
 from ftproc.records import FloatArray
@@ -90,9 +90,9 @@ def train(flights: Sequence[Flight], settings: TrainSettings, progress: Progress
         fingerprint=data.fingerprint,
     )
     progress("validation", 0, 1)
-    judged = judge(stage, flights, data.parts, _streams(settings.seed)[4])
+    stage = with_verdict(stage, flights, data.parts, _streams(settings.seed)[4])
     progress("validation", 1, 1)
-    return judged
+    return stage
 
 
 def _fitted(data: Prepared, settings: TrainSettings, progress: Progress) -> FloatArray:
@@ -114,7 +114,7 @@ def _fitted(data: Prepared, settings: TrainSettings, progress: Progress) -> Floa
 
 
 def _streams(seed: int) -> list[np.random.Generator]:
-    """For splitting, thinning, searching, descending, judging, so that one does not depend on another."""
+    """For splitting, thinning, searching, descending and validation, so that one does not depend on another."""
     return [np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(5)]
 
 

@@ -8,14 +8,14 @@ from ftproc.correction.training.study import CONTENDERS, Comparison, compare
 from ftproc.settings import TrainSettings
 from tests.correction import fake
 
-QUICK = TrainSettings("window", hidden=3, population=6, generations=4, epochs=60)
+QUICK = TrainSettings("window", hidden=3, population=6, generations=4, epochs=40)
 
 
 def test_every_contender_learns_and_the_table_names_them() -> None:
-    found = compare(fake.flights(2, 8, lag=2.0), QUICK, seeds=3)
-    assert found.error.shape == (len(CONTENDERS), 3)
+    found = compare(fake.flights(2, 8, lag=2.0, n=250), QUICK, seeds=2)
+    assert found.error.shape == (len(CONTENDERS), 2)
     assert (found.error < 0.98).all()
-    assert np.array_equal(compare(fake.flights(2, 8, lag=2.0), QUICK, seeds=3).error, found.error)
+    assert np.array_equal(compare(fake.flights(2, 8, lag=2.0, n=250), QUICK, seeds=1).error, found.error[:, :1])
     lines = found.text().splitlines()
     assert [line.split("  ")[0] for line in lines[2:]] == list(CONTENDERS)
 
