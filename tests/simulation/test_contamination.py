@@ -107,6 +107,12 @@ def test_patches_keep_clear_of_each_other_and_what_does_not_fit_is_left_out() ->
     assert not codes(simulate("zuo2021", duration_s=3.0, outliers="offset=3:40:10")).any()
 
 
+def test_isolated_outliers_leave_room_for_patches_whatever_the_order_of_the_items() -> None:
+    for spec in ("isolated=0.5,offset=2:10:20", "offset=2:10:20,isolated=0.5"):
+        flag = codes(simulate("manoeuvre", seed=2, outliers=spec))
+        assert [(flag[:, c] == 2).sum() for c in range(3)] == [20, 20, 20]
+
+
 def test_gap_removes_rows_from_log_and_truth() -> None:
     whole = simulate("manoeuvre", seed=9, outliers="isolated=0.05")
     flight = simulate("manoeuvre", seed=9, outliers="isolated=0.05,gap=1:5")
