@@ -220,7 +220,7 @@ def known_flights(
         if estimate.smoothed is not None:
             runs["smoother"] = _smoothed(estimate.run, estimate.smoothed)
         for stage, run in runs.items():
-            flights[stage].append(Flight(run, known.position_m, known.velocity_mps, log.name))
+            flights[stage].append(Flight(run, known.position_m, known.velocity_mps))
     if progress:
         progress("filtering", len(pairs), len(pairs))
     return {stage: found for stage, found in flights.items() if found}

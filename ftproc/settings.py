@@ -62,4 +62,4 @@ class TrainSettings:
     seed: int = 0
     method: str = "ga-bpnn-ukf"  # the filter whose error is learned
     optimiser: str = "l-bfgs"  # or momentum, as in the paper
-    start: str = "genetic"  # first weights, see ftproc.correction.training.starts
+    start: str = "genetic"  # initial weights, see ftproc.correction.training.initial_weights

@@ -32,21 +32,21 @@ def codes(flight: Simulation) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 
 def deviation(flight: Simulation) -> FloatArray:
-    """(n, 3) tampered minus untampered reading, angles the short way round."""
-    d = flight.log.measurement - flight.untampered
+    """(n, 3) contaminated minus clean reading, azimuth wrapped."""
+    d = flight.log.measurement - flight.clean
     d[:, 1] = wrap(d[:, 1])
     return d
 
 
 def runs(flag: Iterable[float]) -> list[slice]:
     """Runs of non-zero flags, by walking along."""
-    found, begin = [], None
+    found, start = [], None
     for i, value in enumerate([*flag, 0]):
-        if value and begin is None:
-            begin = i
-        if not value and begin is not None:
-            found.append(slice(begin, i))
-            begin = None
+        if value and start is None:
+            start = i
+        if not value and start is not None:
+            found.append(slice(start, i))
+            start = None
     return found
 
 

@@ -58,7 +58,8 @@ def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: 
     from ftproc.files.reading import trajectories as trajectory_files
     from ftproc.report.index import Entry, write
     from ftproc.report.style import require_plotly
-    from ftproc.scoring import axes, render, score
+    from ftproc.scoring import render, score
+    from ftproc.scoring.matching import exchanged_axes
 
     if report is not None:
         require_plotly()
@@ -70,7 +71,7 @@ def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: 
             truth = _truth(truths[number % len(truths)], known) if truths else None
             trajectory = trajectory_files.read(name)
             scores.append(score(trajectory, truth))
-            if truth is not None and (doubt := axes.remark(trajectory, truth)):
+            if truth is not None and (doubt := exchanged_axes(trajectory, truth)):
                 click.echo(f"ftproc: {doubt}", err=True)
             if place is not None:
                 pages.write(trajectory, place, truth)

@@ -46,8 +46,8 @@ def run(
     """Train, or compare, and print what came of it. Raises FtprocError."""
     if output == "-":
         raise UsageError("-o -: a model is not written to standard output; name a file.")
-    if features not in stages.known():
-        raise UsageError(f"there is no feature set {features!r}; choose one of {', '.join(stages.known())}")
+    if features not in stages.feature_choices():
+        raise UsageError(f"there is no feature set {features!r}; choose one of {', '.join(stages.feature_choices())}")
     if output is not None:
         atomic.refuse_overwriting(output, [*logs, *truths, *([config] if config else [])])
         atomic.check_target(output)

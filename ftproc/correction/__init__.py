@@ -1,4 +1,5 @@
-"""The network that corrects the filter's output: its features, its file, how it is applied.
+"""Correction of the filter's output by a trained network: its features, its guards and its file.
 
-`training` makes one. Calls `core.model` and, for the file, `files`; no filter is run here.
+`training` makes networks. Calls `core.model`, `core.filtering` for the record of a run, and `files` for the model file;
+runs no filter.
 """

@@ -1,4 +1,4 @@
-"""How the training data looked: the normalisation of columns, and the region of inputs that was covered."""
+"""Statistics of the training data: the normalisation of columns, and the region that its inputs cover."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ class Normaliser:
 
 @dataclass(frozen=True)
 class Envelope:
-    """What training covered: squared Mahalanobis distance z' precision z of normalised inputs, up to a limit.
+    """The region that the training inputs cover: squared Mahalanobis distance z' precision z of normalised inputs z, up
+    to a limit.
 
     precision: (d, d) symmetric. limit: dimensionless.
     """
@@ -45,10 +46,10 @@ class Envelope:
 
     @classmethod
     def fit(cls, normalised: FloatArray, reach: float = 1.0) -> Envelope:
-        """From the training inputs (n, d), with floored eigenvalues of their covariance, `reach` times as far.
+        """From the training inputs (n, d), with floored eigenvalues of their covariance; radii are scaled by `reach`.
 
-        The limit is chi-square(d) at 0.999, or what holds 99.9 % of the training inputs where their tails are
-        longer: a filter told of too little manoeuvre makes long tails, and these are what is to be corrected.
+        The limit is the 99.9 % quantile of chi-square(d), or that of the training inputs if it is larger: a filter
+        with too little process noise has long tails of innovations, and these are what is to be corrected.
         """
         from scipy.special import chdtri
 

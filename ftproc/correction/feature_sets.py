@@ -1,10 +1,10 @@
 """The feature sets by name.
 
-`correction` is the paper's (2021, section 2.2): update minus prediction in, truth minus estimate out.
-`window` sees the last innovations over their sigmas and the geometry, and answers in units of the filter's own sigma:
-one model serves any range, rate and noise level. It can learn what a wrong noise or jerk level does.
-`instrument` sees where the target is and answers in metres and radians: the repeatable errors of one instrument. These
-survive smoothing, so it serves the smoother as well.
+`correction` is the paper's (Zuo et al. 2021, section 2.2): update minus prediction in, truth minus estimate out.
+`window` has the last normalised innovations and the geometry in, and an output in units of the filter's own sigma: one
+model serves any range, rate and noise. It learns the effect of wrong measurement or process noise.
+`instrument` has the target's position in, and metres and radians out: the repeatable errors of one instrument. These
+survive smoothing, so it serves the smoother too.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from ftproc.correction.features import APPLIED, Features, Place, Record
+from ftproc.core.filtering.records import FilterRun
+from ftproc.correction.features import APPLIED, Features, LineOfSight
 from ftproc.errors import UsageError
 from ftproc.records import FloatArray, IntArray
 
@@ -31,27 +32,27 @@ class CorrectionFeatures(Features):
     def floor(self) -> FloatArray:
         return np.full(9, 1e-6)
 
-    def _raw(self, run: Record, start: int, stop: int) -> FloatArray:
+    def _raw(self, run: FilterRun, start: int, stop: int) -> FloatArray:
         return run.state[start:stop] - run.predicted[start:stop]
 
-    def unit(self, place: Place) -> FloatArray:
-        return np.ones((len(place.position_m), APPLIED))
+    def unit(self, los: LineOfSight) -> FloatArray:
+        return np.ones((len(los.position_m), APPLIED))
 
-    def to_cartesian(self, place: Place, output: FloatArray) -> FloatArray:
+    def to_cartesian(self, los: LineOfSight, output: FloatArray) -> FloatArray:
         return output[:, :APPLIED]
 
-    def from_cartesian(self, place: Place, cartesian: FloatArray) -> FloatArray:
+    def from_cartesian(self, los: LineOfSight, cartesian: FloatArray) -> FloatArray:
         return cartesian
 
-    def targets(self, place: Place, error: FloatArray) -> FloatArray:
+    def targets(self, los: LineOfSight, error: FloatArray) -> FloatArray:
         return error
 
 
 class WindowFeatures(Features):
-    """Innovations over sigma: of the last 8 samples (newest first), then sums over the 8, 16 and 32 before those, each
-    over the root of its length; 0 where not used. A filter that is too slow or too quick errs for as long as it
-    remembers, which single samples do not reach. Then log range, elevation, log sigma (radial in m, cross and up as
-    angles) and log of filter sigma over innovation sigma, which stands for the gain. Targets: error along the
+    """Normalised innovations of the last 8 samples (newest first), then their sums over the 8, 16 and 32 samples before
+    those, each over the root of its length; 0 where not used. The error of a filter with wrong process noise lasts as
+    long as its memory, longer than single samples reach. Then log range, elevation, log sigma (radial in m, cross and
+    up as angles) and log of filter sigma over innovation sigma, a measure of the gain. Targets: error along the
     line-of-sight axes over the filter's sigma."""
 
     name = "window"
@@ -64,18 +65,18 @@ class WindowFeatures(Features):
     def floor(self) -> FloatArray:
         return np.array((*(0.25,) * (3 * (self.SINGLE + len(self.SUMS))), *self._GEOMETRY_FLOOR))
 
-    def _raw(self, run: Record, start: int, stop: int) -> FloatArray:
+    def _raw(self, run: FilterRun, start: int, stop: int) -> FloatArray:
         return np.concatenate([self._history(run, start, stop), self._geometry(run, start, stop)], axis=1)
 
-    def _history(self, run: Record, start: int, stop: int) -> FloatArray:
-        """(m, 33) three components at each lag and of each sum; nothing from before the last (re)start."""
+    def _history(self, run: FilterRun, start: int, stop: int) -> FloatArray:
+        """(m, 33) three components at each lag and of each sum; zero before the last (re-)initialization."""
         first = max(start - 2 * self.SUMS[-1], 0)
         ratio = run.innovation[first:stop] / run.innovation_sigma[first:stop]
         ratio = np.where(run.weight[first:stop] > 0.0, ratio, 0.0)
         since = run.since_start[first:stop, None]
         columns = [_earlier(ratio, lag, since) for lag in range(self.SINGLE)]
         total, width = ratio, 1
-        while width <= self.SUMS[-1]:  # total: over the last `width` samples, so that any cut gives the same sums
+        while width <= self.SUMS[-1]:  # total: over the last `width` samples, any cut of the run gives the same sums
             before = _earlier(total, width, since)
             if width in self.SUMS:
                 columns.append(before / np.sqrt(width))
@@ -83,7 +84,7 @@ class WindowFeatures(Features):
         return np.concatenate(columns, axis=1)[start - first :]
 
     @staticmethod
-    def _geometry(run: Record, start: int, stop: int) -> FloatArray:
+    def _geometry(run: FilterRun, start: int, stop: int) -> FloatArray:
         """(m, 8) log range, elevation rad, three log sigmas, three log ratios to the innovation's sigma."""
         x, y, z = run.state[start:stop, :3].T
         flat = np.hypot(x, y)
@@ -92,22 +93,22 @@ class WindowFeatures(Features):
         lever = np.stack([np.ones_like(distance), np.maximum(flat, 1e-3 * distance), distance], axis=1)
         angular = run.los_sigma[start:stop, :3] / lever
         ratio = np.log(angular / run.innovation_sigma[start:stop])
-        place = np.stack([np.log(distance), np.arctan2(z, flat)], axis=1)
-        return np.concatenate([place, np.log(angular), ratio], axis=1)
+        position = np.stack([np.log(distance), np.arctan2(z, flat)], axis=1)
+        return np.concatenate([position, np.log(angular), ratio], axis=1)
 
-    def unit(self, place: Place) -> FloatArray:
-        return place.los_sigma
+    def unit(self, los: LineOfSight) -> FloatArray:
+        return los.sigma
 
-    def targets(self, place: Place, error: FloatArray) -> FloatArray:
-        return self.from_cartesian(place, error[:, :APPLIED])
+    def targets(self, los: LineOfSight, error: FloatArray) -> FloatArray:
+        return self.from_cartesian(los, error[:, :APPLIED])
 
 
 class InstrumentFeatures(Features):
-    """Cosine and sine of the azimuth, of the elevation, the former two times the sine of the elevation, and the ground
-    range. Targets: error of position along the line of sight in m, across and up as angles in rad.
+    """Cosine and sine of the azimuth and of the elevation, the first two times the sine of the elevation, and the
+    ground range in km. Targets: position error along the line of sight in m, across and up as angles in rad.
 
-    In these, zero-set errors, mislevel and collimation are linear, and so is refraction of a low target: a network
-    with direct connections learns them from a few flights and holds beyond where those went.
+    Zero-set errors, mislevel and collimation are linear in these, and so is refraction of a low target: a network
+    with direct connections learns them from a few flights and extrapolates to other directions.
     """
 
     name = "instrument"
@@ -120,19 +121,19 @@ class InstrumentFeatures(Features):
     def floor(self) -> FloatArray:
         return np.array((*(0.3,) * 6, 3.0))
 
-    def _raw(self, run: Record, start: int, stop: int) -> FloatArray:
+    def _raw(self, run: FilterRun, start: int, stop: int) -> FloatArray:
         x, y, z = run.state[start:stop, :3].T
         flat = np.hypot(x, y)
         distance = np.hypot(flat, z)
         cos_a, sin_a, cos_e, sin_e = x / flat, y / flat, flat / distance, z / distance
         return np.stack([cos_a, sin_a, cos_e, sin_e, cos_a * sin_e, sin_a * sin_e, 1e-3 * flat], axis=1)
 
-    def unit(self, place: Place) -> FloatArray:
-        distance = np.linalg.norm(place.position_m, axis=1)
+    def unit(self, los: LineOfSight) -> FloatArray:
+        distance = np.linalg.norm(los.position_m, axis=1)
         return np.stack([np.ones_like(distance), distance, distance] * 2, axis=1)
 
-    def targets(self, place: Place, error: FloatArray) -> FloatArray:
-        return self.from_cartesian(place, error[:, :APPLIED])[:, :3]
+    def targets(self, los: LineOfSight, error: FloatArray) -> FloatArray:
+        return self.from_cartesian(los, error[:, :APPLIED])[:, :3]
 
 
 FEATURES: dict[str, Features] = {f.name: f for f in (CorrectionFeatures(), WindowFeatures(), InstrumentFeatures())}
@@ -146,7 +147,7 @@ def named(name: str) -> Features:
 
 
 def _earlier(values: FloatArray, lag: int, since: IntArray) -> FloatArray:
-    """(n, 3) the values of `lag` samples before; 0 where there was none since the start (n, 1)."""
+    """(n, 3) the values `lag` samples earlier; 0 where `since` (n, 1), samples since the initialization, is less."""
     moved = np.zeros_like(values)
     moved[lag:] = values[: max(len(values) - lag, 0)]
     return np.where(since >= lag, moved, 0.0)

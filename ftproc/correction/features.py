@@ -1,73 +1,65 @@
-"""What the network sees and what it is to say: from a run to inputs and targets, and from the output back to a
-correction in x, y, z. The feature sets themselves are in `feature_sets`."""
+"""Inputs and targets of the network: from a filter run to inputs and targets, and from the output back to a correction
+in x, y, z. The feature sets themselves are in `feature_sets`."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core.filtering.records import FilterRun
 from ftproc.core.model.frames import line_of_sight_axes
-from ftproc.correction import los
-from ftproc.records import FloatArray, IntArray
+from ftproc.records import FloatArray
 
-SETTLING = 25  # samples after a (re)start that are neither learned from nor corrected
+SETTLING = 25  # samples after (re-)initialization that are neither learned from nor corrected
 APPLIED = 6  # outputs that are applied to the trajectory: position and velocity
 
 BoolArray = NDArray[np.bool_]
 
 
-class Record(Protocol):
-    """What is needed of a run of n samples, of the filter (see `core.filtering.records`) or smoothed; angles in rad.
+@dataclass(frozen=True)
+class LineOfSight:
+    """The line-of-sight axes (radial, cross, up) of n samples, along which instrument errors are simple.
 
-    time_s (n,); state (n, 9) updated and predicted (n, 9) one-step predicted x y z m, v m/s, a m/s2;
-    innovation (n, 3), NaN where missing; innovation_sigma (n, 3) sqrt(S_ii); weight (n, 3) in [0, 1], 0 where
-    rejected or missing; los_sigma (n, 6) 1-sigma m, m/s along the line-of-sight axes; since_start (n,)
-    samples since the last (re)start.
+    position_m: (n, 3) as estimated. sigma: (n, 6) 1-sigma of position m and velocity m/s along the axes.
     """
 
-    @property
-    def time_s(self) -> FloatArray: ...
-    @property
-    def state(self) -> FloatArray: ...
-    @property
-    def predicted(self) -> FloatArray: ...
-    @property
-    def innovation(self) -> FloatArray: ...
-    @property
-    def innovation_sigma(self) -> FloatArray: ...
-    @property
-    def weight(self) -> FloatArray: ...
-    @property
-    def los_sigma(self) -> FloatArray: ...
-    @property
-    def since_start(self) -> IntArray: ...
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where some samples are: position_m (n, 3) as estimated, los_sigma (n, 6) m, m/s."""
-
     position_m: FloatArray
-    los_sigma: FloatArray
+    sigma: FloatArray
 
     @classmethod
-    def of(cls, run: Record, start: int, stop: int) -> Place:
+    def of(cls, run: FilterRun, start: int, stop: int) -> LineOfSight:
+        """Of the samples start:stop of a run."""
         return cls(run.state[start:stop, :3], run.los_sigma[start:stop])
+
+    def rows(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> LineOfSight:
+        """Of the samples of a mask, or of these numbers."""
+        return LineOfSight(self.position_m[rows], self.sigma[rows])
 
     @cached_property
     def axes(self) -> FloatArray:
-        """(n, 3, 3) line-of-sight unit vectors."""
+        """(n, 3, 3) unit vectors, one per row."""
         return line_of_sight_axes(self.position_m)
 
+    def from_cartesian(self, cartesian: FloatArray) -> FloatArray:
+        """Position and velocity (n, 6) in x, y, z as components along the axes."""
+        pairs = cartesian.reshape(len(cartesian), 2, 3)
+        along: FloatArray = np.einsum("nij,npj->npi", self.axes, pairs).reshape(len(cartesian), 6)
+        return along
 
-def usable(run: Record, start: int, stop: int) -> BoolArray:
-    """(m,) true where the filter has settled, is not coasting (some component was used) and has a finite
-    sigma."""
+    def to_cartesian(self, along: FloatArray) -> FloatArray:
+        """The inverse of `from_cartesian`."""
+        pairs = along.reshape(len(along), 2, 3)
+        cartesian: FloatArray = np.einsum("nij,npi->npj", self.axes, pairs).reshape(len(along), 6)
+        return cartesian
+
+
+def usable(run: FilterRun, start: int, stop: int) -> BoolArray:
+    """(m,) true where the filter has settled, is not coasting (some component was used) and has finite sigmas."""
     sigma = run.los_sigma[start:stop]
     fit: BoolArray = (
         (run.since_start[start:stop] >= SETTLING)
@@ -79,9 +71,12 @@ def usable(run: Record, start: int, stop: int) -> BoolArray:
 
 
 class Features(ABC):
-    """A feature set: `name`, names of the outputs (the first six, or fewer, are applied), and the mappings. Rows
-    `start:stop` of a run, m of them. direct: the network has direct connections. smoothed: works on smoothed runs
-    as well, for it needs no innovations. reach: how many times farther than the training inputs it holds."""
+    """A feature set: its name, the names of its outputs (the first six, or fewer, are applied), and the mappings, over
+    the m samples `start:stop` of a filter run or of one with the smoother's states.
+
+    direct: the network has direct connections. smoothed: valid for smoothed runs too, because it needs no innovations.
+    reach: radius of the region where it holds, in units of that covered by the training inputs.
+    """
 
     name: ClassVar[str]
     outputs: ClassVar[tuple[str, ...]]
@@ -92,32 +87,31 @@ class Features(ABC):
     @property
     @abstractmethod
     def floor(self) -> FloatArray:
-        """(d,) smallest scale by which an input is normalised: what is constant in training must not become a
-        razor-thin envelope at run time."""
+        """(d,) smallest normalisation scale of each input: an input that was constant in training must not make the
+        envelope infinitely thin."""
 
     @abstractmethod
-    def _raw(self, run: Record, start: int, stop: int) -> FloatArray:
+    def _raw(self, run: FilterRun, start: int, stop: int) -> FloatArray:
         """(m, d) inputs, not finite where they cannot be formed."""
 
     @abstractmethod
-    def unit(self, place: Place) -> FloatArray:
+    def unit(self, los: LineOfSight) -> FloatArray:
         """(m, 6) size of one unit of each applied output, m or m/s."""
 
     @abstractmethod
-    def targets(self, place: Place, error: FloatArray) -> FloatArray:
-        """Truth minus estimate (m, 9) in x y z as what the network should have said (m, outputs)."""
+    def targets(self, los: LineOfSight, error: FloatArray) -> FloatArray:
+        """Desired outputs (m, outputs) for truth minus estimate (m, 9) in x y z."""
 
-    def to_cartesian(self, place: Place, output: FloatArray) -> FloatArray:
+    def to_cartesian(self, los: LineOfSight, output: FloatArray) -> FloatArray:
         """Applied outputs (m, 6) as a correction of x y z m and vx vy vz m/s (m, 6)."""
-        return los.from_los(place.axes, output * self.unit(place))
+        return los.to_cartesian(output * self.unit(los))
 
-    def from_cartesian(self, place: Place, cartesian: FloatArray) -> FloatArray:
+    def from_cartesian(self, los: LineOfSight, cartesian: FloatArray) -> FloatArray:
         """The inverse of `to_cartesian`."""
-        return los.to_los(place.axes, cartesian) / self.unit(place)
+        return los.from_cartesian(cartesian) / self.unit(los)
 
-    def inputs(self, run: Record, start: int = 0, stop: int | None = None) -> tuple[FloatArray, BoolArray]:
+    def inputs(self, run: FilterRun, start: int, stop: int) -> tuple[FloatArray, BoolArray]:
         """Inputs (m, d), zero where not valid, and the mask (m,) of valid samples."""
-        stop = len(run.time_s) if stop is None else stop
         with np.errstate(invalid="ignore", divide="ignore"):
             raw = self._raw(run, start, stop)
         valid = usable(run, start, stop) & np.all(np.isfinite(raw), axis=1)

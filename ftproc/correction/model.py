@@ -1,5 +1,5 @@
-"""The trained correction: a network for the filter's output, one for the smoother's where it pays, and all that keeps
-them harmless. Its file is in `model_file`."""
+"""The trained correction: a network for the filter's output, one for the smoother's where it improves that, and their
+guards. Its file is in `model_file`."""
 
 from __future__ import annotations
 
@@ -21,12 +21,11 @@ STAGES = (FILTER, SMOOTHER)
 
 @dataclass(frozen=True)
 class Stage:
-    """A network ready to apply to what one stage gives out.
+    """A network ready to apply to the output of one stage, the filter or the smoother.
 
-    features: the feature set. weights: network on normalised inputs and targets. gain: (6,) in [0, 1] per
-    applied output, zero where held-out data did not prove it. bound_sigma: (6,) a correction never exceeds so
-    many of the stage's own sigmas along each line-of-sight axis. fingerprint: SHA-256 of the training,
-    validation and test arrays.
+    weights: network on normalised inputs and targets. gain: (6,) in [0, 1] per applied output, zero where held-out data
+    show no significant improvement. bound_sigma: (6,) bound on the correction along each line-of-sight axis, in the
+    stage's own sigmas. fingerprint: SHA-256 of the training, validation and test arrays.
     """
 
     features: Features
@@ -46,21 +45,21 @@ class Stage:
 
     @property
     def helps(self) -> bool:
-        """Whether it does anything at all."""
+        """Whether any output has a gain."""
         return bool(self.gain.any())
 
 
 @dataclass(frozen=True)
 class Model:
-    """What `train` leaves behind. stages: by name, `filter` always, `smoother` where there is one. settings: how it
-    was trained (JSON-serialisable)."""
+    """A trained correction. stages: by name, `filter` always, `smoother` where it has a gain. settings: of
+    the training, JSON-serialisable."""
 
     stages: Mapping[str, Stage]
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def made_for(self) -> str:
-        """The method whose error it learnt."""
+        """The method whose error it corrects."""
         return str(self.settings.get("method", TrainSettings.method))
 
     @property
@@ -73,7 +72,7 @@ class Model:
 
 
 def card(model: Model) -> str:
-    """The model's card: what it is, how it was trained, and what it brings on held-out flights."""
+    """The model's card: networks, training settings, guards, and the verdict on held-out flights."""
     settings = ", ".join(f"{key} {value}" for key, value in model.settings.items())
     lines = [f"Correction model, schema {SCHEMA}", f"training: {settings or 'not recorded'}"]
     for name, stage in model.stages.items():
@@ -90,8 +89,8 @@ def _stage_card(name: str, stage: Stage) -> list[str]:
     return [
         f"{name}: feature set {stage.features.name!r}, {network}",
         f"data: sha256 {stage.fingerprint}",
-        f"bounded to {_range(stage.bound_sigma)} sigma; zero while coasting, in the first samples after a "
-        "start and outside the range of the training data",
+        f"bounded to {_range(stage.bound_sigma)} sigma; zero while coasting, just after (re-)initialization and "
+        "outside the range of the training data",
         *verdict,
     ]
 

@@ -1,4 +1,4 @@
-"""The model's file: safetensors, weights as tensors, everything else as JSON in the header; no pickle anywhere."""
+"""The model file: safetensors, with the weights as tensors and everything else as JSON in the header; no pickle."""
 
 from __future__ import annotations
 
@@ -24,13 +24,11 @@ from ftproc.settings import NO_MODEL, PACKAGED
 _KEY = "ftproc-correction"  # one key only: safetensors writes several in no fixed order
 _LARGEST = 64 << 20  # bytes; a model has thousands
 _TENSORS = (*Weights._fields, "precision")
-
-
 _PACKAGED_FILE = Path(__file__).parent / "default.safetensors"
 
 
 def named(name: str | Model) -> Model | None:
-    """`packaged`, `none` or a file -> the correction; one that was loaded is what it is. Raises ModelError."""
+    """The model named `packaged` or by its file, None for `none`; a loaded model as it is. Raises ModelError."""
     if name == NO_MODEL:
         return None
     return _loaded(name) if isinstance(name, str) else name
@@ -107,9 +105,9 @@ def from_bytes(content: bytes, name: str) -> Model:
 
 
 def _finite(text: str) -> float:
-    """A number of the header; what is none, or too large for one, cannot be written again."""
+    """A number of the header. Raises ValueError for NaN, infinity and numbers too large for a double."""
     if not math.isfinite(number := float(text)):
-        raise ValueError(f"{text} is no finite number")
+        raise ValueError(f"{text} is not a finite number")
     return number
 
 
@@ -137,7 +135,7 @@ def _stage(header: Mapping[str, Any], tensors: Mapping[str, Any], key: str, name
 
 
 def _check(stage: Stage, header: Mapping[str, Any], name: str) -> None:
-    """Sizes that fit each other and the feature set; finite numbers; a gain and scales that make sense."""
+    """Raise ModelError unless sizes fit the feature set, all is finite, and gains, bounds and scales are in range."""
     features, weights = stage.features, stage.weights
     d, o, h = features.input_size, features.output_size, weights.b1.size
     arrays = {
@@ -162,7 +160,7 @@ def _check(stage: Stage, header: Mapping[str, Any], name: str) -> None:
 
 
 def save(model: Model, path: Path | str) -> None:
-    """Write the model; it appears whole or not at all. Raises OutputError."""
+    """Write the model, atomically. Raises OutputError."""
     from ftproc.files.writing.atomic import replacing
 
     content = to_bytes(model)
@@ -171,7 +169,7 @@ def save(model: Model, path: Path | str) -> None:
 
 
 def load(path: Path | str) -> Model:
-    """Read a model. Raises ModelError, in a sentence, for whatever is not one."""
+    """Read a model. Raises ModelError for any file that is not one."""
     from ftproc.files.reading.formats.content import is_ordinary
 
     try:

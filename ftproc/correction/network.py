@@ -1,7 +1,7 @@
 """The in-h-out back-propagation network: tanh hidden layer, linear output (Zuo et al. 2021, section 2.1).
 
-All weights travel as one vector [W1, b1, W2, b2], and the direct connections where there are any; it is also the
-chromosome of the genetic search.
+All weights form one vector [W1, b1, W2, b2, direct connections if any], which is also the chromosome of the genetic
+search.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ BLOCK_WORK = 200_000  # multiplications in one matrix product
 
 
 class Shape(NamedTuple):
-    """Layer sizes of a network. direct: inputs also reach the outputs without passing the hidden layer, so that what
-    is linear need not be built from tanh."""
+    """Layer sizes of a network. direct: direct connections from inputs to outputs, for the linear part."""
 
     inputs: int
     hidden: int
@@ -28,16 +27,16 @@ class Shape(NamedTuple):
     @property
     def size(self) -> int:
         """Number of weights: 237 for the paper's 9-12-9."""
-        return self.searched + self.outputs * (self.regressors + 1)
+        return self.inner + self.outputs * (self.regressors + 1)
 
     @property
-    def searched(self) -> int:
-        """Number of weights into the hidden layer; given these, the best others solve linear equations."""
+    def inner(self) -> int:
+        """Number of weights into the hidden layer; given these, the optimal others are a linear least-squares fit."""
         return self.hidden * (self.inputs + 1)
 
     @property
     def regressors(self) -> int:
-        """How many numbers an output adds up, besides its bias."""
+        """Number of terms of an output, without its bias."""
         return self.hidden + (self.inputs if self.direct else 0)
 
 
@@ -71,21 +70,20 @@ def pack(weights: Weights) -> FloatArray:
 
 
 def scale(shape: Shape) -> FloatArray:
-    """(size,) 1/sqrt(fan-in) of each weight: what a gene in [-1, 1] is multiplied with.
+    """(size,) 1/sqrt(fan-in) of each weight, by which a gene in [-1, 1] is multiplied.
 
-    Without it a net of 30 and more inputs starts with every tanh saturated, where the gradient is zero.
+    Without it the tanh of a network of 30 and more inputs are saturated at first, and the gradient is zero.
     """
     into_hidden, into_output = 1.0 / np.sqrt(shape.inputs), 1.0 / np.sqrt(shape.regressors)
-    rest = shape.size - shape.searched
-    return np.concatenate([np.full(shape.searched, into_hidden), np.full(rest, into_output)])
+    return np.repeat([into_hidden, into_output], [shape.inner, shape.size - shape.inner])
 
 
 def blocks(rows: int, work: int) -> Iterator[slice]:
     """Rows in blocks whose matrix products, of `work` multiplications per row, a BLAS does in one thread (OpenBLAS:
     below 262144).
 
-    Threads for so small a product cost more than they bring, much more on a busy machine; and with fixed blocks the
-    sums, to the last bit, do not depend on their number.
+    Threads cost more than they gain in so small a product, and with fixed blocks the sums do not depend, to the last
+    bit, on the number of threads.
     """
     step = max(BLOCK_WORK // work, 32)
     return (slice(first, first + step) for first in range(0, rows, step))
@@ -113,7 +111,7 @@ def cost_and_gradient(
     """E/n + decay * sum(w1^2 + w2^2 + direct^2) and its gradient (size,) by back-propagation.
 
     d2 = 2 (Y - T)/n, dW2 = d2' H, d1 = (d2 W2) * (1 - H^2), dW1 = d1' X, dDirect = d2' X. Biases do not decay: they
-    carry the repeatable part of the error, which is what is to be learned.
+    carry the repeatable part of the error.
     """
     w = unpack(vector, shape)
     n = len(inputs)
@@ -133,18 +131,17 @@ def cost_and_gradient(
             total += part
         if shape.direct:
             slope.direct[...] += delta2.T @ x
-    for total, part in zip(slope[::2], w[::2], strict=True):  # not the biases
+    for total, part in zip(slope[::2], w[::2], strict=True):  # all but the biases
         total += 2.0 * decay * part
     return value, gradient
 
 
-def solved(into_hidden: FloatArray, shape: Shape, inputs: FloatArray, targets: FloatArray, ridge: float) -> FloatArray:
-    """The whole vector (size,) for given weights into the hidden layer (searched,): all others by least squares.
+def least_squares(inner: FloatArray, shape: Shape, inputs: FloatArray, targets: FloatArray, ridge: float) -> FloatArray:
+    """The whole vector (size,) for given weights into the hidden layer (inner,): all others by least squares.
 
-    Minimises E/n + ridge * (the squares of the others but the biases), which is linear in them. With an empty
-    hidden layer this is linear regression.
+    Minimises E/n + ridge * sum(w2^2 + direct^2), a linear problem. With zero `inner` this is linear regression.
     """
-    w = unpack(np.concatenate([into_hidden, np.zeros(shape.size - shape.searched)]), shape)
+    w = unpack(np.concatenate([inner, np.zeros(shape.size - shape.inner)]), shape)
     n, m = len(inputs), shape.regressors
     normal, right = np.zeros((m + 1, m + 1)), np.zeros((m + 1, shape.outputs))
     for rows in blocks(n, (m + 1) * (m + 1)):
@@ -160,5 +157,5 @@ def solved(into_hidden: FloatArray, shape: Shape, inputs: FloatArray, targets: F
 
 
 def population_cost(population: FloatArray, shape: Shape, inputs: FloatArray, targets: FloatArray) -> FloatArray:
-    """E/n of each of p networks (p, size): (p,). One after the other, which is faster than one large product."""
+    """(p,) E/n of each of p networks (p, size), one after the other: faster than one large product."""
     return np.array([cost(vector, shape, inputs, targets) for vector in population])

@@ -1,4 +1,4 @@
-"""What held-out flights say about a correction: numbers with their intervals, and plain sentences."""
+"""The hold-out verdict on a correction: numbers with their intervals, and plain sentences."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Ratio:
-    """Error with the correction over error without (root mean square), and its 90 % interval."""
+    """Root-mean-square error with the correction over that without, and its 90 % interval."""
 
     value: float
     low: float
@@ -18,23 +18,37 @@ class Ratio:
     def __str__(self) -> str:
         return f"{self.value:.3f} ({self.low:.3f} to {self.high:.3f})"
 
+    @property
+    def conclusion(self) -> str:
+        """What the interval allows to conclude."""
+        if self.high < 1.0:
+            return "better"
+        return "worse: do not use this model" if self.low > 1.0 else "no significant difference"
+
 
 @dataclass(frozen=True)
 class ComponentVerdict:
-    """One applied output. gain: in [0, 1]. proof: lower bound of the relative decrease of squared error on
-    the validation data, before unproven gains are set to zero. test: on the untouched data, None if there was
-    none."""
+    """One applied output. gain: in [0, 1]. proof: lower bound of the relative decrease of squared error on the
+    validation data, with the gain before insignificant gains are set to zero. test: on the untouched test data, None
+    without any."""
 
     name: str
     gain: float
     proof: float
     test: Ratio | None
 
+    def __str__(self) -> str:
+        if self.gain <= 0.0:
+            return f"{self.name}: gain 0, no significant improvement"
+        test = "" if self.test is None else f", test error ratio {self.test}"
+        return f"{self.name}: gain {self.gain:.2f}{test}"
+
 
 @dataclass(frozen=True)
 class Verdict:
-    """by: "flight" or "block", what was held out. training, validation, test: how many of these. validated: position on
-    the validation data, by which feature sets are compared; position, velocity: on the untouched test data."""
+    """by: "flight" or "block", the unit that is held out. training, validation, test: numbers of these. validated:
+    position on the validation data, by which feature sets are compared. position, velocity: on the untouched test
+    data."""
 
     by: str
     training: int
@@ -47,26 +61,22 @@ class Verdict:
 
     @property
     def helps(self) -> bool:
-        """Whether any gain was proven."""
+        """Whether any gain is significant."""
         return any(c.gain > 0.0 for c in self.components)
 
     def sentences(self) -> list[str]:
         """The verdict in plain sentences, one per line."""
         unit = "flights" if self.by == "flight" else "blocks of at least 30 s"
-        told = [f"Trained on {self.training}, judged on {self.validation} and tested on {self.test} held-out {unit}."]
+        lines = [f"Trained on {self.training} {unit}, validated on {self.validation}, tested on {self.test}."]
         if not self.helps:
-            return [*told, f"The correction brings nothing on held-out {unit}: its gain is zero."]
-        told += [self._component(c) for c in self.components]
-        for name, ratio in (("position", self.position), ("velocity", self.velocity)):
+            return [*lines, f"No significant improvement on the held-out {unit}: the correction is zero."]
+        lines += [f"  {component}." for component in self.components]
+        for name, ratio in (("Position", self.position), ("Velocity", self.velocity)):
             if ratio is not None:
-                told.append(f"Error in {name} on the test {unit}, with over without: {ratio}{_remark(ratio)}.")
-        return told
-
-    def _component(self, c: ComponentVerdict) -> str:
-        if c.gain <= 0.0:
-            return f"  {c.name}: gain 0, nothing proven."
-        tail = "" if c.test is None else f"; test error with over without {c.test}"
-        return f"  {c.name}: gain {c.gain:.2f}{tail}."
+                lines.append(
+                    f"{name} error on the test {unit}, corrected over uncorrected: {ratio}, {ratio.conclusion}."
+                )
+        return lines
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -85,11 +95,3 @@ class Verdict:
 
 def _ratio(content: Mapping[str, float] | None) -> Ratio | None:
     return None if content is None else Ratio(**content)
-
-
-def _remark(ratio: Ratio) -> str:
-    if ratio.high < 1.0:
-        return ", it helps"
-    if ratio.low > 1.0:
-        return ", it HARMS there: do not use this model"
-    return ", no difference proven"

@@ -1,7 +1,9 @@
-"""How good a trajectory is: by itself (smoothness) and against a truth (errors, consistency, outliers found).
+"""Figures of merit of a trajectory: its smoothness, and against a truth its errors, consistency and outliers found.
 
 from ftproc.scoring import render, score
 print(render([score(trajectory, truth)], "table"))
+
+Calls `core.model`, for angles and frames, and `files` for the text of a CSV; reads and writes no file.
 """
 
 from ftproc.scoring.figures import Detection, Gradient, Score, score

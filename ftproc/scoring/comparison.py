@@ -1,5 +1,5 @@
-"""Several methods on one flight, side by side: a line per method, the most accurate first. Methods that may see the
-future are set apart from those that may not, for the two do not compare."""
+"""Several methods on one flight: a line per method, the most accurate first. Methods that use later readings form a
+separate group, because they are not comparable with those that do not."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _HEADER = ("", "RMSE m", "mean m", "95 % m", "largest m", "v m/s", "in 3 sigma",
 _NOTE = "RMSE, mean, 95 %, largest: position error; v: velocity RMSE; found: of all outliers; false: of good readings"
 
 
-def is_one(scores: Sequence[Score]) -> bool:
-    """Whether these are different methods held against one truth."""
+def applies(scores: Sequence[Score]) -> bool:
+    """Whether these are different methods compared with one truth."""
     known = all(s.method and s.sees and s.rmse_3d_m is not None for s in scores)
     return known and len({s.truth for s in scores}) == 1 and len({_name(s) for s in scores}) > 1
 
 
 def table(scores: Sequence[Score]) -> str:
-    """Lines sorted by position RMSE within what the methods see; ends with a newline."""
+    """Lines grouped by the readings that the methods use, sorted by position RMSE; ends with a newline."""
     groups: dict[str, list[Score]] = {}
     for score in sorted(scores, key=_error):
         groups.setdefault(str(score.sees), []).append(score)
@@ -62,7 +62,7 @@ def _row(score: Score) -> tuple[str, ...]:
 
 
 def _flags(score: Score) -> tuple[float | None, float | None]:
-    """Outliers found and good readings called outliers, in percent over the three components."""
+    """Percentages of outliers found and of good readings flagged, over the three components."""
     if score.outliers is None:
         return None, None
     parts = [score.outliers[name] for name in COMPONENTS]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -13,13 +13,13 @@ from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.records import COMPONENTS, ISOLATED, PATCH, FlagArray, FloatArray, Trajectory, Truth
 from ftproc.scoring.matching import match
 
-NEES_BOUNDS = (1.0, 5.0)  # of the mean over a flight, for sigmas to be called consistent; 3 is right
+NEES_BOUNDS = (1.0, 5.0)  # of the mean over a flight, for consistent sigmas; 3 is expected
 LEAST_IN_3SIGMA = 0.97
 
 
 @dataclass(frozen=True)
 class Gradient:
-    """Average gradient F per component: mean change from sample to sample, azimuth the short way round.
+    """Average gradient F per component: mean change from sample to sample, the azimuth's wrapped.
 
     Zuo et al. 2021 eq. 18. NaN where fewer than two consecutive samples have a value. F measures motion as
     well as noise: compare it with that of the truth.
@@ -32,10 +32,10 @@ class Gradient:
 
 @dataclass(frozen=True)
 class Detection:
-    """Outliers found in one component: said = flagged isolated or patch, so = tampered with in the truth.
+    """Outliers found in one component: flagged isolated or patch by the trajectory, against those of the truth.
 
-    Counted over samples the truth has at that very time; readings marked missing are counted in neither. A
-    ratio of nothing is NaN. false_alarm_rate: share of the good readings that were flagged.
+    Counted over the samples that the truth has too; readings marked missing are left out. A ratio over zero is NaN.
+    false_alarm_rate: share of the good readings that were flagged.
     """
 
     precision: float
@@ -50,18 +50,18 @@ class Detection:
 
 @dataclass(frozen=True)
 class Score:
-    """What `score` finds; everything after `average_gradient` needs a truth and is None without one.
+    """The result of `score`; all from `truth` to `outliers` needs a truth and is None without one.
 
-    sees: what the estimates rest on (past readings, or the whole record); smoothed: by --smooth; both None when the
-    file does not say. samples: rows of the trajectory. matched, interpolated, unmatched: of these, how many have a
-    truth at that very time, between two of its times, or none. without_estimate: matched or interpolated, but
-    without a position. rmse_seed_m: mean over the samples of the norm of the position error (Zuo et al.
-    2021 eq. 20 and 21, called RMSE there). rmse_3d_m, rmse_x_m ...: root mean square, in 3-D and per axis;
-    velocity likewise, None if the truth has none. max_error_m, p95_error_m, p99_error_m: of the norm of the
-    position error. in_3sigma: share of samples with all three axes inside 3 published sigmas (0.992 if
-    these are right and independent). nees_position: mean of the sum of (error / published sigma)^2 over the
-    three axes, 3 when the sigmas are right; correlations between the axes are not published and so not
-    used. sigma_verdict: what these two say in words. NaN where nothing could be counted.
+    sees: readings that the estimates use (past ones, or the whole record); smoothed: by --smooth; both None when the
+    file does not say. samples: rows of the trajectory. matched, interpolated, unmatched: number of these with a truth
+    at the same time, between two of its times, or none. without_estimate: matched or interpolated, but without a
+    position. rmse_seed_m: mean over the samples of the norm of the position error (Zuo et al. 2021 eq. 20 and 21,
+    called RMSE there). rmse_3d_m, rmse_x_m ...: root mean square, in 3-D and per axis; rmse_v_mps ...: of the velocity,
+    None if the truth has none. max_error_m, p95_error_m, p99_error_m: of the norm of the position error. in_3sigma:
+    share of samples with all three axes inside 3 published sigmas (0.992 if these are consistent and independent).
+    nees_position: mean of the sum of (error / published sigma)^2 over the three axes, 3 when the sigmas are consistent;
+    correlations between the axes are not published and so not used. sigma_verdict: these two in words. NaN where
+    nothing could be counted.
     """
 
     trajectory: str
@@ -94,16 +94,15 @@ class Score:
     smoothed: bool | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """Nested and JSON-serialisable: what is not known is left out, what could not be computed is None."""
-        plain: dict[str, Any] = _plain(self)
-        return plain
+        """Nested and JSON-serialisable: what is unknown is left out, what could not be computed is None."""
+        return _plain(asdict(self))
 
 
 def score(trajectory: Trajectory, truth: Truth | None = None) -> Score:
     """Figures of merit of a trajectory: its average gradient, and against a truth its errors and flags.
 
     The truth is matched by time (see `matching.match`), never extrapolated. Its own average gradient is
-    taken at the matched samples, so that the two compare.
+    taken at the matched samples, so that the two are comparable.
     """
     method, sees = trajectory.metadata.get("method"), trajectory.metadata.get("sees")
     settings = trajectory.metadata.get("settings")
@@ -179,8 +178,8 @@ def _position_figures(error: FloatArray, sigma: FloatArray) -> dict[str, float |
 def sigma_verdict(ratio: FloatArray) -> str | None:
     """In words, from (m, 3) errors over their published sigmas: `consistent`, `cautious`, or `overconfident in x`.
 
-    Errors of neighbouring samples are alike, so the chi-square bounds of independent ones would be far too narrow;
-    these are what a flight of a few minutes allows to say.
+    Errors of neighbouring samples are correlated, so the chi-square bounds of independent ones would be far too narrow;
+    these bounds suit a flight of a few minutes.
     """
     if not len(ratio):
         return None
@@ -204,11 +203,11 @@ def _velocity_figures(error: FloatArray) -> dict[str, float]:
 
 
 def _detection(flag: FlagArray, injected: FlagArray) -> Detection:
-    """From the (m,) flags of one component and what was injected."""
-    seen = flag <= PATCH
-    said, so = np.isin(flag[seen], (ISOLATED, PATCH)), injected[seen] != 0
-    tp, fp = int((said & so).sum()), int((said & ~so).sum())
-    fn, tn = int((~said & so).sum()), int((~said & ~so).sum())
+    """From the (m,) flags of one component and the codes of its injected outliers."""
+    measured = flag <= PATCH
+    found, bad = np.isin(flag[measured], (ISOLATED, PATCH)), injected[measured] != 0
+    tp, fp = int((found & bad).sum()), int((found & ~bad).sum())
+    fn, tn = int((~found & bad).sum()), int((~found & ~bad).sum())
     return Detection(
         precision=_ratio(tp, tp + fp),
         recall=_ratio(tp, tp + fn),
@@ -226,19 +225,21 @@ def _ratio(part: int, whole: int) -> float:
 
 
 def _mean(values: FloatArray | NDArray[np.bool_]) -> float:
-    """Mean of the values that are there; NaN if none is."""
-    there = values[np.isfinite(values)]
-    return float(np.mean(there)) if len(there) else float("nan")
+    """Mean of the finite values; NaN without any."""
+    finite = values[np.isfinite(values)]
+    return float(np.mean(finite)) if len(finite) else float("nan")
 
 
 def _rms(values: FloatArray) -> float:
     return float(np.sqrt(_mean(values**2)))
 
 
-def _plain(value: Any) -> Any:
-    if is_dataclass(value) and not isinstance(value, type):
-        pairs = ((f.name, getattr(value, f.name)) for f in fields(value))
-        return {name: _plain(inner) for name, inner in pairs if inner is not None}
-    if isinstance(value, dict):
-        return {name: _plain(inner) for name, inner in value.items()}
-    return None if isinstance(value, float) and not np.isfinite(value) else value
+def _plain(value: dict[str, Any]) -> dict[str, Any]:
+    """Without None, and None for what is not finite."""
+    plain: dict[str, Any] = {}
+    for name, inner in value.items():
+        if isinstance(inner, dict):
+            plain[name] = _plain(inner)
+        elif inner is not None:
+            plain[name] = None if isinstance(inner, float) and not np.isfinite(inner) else inner
+    return plain

@@ -1,4 +1,5 @@
-"""The truth at the times of a trajectory: the same sample where there is one, else interpolated."""
+"""The truth at the times of a trajectory: the same sample where there is one, else interpolated; and whether both have
+the same axes."""
 
 from __future__ import annotations
 
@@ -7,15 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.records import FlagArray, FloatArray, IntArray, Truth
+from ftproc.records import FlagArray, FloatArray, IntArray, Trajectory, Truth
+
+FAR_BETTER = 0.1  # share of the error that remains, at most, when x and y are exchanged
 
 
 class MatchedTruth(NamedTuple):
     """The truth row for row with a trajectory of n samples.
 
-    position_m: (n, 3), NaN where unmatched. velocity_mps: (n, 3) or None. outlier: (n, 3) or None; only
-    rows with `exact` have any. exact: (n,) the truth has this very sample. interpolated: (n,) between two
-    of its times.
+    position_m: (n, 3), NaN where unmatched. velocity_mps: (n, 3) or None. outlier: (n, 3) or None, zero where not
+    `exact`. exact: (n,) the truth has the same sample. interpolated: (n,) between two of its times.
     """
 
     position_m: FloatArray
@@ -26,10 +28,10 @@ class MatchedTruth(NamedTuple):
 
 
 def match(time_s: FloatArray, truth: Truth) -> MatchedTruth:
-    """The truth at (n,) never decreasing times in s.
+    """The truth at (n,) non-decreasing times in s.
 
-    The k-th sample at a time gets the truth's k-th row at that time; times are equal when they differ by no
-    more than printing a number rounds. Other samples are interpolated: cubic Hermite where the truth has
+    The k-th sample at a time gets the truth's k-th row at that time; times are equal when they differ by no more than
+    the rounding of printed numbers. Other samples are interpolated: cubic Hermite where the truth has
     velocities, else linear. Outlier flags belong to single readings and are not interpolated.
     """
     rows = _same_sample(time_s, truth.time_s)
@@ -44,6 +46,26 @@ def match(time_s: FloatArray, truth: Truth) -> MatchedTruth:
         outlier[exact] = truth.outlier[rows[exact]]
     between = ~exact & np.isfinite(position).all(axis=1)
     return MatchedTruth(position, velocity, outlier, exact, between)
+
+
+def exchanged_axes(trajectory: Trajectory, truth: Truth) -> str | None:
+    """A sentence when the truth fits far better with x and y exchanged: one has x east, the other x north."""
+    position = match(trajectory.time_s, truth).position_m
+    error = _median_length(trajectory.state[:, :3] - position)
+    exchanged = _median_length(trajectory.state[:, :3] - position[:, [1, 0, 2]])
+    if not exchanged < FAR_BETTER * error:
+        return None
+    return (
+        f"{truth.name} fits {trajectory.name} far better with x and y exchanged: one has x north, the other x east. "
+        "Exchange x and y in the truth (vx and vy too)."
+    )
+
+
+def _median_length(error: FloatArray) -> float:
+    """Median length of (n, 3) errors in m; NaN when there is none."""
+    length = np.sqrt((error**2).sum(1))
+    finite = length[np.isfinite(length)]
+    return float(np.median(finite)) if len(finite) else np.nan
 
 
 def _same_sample(time_s: FloatArray, truth_s: FloatArray) -> IntArray:
@@ -62,7 +84,7 @@ def _same_sample(time_s: FloatArray, truth_s: FloatArray) -> IntArray:
 
 
 def _occurrence(key: FloatArray) -> IntArray:
-    """(n,) how many equal keys come before each in a run; keys are sorted up to NaN."""
+    """(n,) number of equal keys before each in its run; keys are sorted up to NaN."""
     index = np.arange(len(key))
     new = np.concatenate([[True], key[1:] != key[:-1]])
     return np.asarray(index - np.maximum.accumulate(np.where(new, index, 0)))

@@ -42,7 +42,7 @@ _LABELS = {
     "p95_error_m": "  95 % below",
     "p99_error_m": "  99 % below",
     "in_3sigma": "share inside 3 sigma",
-    "nees_position": "position NEES (3 if honest)",
+    "nees_position": "position NEES (3 expected)",
     "sigma_verdict": "the sigmas are",
 } | {
     f"outliers.{component}.{key}": f"{component} outliers, precision" if key == "precision" else f"  {label}"
@@ -59,7 +59,7 @@ def render(scores: Sequence[Score], format: str = "table") -> str:
     json: one score is one object, several are a list. Keys as in `Score`, nested; what needs a truth is
     absent without one; what could not be computed is null. csv: one line per score, keys joined by dots,
     same names; empty where unknown. table: one column per score, in blocks that fit a terminal of 100
-    columns; for several methods held against one truth, one line per method, see `comparison`.
+    columns; for several methods compared with one truth, one line per method, see `comparison`.
 
     Raises UsageError for another format, and when there is no score.
     """
@@ -100,10 +100,11 @@ def _flat(nested: dict[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def _table(scores: Sequence[Score]) -> str:
-    return comparison.table(scores) if comparison.is_one(scores) else _side_by_side(scores)
+    return comparison.table(scores) if comparison.applies(scores) else _columns(scores)
 
 
-def _side_by_side(scores: Sequence[Score]) -> str:
+def _columns(scores: Sequence[Score]) -> str:
+    """One column per score, in blocks of TABLE_WIDTH."""
     columns = [_flat(score.as_dict()) for score in scores]
     keys = [key for key in _LABELS if any(key in column for column in columns)]
     heads = _headings([score.trajectory for score in scores])
@@ -134,7 +135,7 @@ def _blocks(widths: list[int], room: int) -> list[list[int]]:
 
 
 def _headings(names: list[str]) -> list[str]:
-    """File names without folders and endings, as long as that tells them apart; long ones keep their end."""
+    """File names without folders and endings where these differ; of long ones the end."""
     short = [PurePath(name).name for name in names]
     for ending in (".gz", ".parquet", ".csv", ".trajectory"):
         short = [name.removesuffix(ending) for name in short]

@@ -1,14 +1,16 @@
-"""Simulated flights, as dirty as real logs, with their truth.
+"""Simulated flights and logs with outliers, missing readings and instrument errors, with their truth.
 
 from ftproc.simulation import simulate
 flight = simulate("manoeuvre", seed=3)
 flight.log, flight.truth
+
+Calls `core.model`, for the measurement, and `records`; writes no file.
 """
 
 from ftproc.simulation.instrument import InstrumentErrors
+from ftproc.simulation.outlier_spec import GRAMMAR, Fault, OutlierSpec, parse_outliers
 from ftproc.simulation.scenarios import Scenario, list_scenarios
 from ftproc.simulation.simulation import Simulation, simulate
-from ftproc.simulation.spec import GRAMMAR, Fault, OutlierSpec, parse_outliers
 
 __all__ = [
     "GRAMMAR",

@@ -7,21 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from ftproc.records import FloatArray
-from ftproc.simulation.flight import GRAVITY_MPS2, Flight, gusts, integrate, smoothed
+from ftproc.simulation.kinematics import GRAVITY_MPS2, Flight, gusts, integrate, smoothed
 
 Range = tuple[float, float]
 
-PUSH_G = 0.6  # taken off 1 g at most when pushing over: nobody likes to hang in the straps
+PUSH_G = 0.6  # largest decrease from 1 g when pushing over: the load factor stays positive
 
 
 @dataclass(frozen=True)
 class Airframe:
-    """What an aircraft does; every pair is the range values are drawn from.
+    """Performance of an aircraft and its use; every pair is the range that values are drawn from.
 
-    turn_g: load factor of level turns. pull_g: normal acceleration beyond 1 g on entering and leaving
-    climbs. onset_s: time to roll in or to build up g. area_m: horizontal distance of the working area's
-    centre from the station; radius_m: where the pilot turns back. closest_m: least slant range.
-    steepest_rad: largest elevation.
+    turn_g: load factor of level turns. pull_g: normal acceleration beyond 1 g on entering and leaving climbs. onset_s:
+    time to roll in or to build up g. area_m: horizontal distance of the working area's centre from the station.
+    radius_m: distance from that centre at which the pilot turns back. closest_m: smallest slant range. steepest_rad:
+    largest elevation. weights: probabilities of the manoeuvres.
     """
 
     speed_mps: Range
@@ -45,8 +45,7 @@ class Airframe:
 def fly(airframe: Airframe, duration_s: float, rng: np.random.Generator) -> Flight:
     """A flight from before time 0 to `duration_s`, about the origin of the working area.
 
-    Each `rng` state is another flight. The record starts anywhere in the sequence of manoeuvres, not only
-    on a straight leg.
+    Time 0 is anywhere in the sequence of manoeuvres, not only on a straight leg.
     """
     lead = rng.uniform(0.5, 2.0) * airframe.leg_s[1]
     pilot = _Pilot(airframe, rng)
@@ -99,7 +98,7 @@ def path_acceleration(speed: FloatArray, climb: FloatArray, heading: FloatArray,
 
 
 class _Pilot:
-    """Draws the commands; dead reckoning keeps the aircraft in its area, speeds and heights."""
+    """Draws the commands; dead reckoning keeps the aircraft within its area, speeds and heights."""
 
     def __init__(self, airframe: Airframe, rng: np.random.Generator) -> None:
         self.airframe, self.rng = airframe, rng
@@ -112,7 +111,7 @@ class _Pilot:
         self.elapsed_s = 0.0
 
     def decide(self) -> None:
-        """The next manoeuvre: home when outside the area and leaving it, else by the airframe's weights."""
+        """Command a manoeuvre: homewards when outside the area and leaving it, else by the airframe's weights."""
         if np.hypot(*self.place[:2]) > self.airframe.radius_m and abs(self._off_home()) > 1.0:
             self.turn(homewards=True)
             return
@@ -168,7 +167,7 @@ class _Pilot:
         heading: float = 0.0,
         climb_angle: float = 0.0,
     ) -> None:
-        """Append one command and reckon where it leads (mean speed, mean climb angle, arc for a turn)."""
+        """Append one command; dead reckoning with mean speed, mean climb angle, and an arc for a turn."""
         knots = max(1, round(time_s / self.airframe.step_s))
         seconds = knots * self.airframe.step_s
         self.commands.append((knots, speed, climb, heading))

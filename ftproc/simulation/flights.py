@@ -1,4 +1,4 @@
-"""The kinds of flight by name, each placed before the station."""
+"""The kinds of flight by name, each placed relative to the station."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ftproc.core.model.frames import from_cartesian
 from ftproc.simulation.aircraft import Airframe, fly, follow
-from ftproc.simulation.flight import GRAVITY_MPS2, Flight, constant_acceleration, gusts, integrate, smoothed
+from ftproc.simulation.kinematics import GRAVITY_MPS2, Flight, constant_acceleration, gusts, integrate, smoothed
 
 FIGHTER = Airframe(
     speed_mps=(140, 290), turn_g=(1.5, 5.0), turn_rad=(0.5, 2.8), climb_rad=(0.1, 0.5), pull_g=(0.5, 2.0),
@@ -43,13 +43,13 @@ def _manoeuvring(airframe: Airframe) -> Callable[[np.random.Generator, float], F
     def build(rng: np.random.Generator, duration_s: float) -> Flight:
         flight = fly(airframe, duration_s, rng)
         away, bearing = rng.uniform(*airframe.area_m), rng.uniform(-np.pi, np.pi)
-        return _before_station(flight, airframe, duration_s, away, bearing)
+        return _placed(flight, airframe, duration_s, away, bearing)
 
     return build
 
 
-def _before_station(flight: Flight, airframe: Airframe, duration_s: float, away_m: float, bearing: float) -> Flight:
-    """Put the area's centre at a distance and bearing, farther off while the flight is too near or steep."""
+def _placed(flight: Flight, airframe: Airframe, duration_s: float, away_m: float, bearing: float) -> Flight:
+    """Place the area's centre at a distance and bearing, farther away while the flight is too close or too steep."""
     path = flight.at(np.linspace(0.0, duration_s, max(2000, round(2 * duration_s))))[0]
     lift = max(0.0, LOWEST_M - float(path[:, 2].min()))
     while True:
@@ -61,12 +61,12 @@ def _before_station(flight: Flight, airframe: Airframe, duration_s: float, away_
 
 
 def _overhead(rng: np.random.Generator, duration_s: float) -> Flight:
-    """A pass that leaves the zenith by 1 to 3 degrees half way through."""
+    """A pass 1 to 3 degrees from the zenith at its midpoint."""
     airframe = replace(FIGHTER, gust_mps2=0.15)
     speed, heading = rng.uniform(120.0, 250.0), rng.uniform(-np.pi, np.pi)
     lead = 10.0
     knots = round((lead + duration_s + 10.0) / airframe.step_s)
-    drift = rng.uniform(-0.15, 0.15)  # rad over the pass: nobody flies a ruler
+    drift = rng.uniform(-0.15, 0.15)  # of heading over the pass, rad
     initial = (speed, heading - drift / 2, np.zeros(3))
     flight = follow([(knots, 0.0, 0.0, drift)], initial, airframe, lead, rng)
     middle, velocity, _ = flight.at(np.array([duration_s / 2]))

@@ -1,4 +1,4 @@
-"""What the instrument does to a true direction: constant errors, refraction, and random noise."""
+"""The measurement by an instrument: constant errors, refraction, and random noise."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class InstrumentErrors:
 
     range_zero_m, azimuth_zero_rad, elevation_zero_rad: added to the reading (zero-set errors).
     mislevel_rad: tilt of the vertical axis towards the azimuth mislevel_azimuth_rad.
-    collimation_rad: angle between line of sight and trunnion axis' normal; azimuth is off by it over cos E.
+    collimation_rad: angle between line of sight and normal of the trunnion axis; its azimuth error is this over cos E.
     refraction: refractivity n - 1 at the station, 2.8e-4 for light, about 3.2e-4 for radar, 0 for none.
     """
 
@@ -55,11 +55,11 @@ def _bending(position: FloatArray) -> FloatArray:
     """(n,) apparent minus true elevation per unit of refractivity, rad.
 
     Snell's law in flat layers whose refractivity falls off as exp(-h/H): cot E (1 - (H/h)(1 - exp(-h/H))),
-    written so that it stays finite on the horizon. Good above about 2 degrees of elevation.
+    in a form that stays finite on the horizon. Valid above about 2 degrees of elevation.
     """
     ground = np.hypot(position[:, 0], position[:, 1]) / REFRACTION_SCALE_HEIGHT_M
     height = position[:, 2] / REFRACTION_SCALE_HEIGHT_M
-    near = np.abs(height) < 1e-3  # there the difference below would be rounding noise
+    near = np.abs(height) < 1e-3  # where the difference below cancels
     h = np.where(near, 1.0, height)
     return np.asarray(ground * np.where(near, 0.5 - height / 6, (h + np.expm1(-h)) / h**2))
 
@@ -78,8 +78,8 @@ def unit_noise(
 ) -> FloatArray:
     """(n, 3) noise of unit variance: white, or a first-order Gauss-Markov process of that correlation time.
 
-    x_k = f x_{k-1} + sqrt(1 - f^2) w_k with f = exp(-dt/correlation time), so irregular times need no
-    special case. With Student-t tails, w is scaled to unit variance.
+    x_k = f x_{k-1} + sqrt(1 - f^2) w_k with f = exp(-dt/correlation time), exact at
+    irregular times. With Student-t tails, w is scaled to unit variance.
     """
     shape = (len(time_s), 3)
     if tails_dof is None:
@@ -98,7 +98,7 @@ def unit_noise(
 
 
 def readable(reading: FloatArray) -> FloatArray:
-    """(n, 3) as an instrument shows it: range from 0, azimuth in [-pi, pi), elevation within +-pi/2."""
+    """(n, 3) as an instrument displays it: range from 0, azimuth in [-pi, pi), elevation within +-pi/2."""
     azimuth = wrap(reading[:, 1])
     azimuth = np.where(azimuth >= np.pi, -np.pi, azimuth)  # modulo of a tiny negative angle rounds up
     return np.stack([np.maximum(reading[:, 0], 0.0), azimuth, np.clip(reading[:, 2], -np.pi / 2, np.pi / 2)], axis=1)

@@ -1,4 +1,4 @@
-"""When samples are taken: the grid, jitter, gaps and times that appear twice."""
+"""Sample times: the grid, jitter, gaps and duplicate times."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.records import FloatArray, IntArray
-from ftproc.simulation.spec import OutlierSpec
+from ftproc.simulation.outlier_spec import OutlierSpec
 
 
 def sample_times(duration_s: float, dt_s: float, jitter: float, rng: np.random.Generator) -> FloatArray:
@@ -27,24 +27,23 @@ def row_count(duration_s: float, dt_s: float) -> int:
 
 
 def kept_rows(time_s: FloatArray, spec: OutlierSpec, rng: np.random.Generator) -> NDArray[np.bool_]:
-    """(n,) False in the gaps, which fall anywhere but in the first and last tenth; left out if too long."""
+    """(n,) False in the gaps, anywhere but in the first and last tenth; a gap too long for that is left out."""
     first, last = time_s[0], time_s[-1]
     low, high = first + 0.1 * (last - first), last - 0.1 * (last - first)
     keep = np.ones(len(time_s), bool)
     for count, seconds in spec.gaps:
         for _ in range(count):
             length, place = rng.uniform(*seconds), rng.random()
-            begin = low + place * (high - low - length)
-            if begin >= low:
-                keep[(time_s > begin) & (time_s < begin + length)] = False
+            start = low + place * (high - low - length)
+            if start >= low:
+                keep[(time_s > start) & (time_s < start + length)] = False
     return keep
 
 
 def with_duplicates(n: int, count: int, rng: np.random.Generator) -> tuple[IntArray, NDArray[np.bool_]]:
-    """Row numbers with `count` of them repeated (at most n), and which repeats are fresh readings, not
-    copies.
+    """Row numbers with `count` of them repeated (at most n), and a mask of the fresh readings among the repeats.
 
-    Every second repeat on average is a second, good reading of the same instant; the others copy the row.
+    Half of the repeats on average are a second, good reading of the same instant; the others copy the row.
     """
     again = rng.choice(n, min(count, n), replace=False)
     rows = np.concatenate([np.arange(n), again])

@@ -1,4 +1,4 @@
-"""The named scenarios: which flights, how sampled, how noisy, how spoiled."""
+"""The named scenarios: flights, sampling, noise and outliers."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Scenario:
-    """What one draw of a scenario is taken from; a pair is a range.
+    """The distribution of the plans of a scenario; a pair is a range.
 
     flights: kinds in `flights.FLIGHTS`, one is drawn. duration_s: uniform. dt_s: one is drawn.
     range_noise_m, angle_noise_rad: 1-sigma, log-uniform; elevation has the angle noise times a draw of
-    `elevation_ratio`. outliers: specifications (see `spec.GRAMMAR`), one is drawn. instrument: constant
+    `elevation_ratio`. outliers: specifications (see `outlier_spec.GRAMMAR`), one is drawn. instrument: constant
     errors. members: when given, one of these scenarios is drawn instead of all of the above.
     """
 
@@ -49,7 +49,7 @@ class Plan:
 
 
 def draw(scenario: Scenario, rng: np.random.Generator) -> Plan:
-    """One plan. Every value is drawn even if its range is a single one, so that seeds stay comparable."""
+    """One plan. Values of a fixed range are drawn too, so that seeds stay comparable."""
     if scenario.members:
         scenario = scenario.members[rng.integers(len(scenario.members))]
     range_m = _log_uniform(scenario.range_noise_m, rng)
@@ -73,7 +73,7 @@ _ZUO2021 = Scenario(
     "Zuo et al. 2021, section 3.1: constant acceleration, 60 s at 1 Hz, range variance 10 m2",
     flights=("zuo2021",),
     range_noise_m=(10**0.5, 10**0.5),
-    angle_noise_rad=(2e-4, 2e-4),  # the paper gives none: a good theodolite's
+    angle_noise_rad=(2e-4, 2e-4),  # not in the paper: those of a good theodolite
 )
 _MANOEUVRE = Scenario(
     "manoeuvre",

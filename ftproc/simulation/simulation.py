@@ -6,36 +6,37 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.errors import UsageError
-from ftproc.records import FloatArray, MeasurementLog, Truth
+from ftproc.records import FloatArray, IntArray, MeasurementLog, Truth
+from ftproc.simulation.contamination import contaminate
 from ftproc.simulation.flights import FLIGHTS
 from ftproc.simulation.instrument import InstrumentErrors, readable, systematic, unit_noise
+from ftproc.simulation.outlier_spec import OutlierSpec, parse_outliers
 from ftproc.simulation.sampling import kept_rows, row_count, sample_times, with_duplicates
 from ftproc.simulation.scenarios import Plan, draw, find_scenario
-from ftproc.simulation.spec import OutlierSpec, parse_outliers
-from ftproc.simulation.tamper import tamper
 
 MAX_DURATION_S = 1e5
 MAX_ROWS = 10_000_000
 
-# One child generator each, so that another outlier specification leaves the flight and the noise as they are.
+# One child generator each, so that flight and noise do not depend on the outlier specification.
 _STREAMS = ("plan", "flight", "times", "noise", "outliers", "gaps", "duplicates")
 
 
 @dataclass(frozen=True)
 class Simulation:
-    """A simulated log and what really happened, row for row.
+    """A simulated log and its truth, row for row.
 
-    truth.outlier: what was injected: 0 nothing, 1 spike, 2 offset, 3 ramp, 4 stuck, 5 burst, 6 start of
-    record, 7 zero reading. sigma: 1-sigma of the noise, range m, azimuth rad, elevation rad. untampered:
-    (n, 3) the readings with their noise but without outliers, missing values and rounding.
+    truth.outlier: code of the injected outlier: 0 none, 1 spike, 2 offset, 3 ramp, 4 stuck, 5 burst, 6 start of record,
+    7 zero reading. sigma: 1-sigma of the noise, range m, azimuth rad, elevation rad. clean: (n, 3) the readings with
+    their noise but without outliers, missing values and rounding.
     """
 
     log: MeasurementLog
     truth: Truth
     sigma: tuple[float, float, float]
-    untampered: FloatArray
+    clean: FloatArray
 
 
 def simulate(
@@ -50,14 +51,13 @@ def simulate(
 ) -> Simulation:
     """Fly one flight of a scenario and measure it from the station at the origin.
 
-    scenario: a name in `list_scenarios()`. seed: another flight, noise and outliers for each; the same
-    gives the same bytes. duration_s, dt_s: length of the record and sample interval; samples at 0 and at
-    the end are both included. noise: 1-sigma of range m, azimuth rad, elevation rad. outliers: a
-    specification, see `GRAMMAR`; it replaces the scenario's own. instrument: constant errors of the
-    station. What is None comes from the scenario.
+    scenario: a name in `list_scenarios()`. seed: of flight, noise and outliers; the same seed gives the same bytes.
+    duration_s, dt_s: length of the record and sample interval; samples at 0 and at the end are both included. noise:
+    1-sigma of range m, azimuth rad, elevation rad. outliers: a specification, see `GRAMMAR`; it replaces the
+    scenario's own. instrument: constant errors of the station. None: from the scenario.
 
     A = atan2(y, x) in [-pi, pi), E = atan2(z, hypot(x, y)), range >= 0 (Zuo et al. 2021 eq. 3, read as
-    arctangents). Sizes in sigmas count the noise used; where that is zero, the scenario's own.
+    arctangents). Sizes in sigmas are of this noise; where it is zero, of the scenario's.
 
     Raises UsageError for an unknown scenario, a bad value, or a record that would be too long.
     """
@@ -74,7 +74,7 @@ def simulate(
         instrument=instrument or own.instrument,
     )
     _check(plan)
-    sigma = np.array([used or usual for used, usual in zip(plan.noise, own.noise, strict=True)])
+    sigma = np.array([used or default for used, default in zip(plan.noise, own.noise, strict=True)])
     return _measure(plan, sigma, f"simulated {scenario}, seed {seed}", streams)
 
 
@@ -93,10 +93,10 @@ def _check(plan: Plan) -> None:
             "Use a longer sample interval."
         )
     if len(plan.noise) != 3 or not all(math.isfinite(s) and s >= 0 for s in plan.noise):
-        given = ",".join(f"{s:g}" for s in plan.noise)
+        values = ",".join(f"{s:g}" for s in plan.noise)
         raise UsageError(
             "The noise is three numbers from 0: range in m, azimuth and elevation in rad (1 sigma), "
-            f"such as 5,0.0002,0.0002; not {given}."
+            f"such as 5,0.0002,0.0002; not {values}."
         )
 
 
@@ -107,7 +107,7 @@ def _measure(plan: Plan, sigma: FloatArray, name: str, streams: dict[str, np.ran
     position, velocity, acceleration = flight.at(time)
     exact = systematic(position, plan.instrument)
     clean = exact + plan.noise * unit_noise(time, spec.correlation_s, spec.tails_dof, streams["noise"])
-    reading, code = tamper(clean, spec.faults, sigma, streams["outliers"])
+    reading, code = contaminate(clean, spec.faults, sigma, streams["outliers"])
     rows, fresh = _rows(time, spec, streams)
     second = exact[rows] + plan.noise * streams["duplicates"].standard_normal((len(rows), 3))
     clean = np.where(fresh[:, None], second, clean[rows])
@@ -127,8 +127,8 @@ def _measure(plan: Plan, sigma: FloatArray, name: str, streams: dict[str, np.ran
 
 def _rows(
     time: FloatArray, spec: OutlierSpec, streams: dict[str, np.random.Generator]
-) -> tuple[np.ndarray[tuple[int], np.dtype[np.int64]], np.ndarray[tuple[int], np.dtype[np.bool_]]]:
-    """Which samples become rows of the log, and which of those are a second, fresh reading."""
+) -> tuple[IntArray, NDArray[np.bool_]]:
+    """Sample numbers of the rows of the log, and a mask of those that are a second, fresh reading."""
     kept = np.flatnonzero(kept_rows(time, spec, streams["gaps"]))
     index, fresh = with_duplicates(len(kept), spec.duplicates, streams["duplicates"])
     return kept[index], fresh

@@ -13,7 +13,7 @@ QUICK = TrainSettings(epochs=120, population=10, generations=10)
 
 
 @pytest.mark.parametrize(("name", "bound"), [("a", 0.65), ("c", 0.95)])
-def test_a_filter_that_is_told_wrong_is_corrected(name, bound):
+def test_a_filter_with_wrong_settings_is_corrected(name, bound):
     found = result(replace(CASES[name], training=14, duration_s=50.0), new=4, settings=QUICK)
     assert found.ratio() <= bound
 
@@ -31,7 +31,7 @@ def test_a_repeatable_elevation_bias_is_taken_out_of_filter_and_smoother():
     assert found.ratio("smoother position") <= 0.6
 
 
-def test_a_filter_that_is_told_right_is_not_harmed():
+def test_a_filter_with_right_settings_is_not_harmed():
     found = result(replace(CASES["matched"], training=8, duration_s=60.0), new=3, settings=QUICK)
     for what, squares in found.squares.items():
         assert found.ratio(what) <= 1.005

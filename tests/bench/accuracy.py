@@ -46,7 +46,7 @@ def _flight(flight: Simulation, model: object) -> list[float]:
     found = np.isin(trajectory.outlier, (1, 2))
     readings = np.isfinite(flight.log.measurement)
     bad = (flight.truth.outlier != 0) & readings
-    off = flight.log.measurement - flight.untampered
+    off = flight.log.measurement - flight.clean
     off[:, 1] = np.mod(off[:, 1] + np.pi, 2 * np.pi) - np.pi
     large = bad & (np.abs(off) >= 8 * np.array(flight.sigma))
     return [*figures, float(found[large].mean()) if large.any() else np.nan, float(found[readings & ~bad].mean())]

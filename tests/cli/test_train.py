@@ -73,7 +73,7 @@ def test_the_study_of_first_weights(run, here):
     one, two = run("train", *args), run("train", *args, "--jobs", 2)
     assert one.code == 0, one.err
     assert one.out == two.out
-    assert "First weights of the network 'window' at equal cost" in one.out
+    assert "Initial weights of the network 'window' at equal cost" in one.out
     for name in study.CONTENDERS:
         assert name in one.out
     assert list(here.iterdir()) == []
@@ -83,7 +83,7 @@ def test_ctrl_c_leaves_no_file(run, here, monkeypatch):
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("ftproc.correction.training.train.judge", interrupt)
+    monkeypatch.setattr("ftproc.correction.training.train.with_verdict", interrupt)
     result = run("train", "--scenario", "radar", "--flights", 3, *SMALL, "-o", "m.safetensors")
     assert result.code != 0
     assert list(here.iterdir()) == []

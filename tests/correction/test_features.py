@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ftproc.core.model.frames import line_of_sight_axes, to_cartesian
-from ftproc.correction import los
+from ftproc.core.model.frames import to_cartesian
 from ftproc.correction.feature_sets import FEATURES, named
-from ftproc.correction.features import SETTLING, Features, Place
+from ftproc.correction.features import SETTLING, Features, LineOfSight
 from ftproc.errors import UsageError
 from ftproc.simulation.instrument import InstrumentErrors, systematic
 from tests.correction import fake
@@ -22,10 +19,10 @@ coordinate = st.floats(-2e5, 2e5)
 
 @given(st.tuples(coordinate, coordinate, coordinate), st.integers(0, 1000))
 def test_line_of_sight_mapping_there_and_back(position: tuple[float, float, float], seed: int) -> None:
-    axes = line_of_sight_axes(np.array([position]))
+    los = LineOfSight(np.array([position]), np.ones((1, 6)))
     vector = np.random.default_rng(seed).normal(size=(1, 6))
-    along = los.to_los(axes, vector)
-    assert los.from_los(axes, along) == pytest.approx(vector, abs=1e-12)
+    along = los.from_cartesian(vector)
+    assert los.to_cartesian(along) == pytest.approx(vector, abs=1e-12)
     assert np.linalg.norm(along[:, :3]) == pytest.approx(np.linalg.norm(vector[:, :3]))
 
 
@@ -41,26 +38,26 @@ def test_line_of_sight_mapping_there_and_back(position: tuple[float, float, floa
     ],
 )
 def test_what_lies_along_an_axis(position: tuple[float, ...], axis: int, towards: tuple[int, ...]) -> None:
-    axes = line_of_sight_axes(np.array([position]))
+    los = LineOfSight(np.array([position]), np.ones((1, 6)))
     vector = np.array([[*towards, *(-2 * t for t in towards)]], float)
     expected = np.zeros((1, 6))
     expected[0, axis], expected[0, axis + 3] = 1.0, -2.0
-    assert los.to_los(axes, vector) == pytest.approx(expected, abs=1e-12)
+    assert los.from_cartesian(vector) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize("features", FEATURES.values(), ids=FEATURES)
 def test_adding_the_wanted_output_gives_the_truth(features: Features) -> None:
     flight = fake.flights(0, 1, bias=(1, -2, 3, 0, 0.5, 1))[0]
-    place = Place.of(flight.run, 0, 600)
-    wanted = features.targets(place, flight.error)
+    los = LineOfSight.of(flight.run, 0, 600)
+    wanted = features.targets(los, flight.error)
     assert wanted.shape == (600, features.output_size)
-    said = np.zeros((600, 6))
-    said[:, : features.output_size] = wanted[:, :6]
-    corrected = flight.run.state[:, :6] + features.to_cartesian(place, said)
+    output = np.zeros((600, 6))
+    output[:, : features.output_size] = wanted[:, :6]
+    corrected = flight.run.state[:, :6] + features.to_cartesian(los, output)
     assert corrected[:, :3] == pytest.approx(flight.truth_position, abs=1e-9)
     assert features.output_size < 6 or corrected[:, 3:] == pytest.approx(flight.truth_velocity, abs=1e-9)
-    assert features.from_cartesian(place, features.to_cartesian(place, said)) == pytest.approx(said)
-    assert features.unit(place).shape == (600, 6)
+    assert features.from_cartesian(los, features.to_cartesian(los, output)) == pytest.approx(output)
+    assert features.unit(los).shape == (600, 6)
 
 
 def test_the_papers_input_is_update_minus_prediction_and_its_target_truth_minus_estimate() -> None:
@@ -68,14 +65,14 @@ def test_the_papers_input_is_update_minus_prediction_and_its_target_truth_minus_
     features = named("correction")
     x, _ = features.inputs(flight.run, 0, 600)
     assert np.array_equal(x[100], flight.run.state[100] - flight.run.predicted[100])
-    wanted = features.targets(Place.of(flight.run, 0, 600), flight.error)
+    wanted = features.targets(LineOfSight.of(flight.run, 0, 600), flight.error)
     assert wanted[100, :3] == pytest.approx(flight.truth_position[100] - flight.run.state[100, :3])
     assert (features.input_size, features.output_size) == (9, 9)
 
 
 def test_the_window_holds_the_last_innovations_over_sigma_and_zero_where_not_used() -> None:
     filtered = fake.without(fake.run(np.random.default_rng(2)), slice(95, 97), [1])
-    x, valid = named("window").inputs(filtered)
+    x, valid = named("window").inputs(filtered, 0, 600)
     assert valid[100]
     ratio = np.where(filtered.weight > 0, filtered.innovation / filtered.innovation_sigma, 0.0)
     for lag in range(8):
@@ -86,22 +83,19 @@ def test_the_window_holds_the_last_innovations_over_sigma_and_zero_where_not_use
         assert x[100, place : place + 3] == pytest.approx(before.sum(0) / np.sqrt(width), abs=1e-12)
 
 
-def test_the_window_does_not_reach_before_a_restart() -> None:
+def test_the_window_does_not_reach_before_a_reinitialization() -> None:
     filtered = fake.run(np.random.default_rng(2))
     since = filtered.since_start.copy()
     since[300:] = np.arange(300)
-    x, _ = named("window").inputs(replace(filtered, since_start=since))
-    alone = replace(
-        fake.cut(filtered, slice(300, 600)),
-        since_start=since[300:],
-    )
-    expected, _ = named("window").inputs(alone)
+    filtered = filtered._replace(since_start=since)
+    x, _ = named("window").inputs(filtered, 0, 600)
+    expected, _ = named("window").inputs(filtered.rows(300, 600), 0, 300)
     assert np.array_equal(x[300:], expected)
 
 
 def test_the_windows_geometry() -> None:
     filtered = fake.run(np.random.default_rng(3))
-    x, _ = named("window").inputs(filtered)
+    x, _ = named("window").inputs(filtered, 0, 600)
     px, py, pz = filtered.state[50, :3]
     flat, distance = np.hypot(px, py), np.sqrt(px**2 + py**2 + pz**2)
     angle = np.array([fake.SIGMA[0], fake.SIGMA[1] / flat, fake.SIGMA[2] / distance])
@@ -120,10 +114,10 @@ def test_an_instruments_constant_errors_are_linear_in_its_features() -> None:
     errors = InstrumentErrors(3.0, 2e-4, -3e-4, 4e-4, 0.7, 5e-4)
     seen = to_cartesian(systematic(state[:, :3], errors))
     features = named("instrument")
-    run = replace(fake.run(rng, n=400), state=state)
-    x, _ = features.inputs(run)
-    place = Place(state[SETTLING:, :3], run.los_sigma[SETTLING:])
-    target = features.targets(place, np.concatenate([state[:, :3] - seen, np.zeros((400, 6))], axis=1)[SETTLING:])
+    run = fake.run(rng, n=400)._replace(state=state)
+    x, _ = features.inputs(run, 0, 400)
+    los = LineOfSight.of(run, SETTLING, 400)
+    target = features.targets(los, np.concatenate([state[:, :3] - seen, np.zeros((400, 6))], axis=1)[SETTLING:])
     columns = np.concatenate([x[SETTLING:], np.ones((400 - SETTLING, 1))], axis=1)
     left = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
     assert np.sqrt((target**2).mean(0)).min() > 1e-4
@@ -133,7 +127,7 @@ def test_an_instruments_constant_errors_are_linear_in_its_features() -> None:
 @pytest.mark.parametrize("features", FEATURES.values(), ids=FEATURES)
 def test_any_cut_of_a_run_gives_the_same_inputs(features: Features) -> None:
     filtered = fake.without(fake.run(np.random.default_rng(4), n=100), slice(40, 60))
-    whole, mask = features.inputs(filtered)
+    whole, mask = features.inputs(filtered, 0, 100)
     for cut in (1, 3, 7, 8, 50, 63, 64, 65, 99):
         parts = [features.inputs(filtered, 0, cut), features.inputs(filtered, cut, 100)]
         assert np.array_equal(np.concatenate([p[0] for p in parts]), whole)
@@ -150,7 +144,7 @@ def test_valid_is_false_while_coasting_settling_or_without_numbers(features: Fea
     state[400, 7] = np.nan
     sigma[410, 2] = 0.0
     sigma[420, 5] = np.inf
-    x, valid = features.inputs(replace(filtered, since_start=since, state=state, los_sigma=sigma))
+    x, valid = features.inputs(filtered._replace(since_start=since, state=state, los_sigma=sigma), 0, 600)
     expected = np.ones(600, bool)
     expected[:SETTLING] = expected[300 : 300 + SETTLING] = expected[100:110] = False
     expected[[400, 410, 420]] = False
@@ -160,14 +154,14 @@ def test_valid_is_false_while_coasting_settling_or_without_numbers(features: Fea
 
 
 def test_angles_only_logs_have_inputs_too() -> None:
-    x, valid = named("window").inputs(fake.without(fake.run(np.random.default_rng(6)), slice(None), [0]))
+    x, valid = named("window").inputs(fake.without(fake.run(np.random.default_rng(6)), slice(None), [0]), 0, 600)
     assert valid[SETTLING:].all()
     assert not x[:, 0:33:3].any()
 
 
 @pytest.mark.parametrize("features", FEATURES.values(), ids=FEATURES)
 def test_an_empty_run(features: Features) -> None:
-    x, valid = features.inputs(fake.run(np.random.default_rng(0), n=0))
+    x, valid = features.inputs(fake.run(np.random.default_rng(0), n=0), 0, 0)
     assert x.shape == (0, features.input_size)
     assert valid.shape == (0,)
 

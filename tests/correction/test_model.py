@@ -1,4 +1,4 @@
-"""The model's file: there and back, and a plain sentence for everything that is not one."""
+"""The model file: a round trip, and a plain sentence for everything that is not one."""
 
 from __future__ import annotations
 
@@ -64,9 +64,9 @@ def test_there_and_back(model: Model, tmp_path: Path) -> None:
     assert again.settings == model.settings
     filtered = fake.run(np.random.default_rng(9))
     for stage in ("filter", "smoother"):
-        said = correct(filtered, again.stages[stage]).values
-        assert np.array_equal(said, correct(filtered, model.stages[stage]).values)
-        assert said.any()
+        values = correct(filtered, again.stages[stage]).values
+        assert np.array_equal(values, correct(filtered, model.stages[stage]).values)
+        assert values.any()
     assert [p.name for p in tmp_path.iterdir()] == ["model.safetensors"]
 
 
@@ -179,11 +179,11 @@ def test_weights_of_another_size(model: Model) -> None:
         from_bytes(to_bytes(broken), "m")
 
 
-def test_the_card_tells_all_in_plain_words(model: Model) -> None:
-    told = card(model)
+def test_the_card_describes_the_model(model: Model) -> None:
+    text = card(model)
     for part in ("41-4-6", "'window'", "seed 3", model.filter.fingerprint, "bounded to 2 to ", "up: gain"):
-        assert part in told
-    assert "smoother: feature set 'instrument', network 7-4-3 and direct connections" in told
+        assert part in text
+    assert "smoother: feature set 'instrument', network 7-4-3 and direct connections" in text
     assert "no verdict" in card(changed(model, verdict=None))
     alone = replace(model, stages={"filter": model.filter})
     assert "smoother: no network; --smooth is not corrected" in card(alone)

@@ -9,8 +9,6 @@ import pytest
 
 from ftproc.correction import network
 from ftproc.correction.network import Shape
-from ftproc.correction.training import descent
-from ftproc.correction.training.descent import Samples
 
 SHAPES = [Shape(9, 12, 9), Shape(1, 1, 1), Shape(32, 5, 6), Shape(2, 7, 3), Shape(7, 4, 3, direct=True)]
 
@@ -89,43 +87,11 @@ def test_a_population_costs_what_each_network_costs(shape: Shape) -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_no_outer_weights_do_better_than_the_solved_ones(shape: Shape) -> None:
+def test_no_outer_weights_do_better_than_the_least_squares_ones(shape: Shape) -> None:
     vector, x, t = problem(shape)
-    inner = vector[: shape.searched]
-    found = network.solved(inner, shape, x, t, 0.01)
-    assert np.array_equal(found[: shape.searched], inner)
+    inner = vector[: shape.inner]
+    found = network.least_squares(inner, shape, x, t, 0.01)
+    assert np.array_equal(found[: shape.inner], inner)
     value, gradient = network.cost_and_gradient(found, shape, x, t, 0.01)
-    assert gradient[shape.searched :] == pytest.approx(np.zeros(shape.size - shape.searched), abs=1e-10)
+    assert gradient[shape.inner :] == pytest.approx(np.zeros(shape.size - shape.inner), abs=1e-10)
     assert value <= network.cost_and_gradient(vector, shape, x, t, 0.01)[0]
-
-
-def taught(n: int, seed: int, noise: float = 0.05) -> Samples:
-    rng = np.random.default_rng(seed)
-    x = rng.normal(size=(n, 3))
-    t = np.stack([np.sin(x[:, 0]) * x[:, 1], x[:, 2] - 0.5], axis=1)
-    return Samples(x, t + noise * rng.normal(size=t.shape))
-
-
-@pytest.mark.parametrize("optimiser", ["l-bfgs", "momentum"])
-def test_back_propagation_learns_a_function(optimiser: str) -> None:
-    shape = Shape(3, 10, 2)
-    start = np.random.default_rng(0).uniform(-1, 1, shape.size) * network.scale(shape)
-    training, validation = taught(1500, 1), taught(500, 2)
-    if optimiser == "l-bfgs":
-        fit = descent.lbfgs(start, shape, training, validation, 300)
-    else:
-        fit = descent.momentum(start, shape, training, validation, 300, np.random.default_rng(0))
-    assert network.cost(start, shape, *validation) > 1.0
-    assert fit.validation_cost < 0.1
-    assert network.cost(fit.vector, shape, *validation) == fit.validation_cost
-
-
-def test_training_stops_early_when_there_is_nothing_to_learn() -> None:
-    shape = Shape(3, 10, 2)
-    rng = np.random.default_rng(3)
-    noise = [Samples(rng.normal(size=(60, 3)), rng.normal(size=(60, 2))) for _ in range(2)]
-    start = 0.1 * rng.normal(size=shape.size)
-    fit = descent.lbfgs(start, shape, noise[0], noise[1], 1000)
-    assert fit.stopped_early
-    assert fit.epochs < 200
-    assert fit.validation_cost <= network.cost(start, shape, *noise[1])

@@ -16,7 +16,7 @@ def scored(method, error_m, sees=PAST, smooth=False, truth=TRUTH, **changes):
     return score(trajectory_for(truth, error_m=error_m, metadata=metadata, **changes), truth)
 
 
-def test_sorted_by_error_and_apart_by_what_they_see():
+def test_sorted_by_error_and_grouped_by_the_readings_used():
     scores = [
         scored("ukf", 9.0), scored("wavelet-akf", 3.0, WHOLE), scored("gate", 5.0),
         scored("ukf", 2.0, WHOLE, smooth=True), scored("ga-bpnn-ukf", 4.0, EDITED),
@@ -53,13 +53,13 @@ def test_blank_where_nothing_is_known_and_last_without_position():
     assert comparison.table([bare]).splitlines()[2].split()[-2:] == ["-", "0"]
 
 
-def test_side_by_side_unless_methods_are_held_against_one_truth():
+def test_columns_unless_methods_are_compared_with_one_truth():
     ukf, gate = scored("ukf", 9.0), scored("gate", 5.0)
-    assert comparison.is_one([ukf, gate])
-    assert comparison.is_one([ukf, scored("ukf", 1.0, WHOLE, smooth=True)])
-    assert not comparison.is_one([ukf])
-    assert not comparison.is_one([ukf, ukf])
-    assert not comparison.is_one([ukf, scored("gate", 5.0, sees=None)])
-    assert not comparison.is_one([ukf, score(trajectory_for(TRUTH))])
+    assert comparison.applies([ukf, gate])
+    assert comparison.applies([ukf, scored("ukf", 1.0, WHOLE, smooth=True)])
+    assert not comparison.applies([ukf])
+    assert not comparison.applies([ukf, ukf])
+    assert not comparison.applies([ukf, scored("gate", 5.0, sees=None)])
+    assert not comparison.applies([ukf, score(trajectory_for(TRUTH))])
     assert "position RMSE (m)" in render([ukf, ukf])
     assert "position RMSE (m)" not in render([ukf, gate])

@@ -82,9 +82,9 @@ def naive_score(t: Trajectory, truth: Truth) -> dict[str, float]:
     }
 
 
-def naive_detection(said: list[int], injected: list[int]) -> dict[str, float]:
+def naive_detection(flags: list[int], injected: list[int]) -> dict[str, float]:
     tp = fp = fn = tn = 0
-    for flag, code in zip(said, injected, strict=True):
+    for flag, code in zip(flags, injected, strict=True):
         if flag == 3:
             continue
         if flag in (1, 2):
@@ -174,7 +174,7 @@ def test_mean_error_and_rmse_differ() -> None:
     assert found.max_error_m == pytest.approx(201.0)
 
 
-def test_honest_sigmas_give_nees_three_and_992_in_1000() -> None:
+def test_consistent_sigmas_give_nees_three_and_992_in_1000() -> None:
     truth = simulate("calibration", seed=1, duration_s=600.0, dt_s=0.02, outliers="none").truth
     t = trajectory_for(truth, error_m=4.0)
     found = score(replace(t, sigma=np.full((len(t), 6), 4.0)), truth)

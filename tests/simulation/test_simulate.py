@@ -9,7 +9,7 @@ from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.errors import UsageError
 from ftproc.simulation import list_scenarios, simulate
 from ftproc.simulation.aircraft import path_acceleration
-from ftproc.simulation.flight import smoothed
+from ftproc.simulation.kinematics import smoothed
 from tests.simulated import codes, deviation, load_factor
 
 
@@ -129,7 +129,7 @@ def test_manoeuvre_clean_is_the_same_flight_with_the_same_noise() -> None:
     dirty, clean = simulate("manoeuvre", seed=7), simulate("manoeuvre-clean", seed=7)
     rows = np.searchsorted(clean.log.time_s, dirty.log.time_s)
     np.testing.assert_array_equal(clean.truth.position_m[rows], dirty.truth.position_m)
-    np.testing.assert_array_equal(clean.log.measurement[rows], dirty.untampered)
+    np.testing.assert_array_equal(clean.log.measurement[rows], dirty.clean)
     assert not codes(clean).any()
     assert not np.isnan(clean.log.measurement).any()
     assert len(clean.log) == 2401
@@ -221,16 +221,16 @@ def test_every_scenario_takes_every_override(name: str) -> None:
     assert flight.log.time_s[3] == 0.3  # printed as such
     assert flight.log.time_s[-1] == 50.0
     assert flight.sigma == (7.0, 0.001, 0.002)
-    error = flight.untampered - from_cartesian(flight.truth.position_m)
+    error = flight.clean - from_cartesian(flight.truth.position_m)
     error[:, 1] = wrap(error[:, 1])
-    below_zenith = np.abs(flight.untampered[:, 2]) < 1.55
+    below_zenith = np.abs(flight.clean[:, 2]) < 1.55
     np.testing.assert_allclose(error[below_zenith].std(axis=0), (7.0, 0.001, 0.002), rtol=0.15)
     assert np.isnan(flight.log.measurement).mean() == pytest.approx(0.5, abs=0.06)
 
 
 def test_noise_free_log_is_the_truth_and_outliers_keep_their_size() -> None:
     flight = simulate("manoeuvre", seed=1, noise=(0.0, 0.0, 0.0), outliers="isolated=0.1:10")
-    np.testing.assert_allclose(flight.untampered, from_cartesian(flight.truth.position_m), atol=1e-9)
+    np.testing.assert_allclose(flight.clean, from_cartesian(flight.truth.position_m), atol=1e-9)
     hit = codes(flight)[:, 0] == 1
     usual = simulate("manoeuvre", seed=1).sigma[0]
     np.testing.assert_allclose(np.abs(deviation(flight)[hit, 0]), 10 * usual, rtol=1e-6)

@@ -1,4 +1,15 @@
-"""How a network is trained: samples, genetic search, descent, and what held-out flights say of it.
+"""Training of a correction: samples, genetic search, back-propagation, and the verdict of held-out flights.
 
 Calls `correction`; the flights come from `pipeline`.
 """
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+Progress = Callable[[str, int, int], None]  # stage, steps done, steps in all (it may end before)
+Steps = Callable[[int, int], None]  # the same of one stage
+
+
+def silent(*_: object) -> None:
+    """The progress that nobody reads."""

@@ -1,4 +1,4 @@
-"""A bootstrap for errors that are correlated in time: long blocks are drawn, not samples."""
+"""Block bootstrap, for errors that are correlated in time: long blocks are drawn, not samples."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ftproc.records import FloatArray, IntArray
 
 DRAWS = 1000  # enough for a quantile of 0.8 %
 SHORTEST_S, LONGEST_S, BLOCKS = 5.0, 30.0, 40
-WHOLE_PIECES = 8  # with so many flights (or separate blocks of flights), these are drawn whole
+WHOLE_PIECES = 8  # so many pieces (flights, or separate blocks of flights), or more, are drawn whole
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Blocks:
     @classmethod
     def of(cls, times_s: Sequence[FloatArray]) -> Blocks:
         """For pieces with these sample times: whole pieces when there are eight, else about forty blocks of 5 s to
-        30 s, because errors stay correlated for longer than one thinks."""
+        30 s, longer than errors stay correlated."""
         times = [t for t in times_s if len(t)]
         length = np.clip(sum(float(t[-1] - t[0]) for t in times) / BLOCKS, SHORTEST_S, LONGEST_S)
         block, piece = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
@@ -49,7 +49,7 @@ class Blocks:
     def totals(self, sums: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Totals (draws, c) of block sums (b, c): pieces are drawn with replacement, then blocks within each.
 
-        Drawing blocks alone would let two flights that happen to err alike pass for a rule.
+        Drawing blocks alone would make two flights with a similar error by chance significant.
         """
         pieces, start, size = np.unique(self.piece, return_index=True, return_counts=True)
         drawn = rng.multinomial(len(pieces), np.full(len(pieces), 1 / len(pieces)), size=DRAWS)

@@ -1,20 +1,19 @@
-"""Independent pieces of work in this process or in several."""
+"""Independent tasks in this process or in several."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from ftproc.correction.training import Progress, silent
 from ftproc.errors import FtprocError
-
-Progress = Callable[[str, int, int], None]
 
 
 def each(
-    work: Callable[..., Any], tasks: Sequence[tuple[Any, ...]], jobs: int, progress: Progress | None = None
+    work: Callable[..., Any], tasks: Sequence[tuple[Any, ...]], jobs: int, progress: Progress = silent
 ) -> list[Any]:
-    """`work(*task)` of each task, in their order. In one process, `work` is also given `progress`; in several, the
-    tasks done are counted. Raises FtprocError when a process dies."""
+    """`work(*task)` of each task, in their order. In one process, `work` takes `progress` as its last argument; in
+    several, it counts the tasks done. Raises FtprocError when a process dies."""
     if jobs <= 1 or len(tasks) <= 1:
         return [work(*task, progress) for task in tasks]
     import multiprocessing
@@ -26,8 +25,7 @@ def each(
     try:
         futures = [pool.submit(work, *task) for task in tasks]
         for done, _ in enumerate(as_completed(futures)):
-            if progress is not None:
-                progress("training", done + 1, len(tasks))
+            progress("training", done + 1, len(tasks))
         return [future.result() for future in futures]
     except BrokenProcessPool as cause:
         raise FtprocError("a worker process died (out of memory, or killed); use fewer --jobs") from cause
@@ -40,7 +38,7 @@ def each(
 
 
 def _quiet() -> None:
-    """Ctrl-C is the parent's to deal with."""
+    """Ignore Ctrl-C: the parent handles it."""
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,6 +1,5 @@
-"""From flights with truth to training, validation and test samples. Flights are kept whole, or cut into long
-blocks when there are few: neighbouring samples share their error, so a split by sample would prove
-nothing."""
+"""From flights with truth to training, validation and test samples. Flights are kept whole, or cut into long blocks
+when there are few: errors of neighbouring samples are correlated, so a split by sample would prove nothing."""
 
 from __future__ import annotations
 
@@ -8,11 +7,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.correction import los
-from ftproc.correction.features import APPLIED, Features, Place, Record, usable
+from ftproc.core.filtering.records import FilterRun
+from ftproc.correction.features import APPLIED, Features, LineOfSight, usable
 from ftproc.errors import InputError
 from ftproc.records import FloatArray
 
@@ -24,35 +25,27 @@ VALIDATION_SHARE, TEST_SHARE = 1 / 3, 1 / 6
 
 @dataclass(frozen=True)
 class Flight:
-    """A filter run of n samples and the truth at its times, in the station's x, y, z.
+    """A run of n samples, of the filter or with the smoother's states, and the truth at its times in the station's
+    x, y, z.
 
-    truth_position (n, 3) m; truth_velocity (n, 3) m/s and truth_acceleration (n, 3) m/s2, differenced from
-    the position when None. Rows where the truth is not known are NaN and are not used.
+    truth_position: (n, 3) m. truth_velocity: (n, 3) m/s, differenced from the position when None. Rows without truth
+    are NaN and are not used.
     """
 
-    run: Record
+    run: FilterRun
     truth_position: FloatArray
     truth_velocity: FloatArray | None = None
-    name: str = ""
-    truth_acceleration: FloatArray | None = None
-
-    def __post_init__(self) -> None:
-        n = len(self.run.time_s)
-        for array in (self.truth_position, self.truth_velocity, self.truth_acceleration):
-            if array is not None and array.shape != (n, 3):
-                raise ValueError(f"flight {self.name!r}: truth of shape {array.shape}, the run has {n} samples")
 
     @cached_property
     def error(self) -> FloatArray:
         """Truth minus estimate (n, 9): m, m/s, m/s2."""
-        velocity, acceleration = self.truth_velocity, self.truth_acceleration
+        velocity = self.truth_velocity
         velocity = _rate(self.run.time_s, self.truth_position) if velocity is None else velocity
-        acceleration = _rate(self.run.time_s, velocity) if acceleration is None else acceleration
+        acceleration = _rate(self.run.time_s, velocity)
         return np.concatenate([self.truth_position, velocity, acceleration], axis=1) - self.run.state
 
 
-@dataclass(frozen=True)
-class Piece:
+class Piece(NamedTuple):
     """Samples start:stop of flight number `flight`."""
 
     flight: int
@@ -70,6 +63,23 @@ class Split:
     by: str
 
 
+class Samples(NamedTuple):
+    """Inputs (n, d) and targets (n, o) of the network."""
+
+    inputs: FloatArray
+    targets: FloatArray
+
+    def rows(self, rows: slice) -> Samples:
+        return Samples(self.inputs[rows], self.targets[rows])
+
+    def thinned(self, most: int, rng: np.random.Generator) -> Samples:
+        """At most so many of the samples, in their order."""
+        if len(self.inputs) <= most:
+            return self
+        rows = np.sort(rng.choice(len(self.inputs), most, replace=False))
+        return Samples(self.inputs[rows], self.targets[rows])
+
+
 def _rate(time_s: FloatArray, values: FloatArray) -> FloatArray:
     """Derivative (n, 3) of `values` (n, 3) by central differences; samples at one instant count once."""
     instants, first, back = np.unique(time_s, return_index=True, return_inverse=True)
@@ -80,26 +90,23 @@ def _rate(time_s: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def _blocks(flights: Sequence[Flight]) -> list[Piece]:
-    """Blocks of at least 30 s; each but a flight's first starts late."""
+    """Blocks of at least 30 s; each but a flight's first starts APART samples late."""
     pieces = []
     for number, flight in enumerate(flights):
         time = flight.run.time_s
         if len(time) == 0:
             continue
         count = max(int((time[-1] - time[0]) // BLOCK_S), 1)
-        edges = np.searchsorted(time, np.linspace(time[0], time[-1], count + 1)[1:-1])
-        starts, stops = [0, *(int(e) for e in edges)], [*(int(e) for e in edges), len(time)]
-        pieces += [
-            Piece(number, start + (APART if start else 0), stop) for start, stop in zip(starts, stops, strict=True)
-        ]
+        inner = np.searchsorted(time, np.linspace(time[0], time[-1], count + 1)[1:-1])
+        edges = [0, *inner.tolist(), len(time)]
+        pieces += [Piece(number, start + (APART if start else 0), stop) for start, stop in pairwise(edges)]
     return [piece for piece in pieces if piece.stop > piece.start]
 
 
 def split(flights: Sequence[Flight], rng: np.random.Generator) -> Split:
-    """Half for training, a third for validation, a sixth for the test (at least one of each), in random
-    order.
+    """Half for training, a third for validation, a sixth for the test (at least one of each), in random order.
 
-    Raises InputError when there are not three pieces.
+    Raises InputError when there are fewer than three pieces.
     """
     by = "flight" if len(flights) >= WHOLE_FLIGHTS else "block"
     pieces = [Piece(i, 0, len(f.run.time_s)) for i, f in enumerate(flights)] if by == "flight" else _blocks(flights)
@@ -114,35 +121,29 @@ def split(flights: Sequence[Flight], rng: np.random.Generator) -> Split:
     return Split(tuple(order[held:]), tuple(order[tests:held]), tuple(order[:tests]), by)
 
 
-def table(flights: Sequence[Flight], pieces: Sequence[Piece], features: Features) -> tuple[FloatArray, FloatArray]:
-    """Inputs (n, d) and targets (n, o) of all samples in `pieces` that are valid and have truth."""
+def samples(flights: Sequence[Flight], pieces: Sequence[Piece], features: Features) -> Samples:
+    """All samples in `pieces` that are valid and have truth, not normalised."""
     inputs, targets = [np.empty((0, features.input_size))], [np.empty((0, features.output_size))]
-    for piece in pieces:
-        flight, rows = flights[piece.flight], slice(piece.start, piece.stop)
-        x, valid = features.inputs(flight.run, piece.start, piece.stop)
-        keep = np.flatnonzero(valid)
-        run = flight.run
-        place = Place(run.state[rows, :3][keep], run.los_sigma[rows][keep])
-        t = features.targets(place, flight.error[rows][keep])
+    for number, start, stop in pieces:
+        flight = flights[number]
+        x, valid = features.inputs(flight.run, start, stop)
+        t = features.targets(LineOfSight.of(flight.run, start, stop).rows(valid), flight.error[start:stop][valid])
         known = np.all(np.isfinite(t), axis=1)
-        inputs.append(x[keep][known])
+        inputs.append(x[valid][known])
         targets.append(t[known])
-    return np.concatenate(inputs), np.concatenate(targets)
+    return Samples(np.concatenate(inputs), np.concatenate(targets))
 
 
-def honesty(flights: Sequence[Flight], pieces: Sequence[Piece]) -> FloatArray:
-    """(6,) by how much the filter's line-of-sight sigmas are too small in `pieces`, at least 1.
+def overconfidence(flights: Sequence[Flight], pieces: Sequence[Piece]) -> FloatArray:
+    """(6,) by what factor the filter's line-of-sight sigmas are too small in `pieces`, at least 1.
 
-    The 68.3 % quantile of error over sigma (1 for an honest Gaussian sigma), so that a few blunders do not
-    count.
+    The 68.3 % quantile of error over sigma (1 for a consistent Gaussian sigma), so that a few outliers do not count.
     """
     ratios = [np.ones((1, APPLIED))]
-    for piece in pieces:
-        run = flights[piece.flight].run
-        settled = usable(run, piece.start, piece.stop)
-        error = flights[piece.flight].error[piece.start : piece.stop, :APPLIED][settled]
-        place = Place.of(run, piece.start, piece.stop)
-        sigma = place.los_sigma[settled]
-        ratio = np.abs(los.to_los(place.axes[settled], error)) / sigma
+    for number, start, stop in pieces:
+        flight = flights[number]
+        settled = usable(flight.run, start, stop)
+        los = LineOfSight.of(flight.run, start, stop).rows(settled)
+        ratio = np.abs(los.from_cartesian(flight.error[start:stop, :APPLIED][settled])) / los.sigma
         ratios.append(ratio[np.all(np.isfinite(ratio), axis=1)])
     return np.maximum(np.quantile(np.concatenate(ratios), 0.683, axis=0), 1.0)

@@ -1,5 +1,5 @@
-"""Which network for which stage: candidates are trained, held-out flights choose. In any number of workers, with the
-same result to the last bit."""
+"""The networks of all stages: candidates are trained, in any number of processes with the same result to the last bit,
+and held-out flights choose among them."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from dataclasses import asdict, replace
 
 from ftproc.correction.feature_sets import FEATURES, named
 from ftproc.correction.model import FILTER, SMOOTHER, Model, Stage
+from ftproc.correction.training import Progress, silent
 from ftproc.correction.training.parallel import each
 from ftproc.correction.training.samples import Flight
-from ftproc.correction.training.train import Progress, train
+from ftproc.correction.training.train import train
 from ftproc.settings import TrainSettings
 
 AUTO = "auto"
@@ -23,37 +24,34 @@ def train_model(
     progress: Progress | None = None,
     jobs: int = 1,
 ) -> Model:
-    """A model from the flights of each stage (`filter`, `smoother`); of the smoother only what has a gain is kept.
+    """A model from the flights of each stage (`filter`, `smoother`); a smoother's network without a gain is left out.
 
     Raises InputError when there is too little data, UsageError for a wrong choice in the settings.
     """
-    tasks = [
-        (flights[stage], replace(settings, features=name)) for stage in flights for name in _wanted(stage, settings)
-    ]
-    done = each(train, tasks, jobs, progress)
+    wanted = [(stage, name) for stage in flights for name in _candidates(stage, settings)]
+    tasks = [(flights[stage], replace(settings, features=name)) for stage, name in wanted]
+    trained = each(train, tasks, jobs, progress or silent)
     stages: dict[str, Stage] = {}
-    for stage in flights:
-        count = len(_wanted(stage, settings))
-        trained, done = done[:count], done[count:]
-        best = min(trained, key=_merit, default=None)
-        if best is not None and (stage == FILTER or best.helps):
-            stages[stage] = best
-    return Model(stages, asdict(settings))
+    for (stage, _), candidate in zip(wanted, trained, strict=True):
+        if stage not in stages or _remaining_error(candidate) < _remaining_error(stages[stage]):
+            stages[stage] = candidate
+    return Model({k: v for k, v in stages.items() if k == FILTER or v.helps}, asdict(settings))
 
 
-def _wanted(stage: str, settings: TrainSettings) -> tuple[str, ...]:
+def _candidates(stage: str, settings: TrainSettings) -> tuple[str, ...]:
+    """Names of the feature sets to try."""
     if settings.features == AUTO:
         return CANDIDATES[stage]
     serves = stage == FILTER or named(settings.features).smoothed
     return (settings.features,) if serves else ()
 
 
-def _merit(stage: Stage) -> float:
-    """What the correction certainly leaves of the position error on validation data; 1 when it does nothing."""
+def _remaining_error(stage: Stage) -> float:
+    """Upper bound of the position error ratio on validation data; 1 for a network without a gain."""
     ratio = None if stage.verdict is None else stage.verdict.validated
     return ratio.high if stage.helps and ratio is not None else 1.0
 
 
-def known() -> tuple[str, ...]:
-    """The names that the settings' `features` may have."""
+def feature_choices() -> tuple[str, ...]:
+    """The values of the settings' `features`."""
     return (AUTO, *FEATURES)

@@ -56,7 +56,7 @@ def test_the_largest_draw_stays_on_the_wheel() -> None:
     assert sorted(roulette(weight, 7, Highest())) == list(range(7))  # type: ignore[arg-type]
 
 
-def test_hopeless_individuals_are_drawn_only_when_nothing_else_is_left() -> None:
+def test_individuals_of_zero_fitness_are_drawn_last() -> None:
     weight = fitness(np.array([np.nan, 1.0, np.inf, 2.0]))
     for seed in range(50):
         drawn = roulette(weight, 4, np.random.default_rng(seed)).tolist()
@@ -101,10 +101,10 @@ def test_the_same_seed_finds_the_same_and_another_seed_another() -> None:
 
 
 def test_the_search_gives_up_when_the_best_does_not_change() -> None:
-    told: list[int] = []
+    steps: list[int] = []
     settings = GeneticSettings(generations=60, patience=15)
-    search(lambda g: np.ones(len(g)), 4, settings, np.random.default_rng(0), lambda done, _: told.append(done))
-    assert told == list(range(1, 16))
+    search(lambda g: np.ones(len(g)), 4, settings, np.random.default_rng(0), lambda done, _: steps.append(done))
+    assert steps == list(range(1, 16))
 
 
 def test_costs_that_are_not_finite_do_not_win() -> None:

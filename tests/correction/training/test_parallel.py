@@ -7,29 +7,29 @@ import os
 
 import pytest
 
+from ftproc.correction.training import silent
 from ftproc.correction.training.parallel import each
 from ftproc.errors import FtprocError, InputError
 
 
-def square(number, progress=None):
-    if progress is not None:
-        progress("squaring", number, 9)
+def square(number, progress=silent):
+    progress("squaring", number, 9)
     return number**2
 
 
-def refuse(number, progress=None):
+def refuse(number, progress=silent):
     raise InputError(f"flight {number} is none")
 
 
-def die(number, progress=None):
+def die(number, progress=silent):
     os._exit(1)
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_results_come_in_the_order_of_the_tasks(jobs):
-    told = []
-    assert each(square, [(n,) for n in range(4)], jobs, lambda *step: told.append(step)) == [0, 1, 4, 9]
-    assert len(told) == 4
+    steps = []
+    assert each(square, [(n,) for n in range(4)], jobs, lambda *step: steps.append(step)) == [0, 1, 4, 9]
+    assert len(steps) == 4
     assert each(square, [], jobs) == []
 
 
@@ -40,7 +40,7 @@ def test_an_error_reaches_the_caller_and_ends_the_work(jobs):
     assert not multiprocessing.active_children()
 
 
-def test_a_process_that_dies_is_told_in_a_sentence():
+def test_a_process_that_dies_is_an_error():
     with pytest.raises(FtprocError, match=r"a worker process died .* use fewer --jobs"):
         each(die, [(0,), (0,)], 2)
 

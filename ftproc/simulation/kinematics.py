@@ -1,4 +1,4 @@
-"""One true flight: acceleration given at evenly spaced knots, everything else its exact integral."""
+"""The true motion of a flight: acceleration at evenly spaced knots; velocity and position are its exact integrals."""
 
 from __future__ import annotations
 
@@ -62,9 +62,9 @@ def constant_acceleration(
 
 
 def smoothed(profile: FloatArray, width: int) -> FloatArray:
-    """(n, k) command profiles with their steps rounded over `width` knots (Hann window): roll-in takes time.
+    """(n, k) command profiles with their steps smoothed over `width` knots (Hann window): roll-in takes time.
 
-    The window's area is 1, so that what a command adds up to (speed, climb angle, heading) does not change.
+    The window's area is 1, so that the total of a command (speed, climb angle, heading) does not change.
     """
     window = np.sin(np.pi * (np.arange(width) + 0.5) / width) ** 2
     window /= window.sum()
@@ -73,9 +73,9 @@ def smoothed(profile: FloatArray, width: int) -> FloatArray:
 
 
 def gusts(n: int, step_s: float, rms_mps2: float, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """(n, 3) accelerations m/s2 of air that moves with a stationary velocity, and the (3,) velocity at first.
+    """(n, 3) accelerations m/s2 by gusts of a stationary velocity, and the (3,) velocity at the first knot.
 
-    The derivative of filtered white noise, not the noise itself: its integral must not wander off, or a long
+    The derivative of filtered white noise, not the noise itself: the integral of noise is a random walk, and a long
     flight would end in a dive.
     """
     width = max(4, round(3.0 / step_s))

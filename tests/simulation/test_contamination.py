@@ -1,4 +1,4 @@
-"""What is injected into a simulated log is what was asked for, and what the truth says."""
+"""The outliers of a simulated log are those of the specification, and the truth has their codes."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import pytest
 
 from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.simulation import Fault, OutlierSpec, simulate
+from ftproc.simulation.contamination import contaminate
 from ftproc.simulation.sampling import kept_rows, sample_times, with_duplicates
-from ftproc.simulation.tamper import tamper
 from tests.simulated import codes, deviation, runs
 
 
@@ -58,7 +58,7 @@ def test_patches_have_the_length_number_and_shape_said(kind: str) -> None:
                 np.testing.assert_allclose(error, error[-1] * np.arange(1, length + 1) / length, atol=1e-6)
                 assert 8 <= abs(error[-1]) <= 60
             elif kind == "stuck":
-                np.testing.assert_array_equal(flight.log.measurement[patch, c], flight.untampered[patch.start - 1, c])
+                np.testing.assert_array_equal(flight.log.measurement[patch, c], flight.clean[patch.start - 1, c])
             else:
                 assert np.abs(error).max() > 4
 
@@ -87,7 +87,7 @@ def test_absolute_sizes() -> None:
 
 
 def test_sizes_are_log_uniform_with_either_sign() -> None:
-    reading, code = tamper(
+    reading, code = contaminate(
         np.zeros((40000, 3)), (Fault("isolated", rate=0.5, size=(10.0, 1000.0)),), np.ones(3),
         np.random.default_rng(0),
     )  # fmt: skip
@@ -105,6 +105,12 @@ def test_patches_keep_clear_of_each_other_and_what_does_not_fit_is_left_out() ->
         assert {patch.stop - patch.start for patch in patches} == {5}
         assert patches[0].start >= 1
     assert not codes(simulate("zuo2021", duration_s=3.0, outliers="offset=3:40:10")).any()
+
+
+def test_isolated_outliers_leave_room_for_patches_whatever_the_order_of_the_items() -> None:
+    for spec in ("isolated=0.5,offset=2:10:20", "offset=2:10:20,isolated=0.5"):
+        flag = codes(simulate("manoeuvre", seed=2, outliers=spec))
+        assert [(flag[:, c] == 2).sum() for c in range(3)] == [20, 20, 20]
 
 
 def test_gap_removes_rows_from_log_and_truth() -> None:

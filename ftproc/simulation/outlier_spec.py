@@ -1,9 +1,12 @@
-"""The outlier specification: one line of text that says how a log is spoiled. Grammar in `GRAMMAR`."""
+"""The outlier specification: one line of text that says which outliers a log gets. Grammar in `GRAMMAR`."""
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from ftproc.errors import UsageError, nearest
 from ftproc.records import COMPONENTS
@@ -41,6 +44,39 @@ For the whole log, without a prefix:
 
 Range = tuple[float, float]
 
+
+class _Value(NamedTuple):
+    """A value as written: a range (one number: low = high) and its unit."""
+
+    low: float
+    high: float
+    unit: str = "sigma"
+
+
+class _Field(NamedTuple):
+    """Meaning and example of a field, the check of its range, and whether a range is allowed at all."""
+
+    meaning: str
+    example: str
+    valid: Callable[[float, float], bool]
+    ranged: bool = False
+
+
+_FIELDS = {
+    "rate": _Field("a share from 0 to 1", "0.05", lambda _, high: high <= 1.0),
+    "count": _Field("a whole number", "3", lambda low, high: low.is_integer() and high <= 1e6),
+    "length": _Field(
+        "a whole number of samples or a range", "4-30",
+        lambda low, high: low.is_integer() and high.is_integer() and low >= 1 and high <= 1e6, ranged=True,
+    ),
+    "size": _Field(
+        "a number of sigmas or a range, with the suffix m or mrad if absolute", "8-100",
+        lambda low, _: low > 0, ranged=True,
+    ),
+    "fraction": _Field("a share of the sample interval from 0 to below 0.5", "0.2", lambda _, high: high < 0.5),
+    "seconds": _Field("a number of seconds or a range", "5-15", lambda low, _: low > 0, ranged=True),
+    "dof": _Field("a number of degrees of freedom above 2", "6", lambda low, _: low > 2),
+}  # fmt: skip
 _FORMS: dict[str, tuple[str, ...]] = {  # the first field is required
     "isolated": ("rate", "size"),
     "offset": ("count", "length", "size"),
@@ -61,26 +97,15 @@ _LOG_FORMS: dict[str, tuple[str, ...]] = {
     "correlation": ("seconds",),
     "tails": ("dof",),
 }
-_EXPECTED = {  # field -> what it is, an example
-    "rate": ("a share from 0 to 1", "0.05"),
-    "count": ("a whole number", "3"),
-    "length": ("a whole number of samples or a range", "4-30"),
-    "size": ("a number of sigmas or a range, with the suffix m or mrad if absolute", "8-100"),
-    "fraction": ("a share of the sample interval from 0 to below 0.5", "0.2"),
-    "seconds": ("a number of seconds or a range", "5-15"),
-    "dof": ("a number of degrees of freedom above 2", "6"),
-}
 _NUMBER = r"(\d+(?:\.\d*)?(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)"
 _RANGE = re.compile(rf"{_NUMBER}(?:-{_NUMBER})?(m|mrad)?")
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One item that spoils readings of its components: at the same samples when `together`, else each by
-    itself.
+    """One item of the specification, for some components: at the same samples when `together`, else independently.
 
-    rate: share of samples. count: times. length: samples, from and to. size: from and to, in `unit`: sigma,
-    m, mrad.
+    rate: share of samples. count: times. length: samples, from and to. size: from and to, in `unit`: sigma, m, mrad.
     """
 
     kind: str
@@ -95,11 +120,10 @@ class Fault:
 
 @dataclass(frozen=True)
 class OutlierSpec:
-    """How a log is spoiled: readings by `faults`; the rest holds for the whole log (see `GRAMMAR`).
+    """The contamination of a log: `faults` of the readings; the rest holds for the whole log (see `GRAMMAR`).
 
-    jitter: share of the sample interval. gaps: pairs of count and range of seconds. correlation_s:
-    correlation time of the noise, 0 for white. tails_dof: degrees of freedom of Student-t noise, None for
-    Gaussian.
+    jitter: share of the sample interval. gaps: pairs of count and range of seconds. correlation_s: correlation time of
+    the noise, 0 for white. tails_dof: degrees of freedom of Student-t noise, None for Gaussian.
     """
 
     faults: tuple[Fault, ...] = ()
@@ -122,15 +146,15 @@ def parse_outliers(text: str) -> OutlierSpec:
     gaps: list[tuple[int, Range]] = []
     once: dict[str, float] = {}
     for item in items:
-        prefix, kind, fields = _split(item)
+        prefix, kind, values = _split(item)
         if kind in _FORMS:
-            faults.append(_fault(item, prefix, kind, fields))
+            faults.append(_fault(item, prefix, kind, values))
         elif kind == "gap":
-            gaps.append((int(fields["count"][0]), fields["seconds"][:2]))
+            gaps.append((int(values["count"].low), values["seconds"][:2]))
         elif kind in once:
             raise UsageError(f'Outlier specification: "{kind}" is given twice; keep one of them.')
         else:
-            once[kind] = next(iter(fields.values()))[0]
+            once[kind] = next(iter(values.values())).low
     return OutlierSpec(
         faults=tuple(faults),
         jitter=once.get("jitter", 0.0),
@@ -141,8 +165,8 @@ def parse_outliers(text: str) -> OutlierSpec:
     )
 
 
-def _split(item: str) -> tuple[str, str, dict[str, tuple[float, float, str]]]:
-    """`prefix.kind=field:field` as prefix, kind and its fields by name, each low, high, unit."""
+def _split(item: str) -> tuple[str, str, dict[str, _Value]]:
+    """`prefix.kind=value:value` as prefix, kind and its values by field."""
     name, equals, rest = item.partition("=")
     prefix, dot, kind = name.strip().rpartition(".")
     forms = {**_FORMS, **_LOG_FORMS}
@@ -153,76 +177,54 @@ def _split(item: str) -> tuple[str, str, dict[str, tuple[float, float, str]]]:
         raise UsageError(
             f"Outlier specification: {what}{nearest(kind, forms) or '.'} It takes {', '.join(forms)} or none."
         )
+    form = forms[kind]
+    example = f"{kind}={':'.join(_FIELDS[field].example for field in form)}"
     if not equals:
-        raise UsageError(f'Outlier specification: "{item}" lacks its value; write {kind}={_example(forms[kind])}.')
+        raise UsageError(f'Outlier specification: "{item}" lacks its value; write {example}.')
     if dot and kind in _LOG_FORMS:
         raise UsageError(f'Outlier specification: "{kind}" holds for the whole log; drop "{prefix}.".')
     if dot and prefix not in (*COMPONENTS, "all"):
         raise UsageError(
             f'Outlier specification: unknown component "{prefix}" in "{item}"; it takes {", ".join(COMPONENTS)} or all.'
         )
-    values = rest.split(":")
-    form = forms[kind]
-    if len(values) > len(form) or (kind == "gap" and len(values) != 2):
-        raise UsageError(f'Outlier specification: "{item}" has {len(values)} values; write {kind}={_example(form)}.')
-    return prefix, kind, {f: _field(item, f, v) for f, v in zip(form, values, strict=False)}
+    texts = rest.split(":")
+    if len(texts) > len(form) or (kind == "gap" and len(texts) != 2):
+        raise UsageError(f'Outlier specification: "{item}" has {len(texts)} values; write {example}.')
+    return prefix, kind, {field: _value(item, field, text) for field, text in zip(form, texts, strict=False)}
 
 
-def _example(form: tuple[str, ...]) -> str:
-    return ":".join(_EXPECTED[field][1] for field in form)
+def _value(item: str, name: str, text: str) -> _Value:
+    """The value of one field. Raises UsageError when it is not a valid one."""
+    field = _FIELDS[name]
+    if match := _RANGE.fullmatch(text.strip()):
+        low, high, unit = float(match[1]), float(match[2] or match[1]), match[3] or "sigma"
+        allowed = (field.ranged or match[2] is None) and (name == "size" or unit == "sigma")
+        if allowed and low <= high < math.inf and field.valid(low, high):
+            return _Value(low, high, unit)
+    raise UsageError(
+        f'Outlier specification: in "{item}" the {name} is "{text}"; expected {field.meaning}, such as {field.example}.'
+    )
 
 
-def _field(item: str, field: str, text: str) -> tuple[float, float, str]:
-    """Low, high and unit of one value, checked."""
-    match = _RANGE.fullmatch(text.strip())
-    if match:
-        low = float(match[1])
-        high = low if match[2] is None else float(match[2])
-        unit = match[3] or "sigma"
-        ranged = match[2] is not None
-        if _valid(field, low, high, unit, ranged):
-            return low, high, unit
-    what, example = _EXPECTED[field]
-    raise UsageError(f'Outlier specification: in "{item}" the {field} is "{text}"; expected {what}, such as {example}.')
-
-
-def _valid(field: str, low: float, high: float, unit: str, ranged: bool) -> bool:
-    if not low <= high < float("inf") or (unit != "sigma" and field != "size"):
-        return False
-    whole = low.is_integer() and high.is_integer()
-    if field in ("rate", "fraction", "count", "dof") and ranged:
-        return False
-    checks = {
-        "rate": high <= 1.0,
-        "count": whole and high <= 1e6,
-        "length": whole and low >= 1 and high <= 1e6,
-        "size": low > 0,
-        "fraction": high < 0.5,
-        "seconds": low > 0,
-        "dof": low > 2,
-    }
-    return checks[field]
-
-
-def _fault(item: str, prefix: str, kind: str, fields: dict[str, tuple[float, float, str]]) -> Fault:
+def _fault(item: str, prefix: str, kind: str, values: dict[str, _Value]) -> Fault:
     components = (COMPONENTS.index(prefix),) if prefix in COMPONENTS else (0, 1, 2)
     default = Fault(kind)
-    low, high, unit = fields.get("size", (*default.size, "sigma"))
-    if unit != "sigma" and components != ((0,) if unit == "m" else (components[0],)):
+    size = values.get("size", _Value(*default.size))
+    if size.unit != "sigma" and (len(components) > 1 or (size.unit == "m" and components != (0,))):
         raise UsageError(
-            f'Outlier specification: in "{item}" the size is in {unit}, which not every component has; '
-            f"write {'range' if unit == 'm' else 'azimuth'}.{kind}=… or give sigmas."
+            f'Outlier specification: in "{item}" the size is in {size.unit}, which not every component has; '
+            f"write {'range' if size.unit == 'm' else 'azimuth'}.{kind}=… or give sigmas."
         )
-    if unit == "mrad" and components == (0,):
+    if size.unit == "mrad" and components == (0,):
         raise UsageError(f'Outlier specification: in "{item}" a range cannot be off by mrad; use m or sigmas.')
-    length = fields.get("length", (*default.length, ""))
+    length = values.get("length", _Value(*default.length))
     return Fault(
         kind=kind,
         components=components,
         together=prefix == "all",
-        rate=fields.get("rate", (0.0, 0.0, ""))[0],
-        count=int(fields.get("count", (0.0, 0.0, ""))[0]),
-        length=(int(length[0]), int(length[1])),
-        size=(low, high),
-        unit=unit,
+        rate=values["rate"].low if "rate" in values else default.rate,
+        count=int(values["count"].low) if "count" in values else default.count,
+        length=(int(length.low), int(length.high)),
+        size=size[:2],
+        unit=size.unit,
     )
