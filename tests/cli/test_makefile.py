@@ -148,7 +148,7 @@ def test_wrong_logs(make, flights, copy, named, sentence):
 def test_help_lists_every_target(make):
     result = make()
     assert result == make("help")
-    for target in ("run", "test", "samples", "model", "bench", "reproduce", "clean", "install"):
+    for target in ("run", "test", "samples", "model", "readme", "bench", "reproduce", "clean", "install"):
         assert f"\nmake {target} " in result.out
 
 
