@@ -8,7 +8,7 @@ FLAGS =
 MODEL_FLAGS = --scenario family --flights 60 --seed 2021
 FUZZ = csv gzip parquet feather truth trajectory station model header kernel
 FUZZ_SECONDS = 600
-OLDEST = tests/files tests/config tests/correction tests/test_pipeline.py tests/test_readme.py
+OLDEST = tests/files tests/config tests/correction tests/test_pipeline.py tests/docs/test_readme.py
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -126,6 +126,9 @@ samples: $(warmed) ## make sample_data/ anew (fixed seeds: the same bytes)
 	  NR == 1 { print "t", "SD", "Hz", "V"; next } \
 	  { hz = 37.25 - $$3; if (hz < 0) hz += 400; \
 	    printf "%.3f,%.4f,%.5f,%.5f\n", $$1, $$2 + 0.0344, hz, 100 - $$4 + 0.003 }' > sample_data/total_station.csv
+
+readme: $(developer) $(warmed) ## write the tables and outputs in the READMEs; BLOCKS="speed scale" or SLOW=1 for slow ones
+	$(bin)/python -m tests.docs $(BLOCKS) $(if $(SLOW),--slow) $(if $(KEPT),--kept)
 
 model: $(warmed) ## train the packaged model anew (MODEL_FLAGS)
 	$(ftproc) train $(MODEL_FLAGS) -o ftproc/correction/default.safetensors

@@ -1,5 +1,5 @@
-"""`python -m tests.bench [accuracy] [methods] [correction] [speed] [scale] [pages]
-[training]`: the tables of the README, as Markdown on standard output and in out/bench.md."""
+"""`python -m tests.bench [samples] [accuracy] [methods] [correction] [speed] [scale] [pages] [training]`: tables of the
+README and the guide, as Markdown on standard output and in out/bench.md."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from collections.abc import Iterable, Sequence
 from itertools import chain
 from pathlib import Path
 
-from tests.bench import accuracy, correction, methods, pages, scale, speed, training
+from tests.bench import accuracy, correction, methods, pages, samples, scale, speed, training
 
 TABLES = {
+    "samples": samples,
     "accuracy": accuracy,
     "methods": methods,
     "correction": correction,

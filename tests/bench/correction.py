@@ -30,13 +30,13 @@ HEADER = ("what is wrong", "flights learned from", "features", "filter", "veloci
 
 @dataclass(frozen=True)
 class Case:
-    """told: what the filter is told, given the noise and jerk level that the log itself shows."""
+    """specified: the settings of the filter, given the noise and the jerk density found from the log."""
 
     name: str
     scenario: str = "manoeuvre-clean"
     instrument: InstrumentErrors | None = None
     outliers: str | None = None
-    told: Callable[[tuple[float, float, float], float], FilterSettings] | None = None
+    specified: Callable[[tuple[float, float, float], float], FilterSettings] | None = None
     training: int = TRAINING
     duration_s: float | None = None
 
@@ -44,12 +44,13 @@ class Case:
 CASES = {
     "matched": Case("nothing"),
     "a": Case(
-        "jerk level 100 times too small", told=lambda _, jerk: FilterSettings(editing="none", jerk_psd_m2ps5=jerk / 100)
+        "process noise 100 times too small",
+        specified=lambda _, jerk: FilterSettings(editing="none", jerk_psd_m2ps5=jerk / 100),
     ),
     "b": Case("elevation bias and refraction", instrument=REFRACTED),
     "c": Case(
-        "elevation noise stated 5 times too small",
-        told=lambda noise, _: FilterSettings(editing="none", noise=(noise[0], noise[1], noise[2] / 5)),
+        "elevation noise specified 5 times too small",
+        specified=lambda noise, _: FilterSettings(editing="none", noise=(noise[0], noise[1], noise[2] / 5)),
     ),
     "d": Case("noise correlated over 0.5 s", outliers="correlation=0.5"),
     "calibration": Case("zero-set, mislevel, collimation, refraction", "calibration", THEODOLITE, training=3),
@@ -63,18 +64,18 @@ def flights(case: Case, seeds: range) -> dict[str, list[Flight]]:
     for seed in seeds:
         how = {"instrument": case.instrument, "outliers": case.outliers, "duration_s": case.duration_s}
         flight = simulate(case.scenario, seed=seed, **how)  # type: ignore[arg-type]
-        known = pipeline.known_flights([(flight.log, flight.truth)], _told(case, flight))
+        known = pipeline.known_flights([(flight.log, flight.truth)], _settings(case, flight))
         for stage in found:
             found[stage] += known[stage]
     return found
 
 
-def _told(case: Case, flight: Simulation) -> FilterSettings:
-    if case.told is None:
+def _settings(case: Case, flight: Simulation) -> FilterSettings:
+    if case.specified is None:
         return FilterSettings()
-    settings = pipeline.filter_log(flight.log).metadata["settings"]
-    noise = (settings["noise_range_m"], settings["noise_azimuth_rad"], settings["noise_elevation_rad"])
-    return case.told(noise, float(np.exp(np.mean(np.log(settings["jerk_psd_m2ps5"])))))
+    found = pipeline.filter_log(flight.log).metadata["settings"]
+    noise = (found["noise_range_m"], found["noise_azimuth_rad"], found["noise_elevation_rad"])
+    return case.specified(noise, float(np.exp(np.mean(np.log(found["jerk_psd_m2ps5"])))))
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ PEER_SAMPLES = 400
 def rows() -> Iterator[tuple[str, ...]]:
     """Kernels to C, then other libraries to filterpy."""
     flight = simulate("manoeuvre", seed=1, duration_s=2500.0)
-    model, start = told(flight)
+    model, start = known(flight)
     readings = _readings(flight)
     time_s, z, _ = readings
     n = len(time_s)
@@ -49,7 +49,7 @@ def rows() -> Iterator[tuple[str, ...]]:
     yield from _peers(readings, model, start, flight)
 
 
-def told(flight: Simulation) -> tuple[forward.Model, forward.Start]:
+def known(flight: Simulation) -> tuple[forward.Model, forward.Start]:
     """The true noise and start of a flight, and one jerk level."""
     assert flight.truth.velocity_mps is not None
     state = np.r_[flight.truth.position_m[0], flight.truth.velocity_mps[0], np.zeros(3)]

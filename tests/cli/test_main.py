@@ -17,7 +17,8 @@ from ftproc import __version__
 from ftproc.cli.main import COMMANDS, cli
 from ftproc.errors import failure
 from tests.cli.conftest import BIN
-from tests.docs import reference
+from tests.docs.pages import PAGES
+from tests.docs.shell import ROOT
 
 
 def commands() -> list[click.Command]:
@@ -230,16 +231,9 @@ def test_the_shell_s_part_of_completion(shell):
     assert "_FTPROC_COMPLETE=bash_complete" in shell("ftproc", _FTPROC_COMPLETE="bash_source").out
 
 
-def test_the_reference_is_current():
-    """python -m tests.docs.reference > ftproc/cli/README.md"""
-    kept = (Path(reference.__file__).parents[2] / "ftproc" / "cli" / "README.md").read_text()
-    assert kept.split() == reference.text().split()  # line breaks may differ from one version of click to another
-
-
 def test_the_pages_name_only_options_that_there_are():
-    """In the README, in `Choose your options`, and in the station files' comments."""
+    """In the README, in the guide, and in the station files' comments."""
     known = {name for command in commands() for p in command.params for name in (*p.opts, *p.secondary_opts)}
-    root = Path(reference.__file__).parents[2]
-    for page in (root / "README.md", root / "ftproc" / "README.md", *(root / "sample_data").glob("*.toml")):
+    for page in (*PAGES, *(ROOT / "sample_data").glob("*.toml")):
         named = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", page.read_text()))
         assert named - known - {"--help"} == set(), page

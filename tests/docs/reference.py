@@ -1,4 +1,4 @@
-"""The command reference, from the code: python -m tests.docs.reference > ftproc/cli/README.md"""
+"""The command reference, from the code: python -m tests.docs.reference"""
 
 from __future__ import annotations
 
@@ -7,18 +7,12 @@ import click
 from ftproc.cli.main import COMMANDS, cli
 
 _WIDTH = 110
-_HEAD = """\
-# Command reference
-
-What `ftproc -h` and `ftproc COMMAND -h` say, written by `python -m tests.docs.reference`. Which options you need for
-what is told in [Choose your options](../README.md).
-"""
 
 
 def text() -> str:
     """The reference as Markdown."""
     program = _context(cli, None, "ftproc")
-    parts = [_HEAD, _section("ftproc", cli.get_help(program))]
+    parts = [_section("ftproc", cli.get_help(program))]
     for name in COMMANDS:
         command = cli.get_command(program, name)
         assert command is not None

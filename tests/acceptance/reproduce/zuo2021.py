@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 
 from ftproc import pipeline, scoring
@@ -11,17 +9,17 @@ from ftproc.core.model.frames import from_cartesian, unwrap
 from ftproc.correction.model import Model
 from ftproc.records import COMPONENTS, Trajectory
 from ftproc.scoring.figures import average_gradient
-from ftproc.settings import FilterSettings, TrainSettings
+from ftproc.settings import FilterSettings
 from ftproc.simulation import Simulation, simulate
+from tests.acceptance import zuo2021
 from tests.acceptance.reproduce.page import Page, table
+from tests.acceptance.zuo2021 import PAPER, TRIALS
 
 ORDER = 1
 
-TRIALS = (1, 2, 3, 4)  # seeds of the flights that are shown
-PAPER = {"bpnn-ekf": (31.5347, 12.1745, 18.8466, 9.7875), "ga-bpnn-ukf": (9.0323, 9.6778, 11.9063, 6.5939)}
 PAPER_GRADIENT = {"algorithm 1": (4.0753, 0.524, 0.0019), "algorithm 2": (1.0552, 0.521, 0.0013)}
-TRAINING = {"zuo2021": 12, "zuo2021-outliers": 12, "manoeuvre": 6}  # flights
 THEODOLITE = {"scenario": "manoeuvre", "seed": 7, "duration_s": 75.0}
+THEODOLITE_TRAINING = {"flights": 6, "duration_s": 75.0}
 
 _TEXT = """## Zuo et al. 2021: GA-BPNN-UKF
 
@@ -38,13 +36,9 @@ which the paper does not give.
 """
 
 
-@cache
 def model(method: str, scenario: str) -> Model:
     """Trained on flights whose seeds none of the experiments uses."""
-    options = {"duration_s": THEODOLITE["duration_s"]} if scenario == THEODOLITE["scenario"] else {}
-    flights = [simulate(scenario, seed=5000 + i, **options) for i in range(TRAINING[scenario])]
-    settings = TrainSettings(features="correction", method=method, population=20, generations=30, epochs=200, seed=2021)
-    return pipeline.train_flights([(f.log, f.truth) for f in flights], settings)
+    return zuo2021.model(method, scenario, **(THEODOLITE_TRAINING if scenario == THEODOLITE["scenario"] else {}))
 
 
 def run(method: str, flight: Simulation, scenario: str, smooth: bool = False) -> Trajectory:
@@ -137,7 +131,7 @@ def _theodolite(page: Page) -> str:
 def section(page: Page) -> str:
     return "\n".join(
         [
-            _TEXT.format(flights=TRAINING["zuo2021"]),
+            _TEXT.format(flights=zuo2021.FLIGHTS),
             _trials("zuo2021"),
             applied("zuo2021"),
             _ranges(page, "zuo2021", ("bpnn-ekf", "ga-bpnn-ukf"), (4, 5)),

@@ -1,4 +1,4 @@
-"""What the README shows in Python runs as it stands, and pandas and pyarrow give the same."""
+"""What the guide shows in Python runs as it stands, and pandas and pyarrow give the same."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 import ftproc
 from ftproc.files.writing import flights
 
-README = Path(__file__).parents[1] / "README.md"
+GUIDE = Path(ftproc.__file__).with_name("README.md")
 
 
 def test_python_section_runs(tmp_path, monkeypatch, capsys):
-    (code,) = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    (code,) = re.findall(r"```python\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
     monkeypatch.chdir(tmp_path)
     flights.write_log(ftproc.simulate("zuo2021-outliers", seed=3).log, "flight.csv")
     made = {}
