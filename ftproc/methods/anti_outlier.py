@@ -2,10 +2,10 @@
 of any length in memory that does not grow with them. The network's correction (section 2.2) works on its output and is
 added by the pipeline.
 
-Two-pass editing looks at the record on both sides of a sample, but what lies far away says nothing of it: a long log
-is a number of short ones that overlap, of which the middles are kept, and which are worked on side by side. Noise
-belongs to the instrument and is found once, from spans that are spread over the log. Recursive editing sees only the
-past, and goes on from one stretch to the next (`recursive`).
+Two-pass editing uses the record on both sides of a sample, but what lies far away says nothing of it: a long log is cut
+into short ones that overlap, of which the middles are kept, and which are processed in parallel. Noise belongs to the
+instrument and is found once, from spans that are spread over the log. Recursive editing sees only the past, and
+continues from one stretch to the next (`recursive`).
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from ftproc.core import threads
 from ftproc.core.editing import two_pass
 from ftproc.core.filtering import forward
 from ftproc.core.filtering.records import Model
-from ftproc.core.identification import likelihood
+from ftproc.core.identification.likelihood import HORIZONTAL, VERTICAL
+from ftproc.core.identification.profile import median_level
 from ftproc.methods import preparing, recursive
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
 from ftproc.settings import FilterSettings
@@ -47,45 +48,43 @@ def parts(record: Recording, settings: FilterSettings) -> Iterator[Part]:
         stretches = recursive.parts(record, settings)
         yield from stretches if len(record) <= recursive.BLOCK else threads.ahead(stretches)
     elif settings.editing == "two-pass" and len(record) > LONGEST_WHOLE:
-        told = usual(record, settings)
-        work = partial(_segment, record, settings, told)
+        work = partial(_segment, record, settings, usual_of(record, settings))
         yield from threads.in_order(work, segments(record))
     else:
         yield Part(estimate(record.whole(), settings), 0, 0, len(record))
 
 
-def edited_twice(readings: Readings, settings: FilterSettings, told: Usual | None = None) -> Estimate:
-    """Editing with the whole record in view. told: of a segment, what is usual in the log, see
-    `core.editing.two_pass`."""
-    given = preparing.given_sigma(readings, settings)
-    edited = two_pass.edit(*readings[:2], given, settings.jerk_psd_m2ps5, settings.gate, told and told.model)
+def edited_twice(readings: Readings, settings: FilterSettings, usual: Usual | None = None) -> Estimate:
+    """Two-pass editing. usual: of a segment, what is usual in the log, see `core.editing.two_pass`."""
+    known = preparing.what_is_known(readings, settings)
+    edited = two_pass.edit(readings.time_s, readings.measurement, known, usual and usual.model)
     starts = two_pass.smoothed_starts(edited.smoothed)
-    run = forward.filter_log(*readings[:2], edited.weight, edited.model, starts)
+    run = forward.filter_log(readings.weighted(edited.weight), edited.model, starts)
     smoothed = edited.smoothed if settings.smooth else None
-    slow = edited.slow_noise if told is None else told.slow_noise
+    slow = edited.slow_noise if usual is None else usual.slow_noise
     label = preparing.labels(edited.weight, readings.measurement)
-    return Estimate(run, label, edited.model, smoothed, preparing.anew(starts), edited.settled, slow)
+    return Estimate(run, label, edited.model, smoothed, preparing.re_initialized(starts), edited.settled, slow)
 
 
 class Usual(NamedTuple):
-    """What spans of a log say of all of it: noise and usual jerk, and whether the noise passes for motion."""
+    """What spans of a log say of all of it: noise and typical jerk, and whether the noise passes for motion."""
 
     model: Model
     slow_noise: bool
 
 
-def usual(record: Recording, settings: FilterSettings) -> Usual | None:
-    """The medians of what spans spread over a log say by themselves; None if none says anything."""
+def usual_of(record: Recording, settings: FilterSettings) -> Usual | None:
+    """The medians over spans spread over a log; None if no span could be edited."""
     found = [e for e in threads.in_order(partial(_span, record, settings), record.spans()) if e is not None]
     if not found:
         return None
     correlation = np.median([edited.model.correlation for edited in found], 0)
     variance = np.median([edited.model.reading_variance for edited in found], 0)
-    levels = np.array([likelihood.median_level(edited.model).jerk for edited in found])
+    levels = np.array([median_level(edited.model).jerk for edited in found])
     jerk = np.exp(np.median(np.log(levels[:, 0, [0, 5]]), 0))
     model = Model(
         variance * (1 + correlation) / (1 - correlation),
-        jerk[0] * likelihood.HORIZONTAL[None] + jerk[1] * likelihood.VERTICAL[None],
+        jerk[0] * HORIZONTAL[None] + jerk[1] * VERTICAL[None],
         correlation=correlation,
     )
     return Usual(model, bool(np.median([edited.slow_noise for edited in found]) > 0.5))
@@ -93,10 +92,9 @@ def usual(record: Recording, settings: FilterSettings) -> Usual | None:
 
 def _span(record: Recording, settings: FilterSettings, rows: slice) -> two_pass.Edited | None:
     readings = record.part(rows)
-    given = preparing.given_sigma(readings, settings)
     try:
-        return two_pass.edit(*readings[:2], given, settings.jerk_psd_m2ps5, settings.gate)
-    except ValueError:  # a component says too little in this span
+        return two_pass.edit(readings.time_s, readings.measurement, preparing.what_is_known(readings, settings))
+    except ValueError:  # a component has too few readings in this span
         return None
 
 
@@ -108,10 +106,10 @@ def segments(record: Recording) -> list[tuple[int, int]]:
     return [(int(low), int(high)) for low, high in itertools.pairwise(edges)]
 
 
-def _segment(record: Recording, settings: FilterSettings, told: Usual | None, span: tuple[int, int]) -> Part:
-    """The estimate of samples [low, high) of a log, made with the readings around them in view.
+def _segment(record: Recording, settings: FilterSettings, usual: Usual | None, span: tuple[int, int]) -> Part:
+    """The estimate of samples [low, high) of a log, made with the readings around them.
 
-    Where these do not say where the track is (a component is missing for long), it is looked for ever farther away.
+    Where these do not tell where the track is (a component is missing for long), the margins are widened.
     """
     low, high = span
     margin = margin_of(record)
@@ -119,7 +117,7 @@ def _segment(record: Recording, settings: FilterSettings, told: Usual | None, sp
         first, last = max(low - margin, 0), min(high + margin, len(record))
         whole = last - first == len(record)
         try:
-            estimate = edited_twice(record.part(slice(first, last)), settings, told)
+            estimate = edited_twice(record.part(slice(first, last)), settings, usual)
         except ValueError:
             if whole:
                 raise

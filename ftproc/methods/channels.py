@@ -1,5 +1,5 @@
-"""What the methods share that clean range, azimuth and elevation by themselves: what they are told of the log, and
-how their values become a trajectory."""
+"""What the methods share that clean range, azimuth and elevation one by one: what they know of the log, and how their
+values become a trajectory."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core.filtering.records import FilterRun, Model, empty_run
+from ftproc.core.filtering.records import FilterRun, Model
 from ftproc.core.model.frames import line_of_sight_axes, to_cartesian, wrap
 from ftproc.methods.estimate import Estimate, Readings
 from ftproc.methods.preparing import labels, trusted
@@ -45,7 +45,7 @@ class Cleaned(NamedTuple):
 
 
 def look(readings: Readings, settings: FilterSettings) -> Log:
-    """What there is to know of a log before it is filtered: these papers leave their thresholds to the engineer."""
+    """What is known of a log before it is filtered: these papers leave their thresholds to the engineer."""
     time_s, measurement, _ = readings
     weight, sigma = trusted(readings, settings)
     steps = np.diff(time_s)
@@ -93,11 +93,11 @@ def estimate(readings: Readings, log: Log, found: Cleaned) -> Estimate:
         sigma[:, :3] = np.sqrt(np.einsum("nia,ni->na", axes**2, los_sigma[:, :3] ** 2))
     if found.rate is not None:
         state[:, 3:6] = np.einsum("nia,ni->na", axes, scale * found.rate)
-    run: FilterRun = empty_run(readings.time_s)._replace(
-        state=state, predicted=np.full((n, 9), np.nan), sigma=sigma, los_sigma=los_sigma, weight=found.weight,
-        innovation=nothing if found.innovation is None else found.innovation,
-        innovation_sigma=nothing if found.innovation_sigma is None else found.innovation_sigma,
-        since_start=np.arange(n), log_likelihood=np.nan,
+    run = FilterRun(
+        readings.time_s, state, np.full((n, 9), np.nan), sigma,
+        nothing if found.innovation is None else found.innovation,
+        nothing if found.innovation_sigma is None else found.innovation_sigma,
+        found.weight, np.full(n, np.nan), los_sigma, np.arange(n), np.nan,
     )  # fmt: skip
     model = Model(log.sigma**2, np.full((1, 6), np.nan))
     return Estimate(run, labels(found.weight, readings.measurement), model, cleaned=cleaned)

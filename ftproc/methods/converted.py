@@ -2,27 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from ftproc.core.comparators.converted import run_converted
-from ftproc.core.filtering.forward import run_spans
-from ftproc.core.filtering.records import FilterRun
+from ftproc.core.comparators.converted import conversion_of, run_converted
+from ftproc.core.filtering.forward import run_log
 from ftproc.methods.estimate import Estimate, Readings
-from ftproc.methods.preparing import finished, prepare
-from ftproc.records import FloatArray
+from ftproc.methods.preparing import Filtered, finished, prepare
 from ftproc.settings import FilterSettings
 
 
 def estimate(readings: Readings, settings: FilterSettings) -> Estimate:
     """Convert and filter; every reading is used."""
-    model, starts, _ = prepare(readings, settings)
-    time_s, measurement, _ = readings
-
-    def span(first: int, stop: int, x: FloatArray, p: FloatArray, run: FilterRun) -> float:
-        return run_converted(
-            first, stop, time_s, measurement, model.noise_variance, model.jerk, model.knot_s, x, p, run
-        )
-
-    run = run_spans(time_s, measurement, model, starts, span)
-    weight = np.isfinite(measurement).astype(float)
-    return finished(readings, settings, run, weight, weight, model, starts)
+    model, starts = prepare(readings, settings)
+    log = readings.unedited()
+    run = run_log(run_converted, log, model, starts, conversion_of(model.noise_variance))
+    return finished(Filtered(log, run, model, starts), settings)

@@ -17,7 +17,7 @@ from ftproc.settings import FilterSettings
 
 STATES = 9
 FEWEST_PER_STATE = 10  # members, for their covariance to mean something
-LONGEST_PATCH_SAMPLES = 14.5  # after so long without a reading believed, the track is taken to be lost
+LONGEST_PATCH_SAMPLES = 14.5  # after so long without a reading used, the track counts as lost
 # Microseconds per row, as measured: to begin with, for each member, and for each pair of them.
 COST_US = {"enkf": (220, 0.4, 0.0), "enpf": (430, 0.9, 0.0), "enpf-chi2": (430, 0.9, 0.0), "renpf": (770, 1.8, 0.045)}
 FAR_SIGMAS = 3.0  # a component further off is to blame for a refused reading
@@ -31,16 +31,15 @@ def estimate(readings: Readings, settings: FilterSettings, method: str) -> Estim
     more than an hour.
     """
     _warn(method, len(readings.time_s), settings.particles)
-    model, starts, _ = preparing.prepare(readings, settings)
+    model, starts = preparing.prepare(readings, settings)
     longest = settings.max_patch_s
     if longest is None:
         interval = float(np.median(np.diff(readings.time_s))) if len(readings.time_s) > 1 else 0.0
         longest = LONGEST_PATCH_SAMPLES * interval
-    run, begun = ensemble_run.filter_log(
-        method, *readings[:2], model, starts, settings.particles, longest, np.random.default_rng(settings.seed)
-    )
-    anew = tuple(start.sample for start in begun[1:])
-    return Estimate(run, preparing.labels(_kept(run), readings.measurement), model, None, anew)
+    how = ensemble_run.Settings(method, settings.particles, longest, np.random.default_rng(settings.seed))
+    run, made = ensemble_run.filter_log(readings.unedited(), model, starts, how)
+    label = preparing.labels(_kept(run), readings.measurement)
+    return Estimate(run, label, model, None, preparing.re_initialized(made))
 
 
 def _kept(run: FilterRun) -> FloatArray:

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core.filtering.records import FilterRun, Model
+from ftproc.core.filtering.records import FilterRun, Model, Observations
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.records import FlagArray, FloatArray, forget, thinned
 
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: stands in for a component that is missing throughout
-FARTHEST = 1e12  # m, rad: a wilder reading is no more of an outlier, but its square would overflow
+FARTHEST = 1e12  # m, rad: a larger reading is no more of an outlier, but its square would overflow
 SPANS, SPAN = 6, 2_000
 MOST_INTERVALS = 250_000  # between neighbours, for a typical one to be found among them
 
@@ -25,6 +25,14 @@ class Readings(NamedTuple):
     time_s: FloatArray
     measurement: FloatArray
     assumed_sigma: FloatArray
+
+    def unedited(self) -> Observations:
+        """The log with every reading used."""
+        return self.weighted(np.isfinite(self.measurement).astype(float))
+
+    def weighted(self, weight: FloatArray) -> Observations:
+        """The log with weights (n, 3)."""
+        return Observations(self.time_s, self.measurement, weight)
 
 
 @dataclass(frozen=True)
@@ -64,7 +72,7 @@ class Estimate(NamedTuple):
     """What a method found.
 
     run: the recursive filter. label: (n, 3) good, isolated, patch, missing. model: noise and jerk used.
-    smoothed: the smoother's run when it was asked for. reacquired: samples at which the filter began anew.
+    smoothed: the smoother's run when it was asked for. reacquired: samples at which the filter was re-initialized.
     settled: whether two-pass editing's decisions stood still; None where there were none to make. slow_noise: the
     noise is correlated too slowly to be told from motion, so the sigmas are too small. cleaned: (n, 3) readings of a
     method that works on range, azimuth and elevation by themselves; NaN there and in its run means not estimated.

@@ -1,16 +1,13 @@
-"""IMM-UKF: interacting multiple models (Zhang, Li and He 2012, for electro-optical theodolites), told apart by how
+"""IMM-UKF: interacting multiple models (Zhang, Li and He 2012, for electro-optical theodolites), which differ in how
 hard the target manoeuvres."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ftproc.core.comparators.imm import run_imm
-from ftproc.core.filtering.forward import run_spans
-from ftproc.core.filtering.records import FilterRun
-from ftproc.methods.estimate import Estimate, Readings
-from ftproc.methods.preparing import finished, prepare
-from ftproc.records import FloatArray
+from ftproc.core.comparators import imm
+from ftproc.methods.estimate import Estimate, Readings, typical_interval
+from ftproc.methods.preparing import Filtered, finished, prepare
 from ftproc.settings import FilterSettings
 
 LEVELS = np.array([0.1, 1.0, 10.0])
@@ -19,16 +16,9 @@ SOJOURN_S, SOJOURN_SAMPLES = 5.0, 20  # a model holds for the longer of the two,
 
 def estimate(readings: Readings, settings: FilterSettings) -> Estimate:
     """Filter by three models at once; every reading is used. `model` of the result is the middle one."""
-    model, starts, _ = prepare(readings, settings)
-    time_s, measurement, _ = readings
-    interval = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
-    sojourn = max(SOJOURN_S, SOJOURN_SAMPLES * interval)
-    jerk = LEVELS[:, None] * model.jerk[0]
-    probability = np.full((len(time_s), len(LEVELS)), np.nan)
-
-    def span(first: int, stop: int, x: FloatArray, p: FloatArray, run: FilterRun) -> float:
-        return run_imm(first, stop, time_s, measurement, model.noise_variance, jerk, sojourn, x, p, run, probability)
-
-    run = run_spans(time_s, measurement, model, starts, span)
-    weight = np.isfinite(measurement).astype(float)
-    return finished(readings, settings, run, weight, weight, model, starts)
+    model, starts = prepare(readings, settings)
+    log = readings.unedited()
+    interval = typical_interval(log.time_s) if len(log.time_s) > 1 else 1.0
+    jumps = imm.Jumps(LEVELS[:, None] * model.jerk[0], max(SOJOURN_S, SOJOURN_SAMPLES * interval))
+    run, _ = imm.filter_log(log, model, starts, jumps)
+    return finished(Filtered(log, run, model, starts), settings)

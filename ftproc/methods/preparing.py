@@ -3,87 +3,90 @@
 from __future__ import annotations
 
 import contextlib
+from typing import NamedTuple
 
 import numpy as np
 
 from ftproc.core.editing import outlier_chain, two_pass
 from ftproc.core.filtering import forward
-from ftproc.core.filtering.initialization import begin_all
-from ftproc.core.filtering.records import FilterRun, Model, Start
+from ftproc.core.filtering.initialization import find_starts
+from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import smooth_log
-from ftproc.core.identification import likelihood
+from ftproc.core.identification.likelihood import Fixed, fit_level
 from ftproc.core.model.motion import isotropic
 from ftproc.methods.estimate import Estimate, Readings, Recording
 from ftproc.records import MISSING, FlagArray, FloatArray
 from ftproc.settings import FilterSettings
 
-HEAD = 256  # samples at the beginning of a log that a recursive filter is given time to look at
+HEAD = 256  # samples at the beginning of a log that are edited with two passes before a recursive filter starts
 LONGEST_ISOLATED = 2  # readings rejected in a row; more make a patch
 
 
 def unedited(readings: Readings, settings: FilterSettings, extended: bool = False) -> Estimate:
     """The plain UKF (or EKF): every reading is used. Noise and jerk come from the readings that screening trusts."""
-    model, starts, _ = prepare(readings, settings)
-    weight = np.isfinite(readings.measurement).astype(float)
-    run = forward.filter_log(*readings[:2], weight, model, starts, extended)
-    return finished(readings, settings, run, weight, weight, model, starts)
+    model, starts = prepare(readings, settings)
+    log = readings.unedited()
+    return finished(Filtered(log, forward.filter_log(log, model, starts, extended), model, starts), settings)
 
 
-def finished(
-    readings: Readings,
-    settings: FilterSettings,
-    run: FilterRun,
-    weight: FloatArray,
-    kept: FloatArray,
-    model: Model,
-    starts: list[Start],
-) -> Estimate:
-    """What a recursive filter found, with the smoother over the same weights (n, 3) if it was asked for.
+class Filtered(NamedTuple):
+    """What a recursive filter found: the log with the weights that it gave, its run, the model and its starts."""
 
-    kept: (n, 3) zero for the readings that are called outliers.
+    log: Observations
+    run: FilterRun
+    model: Model
+    starts: list[Start]
+
+
+def finished(found: Filtered, settings: FilterSettings, kept: FloatArray | None = None) -> Estimate:
+    """The estimate of a recursive filter, with the smoother over the same weights if it was asked for.
+
+    kept: (n, 3) zero for the readings that are called outliers, where these are not those of weight zero.
     """
-    smoothed = smooth_log(*readings[:2], weight, model, starts) if settings.smooth else None
-    return Estimate(run, labels(kept, readings.measurement), model, smoothed, anew(starts))
+    log, run, model, starts = found
+    smoothed = smooth_log(log, model, starts) if settings.smooth else None
+    label = labels(log.weight if kept is None else kept, log.measurement)
+    return Estimate(run, label, model, smoothed, re_initialized(starts))
 
 
 def trusted(readings: Readings, settings: FilterSettings) -> tuple[FloatArray, FloatArray]:
     """(n, 3) weights, zero for readings not to be believed before a filter has run, and (3,) noise 1-sigma.
 
-    Only the head of the log is edited with all of itself in view, because a recursion cannot repair a wrong start;
-    further on the weights are those of the screening, and serve to find noise and jerk.
+    Only the head of the log is edited in two passes, because a recursion cannot repair a wrong start; after it the
+    weights are those of the screening, and serve to find noise and jerk.
     """
     time_s, measurement, _ = readings
     weight, sigma = two_pass.screen(time_s, measurement)
-    given = given_sigma(readings, settings)
-    with contextlib.suppress(ValueError):  # too little in the head: the screening has to do
-        head = two_pass.edit(time_s[:HEAD], measurement[:HEAD], given, settings.jerk_psd_m2ps5, settings.gate)
+    known = what_is_known(readings, settings)
+    with contextlib.suppress(ValueError):  # too few readings in the head: the screening has to do
+        head = two_pass.edit(time_s[:HEAD], measurement[:HEAD], known)
         weight[:HEAD] = head.weight
         if len(time_s) <= HEAD:
             sigma = np.sqrt(head.model.noise_variance)
-    return weight, np.where(np.isfinite(given), given, sigma)
+    return weight, np.where(np.isfinite(known.sigma), known.sigma, sigma)
 
 
-def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[Start], FloatArray]:
-    """Noise and jerk level, starts and weights (n, 3) of a log, without deciding on its outliers."""
-    time_s, measurement, _ = readings
+def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[Start]]:
+    """Noise and jerk level, and starts of a log, without deciding on its outliers."""
     weight, sigma = trusted(readings, settings)
-    given = given_sigma(readings, settings)
-    guess = Model(sigma**2, isotropic(settings.jerk_psd_m2ps5 or 1.0))
-    starts = begin_all(time_s, measurement, weight, guess.noise_variance, settings.jerk_psd_m2ps5)
-    fixed = np.isfinite(given)
-    model = likelihood.fit_level(time_s, measurement, weight, starts, guess, fixed, settings.jerk_psd_m2ps5 is not None)
-    return model, begin_all(time_s, measurement, weight, model.noise_variance, float(model.jerk[0, 0])), weight
+    known = what_is_known(readings, settings)
+    log = readings.weighted(weight)
+    guess = Model(sigma**2, isotropic(known.jerk_psd or 1.0))
+    starts = find_starts(log, guess.noise_variance, known.jerk_psd)
+    model = fit_level(log, starts, guess, Fixed(np.isfinite(known.sigma), known.jerk_psd is not None))
+    return model, find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
 
 
-def anew(starts: list[Start]) -> tuple[int, ...]:
-    """The samples at which a filter began again."""
+def re_initialized(starts: list[Start]) -> tuple[int, ...]:
+    """The samples at which a filter was started again."""
     return tuple(start.sample for start in starts[1:])
 
 
-def given_sigma(readings: Readings | Recording, settings: FilterSettings) -> FloatArray:
-    """(3,) noise 1-sigma that need not be found: the user's, else what is assumed; NaN where the log tells."""
+def what_is_known(readings: Readings | Recording, settings: FilterSettings) -> two_pass.Known:
+    """What need not be found from the log: what the user has specified, else what is assumed."""
     stated = np.array(settings.noise or (None, None, None), float)  # None becomes NaN
-    return np.where(np.isnan(stated), readings.assumed_sigma, stated)
+    sigma = np.where(np.isnan(stated), readings.assumed_sigma, stated)
+    return two_pass.Known(sigma, settings.jerk_psd_m2ps5, settings.gate)
 
 
 def labels(weight: FloatArray, measurement: FloatArray) -> FlagArray:

@@ -50,10 +50,10 @@ def outlier_kalman(readings: Readings, settings: FilterSettings, improved: bool 
     noise = log.sigma**2
     walk = np.array([channels.walk_variance(log, c) for c in range(3)])
     x0 = readings.measurement[begin, range(3)]
+    model = kernels.Walk(begin, x0, FIRST_VARIANCE * noise, noise, walk, log.interval_s)
     value, variance, *rest, weight = kernels.outlier_kalman(
-        readings.time_s, readings.measurement, begin, x0, FIRST_VARIANCE * noise, noise, walk, log.interval_s,
-        settings.gate, SMALL_GAIN, improved,
-    )  # fmt: skip
+        readings.time_s, readings.measurement, model, settings.gate, SMALL_GAIN, improved
+    )
     early = (np.arange(len(value))[:, None] < begin) & (seen > 0)
     weight[early] = 1.0 if not improved else 0.0
     return channels.estimate(readings, log, Cleaned(value, weight, rest[0], rest[1], np.sqrt(variance)))

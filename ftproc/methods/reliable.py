@@ -31,9 +31,12 @@ def _run(readings: Readings, settings: FilterSettings, kind: int) -> Estimate:
     log = channels.look(readings, settings)
     found = [
         kernels.repaired_walk(
-            readings.time_s, np.ascontiguousarray(readings.measurement[:, c]), kind,
-            channels.largest_change(log, c, settings.gate), float(log.sigma[c]) ** 2, channels.walk_variance(log, c),
-            log.interval_s, c == AZIMUTH,
+            readings.time_s,
+            np.ascontiguousarray(readings.measurement[:, c]),
+            kernels.Repair(
+                kind, channels.largest_change(log, c, settings.gate), float(log.sigma[c]) ** 2,
+                channels.walk_variance(log, c), log.interval_s, c == AZIMUTH,
+            ),
         )
         for c in range(3)
     ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""UKFs that weigh readings down instead of editing them: Huber, Student t, maximum correntropy. One kernel, three
+"""UKFs that give outliers less weight instead of editing them: Huber, Student t, maximum correntropy. One kernel, three
 weights; see `ftproc.core.comparators.robust`."""
 
 from __future__ import annotations
@@ -6,11 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from ftproc.core.comparators import robust
-from ftproc.core.filtering.forward import run_spans
-from ftproc.core.filtering.records import FilterRun
+from ftproc.core.filtering.forward import run_log
 from ftproc.methods.estimate import Estimate, Readings
-from ftproc.methods.preparing import finished, prepare
-from ftproc.records import FloatArray
+from ftproc.methods.preparing import Filtered, finished, prepare
 from ftproc.settings import FilterSettings
 
 HUBER_K = 1.345  # sigmas: 95 % efficient on Gaussian noise
@@ -35,18 +33,13 @@ def correntropy(readings: Readings, settings: FilterSettings) -> Estimate:
 
 
 def _run(readings: Readings, settings: FilterSettings, kind: int, parameter: float) -> Estimate:
-    model, starts, _ = prepare(readings, settings)
-    time_s, measurement, _ = readings
-
-    def span(first: int, stop: int, x: FloatArray, p: FloatArray, run: FilterRun) -> float:
-        return robust.run_robust(
-            first, stop, time_s, measurement, model.noise_variance, model.jerk, model.knot_s, kind, parameter, x, p, run
-        )
-
-    run = run_spans(time_s, measurement, model, starts, span)
-    if not np.linalg.norm(run.state[:, :3], axis=1).max() < LOST_AT * np.nanquantile(np.abs(measurement[:, 0]), 0.99):
-        raise ValueError(f"{settings.method} lost the track, and has no way to take it up again; use ga-bpnn-ukf")
+    model, starts = prepare(readings, settings)
+    log = readings.unedited()
+    run = run_log(robust.run_robust, log, model, starts, robust.weighting_of(kind, parameter))
+    farthest = LOST_AT * np.nanquantile(np.abs(log.measurement[:, 0]), 0.99)
+    if not np.linalg.norm(run.state[:, :3], axis=1).max() < farthest:
+        raise ValueError(f"{settings.method} lost the track, and cannot re-acquire it; use ga-bpnn-ukf")
     at_gate = robust.weight_of(kind, parameter, settings.gate)  # a reading with less is called an outlier
     kept = (run.weight > at_gate).astype(float)
-    kept[: starts[0].sample] = np.isfinite(measurement[: starts[0].sample])  # extrapolated, not judged
-    return finished(readings, settings, run, run.weight, kept, model, starts)
+    kept[: starts[0].sample] = np.isfinite(log.measurement[: starts[0].sample])  # extrapolated, not judged
+    return finished(Filtered(log._replace(weight=run.weight), run, model, starts), settings, kept)

@@ -12,7 +12,7 @@ import itertools
 
 import numpy as np
 
-from ftproc.core.comparators.adaptive import adaptive_kalman
+from ftproc.core.comparators.adaptive import Channel, adaptive_kalman
 from ftproc.core.model.frames import unwrap
 from ftproc.methods import channels
 from ftproc.methods.channels import AZIMUTH, Cleaned
@@ -44,9 +44,9 @@ def _component(readings: Readings, log: channels.Log, c: int) -> tuple[FloatArra
     noise, angular = float(log.sigma[c]) ** 2, c == AZIMUTH
     begin, x0, p0 = _start(time_s, trusted if np.isfinite(trusted).any() else z, float(log.sigma[c]), angular)
     levels = noise * 10.0**DECADES
-    likelihood = [adaptive_kalman(time_s, trusted, begin, x0, p0, noise, q, angular, False)[-1] for q in levels]
-    jerk = float(levels[np.argmax(likelihood)])
-    state, _, innovation, sigma, weight, _ = adaptive_kalman(time_s, z, begin, x0, p0, noise, jerk, angular, True)
+    models = [Channel(begin, x0, p0, noise, float(q), angular) for q in levels]
+    likelihood = [adaptive_kalman(time_s, trusted, model, False)[-1] for model in models]
+    state, _, innovation, sigma, weight, _ = adaptive_kalman(time_s, z, models[np.argmax(likelihood)], True)
     weight[:begin] = 1.0
     value = state[:, 0].copy()
     for low, high in _stretches(time_s, begin, log.interval_s):

@@ -1,9 +1,10 @@
 """The adaptive Kalman filter of one component: value, rate and acceleration, with a gain that yields to outliers and
-a noise that is learnt on the way (Sage and Husa 1969); the first half of the wavelet method's reconstruction."""
+a noise that is estimated on the way (Sage and Husa 1969); the first half of the wavelet method's reconstruction."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,8 @@ FloatArray = NDArray[np.float64]
 FULL_AT, ZERO_AT = 3.0, 8.0  # sigmas: the gain is whole up to the first, and 0 beyond the second
 FORGETTING = 0.98
 NOISE_RANGE = 10.0  # times the given noise variance, up and down
-MOST_REJECTED = 25  # in a row: then the filter begins anew at the reading
-AGAIN = 100.0  # times the variances that it first began with
+MOST_REJECTED = 25  # in a row: then the filter is re-initialized at the reading
+AGAIN = 100.0  # times the variances that it first had
 
 
 @part
@@ -63,29 +64,33 @@ def gain_factor(u: float) -> float:
     return FULL_AT / u if u <= ZERO_AT else 0.0
 
 
+class Channel(NamedTuple):
+    """The model of one component: x0 (3,), p0 (3, 3) at sample `begin`; noise: variance of a reading; jerk: its
+    spectral density in the component's unit, squared, per s^5; angular: an azimuth."""
+
+    begin: int
+    x0: FloatArray
+    p0: FloatArray
+    noise: float
+    jerk: float
+    angular: bool
+
+
 @kernel
 def adaptive_kalman(
-    time: FloatArray,
-    z: FloatArray,
-    begin: int,
-    x0: FloatArray,
-    p0: FloatArray,
-    noise: float,
-    jerk: float,
-    angular: bool,
-    adapt: bool,
+    time: FloatArray, z: FloatArray, model: Channel, adapt: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, float]:
     """Values and rates (n, 3), their variances (n, 3), innovations, their sigmas and weights (n,), and the
     log-likelihood; NaN before sample `begin`.
 
-    z (n,) NaN where missing; x0 (3,), p0 (3, 3) at `begin`; noise: variance of a reading; jerk: its spectral density
-    in the component's unit, squared, per s^5; adapt: False for the plain Kalman filter.
+    z (n,) NaN where missing; adapt: False for the plain Kalman filter.
     """
+    begin, x0, p0, noise, jerk, angular = model
     n = len(z)
     state, variance = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
     innovation, sigma, weight = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n)
     x, p, q = x0.copy(), p0.copy(), np.zeros((3, 3))
-    r, learnt, rejected, likelihood = noise, 0, 0, 0.0
+    r, updates, rejected, likelihood = noise, 0, 0, 0.0
     for k in range(begin, n):
         if k > begin:
             _predict(x, p, time[k] - time[k - 1], jerk, q)
@@ -103,9 +108,9 @@ def adaptive_kalman(
                 p[:] = AGAIN * p0
                 e, s, m, rejected = 0.0, p[0, 0] + r, 1.0, 0
             if m == 1.0 and adapt and p[0, 0] < r:  # the prediction must not drown it
-                share = (1 - FORGETTING) / (1 - FORGETTING ** (learnt + 1))
+                share = (1 - FORGETTING) / (1 - FORGETTING ** (updates + 1))
                 found = (1 - share) * r + share * (e * e - p[0, 0])
-                learnt += 1
+                updates += 1
             else:
                 found = r
             likelihood -= 0.5 * (math.log(s) + e * e / s)

@@ -1,4 +1,4 @@
-"""Editing one component by itself, as range instruments do it in real time (Yu, Feng, Li and Guo, "range-test
+"""Editing one component alone, as range instruments do it in real time (Yu, Feng, Li and Guo, "range-test
 outliers"; Zhang and Zhang, "reliable Kalman filter"): no geometry, no other component.
 
 A component is (n,) readings, NaN where missing; differences of an azimuth are taken the short way round, so values
@@ -8,6 +8,7 @@ may leave [-pi, pi). Intervals are the real ones; a threshold holds for one typi
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ FloatArray = NDArray[np.float64]
 LINE = 4  # readings that the least-squares method extrapolates from
 MOST_REJECTED = 3  # in a row: then that method takes the readings for the truth
 WINDOW = 10  # readings that a repaired value is extrapolated from
-MOST_REPAIRED = 16  # in a row: then the track counts as lost, and begins anew
+MOST_REPAIRED = 16  # in a row: then the track counts as lost, and is re-initialized
 WALK, RELIABLE, RELIABLE_LITERAL = 0, 1, 2
 MEMORY, LEAST_NOISE = 0.9, 0.3  # of the regularised reliable filter: forgetting, and the least noise over the given
 
@@ -138,27 +139,29 @@ def four_point_line(
     return value, weight
 
 
+class Walk(NamedTuple):
+    """A random walk in m components. begin (m,): first sample of each. x0, p0 (m,): state and variance one interval
+    before. noise (m,): variance of a reading. walk (m,): variance gained in one interval. interval: s."""
+
+    begin: NDArray[np.int64]
+    x0: FloatArray
+    p0: FloatArray
+    noise: FloatArray
+    walk: FloatArray
+    interval: float
+
+
 @kernel
 def outlier_kalman(
-    time: FloatArray,
-    z: FloatArray,
-    begin: NDArray[np.int64],
-    x0: FloatArray,
-    p0: FloatArray,
-    noise: FloatArray,
-    walk: FloatArray,
-    interval: float,
-    gate: float,
-    small_gain: float,
-    own_only: bool,
+    time: FloatArray, z: FloatArray, model: Walk, gate: float, small_gain: float, own_only: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """The anti-outlier Kalman filter of a random walk in m components: when an innovation exceeds `gate` sigmas, the
     gain is multiplied by `small_gain`, of all components, or (own_only) of the one that is off.
 
-    z (n, m), the second an azimuth if m is 3; begin (m,) first sample of each; x0, p0 (m,) state and variance one
-    interval before; noise (m,) variance; walk (m,) variance gained in one interval. Returns values, variances,
-    innovations, their sigmas and weights, all (n, m); NaN before the begin.
+    z (n, m), the second an azimuth if m is 3. Returns values, variances, innovations, their sigmas and weights, all
+    (n, m); NaN before the first sample.
     """
+    begin, x0, p0, noise, walk, interval = model
     n, m = z.shape
     value, variance = np.full((n, m), np.nan), np.full((n, m), np.nan)
     innovation, sigma = np.full((n, m), np.nan), np.full((n, m), np.nan)
@@ -188,24 +191,31 @@ def outlier_kalman(
     return value, variance, innovation, sigma, weight
 
 
+class Repair(NamedTuple):
+    """How one component is repaired and filtered. kind: WALK, RELIABLE or RELIABLE_LITERAL. threshold: on the
+    innovation. noise: variance of a reading. walk: variance gained in one interval. interval: s. angular: whether it is
+    an azimuth."""
+
+    kind: int
+    threshold: float
+    noise: float
+    walk: float
+    interval: float
+    angular: bool
+
+
 @kernel
 def repaired_walk(
-    time: FloatArray,
-    z: FloatArray,
-    kind: int,
-    threshold: float,
-    noise: float,
-    walk: float,
-    interval: float,
-    angular: bool,
+    time: FloatArray, z: FloatArray, how: Repair
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """A scalar Kalman filter whose outliers are repaired first: readings whose innovation exceeds the threshold, or
     that are missing, are replaced by the line through up to ten values before them.
 
-    kind: WALK, the Kalman filter of a random walk (walk: variance gained in one interval; noise: variance);
-    RELIABLE_LITERAL, gains from the last differences as published; RELIABLE, the same regularised. Returns (n,)
-    estimates, variances, innovations, their sigmas, weights and the repaired readings; NaN where nothing is known.
+    WALK is the Kalman filter of a random walk; RELIABLE_LITERAL has gains from the last differences as published;
+    RELIABLE the same regularised. Returns (n,) estimates, variances, innovations, their sigmas, weights and the
+    repaired readings; NaN where nothing is known.
     """
+    kind, threshold, noise, walk, interval, angular = how
     n = len(z)
     value, variance = np.full(n, np.nan), np.full(n, np.nan)
     innovation, sigma, weight = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n)

@@ -10,15 +10,15 @@ a component that is missing is a row that is left out.
 from __future__ import annotations
 
 import math
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import kernel, part
+from ftproc.core.compiled import kernel, part, record, zeros
 from ftproc.core.filtering import ukf
-from ftproc.core.filtering.forward import store
-from ftproc.core.filtering.records import FilterRun
-from ftproc.core.model import motion
+from ftproc.core.filtering.forward import recursion
+from ftproc.core.filtering.records import Row, Sample
 from ftproc.core.model.measurement import measure
 
 FloatArray = NDArray[np.float64]
@@ -67,53 +67,59 @@ def _axes(ca: float, sa: float, ce: float, se: float, h: FloatArray) -> None:
     h[2, 0], h[2, 1], h[2, 2] = -ca * se, -sa * se, ce
 
 
-@kernel
-def run_converted(
-    first: int,
-    last: int,
-    time: FloatArray,
-    z: FloatArray,
-    noise: FloatArray,
-    jerk: FloatArray,
-    knot_s: float,
-    x: FloatArray,
-    p: FloatArray,
-    run: FilterRun,
-) -> float:
-    """Filter samples [first, last) from the state x, P (in place); fills the run; returns the log-likelihood (of
-    positions along the line-of-sight axes)."""
-    h, c, r = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    z_hat, e, used, reading, along = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
-    scale, own = np.ones(3), np.zeros(3)
-    pxz, gain, s, s_inv = np.zeros((9, 3)), np.zeros((9, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    likelihood = 0.0
-    for k in range(first, last):
-        if k > first:
-            piece = motion.knot_index(time[k], time[0], knot_s, jerk.shape[0])
-            motion.predict(x, p, time[k] - time[k - 1], jerk[piece], c)
-        run.predicted[k] = x
-        z_hat[0], z_hat[1], z_hat[2] = measure(x[0], x[1], x[2])
-        for i in range(3):
-            used[i] = 1.0 if math.isfinite(z[k, i]) else 0.0
-            reading[i] = z[k, i] if used[i] > 0 else z_hat[i]
-        ce = max(math.cos(z_hat[2]), MIN_COS_ELEVATION)
-        convert(reading, noise, z_hat[0], z_hat[1], z_hat[2], along, r)
-        _axes(math.cos(z_hat[1]), math.sin(z_hat[1]), math.cos(z_hat[2]), math.sin(z_hat[2]), h)
-        scale[1], scale[2] = z_hat[0] * ce, z_hat[0]  # m per rad
-        ukf.cross_covariance(p, h, pxz)
-        for i in range(3):
-            e[i] = along[i] - (h[i, 0] * x[0] + h[i, 1] * x[1] + h[i, 2] * x[2])
-            for j in range(3):
-                c[i, j] = h[j, 0] * pxz[0, i] + h[j, 1] * pxz[1, i] + h[j, 2] * pxz[2, i]
-                if i != j:
-                    c[i, j] += r[i, j]
-            own[i] = r[i, i]
-            run.innovation[k, i] = e[i] / scale[i] if used[i] > 0 else math.nan
-            run.innovation_sigma[k, i] = math.sqrt(c[i, i] + own[i]) / scale[i]
-            run.weight[k, i] = used[i]
-        if used[0] > 0 or used[1] > 0 or used[2] > 0:
-            nis, gained = ukf.update(x, p, pxz, c, h, e, own, used, s, s_inv, gain)
-            run.nis[k] = nis
-            likelihood += gained
-        store(k, first, x, p, run)
-    return likelihood
+class Conversion(Protocol):
+    """The record of the filter's measurements: noise of range and angles, the reading with what is missing filled in,
+    its position along the line-of-sight axes, the covariance of that, and metres per unit of each component."""
+
+    noise: Annotated[FloatArray, 3]
+    reading: Annotated[FloatArray, 3]
+    along: Annotated[FloatArray, 3]
+    r: Annotated[FloatArray, 3, 3]
+    scale: Annotated[FloatArray, 3]
+
+
+CONVERSION = record(Conversion)
+
+
+def conversion_of(noise_variance: FloatArray) -> Any:
+    """An array of one `Conversion` for noise variances (3,)."""
+    conversions = zeros(CONVERSION)
+    conversions["noise"] = noise_variance
+    return conversions
+
+
+@part
+def _converted(f: ukf.Filter, sample: Sample, conversions: Any, row: Row) -> tuple[float, bool]:
+    """The update of a sample by its converted position; every reading is used. The log-likelihood is that of positions
+    along the line-of-sight axes."""
+    v = conversions[0]
+    x, h, c = f.x, f.h, f.c
+    slant, azimuth, elevation = measure(x[0], x[1], x[2])
+    f.z_hat[0], f.z_hat[1], f.z_hat[2] = slant, azimuth, elevation
+    any_used = False
+    for i in range(3):
+        f.used[i] = 1.0 if math.isfinite(sample.measurement[i]) else 0.0
+        v.reading[i] = sample.measurement[i] if f.used[i] > 0 else f.z_hat[i]
+        any_used = any_used or f.used[i] > 0
+    convert(v.reading, v.noise, slant, azimuth, elevation, v.along, v.r)
+    _axes(math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation), h)
+    v.scale[0] = 1.0
+    v.scale[1], v.scale[2] = slant * max(math.cos(elevation), MIN_COS_ELEVATION), slant  # m per rad
+    ukf.cross_covariance(f)
+    for i in range(3):
+        f.e[i] = v.along[i] - (h[i, 0] * x[0] + h[i, 1] * x[1] + h[i, 2] * x[2])
+        for j in range(3):
+            c[i, j] = h[j, 0] * f.pxz[0, i] + h[j, 1] * f.pxz[1, i] + h[j, 2] * f.pxz[2, i]
+            if i != j:
+                c[i, j] += v.r[i, j]
+        f.noise[i] = v.r[i, i]
+        row.innovation[i] = f.e[i] / v.scale[i] if f.used[i] > 0 else math.nan
+        row.innovation_sigma[i] = math.sqrt(c[i, i] + f.noise[i]) / v.scale[i]
+        row.weight[i] = f.used[i]
+    gained = 0.0
+    if any_used:
+        row.nis, gained = ukf.update(f)
+    return gained, False
+
+
+run_converted = recursion(_converted)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ftproc.core.comparators import ensemble, particles
 from ftproc.core.editing.track import RETRY_SAMPLES, reacquire
 from ftproc.core.filtering.forward import lead_in
-from ftproc.core.filtering.records import FilterRun, Model, Start, empty_run
+from ftproc.core.filtering.records import FilterRun, Model, Observations, Start, between, empty_rows
 from ftproc.core.model.frames import line_of_sight_axes
 from ftproc.core.model.measurement import MIN_RANGE_M
 
@@ -66,97 +66,94 @@ def subtract(a: FloatArray, b: FloatArray) -> FloatArray:
     return d
 
 
-class Job(NamedTuple):
-    """A log, what is told of noise and motion, the method's update, and the run to fill. blocks (n, 2, 3, 3):
-    covariances of position and velocity."""
+class Settings(NamedTuple):
+    """method: of `particles.UPDATES`. members: how many. longest_patch_s: without a reading that is used, after which
+    the track counts as lost."""
 
-    time_s: FloatArray
-    measurement: FloatArray
-    sensor: ensemble.Sensor
-    motion: Motion
-    update: Callable[[ensemble.Forecast, Generator], ensemble.Analysis]
+    method: str
     members: int
     longest_patch_s: float
     rng: Generator
-    run: FilterRun
-    blocks: FloatArray
+
+
+class _Run:
+    """A method over a log: its rows, the covariances of position and velocity (n, 2, 3, 3), the starts it made."""
+
+    def __init__(self, log: Observations, model: Model, settings: Settings) -> None:
+        self.log, self.settings = log, settings
+        self.sensor = ensemble.Sensor(measure, subtract, np.diag(model.noise_variance))
+        self.motion = Motion.of(model)
+        self.update: Update = particles.UPDATES[settings.method]
+        self.rows = empty_rows(len(log.time_s))
+        self.blocks = np.empty((len(log.time_s), 2, 3, 3))
+        self.starts: list[Start] = []
+        self.log_likelihood = 0.0
+
+    def follow(self, start: Start, stop: int) -> None:
+        """Filter from a start up to sample `stop`, re-acquiring when the track is lost."""
+        time_s, rng, k = self.log.time_s, self.settings.rng, start.sample
+        cloud = self._drawn(start)
+        used_s, retry = time_s[k], k
+        while k < stop:
+            if k > self.starts[-1].sample:
+                cloud = self.motion.move(cloud, time_s[k] - time_s[0], time_s[k] - time_s[k - 1], rng)
+            cloud = self._step(k, cloud)
+            self.rows["since_start"][k] = k - self.starts[-1].sample
+            if self.rows["weight"][k].max() >= BELIEVED or not np.isfinite(self.log.measurement[k]).any():
+                used_s = time_s[k]
+            elif time_s[k] - used_s > self.settings.longest_patch_s and k >= retry:
+                again = reacquire(time_s, self.log.measurement, np.diag(self.sensor.noise), k)
+                retry = k + RETRY_SAMPLES
+                if again is not None:
+                    cloud = self._drawn(again)
+                    used_s = time_s[k]
+                    continue  # the sample is filtered again, from the new state
+            k += 1
+
+    def _drawn(self, start: Start) -> FloatArray:
+        """Members for a start."""
+        self.starts.append(start)
+        return ensemble.draw(start.state, start.covariance, self.settings.members, self.settings.rng)
+
+    def _step(self, k: int, cloud: FloatArray) -> FloatArray:
+        """Update the predicted members by sample k and keep what came of it; the members."""
+        row = {name: self.rows[name] for name in self.rows.dtype.names}
+        known = ensemble.forecast(cloud, self.log.measurement[k], self.sensor)
+        row["predicted"][k] = row["state"][k] = cloud.mean(0)
+        row["innovation"][k] = row["innovation_sigma"][k] = row["nis"][k] = np.nan
+        row["weight"][k] = 0.0
+        if known is not None:
+            cloud, row["state"][k], gamma = self.update(known, self.settings.rng)
+            row["innovation"][k, known.used] = known.innovation
+            row["innovation_sigma"][k, known.used] = np.sqrt(np.diag(known.covariance))
+            row["weight"][k, known.used] = gamma
+            if gamma > 0:
+                row["nis"][k] = known.rho
+                self.log_likelihood += -0.5 * (known.rho - float(np.linalg.slogdet(known.inverse)[1]))
+        covariance = ensemble.spread(cloud)
+        row["sigma"][k] = np.sqrt(np.diag(covariance))
+        self.blocks[k] = covariance[:3, :3], covariance[3:6, 3:6]
+        return cloud
+
+
+Update = Callable[[ensemble.Forecast, Generator], ensemble.Analysis]
 
 
 def filter_log(
-    method: str,
-    time_s: FloatArray,
-    measurement: FloatArray,
-    model: Model,
-    starts: list[Start],
-    members: int,
-    longest_patch_s: float,
-    rng: Generator,
+    log: Observations, model: Model, starts: list[Start], settings: Settings
 ) -> tuple[FilterRun, list[Start]]:
-    """Run a method of `particles.UPDATES` over the whole log, and every start it made.
+    """Run a method over the whole log, and every start it made.
 
-    time_s (n,), measurement (n, 3) with NaN where missing. The weight of the run is gamma, how far each reading as a
-    whole was used; sigmas are the members' spread. The filter begins anew at each of `starts`, and when no reading
-    was believed for longer than `longest_patch_s`: then it is the track that is wrong.
+    The weight of the run is gamma, how far each reading as a whole was used; sigmas are the members' spread. The filter
+    is re-initialized at each of `starts`, and when no reading was used for longer than `longest_patch_s`: then it is
+    the track that is wrong.
     """
-    run, begun = empty_run(time_s), []
-    job = Job(
-        time_s, measurement, ensemble.Sensor(measure, subtract, np.diag(model.noise_variance)), Motion.of(model),
-        particles.UPDATES[method], members, longest_patch_s, rng, run, np.empty((len(time_s), 2, 3, 3)),
-    )  # fmt: skip
-    likelihood = 0.0
-    for start, stop in zip(starts, [s.sample for s in starts[1:]] + [len(time_s)], strict=True):
-        begun.append(start)
-        likelihood += _follow(job, stop, begun)
-    first = starts[0].sample
-    axes = line_of_sight_axes(run.state[first:, :3])[:, None]
-    variance = np.einsum("...ij,...jk,...ik->...i", axes, job.blocks[first:], axes)
-    run.los_sigma[first:] = np.sqrt(np.maximum(variance, 0.0)).reshape(-1, 6)
-    lead_in(measurement, model, starts[0], run)
-    return run._replace(log_likelihood=likelihood), begun
-
-
-def _follow(job: Job, stop: int, begun: list[Start]) -> float:
-    """Filter from the last start up to sample `stop`, re-acquiring when the track is lost; the log-likelihood."""
-    likelihood, k = 0.0, begun[-1].sample
-    cloud = ensemble.draw(begun[-1].state, begun[-1].covariance, job.members, job.rng)
-    believed_s, retry = job.time_s[k], k
-    while k < stop:
-        if k > begun[-1].sample:
-            since, interval = job.time_s[k] - job.time_s[0], job.time_s[k] - job.time_s[k - 1]
-            cloud = job.motion.move(cloud, since, interval, job.rng)
-        cloud, gained = _step(job, k, cloud)
-        likelihood += gained
-        job.run.since_start[k] = k - begun[-1].sample
-        if job.run.weight[k].max() >= BELIEVED or not np.isfinite(job.measurement[k]).any():
-            believed_s = job.time_s[k]
-        elif job.time_s[k] - believed_s > job.longest_patch_s and k >= retry:
-            again = reacquire(job.time_s, job.measurement, np.diag(job.sensor.noise), k)
-            retry = k + RETRY_SAMPLES
-            if again is not None:
-                begun.append(again)
-                cloud = ensemble.draw(again.state, again.covariance, job.members, job.rng)
-                believed_s = job.time_s[k]
-                continue  # the sample is filtered again, from the new state
-        k += 1
-    return likelihood
-
-
-def _step(job: Job, k: int, cloud: FloatArray) -> tuple[FloatArray, float]:
-    """Update the predicted members by sample k and note what came of it; the members and the log-likelihood."""
-    run, likelihood = job.run, 0.0
-    known = ensemble.forecast(cloud, job.measurement[k], job.sensor)
-    run.predicted[k] = run.state[k] = cloud.mean(0)
-    run.innovation[k] = run.innovation_sigma[k] = run.nis[k] = np.nan
-    run.weight[k] = 0.0
-    if known is not None:
-        cloud, run.state[k], gamma = job.update(known, job.rng)
-        run.innovation[k, known.used] = known.innovation
-        run.innovation_sigma[k, known.used] = np.sqrt(np.diag(known.covariance))
-        run.weight[k, known.used] = gamma
-        if gamma > 0:
-            run.nis[k] = known.rho
-            likelihood = -0.5 * (known.rho - np.linalg.slogdet(known.inverse)[1])
-    covariance = ensemble.spread(cloud)
-    run.sigma[k] = np.sqrt(np.diag(covariance))
-    job.blocks[k] = covariance[:3, :3], covariance[3:6, 3:6]
-    return cloud, float(likelihood)
+    run = _Run(log, model, settings)
+    for start, stop in between(starts, len(log.time_s)):
+        run.follow(start, stop)
+    rows, first = run.rows, starts[0].sample
+    axes = line_of_sight_axes(rows["state"][first:, :3])[:, None]
+    variance = np.einsum("...ij,...jk,...ik->...i", axes, run.blocks[first:], axes)
+    rows["los_sigma"][first:] = np.sqrt(np.maximum(variance, 0.0)).reshape(-1, 6)
+    lead_in(log, model, starts[0], rows)
+    return FilterRun.of(log.time_s, rows, run.log_likelihood), run.starts

@@ -5,146 +5,163 @@ changes from calm flight to a manoeuvre. Every filter begins a step from a mixtu
 from __future__ import annotations
 
 import math
+from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import kernel, part
+from ftproc.core.compiled import kernel, part, record, zeros
 from ftproc.core.filtering import ukf
-from ftproc.core.filtering.forward import store
-from ftproc.core.filtering.records import FilterRun
+from ftproc.core.filtering.forward import Span, lead_in, store
+from ftproc.core.filtering.records import FilterRun, Model, Observations, Row, Start, between, empty_rows
 from ftproc.core.model import motion
-from ftproc.core.model.measurement import innovate
 
 FloatArray = NDArray[np.float64]
 
 
+class Mode(Protocol):
+    """The record of one model of the target's motion: its jerk tensor, its probability after the last reading, that
+    expected before the next one, its state after mixing, and what its filter made of the reading."""
+
+    jerk: Annotated[FloatArray, 6]
+    probability: float
+    expected: float
+    x: Annotated[FloatArray, 9]
+    p: Annotated[FloatArray, 9, 9]
+    gained: float
+    nis: float
+
+
+MODE = record(Mode)
+
+
 @part
-def _mixture(share: FloatArray, xs: FloatArray, ps: FloatArray, x: FloatArray, p: FloatArray) -> None:
-    """Mean and covariance of the mixture of the models in these shares (m,)."""
+def _mixture(share: FloatArray, filters: Any, x: FloatArray, p: FloatArray) -> None:
+    """Mean and covariance of the mixture of the filters in these shares (m,)."""
     x[:] = 0.0
     p[:] = 0.0
     for m in range(len(share)):
         for i in range(9):
-            x[i] += share[m] * xs[m, i]
+            x[i] += share[m] * filters[m].x[i]
     for m in range(len(share)):
+        f = filters[m]
         for i in range(9):
             for j in range(9):
-                p[i, j] += share[m] * (ps[m, i, j] + (xs[m, i] - x[i]) * (xs[m, j] - x[j]))
+                p[i, j] += share[m] * (f.p[i, j] + (f.x[i] - x[i]) * (f.x[j] - x[j]))
 
 
 @part
-def _mix(
-    stay: float, mu: FloatArray, xs: FloatArray, ps: FloatArray, mixed_x: FloatArray, mixed_p: FloatArray,
-    share: FloatArray, expected: FloatArray,
-) -> None:  # fmt: skip
-    """What each model begins with, and its probability before the reading: expected (m,)."""
-    models = len(mu)
+def _mix(stay: float, filters: Any, modes: Any, share: FloatArray) -> None:
+    """The state that each filter continues from, and its probability before the reading; share (m,) is scratch."""
+    models = len(modes)
     for j in range(models):
         total = 0.0
         for i in range(models):
-            share[i] = mu[i] * (stay if i == j else (1 - stay) / (models - 1))
+            share[i] = modes[i].probability * (stay if i == j else (1 - stay) / (models - 1))
             total += share[i]
         for i in range(models):
             share[i] /= total
-        expected[j] = total
-        _mixture(share, xs, ps, mixed_x[j], mixed_p[j])
-    xs[:] = mixed_x
-    ps[:] = mixed_p
+        modes[j].expected = total
+        _mixture(share, filters, modes[j].x, modes[j].p)
+    for j in range(models):
+        filters[j].x[:] = modes[j].x
+        filters[j].p[:] = modes[j].p
 
 
 @kernel
-def run_imm(
-    first: int,
-    last: int,
-    time: FloatArray,
-    z: FloatArray,
-    noise: FloatArray,
-    jerk: FloatArray,
-    sojourn_s: float,
-    x: FloatArray,
-    p: FloatArray,
-    run: FilterRun,
-    probability: FloatArray,
+def _run(
+    span: Span, samples: Any, filters: Any, modes: Any, sojourn_s: float, rows: Any, probability: FloatArray
 ) -> float:
-    """Filter samples [first, last) from the state x, P (in place); fills the run and the probability (n, m) of each
-    model; returns the log-likelihood.
-
-    jerk: (m, 6) tensor of each model. sojourn_s: how long the target keeps to one, on average.
-    """
-    models = jerk.shape[0]
-    factor, b, h, c = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    z_hat, e, used = np.zeros(3), np.zeros(3), np.zeros(3)
-    pxz, gain, s, s_inv = np.zeros((9, 3)), np.zeros((9, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    xs, ps = np.zeros((models, 9)), np.zeros((models, 9, 9))
-    mixed_x, mixed_p = np.zeros((models, 9)), np.zeros((models, 9, 9))
-    mu, expected, share = np.full(models, 1 / models), np.full(models, 1 / models), np.zeros(models)
-    gained, innovation, variance, nis = np.zeros(models), np.zeros((models, 3)), np.zeros((models, 3)), np.zeros(models)
-    for m in range(models):
-        xs[m] = x
-        ps[m] = p
+    """Filter a span by all models; the last of the filters is what they say together. Fills the rows and the
+    probability (n, m) of each model; returns the log-likelihood."""
+    models = len(modes)
+    share, together = np.zeros(models), filters[models]
     likelihood = 0.0
-    for k in range(first, last):
-        if k > first:
-            interval = time[k] - time[k - 1]
-            _mix(math.exp(-interval / sojourn_s), mu, xs, ps, mixed_x, mixed_p, share, expected)
+    for k in range(span.first, span.last):
+        row = rows[k]
+        if k > span.first:
+            interval = samples[k].time_s - samples[k - 1].time_s
+            _mix(math.exp(-interval / sojourn_s), filters, modes, share)
             for m in range(models):
-                motion.predict(xs[m], ps[m], interval, jerk[m], c)
+                motion.predict(filters[m], interval, modes[m].jerk)
         for i in range(9):
-            run.predicted[k, i] = 0.0
+            row.predicted[i] = 0.0
             for m in range(models):
-                run.predicted[k, i] += expected[m] * xs[m, i]
+                row.predicted[i] += modes[m].expected * filters[m].x[i]
         any_used = False
         for m in range(models):
-            ukf.linearise(xs[m], ps[m], factor, b, z_hat, h, c)
-            innovate(z[k], z_hat, e)
-            for i in range(3):
-                used[i] = 1.0 if math.isfinite(e[i]) else 0.0
-                run.weight[k, i] = used[i]
-                innovation[m, i], variance[m, i] = e[i], c[i, i] + noise[i]
-                any_used = any_used or used[i] > 0
-            gained[m] = 0.0
+            f = filters[m]
+            ukf.linearise(f)
+            ukf.innovate(samples[k].measurement, f)
+            any_used = ukf.use(samples[k].weight, f)
+            modes[m].gained = 0.0
             if any_used:
-                ukf.cross_covariance(ps[m], h, pxz)
-                nis[m], gained[m] = ukf.update(xs[m], ps[m], pxz, c, h, e, noise, used, s, s_inv, gain)
-        likelihood += _weigh_models(gained, expected, mu)
-        _report(k, expected, innovation, variance, nis, any_used, run)
-        _mixture(mu, xs, ps, x, p)
-        probability[k] = mu
-        store(k, first, x, p, run)
+                ukf.cross_covariance(f)
+                modes[m].nis, modes[m].gained = ukf.update(f)
+        likelihood += _weigh_models(modes)
+        _store_innovation(filters, modes, any_used, row)
+        for m in range(models):
+            share[m] = probability[k, m] = modes[m].probability
+        _mixture(share, filters, together.x, together.p)
+        store(together, row)
+        row.since_start = k - span.start
     return likelihood
 
 
 @part
-def _weigh_models(gained: FloatArray, expected: FloatArray, mu: FloatArray) -> float:
+def _weigh_models(modes: Any) -> float:
     """Probabilities after the reading; returns its log-likelihood."""
-    best: float = gained.max()
+    best = modes[0].gained
+    for m in range(len(modes)):
+        best = max(best, modes[m].gained)
     total = 0.0
-    for m in range(len(mu)):
-        mu[m] = expected[m] * math.exp(gained[m] - best)
-        total += mu[m]
-    for m in range(len(mu)):
-        mu[m] = max(mu[m] / total, 1e-12)
-    return best + math.log(total)
+    for m in range(len(modes)):
+        modes[m].probability = modes[m].expected * math.exp(modes[m].gained - best)
+        total += modes[m].probability
+    for m in range(len(modes)):
+        modes[m].probability = max(modes[m].probability / total, 1e-12)
+    return float(best + math.log(total))
 
 
 @part
-def _report(
-    k: int, expected: FloatArray, innovation: FloatArray, variance: FloatArray, nis: FloatArray, any_used: bool,
-    run: FilterRun,
-) -> None:  # fmt: skip
-    """Innovation, its sigma and NIS of the models together."""
+def _store_innovation(filters: Any, modes: Any, any_used: bool, row: Row) -> None:
+    """Keep innovation, its sigma, weights and NIS of the models together."""
     for i in range(3):
         mean, square = 0.0, 0.0
-        for m in range(len(expected)):
-            mean += expected[m] * innovation[m, i]
-            square += expected[m] * variance[m, i]
-        run.innovation[k, i] = mean
-        if math.isfinite(innovation[0, i]):  # not of the mean: sums in any order may lose the sight of NaN
-            for m in range(len(expected)):
-                square += expected[m] * (innovation[m, i] - mean) ** 2
-        run.innovation_sigma[k, i] = math.sqrt(square)
+        for m in range(len(modes)):
+            f = filters[m]
+            mean += modes[m].expected * f.e[i]
+            square += modes[m].expected * (f.c[i, i] + f.noise[i])
+        if math.isfinite(filters[0].e[i]):
+            for m in range(len(modes)):
+                square += modes[m].expected * (filters[m].e[i] - mean) ** 2
+        row.innovation[i] = mean
+        row.innovation_sigma[i] = math.sqrt(square)
+        row.weight[i] = filters[0].used[i]
     if any_used:
-        run.nis[k] = 0.0
-        for m in range(len(expected)):
-            run.nis[k] += expected[m] * nis[m]
+        row.nis = 0.0
+        for m in range(len(modes)):
+            row.nis += modes[m].expected * modes[m].nis
+
+
+class Jumps(NamedTuple):
+    """How the target manoeuvres: a jerk tensor for each model (m, 6), and how long one holds on average."""
+
+    jerk: FloatArray
+    sojourn_s: float
+
+
+def filter_log(log: Observations, model: Model, starts: list[Start], jumps: Jumps) -> tuple[FilterRun, FloatArray]:
+    """Run the filters over the whole log, re-initialized at each start; and the probability (n, m) of each model.
+    Samples before the first start are extrapolated. model: the noise; its jerk serves for that extrapolation only."""
+    samples, rows = log.samples(), empty_rows(len(log.time_s))
+    models, likelihood = len(jumps.jerk), 0.0
+    probability = np.full((len(log.time_s), models), np.nan)
+    for start, stop in between(starts, len(log.time_s)):
+        filters, modes = zeros(ukf.FILTER, models + 1), zeros(MODE, models)
+        filters[:] = model.filter(start)
+        modes["jerk"], modes["probability"], modes["expected"] = jumps.jerk, 1 / models, 1 / models
+        span = Span(start.sample, stop, start.sample)
+        likelihood += _run(span, samples, filters, modes, jumps.sojourn_s, rows, probability)
+    lead_in(log, model, starts[0], rows)
+    return FilterRun.of(log.time_s, rows, likelihood), probability

@@ -12,16 +12,15 @@ update, u = |e_i - (H dx)_i| / sqrt(R_ii).
 from __future__ import annotations
 
 import math
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import kernel, part
+from ftproc.core.compiled import kernel, part, record, zeros
 from ftproc.core.filtering import ukf
-from ftproc.core.filtering.forward import store
-from ftproc.core.filtering.records import FilterRun
-from ftproc.core.model import motion
-from ftproc.core.model.measurement import innovate
+from ftproc.core.filtering.forward import recursion, store_innovation
+from ftproc.core.filtering.records import Row, Sample
 
 FloatArray = NDArray[np.float64]
 
@@ -32,7 +31,7 @@ NEGLIGIBLE = 1e-9  # a smaller weight leaves the reading out
 
 @kernel
 def weight_of(kind: int, parameter: float, u: float) -> float:
-    """The weight of a reading u sigmas off. parameter: k, nu or b of the module's head."""
+    """The weight of a reading whose residual is u sigmas. parameter: k, nu or b of the module's head."""
     if kind == HUBER:
         return 1.0 if u <= parameter else parameter / u
     if kind == STUDENT:
@@ -40,68 +39,72 @@ def weight_of(kind: int, parameter: float, u: float) -> float:
     return math.exp(-0.5 * u * u / (parameter * parameter))
 
 
+class Weighting(Protocol):
+    """The record of a robust filter: kind and parameter of its weight, and the state before the update."""
+
+    kind: float
+    parameter: float
+    x: Annotated[FloatArray, 9]
+    p: Annotated[FloatArray, 9, 9]
+    residual: Annotated[FloatArray, 3]
+    variance: Annotated[FloatArray, 3]
+
+
+WEIGHTING = record(Weighting)
+
+
+def weighting_of(kind: int, parameter: float) -> Any:
+    """An array of one `Weighting`."""
+    weightings = zeros(WEIGHTING)
+    weightings["kind"], weightings["parameter"] = kind, parameter
+    return weightings
+
+
 @part
-def _weigh(kind: int, parameter: float, residual: FloatArray, variance: FloatArray, used: FloatArray) -> None:
+def _weigh(f: ukf.Filter, how: Weighting) -> bool:
+    """Weights from the residuals; whether any reading is used."""
+    any_used = False
     for i in range(3):
-        if math.isfinite(residual[i]):
-            used[i] = weight_of(kind, parameter, abs(residual[i]) / math.sqrt(variance[i]))
-            if used[i] < NEGLIGIBLE:
-                used[i] = 0.0
-        else:
-            used[i] = 0.0
+        f.used[i] = 0.0
+        if math.isfinite(how.residual[i]):
+            u = abs(how.residual[i]) / math.sqrt(how.variance[i])
+            f.used[i] = weight_of(int(how.kind), how.parameter, u)
+            if f.used[i] < NEGLIGIBLE:
+                f.used[i] = 0.0
+        any_used = any_used or f.used[i] > 0
+    return any_used
 
 
-@kernel
-def run_robust(
-    first: int,
-    last: int,
-    time: FloatArray,
-    z: FloatArray,
-    noise: FloatArray,
-    jerk: FloatArray,
-    knot_s: float,
-    kind: int,
-    parameter: float,
-    x: FloatArray,
-    p: FloatArray,
-    run: FilterRun,
-) -> float:
-    """Filter samples [first, last) from the state x, P (in place); fills the run; returns the log-likelihood of the
-    innovations at their final weights."""
-    factor, b, h, c = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    z_hat, e, used, residual, variance = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
-    pxz, gain, s, s_inv = np.zeros((9, 3)), np.zeros((9, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    x0, p0 = np.zeros(9), np.zeros((9, 9))
-    likelihood = 0.0
-    for k in range(first, last):
-        if k > first:
-            piece = motion.knot_index(time[k], time[0], knot_s, jerk.shape[0])
-            motion.predict(x, p, time[k] - time[k - 1], jerk[piece], c)
-        x0[:] = x
-        p0[:] = p
-        run.predicted[k] = x
-        ukf.linearise(x, p, factor, b, z_hat, h, c)
-        innovate(z[k], z_hat, e)
-        ukf.cross_covariance(p, h, pxz)
+@part
+def _reweighted(f: ukf.Filter, sample: Sample, weightings: Any, row: Row) -> tuple[float, bool]:
+    """The update of a sample, repeated until its weights fit the residuals that it leaves."""
+    how = weightings[0]
+    how.x[:] = f.x
+    how.p[:] = f.p
+    ukf.linearise(f)
+    ukf.innovate(sample.measurement, f)
+    ukf.cross_covariance(f)
+    store_innovation(f, row)
+    for i in range(3):
+        how.residual[i] = f.e[i]
+        how.variance[i] = f.c[i, i] + f.noise[i]
+    nis, gained = math.nan, 0.0
+    for _ in range(ITERATIONS):
+        if not _weigh(f, how):
+            break
+        f.x[:] = how.x
+        f.p[:] = how.p
+        nis, gained = ukf.update(f)
         for i in range(3):
-            residual[i] = e[i]
-            variance[i] = c[i, i] + noise[i]
-            run.innovation[k, i] = e[i]
-            run.innovation_sigma[k, i] = math.sqrt(variance[i])
-        nis, gained = math.nan, 0.0
-        for _ in range(ITERATIONS):
-            _weigh(kind, parameter, residual, variance, used)
-            if used[0] <= 0 and used[1] <= 0 and used[2] <= 0:
-                break
-            x[:] = x0
-            p[:] = p0
-            nis, gained = ukf.update(x, p, pxz, c, h, e, noise, used, s, s_inv, gain)
-            for i in range(3):
-                moved = h[i, 0] * (x[0] - x0[0]) + h[i, 1] * (x[1] - x0[1]) + h[i, 2] * (x[2] - x0[2])
-                residual[i] = e[i] - moved
-                variance[i] = noise[i]
-        run.weight[k] = used
-        run.nis[k] = nis
-        likelihood += gained
-        store(k, first, x, p, run)
-    return likelihood
+            moved = 0.0
+            for a in range(3):
+                moved += f.h[i, a] * (f.x[a] - how.x[a])
+            how.residual[i] = f.e[i] - moved
+            how.variance[i] = f.noise[i]
+    for i in range(3):
+        row.weight[i] = f.used[i]
+    row.nis = nis
+    return gained, False
+
+
+run_robust = recursion(_reweighted)

@@ -1,9 +1,9 @@
-"""The opposite decision, tried: is it the readings between two patches that are the patch?
+"""Alternative hypotheses: is it the readings between two patches that are the patch?
 
 A filter that has followed a patch calls the good readings on both sides of it bad, and the decisions stand still
 there, because each supports the others. Where a short stretch of used readings lies between two rejected runs, or
-between one and a gap, the decisions are made again from other beginnings, over the neighbourhood alone, and the
-likeliest outcome is kept.
+between one and a gap, the decisions are made again from other initial hypotheses, over the neighbourhood alone, and
+the likeliest outcome is kept.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from ftproc.core.editing import outlier_chain, patch_likelihood
 from ftproc.core.editing.patch_likelihood import SHORTEST_RUN
 from ftproc.core.editing.runs import runs_of
-from ftproc.core.filtering.initialization import begin_all
-from ftproc.core.filtering.records import Model
+from ftproc.core.filtering.initialization import find_starts
+from ftproc.core.filtering.records import Model, Observations
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 
 FloatArray = NDArray[np.float64]
@@ -48,6 +48,10 @@ class Neighbourhood(NamedTuple):
     rates: FloatArray
     gate: float
 
+    def weighted(self, weight: FloatArray) -> Observations:
+        """The log with weights (n, 3)."""
+        return Observations(self.time_s, self.measurement, weight)
+
     def part(self, near: slice) -> Neighbourhood:
         """The readings of a slice."""
         return self._replace(time_s=self.time_s[near], measurement=self.measurement[near], possible=self.possible[near])
@@ -75,9 +79,9 @@ class Step(NamedTuple):
     likelihood: float
 
 
-def try_opposites(log: Neighbourhood, weight: FloatArray, tried: set[Island]) -> FloatArray:
-    """The decisions (n, 3), with better ones in their place where others are likelier. tried: islands that were looked
-    at before, and now are again only if they have changed; those looked at are put in."""
+def try_alternatives(log: Neighbourhood, weight: FloatArray, tried: set[Island]) -> FloatArray:
+    """The decisions (n, 3), replaced by others where these are likelier. tried: islands that were examined before; they
+    are examined again only if they have changed, and those examined now are added."""
     result = weight.copy()
     new = [island for island in islands(log.time_s, weight, log.possible) if island not in tried]
     for island in new[:MOST]:
@@ -86,8 +90,8 @@ def try_opposites(log: Neighbourhood, weight: FloatArray, tried: set[Island]) ->
         near = slice(low, island.last + AROUND)
         part = log.part(near)
         try:
-            steps = [*_decisions(part, result[near]), *_others(part, result[near], island.shifted(low))]
-        except ValueError:  # a component says too little hereabouts
+            steps = [*_decisions(part, result[near]), *_alternatives(part, result[near], island.shifted(low))]
+        except ValueError:  # a component has too few readings there
             continue
         likeliest = max(steps, key=lambda step: step.likelihood)
         if likeliest.likelihood > steps[0].likelihood + MARGIN:
@@ -120,8 +124,8 @@ def _inside(place: int, runs: IntArray) -> bool:
     return bool(((runs[:, 0] <= place) & (place <= runs[:, 1])).any())
 
 
-def _others(log: Neighbourhood, weight: FloatArray, island: Island) -> Iterator[Step]:
-    """Decisions that begin with the opposite, and such as begin with nothing known of the component there."""
+def _alternatives(log: Neighbourhood, weight: FloatArray, island: Island) -> Iterator[Step]:
+    """Decisions from the opposite hypothesis, and from that of nothing known of the component there."""
     component, first, begin, end, last = island
     opposite = weight.copy()
     opposite[first:last, component] = 1.0
@@ -148,8 +152,8 @@ def _decisions(log: Neighbourhood, weight: FloatArray) -> list[Step]:
 
 
 def _without_the_worst(log: Neighbourhood, weight: FloatArray) -> list[Step]:
-    """The decisions with ever fewer readings, the worst of each surroundings first: beside a wild one, good ones look
-    bad."""
+    """The decisions with ever fewer readings, the worst of each surroundings first: beside an outlier, good readings
+    look bad."""
     steps = []
     for _ in range(STEPS):
         step, smoothed = _step(log, weight)
@@ -192,8 +196,9 @@ def _filled(log: Neighbourhood, weight: FloatArray, component: int, hole: slice)
 def _step(log: Neighbourhood, weight: FloatArray) -> tuple[Step, SmootherRun]:
     """How likely the decisions are, and what the readings used say of each other."""
     noise = log.model.noise_variance
-    starts = begin_all(log.time_s, log.measurement, weight, noise, float(log.model.jerk[0, 0]))
-    smoothed = smooth_log(log.time_s, log.measurement, weight, log.model, starts, residuals_only=True)
+    weighted = log.weighted(weight)
+    starts = find_starts(weighted, noise, float(log.model.jerk[0, 0]))
+    smoothed = smooth_log(weighted, log.model, starts, residuals_only=True)
     return Step(weight, smoothed.log_likelihood + _rejections(log, weight, smoothed)), smoothed
 
 

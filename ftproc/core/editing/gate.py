@@ -10,22 +10,22 @@ filled in here:
 * A patch begins with a jump of the raw reading (or far outside) and ends with a jump back; a smooth departure inside
   the outer gate is a manoeuvre. During a patch m = 0: the substitute is the prediction itself, and P stays honest.
 * A component that stays outside for longer than the longest patch means that the track is lost, not the reading:
-  the caller starts anew (`run_gated` stops there, see `track`).
+  `run_gated` stops there, and `track` re-acquires.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import kernel, part
+from ftproc.core.compiled import kernel, part, record, zeros
 from ftproc.core.filtering import ukf
-from ftproc.core.filtering.records import FilterRun
-from ftproc.core.model import motion
-from ftproc.core.model.measurement import innovate, line_of_sight_sigma, measure, wrap_angle
+from ftproc.core.filtering.forward import recursion, store_innovation
+from ftproc.core.filtering.records import Row, Sample
+from ftproc.core.model.measurement import measure, wrap_angle
 
 FloatArray = NDArray[np.float64]
 
@@ -62,61 +62,81 @@ def rejection_weight(gate: float) -> float:
     return float(igg3(gate, FULL_AT * gate, ZERO_AT * gate))
 
 
+class Gate(Protocol):
+    """The record of a gate: its settings, and what it remembers of each component (range, azimuth, elevation).
+
+    full, zero: sigmas at which the weight begins to fall and is zero. longest_patch_s, gain_form: see `GateSettings`.
+    wait: samples to come before the track may be called lost. in_patch: 1 within a patch. rejected: readings of the
+    patch so far. inside: the last of these that are within the gate. residual: of the last reading, NaN before any.
+    onset_s: when the patch began.
+    """
+
+    full: float
+    zero: float
+    longest_patch_s: float
+    gain_form: float
+    wait: float
+    in_patch: Annotated[FloatArray, 3]
+    rejected: Annotated[FloatArray, 3]
+    inside: Annotated[FloatArray, 3]
+    residual: Annotated[FloatArray, 3]
+    onset_s: Annotated[FloatArray, 3]
+
+
+GATE = record(Gate)
+
+
+def gate_of(settings: GateSettings) -> Any:
+    """An array of one `Gate` that has seen nothing."""
+    gates = zeros(GATE)
+    gates["full"], gates["zero"] = FULL_AT * settings.gate, ZERO_AT * settings.gate
+    gates["longest_patch_s"], gates["gain_form"] = settings.longest_patch_s, settings.gain_form
+    gates["residual"] = np.nan
+    return gates
+
+
 @part
-def _decide(
-    k: int,
-    time: FloatArray,
-    e: FloatArray,
-    c: FloatArray,
-    noise: FloatArray,
-    full: float,
-    zero: float,
-    allowed: FloatArray,
-    track: FloatArray,
-    used: FloatArray,
-) -> bool:
-    """Weights of one sample from its innovation; track (3, 5) is the memory of each component: in a patch (0/1),
-    readings in it, readings back inside, last residual, time of its onset. False while any is in a patch."""
-    inside = True
+def _decide(f: ukf.Filter, sample: Sample, gate: Gate) -> bool:
+    """Weights of a sample from its innovation; False while any component is in a patch."""
+    e, used = f.e, f.used
+    all_inside = True
     for i in range(3):
         used[i] = 0.0
-        if not math.isfinite(e[i]) or allowed[i] <= 0:
+        if not math.isfinite(e[i]) or sample.weight[i] <= 0:
             continue
-        u = abs(e[i]) / math.sqrt(c[i, i] + noise[i])
-        step = e[i] - track[i, 3]
+        u = abs(e[i]) / math.sqrt(f.c[i, i] + f.noise[i])
+        step = e[i] - gate.residual[i]
         if i == 1:
             step = wrap_angle(step)
-        jumped = not abs(step) <= JUMP * math.sqrt(2 * noise[i])  # no residual yet (NaN) counts as a jump
-        if track[i, 0] == 0:
+        jumped = not abs(step) <= JUMP * math.sqrt(2 * f.noise[i])  # no residual yet (NaN) counts as a jump
+        if gate.in_patch[i] == 0:
             # A smooth departure within the outer gate is a manoeuvre; beyond it no tuned filter is left behind.
-            used[i] = igg3(u, full, zero) if jumped or u >= zero else 1.0
+            used[i] = igg3(u, gate.full, gate.zero) if jumped or u >= gate.zero else 1.0
             if used[i] < FLOOR:
                 used[i] = 0.0
-                track[i, 0], track[i, 1], track[i, 2], track[i, 4] = 1.0, 1.0, 0.0, time[k]
+                gate.in_patch[i], gate.rejected[i], gate.inside[i] = 1.0, 1.0, 0.0
+                gate.onset_s[i] = sample.time_s
         else:
-            track[i, 1] += 1
-            if u < zero and (jumped != (track[i, 2] > 0)):
-                track[i, 2] += 1
+            gate.rejected[i] += 1
+            if u < gate.zero and (jumped != (gate.inside[i] > 0)):
+                gate.inside[i] += 1
             else:
-                track[i, 2] = 0
-            settled = track[i, 2] >= SETTLE or (track[i, 2] >= 1 and u <= full and track[i, 1] <= 3)
-            if settled:
-                track[i, 0] = track[i, 1] = track[i, 2] = 0.0
-                used[i] = max(igg3(u, full, zero), 0.1)
-        inside = inside and track[i, 0] == 0
-    return inside
+                gate.inside[i] = 0
+            if gate.inside[i] >= SETTLE or (gate.inside[i] >= 1 and u <= gate.full and gate.rejected[i] <= 3):
+                gate.in_patch[i] = gate.rejected[i] = gate.inside[i] = 0.0
+                used[i] = max(igg3(u, gate.full, gate.zero), 0.1)
+        all_inside = all_inside and gate.in_patch[i] == 0
+    return all_inside
 
 
 @part
-def _update_by_gain(
-    x: FloatArray, p: FloatArray, pxz: FloatArray, c: FloatArray, e: FloatArray, noise: FloatArray, used: FloatArray,
-    s: FloatArray, s_inv: FloatArray, gain: FloatArray,
-) -> tuple[float, float]:  # fmt: skip
+def _update_by_gain(f: ukf.Filter) -> tuple[float, float]:
     """The paper's letter, K <- K m, with the covariance that any gain has: P - K Pxz' - Pxz K' + K S K'."""
+    x, p, e, used, s, s_inv, pxz, gain = f.x, f.p, f.e, f.used, f.s, f.s_inv, f.pxz, f.gain
     for i in range(3):
         for j in range(3):
-            s[i, j] = c[i, j] + (noise[i] if i == j else 0.0)
-    log_det = ukf.invert_used(s, used, s_inv)
+            s[i, j] = f.c[i, j] + (f.noise[i] if i == j else 0.0)
+    log_det = ukf.invert_used(f)
     nis = 0.0
     for i in range(3):
         for j in range(3):
@@ -139,88 +159,43 @@ def _update_by_gain(
     return nis, -0.5 * (log_det + nis)
 
 
-@kernel
-def run_gated(
-    first: int,
-    last: int,
-    start: int,
-    time: FloatArray,
-    z: FloatArray,
-    noise: FloatArray,
-    jerk: FloatArray,
-    knot_s: float,
-    gate: float,
-    longest_patch_s: float,
-    gain_form: bool,
-    retry: int,
-    allowed: FloatArray,
-    x: FloatArray,
-    p: FloatArray,
-    track: FloatArray,
-    run: FilterRun,
-) -> tuple[int, float]:
-    """Filter and edit samples [first, last) (x, P in place; the track began at sample `start`).
-
-    Returns the sample at which the track is lost, not before `retry`, or `last`; and the log-likelihood of what was
-    used.
-    """
-    factor, b, h, c = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    z_hat, e, used = np.zeros(3), np.zeros(3), np.zeros(3)
-    pxz, gain, s, s_inv = np.zeros((9, 3)), np.zeros((9, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    full, zero = FULL_AT * gate, ZERO_AT * gate
-    state, covariance = x, p
-    x, p = motion.own(state, covariance)
-    likelihood, lost = 0.0, last
-    for k in range(first, last):
-        if k > start:
-            piece = motion.knot_index(time[k], time[0], knot_s, jerk.shape[0])
-            motion.predict(x, p, time[k] - time[k - 1], jerk[piece], c)
-        for i in range(9):
-            run.predicted[k, i] = x[i]
-        ukf.linearise(x, p, factor, b, z_hat, h, c)
-        innovate(z[k], z_hat, e)
-        inside = _decide(k, time, e, c, noise, full, zero, allowed[k], track, used)
-        any_used = False
-        for i in range(3):
-            run.innovation[k, i] = e[i]
-            run.innovation_sigma[k, i] = math.sqrt(c[i, i] + noise[i])
-            run.weight[k, i] = used[i]
-            any_used = any_used or used[i] > 0
-        if any_used:
-            ukf.cross_covariance(p, h, pxz)
-            if gain_form:
-                nis, gained = _update_by_gain(x, p, pxz, c, e, noise, used, s, s_inv, gain)
-            else:
-                nis, gained = ukf.update(x, p, pxz, c, h, e, noise, used, s, s_inv, gain)
-            run.nis[k] = nis
-            likelihood += gained
-        z_hat[0], z_hat[1], z_hat[2] = measure(x[0], x[1], x[2])
-        innovate(z[k], z_hat, e)
-        for i in range(3):
-            if math.isfinite(e[i]) and allowed[k, i] > 0:
-                track[i, 3] = e[i]
-        for i in range(9):
-            run.state[k, i] = x[i]
-            run.sigma[k, i] = math.sqrt(max(p[i, i], 0.0))
-        line_of_sight_sigma(x, p, run.los_sigma[k])
-        run.since_start[k] = k - start
-        if k >= retry and (_wild(x) or (not inside and _overdue(track, time[k], longest_patch_s))):
-            lost = k
-            break
-    motion.hand_over(x, p, state, covariance)
-    return lost, likelihood
-
-
 @part
-def _overdue(track: FloatArray, now: float, longest_patch_s: float) -> bool:
+def _overdue(gate: Gate, now_s: float) -> bool:
+    """Whether a component has been outside for longer than the longest patch."""
     late = False
     for i in range(3):
-        late = late or (track[i, 0] > 0 and now - track[i, 4] > longest_patch_s)
+        late = late or (gate.in_patch[i] > 0 and now_s - gate.onset_s[i] > gate.longest_patch_s)
     return late
 
 
 @part
-def _wild(x: FloatArray) -> bool:
-    speed2 = x[3] * x[3] + x[4] * x[4] + x[5] * x[5]
-    acceleration2 = x[6] * x[6] + x[7] * x[7] + x[8] * x[8]
+def _diverged(f: ukf.Filter) -> bool:
+    """Whether speed or acceleration are those of nothing that flies."""
+    speed2 = f.x[3] * f.x[3] + f.x[4] * f.x[4] + f.x[5] * f.x[5]
+    acceleration2 = f.x[6] * f.x[6] + f.x[7] * f.x[7] + f.x[8] * f.x[8]
     return not (speed2 < MAX_SPEED_MPS**2 and acceleration2 < MAX_ACCELERATION_MPS2**2)
+
+
+@part
+def _gated(f: ukf.Filter, sample: Sample, gates: Any, row: Row) -> tuple[float, bool]:
+    """The update of a sample through the gate; a component whose weight is zero in the log is barred."""
+    gate = gates[0]
+    ukf.linearise(f)
+    ukf.innovate(sample.measurement, f)
+    all_inside = _decide(f, sample, gate)
+    store_innovation(f, row)
+    gained = 0.0
+    if f.used[0] > 0 or f.used[1] > 0 or f.used[2] > 0:
+        ukf.cross_covariance(f)
+        row.nis, gained = _update_by_gain(f) if gate.gain_form > 0 else ukf.update(f)
+    f.z_hat[0], f.z_hat[1], f.z_hat[2] = measure(f.x[0], f.x[1], f.x[2])
+    ukf.innovate(sample.measurement, f)
+    for i in range(3):
+        if math.isfinite(f.e[i]) and sample.weight[i] > 0:
+            gate.residual[i] = f.e[i]
+    lost = gate.wait <= 0 and (_diverged(f) or (not all_inside and _overdue(gate, sample.time_s)))
+    gate.wait -= 1
+    return gained, lost
+
+
+run_gated = recursion(_gated)

@@ -1,12 +1,13 @@
-"""Patches that a look at one component can tell by their two jumps: in, and back out again.
+"""Patches that one component alone shows by their two jumps: away from the track, and back.
 
-A run of readings is a patch when the readings on both sides lie on one smooth curve (a cubic bridges it) and those
-inside lie off it. A manoeuvre has no such jumps, and no bridge over it.
+A run of readings is a patch when the readings on both sides lie on one smooth curve, a cubic, and those inside lie off
+it. A manoeuvre has no such jumps, and no such curve.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,9 @@ FloatArray = NDArray[np.float64]
 JUMP = 4.0  # sigmas of the difference of two readings
 LONGEST = 48  # readings in a patch that is looked for
 SHORTEST = 3
-PIER = 12  # readings on each side that carry the bridge
-FIT = 1.6  # sigmas: scatter of the piers about the bridge
-OFF = 3.5  # sigmas off the bridge that count as off
+SIDE = 12  # readings on each side that the cubic is fitted to
+FIT = 1.6  # sigmas: scatter of these about it
+OFF = 3.5  # sigmas from it that count as off
 MOSTLY = 0.75  # share of the readings inside that must be off
 
 
@@ -58,13 +59,20 @@ def _value(coefficient: FloatArray, t: float) -> float:
     return float(coefficient[0] + t * (coefficient[1] + t * (coefficient[2] + t * coefficient[3])))
 
 
+class Scratch(NamedTuple):
+    """Memory for one fit: the points x, y (2 SIDE,), the normal equations (4, 5) and the coefficients (4,)."""
+
+    x: FloatArray
+    y: FloatArray
+    normal: FloatArray
+    coefficient: FloatArray
+
+
 @part
-def _is_patch(
-    begin: int, end: int, t: FloatArray, z: FloatArray, sigma: float, x: FloatArray, y: FloatArray,
-    normal: FloatArray, coefficient: FloatArray,
-) -> bool:  # fmt: skip
-    """Whether readings [begin, end) lie off the cubic through the PIER readings on each side."""
-    low, high = begin - PIER, end + PIER
+def _is_patch(begin: int, end: int, t: FloatArray, z: FloatArray, sigma: float, scratch: Scratch) -> bool:
+    """Whether readings [begin, end) lie off the cubic through the SIDE readings on each side."""
+    x, y, normal, coefficient = scratch
+    low, high = begin - SIDE, end + SIDE
     middle, half = 0.5 * (t[low] + t[high - 1]), 0.5 * (t[high - 1] - t[low])
     if half <= 0:
         return False
@@ -84,13 +92,13 @@ def _is_patch(
     for k in range(begin, end):
         away = abs(z[k] - z[low] - _value(coefficient, (t[k] - middle) / half)) > OFF * sigma
         if not away and (k < begin + 2 or k >= end - 2):
-            return False  # a curve leaves the bridge gently, a patch at once
+            return False  # a manoeuvre leaves the cubic gently, a patch at once
         off += away
     return off >= MOSTLY * (end - begin)
 
 
 @kernel
-def bridged(time: FloatArray, channel: FloatArray, good: FloatArray, sigma: float) -> FloatArray:
+def find(time: FloatArray, channel: FloatArray, good: FloatArray, sigma: float) -> FloatArray:
     """(n,) 1 where a reading that was thought good belongs to a patch between two jumps.
 
     time (n,) s, channel (n,) one component (an azimuth unwrapped), good (n,) weight so far, sigma: its noise.
@@ -99,19 +107,18 @@ def bridged(time: FloatArray, channel: FloatArray, good: FloatArray, sigma: floa
     seen = np.flatnonzero((good > 0) & np.isfinite(channel))
     t, z = time[seen], channel[seen]
     n = len(seen)
-    x, y = np.empty(2 * PIER), np.empty(2 * PIER)
-    normal, coefficient = np.empty((4, 5)), np.empty(4)
+    scratch = Scratch(np.empty(2 * SIDE), np.empty(2 * SIDE), np.empty((4, 5)), np.empty(4))
     jumps = np.zeros(n)
     for k in range(2, n - 1):
         # Against the mean of the differences just before and after, which a steady motion shares.
         around = 0.5 * (z[k - 1] - z[k - 2] + z[k + 1] - z[k])
         jumps[k] = 1.0 if abs(z[k] - z[k - 1] - around) > JUMP * math.sqrt(3.0) * sigma else 0.0
-    begin = PIER
-    while begin < n - PIER:
+    begin = SIDE
+    while begin < n - SIDE:
         step = 1
         if jumps[begin] > 0:
-            for end in range(begin + SHORTEST, min(begin + LONGEST, n - PIER) + 1):
-                if jumps[end] > 0 and _is_patch(begin, end, t, z, sigma, x, y, normal, coefficient):
+            for end in range(begin + SHORTEST, min(begin + LONGEST, n - SIDE) + 1):
+                if jumps[end] > 0 and _is_patch(begin, end, t, z, sigma, scratch):
                     for k in range(begin, end):
                         found[seen[k]] = 1.0
                     step = end - begin

@@ -1,4 +1,4 @@
-"""Which samples are bad, with the whole record in view: a hidden Markov chain per component.
+"""Which readings are outliers, from the whole record: a hidden Markov chain per component.
 
 Each sample is good, an isolated outlier, or part of a patch. Given the leave-one-out residual r of a component
 (variance v, from the smoother), good samples are N(0, v), bad ones N(0, v + (WIDE sigma)^2). Isolated outliers come
@@ -91,7 +91,7 @@ def _chain(
 
 
 @part
-def _learn(counts: FloatArray, rates: FloatArray) -> None:
+def _estimate_rates(counts: FloatArray, rates: FloatArray) -> None:
     """Baum-Welch update of the rates, drawn towards rare outliers where the log says little."""
     outside = counts[0].sum() + counts[1].sum()
     isolated = (counts[0, 1] + counts[1, 1] + 0.005 * PRIOR_SAMPLES) / (outside + PRIOR_SAMPLES)
@@ -106,7 +106,7 @@ def _learn(counts: FloatArray, rates: FloatArray) -> None:
 def classify(
     residual: FloatArray, variance: FloatArray, noise_variance: FloatArray, rates: FloatArray, gate: float
 ) -> FloatArray:
-    """(n, 3) probability that each reading is good; zero where missing. `rates` (3, 3) are learnt in place.
+    """(n, 3) probability that each reading is good; zero where missing. `rates` (3, 3) are estimated in place.
 
     residual, variance: (n, 3) leave-one-out, from the smoother; noise_variance (3,). gate: sigmas.
     """
@@ -117,7 +117,7 @@ def classify(
         r, v = residual[:, c].copy(), variance[:, c].copy()
         for _ in range(ROUNDS):
             _chain(r, v, noise_variance[c], stretch, rates[c], column, counts)
-            _learn(counts, rates[c])
+            _estimate_rates(counts, rates[c])
         for k in range(n):
             good[k, c] = column[k]
     return good

@@ -1,9 +1,9 @@
-"""How likely rejected readings are: each by itself, as an unrelated number, or all of a run together.
+"""How likely rejected readings are: each alone, as an unrelated number, or all of a run together.
 
 The readings of a patch are often those of something that moves as smoothly as the target: another target, a reflection,
 an encoder with an offset. They lie beside the track, but on a curve of their own, so that a few numbers (offset, slope
-and bend) explain them all. Who counts them as unrelated finds a long patch so unlikely that they would rather bend the
-track through it.
+and bend) explain them all. If they counted as unrelated, a long patch would be so unlikely that
+the track would rather bend through it.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def _on_a_curve(
         fit[k] = middle
     coefficient = np.zeros(TERMS)
     for trial in range(2 * ROUNDS):
-        # First for the smallest sum of distances, which a few wild readings do not move, then without the wild ones.
+        # First for the smallest sum of distances, which a few outliers do not move, then without them.
         for k in range(n):
             scratch[k] = abs(residual[k] - fit[k])
         near = max(OFF_CURVE * sigma, 2.5 * median(scratch, n))

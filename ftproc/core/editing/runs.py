@@ -83,7 +83,7 @@ def _scan(total: FloatArray, scale: FloatArray) -> NDArray[np.bool_]:
 
 
 def confirmed(suspects: NDArray[np.bool_], residual: FloatArray, variance: FloatArray) -> NDArray[np.bool_]:
-    """(n, 3) those suspect runs that are off at once at both ends, as no curve is.
+    """(n, 3) those suspect runs that are off at once at both ends, as no manoeuvre is.
 
     residual, variance: (n, 3) of the smoother that does not use the suspects.
     """

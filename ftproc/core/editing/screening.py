@@ -1,4 +1,4 @@
-"""A first look at each component by itself, before any filter exists: which samples fit no local parabola?
+"""Screening of each component alone, before any filter exists: which readings fit no local parabola?
 
 Least median of squares (Rousseeuw 1984) in overlapping windows: parabolas through random triples of samples, the
 one with the smallest median residual wins. It needs no start value, no noise level and no motion model, and half of

@@ -1,4 +1,4 @@
-"""Two-pass editing: decide which readings are outliers with the whole record in view.
+"""Two-pass editing: decide which readings are outliers from the whole record.
 
 Screening (no model) -> first state -> noise and jerk by maximum likelihood -> smoother -> Markov indicators on its
 leave-one-out residuals -> again, until the decisions stand still; then a jerk profile that follows the flight.
@@ -13,17 +13,18 @@ from numpy.typing import NDArray
 
 from ftproc.core.editing import jump_patches, outlier_chain, screening
 from ftproc.core.editing.decisions import Decision, Record, allow_for_colour, decide
-from ftproc.core.editing.reassessment import look_again
-from ftproc.core.filtering.initialization import begin_all
+from ftproc.core.editing.reassessment import reassess
+from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Start
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
-from ftproc.core.identification import likelihood
+from ftproc.core.identification.likelihood import NOISE_FLOOR, Fixed
+from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.model.frames import unwrap
 from ftproc.core.model.motion import isotropic
 
 FloatArray = NDArray[np.float64]
 
-SHORT_WINDOW = 11  # samples: sees jumps, and hardly anything else
+SHORT_WINDOW = 11  # samples: sees jumps, and little else
 WINDOWS = (31, 75)  # samples: the short one follows manoeuvres, the long one sees through patches
 FIRST_JERK = 1.0  # m^2/s^5, where the search begins
 FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
@@ -31,11 +32,20 @@ PROFILE_STEPS = 4  # of the search for the jerk profile, once the decisions are 
 START_INFLATION = 2.0  # on the covariance of a smoothed state that starts a filter over the same record
 
 
+class Known(NamedTuple):
+    """What the user has specified: noise 1-sigma (3,) m, rad, rad, NaN where it is to be found; jerk_psd m^2/s^5, None
+    where it is to be found; the gate, in sigmas, beyond which a lone reading is called an outlier."""
+
+    sigma: FloatArray
+    jerk_psd: float | None
+    gate: float
+
+
 class Edited(NamedTuple):
     """The decisions and what they rest on.
 
     weight: (n, 3) 1 good, 0 rejected or missing. model: noise and jerk profile. starts: for the next pass.
-    smoothed: the smoother's run with these. rates: (3, 3) learnt outlier rates per component.
+    smoothed: the smoother's run with these. rates: (3, 3) estimated outlier rates per component.
     rounds: how many passes it took; settled: whether the decisions stood still. slow_noise: the noise is correlated,
     but so slowly that it cannot be told from motion; the sigmas are then too small.
     """
@@ -51,9 +61,9 @@ class Edited(NamedTuple):
 
 
 def screen(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(n, 3) weights after the first look at each component by itself, and (3,) noise 1-sigma."""
+    """(n, 3) weights after screening each component alone, and (3,) noise 1-sigma."""
     weight = np.isfinite(measurement).astype(float)
-    sigma = likelihood.NOISE_FLOOR.copy()
+    sigma = NOISE_FLOOR.copy()
     for c in range(3):
         channel = np.ascontiguousarray(measurement[:, c])
         weight[:, c], scale = _screen_channel(time_s, channel, c == 1)
@@ -71,7 +81,7 @@ def _screen_channel(time_s: FloatArray, channel: FloatArray, angular: bool) -> t
         screening.bar_runs(channel, votes, near, weight)
         if window == WINDOWS[0] and len(scales):
             sigma = float(np.median(scales))
-    weight[jump_patches.bridged(time_s, unwrap(channel) if angular else channel, weight, sigma) > 0] = 0.0
+    weight[jump_patches.find(time_s, unwrap(channel) if angular else channel, weight, sigma) > 0] = 0.0
     # A component that swings too fast for parabolas loses half of itself: then only the short window is believed.
     for alternative in (np.where(near > 0.5, 0.0, seen), seen):
         if weight.sum() < FEWEST_TRUSTED * seen.sum():
@@ -84,44 +94,37 @@ def stuck_readings(measurement: FloatArray, sigma: FloatArray) -> NDArray[np.boo
     return np.stack([screening.stuck(measurement[:, c], float(sigma[c])) for c in range(3)], 1)
 
 
-def edit(
-    time_s: FloatArray,
-    measurement: FloatArray,
-    given_sigma: FloatArray,
-    jerk_psd: float | None,
-    gate: float,
-    told: Model | None = None,
-) -> Edited:
+def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: Model | None = None) -> Edited:
     """Edit a whole log, or a segment of a long one. time_s (n,), measurement (n, 3).
 
-    given_sigma: (3,) noise 1-sigma m, rad, rad, NaN where it is to be found; jerk_psd m^2/s^5 likewise None.
-    gate: sigmas beyond which a lone reading is called an outlier. told: of a segment, the noise of the log that it is
-    part of (taken as it is) and the log's usual jerk (to begin with).
-    Raises ValueError when a component has no reading that agrees with its neighbours.
+    segment_of: of a segment, the noise of the whole log, which is taken as it is, and its typical jerk, with which the
+    search starts. Raises ValueError when a component has no reading that agrees with its neighbours.
     """
+    jerk_psd = known.jerk_psd
     screened, sigma = screen(time_s, measurement)
     possible = np.isfinite(measurement) & ~stuck_readings(measurement, sigma)
-    known = np.isfinite(given_sigma) | (told is not None)
-    record = Record(time_s, measurement, possible, screened * possible, sigma, known, jerk_psd is not None, gate)
+    fixed = Fixed(np.isfinite(known.sigma) | (segment_of is not None), jerk_psd is not None)
+    record = Record(time_s, measurement, possible, screened * possible, sigma, fixed, known.gate)
     first_jerk = FIRST_JERK if jerk_psd is None else jerk_psd
-    model = told or Model(np.where(known, given_sigma, sigma) ** 2, isotropic(first_jerk))
+    model = segment_of or Model(np.where(fixed.noise, known.sigma, sigma) ** 2, isotropic(first_jerk))
     rates = np.tile(np.array(outlier_chain.START_RATES), (3, 1))
-    starts = begin_all(time_s, measurement, record.screened, model.noise_variance, jerk_psd)
+    starts = find_starts(record.weighted(record.screened), model.noise_variance, jerk_psd)
     decision = decide(record, Decision(record.screened, model, starts, rates), tune_first=True)
     if jerk_psd is None:
-        decision = look_again(record, decision)
-    if told is None:
+        decision = reassess(record, decision)
+    if segment_of is None:
         decision = allow_for_colour(record, decision)
+    log = record.weighted(decision.weight)
     if jerk_psd is None:
-        profile = likelihood.fit_profile(*record.log, decision.weight, decision.starts, decision.model, PROFILE_STEPS)
-        decision = decision._replace(model=likelihood.with_allowance(profile))
-    smoothed = smooth_log(time_s, measurement, decision.weight, decision.model, decision.starts)
+        found = fit_profile(log, decision.starts, decision.model, PROFILE_STEPS)
+        decision = decision._replace(model=with_allowance(found))
     d = decision
+    smoothed = smooth_log(log, d.model, d.starts)
     return Edited(d.weight, d.model, d.starts, smoothed, d.rates, d.rounds, d.settled, d.slow_noise)
 
 
 def smoothed_starts(smoothed: SmootherRun) -> list[Start]:
-    """Where the recursive filter begins over a record that has been smoothed: at the smoothed states.
+    """Where the recursive filter starts over a record that has been smoothed: at the smoothed states.
 
     Their covariances are inflated, because the filter will see the same readings once more.
     """

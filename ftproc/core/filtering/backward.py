@@ -3,23 +3,50 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import part
+from ftproc.core.compiled import part, record
+from ftproc.core.filtering.forward import Estimated
+from ftproc.core.filtering.ukf import Filter
 from ftproc.core.model import motion
 from ftproc.core.model.measurement import line_of_sight_sigma
 
 FloatArray = NDArray[np.float64]
 
 
+class Backward(Protocol):
+    """The record of the backward recursion: r, N, and what a step computes on its way.
+
+    u, m, nk: u, M, N K of the smoother's head. state, cov: of the smoothed estimate (of the covariance only the blocks
+    of position and velocity, and the diagonal). pn: P N. q: coefficients of Q. residual, variance: leave-one-out.
+    noise_score: its sum so far. n_first: N+ of the first sample.
+    """
+
+    r: Annotated[FloatArray, 9]
+    n: Annotated[FloatArray, 9, 9]
+    u: Annotated[FloatArray, 3]
+    m: Annotated[FloatArray, 3, 3]
+    nk: Annotated[FloatArray, 9, 3]
+    state: Annotated[FloatArray, 9]
+    cov: Annotated[FloatArray, 9, 9]
+    pn: Annotated[FloatArray, 9, 9]
+    q: Annotated[FloatArray, 3, 3]
+    residual: Annotated[FloatArray, 3]
+    variance: Annotated[FloatArray, 3]
+    noise_score: Annotated[FloatArray, 3]
+    n_first: Annotated[FloatArray, 9, 9]
+
+
+BACKWARD = record(Backward)
+
+
 @part
-def estimate(
-    x: FloatArray, p: FloatArray, r: FloatArray, n: FloatArray, pn: FloatArray, smoothed: FloatArray,
-    state: FloatArray, sigma: FloatArray, los: FloatArray,
-) -> None:  # fmt: skip
-    """x+ + P+ r and P+ - P+ N P+, its diagonal and line-of-sight sigmas."""
+def estimate(back: Backward, f: Filter) -> None:
+    """The smoothed state x+ + P+ r and its covariance P+ - P+ N P+."""
+    x, p, r, n, pn, state, cov = f.x, f.p, back.r, back.n, back.pn, back.state, back.cov
     for i in range(9):
         total = x[i]
         for j in range(9):
@@ -30,42 +57,34 @@ def estimate(
             for j in range(9):
                 pn[i, j] += p[i, k] * n[k, j]
     for i in range(9):
-        for j in range(i // 3 * 3 if i < 6 else i, i + 1):  # the blocks of position and velocity, and the diagonal
+        for j in range(i // 3 * 3 if i < 6 else i, i + 1):
             v = p[i, j]
             for k in range(9):
                 v -= pn[i, k] * p[j, k]
-            smoothed[i, j] = v
-            smoothed[j, i] = v
-        # Rounding may eat a variance that the record has all but determined; it cannot be below that rounding.
-        sigma[i] = math.sqrt(max(smoothed[i, i], 1e-14 * abs(p[i, i])))
-    line_of_sight_sigma(state, smoothed, los)
+            cov[i, j] = v
+            cov[j, i] = v
 
 
 @part
-def absorb(
-    r: FloatArray,
-    n: FloatArray,
-    u: FloatArray,
-    m: FloatArray,
-    nk: FloatArray,
-    h: FloatArray,
-    e: FloatArray,
-    c: FloatArray,
-    s_inv: FloatArray,
-    gain: FloatArray,
-    pxz: FloatArray,
-    weight: FloatArray,
-    noise: FloatArray,
-    residual: FloatArray,
-    variance: FloatArray,
-    noise_score: FloatArray,
-) -> None:
-    """Take r, N back over one measurement; leave the leave-one-out residuals and their variances behind. u (3,),
-    m (3, 3), nk (9, 3) are scratch."""
+def store(back: Backward, f: Filter, row: Estimated) -> None:
+    """Keep the smoothed state of a sample and its sigmas."""
+    for i in range(9):
+        row.state[i] = back.state[i]
+        # Rounding may eat a variance that the record has all but determined; it cannot be below that rounding.
+        row.sigma[i] = math.sqrt(max(back.cov[i, i], 1e-14 * abs(f.p[i, i])))
+    line_of_sight_sigma(back.state, back.cov, row.los_sigma)
+
+
+@part
+def absorb(back: Backward, f: Filter) -> None:
+    """Take r and N back over the measurement of a sample; leave the leave-one-out residuals and their variances behind,
+    and add to the score of the noise."""
+    r, n, u, m, nk = back.r, back.n, back.u, back.m, back.nk
+    h, e, used, s_inv, gain = f.h, f.e, f.used, f.s_inv, f.gain
     for i in range(3):
         u[i] = 0.0
         for j in range(3):
-            if weight[j] > 0 and math.isfinite(e[j]):
+            if used[j] > 0:
                 u[i] += s_inv[i, j] * e[j]
         for a in range(9):
             u[i] -= gain[a, i] * r[a]
@@ -106,25 +125,25 @@ def absorb(
             n[b, a] = v
     for i in range(3):
         if not math.isfinite(e[i]):
-            residual[i] = math.nan
-            variance[i] = math.nan
-        elif weight[i] > 0:
-            residual[i] = u[i] / m[i, i]
-            variance[i] = 1 / m[i, i] + noise[i] * (1 - 1 / weight[i])
-            noise_score[i] += 0.5 * (u[i] * u[i] - m[i, i]) * noise[i] / weight[i]
+            back.residual[i] = back.variance[i] = math.nan
+        elif used[i] > 0:
+            back.residual[i] = u[i] / m[i, i]
+            back.variance[i] = 1 / m[i, i] + f.noise[i] * (1 - 1 / used[i])
+            back.noise_score[i] += 0.5 * (u[i] * u[i] - m[i, i]) * f.noise[i] / used[i]
         else:  # not used: what all the rest predicts is the smoothed estimate itself
-            predicted, spread = 0.0, c[i]
-            for a in range(9):
-                predicted += pxz[a, i] * r[a]
-                for b in range(9):
-                    spread -= pxz[a, i] * n[a, b] * pxz[b, i]
-            residual[i] = e[i] - predicted
-            variance[i] = max(spread, 0.0) + noise[i]
+            predicted, spread = 0.0, f.c[i, i]
+            for j in range(9):
+                predicted += f.pxz[j, i] * r[j]
+                for k in range(9):
+                    spread -= f.pxz[j, i] * n[j, k] * f.pxz[k, i]
+            back.residual[i] = e[i] - predicted
+            back.variance[i] = max(spread, 0.0) + f.noise[i]
 
 
 @part
-def score_jerk(r: FloatArray, n: FloatArray, interval: float, c: FloatArray, score: FloatArray) -> None:
+def score_jerk(back: Backward, interval: float, score: FloatArray) -> None:
     """Add 1/2 c(T) : (r r' - N) to the score of each element of the jerk tensor (off-diagonal ones count twice)."""
+    r, n, c = back.r, back.n, back.q
     motion.noise_coefficients(interval, c)
     k = 0
     for i in range(3):

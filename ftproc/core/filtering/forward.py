@@ -1,175 +1,184 @@
-"""The forward pass over a log whose weights are decided: the plain recursive filter."""
+"""The loop of every recursive filter, and the plain one: a forward pass over a log whose weights are decided."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from types import FunctionType
+from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import kernel, part
+from ftproc.core.compiled import kernel, part, record, zeros
 from ftproc.core.filtering import ukf
-from ftproc.core.filtering.records import FilterRun, Model, Start, empty_run
+from ftproc.core.filtering.records import FilterRun, Model, Observations, Row, Sample, Start, between, empty_rows
 from ftproc.core.model import jacobian, motion
-from ftproc.core.model.measurement import innovate, line_of_sight_sigma
+from ftproc.core.model.measurement import line_of_sight_sigma
 
 FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+
+
+class Span(NamedTuple):
+    """Samples [first, last) of a log, on a track that started at sample `start`."""
+
+    first: int
+    last: int
+    start: int
+
+
+#: The update by which filters differ: (filter, sample, extra, row) -> log-likelihood gained, whether the track is lost.
+Update = Callable[[ukf.Filter, Sample, Any, Row], tuple[float, bool]]
+
+#: (span, samples, profile, filters, extra, rows) -> see `recursion`.
+Recursion = Callable[[Span, Any, motion.Profile, Any, Any, Any], tuple[int, float]]
 
 
 @part
-def store(k: int, first: int, x: FloatArray, p: FloatArray, run: FilterRun) -> None:
-    """The updated state of sample k of a run that began at `first`."""
+def advance(f: ukf.Filter, samples: Any, k: int, profile: motion.Profile) -> None:
+    """Predict from sample k - 1 to sample k."""
+    time_s = samples[k].time_s
+    motion.predict(f, time_s - samples[k - 1].time_s, profile.jerk[motion.knot_index(time_s, profile)])
+
+
+@part
+def store(f: ukf.Filter, row: Row) -> None:
+    """Keep the updated state."""
     for i in range(9):
-        run.state[k, i] = x[i]
-        run.sigma[k, i] = math.sqrt(max(p[i, i], 0.0))
-    line_of_sight_sigma(x, p, run.los_sigma[k])
-    run.since_start[k] = k - first
+        row.state[i] = f.x[i]
+        row.sigma[i] = math.sqrt(max(f.p[i, i], 0.0))
+    line_of_sight_sigma(f.x, f.p, row.los_sigma)
 
 
-@kernel
-def run_span(
-    first: int,
-    last: int,
-    time: FloatArray,
-    z: FloatArray,
-    weight: FloatArray,
-    noise: FloatArray,
-    jerk: FloatArray,
-    knot_s: float,
-    x: FloatArray,
-    p: FloatArray,
-    extended: bool,
-    run: FilterRun,
-) -> float:
-    """Filter samples [first, last) from the state x, P (in place); fills the run; returns the log-likelihood."""
-    factor, b, h, c = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    z_hat, e, used = np.zeros(3), np.zeros(3), np.zeros(3)
-    pxz, gain, s, s_inv = np.zeros((9, 3)), np.zeros((9, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    state, covariance = x, p
-    x, p = motion.own(state, covariance)
+@part
+def store_innovation(f: ukf.Filter, row: Row) -> None:
+    """Keep the innovation, its sigma and the weights."""
+    for i in range(3):
+        row.innovation[i] = f.e[i]
+        row.innovation_sigma[i] = math.sqrt(f.c[i, i] + f.noise[i])
+        row.weight[i] = f.used[i]
+
+
+@part
+def _weighted(f: ukf.Filter, sample: Sample, extended: bool, row: Row) -> tuple[float, bool]:
+    """The update of a sample whose weights are decided; extended: linearised by the Jacobian."""
+    if extended:
+        jacobian.linearise(f)
+    else:
+        ukf.linearise(f)
+    ukf.innovate(sample.measurement, f)
+    any_used = ukf.use(sample.weight, f)
+    store_innovation(f, row)
+    if not any_used:
+        return 0.0, False
+    ukf.cross_covariance(f)
+    row.nis, gained = ukf.update(f)
+    return gained, False
+
+
+_update: Update = _weighted  # of the loop below; each recursion has its own
+
+
+def _loop(span: Span, samples: Any, profile: motion.Profile, filters: Any, extra: Any, rows: Any) -> tuple[int, float]:
+    """Predict, update, keep what came of it; see `recursion`."""
+    f = filters[0]
     likelihood = 0.0
-    for k in range(first, last):
-        if k > first:
-            piece = motion.knot_index(time[k], time[0], knot_s, jerk.shape[0])
-            motion.predict(x, p, time[k] - time[k - 1], jerk[piece], c)
+    for k in range(span.first, span.last):
+        sample, row = samples[k], rows[k]
+        if k > span.start:
+            advance(f, samples, k, profile)
         for i in range(9):
-            run.predicted[k, i] = x[i]
-        if extended:
-            jacobian.linearise(x, p, z_hat, h, c)
-        else:
-            ukf.linearise(x, p, factor, b, z_hat, h, c)
-        innovate(z[k], z_hat, e)
-        any_used = False
-        for i in range(3):
-            run.innovation[k, i] = e[i]
-            run.innovation_sigma[k, i] = math.sqrt(c[i, i] + noise[i])
-            used[i] = weight[k, i] if math.isfinite(e[i]) else 0.0
-            run.weight[k, i] = used[i]
-            any_used = any_used or used[i] > 0
-        if any_used:
-            ukf.cross_covariance(p, h, pxz)
-            nis, gained = ukf.update(x, p, pxz, c, h, e, noise, used, s, s_inv, gain)
-            run.nis[k] = nis
-            likelihood += gained
-        store(k, first, x, p, run)
-    motion.hand_over(x, p, state, covariance)
-    return likelihood
+            row.predicted[i] = f.x[i]
+        gained, lost = _update(f, sample, extra, row)
+        likelihood += gained
+        store(f, row)
+        row.since_start = k - span.start
+        if lost:
+            return k, likelihood
+    return span.last, likelihood
+
+
+def recursion(update: Update) -> Recursion:
+    """A recursive filter: the kernel that runs the loop with this update of one sample compiled into it.
+
+    The kernel takes a span of the samples, from the state of the filter (an array of one `ukf.Filter`), which it
+    changes, and fills the rows. extra: what else the update needs. It returns the sample at which the track was lost,
+    or the span's end, and the log-likelihood of what was used.
+
+    The code of the loop is shared; each kernel has an `_update` of its own among its globals. (A closure would say the
+    same, but numba keeps no machine code of closures.)
+    """
+    function = FunctionType(_loop.__code__, {**globals(), "_update": update}, update.__name__)
+    function.__qualname__ = f"{update.__module__}.{update.__name__}"
+    return kernel(function)
+
+
+run_weighted = recursion(_weighted)
+
+
+class Estimated(Protocol):
+    """What the whole record, or a way back, says of one sample; see `smoother.SmootherRun`."""
+
+    state: Annotated[FloatArray, 9]
+    sigma: Annotated[FloatArray, 9]
+    los_sigma: Annotated[FloatArray, 6]
+    residual: Annotated[FloatArray, 3]
+    residual_variance: Annotated[FloatArray, 3]
+    nis: float
+
+
+ESTIMATED = record(Estimated)
 
 
 @kernel
-def extrapolate_back(
-    sample: int,
-    time: FloatArray,
-    z: FloatArray,
-    noise: FloatArray,
-    jerk: FloatArray,
-    knot_s: float,
-    x: FloatArray,
-    p: FloatArray,
-    state: FloatArray,
-    sigma: FloatArray,
-    los_sigma: FloatArray,
-    residual: FloatArray,
-    variance: FloatArray,
-) -> None:
-    """States of the samples before `sample` from x, P there (in place), going back in time; no reading is used.
-
-    residual, variance (n, 3): reading minus what the state says, and its variance.
-    """
-    factor, b, h, c = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    z_hat, e = np.zeros(3), np.zeros(3)
+def _extrapolate(sample: int, samples: Any, profile: motion.Profile, filters: Any, rows: Any) -> None:
+    """Fill the rows of the samples before `sample` from the state there, which is changed; no reading is used."""
+    f = filters[0]
     for k in range(sample - 1, -1, -1):
-        piece = motion.knot_index(time[k], time[0], knot_s, jerk.shape[0])
-        motion.predict(x, p, time[k] - time[k + 1], jerk[piece], c)
-        ukf.linearise(x, p, factor, b, z_hat, h, c)
-        innovate(z[k], z_hat, e)
+        row, time_s = rows[k], samples[k].time_s
+        motion.predict(f, time_s - samples[k + 1].time_s, profile.jerk[motion.knot_index(time_s, profile)])
+        ukf.linearise(f)
+        ukf.innovate(samples[k].measurement, f)
         for i in range(3):
-            residual[k, i] = e[i]
-            variance[k, i] = c[i, i] + noise[i] if math.isfinite(e[i]) else math.nan
+            row.residual[i] = f.e[i]
+            row.residual_variance[i] = f.c[i, i] + f.noise[i] if math.isfinite(f.e[i]) else math.nan
         for i in range(9):
-            state[k, i] = x[i]
-            sigma[k, i] = math.sqrt(max(p[i, i], 0.0))
-        line_of_sight_sigma(x, p, los_sigma[k])
+            row.state[i] = f.x[i]
+            row.sigma[i] = math.sqrt(max(f.p[i, i], 0.0))
+        line_of_sight_sigma(f.x, f.p, row.los_sigma)
 
 
-def filter_log(
-    time_s: FloatArray,
-    measurement: FloatArray,
-    weight: FloatArray,
-    model: Model,
-    starts: list[Start],
-    extended: bool = False,
-) -> FilterRun:
-    """Run the filter over the whole log, beginning anew at each start.
+def extrapolated(log: Observations, model: Model, start: Start) -> Any:
+    """`Estimated` records of the samples before a start, from the state there back in time; no reading is used."""
+    rows = zeros(ESTIMATED, start.sample)
+    rows["nis"] = np.nan
+    if start.sample:
+        _extrapolate(start.sample, log.samples(), model.profile(log.time_s), model.filter(start), rows)
+    return rows
 
-    time_s (n,), measurement (n, 3), weight (n, 3) in [0, 1]. Samples before the first start are extrapolated.
+
+def filter_log(log: Observations, model: Model, starts: list[Start], extended: bool = False) -> FilterRun:
+    """Run the filter over the whole log, re-initialized at each start. Samples before the first start are extrapolated.
+
     extended: linearise by the Jacobian (EKF) instead of the unscented transform.
     """
-
-    def span(first: int, stop: int, x: FloatArray, p: FloatArray, run: FilterRun) -> float:
-        return run_span(
-            first,
-            stop,
-            time_s,
-            measurement,
-            weight,
-            model.noise_variance,
-            model.jerk,
-            model.knot_s,
-            x,
-            p,
-            extended,
-            run,
-        )
-
-    return run_spans(time_s, measurement, model, starts, span)
+    return run_log(run_weighted, log, model, starts, extended)
 
 
-#: first and one past the last sample, state and covariance before the first (changed in place), the run to fill.
-Span = Callable[[int, int, FloatArray, FloatArray, FilterRun], float]
-
-
-def run_spans(time_s: FloatArray, measurement: FloatArray, model: Model, starts: list[Start], span: Span) -> FilterRun:
-    """A run over the whole log by a filter that begins anew at each start; `span` returns its log-likelihood."""
-    run = empty_run(time_s)
+def run_log(run: Recursion, log: Observations, model: Model, starts: list[Start], extra: Any) -> FilterRun:
+    """A run over the whole log by a recursion that is re-initialized at each start; extra: see `recursion`."""
+    samples, profile, rows = log.samples(), model.profile(log.time_s), empty_rows(len(log.time_s))
     likelihood = 0.0
-    for start, stop in zip(starts, [s.sample for s in starts[1:]] + [len(time_s)], strict=True):
-        likelihood += span(start.sample, stop, start.state.copy(), start.covariance.copy(), run)
-    lead_in(measurement, model, starts[0], run)
-    return run._replace(log_likelihood=likelihood)
+    for start, stop in between(starts, len(log.time_s)):
+        likelihood += run(Span(start.sample, stop, start.sample), samples, profile, model.filter(start), extra, rows)[1]
+    lead_in(log, model, starts[0], rows)
+    return FilterRun.of(log.time_s, rows, likelihood)
 
 
-def lead_in(measurement: FloatArray, model: Model, start: Start, run: FilterRun) -> None:
-    """Fill the run before its first start."""
-    if start.sample == 0:
-        return
-    variance = run.innovation_sigma  # squared until the last line
-    extrapolate_back(
-        start.sample, run.time_s, measurement, model.noise_variance, model.jerk, model.knot_s, start.state.copy(),
-        start.covariance.copy(), run.state, run.sigma, run.los_sigma, run.innovation, variance,
-    )  # fmt: skip
-    before = slice(0, start.sample)
-    run.predicted[before] = run.state[before]
-    run.innovation_sigma[before] = np.sqrt(variance[before])
+def lead_in(log: Observations, model: Model, start: Start, rows: Any) -> None:
+    """Fill the rows before the first start."""
+    before, found = rows[: start.sample], extrapolated(log, model, start)
+    for name in ("state", "sigma", "los_sigma"):
+        before[name] = found[name]
+    before["predicted"], before["innovation"] = found["state"], found["residual"]
+    before["innovation_sigma"] = np.sqrt(found["residual_variance"])

@@ -4,11 +4,12 @@ gates need (a wrong one locks them out), done with a whole window in view."""
 from __future__ import annotations
 
 import itertools
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.filtering.records import Start
+from ftproc.core.filtering.records import Observations, Start
 from ftproc.core.model.frames import line_of_sight_axes, to_cartesian, wrap
 
 FloatArray = NDArray[np.float64]
@@ -27,41 +28,36 @@ SPEED_MPS = 1000.0  # likewise, when a rate cannot be had
 WIDEST_IN_RANGES = 0.1  # the position must not be so vague that the target may be behind the station
 
 
-def begin(time_s: FloatArray, measurement: FloatArray, weight: FloatArray, noise_variance: FloatArray) -> Start:
-    """The start of a record: at its first sample, or, when that would mean reaching back far, where every
-    component has been seen once. Arguments and errors as in `first_state`."""
-    good = (weight > 0) & np.isfinite(measurement)
+def first_start(log: Observations, noise_variance: FloatArray) -> Start:
+    """The start of a log: at its first sample, or, when that would mean reaching back far, where every component has
+    been seen once. Errors as in `first_state`."""
+    good = (log.weight > 0) & np.isfinite(log.measurement)
     if not good.any(0).all():
         raise ValueError(int(np.argmin(good.any(0))))
     sample = int(good.argmax(0).max())
-    if time_s[sample] - time_s[0] <= LONGEST_REACH_S:
+    if log.time_s[sample] - log.time_s[0] <= LONGEST_REACH_S:
         sample = 0
-    return first_state(time_s, measurement, weight, noise_variance, sample, 0, len(time_s))
+    return first_state(log, noise_variance, sample, slice(0, len(log.time_s)))
 
 
-def begin_all(
-    time_s: FloatArray,
-    measurement: FloatArray,
-    weight: FloatArray,
-    noise_variance: FloatArray,
-    jerk_psd: float | None,
-) -> list[Start]:
+def find_starts(log: Observations, noise_variance: FloatArray, jerk_psd: float | None) -> list[Start]:
     """The start of a log, and one more after every gap that is too long to bridge.
 
-    A gap of G seconds is too long when the position has by its end become vague by a noticeable share of the range,
+    A gap of G seconds is too long when the position has by its end become uncertain by a noticeable share of the range,
     sqrt(q G^5 / 20) > WIDEST_BRIDGE R: a filter that came through it would linearise about a wrong place. With
-    jerk_psd None (m^2/s^5, not known yet) every real gap is taken to be so. Arguments and errors as in `first_state`.
+    jerk_psd None (m^2/s^5, not known yet) every gap is taken to be so. Errors as in `first_state`.
     """
-    starts = [begin(time_s, measurement, weight, noise_variance)]
+    time_s, measurement, weight = log
+    starts = [first_start(log, noise_variance)]
     good = (weight > 0) & np.isfinite(measurement)
     interval_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
-    gaps = gaps_of(time_s, good, longest_without(interval_s))
+    gaps = gaps_of(time_s, good, shortest_gap(interval_s))
     edges = [*sorted(gaps), len(time_s)]
     for low, high in itertools.pairwise(edges):
         if low <= starts[-1].sample or (good[low:high].sum(0) < FEWEST_READINGS).any():
             continue
         if jerk_psd is None or too_long(gaps[low], measurement[low:high, 0][good[low:high, 0]], jerk_psd):
-            starts.append(first_state(time_s, measurement, weight, noise_variance, low, low, high))
+            starts.append(first_state(log, noise_variance, low, slice(low, high)))
     return starts
 
 
@@ -72,15 +68,15 @@ def too_long(gap: tuple[float, float], range_m: FloatArray, jerk_psd: float) -> 
     return bool(np.sqrt(jerk_psd * duration_s**5 / 20) > widest * float(np.median(range_m)))
 
 
-def longest_without(interval_s: float) -> float:
-    """Seconds without readings that are no gap yet, at a median interval."""
+def shortest_gap(interval_s: float) -> float:
+    """Seconds without readings beyond which a log of this median interval has a gap."""
     return max(GAP_INTERVALS * interval_s, GAP_S)
 
 
 def gaps_of(
     time_s: FloatArray, good: NDArray[np.bool_], longest_s: float, last_good_s: FloatArray | None = None
 ) -> dict[int, tuple[float, float]]:
-    """The first sample after each gap, with the gap's length in s and how vague (in ranges) the position may be by
+    """The first sample after each gap, with the gap's length in s and how uncertain (in ranges) the position may be by
     its end: gaps between samples, and those in which one component has no good reading. good (n, 3).
 
     last_good_s: (3,) when each component was seen before the first sample; NaN for never."""
@@ -96,42 +92,46 @@ def gaps_of(
     return found
 
 
-def first_state(
-    time_s: FloatArray,
-    measurement: FloatArray,
-    weight: FloatArray,
-    noise_variance: FloatArray,
-    sample: int,
-    low: int,
-    high: int,
-) -> Start:
-    """Start at `sample` from lines through the good readings of [low, high) nearest to it.
+class _Line(NamedTuple):
+    """A line through the readings of one component: value and rate at the start and their 1-sigma (infinite for the
+    rate when all readings are of one instant); then the time over which a curve may have gone unseen, s: between the
+    readings, and from them to the start."""
 
-    time_s (n,), measurement (n, 3), weight (n, 3) with zero for rejected readings, noise_variance (3,). Components
-    are fitted one by one, so they need not come at the same instants. The covariance is inflated.
+    value: float
+    rate: float
+    value_sigma: float
+    rate_sigma: float
+    unseen_s: float
+    lead_s: float
+
+
+def first_state(log: Observations, noise_variance: FloatArray, sample: int, within: slice) -> Start:
+    """Start at `sample` from lines through the good readings nearest to it, among the samples of `within`.
+
+    log: weights of zero for rejected readings. noise_variance (3,). Components are fitted one by one, so they need not
+    come at the same instants. The covariance is inflated.
     Raises ValueError with the component's index when a component has no good reading in the span.
     """
-    fits = []
+    lines = []
     for c in range(3):
-        good = np.flatnonzero((weight[low:high, c] > 0) & np.isfinite(measurement[low:high, c])) + low
+        good = np.flatnonzero((log.weight[within, c] > 0) & np.isfinite(log.measurement[within, c])) + within.start
         if len(good) == 0:
             raise ValueError(c)
         here = int(np.searchsorted(good, sample))
         good = good[max(here - SAMPLES, 0) : here + SAMPLES]  # the nearest are among these
-        away = np.abs(time_s[good] - time_s[sample])
+        away = np.abs(log.time_s[good] - log.time_s[sample])
         nearest = np.argsort(away, kind="stable")[:SAMPLES]
         close = away[nearest] <= away[nearest[0]] + LONGEST_FIT_S
         chosen = np.sort(good[nearest[close | (np.arange(len(nearest)) < 2)]])
-        z = measurement[chosen, c]
+        z = log.measurement[chosen, c]
         if c == 1:
             z = z[0] + np.cumsum(np.r_[0.0, wrap(np.diff(z))])
-        fits.append(_line(time_s[chosen] - time_s[sample], z, float(np.sqrt(noise_variance[c]))))
-    return _to_state(sample, *(np.array(column) for column in zip(*fits, strict=True)))
+        lines.append(_line(log.time_s[chosen] - log.time_s[sample], z, float(np.sqrt(noise_variance[c]))))
+    return _to_state(sample, lines)
 
 
-def _line(t: FloatArray, z: FloatArray, sigma: float) -> tuple[float, float, float, float, float, float]:
-    """Value and rate at t = 0 and their 1-sigma (infinite for the rate when all readings are of one instant); then
-    the time over which a curve may have gone unseen, s: between the readings and from them to t = 0.
+def _line(t: FloatArray, z: FloatArray, sigma: float) -> _Line:
+    """The line at t = 0 through readings (m,) at times (m,) from the start.
 
     The scatter about the line stands for what it misses of a curve, so it is not averaged down; too few readings
     to show a curve leave it to the acceleration that must be allowed for.
@@ -139,26 +139,20 @@ def _line(t: FloatArray, z: FloatArray, sigma: float) -> tuple[float, float, flo
     lead = float(np.abs(t).min())
     span = float(np.ptp(t))
     if span <= 0:
-        return float(z.mean()), 0.0, sigma, np.inf, 0.0, lead
+        return _Line(float(z.mean()), 0.0, sigma, np.inf, 0.0, lead)
     middle = float(t.mean())
     spread = float(((t - middle) ** 2).sum())
     rate = float(((t - middle) * (z - z.mean())).sum()) / spread
     value = float(z.mean()) - rate * middle
     scatter = max(sigma, float(np.abs(z - value - rate * t).max()))
     rate_sigma = 4 * scatter / span
-    return value, rate, float(np.hypot(scatter, rate_sigma * lead)), rate_sigma, span if len(t) < CURVE else 0.0, lead
+    unseen_s = span if len(t) < CURVE else 0.0
+    return _Line(value, rate, float(np.hypot(scatter, rate_sigma * lead)), rate_sigma, unseen_s, lead)
 
 
-def _to_state(
-    sample: int,
-    values: FloatArray,
-    rates: FloatArray,
-    value_sigma: FloatArray,
-    rate_sigma: FloatArray,
-    unseen_s: FloatArray,
-    lead_s: FloatArray,
-) -> Start:
+def _to_state(sample: int, lines: list[_Line]) -> Start:
     """From range, azimuth, elevation and their rates to a Cartesian state with its covariance."""
+    values, rates, value_sigma, rate_sigma, unseen_s, lead_s = np.array(lines).T.copy()
     slant = values[0] = max(values[0], 1.0)
     position = to_cartesian(values)
     axes = line_of_sight_axes(position[None])[0]

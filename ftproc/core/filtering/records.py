@@ -1,27 +1,83 @@
-"""What a filter is given and what it leaves behind."""
+"""What a filter is given and what it leaves behind: NamedTuples of arrays, and the records that kernels work on."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Iterator
+from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ftproc.core.compiled import record, zeros
+from ftproc.core.filtering.ukf import FILTER
+from ftproc.core.model.motion import Profile
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
+class Sample(Protocol):
+    """One row of a log: measurement m, rad, rad, NaN where missing; the weight of each component in [0, 1], zero for
+    one that is not used."""
+
+    time_s: float
+    measurement: Annotated[FloatArray, 3]
+    weight: Annotated[FloatArray, 3]
+
+
+class Row(Protocol):
+    """What a recursive filter leaves behind of one sample, see `FilterRun`."""
+
+    predicted: Annotated[FloatArray, 9]
+    state: Annotated[FloatArray, 9]
+    sigma: Annotated[FloatArray, 9]
+    innovation: Annotated[FloatArray, 3]
+    innovation_sigma: Annotated[FloatArray, 3]
+    weight: Annotated[FloatArray, 3]
+    los_sigma: Annotated[FloatArray, 6]
+    nis: float
+    since_start: float
+
+
+SAMPLE, ROW = record(Sample), record(Row)
+
+
+class Observations(NamedTuple):
+    """A log as the filters see it: time_s (n,), measurement (n, 3) slant range m, azimuth and elevation rad, NaN where
+    missing, and the weight (n, 3) in [0, 1] of each reading, zero for one that is not used."""
+
+    time_s: FloatArray
+    measurement: FloatArray
+    weight: FloatArray
+
+    def part(self, rows: slice | IntArray) -> Observations:
+        """Some of the samples."""
+        return Observations(self.time_s[rows], self.measurement[rows], self.weight[rows])
+
+    def samples(self) -> Any:
+        """The same as an array (n,) of `Sample` records."""
+        samples = zeros(SAMPLE, len(self.time_s))
+        for name, values in self._asdict().items():
+            samples[name] = values
+        return samples
+
+
 class Start(NamedTuple):
-    """Where a recursion begins: state (9,) and covariance (9, 9) before the update of `sample`."""
+    """The state (9,) and covariance (9, 9) with which a recursion starts, before the update of `sample`."""
 
     sample: int
     state: FloatArray
     covariance: FloatArray
 
 
+def between(starts: list[Start], samples: int) -> Iterator[tuple[Start, int]]:
+    """Each start with the sample at which the next one follows, or the log of so many samples ends."""
+    yield from zip(starts, [start.sample for start in starts[1:]] + [samples], strict=True)
+
+
 class Model(NamedTuple):
-    """What the filter is told of noise and motion.
+    """The noise of the measurements, and of the motion.
 
     noise_variance: (3,) m^2, rad^2, rad^2. jerk: (m, 6) tensor of the jerk density, m^2/s^5, each row holding for
     `knot_s` seconds from the first sample on. correlation: (3,) of the noise between neighbouring samples; where it is
@@ -39,6 +95,16 @@ class Model(NamedTuple):
         """(3,) variance of the noise of a single reading."""
         variance: FloatArray = self.noise_variance * (1 - self.correlation) / (1 + self.correlation)
         return variance
+
+    def profile(self, time_s: FloatArray) -> Profile:
+        """The process noise of a log with these times."""
+        return Profile(self.jerk, self.knot_s, float(time_s[0]))
+
+    def filter(self, start: Start) -> Any:
+        """An array of one `ukf.Filter` record at a start."""
+        filters = zeros(FILTER)
+        filters["x"][0], filters["p"][0], filters["noise"][0] = start.state, start.covariance, self.noise_variance
+        return filters
 
 
 class FilterRun(NamedTuple):
@@ -63,15 +129,20 @@ class FilterRun(NamedTuple):
     since_start: IntArray
     log_likelihood: float
 
+    @classmethod
+    def of(cls, time_s: FloatArray, rows: Any, log_likelihood: float) -> FilterRun:
+        """From the `Row` records (n,) that a kernel has filled, whose memory it keeps."""
+        fields = {name: rows[name] for name in ROW.names or ()}
+        fields["since_start"] = fields["since_start"].astype(np.int64)
+        return cls(time_s, log_likelihood=log_likelihood, **fields)
+
     def rows(self, low: int, high: int) -> FilterRun:
         """Of the samples [low, high) alone; the likelihood stays that of the whole run."""
         return FilterRun._make([*(each[low:high] for each in self[:-1]), self.log_likelihood])
 
 
-def empty_run(time_s: FloatArray) -> FilterRun:
-    """A run of the right shapes for the kernels to fill."""
-    n = len(time_s)
-    return FilterRun(
-        time_s, np.empty((n, 9)), np.empty((n, 9)), np.empty((n, 9)), np.empty((n, 3)), np.empty((n, 3)),
-        np.zeros((n, 3)), np.full(n, np.nan), np.empty((n, 6)), np.zeros(n, np.int64), 0.0,
-    )  # fmt: skip
+def empty_rows(n: int) -> Any:
+    """`Row` records (n,) for a kernel to fill."""
+    rows = zeros(ROW, n)
+    rows["nis"] = np.nan
+    return rows

@@ -22,17 +22,16 @@ filters each block again.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import kernel
+from ftproc.core.compiled import kernel, part, zeros
 from ftproc.core.filtering import backward, ukf
-from ftproc.core.filtering.forward import extrapolate_back
-from ftproc.core.filtering.records import Model, Start
+from ftproc.core.filtering.forward import ESTIMATED, Span, advance, extrapolated
+from ftproc.core.filtering.records import Model, Observations, Sample, Start, between
 from ftproc.core.model import motion
-from ftproc.core.model.measurement import innovate
 
 FloatArray = NDArray[np.float64]
 
@@ -58,107 +57,104 @@ class SmootherRun(NamedTuple):
     log_likelihood: float
     noise_score: FloatArray
     jerk_score: FloatArray
-    heads: list[Start]
+    heads: tuple[Start, ...]
 
     def rows(self, low: int, high: int) -> SmootherRun:
         """Of the samples [low, high) alone; likelihood, scores and heads stay those of the whole run."""
         return SmootherRun._make([*(each[low:high] for each in self[:6]), *self[6:]])
 
 
+SCORES, RESIDUALS, STATES = 0, 1, 2  # what is kept of each sample: nothing, residuals, states too
+
+
+class Memory(NamedTuple):
+    """What a sweep works on: `ukf.Filter` records, one for each sample of a block and one for the state before each
+    block, and one `backward.Backward`."""
+
+    block: Any
+    before: Any
+    back: Any
+
+    @classmethod
+    def of(cls, samples: int, first: Any) -> Memory:
+        """For a span of so many samples that begins with a filter (an array of one record)."""
+        before = zeros(ukf.FILTER, -(-samples // BLOCK))
+        before[:1] = first
+        block = zeros(ukf.FILTER, min(samples, BLOCK))
+        block["noise"] = first["noise"][0]
+        return cls(block, before, zeros(backward.BACKWARD))
+
+
+@part
+def _take_in(f: ukf.Filter, sample: Sample) -> tuple[float, float]:
+    """Update by a sample; NIS, NaN where nothing is used, and the log-likelihood. All that the way back needs stays in
+    the record."""
+    ukf.linearise(f)
+    ukf.innovate(sample.measurement, f)
+    any_used = ukf.use(sample.weight, f)
+    ukf.cross_covariance(f)
+    if any_used:
+        return ukf.update(f)
+    for i in range(3):
+        for j in range(3):
+            f.s_inv[i, j] = 0.0
+        for j in range(9):
+            f.gain[j, i] = 0.0
+    return math.nan, 0.0
+
+
+@part
+def _copy_state(source: ukf.Filter, target: ukf.Filter) -> None:
+    for i in range(9):
+        target.x[i] = source.x[i]
+        for j in range(9):
+            target.p[i, j] = source.p[i, j]
+
+
 @kernel
 def _sweep(
-    first: int,
-    last: int,
-    time: FloatArray,
-    z: FloatArray,
-    weight: FloatArray,
-    noise: FloatArray,
-    jerk: FloatArray,
-    knot_s: float,
-    start_x: FloatArray,
-    start_p: FloatArray,
-    state: FloatArray,
-    sigma: FloatArray,
-    los_sigma: FloatArray,
-    residual: FloatArray,
-    variance: FloatArray,
-    nis_out: FloatArray,
-    noise_score: FloatArray,
-    jerk_score: FloatArray,
-    head: FloatArray,
-    scores_only: bool,
-    residuals_only: bool,
+    span: Span, samples: Any, profile: motion.Profile, memory: Memory, rows: Any, jerk_score: FloatArray, kept: int
 ) -> float:
-    """Both sweeps over samples [first, last); returns the log-likelihood. With `scores_only` the arrays of the samples
-    need only one row, which is scratch. Leaves P+ and N+ of sample
-    `first` in `head` (2, 9, 9)."""
-    factor, b, c, s = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    q, z_hat, used = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
-    blocks = (last - first + BLOCK - 1) // BLOCK
-    size = min(last - first, BLOCK)
-    saved_x, saved_p = np.empty((blocks, 9)), np.empty((blocks, 9, 9))
-    xs, ps = np.empty((size, 9)), np.empty((size, 9, 9))
-    hs, es, cs = np.empty((size, 3, 3)), np.empty((size, 3)), np.empty((size, 3))
-    s_invs, gains, pxzs = np.empty((size, 3, 3)), np.empty((size, 9, 3)), np.empty((size, 9, 3))
-    r, n, smoothed = np.zeros(9), np.zeros((9, 9)), np.zeros((9, 9))
-    u, m, nk, pn = np.zeros(3), np.zeros((3, 3)), np.zeros((9, 3)), np.zeros((9, 9))  # scratch
-    x, p = motion.own(start_x, start_p)
+    """Both sweeps over a span; the log-likelihood. Adds to the jerk score (m, 6); fills what is kept of the rows, and
+    with residuals alone also the state of the first sample."""
+    block, before, back = memory.block, memory.before, memory.back[0]
+    f = block[0]
+    _copy_state(before[0], f)
+    for b in range(1, len(before)):
+        for k in range(span.first + (b - 1) * BLOCK, span.first + b * BLOCK):
+            if k > span.first:
+                advance(f, samples, k, profile)
+            _take_in(f, samples[k])
+        _copy_state(f, before[b])
     likelihood = 0.0
-    for round_ in range(2 * blocks):
-        forward_only = round_ < blocks
-        block = round_ if forward_only else 2 * blocks - 1 - round_
-        low = first + block * BLOCK
-        high = min(low + BLOCK, last)
-        if forward_only:
-            saved_x[block] = x
-            saved_p[block] = p
-            if block == blocks - 1:
-                continue  # its filtering is done on the way back
-        else:
-            motion.hand_over(saved_x[block], saved_p[block], x, p)
+    for b in range(len(before) - 1, -1, -1):
+        low = span.first + b * BLOCK
+        high = min(low + BLOCK, span.last)
         for k in range(low, high):
-            j = k - low
-            if k > first:
-                piece = motion.knot_index(time[k], time[0], knot_s, jerk.shape[0])
-                motion.predict(x, p, time[k] - time[k - 1], jerk[piece], q)
-            h, e = hs[j], es[j]
-            ukf.linearise(x, p, factor, b, z_hat, h, c)
-            innovate(z[k], z_hat, e)
-            any_used = False
-            for i in range(3):
-                used[i] = weight[k, i] if math.isfinite(e[i]) else 0.0
-                any_used = any_used or used[i] > 0
-                cs[j, i] = c[i, i]
-            ukf.cross_covariance(p, h, pxzs[j])
-            if any_used:
-                nis, gained = ukf.update(x, p, pxzs[j], c, h, e, noise, used, s, s_invs[j], gains[j])
-                if not forward_only:
-                    nis_out[0 if scores_only else k] = nis
-                    likelihood += gained
-            else:
-                s_invs[j] = 0.0
-                gains[j] = 0.0
-            xs[j] = x
-            ps[j] = p
-        if forward_only:
-            continue
+            f = block[k - low]
+            _copy_state(before[b] if k == low else block[k - low - 1], f)
+            if k > span.first:
+                advance(f, samples, k, profile)
+            nis, gained = _take_in(f, samples[k])
+            likelihood += gained
+            if kept >= RESIDUALS:
+                rows[k].nis = nis
         for k in range(high - 1, low - 1, -1):
-            j = k - low
-            if k == first:
-                head[0] = ps[j]
-                head[1] = n
-            row = 0 if scores_only else k
-            if not scores_only and (not residuals_only or k == first):
-                backward.estimate(xs[j], ps[j], r, n, pn, smoothed, state[k], sigma[k], los_sigma[k])
-            backward.absorb(
-                r, n, u, m, nk, hs[j], es[j], cs[j], s_invs[j], gains[j], pxzs[j], weight[k], noise,
-                residual[row], variance[row], noise_score,
-            )  # fmt: skip
-            if k > first:
-                interval = time[k] - time[k - 1]
-                piece = motion.knot_index(time[k], time[0], knot_s, jerk.shape[0])
-                backward.score_jerk(r, n, interval, q, jerk_score[piece])
-                motion.adjoint(r, n, interval)
+            f = block[k - low]
+            if kept == STATES or (kept == RESIDUALS and k == span.first):
+                backward.estimate(back, f)
+                backward.store(back, f, rows[k])
+            if k == span.first:
+                back.n_first[:] = back.n
+            backward.absorb(back, f)
+            if kept >= RESIDUALS:
+                for i in range(3):
+                    rows[k].residual[i] = back.residual[i]
+                    rows[k].residual_variance[i] = back.variance[i]
+            if k > span.first:
+                interval = samples[k].time_s - samples[k - 1].time_s
+                backward.score_jerk(back, interval, jerk_score[motion.knot_index(samples[k].time_s, profile)])
+                motion.adjoint(back, interval)
     return likelihood
 
 
@@ -185,51 +181,43 @@ class Scores(NamedTuple):
     jerk: FloatArray
 
 
-def score_log(
-    time_s: FloatArray, measurement: FloatArray, weight: FloatArray, model: Model, starts: list[Start]
-) -> Scores:
-    """The likelihood and its scores alone, at half the cost of `smooth_log`; arguments as there."""
-    scratch = (np.empty((1, 9)), np.empty((1, 9)), np.empty((1, 6)), np.empty((1, 3)), np.empty((1, 3)), np.empty(1))
-    noise, jerk, ends = np.zeros(3), np.zeros_like(model.jerk), np.empty((2, 9, 9))
-    likelihood = 0.0
-    for start, stop in zip(starts, [s.sample for s in starts[1:]] + [len(time_s)], strict=True):
-        likelihood += _sweep(
-            start.sample, stop, time_s, measurement, weight, model.noise_variance, model.jerk, model.knot_s,
-            start.state, start.covariance, *scratch, noise, jerk, ends, True, True,
-        )  # fmt: skip
-    return Scores(likelihood, noise, jerk)
+class _Swept(NamedTuple):
+    """What the sweeps over a log leave behind; rows: `Estimated` records, of one sample where only scores are kept."""
+
+    scores: Scores
+    rows: Any
+    heads: tuple[Start, ...]
 
 
-def smooth_log(
-    time_s: FloatArray,
-    measurement: FloatArray,
-    weight: FloatArray,
-    model: Model,
-    starts: list[Start],
-    residuals_only: bool = False,
-) -> SmootherRun:
-    """Smooth the whole log; the record on each side of a start is smoothed by itself.
+def _swept(log: Observations, model: Model, starts: list[Start], kept: int) -> _Swept:
+    n = len(log.time_s)
+    samples, profile = log.samples(), model.profile(log.time_s)
+    rows = zeros(ESTIMATED, 1 if kept == SCORES else n)
+    noise, jerk, likelihood, heads = np.zeros(3), np.zeros_like(model.jerk), 0.0, []
+    for start, stop in between(starts, n):
+        memory = Memory.of(stop - start.sample, model.filter(start))
+        likelihood += _sweep(Span(start.sample, stop, start.sample), samples, profile, memory, rows, jerk, kept)
+        noise += memory.back["noise_score"][0]
+        if kept != SCORES:
+            covariance = smoothed_covariance(memory.block["p"][0], memory.back["n_first"][0])
+            heads.append(Start(start.sample, rows["state"][start.sample].copy(), covariance))
+    return _Swept(Scores(likelihood, noise, jerk), rows, tuple(heads))
 
-    time_s (n,), measurement (n, 3), weight (n, 3) in [0, 1]. Samples before the first start are extrapolated.
-    residuals_only: states and sigmas are left undefined, for who needs only what the record says of its readings.
+
+def score_log(log: Observations, model: Model, starts: list[Start]) -> Scores:
+    """The likelihood and its scores alone, at half the cost of `smooth_log`."""
+    return _swept(log, model, starts, SCORES).scores
+
+
+def smooth_log(log: Observations, model: Model, starts: list[Start], residuals_only: bool = False) -> SmootherRun:
+    """Smooth the whole log; the record on each side of a start separately. Samples before the first start are
+    extrapolated.
+
+    residuals_only: states and sigmas are left undefined, which saves a third of the time.
     """
-    n = len(time_s)
-    state, sigma, los_sigma = np.empty((n, 9)), np.empty((n, 9)), np.empty((n, 6))
-    residual, variance, nis = np.empty((n, 3)), np.empty((n, 3)), np.full(n, np.nan)
-    noise_score, jerk_score = np.zeros(3), np.zeros_like(model.jerk)
-    likelihood = 0.0
-    heads: list[Start] = []
-    for start, stop in zip(starts, [s.sample for s in starts[1:]] + [n], strict=True):
-        ends = np.empty((2, 9, 9))
-        likelihood += _sweep(
-            start.sample, stop, time_s, measurement, weight, model.noise_variance, model.jerk, model.knot_s,
-            start.state, start.covariance, state, sigma, los_sigma, residual, variance, nis, noise_score, jerk_score,
-            ends, False, residuals_only,
-        )  # fmt: skip
-        heads.append(Start(start.sample, state[start.sample].copy(), smoothed_covariance(*ends)))
-    head = heads[0]
-    extrapolate_back(
-        head.sample, time_s, measurement, model.noise_variance, model.jerk, model.knot_s, head.state.copy(),
-        head.covariance.copy(), state, sigma, los_sigma, residual, variance,
-    )  # fmt: skip
-    return SmootherRun(state, sigma, los_sigma, residual, variance, nis, likelihood, noise_score, jerk_score, heads)
+    scores, rows, heads = _swept(log, model, starts, RESIDUALS if residuals_only else STATES)
+    rows[: heads[0].sample] = extrapolated(log, model, heads[0])
+    fields = {name: np.ascontiguousarray(rows[name]) for name in ESTIMATED.names or ()}
+    return SmootherRun(
+        **fields, log_likelihood=scores.log_likelihood, noise_score=scores.noise, jerk_score=scores.jerk, heads=heads
+    )

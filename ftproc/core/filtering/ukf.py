@@ -15,12 +15,13 @@ bend of h adds to the measurement noise.
 from __future__ import annotations
 
 import math
+from typing import Annotated, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import part
-from ftproc.core.model.measurement import MIN_RANGE_M, turn
+from ftproc.core.compiled import part, record
+from ftproc.core.model.measurement import MIN_RANGE_M, turn, wrap_angle
 
 FloatArray = NDArray[np.float64]
 
@@ -29,9 +30,39 @@ MAX_SPREAD_IN_RANGES = 0.3  # of the sigma points about the state
 ROUNDING = 1e-15  # of a number, below which its last digits say nothing
 
 
+class Filter(Protocol):
+    """The record of a filter: its state, and what one measurement update computes on its way.
+
+    x, p: state and covariance, SI units. noise: variance of each component. q: coefficients of Q. z_hat: predicted
+    measurement. e: innovation. used: weight of each component, zero for none. h: H on the position. c: C of the
+    module's head. s, s_inv: innovation covariance of the components used, and its inverse. pxz: P H'. gain. factor, b:
+    of the transform.
+    """
+
+    x: Annotated[FloatArray, 9]
+    p: Annotated[FloatArray, 9, 9]
+    noise: Annotated[FloatArray, 3]
+    q: Annotated[FloatArray, 3, 3]
+    z_hat: Annotated[FloatArray, 3]
+    e: Annotated[FloatArray, 3]
+    used: Annotated[FloatArray, 3]
+    h: Annotated[FloatArray, 3, 3]
+    c: Annotated[FloatArray, 3, 3]
+    s: Annotated[FloatArray, 3, 3]
+    s_inv: Annotated[FloatArray, 3, 3]
+    pxz: Annotated[FloatArray, 9, 3]
+    gain: Annotated[FloatArray, 9, 3]
+    factor: Annotated[FloatArray, 3, 3]
+    b: Annotated[FloatArray, 3, 3]
+
+
+FILTER = record(Filter)
+
+
 @part
-def position_factor(p: FloatArray, factor: FloatArray) -> None:
+def position_factor(f: Filter) -> None:
     """Lower Cholesky factor of the position block; a pivot lost to rounding is floored, never taken the root of."""
+    p, factor = f.p, f.factor
     floor = 1e-12 * (p[0, 0] + p[1, 1] + p[2, 2]) + 1e-300
     for i in range(3):
         for j in range(i + 1):
@@ -45,15 +76,14 @@ def position_factor(p: FloatArray, factor: FloatArray) -> None:
 
 
 @part
-def linearise(
-    x: FloatArray, p: FloatArray, factor: FloatArray, b: FloatArray, z_hat: FloatArray, h: FloatArray, c: FloatArray
-) -> None:
-    """The unscented transform of h at (x, P): fills z_hat (3,), H (3, 3) on the position, C (3, 3).
+def linearise(f: Filter) -> None:
+    """The unscented transform of h at (x, P): fills z_hat, H and C.
 
     When P is so wide (a long coast) that the points would straddle the station, alpha is made smaller, which draws
     the points together; at alpha = 1 the formulas are those of the module's head.
     """
-    position_factor(p, factor)
+    x, p, factor, b, z_hat, h, c = f.x, f.p, f.factor, f.b, f.z_hat, f.h, f.c
+    position_factor(f)
     px, py, pz = x[0], x[1], x[2]
     ground = math.sqrt(px * px + py * py)
     slant = max(math.sqrt(px * px + py * py + pz * pz), MIN_RANGE_M)
@@ -109,67 +139,84 @@ def linearise(
 
 
 @part
-def invert_used(s: FloatArray, used: FloatArray, out: FloatArray) -> float:
+def innovate(z: FloatArray, f: Filter) -> None:
+    """e = z - z^ with the azimuth wrapped; NaN where z (3,) is missing."""
+    e, z_hat = f.e, f.z_hat
+    e[0] = z[0] - z_hat[0]
+    e[1] = z[1] - z_hat[1]
+    e[2] = z[2] - z_hat[2]
+    if math.isfinite(e[1]):
+        e[1] = wrap_angle(e[1])
+
+
+@part
+def use(weight: FloatArray, f: Filter) -> bool:
+    """Take the weights (3,) for the components that have an innovation; whether any is used."""
+    any_used = False
+    for i in range(3):
+        f.used[i] = weight[i] if math.isfinite(f.e[i]) else 0.0
+        any_used = any_used or f.used[i] > 0
+    return any_used
+
+
+@part
+def invert_used(f: Filter) -> float:
     """Inverse of the rows and columns of S whose weight is positive, zero elsewhere; returns ln det of them.
 
     Embedding the inverse of the sub-matrix in zeros makes one formula serve all seven missing patterns.
     """
+    s, used, out = f.s, f.used, f.s_inv
     on0, on1, on2 = used[0] > 0, used[1] > 0, used[2] > 0
     a = math.sqrt(s[0, 0]) if on0 else 1.0
     b = s[1, 0] / a if on0 and on1 else 0.0
     c = s[2, 0] / a if on0 and on2 else 0.0
     d = math.sqrt(s[1, 1] - b * b) if on1 else 1.0
     e = (s[2, 1] - c * b) / d if on1 and on2 else 0.0
-    f = math.sqrt(s[2, 2] - c * c - e * e) if on2 else 1.0
-    # Inverse of the lower factor [[a,0,0],[b,d,0],[c,e,f]], then its Gram matrix.
-    ia, id_, if_ = 1 / a, 1 / d, 1 / f
+    g = math.sqrt(s[2, 2] - c * c - e * e) if on2 else 1.0
+    # Inverse of the lower factor [[a,0,0],[b,d,0],[c,e,g]], then its Gram matrix.
+    ia, id_, ig = 1 / a, 1 / d, 1 / g
     ib = -b * ia * id_
-    ie = -e * id_ * if_
-    ic = -(c * ia + e * ib) * if_
+    ie = -e * id_ * ig
+    ic = -(c * ia + e * ib) * ig
     out[0, 0] = ia * ia + ib * ib + ic * ic if on0 else 0.0
     out[1, 1] = id_ * id_ + ie * ie if on1 else 0.0
-    out[2, 2] = if_ * if_ if on2 else 0.0
+    out[2, 2] = ig * ig if on2 else 0.0
     out[0, 1] = out[1, 0] = ib * id_ + ic * ie if on0 and on1 else 0.0
-    out[0, 2] = out[2, 0] = ic * if_ if on0 and on2 else 0.0
-    out[1, 2] = out[2, 1] = ie * if_ if on1 and on2 else 0.0
-    return 2 * math.log(a * d * f)
+    out[0, 2] = out[2, 0] = ic * ig if on0 and on2 else 0.0
+    out[1, 2] = out[2, 1] = ie * ig if on1 and on2 else 0.0
+    return 2 * math.log(a * d * g)
 
 
 @part
-def cross_covariance(p: FloatArray, h: FloatArray, pxz: FloatArray) -> None:
-    """P_xz = P H' for an H that sees the position only; (9, 3)."""
+def cross_covariance(f: Filter) -> None:
+    """P_xz = P H' for an H that sees the position only."""
+    _times_h(f.p, f.h, f.pxz)
+
+
+@part
+def _times_h(p: FloatArray, h: FloatArray, pxz: FloatArray) -> None:
     for i in range(9):
         for j in range(3):
             pxz[i, j] = p[i, 0] * h[j, 0] + p[i, 1] * h[j, 1] + p[i, 2] * h[j, 2]
 
 
 @part
-def update(
-    x: FloatArray,
-    p: FloatArray,
-    pxz: FloatArray,
-    c: FloatArray,
-    h: FloatArray,
-    e: FloatArray,
-    noise: FloatArray,
-    used: FloatArray,
-    s: FloatArray,
-    s_inv: FloatArray,
-    gain: FloatArray,
-) -> tuple[float, float]:
+def update(f: Filter) -> tuple[float, float]:
     """Measurement update in place with the components whose `used` weight m is positive, at noise variance R/m.
 
-    Returns NIS and the log-likelihood of the innovation (without the constant). Fills s_inv (3, 3), gain (9, 3).
+    Takes e, used, H, C and P_xz of the record, fills S, its inverse and the gain. Returns NIS and the log-likelihood of
+    the innovation (without the constant).
     """
+    x, p, e, used, c, s, s_inv, pxz, gain = f.x, f.p, f.e, f.used, f.c, f.s, f.s_inv, f.pxz, f.gain
     stiff = False
     for i in range(3):
         for j in range(3):
             s[i, j] = c[i, j]
         if used[i] > 0:
-            extra = noise[i] / used[i]
+            extra = f.noise[i] / used[i]
             s[i, i] += extra
             stiff = stiff or c[i, i] > 1e7 * extra
-    log_det = invert_used(s, used, s_inv)
+    log_det = invert_used(f)
     nis = 0.0
     for i in range(3):
         if used[i] > 0:
@@ -189,23 +236,16 @@ def update(
             p[i, j] = v
             p[j, i] = v
     if stiff:
-        _restore_joseph(p, pxz, c, h, gain, noise, used)
+        _restore_joseph(f)
     return nis, -0.5 * (log_det + nis)
 
 
 @part
-def _restore_joseph(
-    p: FloatArray,
-    pxz: FloatArray,
-    c: FloatArray,
-    h: FloatArray,
-    gain: FloatArray,
-    noise: FloatArray,
-    used: FloatArray,
-) -> None:
+def _restore_joseph(f: Filter) -> None:
     """Turn P - K P_xz' (already in p) into the Joseph form, which keeps P >= 0 when the prior dwarfs the noise."""
+    p, used, h, c, pxz, gain = f.p, f.used, f.h, f.c, f.pxz, f.gain
     residue = np.empty((9, 3))  # (I - K H) P H': zero in exact arithmetic but for the measurement noise
-    cross_covariance(p, h, residue)
+    _times_h(p, h, residue)
     rest = np.zeros((3, 3))  # S - H P- H': noise and bend of h
     for i in range(3):
         for j in range(3):
@@ -213,7 +253,7 @@ def _restore_joseph(
             for k in range(3):
                 rest[i, j] -= h[i, k] * pxz[k, j]
         if used[i] > 0:
-            rest[i, i] = max(rest[i, i], 0.0) + noise[i] / used[i]
+            rest[i, i] = max(rest[i, i], 0.0) + f.noise[i] / used[i]
     for i in range(9):
         for j in range(i + 1):
             v = p[i, j]

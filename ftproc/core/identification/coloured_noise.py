@@ -18,9 +18,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.filtering.records import Model, Start
+from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
-from ftproc.core.identification import likelihood
+from ftproc.core.identification.likelihood import Fixed, fit_level
 
 FloatArray = NDArray[np.float64]
 
@@ -83,56 +83,35 @@ def _products(
         yield square, (r[1:] * r[:-1] + np.sqrt(a[1:] * a[:-1]))[both]
 
 
-def fit_coloured(
-    time_s: FloatArray,
-    measurement: FloatArray,
-    weight: FloatArray,
-    starts: list[Start],
-    white: Model,
-    known: NDArray[np.bool_],
-    fix_jerk: bool,
-) -> Model:
-    """A model with correlated noise, from one that took it for white; that one if none is believable.
-
-    known: (3,) components whose sigma is given."""
+def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fixed) -> Model:
+    """A model with correlated noise, from one that took it for white; that one if none is believable."""
     given = white.noise_variance
     model, variance = white, white.noise_variance
-    correlation = np.maximum(
-        moments(smooth_log(time_s, measurement, weight, white, starts, residuals_only=True), weight, given)[1], 0.0
-    )
+    run = smooth_log(log, white, starts, residuals_only=True)
+    correlation = np.maximum(moments(run, log.weight, given)[1], 0.0)
     for _ in range(2):
-        model = _fit_thinned(time_s, measurement, weight, starts, model, variance, correlation, known, fix_jerk)
+        model = _fit_thinned(log, starts, model._replace(noise_variance=variance), correlation, fixed)
         for _ in range(ITERATIONS):
             model = model._replace(
                 noise_variance=variance * (1 + correlation) / (1 - correlation), correlation=correlation
             )
-            run = smooth_log(time_s, measurement, weight, model, starts, residuals_only=True)
-            if not math.isfinite(run.log_likelihood):  # the filter was lost among so few readings
+            run = smooth_log(log, model, starts, residuals_only=True)
+            if not math.isfinite(run.log_likelihood):  # the filter diverged among so few readings
                 return white
-            variance, correlation = moments(run, weight, model.noise_variance)
-            variance = np.where(known, given, variance)
+            variance, correlation = moments(run, log.weight, model.noise_variance)
+            variance = np.where(fixed.noise, given, variance)
             correlation = np.clip(correlation, 0.0, MOST)
     # Slow motion and slow noise look alike; where the search ends among the slowest, it has mistaken one for the other.
-    independent = (weight > 0).sum(0) * (1 - correlation) / (1 + correlation)
+    independent = (log.weight > 0).sum(0) * (1 - correlation) / (1 + correlation)
     believable = (independent > FEWEST_INDEPENDENT) & (variance < GROWTH * given)
     return model if believable.all() else white
 
 
-def _fit_thinned(
-    time_s: FloatArray,
-    measurement: FloatArray,
-    weight: FloatArray,
-    starts: list[Start],
-    model: Model,
-    variance: FloatArray,
-    correlation: FloatArray,
-    known: NDArray[np.bool_],
-    fix_jerk: bool,
-) -> Model:
+def _fit_thinned(log: Observations, starts: list[Start], model: Model, correlation: FloatArray, fixed: Fixed) -> Model:
     """Noise and jerk by the likelihood of every m-th sample, which is nearly white."""
     highest = float(np.clip(correlation.max(), INDEPENDENT, MOST))
-    every = min(math.ceil(math.log(INDEPENDENT) / math.log(highest)), max(len(time_s) // FEWEST, 1))
-    thinned = np.zeros_like(weight)
-    thinned[::every] = weight[::every]
-    guess = model._replace(noise_variance=variance, correlation=np.zeros(3))
-    return likelihood.fit_level(time_s, measurement, thinned, starts, guess, known, fix_jerk)
+    every = min(math.ceil(math.log(INDEPENDENT) / math.log(highest)), max(len(log.time_s) // FEWEST, 1))
+    thinned = np.zeros_like(log.weight)
+    thinned[::every] = log.weight[::every]
+    guess = model._replace(correlation=np.zeros(3))
+    return fit_level(log._replace(weight=thinned), starts, guess, fixed)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel
-from ftproc.core.filtering.records import Model, Start
+from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.model.measurement import wrapped
 
 FloatArray = NDArray[np.float64]
@@ -21,7 +21,7 @@ IntArray = NDArray[np.int64]
 
 SHARE = 0.5  # of the filter's memory, that is merged
 MOST = 16  # readings
-WILD = 0.9  # share of the flight that is no wilder than what the memory is reckoned for
+CALMER = 0.9  # share of the flight with less jerk than the memory is computed for
 ROUNDING = 0.01  # of a reading: times are rounded, and must not decide where the number comes out even
 
 
@@ -31,26 +31,24 @@ def how_many(time_s: FloatArray, range_m: float, model: Model, knot_s: float) ->
     if interval <= 0:
         return 1
     noise = float((model.noise_variance * np.array([1.0, range_m**2, range_m**2])).min())
-    memory = (noise * interval / float(np.quantile(model.jerk[:, 0], WILD))) ** (1 / 6)
+    memory = (noise * interval / float(np.quantile(model.jerk[:, 0], CALMER))) ** (1 / 6)
     wanted = SHARE * min(memory, knot_s / 10) / interval
     return int(np.clip(wanted + ROUNDING, 1, MOST))
 
 
-def merge(
-    time_s: FloatArray, measurement: FloatArray, weight: FloatArray, starts: list[Start], count: int
-) -> tuple[FloatArray, FloatArray, FloatArray, list[Start]]:
-    """A log of one reading in place of `count`, weighing as many as were used; arguments as for `smooth_log`."""
-    interval = float(np.median(np.diff(time_s)))
-    begins = np.zeros(len(time_s), bool)
+def merge(log: Observations, starts: list[Start], count: int) -> tuple[Observations, list[Start]]:
+    """A log of one reading in place of `count`, weighing as many as were used, and its starts."""
+    interval = float(np.median(np.diff(log.time_s)))
+    begins = np.zeros(len(log.time_s), bool)
     begins[[start.sample for start in starts]] = True
-    time, z, number, group = _means(time_s, measurement, weight, begins, count, 1.5 * count * interval)
+    time, z, number, group = _means(*log, begins, count, 1.5 * count * interval)
     moved = []
     for start in starts:
         sample = int(group[start.sample])
-        late = float(time[sample] - time_s[start.sample])
+        late = float(time[sample] - log.time_s[start.sample])
         step = np.kron(np.array([[1.0, late, late**2 / 2], [0.0, 1.0, late], [0.0, 0.0, 1.0]]), np.eye(3))
         moved.append(Start(sample, step @ start.state, step @ start.covariance @ step.T))
-    return time, z, number, moved
+    return Observations(time, z, number), moved
 
 
 @kernel

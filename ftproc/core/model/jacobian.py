@@ -6,6 +6,7 @@ It fills the same z^, H, C as the unscented transform, so the update is shared.
 from __future__ import annotations
 
 import math
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,16 @@ from ftproc.core.model.measurement import MIN_RANGE_M, measure
 FloatArray = NDArray[np.float64]
 
 MIN_COS_ELEVATION = 1e-3  # nearer to the zenith than this the azimuth says nothing
+
+
+class Linearised(Protocol):
+    """x (9,) and P (9, 9) of a record, and what `linearise` fills: z_hat (3,), H (3, 3) on the position, C (3, 3)."""
+
+    x: FloatArray
+    p: FloatArray
+    z_hat: FloatArray
+    h: FloatArray
+    c: FloatArray
 
 
 @part
@@ -31,8 +42,9 @@ def jacobian(x: FloatArray, h: FloatArray) -> None:
 
 
 @part
-def linearise(x: FloatArray, p: FloatArray, z_hat: FloatArray, h: FloatArray, c: FloatArray) -> None:
+def linearise(f: Linearised) -> None:
     """z^ = h(x), H the Jacobian, C = H P H'."""
+    x, p, z_hat, h, c = f.x, f.p, f.z_hat, f.h, f.c
     z_hat[0], z_hat[1], z_hat[2] = measure(x[0], x[1], x[2])
     jacobian(x, h)
     for i in range(3):

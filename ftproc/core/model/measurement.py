@@ -54,16 +54,6 @@ def turn(cross: float, dot: float) -> float:
 
 
 @part
-def innovate(z: FloatArray, z_hat: FloatArray, e: FloatArray) -> None:
-    """e = z - z^ with the azimuth wrapped; NaN where z is missing."""
-    e[0] = z[0] - z_hat[0]
-    e[1] = z[1] - z_hat[1]
-    e[2] = z[2] - z_hat[2]
-    if math.isfinite(e[1]):
-        e[1] = wrap_angle(e[1])
-
-
-@part
 def line_of_sight_sigma(x: FloatArray, p: FloatArray, out: FloatArray) -> None:
     """1-sigma of position and velocity along the radial, cross and up axes at x."""
     ground = max(math.sqrt(x[0] * x[0] + x[1] * x[1]), 1e-9)

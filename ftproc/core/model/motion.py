@@ -13,6 +13,8 @@ from Q(T1) and Q(T2), so gaps and jittered times need no special case. In three 
 
 from __future__ import annotations
 
+from typing import NamedTuple, Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,16 +23,39 @@ from ftproc.core.compiled import part
 FloatArray = NDArray[np.float64]
 
 
+class Moving(Protocol):
+    """x (9,) and P (9, 9) of a record, and memory for Q's coefficients: q (3, 3)."""
+
+    x: FloatArray
+    p: FloatArray
+    q: FloatArray
+
+
+class Adjoint(Protocol):
+    """r (9,) and N (9, 9) of the backward recursion."""
+
+    r: FloatArray
+    n: FloatArray
+
+
 def isotropic(jerk_psd: float) -> FloatArray:
     """(1, 6) jerk tensor of the same density (m^2/s^5) along every axis, for the whole log."""
     return np.array([[jerk_psd, 0.0, 0.0, jerk_psd, 0.0, jerk_psd]])
 
 
+class Profile(NamedTuple):
+    """The process noise of a log: jerk (m, 6) tensors, each row holding for knot_s seconds from first_s on."""
+
+    jerk: FloatArray
+    knot_s: float
+    first_s: float
+
+
 @part
-def knot_index(time: float, first_time: float, knot_s: float, knots: int) -> int:
-    """The piece of the jerk profile that holds at `time`."""
-    index = int((time - first_time) / knot_s)
-    return min(max(index, 0), knots - 1)
+def knot_index(time_s: float, profile: Profile) -> int:
+    """The piece of the jerk profile that holds at a time."""
+    index = int((time_s - profile.first_s) / profile.knot_s)
+    return max(min(index, len(profile.jerk) - 1), 0)
 
 
 @part
@@ -47,30 +72,13 @@ def noise_coefficients(interval: float, out: FloatArray) -> None:
 
 
 @part
-def own(state: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Copies of a state (9,) and its covariance (9, 9) for a kernel to work on: made here, their sizes are known to the
-    compiler, which is worth a fifth of the time."""
-    x, p = np.empty(9), np.empty((9, 9))
-    hand_over(state, covariance, x, p)
-    return x, p
-
-
-@part
-def hand_over(x: FloatArray, p: FloatArray, state: FloatArray, covariance: FloatArray) -> None:
-    """Copy x, P into a state and a covariance."""
-    for i in range(9):
-        state[i] = x[i]
-        for j in range(9):
-            covariance[i, j] = p[i, j]
-
-
-@part
-def predict(x: FloatArray, p: FloatArray, interval: float, jerk: FloatArray, c: FloatArray) -> None:
-    """x <- Phi x and P <- Phi P Phi' + Q in place; c is scratch (3, 3).
+def predict(f: Moving, interval: float, jerk: FloatArray) -> None:
+    """x <- Phi x and P <- Phi P Phi' + Q in place.
 
     Phi mixes position, velocity and acceleration of the same axis only, so each pair of axes (i, j) is a 3 x 3
     problem by itself, written out here.
     """
+    x, p, c = f.x, f.p, f.q
     t = interval
     h = 0.5 * t * t
     for i in range(3):
@@ -100,8 +108,9 @@ def predict(x: FloatArray, p: FloatArray, interval: float, jerk: FloatArray, c: 
 
 
 @part
-def adjoint(r: FloatArray, n: FloatArray, interval: float) -> None:
+def adjoint(b: Adjoint, interval: float) -> None:
     """r <- Phi' r and N <- Phi' N Phi in place: the backward counterpart of `predict`."""
+    r, n = b.r, b.n
     t = interval
     h = 0.5 * t * t
     for i in range(3):
