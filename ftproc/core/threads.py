@@ -44,7 +44,7 @@ def ahead(items: Iterator[Item]) -> Iterator[Item]:
 
 
 def in_order(work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-    """The result of each item. Only as many are begun as there are threads, and one more: results wait in memory."""
+    """The result of each item. Only as many run as there are threads, and one more: results wait in memory."""
     threads = _threads or min(available(), MOST_THREADS)
     if threads == 1:
         yield from map(work, items)

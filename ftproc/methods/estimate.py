@@ -74,7 +74,7 @@ class Estimate(NamedTuple):
     run: the recursive filter. label: (n, 3) good, isolated, patch, missing. model: noise and jerk used.
     smoothed: the smoother's run when it was asked for. reacquired: samples at which the filter was re-initialized.
     settled: whether two-pass editing's decisions stood still; None where there were none to make. slow_noise: the
-    noise is correlated too slowly to be told from motion, so the sigmas are too small. cleaned: (n, 3) readings of a
+    noise is correlated too slowly to be distinguished from motion, so the sigmas are too small. cleaned: (n, 3) readings of a
     method that works on range, azimuth and elevation by themselves; NaN there and in its run means not estimated.
     """
 

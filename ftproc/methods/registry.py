@@ -25,7 +25,7 @@ MAIN = FilterSettings.method
 @dataclass(frozen=True)
 class Method:
     """causal: the estimate of a sample needs no later one, once noise and start are set (two-pass editing, the
-    default of the main method, looks at the whole record to decide what is an outlier). corrected: the network
+    default of the main method, uses the whole record to decide what is an outlier). corrected: the network
     works on its output; own_model: only one trained for this very method. smooths: --smooth can be had. needs: a
     module that must be installed, and the extra that brings it. random: it draws random numbers, so --particles and
     --seed matter. in_parts: how a log of any length is filtered in stretches; without, it is filtered as a whole."""

@@ -9,7 +9,6 @@ by how far each applies.
 
 from __future__ import annotations
 
-import math
 from functools import cache
 
 import numpy as np
@@ -26,30 +25,12 @@ MEMBER_RULES = np.array(  # rows rho of the members' mean, columns of the member
 )  # fmt: skip
 
 
-def chi_square_tail(value: float, freedom: int) -> float:
-    """P(chi-square with so many degrees of freedom > value), by the closed form for whole numbers of them."""
-    half = value / 2
-    if freedom % 2:
-        tail, term = math.erfc(math.sqrt(half)), 2 * math.sqrt(half / math.pi) * math.exp(-half)
-        steps = [k + 1.5 for k in range(freedom // 2)]
-    else:
-        tail, term = 0.0, math.exp(-half)
-        steps = [k + 1.0 for k in range(freedom // 2)]
-    for step in steps:
-        tail += term
-        term *= half / step
-    return tail
-
-
 @cache
 def chi_square_quantile(probability: float, freedom: int) -> float:
     """The value that chi-square with `freedom` degrees of freedom does not exceed with this probability."""
-    low, high = 0.0, 1.0
-    while chi_square_tail(high, freedom) > 1 - probability:
-        high *= 2
-    while (middle := (low + high) / 2) not in (low, high):
-        low, high = (middle, high) if chi_square_tail(middle, freedom) > 1 - probability else (low, middle)
-    return high
+    from scipy.special import chdtri  # loaded by these filters only
+
+    return float(chdtri(freedom, 1 - probability))
 
 
 def memberships(rho: ArrayLike, freedom: int) -> FloatArray:

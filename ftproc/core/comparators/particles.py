@@ -43,7 +43,7 @@ def silverman(members: int, states: int) -> float:
 def enpf(known: Forecast, rng: Generator) -> Analysis:
     """Weigh the analysis members by likelihood times prior over proposal, resample and jitter.
 
-    When hardly one member has any weight the proposal has missed the posterior, and members made of copies of that
+    When almost no member has any weight the proposal has missed the posterior, and members made of copies of that
     one would be far too sure of it: then the ensemble Kalman filter's are kept.
     """
     members = corrected(known, 1.0, rng)

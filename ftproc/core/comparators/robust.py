@@ -1,5 +1,5 @@
-"""Robust unscented Kalman filters: one recursion, in which the readings are weighted anew until the weights fit the
-residuals they leave (iteratively reweighted least squares; R/w per component). They differ in the weight only:
+"""Robust unscented Kalman filters: one recursion, in which the readings are weighted again until the weights fit
+the residuals they leave (iteratively reweighted least squares; R/w per component). They differ in the weight only:
 
 * Huber (Karlgaard and Schaub 2007; Wang, Cui and Guo 2010): w = min(1, k / u)
 * Student t (Roth, Ozkan and Gustafsson 2013; Agamennoni, Nieto and Nebot 2012): w = (nu + 1) / (nu + u^2)

@@ -52,7 +52,7 @@ class Record(NamedTuple):
 
 class Decision(NamedTuple):
     """Weights (n, 3), the model and starts they were made with, the estimated outlier rates (3, 3), how many rounds it
-    took, whether they stand still, and whether the noise is correlated too slowly to be told from motion."""
+    took, whether they stand still, and whether the noise is correlated too slowly to be distinguished from motion."""
 
     weight: FloatArray
     model: Model
@@ -85,7 +85,7 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
 
 def allow_for_colour(record: Record, decision: Decision) -> Decision:
     """The decisions made again with correlated noise, if the noise is correlated; where it is so slowly that it cannot
-    be told from motion, the decision says so."""
+    be distinguished from motion, the decision says so."""
     log, starts = record.weighted(decision.weight), decision.starts
     smoothed = smooth_log(log, decision.model, starts, residuals_only=True)
     if not coloured_noise.is_correlated(smoothed, decision.weight, decision.model.noise_variance):

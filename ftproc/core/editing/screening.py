@@ -143,7 +143,7 @@ def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
 
     channel: (n,) one component, NaN where missing; sigma: its noise. Two neighbours of a reading rounded to steps of
     D agree by chance with probability about D / (2 sqrt(pi) sigma), so a coarse instrument is allowed long runs and
-    a fine one hardly any. The first reading of a run is good. A component of which a fifth is repeats is one that is
+    a fine one almost none. The first reading of a run is good. A component of which a fifth is repeats is one that is
     sampled faster than it measures, not stuck.
     """
     found = np.zeros(len(channel), bool)

@@ -47,7 +47,7 @@ class Edited(NamedTuple):
     weight: (n, 3) 1 good, 0 rejected or missing. model: noise and jerk profile. starts: for the next pass.
     smoothed: the smoother's run with these. rates: (3, 3) estimated outlier rates per component.
     rounds: how many passes it took; settled: whether the decisions stood still. slow_noise: the noise is correlated,
-    but so slowly that it cannot be told from motion; the sigmas are then too small.
+    but so slowly that it cannot be distinguished from motion; the sigmas are then too small.
     """
 
     weight: FloatArray

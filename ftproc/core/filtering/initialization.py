@@ -1,5 +1,5 @@
 """A first state from the first readings that agree with each other: the "check of the first value" that recursive
-gates need (a wrong one locks them out), done with a whole window in view."""
+gates need (a wrong one locks them out), done on a whole window."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FEWEST_READINGS = 8  # of each component after a gap, for a start of its own
 CURVE = 5  # readings that show a curve
 INFLATION = 3.0  # on every sigma of the first state: its readings are filtered again, so it must weigh little
 ACCELERATION_MPS2 = 30.0  # 1-sigma of an acceleration about which nothing is known
-SPEED_MPS = 1000.0  # likewise, when a rate cannot be had
+SPEED_MPS = 1000.0  # 1-sigma of a speed about which nothing is known
 WIDEST_IN_RANGES = 0.1  # the position must not be so vague that the target may be behind the station
 
 

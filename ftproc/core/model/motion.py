@@ -7,7 +7,7 @@ Per axis and interval T (Zuo et al. 2021 eq. 1, with the continuous-time noise i
 
 q is the spectral density of white jerk, m^2/s^5: it means the same at any rate, and Q(T1 + T2) composes exactly
 from Q(T1) and Q(T2), so gaps and jittered times need no special case. In three dimensions q becomes a symmetric
-3 x 3 tensor (an aircraft jerks across its path, hardly along it). It is held piecewise constant between knots
+3 x 3 tensor (an aircraft jerks across its path, far less along it). It is held piecewise constant between knots
 `knot_s` apart; each row of `jerk` is [xx, xy, xz, yy, yz, zz].
 """
 
@@ -76,7 +76,7 @@ def predict(f: Moving, interval: float, jerk: FloatArray) -> None:
     """x <- Phi x and P <- Phi P Phi' + Q in place.
 
     Phi mixes position, velocity and acceleration of the same axis only, so each pair of axes (i, j) is a 3 x 3
-    problem by itself, written out here.
+    problem of its own, written out here.
     """
     x, p, c = f.x, f.p, f.q
     t = interval
