@@ -68,6 +68,7 @@ def train(
 
     filtering: the settings of the filter that it is made for. Raises InputError, UsageError.
     """
+    from ftproc.correction.training.flights import train_flights
     from ftproc.files.reading import truth as truths
 
     read = [
@@ -77,7 +78,7 @@ def train(
         )
         for log, truth in pairs
     ]
-    return pipeline.train_flights(read, settings or TrainSettings(), filtering=filtering)
+    return train_flights(read, settings or TrainSettings(), filtering)
 
 
 def simulate(scenario: str, **options: Any) -> Simulation:

@@ -78,13 +78,13 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
         with compiled.announced(say), _passed_on(task.log, say):
             parts = (geodesy.located(part, settings) for part in filtering.parts())
             if task.report is None:
-                trajectories.write_parts(parts, filtering.metadata, task.at(task.output))
+                trajectories.write_parts(parts, lambda: filtering.metadata, task.at(task.output))
             else:
                 trajectory = joined(list(parts))
-                trajectory = replace(trajectory, metadata={**trajectory.metadata, **filtering.metadata()})
+                trajectory = replace(trajectory, metadata={**trajectory.metadata, **filtering.metadata})
                 trajectories.write(trajectory, task.at(task.output))
                 report.write(trajectory, task.at(task.report))
-        metadata = filtering.metadata()
+        metadata = filtering.metadata
         elapsed_s = time.perf_counter() - began
         return Outcome(task, summary.text(metadata), summary.as_dict(metadata), elapsed_s=elapsed_s)
     except BrokenPipeError:

@@ -87,7 +87,9 @@ def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: 
 
 
 def _summary(trajectory: Trajectory) -> dict[str, Any]:
-    return {"method": trajectory.metadata.get("method", ""), **trajectory.metadata.get("summary", {})}
+    from ftproc.report.view import summary_of
+
+    return {"method": trajectory.metadata.get("method", ""), **summary_of(trajectory)}
 
 
 def _truth(name: str, known: dict[str, Truth]) -> Truth:

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import click
 import numpy as np
 
-from ftproc import api, pipeline
+from ftproc import api
 from ftproc.cli.progress import Progress
 from ftproc.core import compiled
 from ftproc.correction import model, model_file
 from ftproc.correction.training import stages, study
+from ftproc.correction.training.flights import filtered_flights, train_flights
 from ftproc.errors import UsageError
 from ftproc.files.reading import truth as truth_files
 from ftproc.files.writing import atomic
@@ -60,10 +61,10 @@ def run(
             else _simulated(scenario, settings, progress)
         )
         if compare_starts:
-            known = pipeline.known_flights(pairs, filtering, progress)
+            known = filtered_flights(pairs, filtering, progress)
             text = study.compare(known["filter"], settings, progress, jobs).text()
         else:
-            trained = pipeline.train_flights(pairs, settings, progress, filtering, jobs)
+            trained = train_flights(pairs, settings, filtering, progress, jobs)
     if output is not None:
         model_file.save(trained, output)
         text = model.card(model_file.load(output))  # as whoever uses the file will see it

@@ -79,6 +79,12 @@ class Estimate(NamedTuple):
     slow_noise: bool = False
     cleaned: FloatArray | None = None
 
+    @property
+    def smoothed_run(self) -> FilterRun:
+        """The run with the smoother's state and sigmas in place of the filter's, where there is a smoother."""
+        s = self.smoothed
+        return self.run if s is None else self.run._replace(state=s.state, sigma=s.sigma, los_sigma=s.los_sigma)
+
     def rows(self, low: int, high: int) -> Estimate:
         """Of the samples [low, high) alone."""
         if (low, high) == (0, len(self.label)):

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ftproc.errors import UsageError
-from ftproc.quality.verdict import CAREFUL, NO, TRUST
+from ftproc.quality.verdict import CONSISTENT, SUSPECT, UNRELIABLE
 from ftproc.records import ISOLATED, MISSING, PATCH
 
 BLUE, ORANGE, GREEN, SKY = "#0072B2", "#E69F00", "#009E73", "#56B4E9"
@@ -21,7 +21,7 @@ READING, ESTIMATE, LIMIT = GREY, BLUE, BLACK
 AXES = (BLUE, ORANGE, GREEN)  # x, y, z
 BAND = "rgba(0, 114, 178, 0.15)"
 
-VERDICT = {TRUST: GREEN, CAREFUL: ORANGE, NO: VERMILLION}
+VERDICT = {CONSISTENT: GREEN, SUSPECT: ORANGE, UNRELIABLE: VERMILLION}
 
 
 class Kind(NamedTuple):

@@ -39,14 +39,14 @@ def heading(view: View) -> str:
 
 
 def banner(view: View) -> str:
-    """Whether to trust it, in a sentence, with a colour that says the same."""
-    said = view.summary.get("trust")
-    if not said:
-        return _banner(GREY, "This file does not say how it was made, so it cannot be judged by itself.", [])
-    reasons = said["reasons"]
+    """The verdict with its reasons, in its colour."""
+    trust = view.summary.get("trust")
+    if not trust:
+        return _banner(GREY, "no verdict: this file does not say how it was made", [])
+    level, reasons = trust["verdict"], trust["reasons"]
     if len(reasons) < 2:
-        return _banner(VERDICT[said["verdict"]], verdict.sentence(said), [])
-    return _banner(VERDICT[said["verdict"]], f"{verdict.opening(said)}:", reasons)
+        return _banner(VERDICT[level], verdict.sentence(trust), [])
+    return _banner(VERDICT[level], f"{level}:", reasons)
 
 
 def _banner(colour: str, sentence: str, reasons: Sequence[str]) -> str:

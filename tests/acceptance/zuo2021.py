@@ -14,9 +14,9 @@ from functools import cache
 
 import numpy as np
 
-from ftproc import pipeline
 from ftproc.correction.apply import correct
 from ftproc.correction.model import Stage
+from ftproc.correction.training.flights import filtered_flights
 from ftproc.correction.training.train import train
 from ftproc.settings import FilterSettings, TrainSettings
 from ftproc.simulation import simulate
@@ -41,7 +41,7 @@ def network(method: str, scenario: str) -> Stage:
     name, settings = METHODS[method]
     flights = [simulate(scenario, seed=10_000 + number) for number in range(FLIGHTS)]
     pairs = [(flight.log, flight.truth) for flight in flights]
-    known = pipeline.known_flights(pairs, FilterSettings(method=name))
+    known = filtered_flights(pairs, FilterSettings(method=name))
     return train(known["filter"], settings)
 
 
@@ -52,7 +52,7 @@ def errors(method: str, scenario: str, corrected: bool = True) -> tuple[float, .
     for seed in TRIALS:
         flight = simulate(scenario, seed=seed)
         settings = FilterSettings(method=METHODS[method][0])
-        run = pipeline.known_flights([(flight.log, flight.truth)], settings)["filter"][0].run
+        run = filtered_flights([(flight.log, flight.truth)], settings)["filter"][0].run
         position = run.state[:, :3]
         if corrected:
             position = position + correct(run, network(method, scenario)).values[:, :3]

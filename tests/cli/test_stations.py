@@ -133,7 +133,7 @@ def test_write_config_makes_what_config_reads(run, flight):
     assert settings["noise_range_m"] == pytest.approx(3.0)
     assert settings["noise_elevation_rad"] == pytest.approx(0.0002)
     assert settings["noise_azimuth_rad"] != pytest.approx(0.0002, rel=1e-3)
-    assert settings["noise_given"] is False
+    assert settings["noise_specified"] is False
 
 
 def test_the_command_s_defaults_are_those_of_the_settings():

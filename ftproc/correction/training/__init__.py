@@ -1,4 +1,4 @@
 """How a network is trained: samples, genetic search, descent, and what held-out flights say of it.
 
-Calls `correction`; the flights come from `pipeline`.
+Calls `correction`; `flights` also calls `methods`, `quality` and `scoring`.
 """

@@ -9,6 +9,7 @@ import numpy as np
 from ftproc import pipeline, scoring
 from ftproc.core.model.frames import from_cartesian, unwrap
 from ftproc.correction.model import Model
+from ftproc.correction.training.flights import train_flights
 from ftproc.records import COMPONENTS, Trajectory
 from ftproc.scoring.figures import average_gradient
 from ftproc.settings import FilterSettings, TrainSettings
@@ -44,7 +45,7 @@ def model(method: str, scenario: str) -> Model:
     options = {"duration_s": THEODOLITE["duration_s"]} if scenario == THEODOLITE["scenario"] else {}
     flights = [simulate(scenario, seed=5000 + i, **options) for i in range(TRAINING[scenario])]
     settings = TrainSettings(features="correction", method=method, population=20, generations=30, epochs=200, seed=2021)
-    return pipeline.train_flights([(f.log, f.truth) for f in flights], settings)
+    return train_flights([(f.log, f.truth) for f in flights], settings)
 
 
 def run(method: str, flight: Simulation, scenario: str, smooth: bool = False) -> Trajectory:
