@@ -1,6 +1,6 @@
-"""How the report looks: colours, symbols, labels and units, once.
+"""The look of the report: colours, symbols, labels and units.
 
-Colours are Okabe and Ito's, which people with any colour vision tell apart; kinds of readings also differ in symbol.
+The colours are Okabe and Ito's, distinct for every colour vision; kinds of readings also differ in symbol.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ LAYOUT: dict[str, Any] = {
 
 
 def axis(**changes: Any) -> dict[str, Any]:
-    """An axis of a plane figure."""
+    """An axis of a plane figure, with some changes."""
     return {**_AXIS, **changes}
 
 

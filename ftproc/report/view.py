@@ -24,9 +24,9 @@ SLOWEST = 1.0  # m/s; a slower target has no direction of flight
 class View:
     """A trajectory with derived arrays, row for row.
 
-    timeline: its times. cleaned: (n, 3) m, deg, deg, the azimuth unwrapped. reading: the raw readings, as cleaned, on the
-    same turn; None when they are not known. components_used: (n,) degrees of freedom of `nis`. error: (n, 6) estimate
-    minus truth, m and m/s. error and score are None without a truth.
+    timeline: its times. cleaned: (n, 3) m, deg, deg, the azimuth unwrapped. reading: the raw readings in these
+    units, on the same turn; None when they are not known. components_used: (n,) degrees of freedom of `nis`. error:
+    (n, 6) estimate minus truth, m and m/s. error and score are None without a truth.
     """
 
     trajectory: Trajectory

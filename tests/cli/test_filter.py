@@ -104,7 +104,7 @@ def test_reading_options(run, flight):
     table["note"] = "x"
     table["RNG"] = table.pop("range_m") / 1000
     table.to_csv("odd.csv", index=False)
-    tuned = ("--noise", "3,0.0002,0.0002", "--jerk", "1")  # finding these magnifies the rounding of kilometres
+    tuned = ("--noise", "3,0.0002,0.0002", "--jerk", "1")  # their estimation magnifies the rounding of kilometres
     assert run("filter", flight, *tuned, "-o", "a.csv").code == 0
     args = ("--columns", "range=RNG", "--units", "range=km", "--azimuth-from", "north", "--keep-columns")
     assert run("filter", "odd.csv", *tuned, *args, "-o", "b.csv").code == 0
@@ -204,7 +204,7 @@ def test_debug_shows_where_a_log_failed(run, here):
         ([], "Name at least one log."),
         (["flight.csv", "--method", "ekff"], "there is no method 'ekff'; did you mean 'ekf'?"),
         (["flight.csv", "--noise", "1,2"], '"1,2" is not three numbers, R,A,E in m, rad, rad'),
-        (["flight.csv", "--noise", "0,1,1"], "a sigma of zero would mean"),
+        (["flight.csv", "--noise", "0,1,1"], "a sigma of zero means readings without error"),
         (["flight.csv", "--jerk", "-1"], '"-1" is not a number above zero.'),
         (["flight.csv", "--gate", "inf"], '"inf" is not a number above zero.'),
         (["flight.csv", "--max-patch", "long"], '"long" is not a number above zero.'),
