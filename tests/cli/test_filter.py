@@ -80,13 +80,13 @@ def test_every_option_reaches_the_filter(run, flight):
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_random_methods_take_particles_and_a_seed(run, shell, flight, jobs):
-    """And what they warn of is said on stderr, log by log, by workers too."""
+    """Their warnings are on stderr, log by log, from workers too."""
     shutil.copy(flight, "second.csv")
     options = "--method renpf --particles 40 --seed 3 --summary none"
     result = shell(f"ftproc filter flight.csv second.csv {options} --jobs {jobs} -o d")
     warned = "renpf: 40 particles are few for 9 states; 90 or more are trustworthy"
-    said = {f"ftproc: {name}: {warned}" for name in ("flight.csv", "second.csv")}
-    assert (result.code, result.out, set(result.err.splitlines())) == (0, "", said)
+    expected = {f"ftproc: {name}: {warned}" for name in ("flight.csv", "second.csv")}
+    assert (result.code, result.out, set(result.err.splitlines())) == (0, "", expected)
     settings = read("d/flight.trajectory.csv").metadata["settings"]
     assert (settings["particles"], settings["seed"]) == (40, 3)
     run("filter", flight, "-o", "plain.csv")
@@ -116,12 +116,12 @@ def test_reading_options(run, flight):
 
 
 @pytest.mark.parametrize(
-    ("args", "said", "axes"),
+    ("args", "text", "axes"),
     [([], "x is taken as east, y as north", (0, 1)), (["--azimuth-from", "north"], "x is north, y is east", (1, 0))],
 )
-def test_site(run, flight, args, said, axes):
+def test_site(run, flight, args, text, axes):
     result = run("filter", flight, "--site", "-33.9,18.4,100", *args, "-o", "a.parquet", "--summary", "none")
-    assert result == Result(0, "", f"ftproc: positions on the earth: {said}, z is up\n")
+    assert result == Result(0, "", f"ftproc: positions on the earth: {text}, z is up\n")
     table = pq.read_table("a.parquet").to_pandas()
     assert list(table.columns[-3:]) == ["lat_deg", "lon_deg", "height_m"]
     east, north = (table[["x_m", "y_m"]].to_numpy()[:, axis] for axis in axes)

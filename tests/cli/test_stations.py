@@ -137,7 +137,7 @@ def test_write_config_makes_what_config_reads(run, flight):
 
 
 def test_the_command_s_defaults_are_those_of_the_settings():
-    """Else a file that says nothing would be something other than no file."""
+    """Otherwise an empty file would differ from no file."""
     ctx = command.make_context("filter", ["x.csv"])
     keys = {key.option for _, _, key in every()}
     given = {name: value for name, value in ctx.params.items() if name in keys}

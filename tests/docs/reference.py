@@ -10,8 +10,8 @@ _WIDTH = 110
 _HEAD = """\
 # Command reference
 
-What `ftproc -h` and `ftproc COMMAND -h` say, written by `python -m tests.docs.reference`. Which options you need for
-what is told in [Choose your options](../README.md).
+The output of `ftproc -h` and `ftproc COMMAND -h`, written by `python -m tests.docs.reference`. For which options to use
+see [Choose your options](../README.md).
 """
 
 

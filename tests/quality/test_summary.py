@@ -121,7 +121,7 @@ def test_text_has_a_line_for_each_component(dirty):
 
 
 def test_lines_stand_under_each_other(dirty):
-    """Names to the left, what they say from one column on; the table's columns end together."""
+    """Names are left-aligned, their texts start in one column, and the columns of the table end together."""
     _, header, *table = summary.text(dirty[1].metadata).splitlines()[:5]
     assert len({len(line) for line in (header, *table)}) == 1
     rest = summary.text(dirty[1].metadata).splitlines()[5:]

@@ -1,4 +1,4 @@
-"""Many flights full of outliers, and one that is very long: does any result diverge without a verdict that says so?"""
+"""Many flights full of outliers, and one that is very long: does any result diverge and pass for consistent?"""
 
 from __future__ import annotations
 

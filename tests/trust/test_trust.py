@@ -39,6 +39,11 @@ def test_what_counts_as_drift() -> None:
     assert long_runs.drift(found, moved) > long_runs.MOST_DRIFT
 
 
+def test_the_tests_of_the_table_exist() -> None:
+    root = Path(__file__).parents[2]
+    assert [name for name in (*elsewhere.FAULTS, *elsewhere.PLAIN) if not (root / name).exists()] == []
+
+
 def test_failures_elsewhere_are_counted(tmp_path: Path) -> None:
     path = tmp_path / "test_it.py"
     path.write_text("import os\ndef test_a(): pass\ndef test_b(): assert os.environ['WORD'] == 'x'\n")
