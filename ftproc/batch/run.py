@@ -10,6 +10,8 @@ from functools import partial
 
 from ftproc.batch.tasks import Notify, Outcome, Submit, Task, filter_one
 from ftproc.config.recipe import Recipe
+from ftproc.correction import model_file
+from ftproc.files.writing import geodesy
 
 
 def run(
@@ -19,10 +21,11 @@ def run(
     outcomes in the order of the tasks.
 
     notify: takes warnings, and a line when kernels have to be compiled; with workers it must be picklable.
-    Before any log is read, raises ModelError, and UsageError when pymap3d or plotly is needed and not installed, or the
-    cluster does not answer.
+    Before any log is read, raises ModelError, and UsageError when pymap3d is needed and not installed, or the cluster
+    does not answer.
     """
-    _check(tasks, recipe)
+    model_file.named(recipe.model)
+    geodesy.check(recipe.settings)
     with _workers(len(tasks), recipe, jobs, notify, scheduler) as submit:
         waiting = deque([submit(task) for task in tasks])
         while waiting:
@@ -41,14 +44,3 @@ def _workers(
 
         return processes.pool(recipe, min(jobs, tasks), notify)
     return contextlib.nullcontext(lambda task: partial(filter_one, task, recipe, notify))
-
-
-def _check(tasks: Sequence[Task], recipe: Recipe) -> None:
-    from ftproc.correction import model_file
-    from ftproc.files.writing import geodesy
-    from ftproc.report import style
-
-    model_file.named(recipe.model)
-    geodesy.check(recipe.settings)
-    if any(task.report is not None for task in tasks):
-        style.require_plotly()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import click
 
@@ -32,12 +32,14 @@ def _scenarios_and_grammar() -> str:
 @options.seed("Seed of the flight, noise and outliers")
 @click.option(
     "--duration",
+    "duration_s",
     type=options.number,
     metavar="S",
     help="Length of the record in s, such as 60. [default: scenario's]",
 )
 @click.option(
     "--dt",
+    "dt_s",
     type=options.number,
     metavar="S",
     help="Sample interval in s, such as 0.05 for 20 Hz. [default: scenario's]",
@@ -53,39 +55,20 @@ def _scenarios_and_grammar() -> str:
 )
 @options.output("The log to write: .csv, .csv.gz, .parquet, .feather, or - for CSV on stdout.", "LOG", required=True)
 @click.option("--truth", type=options.FILE, metavar="TRUTH", help="The truth to write: states and outlier flags.")
-def command(**options: Any) -> None:
+def command(
+    scenario: str, output: str, truth: str | None, units: str | None, azimuth_from: str, **changes: Any
+) -> None:
     """Make a log as dirty as a real one, with its truth."""
-    _run(_Request(**options))
-
-
-class _Request(NamedTuple):
-    """The options, by their names on the command line."""
-
-    scenario: str
-    seed: int
-    duration: float | None
-    dt: float | None
-    noise: tuple[float, float, float] | None
-    outliers: str | None
-    units: str | None
-    azimuth_from: str
-    output: str
-    truth: str | None
-
-
-def _run(r: _Request) -> None:
     from ftproc.files.units import parse_units
     from ftproc.files.writing import flights
     from ftproc.simulation import simulate
 
-    _check(r.output, r.truth)
-    parse_units(r.units)  # errors are reported before any work
-    flight = simulate(
-        r.scenario, seed=r.seed, duration_s=r.duration, dt_s=r.dt, noise=r.noise, outliers=r.outliers
-    )  # fmt: skip
-    if r.truth is not None:  # first, so that both are there when the log is
-        flights.write_truth(flight.truth, r.truth)
-    flights.write_log(flight.log, r.output, r.units, r.azimuth_from)
+    _check(output, truth)
+    parse_units(units)  # errors are reported before any work
+    flight = simulate(scenario, **changes)
+    if truth is not None:  # first, so that both are there when the log is
+        flights.write_truth(flight.truth, truth)
+    flights.write_log(flight.log, output, units, azimuth_from)
 
 
 def _check(output: str, truth: str | None) -> None:

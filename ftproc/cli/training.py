@@ -48,13 +48,16 @@ class Request(NamedTuple):
 
     @property
     def settings(self) -> TrainSettings:
-        count = len(self.logs) or self.flights
-        search = (self.hidden, self.population, self.generations, self.epochs)
-        return TrainSettings(self.features, *search, count, self.seed, self.method)
+        return TrainSettings(
+            features=self.features, hidden=self.hidden, population=self.population, generations=self.generations,
+            epochs=self.epochs, flights=len(self.logs) or self.flights, seed=self.seed, method=self.method,
+        )  # fmt: skip
 
     @property
     def filtering(self) -> FilterSettings:
-        return FilterSettings(self.method, self.editing, noise=self.noise, jerk_psd_m2ps5=self.jerk)
+        return FilterSettings(
+            method=self.method, editing=self.editing, noise=self.noise, jerk_psd_m2ps5=self.jerk
+        )  # fmt: skip
 
 
 def run(request: Request) -> None:
@@ -70,7 +73,7 @@ def run(request: Request) -> None:
         atomic.check_target(output)
     with Progress() as progress, compiled.announced(lambda text: click.echo(f"ftproc: {text}", err=True)):
         pairs = _read(request) if request.scenario is None else _simulated(request.scenario, settings, progress)
-        if output is None:
+        if output is None:  # --compare-starts
             flights = filtered_flights(pairs, request.filtering, progress)
             text = study.compare(flights["filter"], settings, progress, request.jobs).text()
         else:
