@@ -4,7 +4,7 @@
     trajectory = ftproc.filter_log("flight.csv")
     frame = ftproc.to_pandas(trajectory)
 
-Everything is loaded when first used, so importing the package is cheap.
+Modules are loaded when first used, so that the import is fast.
 """
 
 from __future__ import annotations

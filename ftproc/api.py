@@ -1,4 +1,4 @@
-"""The Python face: the five things the command line does, on pandas DataFrames, pyarrow Tables or files."""
+"""The Python interface: what the command line does, on pandas DataFrames, pyarrow Tables or files."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 def read_log(source: Any, *, config: str | Path | None = None, **options: Any) -> MeasurementLog:
     """A log from a file (.csv, .csv.gz, .parquet, .feather), a pandas DataFrame or a pyarrow Table.
 
-    config: what `--config` takes. options: units, columns, azimuth_from, keep_columns, station; they win over
-    it; see `ftproc.files.reading.logs.read`. Raises InputError, UsageError.
+    config: a station file. options: units, columns, azimuth_from, keep_columns, station (see
+    `ftproc.files.reading.logs.read`); they win over it. Raises InputError, UsageError.
     """
     from ftproc.files.reading import logs
 
@@ -45,20 +45,16 @@ def filter_log(
     """The trajectory of a log (a MeasurementLog, or anything `read_log` takes).
 
     model: the packaged correction, another one (or its file), or None for none.
-    config: what `--config` takes: how the log is read (one that was read already stays as it is), and the
-    settings and the model where they are not given here. With a site in the settings the trajectory has its
-    `lat_deg`, `lon_deg`, `height_m` too. Raises InputError, UsageError.
+    config: a station file: how the log is read (unless it is a MeasurementLog), and the settings and the model where
+    they are not specified here. With a site in the settings the trajectory has `lat_deg`, `lon_deg` and `height_m`.
+    Raises InputError, UsageError.
     """
-    usual = _recipe(config)
-    settings = settings or usual.settings
+    recipe = _recipe(config)
+    settings = settings or recipe.settings
     if isinstance(model, str):
-        model = model_file.named(usual.model if model == PACKAGED else model)
+        model = model_file.named(recipe.model if model == PACKAGED else model)
     read = log if isinstance(log, MeasurementLog) else read_log(log, config=config)
     return geodesy.located(pipeline.filter_log(read, settings, model), settings)
-
-
-def _recipe(config: str | Path | None) -> Recipe:
-    return Recipe() if config is None else Recipe.of(load(config))
 
 
 def train(
@@ -68,16 +64,10 @@ def train(
 
     filtering: the settings of the filter that it is made for. Raises InputError, UsageError.
     """
-    from ftproc.files.reading import truth as truths
+    from ftproc.correction.training.flights import train_flights
 
-    read = [
-        (
-            log if isinstance(log, MeasurementLog) else read_log(log),
-            truth if isinstance(truth, Truth) else truths.read(truth),
-        )
-        for log, truth in pairs
-    ]
-    return pipeline.train_flights(read, settings or TrainSettings(), filtering=filtering)
+    read = [(log if isinstance(log, MeasurementLog) else read_log(log), _truth(truth)) for log, truth in pairs]
+    return train_flights(read, settings or TrainSettings(), filtering)
 
 
 def simulate(scenario: str, **options: Any) -> Simulation:
@@ -88,27 +78,22 @@ def simulate(scenario: str, **options: Any) -> Simulation:
 
 
 def score(trajectory: Any, truth: Any = None) -> Score:
-    """How good a trajectory is, by itself and against a truth (records or files). `.as_dict()` gives the figures."""
+    """The smoothness of a trajectory, and its errors against a truth (records or files); `.as_dict()` has the figures.
+    Raises InputError."""
     from ftproc import scoring
-    from ftproc.files.reading import trajectories
-    from ftproc.files.reading import truth as truths
 
-    found = trajectory if isinstance(trajectory, Trajectory) else trajectories.read(trajectory)
-    known = truth if truth is None or isinstance(truth, Truth) else truths.read(truth)
-    return scoring.score(found, known)
+    return scoring.score(_trajectory(trajectory), None if truth is None else _truth(truth))
 
 
 def write_report(trajectory: Any, target: str | Path, truth: Any = None) -> None:
     """Write an HTML page that shows a trajectory, and with a truth its errors (records or files).
 
-    A trajectory from `filter_log` is shown with its raw readings. Raises OutputError, UsageError (no plotly).
+    A trajectory from `filter_log` is shown with its raw readings. Raises InputError, OutputError, UsageError (no
+    plotly).
     """
     from ftproc import report
-    from ftproc.files.reading import trajectories
-    from ftproc.files.reading import truth as truths
 
-    found = trajectory if isinstance(trajectory, Trajectory) else trajectories.read(trajectory)
-    report.write(found, target, truth if truth is None or isinstance(truth, Truth) else truths.read(truth))
+    report.write(_trajectory(trajectory), target, None if truth is None else _truth(truth))
 
 
 def plot(trajectory: Any, what: str = "track") -> go.Figure:
@@ -118,10 +103,8 @@ def plot(trajectory: Any, what: str = "track") -> go.Figure:
     when plotly is missing, or when there is nothing to draw.
     """
     from ftproc import report
-    from ftproc.files.reading import trajectories
 
-    found = trajectory if isinstance(trajectory, Trajectory) else trajectories.read(trajectory)
-    return report.plot(found, what)
+    return report.plot(_trajectory(trajectory), what)
 
 
 def to_table(trajectory: Trajectory) -> pa.Table:
@@ -135,3 +118,19 @@ def to_pandas(trajectory: Trajectory) -> pd.DataFrame:
     """The trajectory as a pandas DataFrame, with the columns of its file."""
     frame: pd.DataFrame = to_table(trajectory).to_pandas()
     return frame
+
+
+def _recipe(config: str | Path | None) -> Recipe:
+    return Recipe() if config is None else Recipe.of(load(config))
+
+
+def _truth(source: Any) -> Truth:
+    from ftproc.files.reading import truth
+
+    return source if isinstance(source, Truth) else truth.read(source)
+
+
+def _trajectory(source: Any) -> Trajectory:
+    from ftproc.files.reading import trajectories
+
+    return source if isinstance(source, Trajectory) else trajectories.read(source)

@@ -16,7 +16,7 @@ from ftproc.correction.model import Model
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import registry
 from ftproc.quality.summary import text
-from ftproc.records import MISSING, MeasurementLog, Truth
+from ftproc.records import MISSING, MeasurementLog
 from ftproc.settings import FilterSettings
 from tests.correction.test_apply import constant
 from tests.simulated import simulate
@@ -138,7 +138,7 @@ def test_metadata_is_complete_and_serialisable(flight):
     expected = {"editing": "forward", "smooth": False, "gate": 5.0, "max_patch_s": 3.0, "gain_form": False}
     assert expected.items() <= used.items()
     assert used["site"] == [40.0, 3.0, 7.0]
-    assert (used["noise_given"], used["jerk_given"]) == (True, False)
+    assert (used["noise_specified"], used["jerk_specified"]) == (True, False)
     assert used["noise_range_m"] == pytest.approx(4.0)
     assert used["noise_azimuth_rad"] == pytest.approx(2e-4)
     assert used["noise_elevation_rad"] == pytest.approx(3e-4)
@@ -288,19 +288,6 @@ def test_refuses_settings_that_make_no_sense(flight, settings, message):
     with pytest.raises(UsageError) as caught:
         pipeline.filter_log(flight.log, FilterSettings(**settings))
     assert str(caught.value).startswith(message)
-
-
-def test_training_refuses_what_it_cannot_learn_from(flight):
-    z = flight.log.measurement.copy()
-    z[:, :2] = np.nan
-    settings = pipeline.TrainSettings()
-    with pytest.raises(UsageError, match=r"^ukf takes no correction, so there is nothing to train for it$"):
-        pipeline.train_flights([(flight.log, flight.truth)], replace(settings, method="ukf"))
-    with pytest.raises(InputError, match="range and azimuth missing throughout; training needs all three components"):
-        pipeline.train_flights([(replace(flight.log, measurement=z), flight.truth)], settings)
-    late = Truth("late.csv", flight.truth.time_s + 1e4, flight.truth.position_m)
-    with pytest.raises(InputError, match=r"^late\.csv: its times do not overlap those of "):
-        pipeline.train_flights([(flight.log, late)], settings)
 
 
 @pytest.mark.parametrize("smooth", [False, True])

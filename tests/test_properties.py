@@ -1,6 +1,6 @@
-"""What must hold for any flight, over the whole way from log to trajectory.
+"""Properties of any flight, from log to trajectory.
 
-Noise and jerk are given where a change far away, or of the rows' number, would tune them a little differently.
+Noise and jerk are specified where a distant change, or another number of rows, would change their estimates a little.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from ftproc.correction import model_file
 from ftproc.errors import FtprocError
 from ftproc.files.reading import logs, trajectories
 from ftproc.files.writing.trajectories import write as write_trajectory
+from ftproc.quality.verdict import CONSISTENT
 from ftproc.records import MeasurementLog, Trajectory
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
@@ -129,14 +130,14 @@ def test_appended_rows_without_readings_change_nothing_before(seed: int, more: i
 @few
 @given(seeds)
 def test_outliers_far_away_change_nothing_near(seed: int) -> None:
-    """Ten wild ranges in the last two seconds; the first half differs by less than two sigmas.
+    """Ten outliers of range in the last two seconds; the first half differs by less than two sigmas.
 
-    It is not zero: the rates of the outliers are the log's own, so that a borderline reading may be decided otherwise.
+    Not by zero: outlier rates are estimated from the log, so a borderline reading may be decided differently.
     """
     log = flight(seed)
-    wild = log.measurement[:, 0].copy()
-    wild[np.random.default_rng(seed).choice(np.arange(len(log) - 40, len(log)), 10, replace=False)] += 2000.0
-    found, expected = smoothed(table(log, range_m=wild)), smoothed(table(log))
+    spoiled = log.measurement[:, 0].copy()
+    spoiled[np.random.default_rng(seed).choice(np.arange(len(log) - 40, len(log)), 10, replace=False)] += 2000.0
+    found, expected = smoothed(table(log, range_m=spoiled)), smoothed(table(log))
     near = slice(0, len(log) // 2)
     assert np.count_nonzero(found.outlier[near] != expected.outlier[near]) <= 3
     assert (np.abs(found.state[near, :6] - expected.state[near, :6]) / expected.sigma[near]).max() < 2.0
@@ -148,25 +149,25 @@ def test_outliers_far_away_change_nothing_near(seed: int) -> None:
 def test_an_outlier_moves_the_estimate_by_less_than_its_sigma(
     outliers: str, seed: int, row: int, component: int, sigmas: float
 ) -> None:
-    """One wild reading, from 10 sigma on: no position or velocity moves by more than the sigma said of it.
+    """One outlier of at least 10 sigma: no position or velocity moves by more than its published sigma.
 
-    Where patches already hold most of the record, one more reading may decide which of two stories is believed; then
-    the verdict must be another than to trust it.
+    Where patches already hold most of the record, one more outlier may decide between two hypotheses; then the
+    verdict must not be `consistent`.
     """
     log = simulate("manoeuvre", duration_s=15.0, seed=seed, outliers="none").log if outliers == "none" else flight(seed)
     assert FIXED.noise is not None
     size = sigmas * (FIXED.noise[component] or 0.0)
-    wild = log.measurement.copy()
-    wild[row % len(log), component] += size if row % 2 else -size
-    found, expected = smoothed(table(replace(log, measurement=wild))), smoothed(table(log))
+    spoiled = log.measurement.copy()
+    spoiled[row % len(log), component] += size if row % 2 else -size
+    found, expected = smoothed(table(replace(log, measurement=spoiled))), smoothed(table(log))
     moved = (np.abs(found.state[:, :6] - expected.state[:, :6]) / found.sigma).max()
-    assert moved < 1.0 or (outliers != "none" and found.metadata["summary"]["trust"]["verdict"] != "trust")
+    assert moved < 1.0 or (outliers != "none" and found.metadata["summary"]["trust"]["verdict"] != CONSISTENT)
 
 
 @few
 @given(seeds, st.integers(2, 5), st.integers(0, 2))
 def test_more_readings_make_no_sigma_larger(seed: int, every: int, component: int) -> None:
-    """A log without outliers against itself with readings taken out; 0.1 % is what they tell about the geometry."""
+    """A log without outliers, with and without some readings; 0.1 % is their effect on the geometry."""
     log = simulate("manoeuvre", duration_s=15.0, seed=seed, outliers="none").log
     fewer = log.measurement.copy()
     fewer[::every, component] = np.nan

@@ -1,4 +1,5 @@
-"""Many logs: where outputs go (`plan`), one log's work (`tasks`), who does it (`run`, `processes`, `cluster`).
+"""Many logs: where outputs go (`plan`), the work on one log (`tasks`), and on many (`run`) in this process, in worker
+processes (`processes`) or on a Dask cluster (`cluster`).
 
 Calls `pipeline`, `report`, `config` and what is below them; only `cli` calls it.
 """

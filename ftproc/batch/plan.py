@@ -1,5 +1,4 @@
-"""Where each trajectory and each report goes: the one place that knows the rules of `-o` and `--report`, and that no
-input is written over."""
+"""Where each trajectory and each report goes: the rules of `-o` and `--report`, and that no input is overwritten."""
 
 from __future__ import annotations
 
@@ -14,17 +13,17 @@ from ftproc.files.writing import atomic
 INDEX = "index.html"
 _REPORT = "--report"
 _PAGES = (".html", ".htm")
-#: What a trajectory's name ends in, by what the log's name ends in.
+#: Ending of the trajectory's name by that of the log's.
 _SUFFIX = {".csv": ".csv", ".csv.gz": ".csv", ".parquet": ".parquet", ".feather": ".feather"}
 
 
 def tasks(
     logs: Sequence[str], output: str | None, methods: Sequence[str] | None = None, inputs: Sequence[str] = ()
 ) -> list[Task]:
-    """One task per log, or per log and method, its output decided and its directory made.
+    """One task per log, or per log and method, with its output; makes the directory.
 
-    methods: names to run each log through, told apart in the output's name. inputs: other files not to be
-    written over. Raises UsageError, OutputError.
+    methods: names of methods, which the names of the outputs then contain. inputs: other files not to be overwritten.
+    Raises UsageError, OutputError.
     """
     if "-" in logs and len(logs) > 1:
         raise UsageError("- stands for one log on standard input; it cannot be mixed with other logs.")
@@ -86,7 +85,7 @@ def _check(tasks: Sequence[Task], inputs: Sequence[str]) -> None:
 
 
 def _make(directory: Path, option: str = "-o") -> None:
-    """Make a directory for outputs if it is not there. Raises OutputError."""
+    """Make a directory for outputs unless it exists. Raises OutputError."""
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except FileExistsError as error:
@@ -98,18 +97,18 @@ def _make(directory: Path, option: str = "-o") -> None:
         ) from error
 
 
-def pages(names: Sequence[str], given: str | None, inputs: Sequence[str] = ()) -> tuple[list[str | None], str | None]:
-    """The page of each trajectory, and the index page if there is one; the directory is made.
+def pages(names: Sequence[str], report: str | None, inputs: Sequence[str] = ()) -> tuple[list[str | None], str | None]:
+    """The page of each trajectory, and the index page if there is one; makes the directory.
 
-    names: the trajectories' files (in `-` is nothing to name a page by, then the log's). given: the option's value.
-    inputs: files that are not to be written over, beside the trajectories. Raises UsageError, OutputError.
+    names: the trajectories' files, by which the pages are named. report: the option's value. inputs: files not to be
+    overwritten, beside the trajectories. Raises UsageError, OutputError.
     """
-    if given is None:
+    if report is None:
         return [None] * len(names), None
-    if remote.is_uri(given):
-        raise UsageError(f"{_REPORT} {given}: pages are written on this machine; name a file or directory of it.")
-    directory = _page_directory(given, several=len(names) > 1)
-    named = [given] if directory is None else [str(directory / _page(name)) for name in names]
+    if remote.is_uri(report):
+        raise UsageError(f"{_REPORT} {report}: pages are written on this machine; name a file or directory of it.")
+    directory = _page_directory(report, several=len(names) > 1)
+    named = [report] if directory is None else [str(directory / _page(name)) for name in names]
     index = None if directory is None else str(directory / INDEX)
     twice = [page for page in named if named.count(page) > 1]
     if twice:
@@ -124,16 +123,16 @@ def pages(names: Sequence[str], given: str | None, inputs: Sequence[str] = ()) -
     return list(named), index
 
 
-def _page_directory(given: str, several: bool) -> Path | None:
-    path = Path(given)
-    if path.is_dir() or given.endswith("/"):
+def _page_directory(report: str, several: bool) -> Path | None:
+    path = Path(report)
+    if path.is_dir() or report.endswith("/"):
         return path
     if path.suffix.lower() in _PAGES:
         if several:
-            raise UsageError(f"{_REPORT} {given}: there are several reports to write; name a directory.")
+            raise UsageError(f"{_REPORT} {report}: there are several reports to write; name a directory.")
         return None
-    if given == "-" or path.suffix:
-        raise UsageError(f"{_REPORT} {given}: end the name in .html, or in / if it is a directory.")
+    if report == "-" or path.suffix:
+        raise UsageError(f"{_REPORT} {report}: end the name in .html, or in / if it is a directory.")
     return path
 
 

@@ -1,4 +1,4 @@
-"""The worker processes of `batch`: one log at a time each, stopped at once by Ctrl-C, replaced when one dies."""
+"""The worker pool on this machine: one log at a time each, stopped by Ctrl-C, replaced when a worker dies."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from typing import Any
 
-from ftproc.batch.tasks import Begin, Outcome, Say, Task, filter_one
+from ftproc.batch.tasks import Notify, Outcome, Submit, Task, filter_one
 from ftproc.config.recipe import Recipe
 from ftproc.core.compiled import COMPILING
 from ftproc.core.threads import available, use
@@ -21,20 +21,20 @@ _DIED = "its worker process died (out of memory, or killed). Use fewer --jobs, o
 
 
 class _Shared:
-    """What all workers see. stop: begin nothing more. said: somebody has told that kernels are being compiled."""
+    """What all workers share. stop: start no more tasks. compiling: the user knows that kernels are being compiled."""
 
-    def __init__(self, context: Any, say: Say | None) -> None:
-        self.stop, self.said, self.say = context.Event(), context.Value("b", False), say
+    def __init__(self, context: Any, notify: Notify | None) -> None:
+        self.stop, self.compiling, self.notify = context.Event(), context.Value("b", False), notify
 
 
 @contextlib.contextmanager
-def pool(recipe: Recipe, jobs: int, say: Say | None) -> Iterator[Begin]:
-    """`jobs` processes. When one dies, what was not done is done one by one."""
+def pool(recipe: Recipe, jobs: int, notify: Notify | None) -> Iterator[Submit]:
+    """`jobs` processes. When one dies, the tasks left are done one at a time."""
     context = multiprocessing.get_context("spawn")  # fork would copy the threads' locks but not the threads
-    shared = _Shared(context, say)
+    shared = _Shared(context, notify)
     executor = _executor(context, jobs, recipe, shared)
 
-    def begin(task: Task) -> Callable[[], Outcome]:
+    def submit(task: Task) -> Callable[[], Outcome]:
         alone = partial(_alone, context, task, recipe, shared)
         try:
             return partial(_outcome, executor.submit(_work, task), alone)
@@ -42,7 +42,7 @@ def pool(recipe: Recipe, jobs: int, say: Say | None) -> Iterator[Begin]:
             return alone
 
     try:
-        yield begin
+        yield submit
     except BaseException:
         shared.stop.set()
         raise
@@ -58,12 +58,12 @@ def _outcome(future: Future[Outcome], alone: Callable[[], Outcome]) -> Outcome:
 
 
 def _executor(context: Any, jobs: int, recipe: Recipe, shared: _Shared) -> ProcessPoolExecutor:
-    given = (recipe, max(available() // jobs, 1), shared.stop, shared.said, shared.say)
-    return ProcessPoolExecutor(jobs, mp_context=context, initializer=_prepare, initargs=given)
+    arguments = (recipe, max(available() // jobs, 1), shared.stop, shared.compiling, shared.notify)
+    return ProcessPoolExecutor(jobs, mp_context=context, initializer=_prepare, initargs=arguments)
 
 
 def _alone(context: Any, task: Task, recipe: Recipe, shared: _Shared) -> Outcome:
-    """In a worker of its own, so that it is known which log it was that killed one."""
+    """In a separate worker, which shows the log that kills it."""
     with _executor(context, 1, recipe, shared) as executor:
         try:
             return executor.submit(_work, task).result()
@@ -72,32 +72,31 @@ def _alone(context: Any, task: Task, recipe: Recipe, shared: _Shared) -> Outcome
 
 
 _recipe: Recipe
-_say: Say | None
+_notify: Notify | None
 _stop: Any
 
 
-def _prepare(recipe: Recipe, threads: int, stop: Any, said: Any, say: Say | None) -> None:
+def _prepare(recipe: Recipe, threads: int, stop: Any, compiling: Any, notify: Notify | None) -> None:
     """In the worker, before its first task. Together the workers use no more threads than there are processors."""
-    global _recipe, _say, _stop
+    global _recipe, _notify, _stop
     _recipe, _stop = recipe, stop
-    _say = None if say is None else _once(say, said)
+    _notify = None if notify is None else _once(notify, compiling)
     use(threads)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an idle worker waits for the parent to end it
 
 
-def _once(say: Say, said: Any) -> Say:
-    """`say`, but that the kernels are being compiled only from the first of all workers."""
+def _once(notify: Notify, compiling: Any) -> Notify:
+    """`notify`, with the line about compiling kernels from the first worker only."""
 
-    def tell(text: str) -> None:
-        if text != COMPILING:
-            say(text)
-            return
-        with said.get_lock():
-            first, said.value = not said.value, True
-        if first:
-            say(text)
+    def filtered(text: str) -> None:
+        if text == COMPILING:
+            with compiling.get_lock():
+                known, compiling.value = compiling.value, True
+            if known:
+                return
+        notify(text)
 
-    return tell
+    return filtered
 
 
 def _work(task: Task) -> Outcome:
@@ -105,6 +104,6 @@ def _work(task: Task) -> Outcome:
         raise KeyboardInterrupt
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        return filter_one(task, _recipe, _say)
+        return filter_one(task, _recipe, _notify)
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)

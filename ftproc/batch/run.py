@@ -1,8 +1,5 @@
-"""Many logs through the same filter: each by itself, so that a bad one stops no other, in this process, in worker
-processes (`processes`) or on a Dask cluster (`cluster`).
-
-The results come in the order of the tasks, and are the same bytes whoever works.
-"""
+"""Many logs through the same filter, independently, so that a bad one does not stop the others: in this process, in
+worker processes or on a Dask cluster, with the same bytes."""
 
 from __future__ import annotations
 
@@ -11,30 +8,33 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from functools import partial
 
-from ftproc.batch.tasks import Begin, Outcome, Say, Task, filter_one
+from ftproc.batch.tasks import Notify, Outcome, Submit, Task, filter_one
 from ftproc.config.recipe import Recipe
+from ftproc.correction import model_file
+from ftproc.files.writing import geodesy
 
 
 def run(
-    tasks: Sequence[Task], recipe: Recipe, jobs: int = 1, say: Say | None = None, scheduler: str | None = None
+    tasks: Sequence[Task], recipe: Recipe, jobs: int = 1, notify: Notify | None = None, scheduler: str | None = None
 ) -> Iterator[Outcome]:
-    """Filter every log, in up to `jobs` processes or by the workers of a Dask cluster, whose scheduler has the address
-    `scheduler`. Yields the outcomes in the order of the tasks.
+    """Filter every log, in up to `jobs` processes or on the Dask cluster of the scheduler at this address. Yields the
+    outcomes in the order of the tasks.
 
-    say: is told when kernels are being compiled, which takes a while; with workers it must be picklable.
-    Raises ModelError, and UsageError when a site or a report is asked for and pymap3d or plotly is not there, or when
-    the cluster is not, before any log is touched.
+    notify: takes warnings, and a line when kernels have to be compiled; with workers it must be picklable.
+    Before any log is read, raises ModelError, and UsageError when pymap3d is needed and not installed, or the cluster
+    does not answer.
     """
-    _check(tasks, recipe)
-    with _workers(len(tasks), recipe, jobs, say, scheduler) as begin:
-        waiting = deque([begin(task) for task in tasks])
+    model_file.named(recipe.model)
+    geodesy.check(recipe.settings)
+    with _workers(len(tasks), recipe, jobs, notify, scheduler) as submit:
+        waiting = deque([submit(task) for task in tasks])
         while waiting:
             yield waiting.popleft()()
 
 
 def _workers(
-    tasks: int, recipe: Recipe, jobs: int, say: Say | None, scheduler: str | None
-) -> contextlib.AbstractContextManager[Begin]:
+    tasks: int, recipe: Recipe, jobs: int, notify: Notify | None, scheduler: str | None
+) -> contextlib.AbstractContextManager[Submit]:
     if scheduler is not None:
         from ftproc.batch import cluster
 
@@ -42,16 +42,5 @@ def _workers(
     if jobs > 1 and tasks > 1:
         from ftproc.batch import processes
 
-        return processes.pool(recipe, min(jobs, tasks), say)
-    return contextlib.nullcontext(lambda task: partial(filter_one, task, recipe, say))
-
-
-def _check(tasks: Sequence[Task], recipe: Recipe) -> None:
-    from ftproc.correction import model_file
-    from ftproc.files.writing import geodesy
-    from ftproc.report import style
-
-    model_file.named(recipe.model)
-    geodesy.check(recipe.settings)
-    if any(task.report is not None for task in tasks):
-        style.require_plotly()
+        return processes.pool(recipe, min(jobs, tasks), notify)
+    return contextlib.nullcontext(lambda task: partial(filter_one, task, recipe, notify))

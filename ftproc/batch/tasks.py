@@ -1,4 +1,4 @@
-"""One log from file to file, and what became of it: the work that every worker does."""
+"""The work on one log, from file to file, and its outcome."""
 
 from __future__ import annotations
 
@@ -20,14 +20,15 @@ if TYPE_CHECKING:
     from ftproc.correction.model import Model
     from ftproc.methods.registry import Method
 
-Say = Callable[[str], None]
+#: Takes a line for the user.
+Notify = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Task:
-    """One log to filter and where its trajectory goes; either may be `-`. method: instead of the recipe's. report:
-    where the HTML page goes, if one is wanted. place: the directory that names start from, when it is not the one in
-    which the worker stands."""
+    """One log to filter and the file of its trajectory; either may be `-`. method: instead of the recipe's. report: the
+    file of the HTML page, if there is one. place: the directory of relative names, when it is not the worker's current
+    one."""
 
     log: str
     output: str
@@ -36,13 +37,13 @@ class Task:
     place: str = ""
 
     def at(self, name: str) -> str:
-        """Where the file of that name is for whoever does the task."""
+        """The file of that name, as the worker finds it."""
         return str(Path(self.place, name)) if self.place and not remote.is_uri(name) else name
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a task: its summary as text and as a dictionary, or its failure; and the time it took."""
+    """The outcome of a task: its summary as text and as a dictionary, or its failure; and its duration."""
 
     task: Task
     text: str = ""
@@ -51,13 +52,13 @@ class Outcome:
     elapsed_s: float = 0.0
 
 
-#: Takes a task and returns what waits for its outcome.
-Begin = Callable[[Task], Callable[[], Outcome]]
+#: Submits a task; the function returned waits for its outcome.
+Submit = Callable[[Task], Callable[[], Outcome]]
 
 
-def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
-    """Read, filter and write one log. Whatever goes wrong with it is in the outcome; only a closed pipe and
-    an interruption are raised."""
+def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outcome:
+    """Read, filter and write one log. Its errors are in the outcome; only a closed pipe and an interruption are
+    raised."""
     from ftproc import pipeline, report
     from ftproc.core import compiled
     from ftproc.correction import model_file
@@ -66,26 +67,28 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
     from ftproc.methods import registry
     from ftproc.quality import summary
 
-    began = time.perf_counter()
+    started = time.perf_counter()
     try:
         log = logs.read(task.at(task.log), **recipe.reading())
         if task.place:
-            log = replace(log, name=task.log)  # the trajectory says where it comes from in the user's words
+            log = replace(log, name=task.log)  # as the user named it
         settings = replace(recipe.settings, method=task.method or recipe.settings.method)
-        named = None if task.method is None else registry.named(task.method)
-        model = model_file.named(recipe.model) if named is None else model_for(named, recipe.model)
+        if task.method is None:
+            model = model_file.named(recipe.model)
+        else:
+            model = model_for(registry.named(task.method), recipe.model)
         filtering = pipeline.Filtering(log, settings, model)
-        with compiled.announced(say), _passed_on(task.log, say):
+        with compiled.announced(notify), _forwarded(task.log, notify):
             parts = (geodesy.located(part, settings) for part in filtering.parts())
             if task.report is None:
-                trajectories.write_parts(parts, filtering.metadata, task.at(task.output))
+                trajectories.write_parts(parts, lambda: filtering.metadata, task.at(task.output))
             else:
                 trajectory = joined(list(parts))
-                trajectory = replace(trajectory, metadata={**trajectory.metadata, **filtering.metadata()})
+                trajectory = replace(trajectory, metadata={**trajectory.metadata, **filtering.metadata})
                 trajectories.write(trajectory, task.at(task.output))
                 report.write(trajectory, task.at(task.report))
-        metadata = filtering.metadata()
-        elapsed_s = time.perf_counter() - began
+        metadata = filtering.metadata
+        elapsed_s = time.perf_counter() - started
         return Outcome(task, summary.text(metadata), summary.as_dict(metadata), elapsed_s=elapsed_s)
     except BrokenPipeError:
         raise
@@ -96,8 +99,8 @@ def filter_one(task: Task, recipe: Recipe, say: Say | None = None) -> Outcome:
 
 
 def model_for(method: Method, name: str | Model) -> Model | None:
-    """The model named if it was trained for the method, else the packaged one: when all methods are run side
-    by side, one model cannot suit them all. Raises ModelError."""
+    """The model named if it was trained for the method, else the packaged one: no model suits all methods. Raises
+    ModelError."""
     from ftproc.correction import model_file
 
     model = model_file.named(name)
@@ -105,20 +108,20 @@ def model_for(method: Method, name: str | Model) -> Model | None:
 
 
 @contextlib.contextmanager
-def _passed_on(source: str, say: Say | None) -> Iterator[None]:
-    """Inside the block, warnings of ours go to `say`, naming their source."""
-    if say is None:
+def _forwarded(source: str, notify: Notify | None) -> Iterator[None]:
+    """Inside the block, ftproc's warnings go to `notify`, naming their source."""
+    if notify is None:
         yield
         return
     with warnings.catch_warnings():
         warnings.simplefilter("always", FtprocWarning)
         show = warnings.showwarning
 
-        def tell(message: Warning | str, category: type[Warning], *where: Any) -> None:
+        def forward(message: Warning | str, category: type[Warning], *where: Any) -> None:
             if issubclass(category, FtprocWarning):
-                say(f"{source}: {message}")
+                notify(f"{source}: {message}")
             else:
                 show(message, category, *where)
 
-        warnings.showwarning = tell  # type: ignore[assignment]
+        warnings.showwarning = forward  # type: ignore[assignment]
         yield

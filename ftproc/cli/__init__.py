@@ -1,4 +1,4 @@
-"""The command line: one file for each command, which parses, makes one call and prints.
+"""The command line: one file for each command, which parses its options, makes one call and prints.
 
-Calls everything; nothing calls it. What a command needs it loads when it runs, so that help comes at once.
+Calls everything; nothing calls it. A command loads what it needs when it runs, so that help is immediate.
 """

@@ -1,4 +1,4 @@
-"""What every command has in common: `-h`, `--debug`, a help that ends with examples to copy, a quick start."""
+"""What every command has in common: `-h`, `--debug`, a help that ends with examples, a quick start."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ from typing import Any
 import click
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
-
-
 DEBUG = "--debug"
 
 
@@ -28,7 +26,7 @@ def debug_option() -> click.Option:
 class Command(click.Command):
     """A command whose help ends with `examples`, one shell command per line.
 
-    more: text for the help that is only known at run time, such as a list of names; asked for when it is shown.
+    more: makes a text for the help, such as a list of names, when it is shown.
     """
 
     def __init__(self, *args: Any, examples: str, more: Callable[[], str] | None = None, **attributes: Any) -> None:
@@ -49,16 +47,16 @@ def write_examples(formatter: click.HelpFormatter, examples: str) -> None:
     formatter.write(f"\nExamples:\n{lines}")
 
 
-def hasten() -> None:
-    """Do what makes the first result of a process come sooner; before numba is loaded."""
-    gc.set_threshold(100_000, 50, 50)  # loading modules makes many objects and hardly any garbage
-    _spare_blas()
+def start_quickly() -> None:
+    """Shorten the start of the process; to be called before numba is loaded."""
+    gc.set_threshold(100_000, 50, 50)  # loading modules makes many objects and little garbage
+    _skip_blas()
 
 
-def _spare_blas() -> None:
-    """Keep numba from looking for SciPy's BLAS, which loads much of SciPy: no kernel here multiplies matrices by it.
+def _skip_blas() -> None:
+    """Keep numba from loading SciPy's BLAS, and much of SciPy with it: no kernel multiplies matrices by BLAS.
 
-    numba asks once, when its array functions are first needed, and takes "not there" for an answer.
+    numba asks once, when its array functions are first needed, and accepts that there is none.
     """
     name = "scipy.linalg.cython_blas"
     if name in sys.modules or "numba" in sys.modules:

@@ -1,4 +1,4 @@
-"""The `ftproc` command: its subcommands, loaded when used, and the one place where errors become sentences."""
+"""The `ftproc` command: its subcommands, loaded when used, and the one place where errors become messages."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ COMMANDS = ("simulate", "train", "filter", "score")
 
 INTERRUPTED, TERMINATED = 130, 143  # what a shell reports for Ctrl-C and for `kill`
 
-_ALIKE = 0.65  # options: their dashes alone make any two somewhat like each other
+_ALIKE = 0.65  # of options, whose dashes alone make any two somewhat alike
 
 _EXAMPLES = """
 ftproc simulate --scenario zuo2021-outliers -o flight.csv --truth flight.truth.csv
@@ -53,22 +53,22 @@ class Program(click.Group):
 
     def main(self, args: Any = None, prog_name: str | None = None, *rest: Any, **extra: Any) -> Any:
         """Run and exit: 0 done, 1 an input could not be processed, 2 wrong usage."""
-        given = sys.argv[1:] if args is None else list(args)
+        arguments = sys.argv[1:] if args is None else list(args)
         extra["standalone_mode"] = False
         try:
-            code = super().main(given, prog_name or "ftproc", **extra)
-            sys.stdout.flush()  # a full disk behind a redirection shows here at the latest
+            code = super().main(arguments, prog_name or "ftproc", **extra)
+            sys.stdout.flush()  # raises for a full disk behind a redirection
         except (Exception, KeyboardInterrupt) as error:
             stop = interruption(error)
             if isinstance(stop, SystemExit):
                 raise stop from None
-            code = _report(stop or error, DEBUG in given)  # the error may have come before it was parsed
+            code = _report(stop or error, DEBUG in arguments)  # not from the context: parsing may have failed
             _empty_stdout()
         sys.exit(code if isinstance(code, int) else 0)
 
 
 def _report(error: BaseException, debug: bool) -> int:
-    """Say on standard error what went wrong; the exit code."""
+    """Print the error on standard error; the exit code."""
     if debug:
         traceback.print_exception(error)
     if isinstance(error, click.Abort | KeyboardInterrupt):
@@ -80,7 +80,7 @@ def _report(error: BaseException, debug: bool) -> int:
     if isinstance(error, click.ClickException):
         click.echo(_usage(error), err=True)
         return error.exit_code
-    if isinstance(error, BrokenPipeError):  # whoever read our output has seen enough
+    if isinstance(error, BrokenPipeError):  # the reader of our output left early
         return 1
     found = failure(error)
     click.echo(f"ftproc: {found.message}", err=True)
@@ -90,7 +90,7 @@ def _report(error: BaseException, debug: bool) -> int:
 def _usage(error: click.ClickException) -> str:
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else "ftproc"
-    if isinstance(error, click.NoSuchOption) and context is not None:  # click names all that are somewhat like it
+    if isinstance(error, click.NoSuchOption) and context is not None:  # click itself names every similar one
         known = [name for p in context.command.get_params(context) for name in (*p.opts, *p.secondary_opts)]
         message = f"There is no option {error.option_name}{nearest(error.option_name, known, _ALIKE)}"
     else:
@@ -99,8 +99,7 @@ def _usage(error: click.ClickException) -> str:
 
 
 def _empty_stdout() -> None:
-    """What is left for a standard output that takes no more is thrown away: Python would try again at exit, and
-    complain."""
+    """Discard what a standard output that is full or closed did not take: Python would try again at exit, and fail."""
     import os
 
     try:
@@ -110,7 +109,7 @@ def _empty_stdout() -> None:
 
 
 def _terminated(signum: int, frame: object) -> None:
-    sys.exit(TERMINATED)  # through all `finally`, so that nothing half-written stays behind
+    sys.exit(TERMINATED)  # runs every `finally`, so that no partial output remains
 
 
 @click.group("ftproc", cls=Program, context_settings=CONTEXT)
@@ -118,9 +117,9 @@ def _terminated(signum: int, frame: object) -> None:
 def cli() -> None:
     """Clean trajectories, with honest uncertainties, from dirty theodolite and radar logs.
 
-    A log holds the times, slant range R, azimuth A and elevation E of one target as one station saw it. `filter`
-    finds the outliers, estimates position and velocity with the anti-outlier GA-BPNN-UKF (Zuo et al. 2021), and
-    says how far to trust them.
+    A log holds the times, slant range R, azimuth A and elevation E of one target, measured by one station. `filter`
+    finds the outliers, estimates position and velocity with the anti-outlier GA-BPNN-UKF (Zuo et al. 2021), and judges
+    the result: consistent, suspect or unreliable.
     """
 
 

@@ -1,4 +1,4 @@
-"""Each option that several commands share, and the kinds of value, once."""
+"""The options that several commands share, and the kinds of value."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def number(text: Any) -> float:
 
 
 def number_or_auto(text: Any) -> float | None:
-    """`auto` is None: find it from the log."""
+    """`auto` is None: estimated from the log."""
     return None if _is_auto(text) else number(text)
 
 
@@ -39,7 +39,7 @@ def noise_sigmas(text: Any) -> tuple[float, float, float]:
 
 
 def noise_or_auto(text: Any) -> Noise | None:
-    """The same above zero, or `auto` for all or any of them: None, found from the log."""
+    """The same above zero, or `auto` for all or any of them: None, estimated from the log."""
     if _is_auto(text):
         return None
     parts = str(text).split(",")
@@ -47,7 +47,7 @@ def noise_or_auto(text: Any) -> Noise | None:
     if values is None or min(values) < 0:
         raise click.BadParameter(f'"{text}" is not {_NOISE_FORM}.')
     if min(values) == 0:
-        raise click.BadParameter(f'"{text}": a sigma of zero would mean that no reading is ever off; give what it is.')
+        raise click.BadParameter(f'"{text}": a sigma of zero means readings without error; give a larger one.')
     first, second, third = (None if _is_auto(part) else value for part, value in zip(parts, values, strict=True))
     return first, second, third
 
@@ -81,7 +81,7 @@ def _triple(text: Any) -> tuple[float, float, float] | None:
     return (values[0], values[1], values[2])
 
 
-#: The name of a file; shells complete it.
+#: The name of a file, which shells complete.
 FILE = click.Path()
 
 
@@ -118,16 +118,16 @@ def noise(kind: Callable[[Any], Any], default: str | None, text: str) -> Callabl
 
 
 def output(what: str, metavar: str, required: bool = False) -> Callable[[F], F]:
-    """`-o`, which names one file or directory: a second one is refused, not taken for the first."""
+    """`-o`, which names one file or directory: a second one is refused, not preferred to the first."""
 
-    def only(ctx: click.Context, parameter: click.Parameter, given: tuple[str, ...]) -> str | None:
-        if len(given) > 1:
+    def only(ctx: click.Context, parameter: click.Parameter, names: tuple[str, ...]) -> str | None:
+        if len(names) > 1:
             raise click.UsageError(
-                f"-o is given {len(given)} times ({', '.join(given)}), and a run writes one kind of file; "
+                f"-o is given {len(names)} times ({', '.join(names)}), and a run writes one kind of file; "
                 "run it once for each.",
                 ctx,
             )
-        return given[0] if given else None
+        return names[0] if names else None
 
     return click.option(
         "-o", "--output", type=FILE, multiple=True, callback=only, metavar=metavar, required=required, help=what
@@ -151,12 +151,12 @@ def azimuth_from(text: str) -> Callable[[F], F]:
 
 
 def tracker(function: F) -> F:
-    """What the filter does: method, editing, tuning, smoothing."""
+    """Options of the filter: method, model, smoothing, editing, noise, process noise."""
     return _with(_TRACKER, function)
 
 
 def tuned(function: F) -> F:
-    """Editing, noise and jerk level: what a correction depends on."""
+    """Options that a correction depends on: editing, noise, process noise."""
     return _with(_TUNED, function)
 
 
@@ -169,20 +169,20 @@ def _with(options: tuple[Callable[[Any], Any], ...], function: F) -> F:
 _TUNED: tuple[Callable[[Any], Any], ...] = (
     click.option(
         "--editing", type=click.Choice(["two-pass", "forward", "none"]), default=FilterSettings.editing,
-        help="How outliers are found: with the whole log in view, recursively as a live system must, or not at all.",
+        help="How outliers are found: from the whole log, recursively as in a live system, or not at all.",
     ),
-    noise(noise_or_auto, AUTO, "; auto, for all or for one: from the log."),
+    noise(noise_or_auto, AUTO, "; auto, for all or for one: estimated from the log."),
     click.option(
         "--jerk", type=number_or_auto, default=AUTO, metavar="S",
-        help="How hard the target manoeuvres: spectral density of white jerk in m2/s5, such as 1 for gentle "
-        "turns and 100 for a fighter; auto: from the log.",
+        help="Process noise: the spectral density (PSD) of white jerk in m2/s5, such as 1 for gentle turns and 100 for "
+        "a fighter; auto: estimated from the log.",
     ),
 )  # fmt: skip
 
 _TRACKER: tuple[Callable[[Any], Any], ...] = (
     click.option(
         "--method", metavar="NAME", default=FilterSettings.method, shell_complete=_complete_method,
-        help="How to filter; see --list-methods. `all` runs every method, with -o DIRECTORY.",
+        help="The filter; see --list-methods. `all` runs every method, with -o DIRECTORY.",
     ),
     click.option(
         "--model", type=FILE, metavar="MODEL|none", default="packaged",
@@ -192,18 +192,18 @@ _TRACKER: tuple[Callable[[Any], Any], ...] = (
     *_TUNED,
     click.option(
         "--gate", type=number, default=FilterSettings.gate, metavar="C",
-        help="A reading so many sigmas off is suspected of being an outlier.",
+        help="The gate in sigmas: a reading whose innovation is larger is suspected of being an outlier.",
     ),
     click.option(
         "--max-patch", type=number, metavar="SECONDS",
-        help="The longest patch of outliers expected, such as 5; forward editing takes a longer one for a lost track. "
+        help="The longest patch of outliers expected, such as 5; in forward editing a longer one is track loss. "
         "[default: 4 s or 32 samples]",
     ),
     click.option(
         "--particles", type=click.IntRange(min=20), default=FilterSettings.particles, metavar="N",
         help="Members of the ensemble and particle filters.",
     ),
-    seed("Random numbers of these filters"),
+    seed("Seed of these filters"),
     click.option(
         "--weight-form", type=click.Choice(["noise", "gain"]), default="noise",
         help="In forward editing the outlier weight divides the measurement noise, or scales the gain as Zuo et al. "

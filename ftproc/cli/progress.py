@@ -1,4 +1,4 @@
-"""A line on standard error that shows how far long work has come: on a terminal only, and only after a while."""
+"""A progress line on standard error: on a terminal only, and only for work of more than two seconds."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ _WIDTH = 30
 
 
 class Progress:
-    """Call it with (stage, steps done, steps in all); as a context manager it takes the line away at the end."""
+    """Call it with (stage, steps done, steps in all); as a context manager it erases the line at the end."""
 
     def __init__(self, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self._stream = sys.stderr if stream is None else stream
         self._clock = clock
-        self._began = self._shown = clock()
+        self._started = self._shown = clock()
         self._length = 0
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         now = self._clock()
-        if not self._stream.isatty() or now - self._began < PATIENCE_S or now - self._shown < _EVERY_S:
+        if not self._stream.isatty() or now - self._started < PATIENCE_S or now - self._shown < _EVERY_S:
             return
         self._shown = now
         filled = _WIDTH * done // max(total, 1)
@@ -34,7 +34,7 @@ class Progress:
         self._length = len(line)
 
     def clear(self) -> None:
-        """Take the line away, so that something else can be written."""
+        """Erase the line, so that something else can be written."""
         if self._length:
             self._stream.write("\r" + " " * self._length + "\r")
             self._stream.flush()

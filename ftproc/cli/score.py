@@ -1,4 +1,4 @@
-"""`ftproc score`: how good trajectories are, by themselves and against a truth."""
+"""`ftproc score`: the smoothness of trajectories, and their errors against a truth."""
 
 from __future__ import annotations
 
@@ -28,16 +28,18 @@ ftproc score clean.parquet --truth flight.truth.csv --report errors.html
     multiple=True,
     type=options.FILE,
     metavar="TRUTH",
-    help="What really happened: once for all trajectories, or once for each, in the same order.",
+    help="The truth: once for all trajectories, or once for each, in the same order.",
 )
-@click.option("--format", "form", type=click.Choice(["table", "json", "csv"]), default="table", help="How to print it.")
-@options.report("a trajectory and, with a truth, its errors inside their sigmas")
+@click.option(
+    "--format", "form", type=click.Choice(["table", "json", "csv"]), default="table", help="Form of the printed scores."
+)
+@options.report("a trajectory and, with a truth, its errors beside their sigmas")
 def command(trajectories: tuple[str, ...], truths: tuple[str, ...], form: str, report: str | None) -> None:
-    """Print how good trajectories are, side by side.
+    """Print the scores of trajectories, a column for each.
 
     A TRAJECTORY is a file that `filter` wrote, any table with time_s, x_m, y_m, z_m, or - for CSV on standard input.
-    Without a truth only the smoothness (average gradient) can be told; with it also the errors, whether the
-    uncertainties are honest, and how well the outliers were found.
+    Without a truth the score is the smoothness (average gradient); with it also the errors, their consistency with the
+    published sigmas, and precision and recall of the outlier flags.
     """
     if len(truths) > 1 and len(truths) != len(trajectories):
         raise click.UsageError(
@@ -51,7 +53,7 @@ def command(trajectories: tuple[str, ...], truths: tuple[str, ...], form: str, r
 
 
 def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: str | None) -> int:
-    """Score one after the other, print the scores, and write the pages; the exit code."""
+    """Score the trajectories, print the scores, and write the pages; the exit code."""
     from ftproc import report as pages
     from ftproc.batch import plan
     from ftproc.errors import InputError
@@ -88,7 +90,9 @@ def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: 
 
 
 def _summary(trajectory: Trajectory) -> dict[str, Any]:
-    return {"method": trajectory.metadata.get("method", ""), **trajectory.metadata.get("summary", {})}
+    from ftproc.report.view import summary_of
+
+    return {"method": trajectory.metadata.get("method", ""), **summary_of(trajectory)}
 
 
 def _truth(name: str, known: dict[str, Truth]) -> Truth:

@@ -1,8 +1,9 @@
-"""`ftproc simulate`: a flight, measured and spoiled, with its truth."""
+"""`ftproc simulate`: the log of a simulated flight, with outliers, and its truth."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -28,41 +29,34 @@ def _scenarios_and_grammar() -> str:
 
 @click.command(cls=Command, examples=_EXAMPLES, more=_scenarios_and_grammar)
 @options.scenario(True, "Which flight, sampling, noise and outliers; the names are below.")
-@options.seed("Another flight, noise and outliers for each")
+@options.seed("Seed of the flight, noise and outliers")
 @click.option(
     "--duration",
+    "duration_s",
     type=options.number,
     metavar="S",
     help="Length of the record in s, such as 60. [default: scenario's]",
 )
 @click.option(
     "--dt",
+    "dt_s",
     type=options.number,
     metavar="S",
     help="Sample interval in s, such as 0.05 for 20 Hz. [default: scenario's]",
 )
 @options.noise(options.noise_sigmas, None, ". [default: scenario's]")
-@click.option("--outliers", metavar="SPEC", help="How the log is spoiled, or none; see below. [default: scenario's]")
+@click.option(
+    "--outliers", metavar="SPEC", help="Outliers and gaps of the log, or none; see below. [default: scenario's]"
+)
 @options.units("Units to write, such as range=km,azimuth=deg; they show in the column names. [default: m, rad, s]")
 @options.azimuth_from(
-    "north: write the azimuth as a survey does, clockwise from north, from 0 to a full turn. The truth's x is then "
+    "north: azimuth in the survey convention, clockwise from north, from 0 to a full turn. The truth's x is then "
     "north, y east and z up."
 )
 @options.output("The log to write: .csv, .csv.gz, .parquet, .feather, or - for CSV on stdout.", "LOG", required=True)
-@click.option(
-    "--truth", type=options.FILE, metavar="TRUTH", help="Where to write what really happened: states and outlier flags."
-)
+@click.option("--truth", type=options.FILE, metavar="TRUTH", help="The truth to write: states and outlier flags.")
 def command(
-    scenario: str,
-    seed: int,
-    duration: float | None,
-    dt: float | None,
-    noise: tuple[float, float, float] | None,
-    outliers: str | None,
-    units: str | None,
-    azimuth_from: str,
-    output: str,
-    truth: str | None,
+    scenario: str, output: str, truth: str | None, units: str | None, azimuth_from: str, **changes: Any
 ) -> None:
     """Make a log as dirty as a real one, with its truth."""
     from ftproc.files.options import parse_units
@@ -70,15 +64,15 @@ def command(
     from ftproc.simulation import simulate
 
     _check(output, truth)
-    parse_units(units)  # what is wrong with them is said before any work
-    flight = simulate(scenario, seed=seed, duration_s=duration, dt_s=dt, noise=noise, outliers=outliers)
-    if truth is not None:  # first, so that who waits for the log finds both
+    parse_units(units)  # errors are reported before any work
+    flight = simulate(scenario, **changes)
+    if truth is not None:  # first, so that both are there when the log is
         flights.write_truth(flight.truth, truth)
     flights.write_log(flight.log, output, units, azimuth_from)
 
 
 def _check(output: str, truth: str | None) -> None:
-    """Raise UsageError or OutputError before any work when the two cannot both be written."""
+    """Raises UsageError or OutputError when the two cannot both be written."""
     from ftproc.files.writing import atomic, tables
 
     for target in (output, truth):
@@ -86,7 +80,7 @@ def _check(output: str, truth: str | None) -> None:
             tables.kind_of(target)
             atomic.check_target(target)
     if truth is not None and (output == truth or _resolved(output) == _resolved(truth)):
-        raise UsageError(f"-o and --truth are both {output}; give the truth a place of its own.")
+        raise UsageError(f"-o and --truth are both {output}; give the truth another name.")
 
 
 def _resolved(target: str) -> str:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import click
 import numpy as np
 
-from ftproc import api, pipeline
+from ftproc import api
 from ftproc.cli.progress import Progress
 from ftproc.core import compiled
 from ftproc.correction import model, model_file
 from ftproc.correction.training import stages, study
+from ftproc.correction.training.flights import filtered_flights, train_flights
 from ftproc.errors import UsageError
 from ftproc.files.reading import truth as truth_files
 from ftproc.files.writing import atomic
@@ -20,68 +22,77 @@ from ftproc.settings import FilterSettings, Noise, TrainSettings
 from ftproc.simulation import simulate
 
 
-def run(
-    *,
-    logs: Sequence[str],
-    truths: Sequence[str],
-    config: str | None,
-    scenario: str | None,
-    output: str | None,
-    compare_starts: bool,
-    features: str,
-    hidden: int,
-    population: int,
-    generations: int,
-    epochs: int,
-    flights: int,
-    seed: int,
-    method: str,
-    editing: str,
-    noise: Noise | None,
-    jerk: float | None,
-    units: str | None,
-    columns: str | None,
-    jobs: int,
-) -> None:
-    """Train, or compare, and print what came of it. Raises FtprocError."""
+class Request(NamedTuple):
+    """The options of `train`, by their names on the command line."""
+
+    logs: Sequence[str]
+    truths: Sequence[str]
+    config: str | None
+    scenario: str | None
+    output: str | None
+    compare_starts: bool
+    features: str
+    hidden: int
+    population: int
+    generations: int
+    epochs: int
+    flights: int
+    seed: int
+    method: str
+    editing: str
+    noise: Noise | None
+    jerk: float | None
+    units: str | None
+    columns: str | None
+    jobs: int
+
+    @property
+    def settings(self) -> TrainSettings:
+        return TrainSettings(
+            features=self.features, hidden=self.hidden, population=self.population, generations=self.generations,
+            epochs=self.epochs, flights=len(self.logs) or self.flights, seed=self.seed, method=self.method,
+        )  # fmt: skip
+
+    @property
+    def filtering(self) -> FilterSettings:
+        return FilterSettings(
+            method=self.method, editing=self.editing, noise=self.noise, jerk_psd_m2ps5=self.jerk
+        )  # fmt: skip
+
+
+def run(request: Request) -> None:
+    """Train and print the model's card, or compare first weights and print the result. Raises FtprocError."""
+    output, settings = request.output, request.settings
     if output == "-":
         raise UsageError("-o -: a model is not written to standard output; name a file.")
-    if features not in stages.feature_choices():
-        raise UsageError(f"there is no feature set {features!r}; choose one of {', '.join(stages.feature_choices())}")
+    if settings.features not in (choices := stages.feature_choices()):
+        raise UsageError(f"there is no feature set {settings.features!r}; choose one of {', '.join(choices)}")
     if output is not None:
-        atomic.refuse_overwriting(output, [*logs, *truths, *([config] if config else [])])
+        inputs = [*request.logs, *request.truths, *([request.config] if request.config else [])]
+        atomic.refuse_overwriting(output, inputs)
         atomic.check_target(output)
-    settings = TrainSettings(features, hidden, population, generations, epochs, len(logs) or flights, seed, method)
-    filtering = FilterSettings(method=method, editing=editing, noise=noise, jerk_psd_m2ps5=jerk)
     with Progress() as progress, compiled.announced(lambda text: click.echo(f"ftproc: {text}", err=True)):
-        pairs = (
-            _read(logs, truths, config, units, columns)
-            if scenario is None
-            else _simulated(scenario, settings, progress)
-        )
-        if compare_starts:
-            known = pipeline.known_flights(pairs, filtering, progress)
-            text = study.compare(known["filter"], settings, progress, jobs).text()
+        pairs = _read(request) if request.scenario is None else _simulated(request.scenario, settings, progress)
+        if output is None:  # --compare-starts
+            flights = filtered_flights(pairs, request.filtering, progress)
+            text = study.compare(flights["filter"], settings, progress, request.jobs).text()
         else:
-            trained = pipeline.train_flights(pairs, settings, progress, filtering, jobs)
-    if output is not None:
-        model_file.save(trained, output)
-        text = model.card(model_file.load(output))  # as whoever uses the file will see it
+            trained = train_flights(pairs, settings, request.filtering, progress, request.jobs)
+            model_file.save(trained, output)
+            text = model.card(model_file.load(output))  # of the file, as a reader gets it
     click.echo(text)
 
 
-def _read(
-    logs: Sequence[str], truths: Sequence[str], config: str | None, units: str | None, columns: str | None
-) -> list[tuple[MeasurementLog, Truth]]:
-    said = {name: value for name, value in (("units", units), ("columns", columns)) if value is not None}
+def _read(request: Request) -> list[tuple[MeasurementLog, Truth]]:
+    stated = {name: text for name in ("units", "columns") if (text := getattr(request, name)) is not None}
     return [
-        (api.read_log(log, config=config, **said), truth_files.read(truth))
-        for log, truth in zip(logs, truths, strict=True)
+        (api.read_log(log, config=request.config, **stated), truth_files.read(truth))
+        for log, truth in zip(request.logs, request.truths, strict=True)
     ]
 
 
 def _simulated(scenario: str, settings: TrainSettings, progress: Progress) -> list[tuple[MeasurementLog, Truth]]:
-    """Flights that no small seed of `ftproc simulate` makes, so that those stay fit for testing."""
+    """Flights whose seeds are not small, so that those of `ftproc simulate` stay fit for testing."""
     seeds = np.random.SeedSequence(settings.seed).generate_state(settings.flights, np.uint64)
     pairs = []
     for number, seed in enumerate(seeds):

@@ -1,4 +1,4 @@
-"""`python -m ftproc.cli.warm` compiles all kernels beforehand, so that the first `ftproc filter` need not wait."""
+"""`python -m ftproc.cli.warm` compiles all kernels, so that the first `ftproc filter` does not wait for them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ftproc.core.compiled import announced
 
 
 def warm() -> None:
-    """Run a small log through every path that has kernels of its own."""
+    """Filter a small log in every way that has its own kernels."""
     from dataclasses import replace
 
     from ftproc import pipeline
@@ -32,7 +32,7 @@ def warm() -> None:
 
 
 def _as_read(log: Any, read: Callable[..., Any]) -> Any:
-    """The log as it comes from a file: kernels are compiled for each memory layout of their arrays."""
+    """The log as read from a file: kernels are compiled for each memory layout of their arrays."""
     import pyarrow as pa
 
     names = ("time_s", "range_m", "azimuth_rad", "elevation_rad")
@@ -40,11 +40,11 @@ def _as_read(log: Any, read: Callable[..., Any]) -> Any:
 
 
 def main() -> None:
-    """Fill numba's cache, telling on standard error."""
-    began = time.monotonic()
+    """Fill numba's cache; messages go to standard error."""
+    started = time.monotonic()
     with announced(lambda text: print(text, file=sys.stderr, flush=True)):
         warm()
-    print(f"the kernels are ready ({time.monotonic() - began:.0f} s)", file=sys.stderr)
+    print(f"the kernels are ready ({time.monotonic() - started:.0f} s)", file=sys.stderr)
 
 
 if __name__ == "__main__":

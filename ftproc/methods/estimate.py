@@ -74,8 +74,9 @@ class Estimate(NamedTuple):
     run: the recursive filter. label: (n, 3) good, isolated, patch, missing. model: noise and jerk used.
     smoothed: the smoother's run when it was asked for. reacquired: samples at which the filter was re-initialized.
     settled: whether two-pass editing's decisions stood still; None where there were none to make. slow_noise: the
-    noise is correlated too slowly to be distinguished from motion, so the sigmas are too small. cleaned: (n, 3) readings of a
-    method that works on range, azimuth and elevation by themselves; NaN there and in its run means not estimated.
+    noise is correlated too slowly to be distinguished from motion, so the sigmas are too small. cleaned: (n, 3)
+    readings of a method that works on range, azimuth and elevation one by one; NaN there and in its run means not
+    estimated.
     """
 
     run: FilterRun
@@ -86,6 +87,12 @@ class Estimate(NamedTuple):
     settled: bool | None = None
     slow_noise: bool = False
     cleaned: FloatArray | None = None
+
+    @property
+    def smoothed_run(self) -> FilterRun:
+        """The run with the smoother's state and sigmas in place of the filter's, where there is a smoother."""
+        s = self.smoothed
+        return self.run if s is None else self.run._replace(state=s.state, sigma=s.sigma, los_sigma=s.los_sigma)
 
     def rows(self, low: int, high: int) -> Estimate:
         """Of the samples [low, high) alone."""

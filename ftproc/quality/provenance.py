@@ -1,4 +1,4 @@
-"""Everything needed to make a trajectory again, as its file keeps it."""
+"""The metadata of a trajectory: everything needed to reproduce it."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from ftproc.settings import FilterSettings
 if TYPE_CHECKING:
     from ftproc.correction.model import Model
     from ftproc.methods.registry import Method
-    from ftproc.quality.statistics import Tally
+    from ftproc.quality.statistics import RunStatistics
 
 
 def describe(
     log: MeasurementLog,
     method: Method,
     settings: FilterSettings,
-    tally: Tally,
+    statistics: RunStatistics,
     model: Model | None,
     summary: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """The metadata of a trajectory (JSON-serialisable), its summary among them. The jerk profile of a log that was
-    filtered in segments is not: it would be as long as the log."""
+    """The metadata of a trajectory (JSON-serialisable) with its summary, without the jerk profile of a log that was
+    filtered in segments: it would be as long as the log."""
     from ftproc.correction.model_file import sha256
 
-    sigma = np.sqrt(tally.model.reading_variance)
+    sigma = np.sqrt(statistics.model.reading_variance)
     return {
         "program": "ftproc",
         "version": __version__,
         "method": method.name,
-        "segments": tally.parts,
+        "segments": statistics.parts,
         "sees": method.sees(settings),
         "log": log.name,
         "frame": log.frame,
@@ -52,27 +52,27 @@ def describe(
             "site": settings.site,
             "geoid_m": settings.geoid_m,
             "ecef": settings.ecef,
-            "noise_given": settings.noise is not None and None not in settings.noise,
+            "noise_specified": settings.noise is not None and None not in settings.noise,
             **({"particles": settings.particles, "seed": settings.seed} if method.random else {}),
-            "jerk_given": settings.jerk_psd_m2ps5 is not None,
+            "jerk_specified": settings.jerk_psd_m2ps5 is not None,
             "noise_range_m": float(sigma[0]),
             "noise_azimuth_rad": float(sigma[1]),
             "noise_elevation_rad": float(sigma[2]),
-            "noise_correlation": [float(r) for r in tally.model.correlation],
-            **_motion(tally),
+            "noise_correlation": [float(r) for r in statistics.model.correlation],
+            **_motion(statistics),
         },
         "model_sha256": None if model is None else sha256(model),
         "summary": dict(summary),
     }
 
 
-def _motion(tally: Tally) -> dict[str, Any]:
-    """The jerk densities, of a profile that does not fill the file, and of a method that has any."""
-    jerk = tally.model.jerk
-    if not np.isfinite(jerk).all() or (tally.parts > 1 and len(jerk) > 1):
+def _motion(statistics: RunStatistics) -> dict[str, Any]:
+    """The jerk PSD of a method that has one, unless its profile would fill the file."""
+    jerk = statistics.model.jerk
+    if not np.isfinite(jerk).all() or (statistics.parts > 1 and len(jerk) > 1):
         return {"jerk_psd_m2ps5": None, "jerk_vertical_ratio": None, "jerk_knot_s": None}
     return {
         "jerk_psd_m2ps5": [float(q) for q in jerk[:, 0]],
         "jerk_vertical_ratio": float(jerk[0, 5] / jerk[0, 0]),
-        "jerk_knot_s": float(tally.model.knot_s) if len(jerk) > 1 else None,
+        "jerk_knot_s": float(statistics.model.knot_s) if len(jerk) > 1 else None,
     }

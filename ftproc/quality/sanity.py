@@ -1,21 +1,60 @@
-"""Whole logs that cannot be a flight. Single wild readings are no matter: they are for the editing."""
+"""What is refused before filtering, and why: logs that cannot be a flight as a whole, settings that make no sense.
+Single outliers are left to the editing."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ftproc.errors import InputError, row_named
-from ftproc.records import FloatArray, IntArray, MeasurementLog, chunks, forget, thinned
+from ftproc.errors import InputError, UsageError, row_named
+from ftproc.methods.estimate import Recording
+from ftproc.records import COMPONENTS, FloatArray, IntArray, MeasurementLog, chunks, forget, thinned
+from ftproc.settings import FilterSettings
 
-FARTHEST_M = 1e12  # half of all ranges beyond: a mistaken column or unit
-SHORTEST_S = 1e-6  # a log of several times that lasts less: a mistaken unit
-MOST_RANGES = 250_000  # of a longer log only every so many are looked at
-LATEST_S = 1e11  # 3000 years: what is beyond counts no seconds, and its differences would lose their fractions
+FARTHEST_M = 1e12  # with half of all ranges beyond, the column or its unit is wrong
+SHORTEST_S = 1e-6  # the shortest duration of a log of several times; less is a wrong unit
+MOST_RANGES = 250_000  # that are checked; a longer log is thinned
+LATEST_S = 1e11  # 3000 years; beyond, the unit is not seconds, and differences lose their fractions
+EDITING = ("two-pass", "forward", "none")
+SMALLEST = 1e-30  # of noise, jerk PSD and gate: the square and its inverse must be finite
+FEWEST_PARTICLES = 20
+FEWEST_READINGS = 8  # of a component, to estimate its noise
+ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of a component with fewer
+
+
+def recording(log: MeasurementLog) -> Recording:
+    """The log as the methods take it. Raises InputError as `check`."""
+    count = check(log)
+    assumed = np.where(count < FEWEST_READINGS, ASSUMED_SIGMA, np.nan)
+    return Recording(log.time_s, log.measurement, assumed, tuple(np.flatnonzero(count == 0).tolist()))
+
+
+def check_settings(settings: FilterSettings) -> None:
+    """Raises UsageError for settings out of range."""
+    if settings.editing not in EDITING:
+        raise UsageError(f"editing is one of {', '.join(EDITING)}, not {settings.editing!r}")
+    if settings.particles < FEWEST_PARTICLES:
+        raise UsageError(f"particles must be {FEWEST_PARTICLES} or more, not {settings.particles}")
+    numbers: list[tuple[str, float | None]] = [("noise", v) for v in settings.noise or ()]
+    numbers += [("jerk", settings.jerk_psd_m2ps5), ("gate", settings.gate), ("max-patch", settings.max_patch_s)]
+    for name, value in numbers:
+        if value is not None and not SMALLEST <= value <= 1 / SMALLEST:
+            raise UsageError(f"{name} must be a positive number, from {SMALLEST:g} to {1 / SMALLEST:g}, not {value}")
+
+
+def no_start(log: MeasurementLog, cause: ValueError) -> InputError:
+    """The error for a log in which a method found no initial state."""
+    component = cause.args[0] if cause.args and isinstance(cause.args[0], int) else None
+    if component is None:
+        return InputError(f"{log.name}: {cause}")
+    return InputError(
+        f"{log.name}: no {COMPONENTS[component]} reading agrees with its neighbours, so there is no first state; "
+        "check the column and its unit, or leave it out"
+    )
 
 
 def check(log: MeasurementLog) -> IntArray:
-    """(3,) readings of each component. Raises InputError for a log without any, or with times or ranges that are
-    none."""
+    """(3,) number of readings of each component. Raises InputError when there are none, or when times or ranges are
+    impossible."""
     if len(log) == 0:
         raise InputError(f"{log.name}: no row has a time, so there is nothing to filter; check the time column.")
     count = np.zeros(3, np.int64)
@@ -35,8 +74,8 @@ def _check_times(log: MeasurementLog) -> None:
     for k in (0, -1):  # they are in order
         if not abs(log.time_s[k]) <= LATEST_S:
             raise InputError(
-                f"{log.name}: {row_named(int(log.row[k]))}: the time {log.time_s[k]:g} s is none of a flight; correct "
-                "it, or name its unit (--units time=ms or time=us)."
+                f"{log.name}: {row_named(int(log.row[k]))}: the time {log.time_s[k]:g} s is not that of a flight; "
+                "correct it, or name its unit (--units time=ms or time=us)."
             )
     lasts = float(log.time_s[-1] - log.time_s[0])
     if 0 < lasts < SHORTEST_S:
@@ -45,12 +84,12 @@ def _check_times(log: MeasurementLog) -> None:
 
 def _check_ranges(name: str, ranges: FloatArray) -> None:
     known = ranges[np.isfinite(ranges)]
-    within = np.clip(known, -2 * FARTHEST_M, 2 * FARTHEST_M)  # the middle of two huge ones would overflow
+    within = np.clip(known, -2 * FARTHEST_M, 2 * FARTHEST_M)  # the mean of two huge ones would overflow
     typical = float(np.median(within)) if known.size else 1.0
     if 0 < typical <= FARTHEST_M:
         return
     what = "zero" if typical == 0 else "negative" if typical < 0 else f"beyond {FARTHEST_M:g} m"
     raise InputError(
-        f"{name}: half of the ranges are {what}, which is no slant range; check the column and its unit, or leave it "
-        "out with --columns range=none."
+        f"{name}: half of the ranges are {what}, which is not a slant range; check the column and its unit, or leave "
+        "it out with --columns range=none."
     )

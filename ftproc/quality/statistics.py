@@ -1,10 +1,11 @@
-"""The figures of a run's summary, gathered part by part, so that a log of any length needs little memory."""
+"""The figures of a run's summary, collected part by part, so that a log of any length needs little memory."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.methods.estimate import typical_interval
 from ftproc.quality import consistency, verdict
@@ -17,37 +18,38 @@ if TYPE_CHECKING:
 
 UNITS = ("m", "rad", "rad")
 GAP_INTERVALS = 3.0  # median intervals that make a gap
-MOST_KEPT = 250_000  # samples whose sigmas are kept; of more, the worst of every few
+MOST_KEPT = 250_000  # samples whose sigmas are kept; of more, the largest of every few
 _LABELS = {"good": GOOD, "isolated": ISOLATED, "patch": PATCH, "missing": MISSING}
 
 
-class Tally:
-    """Counts of one log, to which its parts are added in their order."""
+class RunStatistics:
+    """Figures of one log, to which its parts are added in their order. absent: components missing throughout."""
 
     def __init__(self, log: MeasurementLog, absent: Sequence[int]) -> None:
         self.log, self.absent = log, absent
         self.every = 1 + (len(log) - 1) // MOST_KEPT
         self.interval_s = typical_interval(log.time_s)
-        self.components = [_Component() for _ in COMPONENTS]
+        self.components = [_Component(self.every) for _ in COMPONENTS]
         self.gaps, self.longest_gap_s, self.last_time = 0, 0.0, np.nan
         self.nis_sum, self.nis_count, self.used, self.rows_used = 0.0, 0, 0, 0
         self.times: list[FloatArray] = []
         self.sigmas: list[FloatArray] = []
-        self.levels: list[FloatArray] = []
+        self.jerk: list[FloatArray] = []
         self.reacquired, self.slow_noise = 0, False
-        self.settled: bool | None = None
+        self.converged: bool | None = None
         self.largest_m, self.outside, self.rows, self.parts = 0.0, 0.0, 0, 0
 
     def add(self, time_s: FloatArray, estimate: Estimate, correction: FloatArray, outside: float) -> None:
-        """Count a part: time_s (n,), its estimate, correction (n, 6), and the share outside the network's training."""
+        """Add a part: time_s (n,), its estimate, correction (n, 6), and the share outside the network's training."""
         run = estimate.run
         best_sigma = (run if estimate.smoothed is None else estimate.smoothed).sigma
         used = run.weight > 0
         with np.errstate(invalid="ignore", divide="ignore"):
             squares = np.square(run.innovation / run.innovation_sigma)
         for c, component in enumerate(self.components):
-            seen = used[:, c] & (c not in self.absent)
-            component.add(time_s, estimate.label[:, c], squares[seen, c], run.innovation_sigma[:, c], seen, self.every)
+            tested = used[:, c] & (c not in self.absent)
+            component.add_labels(time_s, estimate.label[:, c])
+            component.add_innovations(squares[:, c], run.innovation_sigma[:, c], tested)
         self._add_gaps(time_s)
         finite = np.isfinite(run.nis)
         self.nis_sum += float(run.nis[finite].sum())
@@ -55,14 +57,13 @@ class Tally:
         self.used += int(used.sum())
         self.rows_used += int(used.any(1).sum())
         self._add_sigmas(time_s, best_sigma[:, :3])
-        self.levels.append(estimate.model.jerk[:, [0, 3, 5]].mean(1))
+        self.jerk.append(estimate.model.jerk[:, [0, 3, 5]].mean(1))
         self.model = estimate.model
         self.reacquired += len(estimate.reacquired)
         if estimate.settled is not None:
-            self.settled = estimate.settled and self.settled is not False
+            self.converged = estimate.settled and self.converged is not False
         self.slow_noise |= estimate.slow_noise
-        if len(correction):
-            self.largest_m = max(self.largest_m, float(np.linalg.norm(correction[:, :3], axis=1).max()))
+        self.largest_m = max(self.largest_m, float(np.linalg.norm(correction[:, :3], axis=1).max(initial=0.0)))
         self.outside += outside * len(time_s)
         self.rows += len(time_s)
         self.parts += 1
@@ -82,8 +83,8 @@ class Tally:
         self.times.append(time_s[chosen])
         self.sigmas.append(sigma_m[chosen])
 
-    def figures(self) -> dict[str, Any]:
-        """The figures of the summary, JSON-serialisable; units are in the names."""
+    def summary(self) -> dict[str, Any]:
+        """The figures with the verdict on them, JSON-serialisable; units are in the names."""
         log, absent, model = self.log, self.absent, self.model
         components: dict[str, Any] = {}
         for c, name in enumerate(COMPONENTS):
@@ -94,8 +95,8 @@ class Tally:
                 "noise_correlation": float(model.correlation[c]),
                 **self.components[c].consistency(noise),
             }
-        levels = np.concatenate(self.levels)
-        jerk = {"lowest": float(levels.min()), "median": float(np.median(levels)), "highest": float(levels.max())}
+        psd = np.concatenate(self.jerk)
+        jerk = {"lowest": float(psd.min()), "median": float(np.median(psd)), "highest": float(psd.max())}
         time_s, sigma_m = np.concatenate(self.times), np.concatenate(self.sigmas)
         figures = {
             "rows": len(log),
@@ -111,12 +112,12 @@ class Tally:
             "longest_gap_s": self.longest_gap_s,
             "components": components,
             "not_observable": [COMPONENTS[c] for c in absent],
-            "jerk_psd_m2ps5": jerk if np.isfinite(levels).all() else None,
+            "jerk_psd_m2ps5": jerk if np.isfinite(psd).all() else None,
             "nis_mean": self.nis_sum / self.nis_count if self.nis_count else None,
             "components_used_mean": float(self.used / max(self.rows_used, 1)),
-            "hardly_observable": [] if absent else consistency.blind_stretches(time_s, sigma_m),
+            "poorly_observable": [] if absent else consistency.poorly_observable(time_s, sigma_m),
             "reacquired": self.reacquired,
-            "editing_settled": self.settled,
+            "editing_converged": self.converged,
             "slow_noise": self.slow_noise,
             "correction_largest_m": self.largest_m,
             "correction_outside_training": self.outside / max(self.rows, 1),
@@ -125,44 +126,42 @@ class Tally:
 
 
 class _Component:
-    """What is counted of range, azimuth or elevation."""
+    """Figures of range, azimuth or elevation. every: of so many innovation sigmas one is kept."""
 
-    def __init__(self) -> None:
+    def __init__(self, every: int) -> None:
+        self.every = every
         self.labels = np.zeros(4, int)
-        self.longest_s, self.patch_from = 0.0, np.nan  # the longest patch, and when one began that may go on
+        self.longest_s, self.patch_from = 0.0, np.nan  # the longest patch, and the start of one that may continue
         self.squares, self.count = 0.0, 0
         self.innovation_sigma: list[FloatArray] = []
 
-    def add(
-        self, time_s: FloatArray, label: FlagArray, squares: FloatArray, sigma: FloatArray, seen: Any, every: int
-    ) -> None:
-        self.labels += np.bincount(label, minlength=4)
-        self._add_patches(time_s, label)
-        self.squares += float(squares.sum())
-        self.count += len(squares)
-        self.innovation_sigma.append(sigma[::every][seen[::every]])
+    def add_innovations(self, squares: FloatArray, sigma: FloatArray, tested: NDArray[np.bool_]) -> None:
+        """Squares of the normalised innovations (n,), their sigmas (n,), and which of them count (n,)."""
+        self.squares += float(squares[tested].sum())
+        self.count += int(tested.sum())
+        self.innovation_sigma.append(sigma[:: self.every][tested[:: self.every]])
 
-    def _add_patches(self, time_s: FloatArray, label: FlagArray) -> None:
+    def add_labels(self, time_s: FloatArray, label: FlagArray) -> None:
         """Missing readings inside a patch do not end it, nor does the end of a part."""
+        self.labels += np.bincount(label, minlength=4)
         there = np.flatnonzero(label != MISSING)
         if not there.size:
             return
         inside = np.r_[False, label[there] == PATCH, False]
         edges = np.flatnonzero(inside[1:] != inside[:-1]).reshape(-1, 2)
-        begins, ends = time_s[there[edges[:, 0]]], time_s[there[edges[:, 1] - 1]]
+        starts, ends = time_s[there[edges[:, 0]]], time_s[there[edges[:, 1] - 1]]
         if len(edges) and edges[0, 0] == 0 and np.isfinite(self.patch_from):
-            begins[0] = self.patch_from
-        self.longest_s = max(self.longest_s, float((ends - begins).max(initial=0.0)))
-        self.patch_from = begins[-1] if len(edges) and edges[-1, 1] == len(there) else np.nan
+            starts[0] = self.patch_from
+        self.longest_s = max(self.longest_s, float((ends - starts).max(initial=0.0)))
+        self.patch_from = starts[-1] if len(edges) and edges[-1, 1] == len(there) else np.nan
 
     def counts(self) -> dict[str, Any]:
-        return {name: int(self.labels[label]) for name, label in _LABELS.items()} | {
-            "longest_patch_s": self.longest_s,
-        }
+        counts = {name: int(self.labels[label]) for name, label in _LABELS.items()}
+        return {**counts, "longest_patch_s": self.longest_s}
 
     def consistency(self, noise_sigma: float) -> dict[str, Any]:
         sigmas = np.concatenate(self.innovation_sigma)
         return {
-            "prediction_vagueness": consistency.vagueness(sigmas, noise_sigma),
-            **consistency.scatter(self.squares, self.count),
+            "predicted_sigma_ratio": consistency.predicted_sigma_ratio(sigmas, noise_sigma),
+            **consistency.innovation_test(self.squares, self.count),
         }

@@ -1,4 +1,4 @@
-"""What a user wants to know at a glance: how much was edited, what noise was found, whether to trust the result."""
+"""The summary of a run as a dictionary and as text: what was edited, the noise found, and the verdict."""
 
 from __future__ import annotations
 
@@ -16,20 +16,19 @@ def as_dict(metadata: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def text(metadata: Mapping[str, Any]) -> str:
-    """The summary in a trajectory's metadata: at most a screen for the terminal, in plain text."""
+    """The summary in a trajectory's metadata as plain text, at most a screen of a terminal."""
     s, settings = metadata["summary"], metadata["settings"]
     way = "smoothed" if settings["smooth"] else "filtered"
     lines = [f"{metadata['log']}: {counted(s['rows'], 'row')}, {s['duration_s']:.6g} s, {way} by "
              f"{metadata['method']} ({settings['editing']} editing)"]  # fmt: skip
     lines += _table(s["components"])
-    told = facts(s)
-    reasons = s["trust"]["reasons"]
-    told += [("note", text) for text in notes(s)]
+    named = [*facts(s), *(("note", text) for text in notes(s))]
+    level, reasons = s["trust"]["verdict"], s["trust"]["reasons"]
     if len(reasons) < 2:
-        told.append(("verdict", verdict.sentence(s["trust"])))
+        named.append(("verdict", verdict.sentence(s["trust"])))
     else:
-        told += [("verdict", f"{verdict.opening(s['trust'])}:"), *(("", f"- {reason}") for reason in reasons)]
-    return "\n".join([*lines, *(line(name, what) for name, what in told)])
+        named += [("verdict", f"{level}:"), *(("", f"- {reason}") for reason in reasons)]
+    return "\n".join([*lines, *(line(name, what) for name, what in named)])
 
 
 def counted(number: int, what: str) -> str:
@@ -59,21 +58,19 @@ def component_cells(name: str, part: Mapping[str, Any]) -> tuple[str, ...]:
     """One component's line of the table, under HEADER."""
     c = COMPONENTS.index(name)
     noise = part[f"noise_{UNITS[c]}"]
-    spoken = "-" if noise is None else f"{noise:.3g} m" if c == 0 else f"{1e3 * noise:.3g} mrad"
+    sigma = "-" if noise is None else f"{noise:.3g} m" if c == 0 else f"{1e3 * noise:.3g} mrad"
     counts = (str(part[k]) for k in ("good", "isolated", "patch", "missing"))
     share = f"{100 * verdict.outlier_share(part):.2f} %"
-    return (name, *counts, share, f"{part['longest_patch_s']:.3g} s", spoken, part["verdict"])
+    return (name, *counts, share, f"{part['longest_patch_s']:.3g} s", sigma, part["verdict"])
 
 
 def facts(s: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """What there is to say of every run: name and text."""
+    """Name and text of the lines about the log, the process noise and the innovations."""
     found = [("gaps", f"{s['gaps']}, the longest {s['longest_gap_s']:.4g} s" if s["gaps"] else "none")]
-    found += [("rows", line) for line in _oddities(s)]
+    found += [("rows", text) for text in _rows(s)]
     jerk = s["jerk_psd_m2ps5"]
     if jerk is not None:
-        found.append(
-            ("jerk", f"density {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.3g} to {jerk['highest']:.3g})")
-        )
+        found.append(("jerk", f"PSD {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.3g} to {jerk['highest']:.3g})"))
     if s["nis_mean"] is not None:
         found.append(("NIS", f"{s['nis_mean']:.2f} on average, {s['components_used_mean']:.2f} expected"))
     return found
@@ -84,8 +81,8 @@ def notes(s: Mapping[str, Any]) -> list[str]:
     return [remark.text for remark in verdict.remarks(s) if remark.text not in s["trust"]["reasons"]]
 
 
-def _oddities(s: Mapping[str, Any]) -> list[str]:
-    """What was odd about the rows of the log, and how its columns were understood."""
+def _rows(s: Mapping[str, Any]) -> list[str]:
+    """How the columns were understood, and which rows had no time, came out of order or shared a time."""
     found = list(s["remarks"])
     if s["rows_without_time"]:
         have = "has" if s["rows_without_time"] == 1 else "have"

@@ -1,4 +1,4 @@
-"""Whether to trust a trajectory, and why: every remark on a run, each with what it means for trust."""
+"""Is a trajectory consistent, suspect or unreliable, and why: every remark on a run, each with its level."""
 
 from __future__ import annotations
 
@@ -7,102 +7,101 @@ from typing import Any, NamedTuple
 
 from ftproc.quality import consistency
 
-TRUST, CAREFUL, NO = "trust", "be careful", "do not trust"
-LEVELS = (TRUST, CAREFUL, NO)  # from good to bad
-FEWEST_GOOD = 20  # readings of a component, for its sigmas to be judged at all
-FAR_OFF = 2.0  # innovations so many times larger than the filter says: its sigmas mean nothing
-MANY_REJECTED, TOO_MANY_REJECTED = 0.25, 0.5  # share of the readings of a component; of flights with a third of all
-# readings wild a fifth goes astray, and hardly any of these shows fewer than a quarter
+CONSISTENT, SUSPECT, UNRELIABLE = "consistent", "suspect", "unreliable"
+LEVELS = (CONSISTENT, SUSPECT, UNRELIABLE)  # from good to bad
+FEWEST_GOOD = 20  # readings of a component, for a test of its sigmas
+UNRELIABLE_RATIO = 2.0  # innovation ratio over its upper bound, from which the sigmas mean nothing
+MANY_REJECTED, TOO_MANY_REJECTED = 0.25, 0.5  # share of a component's readings. With a third of all readings outliers,
+# one flight in five diverges, and nearly all of these have more than a quarter rejected.
 
-_OPENING = {TRUST: "Trust it", CAREFUL: "Be careful", NO: "Do not trust it"}
-_ALL_WELL = "readings are no farther off than the sigmas say, and nothing else is in doubt"
+#: The reason of a consistent run. What a single log cannot show belongs behind it.
+_NO_FAULT = "residuals agree with the published sigmas, and no fault shows"
 
 
 class Remark(NamedTuple):
-    """A sentence on a run. level: the most that a trajectory of which this is true deserves."""
+    """A sentence on a run. level: the best verdict that it allows."""
 
     level: str
     text: str
 
 
 def remarks(s: Mapping[str, Any]) -> list[Remark]:
-    """All there is to say about the figures of a summary (see `summary.summarise`)."""
+    """All remarks on a summary (see `RunStatistics.summary`)."""
     found = [*_observability(s), *_sigmas(s), *_editing(s)]
     correlation = max(part["noise_correlation"] for part in s["components"].values())
     if correlation > 0:
-        text = f"the noise is correlated from sample to sample (up to {correlation:.2f}); the sigmas allow for it"
-        found.append(Remark(TRUST, text))
+        text = f"the noise is correlated between samples (coefficient up to {correlation:.2f}); the sigmas allow for it"
+        found.append(Remark(CONSISTENT, text))
     if s.get("correction_lost_by_smoothing"):
-        found.append(Remark(TRUST, "the model corrects the filter only: what was smoothed is not corrected"))
+        text = "the model corrects the filter only: the smoothed estimate is not corrected"
+        found.append(Remark(CONSISTENT, text))
     if s["correction_largest_m"] > 0:
-        outside = f"{100 * s['correction_outside_training']:.1f} % of samples outside its training got none"
-        found.append(Remark(TRUST, f"network correction up to {s['correction_largest_m']:.3g} m; {outside}"))
+        outside = f"none for the {100 * s['correction_outside_training']:.1f} % of samples outside its training data"
+        found.append(Remark(CONSISTENT, f"network correction up to {s['correction_largest_m']:.3g} m; {outside}"))
     return found
 
 
 def verdict(found: Sequence[Remark]) -> dict[str, Any]:
     """The worst level among the remarks, with the remarks of that level as reasons; JSON-serialisable."""
-    level = max((remark.level for remark in found), key=LEVELS.index, default=TRUST)
-    reasons = [] if level == TRUST else [remark.text for remark in found if remark.level == level]
+    level = max((remark.level for remark in found), key=LEVELS.index, default=CONSISTENT)
+    reasons = [] if level == CONSISTENT else [remark.text for remark in found if remark.level == level]
     return {"verdict": level, "reasons": reasons}
 
 
 def sentence(trust: Mapping[str, Any]) -> str:
-    """The verdict in words, with what it rests on."""
-    return f"{opening(trust)}: {'; '.join(trust['reasons']) or _ALL_WELL}."
-
-
-def opening(trust: Mapping[str, Any]) -> str:
-    """The verdict in a few words."""
-    return _OPENING[trust["verdict"]]
+    """The verdict with its reasons."""
+    return f"{trust['verdict']}: {'; '.join(trust['reasons']) or _NO_FAULT}"
 
 
 def _observability(s: Mapping[str, Any]) -> Iterator[Remark]:
     if s["not_observable"]:
         names = " and ".join(s["not_observable"])
         text = f"{names} missing throughout: position and velocity are not observable and left empty"
-        yield Remark(CAREFUL, text)
-    blind = s["hardly_observable"]
-    if blind:
-        worst = max(blind, key=lambda part: part["sigma_m"])
+        yield Remark(SUSPECT, text)
+    intervals = s["poorly_observable"]
+    if intervals:
+        worst = max(intervals, key=lambda part: part["sigma_m"])
         first, last = (f"{worst[end]:.6g}" for end in ("from_s", "to_s"))
         when = f"at {first} s" if first == last else f"from {first} to {last} s"
-        text = f"the position is hardly observable: 1 sigma up to {worst['sigma_m']:.3g} m"
-        many = f"in {len(blind)} stretches {text}, most of all {when}"
-        yield Remark(CAREFUL, f"{when} {text}" if len(blind) == 1 else many)
+        size = f"1 sigma up to {worst['sigma_m']:.3g} m"
+        if len(intervals) == 1:
+            yield Remark(SUSPECT, f"the position is poorly observable {when}: {size}")
+        else:
+            text = f"the position is poorly observable in {len(intervals)} intervals: {size}, {when}"
+            yield Remark(SUSPECT, text)
 
 
 def _sigmas(s: Mapping[str, Any]) -> Iterator[Remark]:
     for name, part in s["components"].items():
-        ratio, vague = part["innovation_ratio"], part["prediction_vagueness"]
+        ratio, predicted = part["innovation_ratio"], part["predicted_sigma_ratio"]
         if ratio is not None and part["verdict"] == "overconfident":
-            level = NO if ratio > FAR_OFF * part["innovation_bounds"][1] else CAREFUL
-            yield Remark(level, f"{name} readings are {ratio:.3g} times as far off as the filter says: its sigmas are "
-                                "too small")  # fmt: skip
+            level = UNRELIABLE if ratio > UNRELIABLE_RATIO * part["innovation_bounds"][1] else SUSPECT
+            yield Remark(level, f"{name} innovations are {ratio:.3g} times their predicted sigma: the published sigmas "
+                                "are too small")  # fmt: skip
         if name not in s["not_observable"] and part["good"] < FEWEST_GOOD:
-            yield Remark(CAREFUL, f"{part['good']} good readings of {name} are too few to judge the sigmas by")
-        if vague is not None and vague > consistency.VAGUE:
-            yield Remark(CAREFUL, f"the {name} gate can hardly fire: predictions are {vague:.0f} times vaguer than "
-                                  "readings, so only far larger outliers are noticed")  # fmt: skip
+            yield Remark(SUSPECT, f"too few good {name} readings ({part['good']}) to test the sigmas")
+        if predicted is not None and predicted > consistency.POORLY_PREDICTED:
+            yield Remark(SUSPECT, f"{name} is poorly observable: its predicted sigma is {predicted:.0f} times the "
+                                  "measurement noise, so the gate detects only much larger outliers")  # fmt: skip
     if s["slow_noise"] and not s["not_observable"]:
-        yield Remark(NO, "the noise is correlated so slowly that it passes for motion: the sigmas are too small")
+        text = "the noise is correlated too slowly to be separated from motion: the published sigmas are too small"
+        yield Remark(UNRELIABLE, text)
 
 
 def _editing(s: Mapping[str, Any]) -> Iterator[Remark]:
     for name, part in s["components"].items():
         share = outlier_share(part)
         if share > MANY_REJECTED:
-            level = NO if share > TOO_MANY_REJECTED else CAREFUL
-            yield Remark(level, f"{100 * share:.0f} % of the {name} readings are called outliers")
-    if s["editing_settled"] is False:
-        yield Remark(CAREFUL, "the outlier decisions did not settle: look at the flagged stretches")
+            level = UNRELIABLE if share > TOO_MANY_REJECTED else SUSPECT
+            yield Remark(level, f"{100 * share:.0f} % of the {name} readings are rejected as outliers")
+    if s["editing_converged"] is False:
+        yield Remark(SUSPECT, "the outlier decisions did not converge: inspect the flagged readings")
     if s["reacquired"]:
-        often = "once" if s["reacquired"] == 1 else f"{s['reacquired']} times"
-        times = f"{often} (lost, or a gap too long to bridge)"
-        yield Remark(CAREFUL, f"the track was taken up anew {times}")
+        often = {1: "once", 2: "twice"}.get(s["reacquired"], f"{s['reacquired']} times")
+        yield Remark(SUSPECT, f"re-initialized {often} (track loss, or a gap too long to bridge)")
 
 
 def outlier_share(part: Mapping[str, Any]) -> float:
-    """Outliers among the readings that are there, of one component of a summary."""
+    """Outliers among the readings that are not missing, of one component of a summary."""
     bad = part["isolated"] + part["patch"]
     return float(bad / max(bad + part["good"], 1))

@@ -1,10 +1,10 @@
-"""The report: one HTML page that says what became of a log, whether to trust it, and shows it.
+"""The report: one HTML page with the verdict, the summary and the figures of a trajectory.
 
     from ftproc import report
     report.write(trajectory, "flight.html")     # one self-contained page
     report.plot(trajectory, "residuals")        # one of its figures
 
-plotly draws; it is an extra (`report`) and is loaded when first used.
+plotly draws the figures; it is an extra (`report`), loaded when first used. Calls `quality`, `scoring` and `files`.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 def write(trajectory: Trajectory, target: Target, truth: Truth | None = None) -> None:
     """Write the page of a trajectory, whole or not at all; with a truth also its errors.
 
-    A trajectory that was read from a file has no raw readings, and the page says so. The same trajectory gives the
-    same bytes. Raises OutputError; UsageError when plotly is missing.
+    A trajectory read from a file has no raw readings. The same trajectory gives the same bytes. Raises OutputError;
+    UsageError when plotly is not installed.
     """
     require_plotly()
     from ftproc.report.page import page
@@ -37,10 +37,10 @@ def write(trajectory: Trajectory, target: Target, truth: Truth | None = None) ->
 
 
 def plot(trajectory: Trajectory, what: str = "track") -> go.Figure:
-    """One figure of the page by its name. Raises UsageError for an unknown name, when plotly is missing, or when
-    the trajectory holds nothing of it."""
+    """One figure of the page by its name. Raises UsageError for an unknown name, when plotly is not installed, or when
+    the trajectory has no data for it."""
     require_plotly()
-    from ftproc.report.figures import FIGURES
+    from ftproc.report.page import FIGURES
     from ftproc.report.view import view
 
     if what not in FIGURES:

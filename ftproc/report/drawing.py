@@ -1,4 +1,4 @@
-"""What the figures are made of: rows of plots over one time axis, lines, dots and marks."""
+"""Elements of the figures: rows of plots over one time axis, lines, dots and marks."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 EDGE = 0.01  # of the duration, free before and after it
-FEW = 30  # samples, that are dots on their line
-MANY_MARKS = 3000  # from which the graphics card draws them
-CROWDED, SMALLER = (300, 3000), 0.7  # so many marks in all, from which they are so much smaller, and smaller again
-DASHES = ("solid", "dash", "dot")  # of x, y, z, so that they differ on paper too
+FEW = 30  # samples, up to which a line has dots
+MANY_MARKS = 3000  # from which WebGL draws them
+CROWDED, SMALLER = (300, 3000), 0.7  # numbers of marks from which they shrink, each time by this factor
+DASHES = ("solid", "dash", "dot")  # of x, y, z, which differ in print too
 
 
 class Drawn(NamedTuple):
-    """figure: None when there is nothing to draw. note: what it shows, or why there is none."""
+    """figure: None without data. note: what it shows, or why there is none."""
 
     figure: go.Figure | None
     note: str
@@ -49,7 +49,7 @@ def rows(timeline: Timeline, titles: Sequence[str], height: int, columns: int = 
 
 
 def add(figure: go.Figure, trace: Any, row: int = 0, column: int = 0, first: bool = True) -> None:
-    """Add a trace to a row (from 0). A name stands once in the legend, and a click there takes all of it away."""
+    """Add a trace to a row (from 0). A name is once in the legend, and a click there hides all its traces."""
     trace.update(legendgroup=trace.name, showlegend=first)
     figure.add_trace(trace, row=row + 1, col=column + 1)
 
@@ -60,7 +60,7 @@ def line(timeline: Timeline, value: FloatArray, name: str, colour: str, dash: st
 
 
 def dots(timeline: Timeline, value: FloatArray, name: str, colour: str) -> Any:
-    """(n,) values as small dots; more than there are pixels as a line from extreme to extreme, which looks the same."""
+    """(n,) values as small dots; when too many, a line through their extremes, which looks the same."""
     if timeline.thinned:
         return _joined(*timeline.line(value, over_missing=True), name, {"color": colour, "width": 1})
     chosen = timeline.extremes(value)
@@ -71,7 +71,7 @@ def dots(timeline: Timeline, value: FloatArray, name: str, colour: str) -> Any:
 
 
 def _joined(x: FloatArray, y: FloatArray, name: str, look: dict[str, Any]) -> Any:
-    mode = "lines+markers" if len(x) <= FEW else "lines"  # a single point is no line
+    mode = "lines+markers" if len(x) <= FEW else "lines"  # a line of one point is invisible
     return require_plotly().Scatter(x=x, y=y.astype(np.float32), name=name, mode=mode, line=look, marker={"size": 4})
 
 
@@ -86,8 +86,8 @@ def level(timeline: Timeline, value: float, name: str, dash: str = "dash") -> An
 def marks(
     time_s: FloatArray, value: FloatArray, chosen: IntArray, kind: style.Kind, limits: tuple[float, float], total: int
 ) -> Any:
-    """The chosen of (n,) values in the manner of their kind; one beyond the limits stands at them, and says where it
-    is when it is pointed at. total: marks in the whole figure."""
+    """Marks of a kind at the chosen of (n,) values. One beyond the limits is drawn at them, with its value in the hover
+    text. total: marks in the whole figure."""
     go = require_plotly()
     y = value[chosen].astype(np.float32)
     inside = np.clip(y, np.float32(limits[0]), np.float32(limits[1]))
@@ -101,7 +101,7 @@ def marks(
 
 
 def span(*values: FloatArray, margin: float) -> tuple[float, float]:
-    """From the least to the greatest of the values, and so much of that beyond; (-1, 1) when there are none."""
+    """The least and the greatest of the values, with a margin (share of their distance); (-1, 1) without values."""
     there = np.concatenate([v[np.isfinite(v)] for v in values])
     if not len(there):
         return -1.0, 1.0

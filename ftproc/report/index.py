@@ -21,7 +21,7 @@ _HEADER = ("log", "method", "verdict", "rows", "duration", "outliers R, A, E", "
 
 
 class Entry(NamedTuple):
-    """A log, its page beside the index (None when it has none), its summary (may be empty), why it failed."""
+    """A log, its page beside the index (None: no page), its summary (may be empty), and why it failed."""
 
     log: str
     page: str | None
@@ -46,19 +46,10 @@ def _cells(entry: Entry) -> tuple[str, ...]:
     s = entry.summary
     if entry.failure is not None or "trust" not in s:
         return (name, "", _badge("failed" if entry.failure else "unknown", GREY), "", "", "", entry.failure or "")
-    said = s["trust"]
+    trust = s["trust"]
     rates = ", ".join(f"{100 * verdict.outlier_share(s['components'][name]):.1f} %" for name in COMPONENTS)
-    badge = _badge(said["verdict"], VERDICT[said["verdict"]])
-    why = "; ".join(said["reasons"])
-    return (
-        name,
-        html.escape(str(s.get("method", ""))),
-        badge,
-        f"{s['rows']:,}",
-        f"{s['duration_s']:,.6g} s",
-        rates,
-        why,
-    )
+    method, badge = html.escape(str(s.get("method", ""))), _badge(trust["verdict"], VERDICT[trust["verdict"]])
+    return (name, method, badge, f"{s['rows']:,}", f"{s['duration_s']:,.6g} s", rates, "; ".join(trust["reasons"]))
 
 
 def _badge(text: str, colour: str) -> str:

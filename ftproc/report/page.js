@@ -1,10 +1,10 @@
 "use strict";
-// Unpacks the library, draws the figures one after the other, thins crowded marks to what the screen can tell apart (all
-// of them are there when one zooms in), and draws again in the width of the paper for printing.
+// Unpacks the library, draws the figures one after the other, thins crowded marks to the extremes of each column (all of
+// them appear on zooming in), and redraws in the width of the paper for printing.
 (function () {
   const PAPER = 680; // CSS pixels between the margins of an A4 or Letter page
-  const LOWER = 0.7; // of the height, so that two figures share a page
-  const BROAD = 1.4; // width over height from which all of the space is seen with its labels
+  const LOWER = 0.7; // share of the height, so that two figures fit a page
+  const BROAD = 1.4; // width over height from which the whole space is visible with its labels
   const COLUMNS = 400; // of a figure; in each the lowest and the highest mark of a kind are drawn
   const config = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
   const places = Array.from(document.querySelectorAll("figure"));
@@ -60,12 +60,12 @@
     return part;
   }
 
-  // Crowded marks, by the index of their trace; what is drawn of them at first is put in their place.
+  // Crowded marks, by the index of their trace; the trace keeps those drawn at first.
   function thin(figure) {
     const crowded = new Map();
     figure.data.forEach(function (trace, index) {
       if (trace.mode !== "markers" || !figure.layout.xaxis || !figure.layout.xaxis.range) return;
-      if (trace.type === "scattergl") trace.type = "scatter"; // so few marks are drawn sooner than a context is made
+      if (trace.type === "scattergl") trace.type = "scatter"; // faster than WebGL for so few marks
       const all = { x: array(trace.x), y: array(trace.y) };
       if (all.x.length <= 2 * COLUMNS) return;
       if (trace.customdata) all.customdata = array(trace.customdata);
@@ -75,7 +75,7 @@
     return crowded;
   }
 
-  // How many times farther the eye must be for a place of this size.
+  // Factor on the distance of the eye for an element of this size.
   function distance(width, height) { return Math.max(1, (BROAD * height) / width); }
 
   function moved(eye, factor) { return { x: factor * eye.x, y: factor * eye.y, z: factor * eye.z }; }
@@ -102,10 +102,10 @@
 
   async function drawAll() {
     if (!window.DecompressionStream) {
-      places.forEach(function (place) { place.textContent = "This browser is too old for the figures: it takes one of 2023 or newer."; });
+      places.forEach(function (place) { place.textContent = "This browser is too old for the figures: use one of 2023 or later."; });
     } else {
       await unpack();
-      const inSpace = function (place) { return place.id === "track"; }; // takes longest, so it comes last
+      const inSpace = function (place) { return place.id === "track"; }; // the slowest, therefore last
       for (const place of [...places.filter(function (place) { return !inSpace(place); }), ...places.filter(inSpace)]) {
         await draw(place);
         await nextFrame();
@@ -137,7 +137,7 @@
       resize(place, { width: null, height: parseInt(place.dataset.height, 10), autosize: true });
     });
   });
-  // A document that is open inside the page holds up its load event until all is drawn: who prints then has all.
+  // An open document inside the page delays the load event until all is drawn, so that printing at load has all figures.
   const hold = document.body.appendChild(document.createElement("iframe"));
   hold.hidden = true;
   hold.contentDocument.open();

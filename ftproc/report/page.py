@@ -1,7 +1,7 @@
-"""The page: verdict, tables and figures in one HTML file that needs nothing else, and runs nothing but its own script.
+"""The page: verdict, tables and figures in one HTML file without references, which runs only its own scripts.
 
-Names and values from files reach the page only escaped: as text (`html.escape`) or as JSON without any `<`. What
-slips through all the same does not run: the page allows scripts only by their SHA-256.
+Names and values from files are escaped: as text (`html.escape`) or as JSON without any `<`. As a second barrier, the
+page allows scripts by their SHA-256 only.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import gzip
 import hashlib
 import html
 import re
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -18,26 +19,39 @@ from typing import TYPE_CHECKING, NamedTuple
 from ftproc.records import Trajectory, Truth
 from ftproc.report import tables
 from ftproc.report.drawing import Drawn
-from ftproc.report.figures import ERRORS, FIGURES
-from ftproc.report.view import view
+from ftproc.report.readings import readings, residuals
+from ftproc.report.timeplots import correction, errors, motion, nis, sigmas
+from ftproc.report.track import ground, track
+from ftproc.report.view import View, view
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 _HERE = Path(__file__).parent
 
-#: What plotly puts around its script for module loaders: functions in each other, for each of which a browser would
-#: read all 5 MB once more.
+#: The nested functions around plotly's script, for module loaders; for each a browser would parse all 5 MB again.
 _WRAPPER = re.compile(
     r"\(\s*function\(root, factory\) \{.*?\(\) => \{\n(.*)\nwindow\.Plotly = Plotly;\s*return Plotly;\s*\}\)\);\s*\Z",
     re.DOTALL,
 )
 
-#: The sections with figures: title, names of figures; those of one section stand side by side.
+#: The figures of a trajectory by name; `errors` needs a truth too.
+FIGURES: dict[str, Callable[[View], Drawn]] = {
+    "track": track,
+    "ground": ground,
+    "readings": readings,
+    "residuals": residuals,
+    "nis": nis,
+    "sigmas": sigmas,
+    "motion": motion,
+    "correction": correction,
+}
+
+#: The sections with figures: title and names of the figures, side by side.
 _SECTIONS = (
     ("Track", ("track", "ground")),
     ("Readings", ("readings",)),
-    ("How far the readings were off", ("residuals",)),
+    ("Residuals", ("residuals",)),
     ("Normalised innovation squared", ("nis",)),
     ("Uncertainty", ("sigmas",)),
     ("Motion", ("motion",)),
@@ -50,7 +64,7 @@ def page(trajectory: Trajectory, truth: Truth | None = None) -> str:
     shown = view(trajectory, truth)
     parts = [tables.heading(shown), tables.banner(shown), tables.summary(shown)]
     if truth is not None:
-        parts.append(_section("Against the truth", [("errors", ERRORS(shown))], tables.score(shown)))
+        parts.append(_section("Against the truth", [("errors", errors(shown))], tables.score(shown)))
     for title, names in _SECTIONS:
         parts.append(_section(title, [(name, FIGURES[name](shown)) for name in names]))
     parts.append(tables.provenance(shown))
@@ -58,7 +72,7 @@ def page(trajectory: Trajectory, truth: Truth | None = None) -> str:
 
 
 def document(title: str, body: str, drawn: bool = False) -> str:
-    """A page around its body (HTML). drawn: it has figures."""
+    """A page around its body (HTML). drawn: with figures."""
     library, script = (_plotly(), _text("page.js")) if drawn else (None, "")
     allowed = f"'sha256-{library.sha256}' 'sha256-{_sha256(script)}' 'unsafe-eval'" if library else "'none'"
     policy = f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:"
@@ -81,14 +95,14 @@ def document(title: str, body: str, drawn: bool = False) -> str:
 
 def _section(title: str, figures: list[tuple[str, Drawn]], before: str = "") -> str:
     shown = [_figure(name, drawn.figure) for name, drawn in figures if drawn.figure is not None]
-    notes = dict.fromkeys(drawn.note for _, drawn in figures if drawn.note)  # each once
-    said = f'<p class="note">{html.escape(" ".join(notes))}</p>' if notes else ""
+    notes = dict.fromkeys(drawn.note for _, drawn in figures if drawn.note)  # without repetitions
+    text = f'<p class="note">{html.escape(" ".join(notes))}</p>' if notes else ""
     side = f'<div class="figures">{"".join(shown)}</div>' if shown else ""
-    return f"<section><h2>{html.escape(title)}</h2>{before}{side}{said}</section>"
+    return f"<section><h2>{html.escape(title)}</h2>{before}{side}{text}</section>"
 
 
 def _figure(name: str, figure: go.Figure) -> str:
-    """A place for the figure, and the figure as JSON: no character in it can end the script element."""
+    """An element for the figure, and the figure as JSON, without characters that could end its script element."""
     text = figure.to_json()
     for character in "<>&\u2028\u2029":
         text = text.replace(character, f"\\u{ord(character):04x}")

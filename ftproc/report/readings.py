@@ -1,4 +1,4 @@
-"""The readings beside what was made of them, and how far off they were."""
+"""The readings with the estimate and the flags, and their residuals."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from ftproc.report.thinning import MOST_MARKED
 from ftproc.report.view import View
 
 ROW_HEIGHT = 190
-ROOM = 0.35  # of the range of the trajectory, above and below it, for outliers to stand in
-FOOT = 0.08  # of the height, below the lowest outlier: where missing readings are marked
-FARTHEST = 3.0  # gates, at which residuals stand that are farther off
-FARTHEST_SIGMAS = 12.0  # the same where no gate is known
+ROOM = 0.35  # share of the trajectory's extent, above and below it, where outliers are drawn
+FOOT = 0.08  # share of the height, below the lowest outlier, where missing readings are marked
+LARGEST = 3.0  # gates; larger residuals are drawn there
+LARGEST_SIGMAS = 12.0  # the same where the gate is not known
 
-NONE_TOLD = "This method does not tell by how many sigmas a reading is off."
-NOT_KNOWN = "A trajectory file does not hold the raw readings; the page that `ftproc filter --report` writes has them."
+NO_RESIDUALS = "This method publishes no residuals with sigmas."
+NOT_KNOWN = "A trajectory file does not hold the raw readings; the page of `ftproc filter --report` shows them."
 _WHAT = {
-    "innovation": "Innovation: the reading minus what the readings before it predict",
-    "leave-one-out residual": "Leave-one-out residual: the reading minus what all other readings say of it",
+    "innovation": "Innovation: the reading minus its prediction from the readings before it",
+    "leave-one-out residual": "Leave-one-out residual: the reading minus its estimate from all other readings",
 }
 
 
@@ -35,7 +35,7 @@ def readings(view: View) -> Drawn:
         return Drawn(None, NOT_KNOWN)
     figure = drawing.rows(view.timeline, [style.COMPONENT[c].title for c in seen], _height(seen))
     timeline, flags = view.timeline, view.trajectory.outlier
-    chosen, note = _chosen(view, raw, seen)
+    chosen, note = _marked(view, raw, seen)
     total = sum(map(len, chosen.values()))
     named: set[str] = set()
     for row, c in enumerate(seen):
@@ -49,14 +49,14 @@ def readings(view: View) -> Drawn:
             traces.append(drawing.marks(timeline.time_s, value, chosen[flag, c], kind, within, total))
         traces.append(drawing.line(timeline, view.cleaned[:, c], "estimate", style.ESTIMATE))
         _add(figure, traces, row, named)
-    where = "An outlier beyond the axis stands at its edge; point at it for its value."
+    where = "An outlier beyond the axis is drawn at its edge; point at it for its value."
     if view.reading is None:
         where = f"{NOT_KNOWN} Outliers are marked at the estimate."
     return Drawn(figure, f"{where} {note}".strip())
 
 
 def residuals(view: View) -> Drawn:
-    """Readings minus what the others say of them, in sigmas, with the gate."""
+    """Residuals in units of their sigma, with the gate."""
     known = view.diagnostics
     if known is None:
         return Drawn(None, NOT_KNOWN)
@@ -64,26 +64,26 @@ def residuals(view: View) -> Drawn:
         scaled = known.residual / known.residual_sigma
     seen = [c for c in range(len(COMPONENTS)) if np.isfinite(scaled[:, c]).any()]
     if not seen:
-        return Drawn(None, NONE_TOLD)
-    figure = drawing.rows(view.timeline, [f"{style.COMPONENT[c].label} in sigmas" for c in seen], _height(seen))
+        return Drawn(None, NO_RESIDUALS)
+    figure = drawing.rows(view.timeline, [f"{style.COMPONENT[c].label}, sigmas" for c in seen], _height(seen))
     timeline, flags, gate = view.timeline, view.trajectory.outlier, view.gate
-    farthest = FARTHEST_SIGMAS if gate is None else FARTHEST * gate
+    largest = LARGEST_SIGMAS if gate is None else LARGEST * gate
     named: set[str] = set()
     for row, c in enumerate(seen):
         parts = {flag: np.where(flags[:, c] == flag, scaled[:, c], np.nan) for flag in (GOOD, ISOLATED, PATCH)}
         traces = [drawing.dots(timeline, parts[GOOD], "good reading", style.READING)]
         for flag in (ISOLATED, PATCH):
             at = timeline.extremes(parts[flag])
-            limits = (-farthest, farthest)
+            limits = (-largest, largest)
             traces.append(
                 drawing.marks(timeline.time_s, parts[flag], at, style.KINDS[flag], limits, len(seen) * len(at))
             )
         if gate is not None:
             traces += [drawing.level(timeline, sign * gate, f"gate of {gate:g} sigmas") for sign in (-1, 1)]
         _add(figure, traces, row, named)
-    note = "Decisions look at neighbours too: some readings inside the gate are outliers, some outside not."
+    note = "Decisions also rest on neighbouring readings: some inside the gate are outliers, some outside are not."
     if view.trajectory.metadata.get("settings", {}).get("editing") == "none":
-        note = "Nothing was edited, so the gate decided nothing."
+        note = "No reading was edited: the gate was not used."
     return Drawn(figure, f"{_WHAT[known.residual_kind]}. {note}")
 
 
@@ -92,7 +92,7 @@ def _height(seen: list[int]) -> int:
 
 
 def _add(figure: Any, traces: Iterable[Any], row: int, named: set[str]) -> None:
-    """Add what has any points; each name once in the legend."""
+    """Add the traces that have points; each name once in the legend."""
     for trace in traces:
         if len(trace.x):
             drawing.add(figure, trace, row, first=trace.name not in named)
@@ -100,14 +100,14 @@ def _add(figure: Any, traces: Iterable[Any], row: int, named: set[str]) -> None:
 
 
 def _marked_at(view: View, raw: FloatArray, c: int, flag: int, foot: float) -> FloatArray:
-    """(n,) height at which readings with the flag are marked: where they are, missing ones at the foot."""
+    """(n,) height at which readings with the flag are marked: their value, or the foot for missing ones."""
     if flag == MISSING:
         return np.full(len(raw), foot)
     return np.where(np.isfinite(raw[:, c]), raw[:, c], view.cleaned[:, c])
 
 
-def _chosen(view: View, raw: FloatArray, seen: list[int]) -> tuple[dict[tuple[int, int], IntArray], str]:
-    """Which flagged readings are marked, by flag and component, and a sentence when that is not all of them."""
+def _marked(view: View, raw: FloatArray, seen: list[int]) -> tuple[dict[tuple[int, int], IntArray], str]:
+    """The flagged readings that are marked, by flag and component, and a sentence when these are not all."""
     flags = view.trajectory.outlier
     every = {(flag, c): np.flatnonzero(flags[:, c] == flag) for flag in style.KINDS for c in seen}
     total = sum(map(len, every.values()))
@@ -119,4 +119,4 @@ def _chosen(view: View, raw: FloatArray, seen: list[int]) -> tuple[dict[tuple[in
         value[rows] = _marked_at(view, raw, c, flag, 0.0)[rows]
         chosen[flag, c] = view.timeline.extremes(value)
     drawn = sum(map(len, chosen.values()))
-    return chosen, f"Of {total:,} flagged readings the {drawn:,} that stand out in each pixel column are marked."
+    return chosen, f"Of {total:,} flagged readings {drawn:,} are marked, the extremes of each pixel column."

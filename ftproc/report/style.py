@@ -1,6 +1,6 @@
-"""How the report looks: colours, symbols, labels and units, once.
+"""The look of the report: colours, symbols, labels and units.
 
-Colours are Okabe and Ito's, which people with any colour vision tell apart; kinds of readings also differ in symbol.
+The colours are Okabe and Ito's, distinct for every colour vision; kinds of readings also differ in symbol.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ftproc.errors import UsageError
-from ftproc.quality.verdict import CAREFUL, NO, TRUST
+from ftproc.quality.verdict import CONSISTENT, SUSPECT, UNRELIABLE
 from ftproc.records import ISOLATED, MISSING, PATCH
 
 BLUE, ORANGE, GREEN, SKY = "#0072B2", "#E69F00", "#009E73", "#56B4E9"
@@ -21,7 +21,7 @@ READING, ESTIMATE, LIMIT = GREY, BLUE, BLACK
 AXES = (BLUE, ORANGE, GREEN)  # x, y, z
 BAND = "rgba(0, 114, 178, 0.15)"
 
-VERDICT = {TRUST: GREEN, CAREFUL: ORANGE, NO: VERMILLION}
+VERDICT = {CONSISTENT: GREEN, SUSPECT: ORANGE, UNRELIABLE: VERMILLION}
 
 
 class Kind(NamedTuple):
@@ -83,7 +83,7 @@ LAYOUT: dict[str, Any] = {
 
 
 def axis(**changes: Any) -> dict[str, Any]:
-    """An axis of a plane figure."""
+    """An axis of a plane figure, with some changes."""
     return {**_AXIS, **changes}
 
 

@@ -1,4 +1,4 @@
-"""The words and tables of the page. Everything from a file is escaped here."""
+"""The text and tables of the page. Everything from a file is escaped here."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from ftproc.report.style import GREY, VERDICT
 from ftproc.report.view import View
 from ftproc.scoring import render
 
-_LONGEST_LIST = 6  # values that are all shown
+_LONGEST_LIST = 6  # values; a longer list is shown by its extremes
 
 
 def name(trajectory: Trajectory) -> str:
-    """What the page is about: the log's file name, or the trajectory's own."""
+    """The title of the page: the log's file name, or the trajectory's."""
     return PurePath(str(trajectory.metadata.get("log") or trajectory.name)).name
 
 
 def heading(view: View) -> str:
-    """The log, and in a line what was done to it."""
+    """The log, and a line on how it was filtered."""
     meta, s = view.trajectory.metadata, view.summary
     parts = []
     if s:
@@ -39,23 +39,23 @@ def heading(view: View) -> str:
 
 
 def banner(view: View) -> str:
-    """Whether to trust it, in a sentence, with a colour that says the same."""
-    said = view.summary.get("trust")
-    if not said:
-        return _banner(GREY, "This file does not say how it was made, so it cannot be judged by itself.", [])
-    reasons = said["reasons"]
+    """The verdict with its reasons, in its colour."""
+    trust = view.summary.get("trust")
+    if not trust:
+        return _banner(GREY, "no verdict: this file does not say how it was made", [])
+    level, reasons = trust["verdict"], trust["reasons"]
     if len(reasons) < 2:
-        return _banner(VERDICT[said["verdict"]], verdict.sentence(said), [])
-    return _banner(VERDICT[said["verdict"]], f"{verdict.opening(said)}:", reasons)
+        return _banner(VERDICT[level], verdict.sentence(trust), [])
+    return _banner(VERDICT[level], f"{level}:", reasons)
 
 
 def _banner(colour: str, sentence: str, reasons: Sequence[str]) -> str:
-    said = f"<strong>{html.escape(sentence)}</strong>{_list(reasons)}"
-    return f'<div class="verdict" style="border-color: {colour}">{said}</div>'
+    text = f"<strong>{html.escape(sentence)}</strong>{_list(reasons)}"
+    return f'<div class="verdict" style="border-color: {colour}">{text}</div>'
 
 
 def summary(view: View) -> str:
-    """Counts, rates and noise per component; gaps, jerk, NIS; what else is worth knowing."""
+    """Counts, rates and noise per component; gaps, process noise, NIS; notes."""
     s = view.summary
     if not s:
         return ""
@@ -73,21 +73,21 @@ def score(view: View) -> str:
 
 
 def provenance(view: View) -> str:
-    """Settings (also those found), and what made the trajectory."""
+    """Settings, specified or estimated, and the program, method, model and log."""
     meta = view.trajectory.metadata
     if not meta:
         return ""
     settings = meta.get("settings")
     about = [(key, meta[key]) for key in meta if key not in ("settings", "summary")]
-    parts = [_pairs((str(key), _spoken(value)) for key, value in about)]
+    parts = [_pairs((str(key), _shown(value)) for key, value in about)]
     if isinstance(settings, Mapping):
-        parts.insert(0, _pairs((str(key), _spoken(value)) for key, value in settings.items()))
-    title = "Settings, noise and jerk as used; where it comes from"
+        parts.insert(0, _pairs((str(key), _shown(value)) for key, value in settings.items()))
+    title = "Settings, noise and process noise as used; provenance"
     return f'<section><h2>{title}</h2><div class="tables">{"".join(parts)}</div></section>'
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "", links: int = 0) -> str:
-    """A table of texts. links: so many cells of each row are HTML already."""
+    """A table of texts. links: the first so many cells of each row are HTML."""
     head = "".join(f"<th>{html.escape(cell)}</th>" for cell in header)
     lines = []
     for row in rows:
@@ -108,11 +108,11 @@ def _list(texts: Sequence[str]) -> str:
     return f"<ul>{''.join(f'<li>{html.escape(text)}</li>' for text in texts)}</ul>" if texts else ""
 
 
-def _spoken(value: Any) -> str:
+def _shown(value: Any) -> str:
     if value is None or value == "" or value == []:
         return "-"
     if isinstance(value, Mapping):
-        return ", ".join(f"{key} {_spoken(part)}" for key, part in value.items() if part not in (None, []))
+        return ", ".join(f"{key} {_shown(part)}" for key, part in value.items() if part not in (None, []))
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
@@ -120,5 +120,5 @@ def _spoken(value: Any) -> str:
     if isinstance(value, list | tuple):
         if len(value) > _LONGEST_LIST and all(isinstance(v, int | float) for v in value):
             return f"{len(value)} values, from {min(value):.3g} to {max(value):.3g}"
-        return ", ".join(map(_spoken, value))
+        return ", ".join(map(_shown, value))
     return str(value)

@@ -1,4 +1,4 @@
-"""How sure the estimate is, how the target moved, what the network changed, and how far off all that was."""
+"""NIS, sigmas, motion, network correction and errors over time."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from ftproc.report.view import View, load_factor, speed
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-STRETCHES, LEAST_IN_STRETCH = 60, 25  # means of NIS that are drawn, and samples in each
+INTERVALS, LEAST_IN_INTERVAL = 60, 25  # number of means of NIS, and least samples in each
 TICKS = [m * 10.0**k for k in range(-6, 9) for m in (1, 3)]  # of logarithmic axes
-WITHIN = 3  # published sigmas that errors are held against
+WITHIN = 3  # published sigmas, the limits drawn with the errors
 
 
 def nis(view: View) -> Drawn:
-    """NIS of each sample, and its means over stretches inside their 99 % bounds."""
+    """NIS of each sample, and its means over intervals with their 99 % bounds."""
     value = view.trajectory.nis
     count = int(np.isfinite(value).sum())
     if not count:
         return Drawn(None, "No normalised innovation squared is known.")
     figure = drawing.rows(view.timeline, ["NIS"], 340)
-    number = max(1, min(STRETCHES, count // LEAST_IN_STRETCH))
+    number = max(1, min(INTERVALS, count // LEAST_IN_INTERVAL))
     middle, total, samples = view.timeline.means(value, number)
     _, freedom, _ = view.timeline.means(np.where(np.isfinite(value), view.components_used, np.nan), number)
     samples = np.where(samples > 0, samples, np.nan)
@@ -36,9 +36,9 @@ def nis(view: View) -> Drawn:
     plotly = require_plotly()
     if not view.timeline.thinned:
         drawing.add(figure, drawing.dots(view.timeline, value, "sample", style.READING))
-    how = [("mean over a stretch", total, style.BLUE, "solid"), ("expected", freedom, style.BLACK, "solid"),
+    lines = [("mean over an interval", total, style.BLUE, "solid"), ("expected", freedom, style.BLACK, "solid"),
            ("bounds", low, style.VERMILLION, "dash"), ("bounds", high, style.VERMILLION, "dash")]  # fmt: skip
-    for index, (name, sums, colour, dash) in enumerate(how):
+    for index, (name, sums, colour, dash) in enumerate(lines):
         path = {"color": colour, "dash": dash, "width": 1.5 if index else 2, "shape": "hvh"}
         mode = "lines+markers" if number == 1 or not index else "lines"
         trace = plotly.Scatter(x=middle, y=sums / samples, name=name, mode=mode, line=path, marker={"size": 5})
@@ -48,8 +48,8 @@ def nis(view: View) -> Drawn:
         top = max(top, float(np.nanquantile(value, 0.995)))
     figure.update_yaxes(range=[0, top])
     note = (
-        "Above the bounds the sigmas are too small, below too large. If all is well, 99 of 100 means lie between them; "
-        "where that leaves them narrower than 20 % of a sigma they are as wide as that."
+        "Above the bounds the sigmas are too small, below too large. 99 of 100 means of a consistent filter lie "
+        "between them; they are at least 20 % of a sigma wide."
     )
     return Drawn(figure, note)
 
@@ -58,7 +58,7 @@ def sigmas(view: View) -> Drawn:
     """1-sigma of position and velocity."""
     sigma = view.trajectory.sigma
     if not np.isfinite(sigma).any():
-        return Drawn(None, "The trajectory has no sigmas: its position is not known.")
+        return Drawn(None, "The trajectory has no sigmas: its position is not observable.")
     figure = drawing.rows(view.timeline, ["σ position, m", "σ velocity, m/s"], 440)
     _triples(figure, view, sigma)
     figure.update_yaxes(type="log", tickvals=TICKS, ticktext=[f"{tick:g}" for tick in TICKS])
@@ -69,7 +69,7 @@ def motion(view: View) -> Drawn:
     """Speed, height and load factor."""
     state = view.trajectory.state
     if not view.has_position:
-        return Drawn(None, "Position and velocity are not known.")
+        return Drawn(None, "Position and velocity are not observable.")
     parts = [
         ("speed, m/s", speed(state)),
         ("height, m", state[:, 2]),
@@ -87,15 +87,15 @@ def motion(view: View) -> Drawn:
 
 
 def correction(view: View) -> Drawn:
-    """What the network added to position and velocity."""
+    """The network's correction of position and velocity."""
     added = view.trajectory.correction
     if not np.isfinite(added).any():
-        return Drawn(None, "The file does not say what a network added.")
+        return Drawn(None, "The file has no network correction.")
     if not np.nan_to_num(added).any():
-        return Drawn(None, "The network changed nothing: this is the plain filter or smoother.")
+        return Drawn(None, "No network correction: this is the plain filter or smoother.")
     figure = drawing.rows(view.timeline, ["position, m", "velocity, m/s"], 440)
     _triples(figure, view, added)
-    return Drawn(figure, "Estimate minus this is the plain filter.")
+    return Drawn(figure, "The estimate minus the correction is the plain filter.")
 
 
 def errors(view: View) -> Drawn:

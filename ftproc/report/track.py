@@ -1,4 +1,4 @@
-"""Where the target flew: in space and over the ground, at equal scales."""
+"""The track in space and over the ground."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from ftproc.report.view import View
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-COLUMNS = 2000  # in each of which the extremes of x, y and z are drawn
-FLATTEST = 0.2  # height over width of the figure in space; a flatter flight is drawn higher, and that is said
-LOW = 0.4  # up to so high a figure has room for few numbers
-NEAR = 1.0  # a station so many widths of the flight away, or nearer, is drawn too
+COLUMNS = 2000  # intervals of time, in each of which the extremes of x, y and z are drawn
+FLATTEST = 0.2  # height over width of the figure in space; the heights of a flatter flight are enlarged
+LOW = 0.4  # share of the width, up to which an axis has few numbers
+NEAR = 1.0  # widths of the flight; a station within this distance is drawn too
 HEIGHT = 460
-FILLING = 1.3  # diagonal of the flight against the distance of the eye
-NOTHING = "There is no position to draw: what was measured does not tell it."
+FILLING = 1.3  # diagonal of the flight over the distance of the eye
+NOTHING = "There is no position to draw: it is not observable."
 
 _NORTH = {"x": "x (north), m", "y": "y (east), m", "z": "z (up), m"}
 _LOCAL = {"x": "x, m", "y": "y, m", "z": "z (up), m"}
@@ -54,13 +54,13 @@ def track(view: View) -> Drawn:
              "camera": {"eye": {"x": -1.1, "y": -1.3, "z": 0.8}, "center": {"x": 0, "y": 0, "z": -0.12}}}  # fmt: skip
     figure.update_layout(**{**style.LAYOUT, "margin": {"l": 0, "r": 0, "t": 30, "b": 0}}, scene=scene, height=HEIGHT)
     raised = share[2] * widest / size[2] if size[2] > 0 else 1.0
-    much = float(f"{raised:.2g}")
-    note = "Equal scales." if raised < 1.01 else f"Heights are drawn {much:g} times larger than x and y."
-    return Drawn(figure, f"In space: {note[0].lower()}{note[1:]} Drag to turn it.")
+    factor = float(f"{raised:.2g}")
+    note = "equal scales" if raised < 1.01 else f"heights enlarged {factor:g} times against x and y"
+    return Drawn(figure, f"In space: {note}. Drag to turn it.")
 
 
 def ground(view: View) -> Drawn:
-    """x and y as on a map: north up where it is known, else y."""
+    """x and y as on a map: north up where the frame has north, else y."""
     if not view.has_position:
         return Drawn(None, NOTHING)
     path, names = _path(view), _names(view)
@@ -94,7 +94,7 @@ def _names(view: View) -> dict[str, str]:
 
 
 def _path(view: View) -> FloatArray:
-    """(3, m) thinned x, y, z in m, NaN where broken; the first and the last are there."""
+    """(3, m) thinned x, y, z in m with the first and the last, NaN where broken."""
     state = view.trajectory.state
     there = np.asarray(np.isfinite(state[:, :3]).all(1))
     timeline = Timeline.of(view.trajectory.time_s, COLUMNS)

@@ -1,4 +1,4 @@
-"""What a page shows of a trajectory, in the units it is shown in: made once, drawn by the figures."""
+"""What a page shows of a trajectory, in its units: computed once for all figures."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ftproc.core.model.frames import unwrap, wrap
+from ftproc.quality.verdict import LEVELS
 from ftproc.records import Diagnostics, FloatArray, Trajectory, Truth
 from ftproc.report.style import COMPONENT
 from ftproc.report.thinning import Timeline
@@ -21,11 +22,11 @@ SLOWEST = 1.0  # m/s; a slower target has no direction of flight
 
 @dataclass(frozen=True)
 class View:
-    """A trajectory and what follows from it, row for row.
+    """A trajectory with derived arrays, row for row.
 
-    timeline: its times. cleaned: (n, 3) m, deg, deg; the azimuth goes on past 180 deg. reading: the same of the raw
-    readings, on the same turn as the cleaned ones; None when they are not known. components_used: (n,) degrees of
-    freedom of `nis`. error: (n, 6) estimate minus truth, m and m/s; with `score` None without a truth.
+    timeline: its times. cleaned: (n, 3) m, deg, deg, the azimuth unwrapped. reading: the raw readings in these
+    units, on the same turn; None when they are not known. components_used: (n,) degrees of freedom of `nis`. error:
+    (n, 6) estimate minus truth, m and m/s. error and score are None without a truth.
     """
 
     trajectory: Trajectory
@@ -42,9 +43,8 @@ class View:
 
     @property
     def summary(self) -> Mapping[str, Any]:
-        """Empty for a trajectory of other make."""
-        found = self.trajectory.metadata.get("summary")
-        return found if isinstance(found, Mapping) else {}
+        """Empty for a trajectory of another program or version."""
+        return summary_of(self.trajectory)
 
     @property
     def gate(self) -> float | None:
@@ -57,8 +57,17 @@ class View:
         return bool(np.isfinite(self.trajectory.state[:, :3]).all(1).any())
 
 
+def summary_of(trajectory: Trajectory) -> Mapping[str, Any]:
+    """The summary in its metadata; empty for a trajectory of another program or version."""
+    found = trajectory.metadata.get("summary")
+    trust = found.get("trust") if isinstance(found, Mapping) else None
+    if not isinstance(found, Mapping) or not isinstance(trust, Mapping) or trust.get("verdict") not in LEVELS:
+        return {}
+    return found
+
+
 def view(trajectory: Trajectory, truth: Truth | None = None) -> View:
-    """Prepare a trajectory, and its errors against a truth, for the figures."""
+    """The view of a trajectory, with its errors against a truth."""
     factor = np.array([quantity.factor for quantity in COMPONENT])
     cleaned = trajectory.measurement.copy()
     cleaned[:, 1] = unwrap(cleaned[:, 1])
@@ -88,11 +97,11 @@ def speed(state: FloatArray) -> FloatArray:
 
 
 def load_factor(state: FloatArray) -> FloatArray:
-    """(n,) g: the specific force across the direction of flight, which is what wings must carry; all of it when the
-    target hardly moves. z is taken as the vertical."""
-    felt = state[:, 6:9] + [0.0, 0.0, STANDARD_GRAVITY]
+    """(n,) g: the specific force across the direction of flight, which the wings carry; the whole specific force of a
+    target slower than SLOWEST. z is taken as the vertical."""
+    force = state[:, 6:9] + [0.0, 0.0, STANDARD_GRAVITY]
     v = speed(state)
     along = state[:, 3:6] / np.maximum(v, SLOWEST)[:, None]
-    across = felt - np.where(v > SLOWEST, (felt * along).sum(1), 0.0)[:, None] * along
+    across = force - np.where(v > SLOWEST, (force * along).sum(1), 0.0)[:, None] * along
     found: FloatArray = np.sqrt((across**2).sum(1)) / STANDARD_GRAVITY
     return found

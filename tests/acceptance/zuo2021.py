@@ -16,6 +16,7 @@ import numpy as np
 
 from ftproc import pipeline, scoring
 from ftproc.correction.model import Model
+from ftproc.correction.training.flights import train_flights
 from ftproc.settings import FilterSettings, TrainSettings
 from ftproc.simulation import simulate
 
@@ -38,7 +39,7 @@ HEADER = ("flight", "method", *(f"trial {t}" for t in TRIALS), "mean", "without 
 def model(method: str, scenario: str, flights: int = FLIGHTS, duration_s: float | None = None) -> Model:
     """The method's correction of its filter, trained on other flights of the scenario."""
     known = [simulate(scenario, seed=FIRST_SEED + k, duration_s=duration_s) for k in range(flights)]
-    return pipeline.train_flights([(flight.log, flight.truth) for flight in known], METHODS[method])
+    return train_flights([(flight.log, flight.truth) for flight in known], METHODS[method])
 
 
 @cache

@@ -42,18 +42,18 @@ def two_workers(tmp_path_factory) -> Iterator[Cluster]:
     common = ["--host", "127.0.0.1", "--no-dashboard"]
     worker = ["--scheduler-file", "scheduler.json", "--nthreads", "1", "--no-nanny", "--memory-limit", "0"]
     worker += ["--death-timeout", "60", "--local-directory", str(folder)]
-    begun = [_start(folder, "dask_scheduler", "--port", "0", "--scheduler-file", "scheduler.json", *common)]
+    processes = [_start(folder, "dask_scheduler", "--port", "0", "--scheduler-file", "scheduler.json", *common)]
     try:
-        begun += [_start(folder, "dask_worker", *worker, *common) for _ in range(2)]
+        processes += [_start(folder, "dask_worker", *worker, *common) for _ in range(2)]
         _until((folder / "scheduler.json").exists)
         from distributed import Client
 
         with Client(scheduler_file=str(folder / "scheduler.json"), set_as_default=False) as client:
             client.wait_for_workers(2, timeout=PATIENCE_S)
             address = client.scheduler.address
-        yield Cluster(address, begun[0], begun[1:])
+        yield Cluster(address, processes[0], processes[1:])
     finally:
-        for process in begun:
+        for process in processes:
             process.kill()
             process.wait()
 
@@ -69,7 +69,7 @@ def flights(tmp_path, monkeypatch) -> list[str]:
 
 
 def test_the_cluster_gives_what_this_process_gives(two_workers, flights, monkeypatch):
-    """Names are relative to where the user stands, and a model is the user's, not one that a worker remembers."""
+    """Names are relative to the user's directory, and a model is the user's, not one that a worker has cached."""
     model_file.save(model_file.named("packaged"), Path("mine.safetensors"))
     recipe = Recipe(model="mine.safetensors")
     alone = list(run.run(_tasks(flights, "alone"), recipe))
@@ -123,7 +123,7 @@ def test_the_log_of_a_worker_that_dies_is_done_by_the_other(two_workers, flights
     assert _contents("shared") == _contents("alone")
 
 
-def test_all_workers_dead_says_so(two_workers, flights, monkeypatch):
+def test_all_workers_dead(two_workers, flights, monkeypatch):
     for worker in two_workers.workers:
         worker.kill()
         worker.wait()
@@ -132,18 +132,18 @@ def test_all_workers_dead_says_so(two_workers, flights, monkeypatch):
         next(run.run(_tasks(flights, "none"), Recipe(), scheduler=two_workers.address))
 
 
-def test_the_scheduler_goes_away(two_workers, flights, monkeypatch):
+def test_the_scheduler_stops(two_workers, flights, monkeypatch):
     """After the last test it has no workers, so the log waits when it is killed."""
     monkeypatch.setattr(cluster, "PATIENCE_S", 0.5)
     monkeypatch.setattr(cluster, "_check_workers", lambda client, address: two_workers.scheduler.kill())
     (outcome,) = run.run(_tasks(flights[:1], "none"), Recipe(), scheduler=two_workers.address)
     assert outcome.failure is not None
-    expected = f"0.csv: the scheduler {two_workers.address} went away before it was done; run again."
+    expected = f"0.csv: the scheduler {two_workers.address} stopped before it was done; run again."
     assert outcome.failure.message == expected
 
 
-def test_what_dask_logs_is_not_shown(capsys):
-    """Such as that a result was lost with its worker: it is got anew."""
+def test_dask_s_log_is_not_shown(capsys):
+    """Such as a result lost with its worker, which is computed again."""
     cluster.require_distributed()
     logger = logging.getLogger("distributed.client")
     handler = logging.StreamHandler(sys.stderr)
@@ -180,9 +180,9 @@ def test_no_scheduler_answers(flights, monkeypatch):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))  # and never listens
         address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
-        for given in (address, "nonsense://here", "no address at all"):
-            with pytest.raises(UsageError, match=f"--scheduler {given}: no Dask scheduler answers there within 0.3 s"):
-                next(run.run(_tasks(flights, "none"), Recipe(), scheduler=given))
+        for wrong in (address, "nonsense://here", "no address at all"):
+            with pytest.raises(UsageError, match=f"--scheduler {wrong}: no Dask scheduler answers there within 0.3 s"):
+                next(run.run(_tasks(flights, "none"), Recipe(), scheduler=wrong))
 
 
 def test_without_distributed(flights, monkeypatch):
@@ -210,6 +210,6 @@ def _until(found: Callable[[], T | None]) -> T:
     """What `found` gives as soon as it is true."""
     deadline = time.monotonic() + PATIENCE_S
     while not (value := found()):
-        assert time.monotonic() < deadline, "waited in vain"
+        assert time.monotonic() < deadline, "timed out"
         time.sleep(0.02)
     return value

@@ -11,6 +11,7 @@ import numpy as np
 from ftproc import pipeline
 from ftproc.correction.apply import correct
 from ftproc.correction.model import Model
+from ftproc.correction.training.flights import filtered_flights
 from ftproc.correction.training.samples import Flight
 from ftproc.correction.training.stages import train_model
 from ftproc.records import FloatArray
@@ -64,7 +65,7 @@ def flights(case: Case, seeds: range) -> dict[str, list[Flight]]:
     for seed in seeds:
         how = {"instrument": case.instrument, "outliers": case.outliers, "duration_s": case.duration_s}
         flight = simulate(case.scenario, seed=seed, **how)  # type: ignore[arg-type]
-        known = pipeline.known_flights([(flight.log, flight.truth)], _settings(case, flight))
+        known = filtered_flights([(flight.log, flight.truth)], _settings(case, flight))
         for stage in found:
             found[stage] += known[stage]
     return found

@@ -27,7 +27,7 @@ class Result:
 
 @pytest.fixture(scope="session", autouse=True)
 def _compiled() -> None:
-    """Kernels are compiled before, so that no test meets the line that says so."""
+    """Kernels are compiled first, so that no test has the line about it on stderr."""
     warm()
 
 
@@ -59,14 +59,14 @@ def shell(tmp_path: Path) -> Callable[..., Result]:
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The temporary directory, and we stand in it."""
+    """The temporary directory, as the current one."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
 @pytest.fixture
 def flight(here: Path, run: Callable[..., Result]) -> Path:
-    """`flight.csv` (61 rows, outliers) and `flight.truth.csv` in the directory where we stand."""
+    """`flight.csv` (61 rows, outliers) and `flight.truth.csv` in the current directory."""
     made = run("simulate", "--scenario", "zuo2021-outliers", "-o", "flight.csv", "--truth", "flight.truth.csv")
     assert made == Result(0, "", "")
     return here / "flight.csv"

@@ -80,13 +80,13 @@ def test_every_option_reaches_the_filter(run, flight):
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_random_methods_take_particles_and_a_seed(run, shell, flight, jobs):
-    """And what they warn of is said on stderr, log by log, by workers too."""
+    """Their warnings are on stderr, log by log, from workers too."""
     shutil.copy(flight, "second.csv")
     options = "--method renpf --particles 40 --seed 3 --summary none"
     result = shell(f"ftproc filter flight.csv second.csv {options} --jobs {jobs} -o d")
     warned = "renpf: 40 particles are few for 9 states; 90 or more are trustworthy"
-    said = {f"ftproc: {name}: {warned}" for name in ("flight.csv", "second.csv")}
-    assert (result.code, result.out, set(result.err.splitlines())) == (0, "", said)
+    expected = {f"ftproc: {name}: {warned}" for name in ("flight.csv", "second.csv")}
+    assert (result.code, result.out, set(result.err.splitlines())) == (0, "", expected)
     settings = read("d/flight.trajectory.csv").metadata["settings"]
     assert (settings["particles"], settings["seed"]) == (40, 3)
     run("filter", flight, "-o", "plain.csv")
@@ -104,7 +104,7 @@ def test_reading_options(run, flight):
     table["note"] = "x"
     table["RNG"] = table.pop("range_m") / 1000
     table.to_csv("odd.csv", index=False)
-    tuned = ("--noise", "3,0.0002,0.0002", "--jerk", "1")  # finding these magnifies the rounding of kilometres
+    tuned = ("--noise", "3,0.0002,0.0002", "--jerk", "1")  # their estimation magnifies the rounding of kilometres
     assert run("filter", flight, *tuned, "-o", "a.csv").code == 0
     args = ("--columns", "range=RNG", "--units", "range=km", "--azimuth-from", "north", "--keep-columns")
     assert run("filter", "odd.csv", *tuned, *args, "-o", "b.csv").code == 0
@@ -116,12 +116,12 @@ def test_reading_options(run, flight):
 
 
 @pytest.mark.parametrize(
-    ("args", "said", "axes"),
+    ("args", "text", "axes"),
     [([], "x is taken as east, y as north", (0, 1)), (["--azimuth-from", "north"], "x is north, y is east", (1, 0))],
 )
-def test_site(run, flight, args, said, axes):
+def test_site(run, flight, args, text, axes):
     result = run("filter", flight, "--site", "-33.9,18.4,100", *args, "-o", "a.parquet", "--summary", "none")
-    assert result == Result(0, "", f"ftproc: positions on the earth: {said}, z is up\n")
+    assert result == Result(0, "", f"ftproc: positions on the earth: {text}, z is up\n")
     table = pq.read_table("a.parquet").to_pandas()
     assert list(table.columns[-3:]) == ["lat_deg", "lon_deg", "height_m"]
     east, north = (table[["x_m", "y_m"]].to_numpy()[:, axis] for axis in axes)
@@ -204,7 +204,7 @@ def test_debug_shows_where_a_log_failed(run, here):
         ([], "Name at least one log."),
         (["flight.csv", "--method", "ekff"], "there is no method 'ekff'; did you mean 'ekf'?"),
         (["flight.csv", "--noise", "1,2"], '"1,2" is not three numbers, R,A,E in m, rad, rad'),
-        (["flight.csv", "--noise", "0,1,1"], "a sigma of zero would mean"),
+        (["flight.csv", "--noise", "0,1,1"], "a sigma of zero means readings without error"),
         (["flight.csv", "--jerk", "-1"], '"-1" is not a number above zero.'),
         (["flight.csv", "--gate", "inf"], '"inf" is not a number above zero.'),
         (["flight.csv", "--max-patch", "long"], '"long" is not a number above zero.'),

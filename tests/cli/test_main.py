@@ -1,4 +1,4 @@
-"""The program itself: help, versions, and every kind of error in a plain sentence."""
+"""The program: help, versions, and a plain sentence for every kind of error."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def test_wrong_usage(run, here, args, sentence):
     assert re.fullmatch(sentence, result.err.strip())
 
 
-def test_an_error_of_our_own_is_a_sentence_and_debug_shows_where(run, here):
+def test_an_error_is_a_sentence_and_debug_shows_its_origin(run, here):
     plain = run("score", "none.csv")
     assert plain.err == "ftproc: none.csv: there is no such file.\n"
     for args in (["--debug", "train", "--show", "none.st"], ["train", "--show", "none.st", "--debug"]):
@@ -149,9 +149,9 @@ def test_errors_of_the_system(error, sentence):
 
 @pytest.mark.parametrize("inside_a_kernel", [False, True])
 @pytest.mark.parametrize(
-    ("stop", "code", "said"), [(KeyboardInterrupt(), 130, "ftproc: interrupted"), (SystemExit(143), 143, "")]
+    ("stop", "code", "message"), [(KeyboardInterrupt(), 130, "ftproc: interrupted"), (SystemExit(143), 143, "")]
 )
-def test_interrupted(run, here, monkeypatch, inside_a_kernel, stop, code, said):
+def test_interrupted(run, here, monkeypatch, inside_a_kernel, stop, code, message):
     def interrupt(*args, **kwargs):
         if inside_a_kernel:
             raise SystemError("CPUDispatcher returned a result with an exception set") from stop
@@ -160,11 +160,11 @@ def test_interrupted(run, here, monkeypatch, inside_a_kernel, stop, code, said):
     monkeypatch.setattr("ftproc.files.reading.trajectories.read", interrupt)
     result = run("score", "x.csv")
     assert result.code == code
-    assert result.err.strip() == said
+    assert result.err.strip() == message
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_stopped_from_outside_leaves_nothing_half_written(tmp_path, number, code):
+def test_a_signal_leaves_no_partial_output(tmp_path, number, code):
     """Two minutes of work, stopped after two seconds: only whole files are there."""
     command = [BIN / "ftproc", "train", "--scenario", "manoeuvre", "--flights", "500", "-o", "model.safetensors"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
@@ -177,7 +177,7 @@ def test_stopped_from_outside_leaves_nothing_half_written(tmp_path, number, code
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_reader_that_leaves_early_is_no_error_to_tell(shell):
+def test_a_reader_that_leaves_early_is_no_error(shell):
     result = shell("ftproc simulate --scenario zuo2021 --duration 50000 -o - | head -n 1")
     assert result.out == "time_s,range_m,azimuth_rad,elevation_rad\n"
     assert result.err == ""

@@ -1,4 +1,4 @@
-"""`--report` of filter and score: where the pages go, what is refused, what the index says."""
+"""`--report` of filter and score: the places of the pages, refusals, the index."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def test_an_index_never_replaces_an_input(run, flight):
 
 
 @pytest.mark.parametrize("command", ["filter", "score"])
-def test_without_plotly_nothing_is_begun(run, clean, monkeypatch, command):
+def test_without_plotly_nothing_is_started(run, clean, monkeypatch, command):
     monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
     before = sorted(clean.parent.iterdir())
     name = "flight.csv" if command == "filter" else clean
@@ -139,7 +139,7 @@ def test_without_plotly_nothing_is_begun(run, clean, monkeypatch, command):
     assert sorted(clean.parent.iterdir()) == before
 
 
-def test_a_page_that_cannot_be_written_leaves_the_trajectory_and_says_so(run, flight, monkeypatch):
+def test_a_page_that_cannot_be_written_leaves_the_trajectory(run, flight, monkeypatch):
     def full(*_):
         raise OutputError("page.html: the disk is full; nothing was written.")
 

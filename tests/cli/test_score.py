@@ -36,13 +36,13 @@ def test_json_has_the_promised_keys(run, clean):
     assert found["outliers"]["range"].keys() >= {"precision", "recall", "f1"}
 
 
-def test_axes_exchanged_are_told(run, clean):
+def test_exchanged_axes_are_reported(run, clean):
     truth = pd.read_csv("flight.truth.csv")
     exchanged = {"x_m": "y_m", "y_m": "x_m", "vx_mps": "vy_mps", "vy_mps": "vx_mps"}
     truth.rename(columns=exchanged).to_csv("east.csv", index=False)
-    told = run("score", clean, "--truth", "east.csv")
-    assert told.code == 0
-    assert f"ftproc: east.csv fits {clean} far better with x and y exchanged" in told.err
+    result = run("score", clean, "--truth", "east.csv")
+    assert result.code == 0
+    assert f"ftproc: east.csv fits {clean} far better with x and y exchanged" in result.err
     assert run("score", clean, "--truth", "flight.truth.csv").err == ""
 
 

@@ -13,13 +13,13 @@ import pytest
 import ftproc
 from ftproc import config
 from ftproc.batch.run import Recipe
-from ftproc.cli import stations
+from ftproc.cli import filtering
 from ftproc.cli.filter import command
 from ftproc.config.keys import every
 from ftproc.files.reading import logs, trajectories
 from ftproc.settings import FilterSettings
 
-TUNED = ("--noise", "3,0.0002,0.0002", "--jerk", "1")  # finding these magnifies rounding
+TUNED = ("--noise", "3,0.0002,0.0002", "--jerk", "1")  # their estimation magnifies rounding
 
 TOTAL_STATION = """
 [site]
@@ -49,8 +49,8 @@ from = "zenith"
 
 
 @pytest.fixture
-def other_world(flight):
-    """The same flight as an instrument with other habits would have logged it, and its station file."""
+def other_conventions(flight):
+    """The same flight in the conventions of another instrument, and its station file."""
     log = logs.read(flight)
     distance, azimuth, elevation = log.measurement.T
     gon = 200 / np.pi
@@ -66,8 +66,8 @@ def other_world(flight):
     return flight
 
 
-def test_a_station_file_undoes_the_habits_of_its_instrument(run, other_world):
-    assert run("filter", other_world, *TUNED, "-o", "a.csv").code == 0
+def test_a_station_file_undoes_the_conventions_of_its_instrument(run, other_conventions):
+    assert run("filter", other_conventions, *TUNED, "-o", "a.csv").code == 0
     result = run("filter", "odd.csv", "--config", "s.toml", *TUNED, "-o", "b.csv", "--summary", "none")
     assert (result.code, result.out) == (0, "")
     assert result.err.splitlines() == [
@@ -87,7 +87,7 @@ def test_a_station_file_undoes_the_habits_of_its_instrument(run, other_world):
     assert "elevation from zenith angles" in odd.metadata["station"]["in_words"]
 
 
-def test_in_python_too(run, other_world):
+def test_in_python_too(run, other_conventions):
     assert run("filter", "odd.csv", "--config", "s.toml", "-o", "b.csv").code == 0
     found = ftproc.filter_log("odd.csv", config="s.toml")
     np.testing.assert_array_equal(found.state, trajectories.read("b.csv").state)
@@ -99,8 +99,8 @@ def test_in_python_too(run, other_world):
     assert ftproc.read_log("odd.csv", config="s.toml", columns={"time": "clock", "range": "Dist"}).frame == read.frame
 
 
-def test_the_command_line_wins(run, other_world):
-    (other_world.parent / "f.toml").write_text(
+def test_the_command_line_wins(run, other_conventions):
+    (other_conventions.parent / "f.toml").write_text(
         '[filter]\nsmooth = true\ngate = 3\nediting = "forward"\nmodel = "none"\n[range]\nsigma_m = 9\nunit = "km"\n'
         '[azimuth]\ncolumn = "Hz"\nunit = "deg"\n'
     )
@@ -133,15 +133,15 @@ def test_write_config_makes_what_config_reads(run, flight):
     assert settings["noise_range_m"] == pytest.approx(3.0)
     assert settings["noise_elevation_rad"] == pytest.approx(0.0002)
     assert settings["noise_azimuth_rad"] != pytest.approx(0.0002, rel=1e-3)
-    assert settings["noise_given"] is False
+    assert settings["noise_specified"] is False
 
 
 def test_the_command_s_defaults_are_those_of_the_settings():
-    """Else a file that says nothing would be something other than no file."""
+    """Otherwise an empty file would differ from no file."""
     ctx = command.make_context("filter", ["x.csv"])
     keys = {key.option for _, _, key in every()}
     given = {name: value for name, value in ctx.params.items() if name in keys}
-    assert config.Recipe.of(given) == Recipe() == stations.recipe(ctx)
+    assert config.Recipe.of(given) == Recipe() == filtering.recipe(ctx)
 
 
 def test_every_filter_option_can_be_kept_in_a_file():
@@ -169,7 +169,7 @@ def test_every_filter_option_can_be_kept_in_a_file():
         (["--method", "ukff", "--write-config"], "there is no method 'ukff'; did you mean"),
         (["--ecef"], "--ecef needs the station: give --site LAT,LON,HEIGHT, or [site] in the --config file."),
         (["--noise", "auto,1"], '"auto,1" is not three numbers, R,A,E in m, rad, rad'),
-        (["--noise", "auto,auto,0"], '"auto,auto,0": a sigma of zero would mean that no reading is ever off'),
+        (["--noise", "auto,auto,0"], '"auto,auto,0": a sigma of zero means readings without error'),
     ],
 )
 def test_wrong_usage(run, here, args, sentence):
@@ -214,5 +214,5 @@ def test_train_reads_its_logs_as_the_station_file_says(run, here):
     assert Path("m.safetensors").exists()
     both = run("train", "--scenario", "zuo2021", "-o", "m.safetensors", "--config", "s.toml")
     assert (both.code, both.err) == (
-        2, "ftproc train: --config tells how to read a --log; --scenario has none. See ftproc train -h.\n"
+        2, "ftproc train: --config says how to read a --log; --scenario has none. See ftproc train -h.\n"
     )  # fmt: skip

@@ -42,14 +42,14 @@ def test_two_workers_write_the_same_bytes_as_one(run, here):
     assert (here / "1.safetensors").read_bytes() == (here / "2.safetensors").read_bytes()
 
 
-def test_what_the_filter_is_told_is_trained_for_and_kept(run, here):
+def test_the_filter_s_settings_are_trained_for_and_kept(run, here):
     args = ("--scenario", "radar", "--flights", 3, *SMALL, "--jerk", "0.01", "--editing", "none")
-    trained = run("train", *args, "-o", "told.safetensors")
+    trained = run("train", *args, "-o", "specified.safetensors")
     assert "editing none" in trained.out
     assert "jerk 0.01" in trained.out
     run("train", *args[:-4], "-o", "auto.safetensors")
     assert "jerk auto" in run("train", "--show", "auto.safetensors").out
-    assert (here / "told.safetensors").read_bytes() != (here / "auto.safetensors").read_bytes()
+    assert (here / "specified.safetensors").read_bytes() != (here / "auto.safetensors").read_bytes()
 
 
 def test_logs_with_columns_and_units_of_their_own(run, here):

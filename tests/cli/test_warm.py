@@ -1,4 +1,4 @@
-"""Compiling beforehand, and saying so when it happens."""
+"""Compilation in advance, and the line that announces it."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ BIN = Path(sys.prefix) / "bin"
 
 
 @pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")
-def test_only_our_own_kernels_are_told_of_and_once():
-    said: list[str] = []
+def test_only_ftproc_s_kernels_are_announced_and_once():
+    lines: list[str] = []
 
     def double(x):
         return 2 * x
@@ -28,18 +28,18 @@ def test_only_our_own_kernels_are_told_of_and_once():
 
     foreign, own, other = njit(double), njit(triple), njit(lambda x: x)
     own.py_func.__module__ = "ftproc.core.example"
-    with compiled.announced(said.append):
+    with compiled.announced(lines.append):
         foreign(1.0)
-        assert said == []
+        assert lines == []
         own(1.0)
         own(1)
         own(1.0)
     other(1.0)
-    assert said == [compiled.COMPILING]
+    assert lines == [compiled.COMPILING]
 
 
-def test_a_cold_start_says_so_and_a_warm_one_does_not(tmp_path):
-    """After `python -m ftproc.warm` no way of filtering compiles anything."""
+def test_a_cold_start_is_announced_and_a_warm_one_is_not(tmp_path):
+    """After `python -m ftproc.cli.warm` no way of filtering compiles anything."""
 
     def execute(*command: str) -> str:
         environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
@@ -49,9 +49,9 @@ def test_a_cold_start_says_so_and_a_warm_one_does_not(tmp_path):
     ftproc = str(BIN / "ftproc")
     execute(ftproc, "simulate", "--scenario", "manoeuvre", "--duration", "30", "-o", "a.csv")
     execute(ftproc, "simulate", "--scenario", "radar", "-o", "b.parquet")
-    told = execute(sys.executable, "-m", "ftproc.cli.warm")
-    assert told.splitlines()[0] == compiled.COMPILING
-    assert told.splitlines()[-1].startswith("the kernels are ready")
+    text = execute(sys.executable, "-m", "ftproc.cli.warm")
+    assert text.splitlines()[0] == compiled.COMPILING
+    assert text.splitlines()[-1].startswith("the kernels are ready")
     for options in (["--smooth"], ["--editing", "forward"], ["--method", "all"]):
         assert compiled.COMPILING not in execute(ftproc, "filter", "a.csv", "b.parquet", "-o", "out", *options)
 

@@ -1,4 +1,4 @@
-"""A batch of flights as a user runs it, to be disturbed from outside; and what must be found afterwards."""
+"""A batch of flights as a user runs it, to be disturbed from outside, and checks of its outputs."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ftproc.files.reading import logs, trajectories
+from ftproc.files.writing.flights import write_log
 from ftproc.simulation import simulate
 
 PROGRAM = str(Path(sys.prefix) / "bin" / "ftproc")
@@ -25,7 +26,7 @@ def fill(directory: Path, flights: int = FLIGHTS) -> list[str]:
     """Logs of 30 s at 10 Hz; their names."""
     names = [f"{number}.csv" for number in range(flights)]
     for number, name in enumerate(names):
-        flights.write_log(simulate("manoeuvre", duration_s=30.0, seed=number).log, directory / name)
+        write_log(simulate("manoeuvre", duration_s=30.0, seed=number).log, directory / name)
     return names
 
 
@@ -40,7 +41,7 @@ def run(directory: Path, args: list[str], **options: Any) -> subprocess.Complete
 
 
 def whole(directory: Path) -> list[str]:
-    """The trajectories in `out`, each of which must be whole and have its sidecar; AssertionError otherwise."""
+    """The trajectories in `out`. AssertionError unless each is whole and has its sidecar."""
     found = sorted(directory.glob("out/*.csv"))
     for path in found:
         read = trajectories.read(path)
@@ -51,17 +52,15 @@ def whole(directory: Path) -> list[str]:
 
 @cache
 def duration_s(directory: Path) -> float:
-    """How long the undisturbed batch takes here and now."""
-    began = time.monotonic()
+    """Duration of the undisturbed batch."""
+    started = time.monotonic()
     assert run(directory, command([path.name for path in sorted(directory.glob("?.csv"))])).returncode == 0
-    return time.monotonic() - began
+    return time.monotonic() - started
 
 
 def killed(directory: Path, names: list[str], moments: int, seed: int = 0) -> list[int]:
-    """SIGKILL at so many random moments, then run to the end: how many outputs were there after each kill.
-
-    AssertionError when one is not whole, or the second run does not complete them to the same bytes.
-    """
+    """SIGKILL at so many random moments; every fifth time the batch is then run to its end. The number of outputs after
+    each kill. AssertionError when one is not whole, or the second run does not give the same bytes."""
     draw, found = random.Random(seed), []
     lasts = duration_s(directory)
     expected = {path.name: path.read_bytes() for path in directory.glob("out/*")}

@@ -1,23 +1,18 @@
-"""What the machine may do to a run: nothing is lost, nothing half-written is taken for a result, and it is said."""
+"""Faults of the machine during a run: no output is lost, none is partial, and the fault is reported."""
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import resource
 import signal
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
 import pytest
 
-from ftproc.batch.run import run as run_batch
-from ftproc.batch.tasks import Task
 from ftproc.cli.warm import warm
-from ftproc.config.recipe import Recipe
 from ftproc.files.reading import logs, trajectories
 from ftproc.files.writing import flights
 from ftproc.simulation import simulate
@@ -63,22 +58,6 @@ def test_a_full_disk_loses_nothing(flight: Path, tmp_path: Path, output: str) ->
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["flight.csv", output])
 
 
-def test_a_target_that_cannot_be_written_to(flight: Path, tmp_path: Path) -> None:
-    if os.geteuid() == 0:
-        pytest.skip("root may write everywhere")
-    (tmp_path / "closed").mkdir(mode=0o500)
-    assert "no permission" in plain(run(tmp_path, [PROGRAM, "filter", flight.name, "-o", "closed/a.csv"]))
-
-
-@pytest.mark.parametrize("output", ["flight.csv", "./flight.csv", "link.csv", "hard.csv"])
-def test_a_log_is_never_written_over(flight: Path, tmp_path: Path, output: str) -> None:
-    before = flight.read_bytes()
-    (tmp_path / "link.csv").symlink_to("flight.csv")
-    (tmp_path / "hard.csv").hardlink_to(flight)
-    assert "never overwritten" in plain(run(tmp_path, [PROGRAM, "filter", flight.name, "-o", output]))
-    assert flight.read_bytes() == before
-
-
 @pytest.mark.parametrize("output", ["loop.csv", "loop/a.csv"])
 def test_a_target_that_links_to_itself(flight: Path, tmp_path: Path, output: str) -> None:
     (tmp_path / "loop.csv").symlink_to("loop.csv")
@@ -96,16 +75,16 @@ def test_two_processes_write_the_same_target(flight: Path, tmp_path: Path) -> No
     assert sorted(path.name for path in tmp_path.iterdir()) == ["flight.csv", "out.csv", "out.json"]
 
 
-@pytest.mark.skipif("FTPROC_TRUST" not in os.environ, reason="hangs on what memory the machine has; make trust runs it")
-def test_out_of_memory_is_said(flight: Path, tmp_path: Path) -> None:
-    """A limit that the program's own start fits into, and a log that does not."""
+@pytest.mark.skipif("FTPROC_TRUST" not in os.environ, reason="depends on the machine's memory; make trust runs it")
+def test_out_of_memory_is_reported(flight: Path, tmp_path: Path) -> None:
+    """A limit that holds the program, but not the log."""
     long = tmp_path / "long.csv"
     with long.open("w") as stream:
         stream.write("time_s,range_m,azimuth_rad,elevation_rad\n")
         stream.writelines(f"{k / 100},{5000 + k % 7},0.5,0.3\n" for k in range(3_000_000))
     code = (
         "import resource, sys\n"
-        "from ftproc import pipeline, warm\nfrom ftproc.files import logs\nwarm.warm()\n"
+        "from ftproc.cli import warm\nfrom ftproc.files.reading import logs\nwarm.warm()\n"
         "logs.read('flight.csv')\n"
         "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
         "resource.setrlimit(resource.RLIMIT_AS, (used + (96 << 20),) * 2)\n"
@@ -118,35 +97,10 @@ def test_out_of_memory_is_said(flight: Path, tmp_path: Path) -> None:
     assert "long.csv: " in done.stderr
     assert "memory" in done.stderr
     assert "internal error" not in done.stderr
-    assert batches_names(tmp_path) == ["flight.trajectory.csv", "flight.trajectory.json"]
-
-
-def batches_names(directory: Path) -> list[str]:
-    return sorted(path.name for path in (directory / "out").iterdir())
-
-
-def test_a_worker_that_crashes_takes_only_its_log_with_it(flight: Path, tmp_path: Path) -> None:
-    """The first worker to open the pipe is killed, as the system does when memory is short."""
-    os.mkfifo(tmp_path / "stuck.csv")
-    tasks = [Task(str(flight), str(tmp_path / "stuck.csv")), Task(str(flight), str(tmp_path / "b.csv"))]
-    done = threading.Event()
-
-    def kill_whoever_waits() -> None:
-        while not done.wait(5.0):
-            for child in multiprocessing.active_children():
-                child.kill()
-
-    killer = threading.Thread(target=kill_whoever_waits)
-    killer.start()
-    try:
-        first, second = run_batch(tasks, Recipe(), jobs=2)
-    finally:
-        done.set()
-        killer.join()
-    assert first.failure is not None
-    assert "worker process died" in first.failure.message
-    assert second.failure is None
-    assert len(trajectories.read(tmp_path / "b.csv")) == len(logs.read(flight))
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "flight.trajectory.csv",
+        "flight.trajectory.json",
+    ]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -18,6 +18,7 @@ import numpy as np
 from ftproc import pipeline
 from ftproc.correction import model_file
 from ftproc.methods import recursive
+from ftproc.quality import sanity
 from ftproc.records import MeasurementLog
 from ftproc.settings import FilterSettings
 from tests.trust import cases
@@ -69,7 +70,7 @@ def _settings(content: bytes) -> FilterSettings:
     flags, scale = content[0], content[5]
     return FilterSettings(
         smooth=bool(flags & 1),
-        editing=pipeline.EDITING[flags // 16 % 3],
+        editing=sanity.EDITING[flags // 16 % 3],
         noise=(10.0 ** (scale % 8 - 4), 10.0 ** -(scale % 6), 10.0 ** -(scale % 5)) if flags & 2 else None,
         jerk_psd_m2ps5=10.0 ** (scale // 16 - 6) if flags & 4 else None,
     )

@@ -12,7 +12,7 @@ from ftproc.records import MISSING
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
 from tests.methods.flights import PATHS, TIME, held, measured, rms, run, turned
-from tests.trust.long_runs import is_astray
+from tests.trust.long_runs import is_diverged
 
 SETTINGS = [
     {},
@@ -144,7 +144,7 @@ def test_patches_are_not_followed(seed):
     patches = "isolated=0.01:6-300,offset=2:8-30:8-200,ramp=1:10-30:20-200,burst=1:8-20:10-100,nan=0.01"
     flight = simulate("manoeuvre", seed=seed, duration_s=60.0, dt_s=0.1, outliers=patches)
     found = pipeline.filter_log(flight.log, FilterSettings(smooth=True))
-    assert not is_astray(found, flight.truth)
+    assert not is_diverged(found, flight.truth)
     bad = flight.truth.outlier > 0
     called = (found.outlier > 0) & (found.outlier < MISSING)
     assert (called & ~bad).sum() < 0.01 * bad.size

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ftproc import pipeline
+from ftproc.correction.training.flights import train_flights
 from ftproc.errors import UsageError
 from ftproc.methods import registry
 from ftproc.methods.estimate import Readings
@@ -91,7 +92,7 @@ def test_missing_extra_is_a_sentence(monkeypatch):
 def test_a_model_for_the_ekf_corrects_the_ekf_and_only_that():
     flights = [simulate("cruise", seed=seed, duration_s=60.0) for seed in range(4)]
     settings = TrainSettings(method="bpnn-ekf", hidden=4, epochs=20, seed=1)
-    model = pipeline.train_flights([(f.log, f.truth) for f in flights], settings)
+    model = train_flights([(f.log, f.truth) for f in flights], settings)
     assert model.made_for == "bpnn-ekf"
     assert model.settings["start"] == "random"
     stage = replace(model.filter, gain=np.full(6, 0.5))  # whatever held-out flights say

@@ -1,4 +1,4 @@
-"""The figures of a log in parts are those of the whole."""
+"""Statistics of a log in parts are those of the whole."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.quality import statistics
-from ftproc.quality.statistics import Tally
+from ftproc.quality.statistics import RunStatistics
 from ftproc.settings import FilterSettings
 from tests.simulated import simulate
 
@@ -20,7 +20,7 @@ SPEC = "isolated=0.03:10-200,offset=4:8-40:20-100,nan=0.02,gap=2:3-5,duplicates=
 
 @pytest.fixture(scope="module")
 def made():
-    """A log, and all that its tally is given."""
+    """A log and its estimate."""
     flight = simulate("cruise", seed=1, duration_s=90.0, outliers=SPEC)
     filtering = pipeline.Filtering(flight.log, FilterSettings(), None)
     (part,) = filtering.method.parts(filtering.record, filtering.settings)
@@ -28,11 +28,11 @@ def made():
 
 
 def counted(log, estimate, edges, correction=None):
-    found = Tally(log, ())
+    found = RunStatistics(log, ())
     correction = np.zeros((len(log), 6)) if correction is None else correction
     for low, high in itertools.pairwise(edges):
         found.add(log.time_s[low:high], estimate.rows(low, high), correction[low:high], 0.25)
-    return found.figures()
+    return found.summary()
 
 
 @pytest.mark.parametrize("size", [1, 7, 100])
@@ -48,9 +48,9 @@ def test_parts_count_as_the_whole(made, size):
         assert again[name] == (pytest.approx(value, rel=1e-9) if isinstance(value, float) else value), name
 
 
-def flattened(figures, prefix=""):
+def flattened(summary, prefix=""):
     found = {}
-    for name, value in figures.items():
+    for name, value in summary.items():
         if isinstance(value, dict):
             found |= flattened(value, f"{prefix}{name}.")
         else:
@@ -58,7 +58,7 @@ def flattened(figures, prefix=""):
     return found
 
 
-def test_patch_over_a_seam_is_one(made):
+def test_a_patch_across_parts_is_one(made):
     log, estimate = made
     label = np.zeros_like(estimate.label)
     label[40:60, 0] = 2
@@ -67,24 +67,24 @@ def test_patch_over_a_seam_is_one(made):
     assert found["components"]["range"]["longest_patch_s"] == pytest.approx(log.time_s[59] - log.time_s[40])
 
 
-def test_unsettled_part_unsettles_the_log(made):
+def test_a_part_that_did_not_converge_decides_for_the_log(made):
     log, estimate = made
-    found = Tally(log, ())
+    found = RunStatistics(log, ())
     nothing = np.zeros((len(log), 6))
     for settled in (True, False, True):
         found.add(log.time_s, estimate._replace(settled=settled), nothing, 0.0)
-    assert found.figures()["editing_settled"] is False
+    assert found.summary()["editing_converged"] is False
 
 
-def test_of_a_long_log_the_worst_sigmas_are_kept(made, monkeypatch):
+def test_the_largest_sigmas_of_a_long_log_are_kept(made, monkeypatch):
     log, estimate = made
     sigma = estimate.run.sigma.copy()
     sigma[333:336] = 5000.0
     monkeypatch.setattr(statistics, "MOST_KEPT", 100)
     found = counted(log, estimate._replace(run=estimate.run._replace(sigma=sigma)), [0, 400, len(log)])
-    (blind,) = [s for s in found["hardly_observable"] if s["sigma_m"] > 5000]
-    assert blind["from_s"] <= log.time_s[336]
-    assert blind["to_s"] >= log.time_s[333]
+    (interval,) = [s for s in found["poorly_observable"] if s["sigma_m"] > 5000]
+    assert interval["from_s"] <= log.time_s[336]
+    assert interval["to_s"] >= log.time_s[333]
 
 
 def test_largest_correction_of_all_parts(made):
@@ -101,5 +101,5 @@ def test_metadata_are_those_of_the_joined_parts():
     settings = FilterSettings(editing="forward")
     filtering = pipeline.Filtering(flight.log, settings, None)
     (part,) = filtering.parts()
-    assert filtering.metadata() == replace(pipeline.filter_log(flight.log, settings)).metadata
+    assert filtering.metadata == replace(pipeline.filter_log(flight.log, settings)).metadata
     assert part.metadata == {"frame": "local"}

@@ -1,4 +1,4 @@
-"""The figures of the summary, counted by hand, and the lines for the terminal."""
+"""The figures of the summary against a count by hand, and the lines for the terminal."""
 
 from __future__ import annotations
 
@@ -72,10 +72,10 @@ def test_noise_shown_is_that_of_a_reading_even_if_correlated():
     part = figures(trajectory)["components"]["range"]
     assert part["noise_m"] == pytest.approx(flight.sigma[0], rel=0.2)
     assert part["noise_correlation"] == pytest.approx(np.exp(-0.2), abs=0.06)
-    assert "the noise is correlated from sample to sample (up to 0.8" in summary.text(trajectory.metadata)
+    assert "the noise is correlated between samples (coefficient up to 0.8" in summary.text(trajectory.metadata)
 
 
-def test_consistent_filter_is_called_so(dirty):
+def test_a_consistent_filter(dirty):
     s = figures(dirty[1])
     for name in COMPONENTS:
         assert s["components"][name]["verdict"] == "consistent"
@@ -85,7 +85,7 @@ def test_consistent_filter_is_called_so(dirty):
 
 
 @pytest.mark.parametrize(("factor", "verdict"), [(0.3, "overconfident"), (1.0, "consistent"), (3.0, "cautious")])
-def test_verdict_on_a_given_noise(factor, verdict):
+def test_sigmas_of_a_specified_noise(factor, verdict):
     flight = simulate("cruise", seed=2, duration_s=60.0, outliers="none")
     noise = tuple(factor * s for s in flight.sigma)
     trajectory = pipeline.filter_log(flight.log, FilterSettings(editing="none", noise=noise, jerk_psd_m2ps5=1.0))
@@ -121,22 +121,20 @@ def test_text_has_a_line_for_each_component(dirty):
 
 
 def test_lines_stand_under_each_other(dirty):
-    """Names to the left, what they say from one column on; the table's columns end together."""
+    """Names are left-aligned, their texts start in one column, and the columns of the table end together."""
     _, header, *table = summary.text(dirty[1].metadata).splitlines()[:5]
     assert len({len(line) for line in (header, *table)}) == 1
     rest = summary.text(dirty[1].metadata).splitlines()[5:]
     assert {line[13] != " " and line[11:13] == "  " for line in rest} == {True}
 
 
-def test_text_says_whether_to_trust(dirty):
+def test_text_ends_with_the_verdict(dirty):
     verdict = summary.text(dirty[1].metadata).splitlines()[-1]
-    assert verdict == (
-        "  verdict    Trust it: readings are no farther off than the sigmas say, and nothing else is in doubt."
-    )
-    assert figures(dirty[1])["trust"] == {"verdict": "trust", "reasons": []}
+    assert verdict == ("  verdict    consistent: residuals agree with the published sigmas, and no fault shows")
+    assert figures(dirty[1])["trust"] == {"verdict": "consistent", "reasons": []}
 
 
-def test_text_tells_what_was_odd_about_the_rows():
+def test_text_reports_rows_without_time_and_out_of_order():
     flight = simulate("cruise", seed=3, duration_s=20.0, outliers="none")
     log = replace(flight.log, rows_without_time=(17, 40), rows_out_of_order=3, rows_in_file=len(flight.log) + 2)
     text = summary.text(pipeline.filter_log(log, FilterSettings(smooth=True)).metadata)
@@ -169,8 +167,8 @@ def test_text_reports_reacquisition_and_correction():
     trajectory = pipeline.filter_log(replace(flight.log, measurement=z), FilterSettings(editing="forward"))
     times = figures(trajectory)["reacquired"]
     assert times >= 1
-    often = "once" if times == 1 else f"{times} times"
-    assert f"the track was taken up anew {often} (lost" in summary.text(trajectory.metadata)
+    often = {1: "once", 2: "twice"}.get(times, f"{times} times")
+    assert f"re-initialized {often} (track loss" in summary.text(trajectory.metadata)
     corrected = replace(
         trajectory,
         metadata={
@@ -178,14 +176,14 @@ def test_text_reports_reacquisition_and_correction():
             "summary": {**figures(trajectory), "correction_largest_m": 1.25, "correction_outside_training": 0.125},
         },
     )
-    said = summary.text(corrected.metadata)
-    assert "network correction up to 1.25 m; 12.5 % of samples outside its training got none" in said
-    unsettled = replace(
-        trajectory, metadata={**trajectory.metadata, "summary": {**figures(trajectory), "editing_settled": False}}
+    text = "network correction up to 1.25 m; none for the 12.5 % of samples outside its training data"
+    assert text in summary.text(corrected.metadata)
+    undecided = replace(
+        trajectory, metadata={**trajectory.metadata, "summary": {**figures(trajectory), "editing_converged": False}}
     )
-    assert "did not settle" in summary.text(unsettled.metadata)
+    assert "did not converge" in summary.text(undecided.metadata)
     slow = replace(trajectory, metadata={**trajectory.metadata, "summary": {**figures(trajectory), "slow_noise": True}})
-    assert "correlated so slowly that it passes for motion: the sigmas are too small" in summary.text(slow.metadata)
+    assert "too slowly to be separated from motion: the published sigmas are too small" in summary.text(slow.metadata)
 
 
 def test_single_row():

@@ -42,7 +42,7 @@ class Opened:
     def __init__(self, context: Any, file: Path) -> None:
         self.complaints: list[str] = []
         self.page = context.new_page()
-        self.page.on("console", lambda said: said.type == "error" and self.complaints.append(said.text))
+        self.page.on("console", lambda message: message.type == "error" and self.complaints.append(message.text))
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("dialog", lambda dialog: (self.complaints.append(dialog.message), dialog.dismiss()))
         address = file.resolve().as_uri()

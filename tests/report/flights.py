@@ -43,7 +43,7 @@ def one_row() -> Trajectory:
 
 @cache
 def position_only() -> Trajectory:
-    """What `score` reads from a table of another program."""
+    """A table of another program, as `score` reads it."""
     made, nothing = filtered(), np.full((len(filtered()), 6), np.nan)
     state = np.where(np.arange(9) < 3, made.state, np.nan)
     return replace(
@@ -54,7 +54,7 @@ def position_only() -> Trajectory:
 
 @cache
 def hostile() -> Trajectory:
-    """Every name and word that a file could bring is out to run."""
+    """Every name and word that a file can hold tries to run."""
     made = filtered()
     words = {"log": HOSTILE, "method": "</script><img src=x onerror=alert(2)>", "frame": '"><svg onload=alert(3)>'}
     settings = {**made.metadata["settings"], "<b onclick=alert(4)>key": "&lt;<!--</style>"}

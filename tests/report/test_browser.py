@@ -1,4 +1,4 @@
-"""The page in a real browser: it draws, complains of nothing, answers the mouse, and prints."""
+"""The page in a real browser: it draws, reports no error, reacts to the mouse, and prints."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def usual(show):
     return show(filtered(), flight().truth)
 
 
-def test_everything_is_drawn_without_complaint(usual):
+def test_everything_is_drawn_without_an_error(usual):
     assert usual.complaints == []
     drawn = usual.page.evaluate(
         "() => Array.from(document.querySelectorAll('figure')).map(f => [f.id, f._fullData.length, f.clientWidth,"
@@ -52,12 +52,12 @@ def test_everything_is_drawn_without_complaint(usual):
     assert all(traces > 0 and width > 300 and marks > 0 for _, traces, width, marks in drawn)
 
 
-def test_nothing_sticks_out_of_a_laptop_window(usual):
+def test_nothing_exceeds_a_laptop_window(usual):
     wide = usual.page.evaluate("document.documentElement.scrollWidth")
     assert wide <= 1366
 
 
-def test_nothing_sticks_out_of_a_telephone(context, show):
+def test_nothing_exceeds_a_telephone(context, show):
     page = show(filtered(), flight().truth).page
     page.set_viewport_size({"width": 390, "height": 844})
     page.wait_for_function("() => document.documentElement.scrollWidth <= 390", timeout=5000)
@@ -65,7 +65,7 @@ def test_nothing_sticks_out_of_a_telephone(context, show):
 
 
 @pytest.mark.parametrize("name", ["readings", "residuals", "nis", "sigmas", "motion", "errors"])
-def test_axis_titles_and_labels_do_not_stand_on_each_other(usual, name):
+def test_axis_titles_and_labels_do_not_overlap(usual, name):
     """Boxes of all texts of a figure, taken from the browser; none overlaps another or leaves the figure."""
     boxes = usual.page.evaluate(
         "id => { const place = document.getElementById(id), frame = place.getBoundingClientRect();"
@@ -84,10 +84,10 @@ def test_axis_titles_and_labels_do_not_stand_on_each_other(usual, name):
         assert bottom <= height + 1, text
     for i, (text, left, top, right, bottom, *_) in enumerate(boxes):
         for other, a, b, c, d, *_ in boxes[i + 1 :]:
-            assert min(right, c) - max(left, a) < 1 or min(bottom, d) - max(top, b) < 1, f"{text!r} stands on {other!r}"
+            assert min(right, c) - max(left, a) < 1 or min(bottom, d) - max(top, b) < 1, f"{text!r} overlaps {other!r}"
 
 
-def test_pointing_tells_and_the_legend_takes_away(usual):
+def test_hover_shows_values_and_the_legend_hides_traces(usual):
     page = usual.page
     page.locator("#motion").scroll_into_view_if_needed()
     page.locator("#motion .nsewdrag").first.hover()
@@ -105,8 +105,8 @@ def test_hostile_names_do_nothing(show):
     assert opened.page.locator("figure .main-svg, figure canvas").count() > 0
 
 
-def test_crowded_marks_are_thinned_and_all_there_when_one_zooms_in(context, tmp_path, monkeypatch):
-    """In the page are all; what is drawn is few, without the graphics card, and reaches as far up and down."""
+def test_crowded_marks_are_thinned_and_all_appear_on_zooming_in(context, tmp_path, monkeypatch):
+    """The page holds all marks; few are drawn, without WebGL, with the same extremes."""
     monkeypatch.setattr("ftproc.report.drawing.MANY_MARKS", 10)
     monkeypatch.setattr("ftproc.report.page._text", lambda file: _text(file).replace("COLUMNS = 400", "COLUMNS = 4"))
     made = filtered()
@@ -132,8 +132,8 @@ def test_crowded_marks_are_thinned_and_all_there_when_one_zooms_in(context, tmp_
     opened.page.wait_for_function(f"() => ({marks})()[0][1].length === {len(x)}", timeout=5000)
 
 
-def test_printing_at_once_prints_all_figures(context, tmp_path):
-    """The page counts as loaded when all is drawn, so a printer that waits for that, and no longer, has all."""
+def test_printing_at_load_prints_all_figures(context, tmp_path):
+    """The load event comes when all is drawn, so a printer that waits for it has all figures."""
     report.write(filtered(), tmp_path / "page.html")
     page = context.new_page()
     page.goto((tmp_path / "page.html").as_uri(), wait_until="load")
@@ -141,7 +141,7 @@ def test_printing_at_once_prints_all_figures(context, tmp_path):
     assert page.evaluate("document.body.dataset.drawn") == "yes"
 
 
-def test_what_slips_through_does_not_run(context, tmp_path, monkeypatch):
+def test_unescaped_scripts_do_not_run(context, tmp_path, monkeypatch):
     """Even if a name were not escaped, the page's policy keeps it from running."""
     monkeypatch.setattr("ftproc.report.tables.html.escape", lambda text: text)
     made = replace(
@@ -153,14 +153,14 @@ def test_what_slips_through_does_not_run(context, tmp_path, monkeypatch):
     assert any("Content Security Policy" in complaint for complaint in opened.complaints)
 
 
-def test_printing_fits_the_paper_and_gives_the_window_back(usual):
+def test_printing_fits_the_paper_and_restores_the_window(usual):
     page = usual.page
     eye = "() => document.getElementById('track')._fullLayout.scene.camera.eye"
     near = page.evaluate(eye)
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     page.wait_for_function("() => document.getElementById('readings')._fullLayout.width === 680", timeout=5000)
     assert page.evaluate("() => document.getElementById('ground')._fullLayout.width") == 340
-    assert page.evaluate(eye)["x"] < 1.1 * near["x"] < 0  # farther off, so that no label is cut
+    assert page.evaluate(eye)["x"] < 1.1 * near["x"] < 0  # more distant, so that no label is cut
     page.evaluate("dispatchEvent(new Event('afterprint'))")
     page.wait_for_function("() => document.getElementById('readings')._fullLayout.width > 1000", timeout=5000)
     assert page.evaluate(eye) == pytest.approx(near)

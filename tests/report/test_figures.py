@@ -1,4 +1,4 @@
-"""What the figures show, read back from plotly's own objects."""
+"""The figures, read back from plotly's objects."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import pytest
 from ftproc.errors import UsageError
 from ftproc.records import ISOLATED, MISSING, PATCH
 from ftproc.report import plot, readings, style, thinning
-from ftproc.report.figures import ERRORS, FIGURES
+from ftproc.report.page import FIGURES
 from ftproc.report.readings import NOT_KNOWN
+from ftproc.report.timeplots import errors
 from ftproc.report.view import view
 from tests.report.flights import angles_only, filtered, flight, one_row, position_only
 
@@ -90,11 +91,11 @@ def test_too_many_marks_are_thinned_and_counted(monkeypatch):
     total = int((filtered().outlier > 0).sum())
     marked = sum(len(trace.x) for name in NAMES.values() for trace in traces(found.figure, name))
     assert 50 < marked < total
-    assert f"Of {total:,} flagged readings the {marked:,} that stand out in each pixel column are marked." in found.note
+    assert f"Of {total:,} flagged readings {marked:,} are marked, the extremes of each pixel column." in found.note
 
 
 @pytest.mark.parametrize("what", list(FIGURES))
-def test_a_name_stands_once_in_the_legend(what):
+def test_a_name_is_once_in_the_legend(what):
     figure = drawn(filtered(), what).figure
     if figure is not None and figure.layout.showlegend is not False:
         shown = [trace.name for trace in figure.data if trace.showlegend is not False]
@@ -117,7 +118,7 @@ def test_residuals_are_in_sigmas_with_the_gate():
 
 def test_nis_means_lie_between_their_bounds():
     figure = drawn(filtered(), "nis").figure
-    (mean,) = traces(figure, "mean over a stretch")
+    (mean,) = traces(figure, "mean over an interval")
     low, high = traces(figure, "bounds")
     there = np.isfinite(mean.y)
     assert ((low.y <= mean.y) & (mean.y <= high.y))[there].mean() > 0.9
@@ -136,33 +137,33 @@ def test_ground_track_is_drawn_at_equal_scales_with_north_up():
     assert np.nanmax(path) == pytest.approx(np.nanmax(filtered().state[:, 0]), rel=1e-6)
 
 
-def test_track_says_how_much_higher_it_is_drawn():
+def test_track_says_how_much_heights_are_enlarged():
     flat = replace(filtered(), state=filtered().state * [1, 1, 0.01, 1, 1, 1, 1, 1, 1])
     found = drawn(flat, "track")
     ratio = found.figure.layout.scene.aspectratio
     size = np.ptp(flat.state[:, :3], axis=0)
     raised = (ratio.z / size[2]) / (ratio.y / size[1])
-    assert f"heights are drawn {float(f'{raised:.2g}'):g} times larger" in found.note
+    assert f"heights enlarged {float(f'{raised:.2g}'):g} times" in found.note
     tall = replace(filtered(), state=filtered().state * [1, 1, 9, 1, 1, 1, 1, 1, 1])
     ratio, size = drawn(tall, "track").figure.layout.scene.aspectratio, np.ptp(tall.state[:, :3], axis=0)
     assert ratio.z / size[2] == pytest.approx(ratio.y / size[1])
 
 
-def test_correction_is_drawn_when_there_is_one():
-    assert "changed nothing" in drawn(filtered(), "correction").note
+def test_correction_is_drawn_where_there_is_one():
+    assert "No network correction" in drawn(filtered(), "correction").note
     added = np.zeros((len(filtered()), 6))
     added[3] = 2.0
     assert drawn(replace(filtered(), correction=added), "correction").figure is not None
 
 
-def test_errors_stand_inside_three_published_sigmas():
-    found = ERRORS(view(filtered(), flight().truth)).figure
+def test_errors_are_drawn_with_three_published_sigmas():
+    found = errors(view(filtered(), flight().truth)).figure
     error, limit = traces(found, "error"), traces(found, "3 sigmas")
     assert (len(error), len(limit)) == (6, 12)
     np.testing.assert_allclose(np.asarray(limit[1].y), -np.asarray(limit[0].y))
     late = replace(flight().truth, time_s=flight().truth.time_s + 1e6)
-    assert "do not overlap" in ERRORS(view(filtered(), late)).note
-    assert ERRORS(view(filtered())).figure is None
+    assert "do not overlap" in errors(view(filtered(), late)).note
+    assert errors(view(filtered())).figure is None
 
 
 def test_plot_in_a_notebook():

@@ -24,9 +24,9 @@ def test_a_line_for_each_log(tmp_path):
     )
     assert "<h1>3 reports, 1 failed</h1>" in text
     assert '<a href="./a%20b%231.report.html">in/a.csv</a>' in text
-    assert ">trust</span></td><td>" in text
-    assert ">be careful</span>" in text
-    assert "1 good readings of range are too few to judge the sigmas by; " in text
+    assert ">consistent</span></td><td>" in text
+    assert ">suspect</span>" in text
+    assert "too few good range readings (1) to test the sigmas; " in text
     assert ">failed</span>" in text
     assert "d.csv: there is no such file." in text
     assert ">unknown</span>" in text

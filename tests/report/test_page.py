@@ -119,18 +119,18 @@ def test_figures_are_json_and_have_their_places(text):
 def test_words_of_the_page(text):
     assert "<h1>simulated manoeuvre, seed 3</h1>" in text
     assert f"{len(filtered()):,} rows · 40 s · filtered by ga-bpnn-ukf, two-pass editing" in text
-    assert "<strong>Trust it: readings are no farther off than the sigmas say" in text
+    assert "<strong>consistent: residuals agree with the published sigmas" in text
     part = filtered().metadata["summary"]["components"]["azimuth"]
     assert f"<td>{part['good']}</td><td>{part['isolated']}</td><td>{part['patch']}</td>" in text
     assert "<th>jerk_psd_m2ps5</th><td>10 values, from" in text
     assert "<th>version</th><td>" in text
     assert "<th>station</th><td>azimuth_from x, azimuth_zero_rad 0, elevation_from horizon, bias 0, 0, 0," in text
-    assert "The network changed nothing" in text
+    assert "No network correction: " in text
     assert "Against the truth" not in text
 
 
-def test_several_doubts_are_a_list():
-    assert "<strong>Be careful:</strong><ul><li>1 good readings of range are too few" in page(one_row())
+def test_several_reasons_are_a_list():
+    assert "<strong>suspect:</strong><ul><li>too few good range readings (1)" in page(one_row())
     assert 'style="border-color: #E69F00"' in page(one_row())
 
 
@@ -141,13 +141,18 @@ def test_page_without_position_says_so():
     assert "range missing throughout: position and velocity are not observable" in text
 
 
-def test_page_of_a_file_of_other_make_with_truth():
+def test_page_of_a_file_of_another_program_with_truth():
     text = page(position_only(), flight().truth)
-    assert "This file does not say how it was made, so it cannot be judged by itself." in text
+    assert "no verdict: this file does not say how it was made" in text
     assert "Summary</h2>" not in text
     assert "Against the truth" in text
     assert "position RMSE (m)" in text
     assert "errors" in figures(text)
+
+
+def test_a_verdict_of_another_version_is_not_shown():
+    metadata = {**filtered().metadata, "summary": {"trust": {"verdict": "fine", "reasons": []}, "rows": 3}}
+    assert "no verdict: " in page(replace(filtered(), metadata=metadata))
 
 
 def test_same_trajectory_same_bytes(tmp_path):

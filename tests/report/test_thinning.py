@@ -81,7 +81,7 @@ def test_times_of_one_instant_have_no_gaps():
     assert Timeline.of(np.array([3.0])).line(np.array([1.0]))[1].tolist() == [1.0]
 
 
-def test_means_over_stretches():
+def test_means_over_intervals():
     time_s, value = np.arange(8.0), np.array([1, 3, np.nan, 5, 7, 9, 11, 13])
     middle, total, count = Timeline.of(time_s).means(value, 2)
     np.testing.assert_allclose(middle, [1.75, 5.25])

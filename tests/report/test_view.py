@@ -1,4 +1,4 @@
-"""What the report derives from a trajectory."""
+"""Quantities that the report derives from a trajectory."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_load_factor_of_a_simulated_flight():
     np.testing.assert_allclose(load_factor(state), load_factor_of(flight()), rtol=1e-9)
 
 
-def test_azimuth_goes_on_past_half_a_turn_and_readings_with_it():
+def test_azimuth_is_unwrapped_and_readings_follow():
     made = filtered()
     steady = np.linspace(3.0, 7.0, len(made))
     measurement, reading = made.measurement.copy(), made.diagnostics.reading.copy()

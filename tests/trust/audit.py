@@ -1,6 +1,6 @@
 """`make audit`: asks PyPI, by pip-audit, whether a vulnerability of one of the tested versions is known.
 
-An answer that could not be had fails nothing, but is said: no news is not good news.
+A missing answer fails nothing, but is reported.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def verdict(answer: str, complaint: str = "") -> tuple[list[str], int]:
     try:
         packages = json.loads(answer)["dependencies"]
     except (ValueError, KeyError, TypeError):
-        reason = complaint.strip().splitlines()[-1] if complaint.strip() else "it said nothing"
+        reason = complaint.strip().splitlines()[-1] if complaint.strip() else "no output"
         return [f"NOT audited: pip-audit had no answer ({reason})."], 0
     unknown = [package["name"] for package in packages if "skip_reason" in package]
     holes = [

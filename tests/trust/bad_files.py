@@ -1,4 +1,4 @@
-"""Logs as Parquet, and what may stand under a log's name instead of a file."""
+"""Parquet logs, and things that are not files under a log's name."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from tests.trust.cases import HEADER, Case, flight, rows, same, same_but, text, 
 COLUMNS = HEADER.split(",")
 _ROW = 17  # where the bad cell is
 
-#: Cells that are no number, and what is said of them.
+#: Cells that are no number, and words of their refusal.
 _NO_NUMBER = (
     *("abc", "12x4", "1.2.3", "1_000", "0x1F", "1d5", "5 m", "12°", "--5", "5-", "-", "e5", "1e", "+", ".", "?"),
     *("true", "FALSE", "=1+1", "'5", "@SUM(A1)", "#VALUE!", "#DIV/0!", "#REF!", "1/2", "∞", "١٢", "１２", "1 000"),
@@ -76,7 +76,7 @@ def encodings() -> Iterator[Case]:
 
 
 def bytes_() -> Iterator[Case]:
-    """Bytes that are no text, and files that are something else than their name says."""
+    """Bytes that are no text, and files of another kind than their name."""
     good = text().encode()
     for place in (0, 3, len(HEADER) + 5, len(good) // 2, len(good) - 2):
         content = good[:place] + b"\0" + good[place:]
@@ -228,7 +228,7 @@ def shapes() -> Iterator[Case]:
 
 
 def values() -> Iterator[Case]:
-    """Whole columns of readings that no flight has; single wild readings are for the editing."""
+    """Columns of readings that no flight has; single outliers are for the editing."""
     for column, name in enumerate(COLUMNS[1:], 1):
         for label, change in (
             ("all NaN", lambda v: np.nan),

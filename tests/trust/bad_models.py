@@ -42,7 +42,7 @@ def rewritten(change: Callable[[dict[str, Any], dict[str, Any]], None]) -> bytes
 
 
 def framed(header: bytes, length: int | None = None, data: bytes = b"") -> bytes:
-    """A safetensors file whose header has this text and says that it is so long."""
+    """A safetensors file whose header has this text and this length field."""
     return struct.pack("<Q", len(header) if length is None else length) + header + data
 
 

@@ -14,7 +14,7 @@ from tests.trust.cases import Case, written
 NAME = "s.toml"
 _CUTS = 30
 
-#: Values that no key, or hardly any, may have.
+#: Values that almost no key may have.
 _ODD = ("[]", "{}",
         "[[1]]", "true", "''", "nan", "inf", "-inf", "-1", "0", "1e308", "1e-320", "1e999", f"1{'0' * 400}",
         f"1{'0' * 5000}", "'x'",

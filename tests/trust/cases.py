@@ -1,4 +1,4 @@
-"""What a case of the corpus is, and how it is judged: refused in a plain sentence, or read correctly."""
+"""A case of the corpus, and its judge: refused in a plain sentence, or read correctly."""
 
 from __future__ import annotations
 
@@ -135,12 +135,12 @@ def judge(case: Case, directory: Path) -> str:
 
 
 def judge_sentence(name: str, sentence: str) -> None:
-    """AssertionError unless it names the file of this name, is plain and tells a cure."""
+    """AssertionError unless it names the file of this name, is plain and has a cure."""
     assert name in sentence, f"does not name the file: {sentence}"
     assert "internal error" not in sentence, sentence
     assert sentence.isprintable(), f"holds control characters: {sentence!r}"
     assert len(sentence) < LONGEST_SENTENCE, f"is too long: {sentence}"
-    assert _tells_a_cure(sentence), f"tells no cure: {sentence}"
+    assert _has_a_cure(sentence), f"has no cure: {sentence}"
 
 
 _CURES = (
@@ -151,12 +151,12 @@ _CURES = (
 )
 
 
-def _tells_a_cure(sentence: str) -> bool:
+def _has_a_cure(sentence: str) -> bool:
     return any(word in sentence.lower() for word in _CURES)
 
 
 def _log(path: Path, options: dict[str, Any]) -> MeasurementLog:
-    """Read it; and when it is not the flight itself, filter it too: whatever was let in must not do harm later."""
+    """Read it; and unless it is the flight itself, filter it: an accepted log must not fail later."""
     log = logs.read(path, **options)
     if not same(log):
         judge_trajectory(pipeline.filter_log(log, None, model_file.named("packaged")))
@@ -179,7 +179,7 @@ def _model(path: Path, options: dict[str, Any]) -> model.Model:
 
 
 def _station(path: Path, options: dict[str, Any]) -> Recipe:
-    """Read it; and filter the flight by it, which may be refused but must do no harm."""
+    """Read it; and filter the flight by it, which may be refused but must not fail."""
     found = config.Recipe.of(config.load(path))
     log = path.with_name("flight.csv")
     log.write_text(text())
@@ -199,7 +199,7 @@ _READ: dict[str, Callable[[Path, dict[str, Any]], Any]] = {
 
 
 def judge_trajectory(trajectory: Trajectory) -> None:
-    """Finite states and positive, finite sigmas throughout, unless the summary says that there are none to be had."""
+    """Finite states and positive, finite sigmas throughout, unless a component is not observable."""
     if trajectory.metadata["summary"]["not_observable"]:
         assert np.isnan(trajectory.state).all(), "states without all three components"
         return

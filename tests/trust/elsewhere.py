@@ -1,4 +1,4 @@
-"""Tests of the suite that count in the table of `make trust`, each in a process of its own."""
+"""Tests of the suite that count in the table of `make trust`, each group in its own process."""
 
 from __future__ import annotations
 
@@ -8,13 +8,22 @@ import subprocess
 import sys
 from typing import NamedTuple
 
-#: What happens to a run from outside: also to the workers and the scheduler of a cluster.
-FAULTS = ("tests/faults", "tests/test_cluster.py")
+#: Faults from outside: of the machine, of worker processes, of the workers and the scheduler of a cluster.
+FAULTS = ("tests/faults", "tests/batch")
 
 #: Kernels against plain Python and against each other, those that take seconds when they are not compiled.
-PLAIN = tuple(f"tests/core/test_{name}.py" for name in
-              ("geometry", "motion", "ukf", "ekf", "bridges", "ascent", "forward", "gate", "channels", "imm",
-               "indicators", "refraction", "screening", "swaps"))  # fmt: skip
+PLAIN = (
+    "tests/core/model",
+    "tests/core/filtering/test_ukf.py",
+    "tests/core/filtering/test_forward.py",
+    "tests/core/editing/test_gate.py",
+    "tests/core/editing/test_jump_patches.py",
+    "tests/core/editing/test_alternatives.py",
+    "tests/core/editing/test_screening.py",
+    "tests/core/identification/test_optimizer.py",
+    "tests/core/comparators/test_channels.py",
+    "tests/core/comparators/test_imm.py",
+)
 
 
 class Count(NamedTuple):

@@ -63,8 +63,8 @@ def test_what_moves_the_cursor_is_written_out() -> None:
 
 def test_a_long_name_does_not_displace_the_cure() -> None:
     for name in ("\x11" * 500, "all one " * 500):
-        sentence = str(InputError(f'log.csv: "{name}" is no unit. Rename the column, or say --columns range={name}.'))
-        assert "is no unit. Rename the column, or say --columns range=" in sentence
+        sentence = str(InputError(f'log.csv: "{name}" is no unit. Rename the column, or give --columns range={name}.'))
+        assert "is no unit. Rename the column, or give --columns range=" in sentence
         assert sentence.startswith("log.csv: ")
         assert len(sentence) < cases.LONGEST_SENTENCE
     usual = "log.csv: " + "word " * 200

@@ -1,4 +1,4 @@
-"""Nobody is let in: no code from files, no formulas in tables, no outputs outside the directory asked for."""
+"""Security: no code from files, no formulas in tables, no outputs outside the directory of -o."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.trust import cases
 
 PACKAGE = Path(ftproc.__file__).parent
 
-#: Modules that run what a file or a string says, or a shell. (numba's own cache of kernels, and the pipes between our
+#: Modules that run the content of a file or string, or a shell. (numba's cache of kernels, and the pipes between our
 #: own processes, use pickle inside those libraries; no file of a user goes that way.)
 _MODULES = {
     "pickle",
@@ -57,7 +57,7 @@ def offences(source: str) -> list[str]:
     return found
 
 
-def test_nothing_that_runs_what_a_file_says() -> None:
+def test_no_code_from_files_is_run() -> None:
     for path in PACKAGE.rglob("*.py"):
         assert offences(path.read_text()) == [], path
 
@@ -104,7 +104,7 @@ def test_kept_columns_and_scores_are_no_formulas(tmp_path: Path, monkeypatch: py
 
 @pytest.mark.parametrize("log", ["../a.csv", "../../../../etc/a.csv", "/etc/..csv", "x/../../b.parquet", "..", "."])
 def test_outputs_stay_in_the_directory_asked_for(log: str, tmp_path: Path) -> None:
-    for task in plan.plan([log], f"{tmp_path}/out/"):
+    for task in plan.tasks([log], f"{tmp_path}/out/"):
         assert Path(task.output).resolve().parent == (tmp_path / "out").resolve()
 
 

@@ -1,4 +1,4 @@
-"""A little of what `make trust` does at length, and that its judges see."""
+"""A short version of `make trust`, and tests of its judges."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ftproc.simulation import simulate
 from tests.trust import elsewhere, long_runs
 
 
-def test_flights_full_of_outliers_do_not_go_astray_unsaid() -> None:
+def test_no_divergence_is_called_consistent() -> None:
     assert long_runs.many(5).unreported == 0
 
 
@@ -21,22 +21,27 @@ def test_a_longer_run() -> None:
     assert long_runs.endless(60_000) == "ok"
 
 
-@pytest.mark.parametrize(("begin", "end", "expected"), [(100, 141, True), (100, 115, False), (0, 0, False)])
-def test_who_is_astray(begin: int, end: int, expected: bool) -> None:
+@pytest.mark.parametrize(("start", "end", "expected"), [(100, 141, True), (100, 115, False), (0, 0, False)])
+def test_what_counts_as_diverged(start: int, end: int, expected: bool) -> None:
     flight = simulate("manoeuvre", seed=2, duration_s=60.0, dt_s=0.1, outliers="none")
     found = pipeline.filter_log(flight.log)
     state = found.state.copy()
-    state[begin:end, 0] += 1e5
-    assert long_runs.is_astray(replace(found, state=state), flight.truth) is expected
+    state[start:end, 0] += 1e5
+    assert long_runs.is_diverged(replace(found, state=state), flight.truth) is expected
     assert np.isfinite(state).all()
 
 
-def test_who_drifts() -> None:
+def test_what_counts_as_drift() -> None:
     flight = simulate("manoeuvre", seed=2, duration_s=150.0, dt_s=0.1, outliers="none")
     found = pipeline.filter_log(flight.log)
     assert long_runs.drift(found, found) == 0
     moved = replace(found, state=found.state + np.r_[np.zeros(3), 2.0, np.zeros(5)])
     assert long_runs.drift(found, moved) > long_runs.MOST_DRIFT
+
+
+def test_the_tests_of_the_table_exist() -> None:
+    root = Path(__file__).parents[2]
+    assert [name for name in (*elsewhere.FAULTS, *elsewhere.PLAIN) if not (root / name).exists()] == []
 
 
 def test_failures_elsewhere_are_counted(tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """Training of a correction: samples, genetic search, back-propagation, and the verdict of held-out flights.
 
-Calls `correction`; the flights come from `pipeline`.
+Calls `correction`; `flights` also calls `methods`, `quality` and `scoring`.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ CANDIDATES = {FILTER: ("window", "instrument"), SMOOTHER: ("instrument",)}
 def train_model(
     flights: Mapping[str, Sequence[Flight]],
     settings: TrainSettings,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     jobs: int = 1,
 ) -> Model:
     """A model from the flights of each stage (`filter`, `smoother`); a smoother's network without a gain is left out.
@@ -30,7 +30,7 @@ def train_model(
     """
     wanted = [(stage, name) for stage in flights for name in _candidates(stage, settings)]
     tasks = [(flights[stage], replace(settings, features=name)) for stage, name in wanted]
-    trained = each(train, tasks, jobs, progress or silent)
+    trained = each(train, tasks, jobs, progress)
     stages: dict[str, Stage] = {}
     for (stage, _), candidate in zip(wanted, trained, strict=True):
         if stage not in stages or _remaining_error(candidate) < _remaining_error(stages[stage]):

@@ -1,0 +1,78 @@
+"""From logs with truth to a trained correction: every log is filtered and smoothed, held against its truth, and the
+differences are learned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ftproc.correction.model import FILTER, SMOOTHER, Model
+from ftproc.correction.training import Progress, silent
+from ftproc.correction.training.samples import Flight
+from ftproc.correction.training.stages import train_model
+from ftproc.errors import InputError, UsageError
+from ftproc.methods import registry
+from ftproc.quality import sanity
+from ftproc.records import COMPONENTS, MeasurementLog, Truth
+from ftproc.scoring.matching import match
+from ftproc.settings import FilterSettings, TrainSettings
+
+
+def train_flights(
+    pairs: Sequence[tuple[MeasurementLog, Truth]],
+    settings: TrainSettings,
+    filtering: FilterSettings | None = None,
+    progress: Progress = silent,
+    jobs: int = 1,
+) -> Model:
+    """A correction learned from (log, truth) pairs.
+
+    filtering: the settings that the correction is made for. Raises InputError when a log cannot be processed or
+    shares no time with its truth, UsageError for a method that takes no correction.
+    """
+    filtering = replace(filtering or FilterSettings(), method=settings.method)
+    if registry.named(settings.method).own_model:
+        settings = replace(settings, start="random")
+    model = train_model(filtered_flights(pairs, filtering, progress), settings, progress, jobs)
+    made_for = {
+        "editing": filtering.editing,
+        "noise": filtering.noise or "auto",
+        "jerk": filtering.jerk_psd_m2ps5 or "auto",
+    }
+    return replace(model, settings={**model.settings, **made_for})
+
+
+def filtered_flights(
+    pairs: Sequence[tuple[MeasurementLog, Truth]],
+    filtering: FilterSettings | None = None,
+    progress: Progress = silent,
+) -> dict[str, list[Flight]]:
+    """Runs with truth by their stage, `filter` or `smoother`. Raises InputError and UsageError as `train_flights`."""
+    filtering = replace(filtering or FilterSettings(), smooth=True)
+    sanity.check_settings(filtering)
+    method = registry.named(filtering.method)
+    if not method.corrected:
+        raise UsageError(f"{method.name} takes no correction, so there is nothing to train for it")
+    flights: dict[str, list[Flight]] = {FILTER: [], SMOOTHER: []}
+    for number, (log, truth) in enumerate(pairs):
+        progress("filtering", number, len(pairs))
+        record = sanity.recording(log)
+        if record.absent:
+            names = " and ".join(COMPONENTS[c] for c in record.absent)
+            raise InputError(f"{log.name}: {names} missing throughout; training needs all three components")
+        try:
+            estimate = method.run(record.whole(), filtering)
+        except ValueError as cause:
+            raise sanity.no_start(log, cause) from cause
+        known = match(log.time_s, truth)
+        if not np.isfinite(known.position_m).any():
+            raise InputError(f"{truth.name}: its times do not overlap those of {log.name}")
+        runs = {FILTER: estimate.run}
+        if estimate.smoothed is not None:
+            runs[SMOOTHER] = estimate.smoothed_run
+        for stage, run in runs.items():
+            flights[stage].append(Flight(run, known.position_m, known.velocity_mps))
+    progress("filtering", len(pairs), len(pairs))
+    return {stage: found for stage, found in flights.items() if found}
