@@ -1,5 +1,5 @@
-"""The plan of the house: which room may call which, how large rooms and files may be, and that each says who lives
-there. Imports are read, not made, so that those inside functions count too."""
+"""The structure of the package: which folder may call which, how large folders, files and signatures may be, and that
+each folder says what is in it. Imports are read, not made, so that those inside functions count too."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).parent.parent / "ftproc"
-MOST_FILES, MOST_LINES = 14, 300
+MOST_FILES, MOST_LINES, MOST_PARAMETERS = 14, 300, 7
 
 #: The rooms from the ground up: each may call itself and those before it, no other.
 FLOORS = (
@@ -117,6 +117,15 @@ def test_rooms_and_files_have_a_size_that_can_be_seen_at_once() -> None:
         assert len(files) <= MOST_FILES, f"{folder} holds {len(files)} files"
     for path in [*PACKAGE.rglob("*.py"), *Path(__file__).parent.rglob("*.py")]:
         assert len(path.read_text().splitlines()) <= MOST_LINES + 100 * ("tests" in path.parts), path
+
+
+def test_what_travels_together_travels_as_one_record() -> None:
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef):
+                given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+                own = [argument.arg for argument in given if argument.arg not in ("self", "cls")]
+                assert len(own) <= MOST_PARAMETERS, f"{path}:{node.lineno} {node.name} takes {len(own)}"
 
 
 def test_every_room_says_who_lives_there() -> None:
