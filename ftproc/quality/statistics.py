@@ -116,6 +116,7 @@ class RunStatistics:
             "nis_mean": self.nis_sum / self.nis_count if self.nis_count else None,
             "components_used_mean": float(self.used / max(self.rows_used, 1)),
             "poorly_observable": [] if absent else consistency.poorly_observable(time_s, sigma_m),
+            "sigmas_published": bool(np.isfinite(sigma_m).any()),
             "reacquired": self.reacquired,
             "editing_converged": self.converged,
             "slow_noise": self.slow_noise,

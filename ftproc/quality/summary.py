@@ -26,6 +26,7 @@ def text(metadata: Mapping[str, Any]) -> str:
     level, reasons = s["trust"]["verdict"], s["trust"]["reasons"]
     if len(reasons) < 2:
         named.append(("verdict", verdict.sentence(s["trust"])))
+        named += [("", s["trust"]["not_shown"])] if level == verdict.CONSISTENT else []
     else:
         named += [("verdict", f"{level}:"), *(("", f"- {reason}") for reason in reasons)]
     return "\n".join([*lines, *(line(name, what) for name, what in named)])

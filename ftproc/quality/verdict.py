@@ -14,8 +14,11 @@ UNRELIABLE_RATIO = 2.0  # innovation ratio over its upper bound, from which the 
 MANY_REJECTED, TOO_MANY_REJECTED = 0.25, 0.5  # share of a component's readings. With a third of all readings outliers,
 # one flight in five diverges, and nearly all of these have more than a quarter rejected.
 
-#: The reason of a consistent run. What a single log cannot show belongs behind it.
 _NO_FAULT = "residuals agree with the published sigmas, and no fault shows"
+#: Is said with every consistent run.
+NOT_SHOWN = (
+    "One log cannot show constant or slow biases, an offset of the clock, or a false target followed throughout."
+)
 
 
 class Remark(NamedTuple):
@@ -42,10 +45,12 @@ def remarks(s: Mapping[str, Any]) -> list[Remark]:
 
 
 def verdict(found: Sequence[Remark]) -> dict[str, Any]:
-    """The worst level among the remarks, with the remarks of that level as reasons; JSON-serialisable."""
+    """The worst level among the remarks, with the remarks of that level as reasons, and of a consistent run what a
+    single log cannot show; JSON-serialisable."""
     level = max((remark.level for remark in found), key=LEVELS.index, default=CONSISTENT)
-    reasons = [] if level == CONSISTENT else [remark.text for remark in found if remark.level == level]
-    return {"verdict": level, "reasons": reasons}
+    if level == CONSISTENT:
+        return {"verdict": level, "reasons": [], "not_shown": NOT_SHOWN}
+    return {"verdict": level, "reasons": [remark.text for remark in found if remark.level == level]}
 
 
 def sentence(trust: Mapping[str, Any]) -> str:
@@ -72,6 +77,8 @@ def _observability(s: Mapping[str, Any]) -> Iterator[Remark]:
 
 
 def _sigmas(s: Mapping[str, Any]) -> Iterator[Remark]:
+    if not s["sigmas_published"] and not s["not_observable"]:
+        yield Remark(SUSPECT, "the method publishes no sigmas, so nothing tests its estimate")
     for name, part in s["components"].items():
         ratio, predicted = part["innovation_ratio"], part["predicted_sigma_ratio"]
         if ratio is not None and part["verdict"] == "overconfident":

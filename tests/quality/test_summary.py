@@ -10,6 +10,7 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.quality import summary
+from ftproc.quality.verdict import NOT_SHOWN
 from ftproc.records import GOOD, ISOLATED, MISSING, PATCH
 from ftproc.settings import FilterSettings
 from tests.simulated import simulate
@@ -129,9 +130,11 @@ def test_lines_stand_under_each_other(dirty):
 
 
 def test_text_ends_with_the_verdict(dirty):
-    verdict = summary.text(dirty[1].metadata).splitlines()[-1]
-    assert verdict == ("  verdict    consistent: residuals agree with the published sigmas, and no fault shows")
-    assert figures(dirty[1])["trust"] == {"verdict": "consistent", "reasons": []}
+    assert summary.text(dirty[1].metadata).splitlines()[-2:] == [
+        "  verdict    consistent: residuals agree with the published sigmas, and no fault shows",
+        f"             {NOT_SHOWN}",
+    ]
+    assert figures(dirty[1])["trust"] == {"verdict": "consistent", "reasons": [], "not_shown": NOT_SHOWN}
 
 
 def test_text_reports_rows_without_time_and_out_of_order():

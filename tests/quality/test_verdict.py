@@ -28,7 +28,7 @@ def judged(good, part=None, **changes):
 
 def test_the_words_of_the_contract(good):
     assert verdict.LEVELS == ("consistent", "suspect", "unreliable")
-    assert judged(good) == {"verdict": "consistent", "reasons": []} == good["trust"]
+    assert judged(good) == {"verdict": "consistent", "reasons": [], "not_shown": verdict.NOT_SHOWN} == good["trust"]
     assert verdict.sentence(good["trust"]) == (
         "consistent: residuals agree with the published sigmas, and no fault shows"
     )
@@ -55,6 +55,7 @@ OFF = {"innovation_ratio": 1.5, "innovation_bounds": [0.8, 1.2], "verdict": "ove
         ({"poorly_observable": [{**LARGE[0], "to_s": 3.0}]}, {}, SUSPECT, "the position is poorly observable at 3 s"),
         ({"poorly_observable": LARGE}, {}, SUSPECT, "the position is poorly observable in 2 intervals: 1 sigma up to "
                                                     "90 m, from 7 to 8 s"),
+        ({"sigmas_published": False}, {}, SUSPECT, "the method publishes no sigmas, so nothing tests its estimate"),
         ({"editing_converged": False}, {}, SUSPECT, "did not converge"),
         ({"reacquired": 1}, {}, SUSPECT, "re-initialized once (track loss, or a gap too long to bridge)"),
         ({"reacquired": 2}, {}, SUSPECT, "re-initialized twice (track loss"),
@@ -89,6 +90,22 @@ def test_several_reasons_have_a_line_each():
     at = lines.index("  verdict    unreliable:")
     assert [line.split()[1] for line in lines[at + 1 :]] == ["range", "azimuth", "elevation"]
     assert all(line.startswith("             - ") for line in lines[at + 1 :])
+
+
+@pytest.mark.parametrize("method", ["gate", "ls4", "rkf"])
+def test_a_method_without_sigmas_is_never_consistent(method):
+    flight = simulate("zuo2021", seed=1)
+    found = pipeline.filter_log(flight.log, FilterSettings(method=method)).metadata["summary"]
+    assert not found["sigmas_published"]
+    assert found["trust"]["verdict"] == SUSPECT
+    assert "not_shown" not in found["trust"]
+
+
+def test_a_consistent_run_says_what_one_log_cannot_show():
+    flight = simulate("manoeuvre-clean", seed=5, duration_s=30.0)
+    lines = summary.text(pipeline.filter_log(flight.log).metadata).splitlines()
+    assert lines[-2].split()[:2] == ["verdict", "consistent:"]
+    assert lines[-1].strip() == verdict.NOT_SHOWN
 
 
 def test_the_verdict_against_the_truth():
