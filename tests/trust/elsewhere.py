@@ -9,12 +9,10 @@ import sys
 from typing import NamedTuple
 
 #: What happens to a run from outside: also to the workers and the scheduler of a cluster.
-FAULTS = ("tests/faults", "tests/test_cluster.py")
+FAULTS = ("tests/faults", "tests/batch/test_cluster.py")
 
-#: Kernels against plain Python and against each other, those that take seconds when they are not compiled.
-PLAIN = tuple(f"tests/core/test_{name}.py" for name in
-              ("geometry", "motion", "ukf", "ekf", "bridges", "ascent", "forward", "gate", "channels", "imm",
-               "indicators", "refraction", "screening", "swaps"))  # fmt: skip
+#: Kernels against plain Python and against each other; those that take minutes without the compiler are left out there.
+PLAIN = ("tests/core",)
 
 
 class Count(NamedTuple):
