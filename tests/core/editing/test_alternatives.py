@@ -33,6 +33,7 @@ def test_patch_that_was_followed_is_given_up(component):
     assert (found == right).mean() > 0.998
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("component", range(3))
 def test_far_patch_beside_other_outliers_is_given_up(component):
     """What stands between the decisions and the alternative: isolated outliers among the good readings that were
@@ -80,6 +81,7 @@ def test_hole_is_filled_from_its_edges_and_not_with_the_patch(component):
     assert (steps[-1].weight == right).mean() > 0.998
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("component", range(3))
 def test_right_decisions_stay(component):
     log, _, right = followed(component)

@@ -90,6 +90,7 @@ def moved(model, noise=0.0, jerk=0.0):
     return model._replace(noise_variance=model.noise_variance * np.exp(noise), jerk=model.jerk + jerk)
 
 
+@pytest.mark.compiled
 def test_jerk_score_is_the_derivative_by_every_element_of_every_piece():
     a = matched(7, 200, dt=0.5, q=5.0, irregular=True, missing=0.1, pieces=3, **STRAIGHT)
     score = smooth(a).jerk_score
@@ -112,6 +113,7 @@ def test_scores_alone_are_the_same():
         assert alone.log_likelihood == pytest.approx(found.log_likelihood, rel=1e-12)
 
 
+@pytest.mark.compiled
 def test_scores_vanish_on_average_at_the_truth():
     """Expectation zero, and a variance that is the information: about n / 2 for ln(variance) of each component."""
     scores = np.array([smooth(matched(seed, 200, q=5.0)).noise_score for seed in range(40, 80)])
@@ -120,6 +122,7 @@ def test_scores_vanish_on_average_at_the_truth():
     assert (scores.var(0) > 30).all()
 
 
+@pytest.mark.compiled
 def test_likelihood_is_highest_near_the_true_noise_and_jerk():
     a = matched(9, 800, q=10.0)
     best = likelihood(a, a.model)

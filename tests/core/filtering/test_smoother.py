@@ -135,6 +135,7 @@ def test_smoothed_covariance_is_positive_even_if_rounding_ate_it():
     np.testing.assert_allclose(half, p / 2, rtol=1e-6)
 
 
+@pytest.mark.compiled
 def test_smoother_beats_the_filter_and_its_sigmas_hold_the_truth():
     ratio, inside = [], []
     for seed in range(20, 28):

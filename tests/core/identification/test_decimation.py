@@ -61,6 +61,7 @@ def test_start_within_the_log_begins_a_group():
     assert [s.sample for s in starts] == [0, 4]
 
 
+@pytest.mark.compiled
 def test_score_of_the_jerk_is_that_of_single_readings():
     """The likelihood by jerk, of merged readings and of single ones, has its summit at the same place."""
     a = matched(5, 4000)
