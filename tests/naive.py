@@ -129,7 +129,7 @@ class Step(NamedTuple):
 
 
 def run(time, z, weight, model, x, p, transform=unscented):
-    """The recursive filter; `model` as in ftproc.core.forward."""
+    """The recursive filter; `model` as in ftproc.core.filtering.records."""
     steps = []
     for k in range(len(time)):
         phi, q = np.eye(9), np.zeros((9, 9))

@@ -9,6 +9,7 @@ import numpy as np
 
 from ftproc import pipeline, scoring
 from ftproc.core.filtering import forward
+from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.model import motion
 from ftproc.correction import model_file
@@ -58,13 +59,14 @@ def _oracle(flight: Simulation) -> tuple[float, float]:
     assert truth.outlier is not None
     assert truth.velocity_mps is not None
     weight = (np.isfinite(log.measurement) & (truth.outlier == 0)).astype(float)
-    covariance = np.diag(np.r_[np.full(3, 25.0), np.full(3, 4.0), np.full(3, 25.0)])
-    starts = [forward.Start(0, np.r_[truth.position_m[0], truth.velocity_mps[0], np.zeros(3)], covariance)]
+    observations = Observations(log.time_s - log.time_s[0], log.measurement, weight)
+    known = np.diag(np.r_[np.full(3, 25.0), np.full(3, 4.0), np.full(3, 25.0)])
+    starts = [Start(0, np.r_[truth.position_m[0], truth.velocity_mps[0], np.zeros(3)], known)]
     best = [np.inf, np.inf]
     for jerk in JERK_GRID:
-        model = forward.Model(np.array(flight.sigma) ** 2, motion.isotropic(float(jerk)))
-        known = (log.time_s - log.time_s[0], log.measurement, weight, model, starts)
-        states = (forward.filter_log(*known).state, smooth_log(*known).state)
+        model = Model(np.array(flight.sigma) ** 2, motion.isotropic(float(jerk)))
+        runs = forward.filter_log(observations, model, starts), smooth_log(observations, model, starts)
+        states = [run.state for run in runs]
         for k, state in enumerate(states):
             error = state[:, :3] - truth.position_m
             best[k] = min(best[k], float(np.sqrt((error**2).sum(1).mean())))

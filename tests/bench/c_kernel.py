@@ -7,15 +7,16 @@ import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.filtering.records import FilterRun, Model, Start, empty_run
+from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 
 SOURCE = Path(__file__).with_name("ukf.c")
-Array = NDArray[np.float64]
-Filter = Callable[[Array, Array, Array, Model, Start], FilterRun]
+Filter = Callable[[Observations, Model, Start], FilterRun]
+WIDTHS = (9, 9, 9, 3, 3, 3)  # state, predicted, sigma, innovation, innovation_sigma, weight
 
 
 def compiled(folder: Path) -> Filter | None:
@@ -28,13 +29,13 @@ def compiled(folder: Path) -> Filter | None:
     function = ctypes.CDLL(str(library)).run
     function.restype = ctypes.c_double
 
-    def run(time_s: Array, measurement: Array, weight: Array, model: Model, start: Start) -> FilterRun:
-        out = empty_run(time_s)
-        given = (time_s, measurement, weight, model.noise_variance, model.jerk, start.state.copy())
-        filled = (out.state, out.predicted, out.sigma, out.innovation, out.innovation_sigma, out.weight, out.nis)
-        arrays = [*given, start.covariance.copy(), *filled, out.los_sigma, out.since_start]
-        assert all(array.flags.c_contiguous for array in arrays)
-        pointers = [array.ctypes.data_as(ctypes.c_void_p) for array in arrays]
-        return out._replace(log_likelihood=function(ctypes.c_int64(len(time_s)), *pointers))
+    def run(log: Observations, model: Model, start: Start) -> FilterRun:
+        n = len(log.time_s)
+        taken = (*log, model.noise_variance, model.jerk, start.state.copy(), start.covariance.copy())
+        filled: list[NDArray[Any]] = [np.empty((n, width)) for width in WIDTHS]
+        filled += [np.full(n, np.nan), np.empty((n, 6)), np.empty(n, np.int64)]  # nis, los_sigma, since_start
+        assert all(array.flags.c_contiguous for array in (*taken, *filled))
+        pointers = [array.ctypes.data_as(ctypes.c_void_p) for array in (*taken, *filled)]
+        return FilterRun._make([log.time_s, *filled, function(ctypes.c_int64(n), *pointers)])
 
     return run

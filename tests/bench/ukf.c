@@ -1,4 +1,4 @@
-/* The plain UKF run of ftproc/core/forward.py:run_span in C, step for step, as the yardstick of its speed. */
+/* The plain UKF run of ftproc/core/filtering/forward.py:run_weighted in C, step for step, as the yardstick of its speed. */
 
 #include <math.h>
 #include <stdint.h>

@@ -1,32 +1,38 @@
-"""One unscented transform or update by the kernels, on arrays that they may keep; and random problems for it."""
+"""One unscented transform or update by the kernels, on one record; and random problems for it."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from ftproc.core.compiled import zeros
 from ftproc.core.filtering import ukf
-from ftproc.core.model.measurement import innovate
 from tests import naive
 from tests.core.tracks import covariance
 
 
+def filter_at(x, p, noise=0.0):
+    """The record of a filter in this state."""
+    filters = zeros(ukf.FILTER)
+    filters["x"], filters["p"], filters["noise"] = x, p, noise
+    return filters[0]
+
+
 def transform(x, p):
     """z^, C, P_xz and H of the kernel."""
-    factor, b, z_hat, h, c = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
-    pxz = np.zeros((9, 3))
-    ukf.linearise(x, p, factor, b, z_hat, h, c)
-    ukf.cross_covariance(p, h, pxz)
-    return z_hat, c, pxz, h
+    f = filter_at(x, p)
+    ukf.linearise(f)
+    ukf.cross_covariance(f)
+    return f["z_hat"], f["c"], f["pxz"], f["h"]
 
 
 def update(x, p, z, noise, weight):
-    """x+, P+, NIS and log-likelihood of the kernel."""
-    x, p = x.copy(), p.copy()
-    z_hat, c, pxz, h = transform(x, p)
-    e, s, s_inv, gain = np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((9, 3))
-    innovate(z, z_hat, e)
-    used = np.where(np.isfinite(e), weight, 0.0)
-    return x, p, *ukf.update(x, p, pxz, c, h, e, noise, used, s, s_inv, gain)
+    """x+, P+, NIS and log-likelihood of the kernel; the last two of an update that uses nothing mean nothing."""
+    f = filter_at(x, p, noise)
+    ukf.linearise(f)
+    ukf.cross_covariance(f)
+    ukf.innovate(z, f)
+    ukf.use(weight, f)
+    return f["x"], f["p"], *ukf.update(f)
 
 
 def random_problem(rng, spread=0.05):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core.filtering.records import Model, Start
+from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.model.frames import from_cartesian, wrap
 from tests import naive
 
@@ -24,6 +24,14 @@ class Problem(NamedTuple):
     model: Model
     starts: list[Start]
     truth: np.ndarray
+
+    @property
+    def log(self):
+        return Observations(self.time, self.z, self.weight)
+
+    def part(self, rows, starts):
+        """Some of the samples, with their own starts."""
+        return Problem(self.time[rows], self.z[rows], self.weight[rows], self.model, starts, self.truth[rows])
 
 
 def covariance(rng, sigmas):

@@ -17,7 +17,8 @@ from pathlib import Path
 import atheris
 
 _HERE = Path(__file__).parent
-_KERNELS = [f"ftproc.core.{path.stem}" for path in (_HERE.parents[1] / "ftproc" / "core").glob("*.py")]
+_ROOT = _HERE.parents[1]
+_KERNELS = [".".join(path.relative_to(_ROOT).with_suffix("").parts) for path in _ROOT.glob("ftproc/core/**/*.py")]
 
 
 def main() -> None:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from ftproc import pipeline
-from ftproc.core.filtering import backward
 from tests.fuzz import kernel, mutation, targets
 from tests.trust import cases
 
@@ -74,16 +73,9 @@ def test_bytes_become_readings() -> None:
 
 @pytest.mark.parametrize("smooth", [False, True])
 def test_a_variance_that_rounding_eats_stays_positive(smooth: bool) -> None:
-    """Readings hours apart in a wild flight: of what was known before them, an update leaves less than its rounding."""
+    """Readings hours apart: of what was known before them, an update leaves less than its rounding."""
     content = (CORPUS / "kernel" / "found-384b1219").read_bytes()
     log = kernel.decoded(content, "log")
     assert log is not None
     settings = replace(kernel._settings(content), editing="none", smooth=smooth)
     cases.judge_trajectory(pipeline.filter_log(log, settings))
-
-
-def test_a_smoothed_sigma_is_a_number_even_where_the_covariance_is_none() -> None:
-    lost = np.diag([-1.0, *np.ones(8)])
-    zero, state, sigma, los = np.zeros((9, 9)), np.zeros(9), np.zeros(9), np.zeros(6)
-    backward.estimate(np.arange(1.0, 10.0), lost, np.zeros(9), zero, zero.copy(), zero.copy(), state, sigma, los)
-    np.testing.assert_allclose(sigma, [1e-7, *np.ones(8)])

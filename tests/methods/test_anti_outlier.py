@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.filtering import forward
+from ftproc.core.filtering.records import Start
 from ftproc.methods import anti_outlier, preparing
 from ftproc.methods.estimate import Readings
 from ftproc.records import GOOD, ISOLATED, MISSING, PATCH
@@ -55,7 +56,7 @@ def test_labels_are_complete(dirty, editing):
 
 
 @pytest.mark.parametrize("editing", ["two-pass", "forward"])
-def test_patches_and_isolated_outliers_are_told_apart(dirty, editing):
+def test_patches_and_isolated_outliers_are_distinguished(dirty, editing):
     found = anti_outlier.estimate(readings(dirty), FilterSettings(editing=editing))
     large = np.abs(deviation(dirty)) > 10 * np.array(dirty.sigma)
     spike = (codes(dirty) == 1) & large
@@ -74,7 +75,7 @@ def test_smoother_comes_only_when_asked(dirty):
             assert error(asked.smoothed, dirty) < error(asked.run, dirty)
 
 
-def test_given_noise_and_jerk_are_used(clean):
+def test_specified_noise_and_jerk_are_used(clean):
     settings = FilterSettings(editing="none", noise=(5.0, 1e-3, 2e-3), jerk_psd_m2ps5=7.0)
     found = anti_outlier.estimate(readings(clean), settings)
     np.testing.assert_allclose(np.sqrt(found.model.noise_variance), (5.0, 1e-3, 2e-3))
@@ -101,10 +102,8 @@ def test_run_of_two_passes_is_the_plain_filter_over_what_is_good(dirty):
     weight = np.where(found.label == GOOD, 1.0, 0.0)
     np.testing.assert_array_equal(found.run.weight, weight)
     seen = found.run.since_start
-    again = forward.filter_log(
-        dirty.log.time_s, dirty.log.measurement, weight, found.model,
-        [forward.Start(0, found.run.predicted[0], np.diag(found.run.sigma[0] ** 2))],
-    )  # fmt: skip
+    start = Start(0, found.run.predicted[0], np.diag(found.run.sigma[0] ** 2))
+    again = forward.filter_log(readings(dirty).weighted(weight), found.model, [start])
     np.testing.assert_allclose(again.state[-1], found.run.state[-1], rtol=0.02, atol=1)
     assert (seen == np.arange(len(seen))).all()
 

@@ -69,7 +69,7 @@ def test_blame_is_on_the_component_that_is_off():
     flight = simulate("cruise", seed=2, duration_s=15.0, outliers="azimuth.isolated=0.05:20-60")
     found = pipeline.filter_log(flight.log, FilterSettings(method="renpf"))
     hit = np.flatnonzero(flight.truth.outlier[:, 1] > 0)
-    hit = hit[hit >= 10]  # the first state is vague
+    hit = hit[hit >= 10]  # the first state is uncertain
     assert len(hit) > 5
     assert (found.outlier[hit, 1] != GOOD).all()
     assert (found.outlier[hit][:, [0, 2]] != GOOD).mean() < 0.2
@@ -120,11 +120,11 @@ def test_too_few_particles_are_refused():
 def test_long_work_is_said_and_hours_are_refused(monkeypatch):
     """Without doing it."""
 
-    class Begun(Exception):
+    class Started(Exception):
         pass
 
     def begin(*_):
-        raise Begun
+        raise Started
 
     monkeypatch.setattr(ensemble.preparing, "prepare", begin)
 
@@ -137,11 +137,14 @@ def test_long_work_is_said_and_hours_are_refused(monkeypatch):
 
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        with pytest.raises(Begun):
+        with pytest.raises(Started):
             tried(2000, 100)
     for rows in (50_000, 200_000):
         spoken = f"{seconds(rows, 100):.0f} s" if seconds(rows, 100) < 120 else f"{seconds(rows, 100) / 60:.0f} minutes"
-        with pytest.warns(FtprocWarning, match=f"^renpf: {rows} rows will take about {spoken}$"), pytest.raises(Begun):
+        with (
+            pytest.warns(FtprocWarning, match=f"^renpf: {rows} rows will take about {spoken}$"),
+            pytest.raises(Started),
+        ):
             tried(rows, 100)
     with pytest.raises(ValueError, match=r"^1000000 rows would take renpf about [0-9.]+ hours with 300 particles; cut"):
         tried(1_000_000, 300)

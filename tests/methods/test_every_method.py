@@ -54,7 +54,7 @@ def measured_position(log):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_missing_readings(name):
-    """Their label says so, nothing else is lost, and no method goes astray."""
+    """Their label says so, nothing else is lost, and no method loses the track."""
     position = PATHS["helix"](TIME)
     whole = measured(position)
     log = blanked(whole, 0.2)
@@ -139,6 +139,6 @@ def test_logs_of_a_few_rows(name, rows):
 
 def test_lost_track_of_a_robust_filter_is_a_sentence(monkeypatch):
     monkeypatch.setattr("ftproc.methods.robust.LOST_AT", 0.5)
-    message = r"^flight\.csv: mcc-ukf lost the track, and has no way to take it up again; use ga-bpnn-ukf$"
+    message = r"^flight\.csv: mcc-ukf lost the track, and cannot re-acquire it; use ga-bpnn-ukf$"
     with pytest.raises(InputError, match=message):
         run(measured(PATHS["receding"](TIME)), "mcc-ukf")

@@ -151,7 +151,7 @@ def test_patches_are_not_followed(seed):
     assert (bad & ~called & np.isfinite(flight.log.measurement)).sum() < 0.05 * bad.sum()
 
 
-def test_opposites_are_tried_again_when_the_jerk_level_is_another():
+def test_alternatives_are_tried_again_when_the_jerk_level_is_another():
     """An overhead pass of which the first decisions, and with them the jerk level, are far off."""
     patches = "isolated=0.03:6-300,offset=2:8-30:8-200,ramp=1:10-30:20-200,burst=1:8-20:10-100,nan=0.01"
     flight = simulate("overhead", seed=37, duration_s=60.0, dt_s=0.1, outliers=patches)

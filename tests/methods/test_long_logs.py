@@ -36,7 +36,9 @@ def kept(parts):
     }
 
 
-@pytest.mark.parametrize("given", [{}, {"noise": (5.0, 1e-4, 1e-4), "jerk_psd_m2ps5": 10.0}], ids=["found", "given"])
+@pytest.mark.parametrize(
+    "given", [{}, {"noise": (5.0, 1e-4, 1e-4), "jerk_psd_m2ps5": 10.0}], ids=["found", "specified"]
+)
 @pytest.mark.parametrize("block", [300, 1000])
 def test_recursion_in_blocks_is_the_recursion_bit_for_bit(flight, given, block):
     settings = FilterSettings(editing="forward", **given)
@@ -48,9 +50,9 @@ def test_recursion_in_blocks_is_the_recursion_bit_for_bit(flight, given, block):
     one, many = kept(whole), kept(parts)
     for name, values in one.items():
         np.testing.assert_array_equal(many[name], values, err_msg=name)
-    anew = [p.first + k for p in parts for k in p.estimate.reacquired if p.low <= k < p.high]
-    assert anew == list(whole[0].estimate.reacquired)
-    assert anew
+    again = [p.first + k for p in parts for k in p.estimate.reacquired if p.low <= k < p.high]
+    assert again == list(whole[0].estimate.reacquired)
+    assert again
 
 
 def test_run_of_outliers_over_a_seam_has_one_label_also_where_another_component_is_missing(flight):
@@ -89,7 +91,7 @@ def in_segments(monkeypatch):
 
 
 @pytest.mark.parametrize("smooth", [False, True])
-def test_segments_tell_what_the_whole_tells(in_segments, smooth):
+def test_segments_agree_with_the_whole(in_segments, smooth):
     """Half of all samples within 0.15 of their sigma, 99 % within 1, also at the seams, and as accurate. (Decisions
     that hang in the balance, of a patch in a turn, may come out otherwise.)"""
     flight = simulate("manoeuvre", seed=3, duration_s=700.0, dt_s=0.1, outliers="isolated=0.05:8-300,nan=0.01")
@@ -137,7 +139,7 @@ def test_segment_without_a_component_looks_farther(flight, in_segments):
     assert (part.estimate.run.since_start[part.low : part.high] > 0).all()
 
 
-def test_noise_given_is_taken(flight, in_segments):
+def test_specified_noise_is_taken(flight, in_segments):
     in_segments(3000, 2000, 300)
     cut = pipeline.filter_log(flight.log, FilterSettings(noise=(7.0, None, None), jerk_psd_m2ps5=5.0))
     settings = cut.metadata["settings"]

@@ -8,22 +8,11 @@ import subprocess
 import sys
 from typing import NamedTuple
 
-#: Faults from outside: of the machine, of worker processes, of the workers and the scheduler of a cluster.
+#: What happens to a run from outside: also to the workers and the scheduler of a cluster.
 FAULTS = ("tests/faults", "tests/batch")
 
-#: Kernels against plain Python and against each other, those that take seconds when they are not compiled.
-PLAIN = (
-    "tests/core/model",
-    "tests/core/filtering/test_ukf.py",
-    "tests/core/filtering/test_forward.py",
-    "tests/core/editing/test_gate.py",
-    "tests/core/editing/test_jump_patches.py",
-    "tests/core/editing/test_alternatives.py",
-    "tests/core/editing/test_screening.py",
-    "tests/core/identification/test_optimizer.py",
-    "tests/core/comparators/test_channels.py",
-    "tests/core/comparators/test_imm.py",
-)
+#: Kernels against plain Python and against each other; those that take minutes without the compiler are left out there.
+PLAIN = ("tests/core",)
 
 
 class Count(NamedTuple):

@@ -69,10 +69,8 @@ def kalman(z, improved=False, start=WRONG_START):
     if improved:
         begin[:] = int(gate(z, check_first=True).kept.argmax())
         x0 = z[begin[0]]
-    value, variance, _, _, weight = channels.outlier_kalman(
-        TIME, z, begin, np.array(x0, float), np.full(2, P0), np.full(2, R), np.full(2, Q), 1.0, SIGMAS, SMALL_GAIN,
-        improved,
-    )  # fmt: skip
+    model = channels.Walk(begin, np.array(x0, float), np.full(2, P0), np.full(2, R), np.full(2, Q), 1.0)
+    value, variance, _, _, weight = channels.outlier_kalman(TIME, z, model, SIGMAS, SMALL_GAIN, improved)
     return Result(value, weight.all(1), variance[:, 0])
 
 

@@ -13,7 +13,8 @@ TIME = np.cumsum(RNG.choice([0.05, 0.1, 0.3], 300))
 
 
 def run(z, noise=0.01, jerk=0.5, x0=(0.0, 1.0, 0.0), p0=1.0, adapt=True, angular=False):
-    return adaptive.adaptive_kalman(TIME, z, 0, np.array(x0, float), p0 * np.eye(3), noise, jerk, angular, adapt)
+    model = adaptive.Channel(0, np.array(x0, float), p0 * np.eye(3), noise, jerk, angular)
+    return adaptive.adaptive_kalman(TIME, z, model, adapt)
 
 
 def test_without_adaptation_it_is_the_textbook_kalman_filter():
@@ -63,7 +64,7 @@ def test_noise_is_learnt():
     assert np.mean((plain[2][100:] / plain[3][100:]) ** 2) > 3
 
 
-def test_after_a_lasting_jump_it_begins_anew():
+def test_after_a_lasting_jump_it_is_re_initialized():
     z = 0.01 * RNG.standard_normal(300)
     z[100:] += 50
     state, _, _, _, weight, _ = run(z, noise=1e-4, jerk=1e-4, x0=(0, 0, 0))

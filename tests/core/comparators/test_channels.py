@@ -62,7 +62,7 @@ def test_weights_of_the_last_four_are_minus_half_nought_half_one():
 
 
 @pytest.mark.parametrize("run", [1, 2])
-def test_line_bridges_one_or_two_outliers_exactly(run):
+def test_line_replaces_one_or_two_outliers_exactly(run):
     z = 3 + 2 * TIME[:30]
     truth = z.copy()
     z[10 : 10 + run] += 50
@@ -107,16 +107,14 @@ def kalman(z, x0, own_only=False, small_gain=0.002, gate=4.0):
     """With the paper's Q = 0.006, R = 0.002, P0 = 0.01."""
     z = np.asarray(z, float)
     m = z.shape[1]
-    return channels.outlier_kalman(
-        TIME[: len(z)], z, np.zeros(m, np.int64), np.asarray(x0, float), np.full(m, 0.01), np.full(m, 0.002),
-        np.full(m, 0.006), 1.0, gate, small_gain, own_only,
-    )  # fmt: skip
+    p0, noise, gained = np.full(m, 0.01), np.full(m, 0.002), np.full(m, 0.006)
+    model = channels.Walk(np.zeros(m, np.int64), np.asarray(x0, float), p0, noise, gained, 1.0)
+    return channels.outlier_kalman(TIME[: len(z)], z, model, gate, small_gain, own_only)
 
 
 def test_from_the_papers_wrong_start_the_gate_opens_at_the_eighth_recursion():
     value, _, _, _, weight = kalman(np.tile([110.712, 33.917], (20, 1)), (109.99, 32.95))
-    opened = int(np.argmax(weight.all(1))) + 1
-    assert opened == 8
+    assert int(np.argmax(weight.all(1))) + 1 == 8
     np.testing.assert_allclose(value[-1], (110.712, 33.917), atol=1e-3)
 
 
@@ -168,7 +166,7 @@ def test_missing_reading_leaves_the_value_and_widens_it():
 
 def walk(z, kind=channels.WALK, threshold=5.0, noise=1.0, gained=1.0, time=TIME, angular=False):
     z = np.asarray(z, float)
-    return channels.repaired_walk(time[: len(z)], z, kind, threshold, noise, gained, 1.0, angular)
+    return channels.repaired_walk(time[: len(z)], z, channels.Repair(kind, threshold, noise, gained, 1.0, angular))
 
 
 @pytest.mark.parametrize("run", [1, 5, 16])
@@ -182,7 +180,7 @@ def test_repaired_value_of_a_line_is_exact_for_up_to_sixteen_in_a_row(run, kind)
     np.testing.assert_array_equal(np.flatnonzero(weight == 0), np.arange(28, 28 + run))
 
 
-def test_seventeenth_in_a_row_begins_anew():
+def test_seventeenth_in_a_row_re_initializes():
     z = 300 + 0.5 * TIME
     z[28:50] = 1500
     *_, weight, repaired = walk(z, threshold=300)

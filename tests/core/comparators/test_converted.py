@@ -7,7 +7,6 @@ import pytest
 
 from ftproc.core.comparators import converted
 from ftproc.core.filtering import forward
-from ftproc.core.filtering.forward import run_spans
 from ftproc.core.model.frames import line_of_sight_axes, to_cartesian
 from tests import naive
 from tests.core.tracks import matched, position_error
@@ -20,13 +19,8 @@ def convert(z, noise, at):
 
 
 def run(a):
-    def span(first, stop, x, p, filled):
-        model = a.model
-        return converted.run_converted(
-            first, stop, a.time, a.z, model.noise_variance, model.jerk, model.knot_s, x, p, filled
-        )
-
-    return run_spans(a.time, a.z, a.model, a.starts, span)
+    extra = converted.conversion_of(a.model.noise_variance)
+    return forward.run_log(converted.run_converted, a.log, a.model, a.starts, extra)
 
 
 @pytest.mark.parametrize("place", [(5000.0, 2.0, 0.3), (800.0, -3.1, 1.2), (100.0, 0.0, -0.4)])
@@ -75,7 +69,7 @@ def test_run_is_the_linear_kalman_filter_on_positions():
 
 def test_at_small_angles_of_noise_it_is_as_good_as_the_ukf_with_readings_missing():
     a = matched(3, 300, missing=0.3)
-    found, ukf = run(a), forward.filter_log(a.time, a.z, a.weight, a.model, a.starts)
+    found, ukf = run(a), forward.filter_log(a.log, a.model, a.starts)
     assert np.mean(position_error(found.state, a.truth)) < 1.02 * np.mean(position_error(ukf.state, a.truth))
     np.testing.assert_array_equal(found.weight, a.weight)
     np.testing.assert_allclose(found.innovation_sigma, ukf.innovation_sigma, rtol=0.05)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from ftproc.core.comparators import ensemble, particles
-from ftproc.core.comparators.ensemble_run import Motion, filter_log, measure, subtract
+from ftproc.core.comparators.ensemble_run import Motion, Settings, filter_log, measure, subtract
 from ftproc.core.filtering import forward
-from ftproc.core.filtering.records import Model
+from ftproc.core.filtering.records import Model, Start
 from tests import naive
 from tests.core.tracks import matched, position_error, random_jerk
 
@@ -16,7 +16,8 @@ NAMES = list(particles.UPDATES)
 
 
 def run(name, a, members=100, patch_s=1.5, seed=0):
-    return filter_log(name, a.time, a.z, a.model, a.starts, members, patch_s, np.random.default_rng(seed))
+    settings = Settings(name, members, patch_s, np.random.default_rng(seed))
+    return filter_log(a.log, a.model, a.starts, settings)
 
 
 def rms(found, a):
@@ -56,10 +57,10 @@ def test_nearly_as_good_as_the_ukf_and_honest(name):
     found, plain, nees = [], [], []
     for seed in range(3):
         a = matched(seed, 250, irregular=True, missing=0.15)
-        filtered, begun = run(name, a)
-        assert len(begun) == 1
+        filtered, made = run(name, a)
+        assert len(made) == 1
         found.append(rms(filtered, a))
-        plain.append(rms(forward.filter_log(a.time, a.z, a.weight, a.model, a.starts), a))
+        plain.append(rms(forward.filter_log(a.log, a.model, a.starts), a))
         nees.append(np.mean(((filtered.state - a.truth)[:, :3] / filtered.sigma[:, :3]) ** 2))
         assert np.isnan(filtered.nis[np.isnan(a.z).all(1)]).all()
         assert (filtered.weight[np.isnan(a.z)] == 0).all()
@@ -70,7 +71,7 @@ def test_nearly_as_good_as_the_ukf_and_honest(name):
 def test_innovations_and_sigmas_are_the_ukfs():
     a = matched(4, 120)
     many, _ = run("enkf", a, members=3000)
-    plain = forward.filter_log(a.time, a.z, a.weight, a.model, a.starts)
+    plain = forward.filter_log(a.log, a.model, a.starts)
     np.testing.assert_allclose(many.sigma, plain.sigma, rtol=0.12)
     np.testing.assert_allclose(many.los_sigma, plain.los_sigma, rtol=0.12)
     np.testing.assert_allclose(many.innovation_sigma, plain.innovation_sigma, rtol=0.12)
@@ -95,8 +96,8 @@ def test_isolated_outliers_are_refused():
     errors = []
     for seed in range(3):
         a, hit = spoiled(seed)
-        fuzzy, begun = run("renpf", a)
-        assert len(begun) == 1
+        fuzzy, made = run("renpf", a)
+        assert len(made) == 1
         assert fuzzy.weight[hit].max() < 0.2
         assert (fuzzy.weight > 0).all(1).mean() > 0.9
         errors.append([rms(fuzzy, a), rms(run("enpf-chi2", a)[0], a), rms(run("enkf", a)[0], a)])
@@ -106,31 +107,31 @@ def test_isolated_outliers_are_refused():
 
 
 @pytest.mark.parametrize("name", ["enpf-chi2", "renpf"])
-def test_a_wrong_track_is_taken_up_anew(name):
+def test_a_wrong_track_is_re_acquired(name):
     """The target is suddenly 2 km further on: the gate refuses all, until the readings before agree on a new start."""
     a = matched(5, 200)
     a.truth[90:, :3] += np.array([1200.0, 1600.0, 0.0])
     z = measure(a.truth) + (a.z - measure(matched(5, 200).truth))
-    found, begun = run(name, a._replace(z=z))
-    assert len(begun) == 2
-    assert 90 + 15 <= begun[1].sample <= 90 + 25
-    assert (found.weight[90 : begun[1].sample] == 0).all()
-    assert (found.weight[begun[1].sample :] > 0).mean() > 0.9
+    found, made = run(name, a._replace(z=z))
+    assert len(made) == 2
+    assert 90 + 15 <= made[1].sample <= 90 + 25
+    assert (found.weight[90 : made[1].sample] == 0).all()
+    assert (found.weight[made[1].sample :] > 0).mean() > 0.9
     assert position_error(found.state, a.truth)[-50:].max() < 12
-    assert found.since_start[-1] == 199 - begun[1].sample
+    assert found.since_start[-1] == 199 - made[1].sample
 
 
-def test_a_log_with_several_starts_begins_anew_at_each():
+def test_a_log_with_several_starts_is_re_initialized_at_each():
     a = matched(6, 120)
-    second = forward.Start(60, a.truth[60], a.starts[0].covariance)
-    found, begun = run("enkf", a._replace(starts=[*a.starts, second]))
-    assert begun == [*a.starts, second]
+    second = Start(60, a.truth[60], a.starts[0].covariance)
+    found, made = run("enkf", a._replace(starts=[*a.starts, second]))
+    assert made == [*a.starts, second]
     assert list(found.since_start[[59, 60, 119]]) == [59, 0, 59]
 
 
 def test_samples_before_the_first_start_are_extrapolated():
     a = matched(7, 60)
-    late = forward.Start(5, a.truth[5], a.starts[0].covariance)
+    late = Start(5, a.truth[5], a.starts[0].covariance)
     found, _ = run("enkf", a._replace(starts=[late]))
     assert np.isfinite(found.state).all()
     assert np.isfinite(found.los_sigma).all()

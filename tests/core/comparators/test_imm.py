@@ -7,7 +7,6 @@ import pytest
 
 from ftproc.core.comparators import imm
 from ftproc.core.filtering import forward
-from ftproc.core.filtering.forward import run_spans
 from tests import naive
 from tests.core.tracks import matched, position_error
 
@@ -15,12 +14,7 @@ SOJOURN = 5.0
 
 
 def run(a, jerk):
-    probability = np.full((len(a.time), len(jerk)), np.nan)
-
-    def span(first, stop, x, p, filled):
-        return imm.run_imm(first, stop, a.time, a.z, a.model.noise_variance, jerk, SOJOURN, x, p, filled, probability)
-
-    return run_spans(a.time, a.z, a.model, a.starts, span), probability
+    return imm.filter_log(a.log, a.model, a.starts, imm.Jumps(jerk, SOJOURN))
 
 
 def plain(a, jerk):
@@ -70,7 +64,7 @@ def test_run_is_that_of_the_textbook():
 def test_equal_models_are_one_filter():
     a = matched(3, 100, missing=0.2)
     found, probability = run(a, np.repeat(a.model.jerk, 3, 0))
-    single = forward.filter_log(a.time, a.z, a.weight, a.model, a.starts)
+    single = forward.filter_log(a.log, a.model, a.starts)
     np.testing.assert_allclose((found.state - single.state) / single.sigma, 0, atol=1e-6)
     np.testing.assert_allclose(found.innovation_sigma, single.innovation_sigma, rtol=1e-6)
     np.testing.assert_allclose(found.nis, single.nis, rtol=1e-5, atol=1e-5)
@@ -89,7 +83,7 @@ def test_manoeuvre_raises_the_probability_of_hard_jerk_and_the_gain_pays():
     truth[:, :3] = position
     a = a._replace(z=z, truth=truth)
     found, probability = run(a, np.array([1e-2, 1.0, 1e4])[:, None] * a.model.jerk)
-    single = forward.filter_log(a.time, a.z, a.weight, a.model, a.starts)
+    single = forward.filter_log(a.log, a.model, a.starts)
     assert probability[150:200, 2].mean() < 0.25
     assert probability[205:225, 2].max() > 0.9
     mean = [np.mean(position_error(r.state, truth)[200:260]) for r in (found, single)]

@@ -67,7 +67,7 @@ def test_few_members_are_weighed_by_likelihood_only():
 
 
 def test_collapsed_weights_leave_the_kalman_members():
-    """Close to the station, from a vague prior, the proposal misses the posterior."""
+    """Close to the station, from a wide prior, the proposal misses the posterior."""
     members = np.random.default_rng(0).normal([200, 100, 80, 0, 0, 0, 0, 0, 0], 90, (100, 9))
     known = ensemble.forecast(members, np.array([230.0, 0.5, 0.3]), TRACKER)
     found = particles.enpf(known, np.random.default_rng(3))
@@ -86,7 +86,7 @@ def test_gate_refuses_and_lets_pass():
 
 
 def test_renpf_is_the_one_member_by_member():
-    """Every density by SciPy, every chain by itself; the draws in the same order."""
+    """Every density by SciPy, one chain at a time; the draws in the same order."""
     members = cloud(3, n=40)
     z = near(members, sigmas=8.0)
     known = ensemble.forecast(members, z, TRACKER)

@@ -1,4 +1,4 @@
-"""The opposite of a decision, tried where a patch may have been followed."""
+"""Alternative hypotheses, where a patch may have been followed."""
 
 from __future__ import annotations
 
@@ -28,33 +28,34 @@ def followed(component=0, begin=190, end=215, flank=8, sigmas=12.0):
 @pytest.mark.parametrize("component", range(3))
 def test_patch_that_was_followed_is_given_up(component):
     log, wrong, right = followed(component)
-    found = alternatives.try_opposites(log, wrong, set())
+    found = alternatives.try_alternatives(log, wrong, set())
     np.testing.assert_array_equal(found[190:215, component], 0.0)
     assert (found == right).mean() > 0.998
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("component", range(3))
-def test_far_patch_beside_wild_readings_is_given_up(component):
-    """What stands between the decisions and the opposite: single outliers among the good readings that were rejected,
-    and a patch of unrelated ones next to them."""
+def test_far_patch_beside_other_outliers_is_given_up(component):
+    """What stands between the decisions and the alternative: isolated outliers among the good readings that were
+    rejected, and a patch of unrelated ones next to them."""
     log, wrong, right = followed(component, begin=190, end=215, flank=25, sigmas=150.0)
     noise = np.sqrt(log.model.noise_variance[component])
-    for wild in (170, 178, 221, 233):
-        log.measurement[wild, component] += 60 * noise
-        right[wild, component] = wrong[wild, component] = 0.0
+    for outlier in (170, 178, 221, 233):
+        log.measurement[outlier, component] += 60 * noise
+        right[outlier, component] = wrong[outlier, component] = 0.0
     log.measurement[240:250, component] += noise * np.array([70, -40, 55, -80, 30, 90, -60, 45, -75, 65])
     right[240:250, component] = wrong[240:250, component] = 0.0
-    found = alternatives.try_opposites(log, wrong, set())
+    found = alternatives.try_alternatives(log, wrong, set())
     np.testing.assert_array_equal(found[165:255, component], right[165:255, component])
 
 
 def test_islands_are_tried_once():
     log, wrong, _ = followed()
     tried = set(alternatives.islands(log.time_s, wrong, log.possible))
-    np.testing.assert_array_equal(alternatives.try_opposites(log, wrong, tried), wrong)
+    np.testing.assert_array_equal(alternatives.try_alternatives(log, wrong, tried), wrong)
     (again,) = tried
     tried = {again._replace(end=again.end - 1)}
-    assert (alternatives.try_opposites(log, wrong, tried) != wrong).any()
+    assert (alternatives.try_alternatives(log, wrong, tried) != wrong).any()
     assert again in tried
 
 
@@ -80,14 +81,15 @@ def test_hole_is_filled_from_its_edges_and_not_with_the_patch(component):
     assert (steps[-1].weight == right).mean() > 0.998
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("component", range(3))
 def test_right_decisions_stay(component):
     log, _, right = followed(component)
-    np.testing.assert_array_equal(alternatives.try_opposites(log, right, set()), right)
+    np.testing.assert_array_equal(alternatives.try_alternatives(log, right, set()), right)
     two = right.copy()  # good readings between two real patches are no patch
     two[225:235, component] = 0.0
     log.measurement[225:235, component] += 20 * np.sqrt(log.model.noise_variance[component])
-    np.testing.assert_array_equal(alternatives.try_opposites(log, two, set()), two)
+    np.testing.assert_array_equal(alternatives.try_alternatives(log, two, set()), two)
 
 
 def test_islands_lie_between_two_rejected_runs():
@@ -130,4 +132,4 @@ def test_neighbourhood_that_says_too_little_is_left():
     log.measurement[:, 2] = np.nan
     log = log._replace(possible=np.isfinite(log.measurement))
     wrong = wrong * log.possible
-    np.testing.assert_array_equal(alternatives.try_opposites(log, wrong, set()), wrong)
+    np.testing.assert_array_equal(alternatives.try_alternatives(log, wrong, set()), wrong)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core.editing.jump_patches import LONGEST, PIER, SHORTEST, bridged
+from ftproc.core.editing.jump_patches import LONGEST, SHORTEST, SIDE, find
 
 
 def record(seed=0, n=400):
@@ -15,7 +15,7 @@ def record(seed=0, n=400):
 
 
 def found(t, z, good=None, sigma=1.0):
-    flag = bridged(t, z, np.isfinite(z).astype(float) if good is None else good, sigma)
+    flag = find(t, z, np.isfinite(z).astype(float) if good is None else good, sigma)
     return np.flatnonzero(flag)
 
 
@@ -64,7 +64,7 @@ def test_missing_and_barred_readings_are_stepped_over():
     np.testing.assert_array_equal(found(t, z, good), np.setdiff1d(np.arange(200, 215), [204, 207]))
 
 
-@pytest.mark.parametrize("n", [0, 1, PIER, 2 * PIER, 2 * PIER + SHORTEST])
+@pytest.mark.parametrize("n", [0, 1, SIDE, 2 * SIDE, 2 * SIDE + SHORTEST])
 def test_short_records(n):
     assert len(found(0.1 * np.arange(n), np.zeros(n))) == 0
 

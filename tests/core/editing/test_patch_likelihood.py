@@ -1,4 +1,4 @@
-"""Rejected readings by themselves, and on a curve of their own, against plain numpy."""
+"""Rejected readings, each alone and on a curve of their own, against plain numpy."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ def on_a_curve(time, residual, sigma, lone):
     inside = np.abs(residual - fit) <= patch_likelihood.OFF_CURVE * sigma
     k = inside.sum()
     good = np.log(1 - lone) - np.log(sigma) - 0.5 * ((residual - fit)[inside] / sigma) ** 2
-    wild = np.log(lone) + unrelated((residual - fit)[~inside], patch_likelihood.WIDE * sigma)
+    off_curve = np.log(lone) + unrelated((residual - fit)[~inside], patch_likelihood.WIDE * sigma)
     occam = np.log(sigma / np.sqrt(k)) + unrelated(coefficient, patch_likelihood.WIDE * sigma)
-    return good.sum() + wild.sum() + occam.sum()
+    return good.sum() + off_curve.sum() + occam.sum()
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -51,8 +51,8 @@ def test_a_patch_by_plain_numpy(seed):
     n = int(rng.integers(7, 40))
     time = np.cumsum(rng.uniform(0.02, 0.2, n))
     residual = 8 * SIGMA + 0.5 * (seed % 3) * (time - time[0]) + SIGMA * rng.standard_normal(n)
-    wild = rng.random(n) < 0.1
-    residual[wild] += 30 * rng.standard_normal(wild.sum())
+    lone = rng.random(n) < 0.1
+    residual[lone] += 30 * rng.standard_normal(lone.sum())
     apart = unrelated(residual, np.hypot(SIGMA, patch_likelihood.WIDE * SIGMA)).sum()
     together = on_a_curve(time, residual, SIGMA, RATES[0])
     expected = np.logaddexp(apart, together) - np.log(2) + np.log(RATES[1]) + n * np.log(RATES[2])
@@ -71,7 +71,7 @@ def test_the_density_of_the_unrelated_is_one():
     assert whole == pytest.approx(1.0, abs=1e-8)
 
 
-def test_what_is_on_a_curve_is_likelier_than_what_is_not_and_its_distance_hardly_matters():
+def test_what_is_on_a_curve_is_likelier_than_what_is_not_at_almost_any_distance():
     rng = np.random.default_rng(5)
     noise = SIGMA * rng.standard_normal(25)
     near, far, scattered = (said(offset + noise) for offset in (8 * SIGMA, 200 * SIGMA, 40 * SIGMA * noise))

@@ -10,7 +10,7 @@ from ftproc.core.filtering.smoother import smooth_log
 from tests.core.tracks import matched
 from tests.simulated import codes, simulate
 
-UNKNOWN = np.full(3, np.nan)
+UNKNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
 
 
 @pytest.mark.parametrize("component", range(3))
@@ -18,13 +18,13 @@ UNKNOWN = np.full(3, np.nan)
 def test_sum_of_smoothations_is_the_score_of_a_common_offset(component, begin, end):
     """d log-likelihood / d offset of the run's readings, by central differences."""
     a = matched(3, 120)
-    run = smooth_log(*a[:3], a.model, a.starts)
+    run = smooth_log(a.log, a.model, a.starts)
     step = 1e-3 * np.sqrt(a.model.noise_variance[component])
     likelihood = []
     for sign in (1, -1):
         shifted = a.z.copy()
         shifted[begin:end, component] += sign * step
-        likelihood.append(smooth_log(a.time, shifted, a.weight, a.model, a.starts).log_likelihood)
+        likelihood.append(smooth_log(a.log._replace(measurement=shifted), a.model, a.starts).log_likelihood)
     slope = (likelihood[0] - likelihood[1]) / (2 * step)
     total = (run.residual / run.residual_variance)[begin:end, component].sum()
     assert -total == pytest.approx(slope, rel=2e-2, abs=2e-2 / np.sqrt(a.model.noise_variance[component]))
@@ -97,11 +97,12 @@ def test_curve_is_not_confirmed_but_a_step_is():
     assert not kept[:20].any()
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("seed", [0, 5, 9])
 def test_weak_patches_are_found(seed):
     """Patches of 3 to 8 sigmas, which hide between manoeuvres and noise."""
     flight = simulate("manoeuvre", seed=seed, outliers="patch=6:5-40:3-8")
-    edited = two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN, None, 4.0)
+    edited = two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN)
     bad = codes(flight) > 0
     assert (edited.weight[bad] == 0).mean() > 0.6
     assert (edited.weight[~bad] == 0).mean() < 0.002

@@ -5,16 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core.editing import decisions, reassessment, two_pass
+from ftproc.core.editing import decisions, two_pass
 from ftproc.core.filtering.initialization import first_state
+from ftproc.core.filtering.records import Observations
 from tests.core.tracks import matched, position_error
 from tests.simulated import codes, deviation, simulate
 
-UNKNOWN = np.full(3, np.nan)
+pytestmark = pytest.mark.compiled
+
+UNKNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
 
 
 def edit(flight, gate=4.0):
-    return two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN, None, gate)
+    return two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN._replace(gate=gate))
 
 
 def flags(flight, edited):
@@ -94,11 +97,11 @@ def test_narrow_gate_keeps_less_than_the_usual_one():
     assert edit(flight, 3.0).weight.sum() < edit(flight, 4.0).weight.sum()
 
 
-def test_given_noise_and_jerk_are_kept():
+def test_specified_noise_and_jerk_are_kept():
     flight = simulate("cruise", seed=3, duration_s=60.0)
-    given = np.array([7.0, np.nan, 4e-4])
-    edited = two_pass.edit(flight.log.time_s, flight.log.measurement, given, 12.0, 4.0)
-    np.testing.assert_allclose(edited.model.noise_variance[[0, 2]], given[[0, 2]] ** 2)
+    sigma = np.array([7.0, np.nan, 4e-4])
+    edited = two_pass.edit(flight.log.time_s, flight.log.measurement, two_pass.Known(sigma, 12.0, 4.0))
+    np.testing.assert_allclose(edited.model.noise_variance[[0, 2]], sigma[[0, 2]] ** 2)
     np.testing.assert_allclose(edited.model.jerk, [[12.0, 0, 0, 12.0, 0, 12.0]])
     assert edited.model.noise_variance[1] != pytest.approx(12.0)
 
@@ -107,7 +110,7 @@ def test_component_that_agrees_nowhere_is_named():
     a = matched(1, 50)
     a.z[:, 1] = np.nan
     with pytest.raises(ValueError, match=r"^1$"):
-        two_pass.edit(a.time, a.z, UNKNOWN, None, 4.0)
+        two_pass.edit(a.time, a.z, UNKNOWN)
 
 
 def test_missing_readings_have_no_weight_and_decisions_are_all_or_nothing():
@@ -128,7 +131,7 @@ def test_smoothed_start_is_the_head_with_a_wider_covariance():
     assert np.linalg.eigvalsh(start.covariance[:3, :3]).min() > 0
 
 
-def test_screening_trusts_most_of_a_clean_log_and_tells_its_noise():
+def test_screening_trusts_most_of_a_clean_log_and_finds_its_noise():
     a = matched(2, 600, q=1e-2)
     weight, sigma = two_pass.screen(a.time, a.z)
     assert weight.mean() > 0.95
@@ -138,48 +141,7 @@ def test_screening_trusts_most_of_a_clean_log_and_tells_its_noise():
 def test_first_state_from_the_edited_log_is_near_the_truth():
     flight = simulate("cruise", seed=5, duration_s=30.0, outliers="start=6:15-300")
     edited = edit(flight)
-    start = first_state(
-        flight.log.time_s, flight.log.measurement, edited.weight, edited.model.noise_variance, 0, 0, 200
-    )  # fmt: skip
+    log = Observations(flight.log.time_s, flight.log.measurement, edited.weight)
+    start = first_state(log, edited.model.noise_variance, 0, slice(0, 200))
     error = position_error(start.state[None], flight.truth.position_m[:1])[0]
     assert error < 3 * np.sqrt(np.trace(start.covariance[:3, :3]))
-
-
-def test_second_look_finds_the_patch_that_made_the_jerk_jump(monkeypatch):
-    """A ramp in elevation at the very beginning; without the second look it passes for a manoeuvre."""
-    spec = "isolated=0.03:6-300,offset=2:8-30:8-200,ramp=1:10-30:20-200,burst=1:8-20:10-100,nan=0.01,gap=1:2-4"
-    flight = simulate("manoeuvre", seed=7, duration_s=75.0, outliers=spec)
-
-    def rms():
-        error = edit(flight).smoothed.state[:, :3] - flight.truth.position_m
-        return np.sqrt((error**2).sum(1).mean())
-
-    looked_twice = rms()
-    monkeypatch.setattr(two_pass, "look_again", lambda record, decision: decision)
-    assert looked_twice < 0.7
-    assert rms() > 3 * looked_twice
-
-
-def test_long_log_is_looked_at_again_in_spans_only(monkeypatch):
-    """The same outliers are found as with all of it looked at, though hardly any of it is."""
-    spec = "isolated=0.03:6-300,range.patch=12:15-40:4-7"
-    flight = simulate("manoeuvre", seed=5, duration_s=500.0, outliers=spec)
-    assert len(flight.log) > reassessment.SHORT_LOG
-    spans = []
-    whole = reassessment._look_until_settled
-
-    def spy(record, decision, profile):
-        spans.append(len(record.time_s))
-        return whole(record, decision, profile)
-
-    monkeypatch.setattr(reassessment, "_look_until_settled", spy)
-    in_spans = edit(flight)
-    assert 0 < sum(spans) < len(flight.log)
-    assert max(spans) <= 1.5 * reassessment.LONGEST_SPAN
-    monkeypatch.setattr(reassessment, "SHORT_LOG", 10**6)
-    monkeypatch.setattr(reassessment, "MOST", 0.0)
-    entire = edit(flight)
-    assert (in_spans.weight != entire.weight).mean() < 0.002
-    rejected, large, good = flags(flight, in_spans)
-    assert rejected[large].mean() > 0.98
-    assert rejected[good].mean() < 0.002

@@ -14,7 +14,7 @@ from tests.core.tracks import SIGMA, matched
 
 def run(a, **changes):
     a = a._replace(**changes)
-    return forward.filter_log(a.time, a.z, a.weight, a.model, a.starts)
+    return forward.filter_log(a.log, a.model, a.starts)
 
 
 def same(one, other):
@@ -42,11 +42,11 @@ def test_value_of_a_barred_reading_does_not_matter():
     a = matched(2, 50)
     weight = a.weight.copy()
     weight[np.random.default_rng(0).random(weight.shape) < 0.4] = 0.0
-    wild, missing = a.z.copy(), a.z.copy()
-    wild[weight == 0] = 12345.0
+    absurd, missing = a.z.copy(), a.z.copy()
+    absurd[weight == 0] = 12345.0
     missing[weight == 0] = np.nan
     barred = run(a, weight=weight)
-    for other in (run(a, weight=weight, z=wild), run(a, weight=weight, z=missing), run(a, z=missing)):
+    for other in (run(a, weight=weight, z=absurd), run(a, weight=weight, z=missing), run(a, z=missing)):
         np.testing.assert_array_equal(other.state, barred.state)
         np.testing.assert_array_equal(other.sigma, barred.sigma)
         np.testing.assert_array_equal(other.weight, barred.weight)
@@ -56,29 +56,25 @@ def test_value_of_a_barred_reading_does_not_matter():
 def test_two_readings_at_one_instant_are_two_updates():
     a = matched(3, 20)
     twice = np.repeat(np.arange(20), 2)
-    b = a._replace(time=a.time[twice], z=a.z[twice], weight=a.weight[twice])
     half = a.model._replace(noise_variance=2 * a.model.noise_variance)
-    double = run(b, model=half)
+    double = run(a.part(twice, a.starts), model=half)
     np.testing.assert_allclose(double.sigma[1::2], run(a).sigma, rtol=1e-3)
     np.testing.assert_allclose((double.state[1::2] - run(a).state) / run(a).sigma, 0, atol=0.05)
     np.testing.assert_array_equal(double.predicted[1::2], double.state[0::2])
 
 
-def test_run_begins_anew_at_each_start():
+def test_run_is_re_initialized_at_each_start():
     a = matched(4, 60)
     later = Start(25, a.truth[25] + 3.0, np.diag(np.repeat([9.0, 4.0, 1.0], 3)) ** 2)
     both = run(a, starts=[a.starts[0], later])
-    first = run(a)
-    second = forward.filter_log(
-        a.time[25:], a.z[25:], a.weight[25:], a.model, [later._replace(sample=0)]
-    )  # fmt: skip
-    np.testing.assert_array_equal(both.state[:25], first.state[:25])
+    first = run(a.part(slice(25), a.starts))
+    second = run(a.part(slice(25, None), [later._replace(sample=0)]))
+    np.testing.assert_array_equal(both.state[:25], first.state)
+    np.testing.assert_array_equal(both.state[:25], run(a).state[:25])
     np.testing.assert_array_equal(both.state[25:], second.state)
     np.testing.assert_array_equal(both.sigma[25:], second.sigma)
     np.testing.assert_array_equal(both.since_start, np.r_[np.arange(25), np.arange(35)])
-    assert both.log_likelihood == pytest.approx(
-        second.log_likelihood + forward.filter_log(a.time[:25], a.z[:25], a.weight[:25], *a[3:5]).log_likelihood
-    )
+    assert both.log_likelihood == pytest.approx(second.log_likelihood + first.log_likelihood)
 
 
 def test_samples_before_the_first_start_are_extrapolated_backwards():

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from ftproc.core.editing import two_pass
-from ftproc.core.filtering.initialization import begin, begin_all, first_state
+from ftproc.core.filtering.initialization import find_starts, first_start, first_state
+from ftproc.core.filtering.records import Observations
 from ftproc.core.model.frames import from_cartesian, wrap
 from tests.core.tracks import SIGMA, matched
 from tests.simulated import simulate
@@ -23,8 +24,9 @@ def straight(n=60, dt=0.1, position=(3000.0, -2000.0, 900.0), velocity=(-120.0, 
     return time, z, np.hstack([p, np.tile(velocity, (n, 1))])
 
 
-def seen(z):
-    return np.isfinite(z).astype(float)
+def log(time, z, weight=None):
+    """With every reading used that is there, unless weights say otherwise."""
+    return Observations(time, z, np.isfinite(z).astype(float) if weight is None else weight)
 
 
 def inside(start, truth, sigmas=1.0):
@@ -43,7 +45,7 @@ def inside(start, truth, sigmas=1.0):
 )
 def test_straight_lines_are_recovered(position, velocity):
     time, z, truth = straight(position=position, velocity=velocity)
-    start = begin(time, z, seen(z), NOISE)
+    start = first_start(log(time, z), NOISE)
     assert start.sample == 0
     assert not start.state[6:].any()
     slant = np.linalg.norm(position)
@@ -54,22 +56,19 @@ def test_straight_lines_are_recovered(position, velocity):
 
 def test_near_overhead_the_sigmas_hold_the_truth():
     time, z, truth = straight(position=(500.0, 0.0, 8000.0), velocity=(100.0, 200.0, 0.0))
-    assert inside(begin(time, z, seen(z), NOISE), truth[0])
+    assert inside(first_start(log(time, z), NOISE), truth[0])
 
 
 def test_sigmas_hold_the_truth_of_noisy_and_curved_flights():
-    held = [
-        inside(begin(*straight(noise=1.0, seed=s)[:2], np.ones((60, 3)), NOISE), straight()[2][0]) for s in range(50)
-    ]
-    assert all(held)
+    assert all(inside(first_start(log(*straight(noise=1.0, seed=s)[:2]), NOISE), straight()[2][0]) for s in range(50))
     for seed in range(20):
         a = matched(seed, 60, q=100.0)
-        assert inside(begin(a.time, a.z, a.weight, NOISE), a.truth[0, :6])
+        assert inside(first_start(a.log, NOISE), a.truth[0, :6])
 
 
 def test_covariance_is_positive_definite_and_symmetric():
     time, z, _ = straight(noise=1.0)
-    p = begin(time, z, seen(z), NOISE).covariance
+    p = first_start(log(time, z), NOISE).covariance
     np.testing.assert_allclose(p, p.T, rtol=1e-12, atol=1e-9)
     assert np.linalg.eigvalsh(p).min() > 0
 
@@ -77,19 +76,19 @@ def test_covariance_is_positive_definite_and_symmetric():
 def test_wrong_first_samples_are_reached_back_over():
     time, z, truth = straight(noise=1.0)
     z[:8] += 500 * SIGMA
-    weight = seen(z)
+    weight = np.ones_like(z)
     weight[:8] = 0.0
-    start = begin(time, z, weight, NOISE)
+    start = first_start(log(time, z, weight), NOISE)
     assert start.sample == 0
     assert inside(start, truth[0])
 
 
 def test_far_reach_back_is_not_made():
-    """When a component is first seen after more than 3 s, the filter begins there."""
+    """When a component is first seen after more than 3 s, the filter starts there."""
     time, z, truth = straight(n=120)
-    weight = seen(z)
+    weight = np.ones_like(z)
     weight[:50, 2] = 0.0
-    start = begin(time, z, weight, NOISE)
+    start = first_start(log(time, z, weight), NOISE)
     assert start.sample == 50
     assert inside(start, truth[50])
 
@@ -98,14 +97,14 @@ def test_components_need_not_come_at_the_same_instants():
     time, z, truth = straight(n=90, noise=1.0)
     for c in range(3):
         z[np.arange(90) % 3 != c, c] = np.nan
-    start = begin(time, z, seen(z), NOISE)
+    start = first_start(log(time, z), NOISE)
     assert inside(start, truth[start.sample])
     np.testing.assert_allclose(start.state[3:6], truth[0, 3:], atol=15)
 
 
 def test_single_sample():
     z = from_cartesian(np.array([[3000.0, 400.0, 500.0]]))
-    start = begin(np.zeros(1), z, np.ones((1, 3)), NOISE)
+    start = first_start(log(np.zeros(1), z), NOISE)
     np.testing.assert_allclose(start.state[:3], [3000, 400, 500], rtol=1e-12)
     assert not start.state[3:].any()
     assert np.sqrt(np.diag(start.covariance))[3:6].min() >= 1000.0  # nothing is known of the velocity
@@ -114,17 +113,17 @@ def test_single_sample():
 
 def test_two_samples_and_one_instant():
     time, z, truth = straight(n=2, dt=1.0)
-    start = begin(time, z, np.ones((2, 3)), NOISE)
+    start = first_start(log(time, z), NOISE)
     assert inside(start, truth[0])
     np.testing.assert_allclose(start.state[3:6], truth[0, 3:], rtol=0.05, atol=2)
-    same = begin(np.zeros(2), z[[0, 0]], np.ones((2, 3)), NOISE)
+    same = first_start(log(np.zeros(2), z[[0, 0]]), NOISE)
     assert np.isfinite(same.covariance).all()
 
 
 def test_azimuth_across_the_cut():
     time, z, truth = straight(position=(-5000.0, 10.0, 400.0), velocity=(0.0, -100.0, 0.0))
     assert np.ptp(z[:15, 1]) > 6
-    start = begin(time, z, seen(z), NOISE)
+    start = first_start(log(time, z), NOISE)
     assert inside(start, truth[0])
     np.testing.assert_allclose(start.state[3:6], truth[0, 3:], atol=2)
 
@@ -132,12 +131,12 @@ def test_azimuth_across_the_cut():
 @pytest.mark.parametrize("component", range(3))
 def test_component_without_a_good_reading_is_named(component):
     time, z, _ = straight()
-    weight = seen(z)
+    weight = np.ones_like(z)
     weight[:, component] = 0.0
     with pytest.raises(ValueError, match=rf"^{component}$"):
-        begin(time, z, weight, NOISE)
+        first_start(log(time, z, weight), NOISE)
     with pytest.raises(ValueError, match=rf"^{component}$"):
-        first_state(time, z, weight, NOISE, 10, 0, 20)
+        first_state(log(time, z, weight), NOISE, 10, slice(0, 20))
 
 
 def test_first_state_uses_its_span_only():
@@ -145,16 +144,16 @@ def test_first_state_uses_its_span_only():
     spoiled = z.copy()
     spoiled[:40] += 1.0
     spoiled[60:] -= 1.0
-    one = first_state(time, z, seen(z), NOISE, 50, 40, 60)
-    other = first_state(time, spoiled, seen(z), NOISE, 50, 40, 60)
+    one = first_state(log(time, z), NOISE, 50, slice(40, 60))
+    other = first_state(log(time, spoiled), NOISE, 50, slice(40, 60))
     np.testing.assert_array_equal(one.state, other.state)
     assert one.sample == 50
     assert inside(one, truth[50])
 
 
-def test_position_is_never_so_vague_that_it_may_lie_behind_the_station():
+def test_position_sigma_stays_well_below_the_range():
     z = from_cartesian(np.array([[40.0, 30.0, 10.0]]))
-    start = begin(np.zeros(1), z, np.ones((1, 3)), np.array([1e4, 1.0, 1.0]))
+    start = first_start(log(np.zeros(1), z), np.array([1e4, 1.0, 1.0]))
     assert np.sqrt(np.linalg.eigvalsh(start.covariance[:3, :3]).max()) < 0.5 * 51
 
 
@@ -169,54 +168,55 @@ def interrupted(gap, n=80, after=60):
 
 
 @pytest.mark.parametrize(
-    ("gap", "jerk", "anew"),
+    ("gap", "jerk", "again"),
     [(0.0, None, False), (4.0, None, False), (30.0, None, True), (30.0, 1e-3, False), (30.0, 10.0, True),
      (300.0, 1e-3, True)],
 )  # fmt: skip
-def test_record_begins_anew_after_a_gap_too_long_to_bridge(gap, jerk, anew):
-    """The position is vague by sqrt(q gap^5 / 20); without a jerk level every gap of more than 5 s counts."""
+def test_filter_is_re_initialized_after_a_gap_too_long_to_coast(gap, jerk, again):
+    """The position becomes uncertain by sqrt(q gap^5 / 20); without a jerk level every gap of more than 5 s counts."""
     time, z, truth = interrupted(gap)
-    starts = begin_all(time, z, seen(z), NOISE, jerk)
-    assert [start.sample for start in starts] == ([0, 80] if anew else [0])
+    starts = find_starts(log(time, z), NOISE, jerk)
+    assert [start.sample for start in starts] == ([0, 80] if again else [0])
     for start in starts:
         assert inside(start, truth[start.sample])
 
 
 def test_too_few_readings_after_a_gap_are_no_start():
     time, z, _ = interrupted(300.0, after=5)
-    assert len(begin_all(time, z, seen(z), NOISE, None)) == 1
+    assert len(find_starts(log(time, z), NOISE, None)) == 1
     time, z, _ = interrupted(300.0)
     z[84:, 1] = np.nan
-    assert len(begin_all(time, z, seen(z), NOISE, None)) == 1
+    assert len(find_starts(log(time, z), NOISE, None)) == 1
 
 
 def test_start_after_a_gap_rests_on_its_own_side_only():
     time, z, _ = interrupted(300.0)
     spoiled = z.copy()
     spoiled[:80] += 0.05
-    one, other = (begin_all(time, readings, seen(z), NOISE, None)[1] for readings in (z, spoiled))
+    one, other = (find_starts(log(time, readings), NOISE, None)[1] for readings in (z, spoiled))
     np.testing.assert_array_equal(one.state, other.state)
 
 
 @pytest.mark.parametrize(
-    ("seconds", "jerk", "anew"), [(4.0, None, False), (20.0, None, True), (20.0, 1e-3, False), (20.0, 100.0, True)]
+    ("seconds", "jerk", "again"), [(4.0, None, False), (20.0, None, True), (20.0, 1e-3, False), (20.0, 100.0, True)]
 )
 @pytest.mark.parametrize("component", range(3))
-def test_record_begins_anew_after_one_component_was_blind_too_long(component, seconds, jerk, anew):
+def test_filter_is_re_initialized_after_one_component_was_blind_too_long(component, seconds, jerk, again):
     """The others hold the track, so the gap may be longer; a filter that comes out of it would be lost."""
     time, z, truth = interrupted(0.1, n=300, after=100)
     z[300 - round(seconds / 0.1) : 300, component] = np.nan
-    starts = begin_all(time, z, seen(z), NOISE, jerk)
-    assert [start.sample for start in starts] == ([0, 300] if anew else [0])
+    starts = find_starts(log(time, z), NOISE, jerk)
+    assert [start.sample for start in starts] == ([0, 300] if again else [0])
     for start in starts:
         assert inside(start, truth[start.sample])
 
 
+@pytest.mark.compiled
 def test_flight_with_blind_turns_does_not_run_away():
-    """5 g turns seen once a second with patches of half a minute: the patches cannot be bridged, the rest can."""
+    """5 g turns seen once a second, with patches of half a minute, which are too long to coast through."""
     flight = simulate("manoeuvre", seed=15, dt_s=1.0, duration_s=600.0, outliers="patch=3:10-30:10-50")
-    log = flight.log
-    edited = two_pass.edit(log.time_s, log.measurement, np.full(3, np.nan), None, 4.0)
+    known = two_pass.Known(np.full(3, np.nan), None, 4.0)
+    edited = two_pass.edit(flight.log.time_s, flight.log.measurement, known)
     error = np.linalg.norm(edited.smoothed.state[:, :3] - flight.truth.position_m, axis=1)
     assert np.median(error) < 5
     assert np.quantile(error, 0.9) < 500

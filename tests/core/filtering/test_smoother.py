@@ -16,7 +16,7 @@ from tests.core.tracks import SIGMA, covariance, matched
 
 def smooth(a, **changes):
     a = a._replace(**changes)
-    return smoother.smooth_log(a.time, a.z, a.weight, a.model, a.starts)
+    return smoother.smooth_log(a.log, a.model, a.starts)
 
 
 def steps_of(a):
@@ -67,7 +67,7 @@ def test_block_boundaries_leave_no_seam(n):
     sigma = np.sqrt(np.diagonal(p, axis1=1, axis2=2))
     np.testing.assert_allclose((found.state - x) / sigma, 0, atol=1e-6)
     np.testing.assert_allclose(found.sigma, sigma, rtol=1e-6)
-    run = forward.filter_log(a.time, a.z, a.weight, a.model, a.starts)
+    run = forward.filter_log(a.log, a.model, a.starts)
     np.testing.assert_allclose(found.nis, run.nis, rtol=1e-10)
     assert found.log_likelihood == pytest.approx(run.log_likelihood, rel=1e-12)
     np.testing.assert_allclose(found.state[-1], run.state[-1], rtol=1e-12)
@@ -91,8 +91,8 @@ def test_segments_are_independent():
     a = matched(9, 200, dt=0.2, missing=0.1)
     second = Start(90, a.truth[90], np.diag(np.repeat([9.0, 4.0, 1.0], 3)) ** 2)
     both = smooth(a, starts=[a.starts[0], second])
-    first = smooth(a, time=a.time[:90], z=a.z[:90], weight=a.weight[:90])
-    rest = smooth(a, time=a.time[90:], z=a.z[90:], weight=a.weight[90:], starts=[second._replace(sample=0)])
+    first = smooth(a.part(slice(90), a.starts))
+    rest = smooth(a.part(slice(90, None), [second._replace(sample=0)]))
     for name in ("state", "sigma", "residual", "residual_variance", "nis"):
         np.testing.assert_allclose(getattr(both, name)[:90], getattr(first, name), rtol=1e-10, err_msg=name)
         np.testing.assert_allclose(getattr(both, name)[90:], getattr(rest, name), rtol=1e-10, err_msg=name)
@@ -108,9 +108,7 @@ def test_segments_are_independent():
 def test_head_and_extrapolation_before_the_first_start():
     a = matched(10, 60, dt=0.2)
     found = smooth(a, starts=[Start(15, a.truth[15], a.starts[0].covariance)])
-    late = smooth(
-        a, time=a.time[15:], z=a.z[15:], weight=a.weight[15:], starts=[Start(0, a.truth[15], a.starts[0].covariance)]
-    )  # fmt: skip
+    late = smooth(a.part(slice(15, None), [Start(0, a.truth[15], a.starts[0].covariance)]))
     np.testing.assert_array_equal(found.state[15:], late.state)
     (head,) = found.heads
     assert head.sample == 15
@@ -137,11 +135,12 @@ def test_smoothed_covariance_is_positive_even_if_rounding_ate_it():
     np.testing.assert_allclose(half, p / 2, rtol=1e-6)
 
 
+@pytest.mark.compiled
 def test_smoother_beats_the_filter_and_its_sigmas_hold_the_truth():
     ratio, inside = [], []
     for seed in range(20, 28):
         a = matched(seed, 400, q=20.0, irregular=True, missing=0.1)
-        found, run = smooth(a), forward.filter_log(a.time, a.z, a.weight, a.model, a.starts)
+        found, run = smooth(a), forward.filter_log(a.log, a.model, a.starts)
         ratio.append(np.mean((found.state - a.truth)[:, :3] ** 2) / np.mean((run.state - a.truth)[:, :3] ** 2))
         inside.append(np.mean(((found.state - a.truth) / found.sigma) ** 2))
     assert np.mean(ratio) < 0.5
@@ -153,7 +152,7 @@ def test_very_long_gap_keeps_sigmas_positive():
     time = a.time + np.where(np.arange(100) >= 50, 3600.0, 0.0)
     weight = a.weight.copy()
     weight[50:] = 0.0
-    found = smoother.smooth_log(time, a.z, weight, Model(SIGMA**2, a.model.jerk), a.starts)
+    found = smooth(a, time=time, weight=weight, model=Model(SIGMA**2, a.model.jerk))
     assert np.isfinite(found.state).all()
     assert (found.sigma > 0).all()
     assert found.sigma[60, 0] > 1e4

@@ -43,7 +43,7 @@ def test_run_of_random_steps_is_that_of_the_plain_19_point_filter():
     """Irregular intervals, random jerk tensors, and every missing pattern many times over."""
     a = matched(2, 120, dt=0.5, irregular=True, pieces=3, missing=0.4, distance=800.0)
     assert {tuple(w) for w in a.weight.astype(int)} == set(PATTERNS)
-    run = forward.filter_log(a.time, a.z, a.weight, a.model, a.starts)
+    run = forward.filter_log(a.log, a.model, a.starts)
     steps = naive.run(a.time, a.z, a.weight, a.model, a.starts[0].state, a.starts[0].covariance)
     for k, step in enumerate(steps):
         sigma = np.sqrt(np.diag(step.p))

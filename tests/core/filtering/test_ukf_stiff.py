@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from ftproc.core.filtering import forward
+from ftproc.core.filtering.records import Model, Observations, Start, empty_rows
+from ftproc.core.model import motion
 from ftproc.core.model.measurement import measure
 from tests import naive
 from tests.core.single import transform, update
@@ -65,6 +67,7 @@ def test_stiff_update_of_a_needle_stays_positive(ratio):
         assert least_eigenvalue(update(x, p, z, noise, np.ones(3))[1]) > 0
 
 
+@pytest.mark.compiled
 def test_covariance_stays_positive_over_a_million_steps():
     n = 100_000
     time = 0.05 * np.arange(n)
@@ -72,12 +75,13 @@ def test_covariance_stays_positive_over_a_million_steps():
     z = np.stack([np.full(n, 4000.0), (turn + np.pi) % (2 * np.pi) - np.pi, np.full(n, 0.3)], 1)
     z[::7, 0] = np.nan
     z[3::11, 1] = np.nan
-    weight, noise = np.isfinite(z).astype(float), SIGMA**2
-    x = np.r_[4000 * np.cos(0.3), 0, 4000 * np.sin(0.3), np.zeros(6)]
-    p = np.diag(np.repeat([10.0, 500.0, 60.0], 3) ** 2)
-    run, jerk = forward.empty_run(time), 5 * np.array([[1.0, 0, 0, 1, 0, 1]])
+    samples = Observations(time, z, np.isfinite(z).astype(float)).samples()
+    model = Model(SIGMA**2, motion.isotropic(5.0))
+    state = np.r_[4000 * np.cos(0.3), 0, 4000 * np.sin(0.3), np.zeros(6)]
+    filters = model.filter(Start(0, state, np.diag(np.repeat([10.0, 500.0, 60.0], 3) ** 2)))
+    profile, rows, x, p = model.profile(time), empty_rows(n), filters["x"][0], filters["p"][0]
     for _ in range(10):
-        forward.run_span(0, n, time, z, weight, noise, jerk, np.inf, x, p, False, run)
+        forward.run_weighted(forward.Span(0, n, 0), samples, profile, filters, False, rows)
         x[:3] = x[:3] / np.linalg.norm(x[:3]) * 4000
         sigma = np.sqrt(np.diag(p))
         np.testing.assert_array_equal(p, p.T)

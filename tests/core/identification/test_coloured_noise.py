@@ -12,13 +12,15 @@ from ftproc.core.model.frames import from_cartesian
 from tests.core.tracks import SIGMA, matched
 from tests.simulated import simulate
 
+pytestmark = pytest.mark.compiled
+
 UNKNOWN = np.full(3, np.nan)
 
 
 def edited(correlation_s, seed):
     spec = f"correlation={correlation_s}" if correlation_s else "none"
     flight = simulate("cruise", seed=seed, duration_s=150.0, outliers=spec)
-    return flight, two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN, None, 4.0)
+    return flight, two_pass.edit(flight.log.time_s, flight.log.measurement, two_pass.Known(UNKNOWN, None, 4.0))
 
 
 @pytest.mark.parametrize("correlation_s", [0.3, 0.5])
@@ -57,13 +59,13 @@ def test_moments_of_white_and_of_correlated_noise():
     rng = np.random.default_rng(1)
     noise = rng.standard_normal((3000, 3))
     for rho in (0.0, 0.6):
-        coloured_noise = noise.copy()
+        coloured = noise.copy()
         for k in range(1, 3000):
-            coloured_noise[k] = rho * coloured_noise[k - 1] + np.sqrt(1 - rho**2) * noise[k]
-        z = from_cartesian(a.truth[:, :3]) + SIGMA * coloured_noise
+            coloured[k] = rho * coloured[k - 1] + np.sqrt(1 - rho**2) * noise[k]
+        a = a._replace(z=from_cartesian(a.truth[:, :3]) + SIGMA * coloured)
         variance = SIGMA**2 * (1 + rho) / (1 - rho)
         model = a.model._replace(noise_variance=variance)
-        run = smooth_log(a.time, z, a.weight, model, a.starts)
+        run = smooth_log(a.log, model, a.starts)
         found, correlation = coloured_noise.moments(run, a.weight, variance)
         np.testing.assert_allclose(found / SIGMA**2, 1, atol=0.15)
         np.testing.assert_allclose(correlation, rho, atol=0.06)
@@ -71,7 +73,7 @@ def test_moments_of_white_and_of_correlated_noise():
 
 def test_short_record_is_not_judged():
     a = matched(2, 40)
-    run = smooth_log(a.time, a.z, a.weight, a.model, a.starts)
+    run = smooth_log(a.log, a.model, a.starts)
     variance, correlation = coloured_noise.moments(run, a.weight, a.model.noise_variance)
     np.testing.assert_array_equal(variance, a.model.noise_variance)
     np.testing.assert_array_equal(correlation, 0)
@@ -88,8 +90,8 @@ def markov(correlation, n):
 def smoothed(noise):
     """The run of a smoother that takes such noise for white, its weights and the noise variances it was given."""
     a = matched(1, len(noise), q=1e-3)
-    z = from_cartesian(a.truth[:, :3]) + SIGMA * noise
-    return smooth_log(a.time, z, a.weight, a.model, a.starts), a.weight, a.model.noise_variance
+    a = a._replace(z=from_cartesian(a.truth[:, :3]) + SIGMA * noise)
+    return smooth_log(a.log, a.model, a.starts), a.weight, a.model.noise_variance
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ftproc.core.filtering.records import Observations
 from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import decimation, likelihood
 from tests.core.tracks import matched
@@ -17,7 +18,7 @@ def plain_means(time, z, count):
 
 def test_complete_groups_are_plain_means():
     a = matched(1, 120)
-    time, z, number, starts = decimation.merge(*a[:3], a.starts, 4)
+    (time, z, number), starts = decimation.merge(a.log, a.starts, 4)
     unwrapped = np.column_stack([a.z[:, 0], np.unwrap(a.z[:, 1]), a.z[:, 2]])
     expected_time, expected = plain_means(a.time, unwrapped, 4)
     np.testing.assert_allclose(time, expected_time, rtol=1e-12)
@@ -35,7 +36,7 @@ def test_mean_of_some_is_moved_to_the_time_of_all():
     weight = np.ones_like(z)
     weight[3, 0] = weight[11, 1] = weight[22, 2] = 0
     start = matched(1, 40).starts[0]
-    t, merged, number, _ = decimation.merge(time, z, weight, [start], 4)
+    (t, merged, number), _ = decimation.merge(Observations(time, z, weight), [start], 4)
     np.testing.assert_allclose(merged[:, 0], 1000 + 50 * t, atol=0.9)
     np.testing.assert_allclose(merged[1:-1, 0], 1000 + 50 * t[1:-1], atol=1e-9)
     np.testing.assert_allclose(np.sin(merged[:, 1] - 3.1 - 0.02 * t), 0, atol=4e-4)
@@ -47,7 +48,7 @@ def test_missing_group_stays_missing_and_a_gap_ends_one():
     weight, time = a.weight.copy(), a.time.copy()
     weight[8:12, 1] = 0
     time[30:] += 100.0
-    t, z, number, _ = decimation.merge(time, a.z, weight, a.starts, 4)
+    (t, z, number), _ = decimation.merge(Observations(time, a.z, weight), a.starts, 4)
     assert np.isnan(z[2, 1])
     assert number[2, 1] == 0
     assert not ((t > time[29] + 1) & (t < time[30])).any()
@@ -56,23 +57,24 @@ def test_missing_group_stays_missing_and_a_gap_ends_one():
 def test_start_within_the_log_begins_a_group():
     a = matched(2, 60)
     second = a.starts[0]._replace(sample=30)
-    _, _, _, starts = decimation.merge(*a[:3], [a.starts[0], second], 8)
+    _, starts = decimation.merge(a.log, [a.starts[0], second], 8)
     assert [s.sample for s in starts] == [0, 4]
 
 
+@pytest.mark.compiled
 def test_score_of_the_jerk_is_that_of_single_readings():
     """The likelihood by jerk, of merged readings and of single ones, has its summit at the same place."""
     a = matched(5, 4000)
 
     def slope(log, starts, factor):
         model = a.model._replace(jerk=factor * a.model.jerk)
-        return (score_log(*log, model, starts).jerk * model.jerk).sum()
+        return (score_log(log, model, starts).jerk * model.jerk).sum()
 
-    *log, starts = decimation.merge(*a[:3], a.starts, 2)
+    log, starts = decimation.merge(a.log, a.starts, 2)
     for factor in (0.3, 3.0):
-        assert slope(log, starts, factor) * slope(a[:3], a.starts, factor) > 0
-    single, merged = (slope(x, s, 1.0) for x, s in ((a[:3], a.starts), (log, starts)))
-    assert abs(merged - single) < 0.25 * abs(slope(a[:3], a.starts, 3.0))
+        assert slope(log, starts, factor) * slope(a.log, a.starts, factor) > 0
+    single, merged = (slope(x, s, 1.0) for x, s in ((a.log, a.starts), (log, starts)))
+    assert abs(merged - single) < 0.25 * abs(slope(a.log, a.starts, 3.0))
 
 
 @pytest.mark.parametrize(("interval", "expected"), [(1.0, 1), (0.05, 1), (0.005, 13)])

@@ -8,26 +8,26 @@ import pytest
 from ftproc.core.filtering import forward
 from ftproc.core.model import jacobian
 from tests import naive
-from tests.core.single import random_problem
+from tests.core.single import filter_at, random_problem
 from tests.core.tracks import PATTERNS, matched
 
 
 def test_linearisation_is_h_p_h():
     rng = np.random.default_rng(1)
-    z_hat, h, c = np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
     for _ in range(50):
         x, p, _, _ = random_problem(rng)
-        jacobian.linearise(x, p, z_hat, h, c)
+        f = filter_at(x, p)
+        jacobian.linearise(f)
         expected = naive.extended(x, p)
-        np.testing.assert_allclose(naive.difference(z_hat, expected[0]), 0, atol=1e-10)
+        np.testing.assert_allclose(naive.difference(f["z_hat"], expected[0]), 0, atol=1e-10)
         scale = np.sqrt(np.diag(expected[1]))
-        np.testing.assert_allclose(c / np.outer(scale, scale), expected[1] / np.outer(scale, scale), atol=1e-7)
+        np.testing.assert_allclose(f["c"] / np.outer(scale, scale), expected[1] / np.outer(scale, scale), atol=1e-7)
 
 
 def test_run_with_missing_readings_is_that_of_the_plain_ekf():
     a = matched(2, 80, irregular=True, missing=0.4, pieces=2)
     assert {tuple(w) for w in a.weight.astype(int)} == set(PATTERNS)
-    run = forward.filter_log(a.time, a.z, a.weight, a.model, a.starts, extended=True)
+    run = forward.filter_log(a.log, a.model, a.starts, extended=True)
     steps = naive.run(
         a.time, a.z, a.weight, a.model, a.starts[0].state, a.starts[0].covariance, transform=naive.extended
     )  # fmt: skip
@@ -39,7 +39,7 @@ def test_run_with_missing_readings_is_that_of_the_plain_ekf():
 
 def test_far_target_ekf_and_ukf_agree():
     a = matched(3, 60, distance=1e6, missing=0.2)
-    extended = forward.filter_log(a.time, a.z, a.weight, a.model, a.starts, extended=True)
-    plain = forward.filter_log(a.time, a.z, a.weight, a.model, a.starts)
+    extended = forward.filter_log(a.log, a.model, a.starts, extended=True)
+    plain = forward.filter_log(a.log, a.model, a.starts)
     np.testing.assert_allclose((extended.state - plain.state) / plain.sigma, 0, atol=1e-3)
     assert not np.array_equal(extended.state, plain.state)

@@ -5,18 +5,26 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ftproc.core.compiled import zeros
+from ftproc.core.filtering.backward import BACKWARD
 from ftproc.core.model import motion
 from tests import naive
+from tests.core.single import filter_at
 from tests.core.tracks import covariance, random_jerk
 
 INTERVALS = [0.0, 1e-6, 0.05, 1.0, 7.3, 120.0, -0.05, -2.0]
 
 
+def predict(x, p, interval, jerk):
+    """x and P after the interval."""
+    f = filter_at(x, p)
+    motion.predict(f, interval, jerk)
+    return f["x"], f["p"]
+
+
 def noise_of(interval, jerk):
     """Q as `predict` adds it: what becomes of P = 0."""
-    p = np.zeros((9, 9))
-    motion.predict(np.zeros(9), p, interval, jerk, np.empty((3, 3)))
-    return p
+    return predict(np.zeros(9), np.zeros((9, 9)), interval, jerk)[1]
 
 
 def scaled(q, interval):
@@ -33,28 +41,26 @@ def test_predict_is_phi_p_phi_plus_q(interval):
         p = covariance(rng, 10 ** rng.uniform(-1, 2, 9))
         phi = naive.transition(interval)
         expected = phi @ p @ phi.T + naive.process_noise(interval, jerk)
-        expected_x = phi @ x
-        motion.predict(x, p, interval, jerk, np.empty((3, 3)))
-        np.testing.assert_allclose(x, expected_x, rtol=1e-13, atol=1e-9)
+        found_x, found = predict(x, p, interval, jerk)
+        np.testing.assert_allclose(found_x, phi @ x, rtol=1e-13, atol=1e-9)
         scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
-        np.testing.assert_allclose(p / scale, expected / scale, atol=1e-11)
+        np.testing.assert_allclose(found / scale, expected / scale, atol=1e-11)
 
 
 def test_predict_over_no_time_changes_nothing():
     rng = np.random.default_rng(2)
     x, p = rng.normal(0, 1, 9), covariance(rng, np.ones(9))
-    before = x.copy(), p.copy()
-    motion.predict(x, p, 0.0, random_jerk(rng)[0], np.empty((3, 3)))
-    np.testing.assert_array_equal(x, before[0])
-    np.testing.assert_array_equal(p, before[1])
+    after = predict(x, p, 0.0, random_jerk(rng)[0])
+    np.testing.assert_array_equal(after[0], x)
+    np.testing.assert_array_equal(after[1], p)
 
 
 def test_predict_there_and_back_returns_the_state():
     rng = np.random.default_rng(3)
     x = rng.normal(0, 10, 9)
-    there = x.copy()
+    there = x
     for t in (3.7, -3.7):
-        motion.predict(there, np.eye(9), t, np.zeros(6), np.empty((3, 3)))
+        there, _ = predict(there, np.eye(9), t, np.zeros(6))
     np.testing.assert_allclose(there, x, atol=1e-12)
 
 
@@ -88,10 +94,11 @@ def test_adjoint_is_the_transpose(interval):
     rng = np.random.default_rng(7)
     r, n = rng.normal(0, 1, 9), covariance(rng, np.ones(9))
     phi = naive.transition(interval)
-    expected = phi.T @ r, phi.T @ n @ phi
-    motion.adjoint(r, n, interval)
-    np.testing.assert_allclose(r, expected[0], rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(n, expected[1], rtol=1e-12, atol=1e-9)
+    back = zeros(BACKWARD)[0]
+    back["r"], back["n"] = r, n
+    motion.adjoint(back, interval)
+    np.testing.assert_allclose(back["r"], phi.T @ r, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(back["n"], phi.T @ n @ phi, rtol=1e-12, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -99,11 +106,11 @@ def test_adjoint_is_the_transpose(interval):
     [(0.0, 0), (9.999, 0), (10.0, 1), (25.0, 2), (39.0, 3), (40.0, 3), (1e6, 3), (-5.0, 0)],
 )
 def test_knot_index_is_clamped_to_the_profile(time, piece):
-    assert motion.knot_index(time + 100.0, 100.0, 10.0, 4) == piece
+    assert motion.knot_index(time + 100.0, motion.Profile(np.ones((4, 6)), 10.0, 100.0)) == piece
 
 
 def test_knot_index_of_a_single_level():
-    assert motion.knot_index(1e9, 0.0, np.inf, 1) == 0
+    assert motion.knot_index(1e9, motion.Profile(np.ones((1, 6)), np.inf, 0.0)) == 0
 
 
 def test_isotropic_is_the_same_along_every_axis():

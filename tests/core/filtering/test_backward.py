@@ -1,22 +1,26 @@
-"""What the smoother's backward pass tells besides the states: leave-one-out residuals and scores."""
+"""What the smoother's backward recursion gives besides the states: leave-one-out residuals and scores."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from ftproc.core.compiled import zeros
+from ftproc.core.filtering import backward
+from ftproc.core.filtering.forward import ESTIMATED
 from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.smoother import score_log, smooth_log
+from ftproc.core.filtering.ukf import FILTER
 from ftproc.core.model import motion
 from tests import naive
 from tests.core.tracks import matched
 
-STRAIGHT = {"distance": 1e6, "sigma": np.array([0.1, 1e-7, 2e-7])}  # so far and so exact that h hardly bends
+STRAIGHT = {"distance": 1e6, "sigma": np.array([0.1, 1e-7, 2e-7])}  # so far and so exact that h is almost straight
 
 
 def smooth(a, **changes):
     a = a._replace(**changes)
-    return smooth_log(a.time, a.z, a.weight, a.model, a.starts)
+    return smooth_log(a.log, a.model, a.starts)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -86,6 +90,7 @@ def moved(model, noise=0.0, jerk=0.0):
     return model._replace(noise_variance=model.noise_variance * np.exp(noise), jerk=model.jerk + jerk)
 
 
+@pytest.mark.compiled
 def test_jerk_score_is_the_derivative_by_every_element_of_every_piece():
     a = matched(7, 200, dt=0.5, q=5.0, irregular=True, missing=0.1, pieces=3, **STRAIGHT)
     score = smooth(a).jerk_score
@@ -102,12 +107,13 @@ def test_scores_alone_are_the_same():
     a = matched(8, 300, irregular=True, missing=0.1, pieces=3)
     again = a.starts[0]._replace(sample=140, state=a.truth[140])
     for starts in (a.starts, [a.starts[0], again]):
-        found, alone = smooth(a, starts=starts), score_log(a.time, a.z, a.weight, a.model, starts)
+        found, alone = smooth(a, starts=starts), score_log(a.log, a.model, starts)
         np.testing.assert_allclose(alone.noise, found.noise_score, rtol=1e-10)
         np.testing.assert_allclose(alone.jerk, found.jerk_score, rtol=1e-10, atol=1e-12)
         assert alone.log_likelihood == pytest.approx(found.log_likelihood, rel=1e-12)
 
 
+@pytest.mark.compiled
 def test_scores_vanish_on_average_at_the_truth():
     """Expectation zero, and a variance that is the information: about n / 2 for ln(variance) of each component."""
     scores = np.array([smooth(matched(seed, 200, q=5.0)).noise_score for seed in range(40, 80)])
@@ -116,6 +122,7 @@ def test_scores_vanish_on_average_at_the_truth():
     assert (scores.var(0) > 30).all()
 
 
+@pytest.mark.compiled
 def test_likelihood_is_highest_near_the_true_noise_and_jerk():
     a = matched(9, 800, q=10.0)
     best = likelihood(a, a.model)
@@ -126,3 +133,11 @@ def test_likelihood_is_highest_near_the_true_noise_and_jerk():
             assert likelihood(a, a.model._replace(noise_variance=noise)) < best - 20
     for factor in (1e-3, 1e3):
         assert likelihood(a, Model(a.model.noise_variance, motion.isotropic(10 * factor))) < best - 5
+
+
+def test_a_sigma_is_a_number_even_where_the_covariance_is_none():
+    f, back, rows = zeros(FILTER)[0], zeros(backward.BACKWARD)[0], zeros(ESTIMATED)
+    f["x"], f["p"] = np.arange(1.0, 10.0), np.diag([-1.0, *np.ones(8)])
+    backward.estimate(back, f)
+    backward.store(back, f, rows[0])
+    np.testing.assert_allclose(rows["sigma"][0], [1e-7, *np.ones(8)])

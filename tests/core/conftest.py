@@ -1,0 +1,17 @@
+"""Tests that take minutes where the kernels run as plain Python."""
+
+from __future__ import annotations
+
+from ftproc.core.compiled import NOT_COMPILED
+
+
+def pytest_configure(config):
+    config.addinivalue_line("markers", "compiled: left out where the kernels are not compiled (NUMBA_DISABLE_JIT=1)")
+
+
+def pytest_collection_modifyitems(config, items):
+    if not NOT_COMPILED:
+        return
+    slow = [item for item in items if item.get_closest_marker("compiled")]
+    items[:] = [item for item in items if item not in slow]
+    config.hook.pytest_deselected(items=slow)
