@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ftproc.core.filtering.records import FilterRun, empty_run
+from ftproc.core.filtering.records import FilterRun, empty_rows
 from ftproc.core.model.frames import line_of_sight_axes
 from ftproc.correction.training.samples import Flight
 from ftproc.records import FloatArray
@@ -21,7 +21,7 @@ def run(rng: np.random.Generator, n: int = 600, dt: float = 0.1) -> FilterRun:
     position = np.array([3000.0, 2000.0, 1500.0]) + rng.uniform(-300, 300, 3) + time[:, None] * velocity
     state = np.concatenate([position, np.tile(velocity, (n, 1)), np.zeros((n, 3))], axis=1)
     sigma = np.tile([5.0, 4e-4, 4e-4], (n, 1))
-    return empty_run(time)._replace(
+    return FilterRun.of(time, empty_rows(n), 0.0)._replace(
         state=state,
         predicted=state - rng.normal(size=(n, 9)) * ([1.0] * 3 + [0.3] * 3 + [0.1] * 3),
         innovation=rng.normal(size=(n, 3)) * sigma,
