@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable
@@ -11,7 +12,7 @@ from ftproc.core.compiled import announced
 
 
 def warm() -> None:
-    """Filter a small log in every way that has its own kernels."""
+    """Filter a small log in every way that has its own kernels; only the first estimates the noise."""
     from dataclasses import replace
 
     from ftproc import pipeline
@@ -21,14 +22,14 @@ def warm() -> None:
     from ftproc.simulation import simulate
 
     log = _as_read(simulate("manoeuvre", duration_s=20.0).log, logs.read)
+    known = FilterSettings(noise=(5.0, 2e-4, 2e-4), jerk_psd_m2ps5=1.0, particles=90)
     paths: list[dict[str, Any]] = [
-        {"smooth": True},
         {"editing": "forward"},
         {"editing": "forward", "gain_form": True},
         *({"method": m.name} for m in registry.METHODS.values() if registry.obstacle(m, False, None) is None),
     ]
-    for path in paths:
-        pipeline.filter_log(log, replace(FilterSettings(), **path))
+    for settings in (FilterSettings(smooth=True), *(replace(known, **path) for path in paths)):
+        pipeline.filter_log(log, settings)
 
 
 def _as_read(log: Any, read: Callable[..., Any]) -> Any:
@@ -36,7 +37,9 @@ def _as_read(log: Any, read: Callable[..., Any]) -> Any:
     import pyarrow as pa
 
     names = ("time_s", "range_m", "azimuth_rad", "elevation_rad")
-    return read(pa.table(dict(zip(names, (log.time_s, *log.measurement.T.copy()), strict=True))))
+    measurement = log.measurement.copy()
+    measurement[log.time_s < log.time_s[0] + 5.0] = math.nan  # the filter starts late; what is before is extrapolated
+    return read(pa.table(dict(zip(names, (log.time_s, *measurement.T.copy()), strict=True))))
 
 
 def main() -> None:
