@@ -1,4 +1,4 @@
-"""What all tests need of the process they run in."""
+"""State of the process that all tests run in."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from collections.abc import Iterator
 
 import pytest
 
+from ftproc.cli.warm import warm
+
 
 @pytest.fixture(scope="session", autouse=True)
 def _hears_interruptions() -> Iterator[None]:
@@ -14,3 +16,9 @@ def _hears_interruptions() -> Iterator[None]:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture(scope="session")
+def compiled() -> None:
+    """All kernels are compiled, and kept on disk: no program that a test starts has the line about it on stderr."""
+    warm()

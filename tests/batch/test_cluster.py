@@ -16,7 +16,6 @@ import pytest
 
 from ftproc.batch import cluster, run
 from ftproc.batch.tasks import Task
-from ftproc.cli.warm import warm
 from ftproc.config.recipe import Recipe
 from ftproc.correction import model_file
 from ftproc.errors import UsageError
@@ -35,10 +34,9 @@ class Cluster(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def two_workers(tmp_path_factory) -> Iterator[Cluster]:
+def two_workers(compiled, tmp_path_factory) -> Iterator[Cluster]:
     """A scheduler on a free port and two workers of one thread each, in a directory of their own."""
     folder = tmp_path_factory.mktemp("cluster")
-    warm()
     common = ["--host", "127.0.0.1", "--no-dashboard"]
     worker = ["--scheduler-file", "scheduler.json", "--nthreads", "1", "--no-nanny", "--memory-limit", "0"]
     worker += ["--death-timeout", "60", "--local-directory", str(folder)]

@@ -13,7 +13,6 @@ import pytest
 from click.testing import CliRunner
 
 from ftproc.cli.main import cli
-from ftproc.cli.warm import warm
 
 BIN = Path(sys.prefix) / "bin"
 
@@ -25,14 +24,8 @@ class Result:
     err: str
 
 
-@pytest.fixture(scope="session", autouse=True)
-def _compiled() -> None:
-    """Kernels are compiled first, so that no test has the line about it on stderr."""
-    warm()
-
-
 @pytest.fixture
-def run() -> Callable[..., Result]:
+def run(compiled: None) -> Callable[..., Result]:
     """run("filter", "log.csv") -> exit code, stdout and stderr."""
 
     def invoke(*args: object, stdin: str | None = None) -> Result:
@@ -43,7 +36,7 @@ def run() -> Callable[..., Result]:
 
 
 @pytest.fixture
-def shell(tmp_path: Path) -> Callable[..., Result]:
+def shell(compiled: None, tmp_path: Path) -> Callable[..., Result]:
     """shell("ftproc filter log.csv") in the temporary directory, with this environment's programs first."""
 
     def execute(command: str, cwd: Path = tmp_path, **environment: str) -> Result:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import click
 import pytest
+from click.shell_completion import BashComplete
 
 from ftproc import __version__
 from ftproc.cli.main import COMMANDS, cli
@@ -52,11 +54,12 @@ def test_every_command_and_option_has_help(command):
 
 
 @pytest.mark.parametrize("name", ["", *COMMANDS])
-def test_examples_run(shell, run, name):
+def test_examples_run(run, here, name):
     text = run(*[name] * bool(name), "-h").out
     for line in text.partition("\nExamples:\n")[2].splitlines():
-        result = shell(line)
-        assert result.code == 0, result.err
+        program, *args = shlex.split(line)
+        result = run(*args)
+        assert (program, result.code) == ("ftproc", 0), result.err
 
 
 @pytest.mark.parametrize("name", ["", *COMMANDS])
@@ -221,14 +224,16 @@ def test_as_a_module(shell):
         ("ftproc simulate --scenario man", ["plain,manoeuvre", "plain,manoeuvre-clean"]),
     ],
 )
-def test_completion(shell, words, expected):
-    count = len(words.split()) - 1
-    result = shell("ftproc", COMP_WORDS=words, COMP_CWORD=str(count), _FTPROC_COMPLETE="bash_complete")
-    assert result.out.splitlines() == expected
+def test_completion(monkeypatch, words, expected):
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
+    assert BashComplete(cli, {}, "ftproc", "_FTPROC_COMPLETE").complete().splitlines() == expected
 
 
 def test_the_shell_s_part_of_completion(shell):
     assert "_FTPROC_COMPLETE=bash_complete" in shell("ftproc", _FTPROC_COMPLETE="bash_source").out
+    asked = {"COMP_WORDS": "ftproc fil", "COMP_CWORD": "1", "_FTPROC_COMPLETE": "bash_complete"}
+    assert shell("ftproc", **asked).out == "plain,filter\n"
 
 
 def test_the_pages_name_only_options_that_there_are():

@@ -13,7 +13,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from ftproc.files.reading import logs, trajectories, truth
+from ftproc.files.reading import logs, truth
 from tests.cli.conftest import Result
 
 PROJECT = Path(__file__).parents[2]
@@ -75,25 +75,6 @@ def test_all_logs_then_the_score_table(make, flights, copy):
     assert "position RMSE (m)" in table
 
 
-def test_only_what_changed_runs_again(make, flights):
-    assert len(done(make("run", LOGS))) == 3
-    again = make("run", LOGS)
-    assert done(again) == []
-    assert "position RMSE (m)" in again.out
-    later = time.time() + 5
-    os.utime(flights / "b.csv.gz", (later, later))
-    assert done(make("run", LOGS)) == ["flights/b.csv.gz"]
-
-
-def test_other_flags_make_all_results_old(make, flights, copy):
-    assert len(done(make("run", LOGS, "OUT=clean", "FLAGS=--model none"))) == 3
-    assert len(done(make("run", LOGS, "OUT=clean", "FLAGS=--model none --smooth"))) == 3
-    assert done(make("run", LOGS, "OUT=clean", "FLAGS=--model none --smooth")) == []
-    metadata = trajectories.read(copy / "clean" / "a.trajectory.parquet").metadata
-    assert metadata["settings"]["smooth"] is True
-    assert metadata["model_sha256"] is None
-
-
 def test_a_failed_log_fails_the_target_but_stops_no_other(make, flights, copy):
     (flights / "a.csv").write_text("time_s,range_m\n0,wrong\n")
     result = make("run", LOGS)
@@ -104,27 +85,76 @@ def test_a_failed_log_fails_the_target_but_stops_no_other(make, flights, copy):
     ]  # fmt: skip
 
 
-def test_logs_without_truth(make, flights):
-    result = make("run", "LOGS=flights/b.csv.gz")
-    assert result.code == 0
-    assert result.out.endswith("No log has a truth beside it, so there is nothing to score.\n")
+@pytest.fixture
+def plan(make, copy) -> Callable[..., list[str]]:
+    """plan("LOGS=...") -> the commands of `make run`, each given to a program that only writes an empty output."""
+    program = copy / "venv" / "bin" / "ftproc"
+    program.parent.mkdir(parents=True)
+    program.write_text('#!/bin/sh\necho "ftproc $*"\n[ "$1" = score ] || : > "$4"\n')
+    program.chmod(0o755)
+    for name in (".installed", ".warmed"):
+        (program.parents[1] / name).touch()
+
+    def execute(*args: str) -> list[str]:
+        result = make("run", "-o", "venv/.installed", "-o", "venv/.warmed", *args, venv="venv")
+        assert result.code == 0, result.err
+        return sorted(line for line in result.out.splitlines() if line)
+
+    return execute
 
 
-def test_a_station_file_beside_a_log_is_used(make, copy):
-    """And the result is old when it changes."""
-    shutil.copytree(PROJECT / "sample_data", copy / "sample_data")
-    result = make("run", "LOGS=sample_data/total_station.csv")
-    assert result.code == 0, result.err
-    assert "elevation from zenith angles" in result.err
-    assert done(make("run", "LOGS=sample_data/total_station.csv")) == []
+def filtered(name: str, out: str = "out") -> str:
+    return f"ftproc filter flights/{name} -o {out}/{name[0]}.trajectory.parquet"
+
+
+def scored(out: str = "out") -> str:
+    truths = {"a": "a.truth.csv", "c": "c.truth.parquet"}
+    return "ftproc score " + " ".join(f"{out}/{k}.trajectory.parquet --truth flights/{v}" for k, v in truths.items())
+
+
+def test_only_what_changed_runs_again(plan, flights):
+    score = scored()
+    assert plan(LOGS) == [*map(filtered, ("a.csv", "b.csv.gz", "c.parquet")), score]
+    assert plan(LOGS) == [score]
     later = time.time() + 5
-    os.utime(copy / "sample_data" / "total_station.toml", (later, later))
-    assert done(make("run", "LOGS=sample_data/total_station.csv")) == ["sample_data/total_station.csv"]
+    os.utime(flights / "b.csv.gz", (later, later))
+    assert plan(LOGS) == [filtered("b.csv.gz"), score]
 
 
-def test_trajectories_and_truths_are_no_logs(make, flights, copy):
-    assert len(done(make("run", LOGS, "OUT=flights"))) == 3
-    assert done(make("run", LOGS, "OUT=flights")) == []
+def test_a_change_of_the_program_makes_all_results_old(plan, flights, copy):
+    assert len(plan(LOGS)) == 4
+    later = time.time() + 5
+    os.utime(copy / "ftproc" / "settings.py", (later, later))
+    assert len(plan(LOGS)) == 4
+
+
+def test_other_flags_make_all_results_old(plan, flights):
+    for flags in ("--model none", "--model none --smooth"):
+        *filters, _ = plan(LOGS, "OUT=clean", f"FLAGS={flags}")
+        assert filters == [f"{filtered(name, 'clean')} {flags}" for name in ("a.csv", "b.csv.gz", "c.parquet")]
+    assert plan(LOGS, "OUT=clean", "FLAGS=--model none --smooth") == [scored("clean")]
+
+
+def test_logs_without_truth(plan, flights):
+    nothing = "No log has a truth beside it, so there is nothing to score."
+    assert plan("LOGS=flights/b.csv.gz") == [nothing, filtered("b.csv.gz")]
+
+
+def test_a_station_file_beside_a_log_is_used(plan, flights):
+    """And the result is old when it changes."""
+    station = flights / "b.toml"
+    station.touch()
+    with_station = f"{filtered('b.csv.gz')} --config flights/b.toml"
+    assert with_station in plan("LOGS=flights/b.csv.gz")
+    assert with_station not in plan("LOGS=flights/b.csv.gz")
+    later = time.time() + 5
+    os.utime(station, (later, later))
+    assert with_station in plan("LOGS=flights/b.csv.gz")
+
+
+def test_trajectories_and_truths_are_no_logs(plan, flights):
+    assert len(plan(LOGS, "OUT=flights")) == 4
+    assert plan(LOGS, "OUT=flights") == [scored("flights")]
 
 
 @pytest.mark.parametrize(

@@ -69,7 +69,7 @@ def test_logs_with_columns_and_units_of_their_own(run, here):
 
 
 def test_the_study_of_first_weights(run, here):
-    args = ("--scenario", "radar", "--flights", 3, *SMALL, "--epochs", 40, "--compare-starts")
+    args = ("--scenario", "radar", "--flights", 3, *SMALL, "--compare-starts")
     one, two = run("train", *args), run("train", *args, "--jobs", 2)
     assert one.code == 0, one.err
     assert one.out == two.out

@@ -12,17 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from ftproc.cli.warm import warm
 from ftproc.files.reading import logs, trajectories
 from ftproc.files.writing import flights
 from ftproc.simulation import simulate
 from tests.faults import batches
 from tests.faults.batches import PROGRAM, run
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _compiled() -> None:
-    warm()
+pytestmark = pytest.mark.usefixtures("compiled")
 
 
 @pytest.fixture
@@ -42,8 +38,8 @@ def plain(done: subprocess.CompletedProcess[str], code: int = 1) -> str:
 
 def test_killed_at_random_moments(tmp_path: Path) -> None:
     names = batches.fill(tmp_path)
-    found = batches.killed(tmp_path, names, moments=6)
-    assert len(found) == 6
+    found = batches.killed(tmp_path, names, moments=4)
+    assert len(found) == 4
     assert min(found) < len(names)
 
 
@@ -105,7 +101,7 @@ def test_out_of_memory_is_reported(flight: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted(tmp_path: Path, number: signal.Signals) -> None:
-    names = batches.fill(tmp_path, 60)
+    names = batches.fill(tmp_path, 30)
     with subprocess.Popen(
         batches.command(names), cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:
