@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing import gate, two_pass
-from ftproc.core.editing.track import Recursion, Track
+from ftproc.core.editing.track import GatedRecursion, Track
 from ftproc.core.filtering import initialization
 from ftproc.core.filtering.forward import lead_in
 from ftproc.core.filtering.records import FilterRun, Model, Start, empty_rows
@@ -106,7 +106,7 @@ def _stretches(record: Recording, settings: FilterSettings, model: Model, block:
         log = Readings(readings.time_s[:stop], readings.measurement[:stop], readings.assumed_sigma).weighted(allowed)
         rows = empty_rows(stop)
         rows[: len(history)] = history
-        recursion = Recursion(log, model, how, rows)
+        recursion = GatedRecursion(log, model, how, rows)
         track = recursion.run(track, here, starts)
         if low == 0:
             lead_in(log, model, start, rows)

@@ -34,7 +34,7 @@ class Track(NamedTuple):
         return self._replace(start=self.start - samples)
 
 
-class Recursion:
+class GatedRecursion:
     """The filter with recursive editing over a log, or a stretch of it.
 
     log: weights of zero bar a reading from the outset. rows: the `Row` records that it fills. Afterwards `starts` holds
@@ -98,7 +98,7 @@ def filter_and_edit(
     log: weights of zero bar a reading from the outset. starts: at the beginning and after gaps; samples before the
     first are extrapolated.
     """
-    recursion = Recursion(log, model, settings, empty_rows(len(log.time_s)))
+    recursion = GatedRecursion(log, model, settings, empty_rows(len(log.time_s)))
     recursion.run(None, 0, starts)
     lead_in(log, model, starts[0], recursion.rows)
     return FilterRun.of(log.time_s, recursion.rows, recursion.log_likelihood), recursion.starts
