@@ -130,5 +130,4 @@ def test_what_travels_together_travels_as_one_record() -> None:
 
 def test_every_room_says_who_lives_there() -> None:
     for path in PACKAGE.rglob("__init__.py"):
-        told = ast.get_docstring(ast.parse(path.read_text()))
-        assert told, f"{path} says nothing"
+        assert ast.get_docstring(ast.parse(path.read_text())), f"{path} says nothing"
