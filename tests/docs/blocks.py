@@ -90,7 +90,7 @@ BLOCKS = {
         only=("flight", "method", "samples", "mean position", "position", "velocity RMSE", "share", "the sigmas",
               "range outliers", "recall", "F1"),
     ),
-    "train": session(TRAIN, before=(FLY,), only=("filter:", "smoother:", "Error in position")),
+    "train": session(TRAIN, before=(FLY,), only=("filter:", "smoother:", "Position error")),
     "train-use": session(
         "ftproc filter next.csv --smooth --model none -o plain.csv --summary none",
         "ftproc filter next.csv --smooth --model theodolite.safetensors -o corrected.csv --summary none",

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 import ftproc
 from ftproc.batch import plan
 from ftproc.cli.main import cli
-from ftproc.files.writing import tables
+from ftproc.files.writing import csvtext, tables
 from tests.trust import cases
 
 PACKAGE = Path(ftproc.__file__).parent
@@ -85,7 +85,7 @@ def test_text_is_no_formula_and_numbers_stay_numbers(kind: pa.DataType) -> None:
     assert found[0] == ["'=name", "n"]
     assert [row[0] for row in found[1:]] == [f"'{text}" for text in FORMULAS] + [*HARMLESS, ""]
     assert {row[1] for row in found[1:]} == {"-1.5"}
-    assert [tables.no_formula(text) for text in HARMLESS] == HARMLESS
+    assert [csvtext.no_formula(text) for text in HARMLESS] == HARMLESS
 
 
 def test_kept_columns_and_scores_are_no_formulas(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
