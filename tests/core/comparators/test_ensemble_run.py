@@ -12,6 +12,8 @@ from ftproc.core.filtering.records import Model, Start
 from tests import naive
 from tests.core.tracks import matched, position_error, random_jerk
 
+pytestmark = pytest.mark.compiled
+
 NAMES = list(particles.UPDATES)
 
 

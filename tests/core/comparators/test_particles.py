@@ -130,6 +130,7 @@ def test_renpf_is_the_one_member_by_member():
     assert found.gamma == gamma
 
 
+@pytest.mark.compiled
 def test_renpf_agrees_with_the_kalman_filter_where_all_is_gaussian():
     """Averages of 60 updates of 400 members each; a reading in the bulk, so that the weights are one."""
     rng = np.random.default_rng(1)
@@ -149,6 +150,7 @@ def test_renpf_agrees_with_the_kalman_filter_where_all_is_gaussian():
     np.testing.assert_allclose(np.mean(spreads, 0), posterior, rtol=0.15)
 
 
+@pytest.mark.compiled
 def test_chains_without_a_reading_keep_the_prior():
     """gamma = 0: the target is the prior alone, whose mean and covariance are the members'."""
     rng = np.random.default_rng(2)
