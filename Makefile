@@ -109,7 +109,7 @@ test: $(developer) $(warmed) ## lint, types and the whole test suite
 	$(bin)/ruff check .
 	$(bin)/ruff format --check .
 	$(bin)/mypy
-	$(bin)/python -m pytest -q -n auto --dist worksteal
+	$(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal
 
 samples: $(warmed) ## make sample_data/ anew (fixed seeds: the same bytes)
 	@mkdir -p sample_data

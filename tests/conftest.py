@@ -6,8 +6,12 @@ import signal
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import settings
 
 from ftproc.cli.warm import warm
+
+settings.register_profile("suite", deadline=None)  # several processes share the processors
+settings.load_profile("suite")
 
 
 @pytest.fixture(scope="session", autouse=True)

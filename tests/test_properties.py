@@ -28,7 +28,7 @@ from ftproc.records import MeasurementLog, Trajectory
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
 
-few = settings(max_examples=6, deadline=None, derandomize=True)
+few = settings(max_examples=6, derandomize=True)
 seeds = st.integers(0, 1000)
 NAMES = ("time_s", "range_m", "azimuth_rad", "elevation_rad")
 FIXED = FilterSettings(smooth=True, noise=(3.0, 2e-4, 2e-4), jerk_psd_m2ps5=10.0)
@@ -182,7 +182,7 @@ finite = st.floats(-1e300, 1e300, allow_nan=False)
 reading = st.one_of(finite, st.just(np.nan), st.floats(-10.0, 10.0))
 
 
-@settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(st.data(), st.integers(1, 25), st.booleans())
 def test_any_finite_input_gives_finite_output_or_a_plain_error(data: st.DataObject, n: int, smooth: bool) -> None:
     time = data.draw(hnp.arrays(np.float64, n, elements=st.one_of(finite, st.floats(0.0, 100.0))))

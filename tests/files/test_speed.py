@@ -23,15 +23,15 @@ def test_importing_readers_and_writers_is_cheap() -> None:
 
 
 def test_a_million_rows_are_read_fast(tmp_path: Path) -> None:
-    """About half a second on two cores; the bound only catches work done row by row in Python."""
+    """About a second of processor time; the bound only catches work done row by row in Python."""
     n = 1_000_000
     rng = np.random.default_rng(0)
     names = ("time_s", "range_m", "azimuth_rad", "elevation_rad")
     table = pa.table(dict(zip(names, (np.arange(n) / 20, *rng.normal(size=(3, n))), strict=True)))
     tables.write_table(table, tmp_path / "log.csv")
-    start = time.perf_counter()
+    start = time.process_time()
     log = logs.read(tmp_path / "log.csv")
-    assert time.perf_counter() - start < 5
+    assert time.process_time() - start < 5
     assert np.array_equal(log.measurement[:, 0], table["range_m"].to_numpy())
 
 

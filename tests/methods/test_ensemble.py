@@ -14,7 +14,7 @@ from ftproc.methods import ensemble
 from ftproc.methods.estimate import Readings
 from ftproc.records import GOOD, MISSING
 from ftproc.settings import FilterSettings
-from tests.methods.flights import PATHS, TIME, held, measured, rms, run, turned
+from tests.methods.flights import PATHS, TIME, held, measured, rms, run
 from tests.simulated import simulate
 
 NAMES = list(particles.UPDATES)
@@ -40,16 +40,6 @@ def test_a_rough_log_is_followed(name):
     else:
         assert rms(found, flight.truth.position_m) < 60
         assert (found.outlier[~missing] == GOOD).all()
-
-
-@pytest.mark.parametrize("name", ["enkf", "renpf"])
-def test_cut_costs_no_accuracy(name):
-    position = PATHS["swinging across the cut"](TIME)[:300]
-    errors = [
-        rms(run(measured(where, TIME[:300]), method=name), where) for where in (position, turned(position, np.pi / 2))
-    ]
-    assert errors[0] == pytest.approx(errors[1], rel=0.05)
-    assert max(errors) < 3.5
 
 
 def test_isolated_outliers_are_refused():

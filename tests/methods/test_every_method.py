@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -25,6 +26,12 @@ def run(log, name):
     return pipeline.filter_log(log, FilterSettings(method=name))
 
 
+@cache
+def undisturbed(name):
+    """The helix, measured at even times without a fault."""
+    return run(measured(PATHS["helix"](TIME)), name)
+
+
 def rms(trajectory, position):
     error = np.sum((trajectory.state[:, :3] - position) ** 2, 1)
     assert np.isfinite(error).mean() > 0.4  # without its bad and incomplete readings a gate has no more
@@ -41,7 +48,7 @@ def blanked(log, share, seed=0):
 def test_no_method_is_worse_than_the_readings_of_a_clean_log(name):
     """Each component off by 1 sigma is 3.4 m at 5 km on average; a random walk lags a little behind."""
     position = PATHS["helix"](TIME)
-    found = run(measured(position), name)
+    found = undisturbed(name)
     raw = np.sqrt(np.mean(np.sum((measured_position(measured(position)) - position) ** 2, 1)))
     assert rms(found, position) < 1.02 * raw
     assert (found.outlier == GOOD).mean() > 0.97
@@ -56,19 +63,18 @@ def measured_position(log):
 def test_missing_readings(name):
     """Their label says so, nothing else is lost, and no method loses the track."""
     position = PATHS["helix"](TIME)
-    whole = measured(position)
-    log = blanked(whole, 0.2)
+    log = blanked(measured(position), 0.2)
     missing = np.isnan(log.measurement)
     found = run(log, name)
     np.testing.assert_array_equal(found.outlier == MISSING, missing)
     assert np.isfinite(found.state[~missing.any(1), :3]).all(1).mean() > 0.95
-    assert rms(found, position) < 1.7 * rms(run(whole, name), position)
+    assert rms(found, position) < 1.7 * rms(undisturbed(name), position)
 
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("component", range(3))
 def test_component_missing_throughout(name, component):
-    log = measured(PATHS["helix"](TIME))
+    log = measured(PATHS["helix"](TIME[:200]), TIME[:200])
     z = log.measurement.copy()
     z[:, component] = np.nan
     found = run(replace(log, measurement=z), name)
@@ -84,21 +90,21 @@ def test_jittered_and_irregular_times(name):
     rng = np.random.default_rng(1)
     times = np.sort(TIME + 0.045 * rng.uniform(-1, 1, 600))
     times[300:] += 2.0  # a gap
-    position, even = PATHS["helix"](times), PATHS["helix"](TIME)
-    assert rms(run(measured(position, times), name), position) < ROOM.get(name, 1.25) * rms(
-        run(measured(even), name), even
-    )
+    position = PATHS["helix"](times)
+    even = rms(undisturbed(name), PATHS["helix"](TIME))
+    assert rms(run(measured(position, times), name), position) < ROOM.get(name, 1.25) * even
 
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("path", ["radial", "swinging across the cut", "orbit"])
 def test_cut_costs_nothing(name, path):
     """The flight turned by a quarter, away from the cut, has the same error (about, if chance decides)."""
-    position = PATHS[path](TIME)
+    times = TIME[300:]  # when the orbit crosses it
+    position = PATHS[path](times)
     away = turned(position, np.pi / 2)
-    here, there = run(measured(position), name), run(measured(away), name)
+    here, there = (run(measured(where, times), name) for where in (position, away))
     by_chance = registry.METHODS[name].random
-    assert rms(here, position) == pytest.approx(rms(there, away), rel=0.5 if by_chance else 1e-3)
+    assert rms(here, position) == pytest.approx(rms(there, away), rel=0.2 if by_chance else 1e-3)
     azimuth = here.measurement[:, 1]
     assert (np.abs(azimuth[np.isfinite(azimuth)]) <= np.pi).all()
     if not by_chance:
@@ -110,7 +116,7 @@ def test_two_readings_at_every_instant(name):
     twice = np.repeat(np.arange(600), 2)
     position = PATHS["helix"](TIME)
     found = run(measured(position[twice], TIME[twice]), name)
-    assert rms(found, position[twice]) < ROOM.get(name, 1.25) * rms(run(measured(position), name), position)
+    assert rms(found, position[twice]) < ROOM.get(name, 1.25) * rms(undisturbed(name), position)
 
 
 @pytest.mark.parametrize("name", [n for n in NAMES if registry.METHODS[n].handles_outliers and n != "rkf-literal"])
@@ -124,7 +130,7 @@ def test_isolated_outliers_are_found_and_do_little_harm(name):
     z = clean.measurement + bad * np.array([400.0, 0.1, 0.1]) * rng.choice([-1, 1], (600, 3))
     found = run(replace(clean, measurement=z), name)
     assert np.isin(found.outlier[bad], (ISOLATED, PATCH)).mean() > 0.9
-    near = [np.nanpercentile(np.linalg.norm(t.state[:, :3] - position, axis=1), 95) for t in (found, run(clean, name))]
+    near = [np.nanpercentile(np.linalg.norm(t.state[:, :3] - position, axis=1), 95) for t in (found, undisturbed(name))]
     assert near[0] < 2 * near[1]
 
 

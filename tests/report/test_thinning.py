@@ -25,7 +25,7 @@ def walked(time_s, value, columns):
 values = st.one_of(st.floats(-5, 5).map(lambda v: round(v, 1)), st.just(np.nan))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(st.integers(0, 40), values), min_size=9, max_size=60))
 def test_extremes_are_those_found_by_walking(rows):
     time_s = np.sort(np.array([t for t, _ in rows], float))

@@ -75,7 +75,7 @@ def test_any_text_is_read_or_refused_in_a_plain_sentence(text: str) -> None:
     assert sentence is None or (sentence.startswith("Outlier specification: ") and sentence.endswith("."))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(items(), min_size=1, max_size=4), st.integers(0, 1000), st.integers(2, 60))
 def test_any_specification_contaminates_any_log(written: list[tuple[str, Fault]], seed: int, duration: int) -> None:
     """Readings without a code are clean or missing, and the truth is row for row."""

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ftproc.correction.model_file import to_bytes
 from ftproc.correction.training.samples import Flight
 from ftproc.correction.training.stages import train_model
 from ftproc.errors import UsageError
@@ -61,10 +60,3 @@ def test_a_feature_set_that_is_named_is_taken_and_serves_the_smoother_if_it_can(
         assert model.filter.features.name == features
     with pytest.raises(UsageError, match="no feature set 'magic'"):
         train_model(flights, replace(QUICK, features="magic"))
-
-
-def test_one_worker_and_two_make_the_same_bytes() -> None:
-    flights = {"filter": tilted(0, 6), "smoother": tilted(1, 6)}
-    one, two = (train_model(flights, replace(QUICK, epochs=10), jobs=jobs) for jobs in (1, 2))
-    assert to_bytes(one) == to_bytes(two)
-    assert one.smoother is not None

@@ -38,7 +38,7 @@ def some_logs(draw: st.DrawFn) -> MeasurementLog:
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".csv.gz", ".parquet", ".feather"])
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=40)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40)
 @given(log=some_logs())
 def test_every_bit_comes_back(tmp_path: Path, suffix: str, log: MeasurementLog) -> None:
     path = tmp_path / f"log{suffix}"
@@ -51,7 +51,7 @@ def test_every_bit_comes_back(tmp_path: Path, suffix: str, log: MeasurementLog) 
     assert (back.name, back.rows_in_file, back.frame) == (str(path), len(log), "local")
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(data=st.data(), n=st.integers(1, 40))
 def test_a_permutation_of_the_rows_changes_only_their_numbers(data: st.DataObject, n: int) -> None:
     time = np.arange(n) * 0.05

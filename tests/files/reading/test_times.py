@@ -3,7 +3,7 @@
 import numpy as np
 import pyarrow as pa
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from ftproc.errors import InputError
@@ -72,7 +72,6 @@ def test_other_ways_to_write_iso_8601(make: Make, moment: str) -> None:
 
 
 @given(st.lists(st.integers(0, 7 * 86400 * 10**6), min_size=1, max_size=20))
-@settings(deadline=None)
 def test_timestamps_keep_microseconds_for_a_week(ticks: list[int]) -> None:
     day = 19874 * 86400 * 10**6
     first = min(ticks) // (86400 * 10**6) * 86400 * 10**6

@@ -39,7 +39,7 @@ def assert_same(one: np.ndarray | None, other: np.ndarray | None) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".csv.gz", ".parquet", ".feather"])
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=30)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30)
 @given(original=some_truths())
 def test_every_bit_comes_back(tmp_path: Path, suffix: str, original: Truth) -> None:
     path = tmp_path / f"truth{suffix}"
