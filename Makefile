@@ -22,7 +22,6 @@ ftproc := $(bin)/ftproc
 installed := $(VENV)/.installed
 developer := $(VENV)/.installed-dev
 oldest := $(VENV)-oldest/.installed
-warmed := $(VENV)/.warmed
 
 # --- the logs ---------------------------------------------------------------------------------------------------
 
@@ -67,7 +66,7 @@ else
 endif
 
 # The log is the first prerequisite. A change of the program, its model or FLAGS makes all results old.
-$(OUT)/%.trajectory.parquet: $$(log-of-$$*) $$(call station,$$(log-of-$$*)) $(OUT)/.flags $(program) | $(warmed)
+$(OUT)/%.trajectory.parquet: $$(log-of-$$*) $$(call station,$$(log-of-$$*)) $(OUT)/.flags $(program) | $(installed)
 	@$(ftproc) filter $< -o $@ $(addprefix --config ,$(call station,$<)) $(FLAGS)
 
 export FLAGS
@@ -77,7 +76,7 @@ $(OUT)/.flags: FORCE
 
 # --- the installation -------------------------------------------------------------------------------------------
 
-install: $(warmed) ## make .venv and install ftproc in it
+install: $(installed) ## make .venv and install ftproc in it
 
 $(bin)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -87,31 +86,26 @@ $(bin)/python:
 	@echo 'making $(VENV)'
 	@$(PYTHON) -m venv $(VENV)
 
-$(installed): pyproject.toml | $(bin)/python
-	@echo 'installing ftproc in $(VENV)'
+# The kernels are compiled here, anew when one of them has changed.
+$(installed): pyproject.toml hatch_build.py $(shell find ftproc/core -name '*.py') | $(bin)/python
+	@echo 'installing ftproc in $(VENV), with its kernels compiled (about a minute)'
 	@$(bin)/python -m pip install --quiet --disable-pip-version-check -e '.[geo,report]'
 	@touch $@
 
-$(developer): pyproject.toml $(installed)
+$(developer): pyproject.toml | $(installed)
 	@echo 'installing the developer tools in $(VENV)'
 	@$(bin)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,geo,report]'
 	@touch $@
 
-# Compiled kernels are kept; after this the first log does not wait for the compiler.
-$(warmed): $(installed) $(shell find ftproc/core -name '*.py')
-	@find ftproc/core -name '*.nb?' -delete
-	@$(bin)/python -m ftproc.cli.warm
-	@touch $@
-
 # --- development ------------------------------------------------------------------------------------------------
 
-test: $(developer) $(warmed) ## lint, types and the whole test suite
+test: $(developer) ## lint, types and the whole test suite
 	$(bin)/ruff check .
 	$(bin)/ruff format --check .
 	$(bin)/mypy
 	$(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal
 
-samples: $(warmed) ## make sample_data/ anew (fixed seeds: the same bytes)
+samples: $(installed) ## make sample_data/ anew (fixed seeds: the same bytes)
 	@mkdir -p sample_data
 	$(ftproc) simulate --scenario zuo2021-outliers --seed 2021 \
 	  -o sample_data/zuo2021-outliers.csv --truth sample_data/zuo2021-outliers.truth.csv
@@ -127,16 +121,16 @@ samples: $(warmed) ## make sample_data/ anew (fixed seeds: the same bytes)
 	  { hz = 37.25 - $$3; if (hz < 0) hz += 400; \
 	    printf "%.3f,%.4f,%.5f,%.5f\n", $$1, $$2 + 0.0344, hz, 100 - $$4 + 0.003 }' > sample_data/total_station.csv
 
-readme: $(developer) $(warmed) ## write the tables and outputs in the READMEs; BLOCKS="speed scale" or SLOW=1 for slow ones
+readme: $(developer) ## write the tables and outputs in the READMEs; BLOCKS="speed scale" or SLOW=1 for slow ones
 	$(bin)/python -m tests.docs $(BLOCKS) $(if $(SLOW),--slow) $(if $(KEPT),--kept)
 
-model: $(warmed) ## train the packaged model anew (MODEL_FLAGS)
+model: $(installed) ## train the packaged model anew (MODEL_FLAGS)
 	$(ftproc) train $(MODEL_FLAGS) -o ftproc/correction/default.safetensors
 
-trust: $(developer) $(warmed) ## the table of reliability: bad files, faults, long runs, fuzz (some ten minutes)
+trust: $(developer) ## the table of reliability: bad files, faults, long runs, fuzz (some ten minutes)
 	$(bin)/python -m tests.trust
 
-fuzz: $(developer) $(warmed) ## fuzz the readers and the filter (FUZZ) for FUZZ_SECONDS each; findings go to out/fuzz
+fuzz: $(developer) ## fuzz the readers and the filter (FUZZ) for FUZZ_SECONDS each; findings go to out/fuzz
 	@$(bin)/python -m pip install --quiet --disable-pip-version-check -e '.[fuzz]'
 	@found=0; for target in $(FUZZ); do echo "fuzzing $$target"; \
 	  $(bin)/python -m tests.fuzz $$target $(FUZZ_SECONDS) || found=1; done; exit $$found
@@ -157,13 +151,13 @@ audit: $(developer) ## whether a vulnerability of one of the tested versions is 
 	@$(bin)/python -m pip install --quiet --disable-pip-version-check -e '.[audit]'
 	@$(bin)/python -m tests.trust.audit
 
-bench: $(developer) $(warmed) ## measure accuracy and speed
+bench: $(developer) ## measure accuracy and speed
 	$(bin)/python -m tests.bench
 
-reproduce: $(developer) $(warmed) ## do the papers' experiments again: out/reproduce/reproduce.md
+reproduce: $(developer) ## do the papers' experiments again: out/reproduce/reproduce.md
 	$(bin)/python -m tests.acceptance.reproduce
 
 clean: ## remove results and caches; the virtual environment stays
-	rm -rf out build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	rm -rf out build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis ftproc/core/_kernels_*
+	rm -f $(installed)
 	find ftproc tests -name __pycache__ -type d -prune -exec rm -rf {} +
-	rm -f $(warmed)

@@ -56,6 +56,10 @@ class InputError(FtprocError):
     """A log, truth, trajectory or other input cannot be processed."""
 
 
+class InstallationError(FtprocError):
+    """The installation lacks something that this run needs."""
+
+
 class ModelError(InputError):
     """A file is not a correction model, or is a model for another method or other features."""
 

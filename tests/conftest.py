@@ -8,8 +8,6 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import settings
 
-from ftproc.cli.warm import warm
-
 settings.register_profile("suite", deadline=None)  # several processes share the processors
 settings.load_profile("suite")
 
@@ -20,9 +18,3 @@ def _hears_interruptions() -> Iterator[None]:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
-
-
-@pytest.fixture(scope="session")
-def compiled() -> None:
-    """All kernels are compiled, and kept on disk: no program that a test starts has the line about it on stderr."""
-    warm()

@@ -16,7 +16,8 @@ MOST_FILES, MOST_LINES, MOST_PARAMETERS = 14, 300, 7
 FLOORS = (
     ("errors", "settings"),
     ("records", "__init__"),
-    ("core.compiled", "core.threads"),
+    ("core.signatures", "core.threads"),
+    ("core.compiled",),
     ("core.model",),
     ("core.filtering",),
     ("core.identification",),

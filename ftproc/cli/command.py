@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -48,21 +47,5 @@ def write_examples(formatter: click.HelpFormatter, examples: str) -> None:
 
 
 def start_quickly() -> None:
-    """Shorten the start of the process; to be called before numba is loaded."""
+    """Shorten the start of the process."""
     gc.set_threshold(100_000, 50, 50)  # loading modules makes many objects and little garbage
-    _skip_blas()
-
-
-def _skip_blas() -> None:
-    """Keep numba from loading SciPy's BLAS, and much of SciPy with it: no kernel multiplies matrices by BLAS.
-
-    numba asks once, when its array functions are first needed, and accepts that there is none.
-    """
-    name = "scipy.linalg.cython_blas"
-    if name in sys.modules or "numba" in sys.modules:
-        return
-    sys.modules[name] = None  # type: ignore[assignment]
-    try:
-        import numba.np.arraymath  # noqa: F401
-    finally:
-        del sys.modules[name]

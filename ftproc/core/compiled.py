@@ -1,8 +1,13 @@
-"""How the kernels are compiled, and the records that they work on.
+"""How the kernels come to run, and the records that they work on.
 
-A `kernel` is called from Python, and its machine code is kept on disk. A `part` is only called by kernels, into which
-it is compiled; keeping it too would cost every process a look at the disk. numba does not see that a kernel in one
-file is stale when a part in another has changed: `make` clears what was kept when anything here changes.
+A `kernel` is called from Python, a `part` only by kernels, into which it is compiled. FTPROC_KERNELS says how they run:
+
+* `compiled`: from the library that was made of them when ftproc was installed (`hatch_build.py`). It bears the digest
+  of its sources in its name, so that it never runs for others.
+* `jit`: numba compiles each when it is first called, and keeps the machine code, under the same digest.
+* `python`: as plain Python, a hundred times slower, for tests and fuzzers that follow every branch.
+
+Without the variable it is the library where there is one, else numba.
 
 No Python errors inside; a product and a sum may become one operation, but sums keep their order, so that a kernel gives
 the same digits wherever its parts stand.
@@ -14,32 +19,119 @@ large it is, and that no two overlap. With separate arrays the passes take twice
 from __future__ import annotations
 
 import contextlib
+import functools
+import hashlib
+import importlib
+import importlib.util
+import os
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any, TypeVar, cast, get_type_hints
 
-import numba
 import numpy as np
-from numba import njit
 
-COMPILING = "compiling the kernels once (about half a minute)..."
+from ftproc.core import signatures
+from ftproc.errors import InstallationError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-NOT_COMPILED = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
-
 HOW: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+WAYS = ("compiled", "jit", "python")
+ROOM = Path(__file__).parent
+CURE = (
+    "Install a C compiler and then ftproc again (pip install --force-reinstall), or numba, which compiles when running."
+)
+
+
+def digest(room: Path = ROOM) -> str:
+    """Of all sources in which kernels are written."""
+    found = hashlib.blake2b(digest_size=8)
+    for folder, folders, names in os.walk(room):
+        folders.sort()
+        for name in sorted(names):
+            if name.endswith(".py"):
+                found.update(Path(folder, name).read_bytes())
+    return found.hexdigest()
+
+
+DIGEST = digest()
+LIBRARY = f"_kernels_{DIGEST}"  # the library's name as a module
+
+
+def _library() -> Any:
+    """The library that belongs to these sources, or None."""
+    try:
+        return importlib.import_module(f"ftproc.core.{LIBRARY}")
+    except ModuleNotFoundError:
+        return None
+
+
+def _choose(wanted: str) -> tuple[str, Any]:
+    """How the kernels run, and the library if they run from it."""
+    if wanted not in ("", *WAYS):
+        raise InstallationError(f'FTPROC_KERNELS is "{wanted}"; it is one of {", ".join(WAYS)}, or not set.')
+    library = _library() if wanted in ("", "compiled") else None
+    if library is not None:
+        return "compiled", library
+    if wanted == "compiled":
+        raise InstallationError(f"FTPROC_KERNELS asks for compiled kernels, but {_missing()}. {CURE}")
+    if wanted == "" and importlib.util.find_spec("numba") is None:
+        raise InstallationError(f"{_missing()}, and there is no numba. {CURE}")
+    return wanted or "jit", None
+
+
+def _missing() -> str:
+    """Why the library cannot be used."""
+    if any(ROOM.glob("_kernels_*")):
+        return f"the compiled kernels in {ROOM} are not of these sources or not for this Python"
+    return f"there are no compiled kernels in {ROOM}"
+
+
+_WANTED = os.environ.get("FTPROC_KERNELS", "")
+WAY, _LIBRARY = _choose(_WANTED)
+
+#: The line for the user before numba compiles.
+COMPILING = f"{'FTPROC_KERNELS is jit' if _WANTED else _missing()}: numba compiles what is needed, once (a minute)..."
+
+#: All kernels, by the name under which the library exports them, as Python functions.
+KERNELS: dict[str, Callable[..., Any]] = {}
 
 
 def kernel(function: F) -> F:
     """Compile a function that Python calls, while other threads go on; to a type checker it stays what it was."""
-    compiled: Any = njit(cache=True, nogil=True, **HOW)(function)
-    return cast(F, compiled)
+    name = f"{function.__module__}.{function.__name__}".removeprefix("ftproc.core.").replace(".", "_")
+    KERNELS[name] = function
+    if WAY == "compiled":
+        return cast(F, _checked(function, getattr(_LIBRARY, name)))
+    if WAY == "jit":
+        from numba import njit
+
+        function.__qualname__ += f"_{DIGEST}"  # part of the name under which numba keeps the machine code
+        return cast(F, njit(cache=True, nogil=True, **HOW)(function))
+    return function
+
+
+def _checked(function: Callable[..., Any], compiled: Callable[..., Any]) -> Callable[..., Any]:
+    check: signatures.Check | None = None
+
+    @functools.wraps(function)
+    def call(*arguments: Any) -> Any:
+        nonlocal check
+        if check is None:
+            check = signatures.Check(function)
+        check(arguments)
+        return compiled(*arguments)
+
+    return call
 
 
 def part(function: F) -> F:
     """Compile a function that kernels call."""
-    compiled: Any = njit(**HOW)(function)
-    return cast(F, compiled)
+    if WAY == "jit":
+        from numba import njit
+
+        return cast(F, njit(**HOW)(function))
+    return function
 
 
 def record(kind: type) -> np.dtype[np.void]:
@@ -53,7 +145,7 @@ def zeros(layout: np.dtype[np.void], count: int = 1) -> Any:
     """`count` records in one array, all zero. For kernels fields are attributes; elsewhere `records["x"]` is the array
     (count, ...) of a field."""
     made = np.zeros(count, layout)
-    return made.view(np.recarray) if NOT_COMPILED else made
+    return made.view(np.recarray) if WAY == "python" else made
 
 
 @contextlib.contextmanager
@@ -63,7 +155,7 @@ def announced(say: Callable[[str], None] | None) -> Iterator[None]:
     numba itself is listened to: no other sign knows for sure which kernels its cache holds for these sources,
     this processor and this version, or where it keeps them when the installation is read-only.
     """
-    if say is None:
+    if say is None or WAY != "jit":
         yield
         return
     tell = say

@@ -32,6 +32,16 @@ def _chunk(chunk: pa.Array) -> FloatArray:
     return np.where(present == 1, values, np.nan)
 
 
+def nan_as_missing(column: pa.ChunkedArray) -> pa.ChunkedArray:
+    """A float64 column with NaN as missing."""
+    import pyarrow as pa
+
+    values = to_numpy(column)
+    present = np.packbits(~np.isnan(values), bitorder="little")
+    buffers = [pa.py_buffer(present), pa.py_buffer(np.ascontiguousarray(values))]
+    return pa.chunked_array([pa.Array.from_buffers(pa.float64(), len(values), buffers)])
+
+
 def _from_numpy(values: NDArray[Any]) -> pa.Array:
     """An Arrow array over the memory of a (n,) array of float64, int64 or uint8."""
     import pyarrow as pa

@@ -34,7 +34,7 @@ class Cluster(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def two_workers(compiled, tmp_path_factory) -> Iterator[Cluster]:
+def two_workers(tmp_path_factory) -> Iterator[Cluster]:
     """A scheduler on a free port and two workers of one thread each, in a directory of their own."""
     folder = tmp_path_factory.mktemp("cluster")
     common = ["--host", "127.0.0.1", "--no-dashboard"]

@@ -102,7 +102,7 @@ def test_a_worker_that_dies_takes_only_its_own_log_with_it(tmp_path):
     assert (tmp_path / "b.csv").exists()
 
 
-def test_ctrl_c_stops_all_workers_and_leaves_only_whole_files(compiled, tmp_path):
+def test_ctrl_c_stops_all_workers_and_leaves_only_whole_files(tmp_path):
     for number in range(COUNT):
         flights.write_log(simulate("manoeuvre", duration_s=30.0, seed=number).log, tmp_path / f"{number}.parquet")
     program = str(Path(sys.prefix) / "bin" / "ftproc")

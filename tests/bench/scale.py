@@ -27,7 +27,7 @@ FLOOR = "read CSV, write 30 Parquet columns"
 FORWARD = "`filter --editing forward --noise --jerk`"
 WAYS = {FORWARD: ("--editing", "forward"), "`filter`": (), "`filter --smooth`": ("--smooth",)}
 BOUNDS = {FORWARD: "<= 3.0", "`filter`": "<= 12", "`filter --smooth`": "<= 15"}
-LIBRARIES = "import numpy, numba, pyarrow.parquet"
+LIBRARIES = "import numpy, pyarrow.parquet"
 
 _FLOOR = """
 import sys, numpy as np, pyarrow as pa, pyarrow.csv, pyarrow.parquet

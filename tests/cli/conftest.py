@@ -25,7 +25,7 @@ class Result:
 
 
 @pytest.fixture
-def run(compiled: None) -> Callable[..., Result]:
+def run() -> Callable[..., Result]:
     """run("filter", "log.csv") -> exit code, stdout and stderr."""
 
     def invoke(*args: object, stdin: str | None = None) -> Result:
@@ -36,7 +36,7 @@ def run(compiled: None) -> Callable[..., Result]:
 
 
 @pytest.fixture
-def shell(compiled: None, tmp_path: Path) -> Callable[..., Result]:
+def shell(tmp_path: Path) -> Callable[..., Result]:
     """shell("ftproc filter log.csv") in the temporary directory, with this environment's programs first."""
 
     def execute(command: str, cwd: Path = tmp_path, **environment: str) -> Result:

@@ -22,7 +22,7 @@ PROJECT = Path(__file__).parents[2]
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
     shutil.copytree(PROJECT / "ftproc", tmp_path / "ftproc", ignore=shutil.ignore_patterns("__pycache__"))
-    for name in ("Makefile", "pyproject.toml"):
+    for name in ("Makefile", "pyproject.toml", "hatch_build.py"):
         shutil.copy2(PROJECT / name, tmp_path / name)
     return tmp_path
 
@@ -33,8 +33,8 @@ def make(copy: Path) -> Callable[..., Result]:
     mine = {name: value for name, value in os.environ.items() if not name.startswith("MAKE") and name != "MFLAGS"}
 
     def execute(*args: str, venv: str = sys.prefix) -> Result:
-        installed = [part for name in (".installed", ".warmed") for part in ("-o", f"{venv}/{name}")]
-        command = ["make", f"VENV={venv}", *(installed if venv == sys.prefix else []), *args]
+        installed = ["-o", f"{venv}/.installed"] if venv == sys.prefix else []
+        command = ["make", f"VENV={venv}", *installed, *args]
         done = subprocess.run(command, cwd=copy, env=mine, capture_output=True, text=True, timeout=300)
         return Result(done.returncode, done.stdout, done.stderr)
 
@@ -92,11 +92,10 @@ def plan(make, copy) -> Callable[..., list[str]]:
     program.parent.mkdir(parents=True)
     program.write_text('#!/bin/sh\necho "ftproc $*"\n[ "$1" = score ] || : > "$4"\n')
     program.chmod(0o755)
-    for name in (".installed", ".warmed"):
-        (program.parents[1] / name).touch()
+    (program.parents[1] / ".installed").touch()
 
     def execute(*args: str) -> list[str]:
-        result = make("run", "-o", "venv/.installed", "-o", "venv/.warmed", *args, venv="venv")
+        result = make("run", "-o", "venv/.installed", *args, venv="venv")
         assert result.code == 0, result.err
         return sorted(line for line in result.out.splitlines() if line)
 
@@ -206,7 +205,7 @@ def test_clean(make, copy):
     (copy / "out").mkdir()
     (copy / "ftproc" / "__pycache__").mkdir()
     (copy / "tests").mkdir()
-    assert make("clean", f"warmed={copy}/none").code == 0
+    assert make("clean", f"installed={copy}/none").code == 0
     assert not (copy / "out").exists()
     assert not (copy / "ftproc" / "__pycache__").exists()
 

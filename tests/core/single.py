@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from ftproc.core.compiled import zeros
+from ftproc.core.compiled import WAY, zeros
 from ftproc.core.filtering import ukf
 from tests import naive
 from tests.core.tracks import covariance
 
 
+def one(layout):
+    """A record of zeros for `part`s that a test calls; where those are plain Python its fields are attributes."""
+    records = zeros(layout)
+    return records[0] if WAY == "jit" else records.view(np.recarray)[0]
+
+
 def filter_at(x, p, noise=0.0):
     """The record of a filter in this state."""
-    filters = zeros(ukf.FILTER)
-    filters["x"], filters["p"], filters["noise"] = x, p, noise
-    return filters[0]
+    f = one(ukf.FILTER)
+    f["x"], f["p"], f["noise"] = x, p, noise
+    return f
 
 
 def transform(x, p):

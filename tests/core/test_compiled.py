@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+from ftproc.core import compiled
 from ftproc.core.compiled import record, zeros
 from ftproc.core.editing.gate import GATE
 from ftproc.core.filtering.backward import BACKWARD
@@ -30,13 +32,14 @@ def test_fields_are_views_of_the_records():
     assert not filters["x"][0].any()
 
 
+@pytest.mark.skipif(compiled.WAY == "compiled", reason="a library holds no kernels of tests")
 def test_each_recursion_has_its_own_update():
     """The code of the loop is shared; what one filter calls is not what another calls."""
 
     def nothing(f, sample, extra, row):
         return 1.0, False
 
-    other = getattr(recursion(nothing), "py_func", recursion(nothing))
+    other = getattr(recursion(nothing, float), "py_func", recursion(nothing, float))
     plain = getattr(run_weighted, "py_func", run_weighted)
     assert other.__code__ is plain.__code__
     assert other.__globals__["_update"] is nothing

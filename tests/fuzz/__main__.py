@@ -3,7 +3,7 @@
 DIRECTORY (out/fuzz) takes the inputs that reached something new, in TARGET/, and what is wrong, as TARGET-crash-*.
 It goes on where it stopped. What is worth keeping belongs in corpus/TARGET/, which the tests replay.
 
-With NUMBA_DISABLE_JIT=1 the kernels run as Python: their branches guide the search, but one log takes seconds.
+With FTPROC_KERNELS=python the kernels run as Python: their branches guide the search, but one log takes seconds.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def main() -> None:
     """Ends the process: with 0 when the time is over and nothing was found."""
     name, seconds = sys.argv[1], sys.argv[2]
     out = Path(sys.argv[3] if len(sys.argv) > 3 else "out/fuzz")
-    compiled = [] if os.environ.get("NUMBA_DISABLE_JIT") == "1" else _KERNELS  # numba compiles what is not instrumented
+    compiled = [] if os.environ.get("FTPROC_KERNELS") == "python" else _KERNELS
     with atheris.instrument_imports(include=["ftproc", "tomllib"], exclude=compiled):
         import tomllib  # noqa: F401
 

@@ -20,7 +20,7 @@ def main() -> int:
     fuzzed, wrong = mutation.run(FUZZ_S)
     kills, lost = _kills()
     faults = elsewhere.run(*elsewhere.FAULTS, FTPROC_TRUST="1")
-    plain = elsewhere.run(*elsewhere.PLAIN, NUMBA_DISABLE_JIT="1")
+    plain = elsewhere.run(*elsewhere.PLAIN, FTPROC_KERNELS="python")
     diverged = long_runs.many(FLIGHTS)
     endless = long_runs.endless(SAMPLES)
     tracebacks = counts["wrong"] + counts["known"] + len(wrong)

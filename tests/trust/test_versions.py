@@ -20,10 +20,12 @@ def listed(name: str) -> dict[str, str]:
 
 
 def bounds() -> dict[str, str]:
-    """What a user's installation may need, and from which version on."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    """What a user's installation may need, and from which version on; numba compiles the kernels."""
+    said = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    project = said["project"]
     extras = [need for extra in OF_THE_USER for need in project["optional-dependencies"][extra]]
-    return dict(need.split(">=") for need in [*project["dependencies"], *extras])
+    compiler = [need for need in said["build-system"]["requires"] if need.startswith("numba")]
+    return dict(need.split(">=") for need in [*project["dependencies"], *extras, *compiler])
 
 
 def test_the_oldest_versions_are_those_of_pyproject() -> None:

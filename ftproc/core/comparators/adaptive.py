@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ftproc.core.compiled import kernel, part
 from ftproc.core.model import motion
 from ftproc.core.model.measurement import wrap_angle
+from ftproc.core.signatures import Matrix, Vector
 
 FloatArray = NDArray[np.float64]
 
@@ -69,8 +70,8 @@ class Channel(NamedTuple):
     spectral density in the component's unit, squared, per s^5; angular: an azimuth."""
 
     begin: int
-    x0: FloatArray
-    p0: FloatArray
+    x0: Vector
+    p0: Matrix
     noise: float
     jerk: float
     angular: bool
@@ -78,8 +79,8 @@ class Channel(NamedTuple):
 
 @kernel
 def adaptive_kalman(
-    time: FloatArray, z: FloatArray, model: Channel, adapt: bool
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, float]:
+    time: Vector, z: Vector, model: Channel, adapt: bool
+) -> tuple[Matrix, Matrix, Vector, Vector, Vector, float]:
     """Values and rates (n, 3), their variances (n, 3), innovations, their sigmas and weights (n,), and the
     log-likelihood; NaN before sample `begin`.
 

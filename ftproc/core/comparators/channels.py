@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part
 from ftproc.core.model.measurement import wrap_angle
+from ftproc.core.signatures import Indices, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
 
@@ -38,9 +39,7 @@ def _agree(z: FloatArray, time: FloatArray, a: int, b: int, threshold: float, in
 
 
 @kernel
-def gate(
-    time: FloatArray, z: FloatArray, threshold: float, interval: float, angular: bool, check_first: bool
-) -> FloatArray:
+def gate(time: Vector, z: Vector, threshold: float, interval: float, angular: bool, check_first: bool) -> Vector:
     """(n,) 1 for readings that differ from the last accepted one by no more than the threshold, else 0.
 
     The first reading is accepted blindly; check_first: begin with the first pair of readings that agree, dropping
@@ -97,9 +96,7 @@ def _push(t: FloatArray, v: FloatArray, count: int, time: float, value: float) -
 
 
 @kernel
-def four_point_line(
-    time: FloatArray, z: FloatArray, threshold: float, interval: float, angular: bool
-) -> tuple[FloatArray, FloatArray]:
+def four_point_line(time: Vector, z: Vector, threshold: float, interval: float, angular: bool) -> tuple[Vector, Vector]:
     """Cleaned values (n,) and weights (n,): a reading further than the threshold from the line through the last four
     values is replaced by the line. The third in a row is believed instead, with the two before it.
 
@@ -143,18 +140,18 @@ class Walk(NamedTuple):
     """A random walk in m components. begin (m,): first sample of each. x0, p0 (m,): state and variance one interval
     before. noise (m,): variance of a reading. walk (m,): variance gained in one interval. interval: s."""
 
-    begin: NDArray[np.int64]
-    x0: FloatArray
-    p0: FloatArray
-    noise: FloatArray
-    walk: FloatArray
+    begin: Indices
+    x0: Vector
+    p0: Vector
+    noise: Vector
+    walk: Vector
     interval: float
 
 
 @kernel
 def outlier_kalman(
-    time: FloatArray, z: FloatArray, model: Walk, gate: float, small_gain: float, own_only: bool
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    time: Vector, z: Matrix, model: Walk, gate: float, small_gain: float, own_only: bool
+) -> tuple[Matrix, Matrix, Matrix, Matrix, Matrix]:
     """The anti-outlier Kalman filter of a random walk in m components: when an innovation exceeds `gate` sigmas, the
     gain is multiplied by `small_gain`, of all components, or (own_only) of the one that is off.
 
@@ -205,9 +202,7 @@ class Repair(NamedTuple):
 
 
 @kernel
-def repaired_walk(
-    time: FloatArray, z: FloatArray, how: Repair
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+def repaired_walk(time: Vector, z: Vector, how: Repair) -> tuple[Vector, Vector, Vector, Vector, Vector, Vector]:
     """A scalar Kalman filter whose outliers are repaired first: readings whose innovation exceeds the threshold, or
     that are missing, are replaced by the line through up to ten values before them.
 

@@ -20,6 +20,7 @@ from ftproc.core.filtering import ukf
 from ftproc.core.filtering.forward import recursion
 from ftproc.core.filtering.records import Row, Sample
 from ftproc.core.model.measurement import measure
+from ftproc.core.signatures import Layout, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
 
@@ -27,9 +28,7 @@ MIN_COS_ELEVATION = 1e-3  # nearer to the zenith than this the azimuth says noth
 
 
 @kernel
-def convert(
-    z: FloatArray, noise: FloatArray, slant: float, azimuth: float, elevation: float, out: FloatArray, r: FloatArray
-) -> None:
+def convert(z: Vector, noise: Vector, slant: float, azimuth: float, elevation: float, out: Vector, r: Matrix) -> None:
     """The unbiased position of a reading z (3,) with noise variances (3,), along the radial, cross and up axes of the
     direction azimuth, elevation: out (3,) m; its covariance at that direction and slant range: r (3, 3) m^2."""
     la, le = math.exp(-noise[1] / 2), math.exp(-noise[2] / 2)
@@ -79,6 +78,7 @@ class Conversion(Protocol):
 
 
 CONVERSION = record(Conversion)
+Conversions = Annotated[Any, Layout(CONVERSION)]
 
 
 def conversion_of(noise_variance: FloatArray) -> Any:
@@ -89,7 +89,7 @@ def conversion_of(noise_variance: FloatArray) -> Any:
 
 
 @part
-def _converted(f: ukf.Filter, sample: Sample, conversions: Any, row: Row) -> tuple[float, bool]:
+def _converted(f: ukf.Filter, sample: Sample, conversions: Conversions, row: Row) -> tuple[float, bool]:
     """The update of a sample by its converted position; every reading is used. The log-likelihood is that of positions
     along the line-of-sight axes."""
     v = conversions[0]
@@ -122,4 +122,4 @@ def _converted(f: ukf.Filter, sample: Sample, conversions: Any, row: Row) -> tup
     return gained, False
 
 
-run_converted = recursion(_converted)
+run_converted = recursion(_converted, Conversions)

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from ftproc.core.compiled import kernel, part, record, zeros
 from ftproc.core.filtering import ukf
 from ftproc.core.filtering.forward import Span, lead_in, store
-from ftproc.core.filtering.records import FilterRun, Model, Observations, Row, Start, between, empty_rows
+from ftproc.core.filtering.records import FilterRun, Model, Observations, Row, Rows, Samples, Start, between, empty_rows
 from ftproc.core.model import motion
+from ftproc.core.signatures import Layout, Matrix
 
 FloatArray = NDArray[np.float64]
 
@@ -33,6 +34,7 @@ class Mode(Protocol):
 
 
 MODE = record(Mode)
+Modes = Annotated[Any, Layout(MODE)]
 
 
 @part
@@ -70,7 +72,7 @@ def _mix(stay: float, filters: Any, modes: Any, share: FloatArray) -> None:
 
 @kernel
 def _run(
-    span: Span, samples: Any, filters: Any, modes: Any, sojourn_s: float, rows: Any, probability: FloatArray
+    span: Span, samples: Samples, filters: ukf.Filters, modes: Modes, sojourn_s: float, rows: Rows, probability: Matrix
 ) -> float:
     """Filter a span by all models; the last of the filters is what they say together. Fills the rows and the
     probability (n, m) of each model; returns the log-likelihood."""

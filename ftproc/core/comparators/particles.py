@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ftproc.core.comparators.ensemble import Analysis, Forecast, corrected, enkf, misfit, root, spread
 from ftproc.core.comparators.fuzzy import chi_square_quantile, trust_in_members, trust_in_reading
 from ftproc.core.compiled import kernel
+from ftproc.core.signatures import Matrix, Vector
 
 FloatArray = NDArray[np.float64]
 
@@ -116,7 +117,7 @@ def _walk(known: Forecast, members: FloatArray, trust: FloatArray, rng: Generato
 
 
 @kernel
-def log_kernel_sum(points: FloatArray, centres: FloatArray) -> FloatArray:
+def log_kernel_sum(points: Matrix, centres: Matrix) -> Vector:
     """(n,) ln sum_j exp(-|point - centre_j|^2 / 2); points (n, d), centres (d, m) with a column each."""
     count, states = points.shape
     out, distance = np.empty(count), np.empty(centres.shape[1])

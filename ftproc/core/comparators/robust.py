@@ -21,6 +21,7 @@ from ftproc.core.compiled import kernel, part, record, zeros
 from ftproc.core.filtering import ukf
 from ftproc.core.filtering.forward import recursion, store_innovation
 from ftproc.core.filtering.records import Row, Sample
+from ftproc.core.signatures import Layout
 
 FloatArray = NDArray[np.float64]
 
@@ -51,6 +52,7 @@ class Weighting(Protocol):
 
 
 WEIGHTING = record(Weighting)
+Weightings = Annotated[Any, Layout(WEIGHTING)]
 
 
 def weighting_of(kind: int, parameter: float) -> Any:
@@ -76,7 +78,7 @@ def _weigh(f: ukf.Filter, how: Weighting) -> bool:
 
 
 @part
-def _reweighted(f: ukf.Filter, sample: Sample, weightings: Any, row: Row) -> tuple[float, bool]:
+def _reweighted(f: ukf.Filter, sample: Sample, weightings: Weightings, row: Row) -> tuple[float, bool]:
     """The update of a sample, repeated until its weights fit the residuals that it leaves."""
     how = weightings[0]
     how.x[:] = f.x
@@ -107,4 +109,4 @@ def _reweighted(f: ukf.Filter, sample: Sample, weightings: Any, row: Row) -> tup
     return gained, False
 
 
-run_robust = recursion(_reweighted)
+run_robust = recursion(_reweighted, Weightings)

@@ -26,6 +26,7 @@ from ftproc.core.filtering import ukf
 from ftproc.core.filtering.forward import recursion, store_innovation
 from ftproc.core.filtering.records import Row, Sample
 from ftproc.core.model.measurement import measure, wrap_angle
+from ftproc.core.signatures import Layout
 
 FloatArray = NDArray[np.float64]
 
@@ -84,6 +85,7 @@ class Gate(Protocol):
 
 
 GATE = record(Gate)
+Gates = Annotated[Any, Layout(GATE)]
 
 
 def gate_of(settings: GateSettings) -> Any:
@@ -177,7 +179,7 @@ def _diverged(f: ukf.Filter) -> bool:
 
 
 @part
-def _gated(f: ukf.Filter, sample: Sample, gates: Any, row: Row) -> tuple[float, bool]:
+def _gated(f: ukf.Filter, sample: Sample, gates: Gates, row: Row) -> tuple[float, bool]:
     """The update of a sample through the gate; a component whose weight is zero in the log is barred."""
     gate = gates[0]
     ukf.linearise(f)
@@ -198,4 +200,4 @@ def _gated(f: ukf.Filter, sample: Sample, gates: Any, row: Row) -> tuple[float, 
     return gained, lost
 
 
-run_gated = recursion(_gated)
+run_gated = recursion(_gated, Gates)

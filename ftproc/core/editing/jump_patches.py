@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part
+from ftproc.core.signatures import Vector
 
 FloatArray = NDArray[np.float64]
 
@@ -98,7 +99,7 @@ def _is_patch(begin: int, end: int, t: FloatArray, z: FloatArray, sigma: float, 
 
 
 @kernel
-def find(time: FloatArray, channel: FloatArray, good: FloatArray, sigma: float) -> FloatArray:
+def find(time: Vector, channel: Vector, good: Vector, sigma: float) -> Vector:
     """(n,) 1 where a reading that was thought good belongs to a patch between two jumps.
 
     time (n,) s, channel (n,) one component (an azimuth unwrapped), good (n,) weight so far, sigma: its noise.

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part
+from ftproc.core.signatures import Matrix, Vector
 
 FloatArray = NDArray[np.float64]
 
@@ -103,9 +104,7 @@ def _estimate_rates(counts: FloatArray, rates: FloatArray) -> None:
 
 
 @kernel
-def classify(
-    residual: FloatArray, variance: FloatArray, noise_variance: FloatArray, rates: FloatArray, gate: float
-) -> FloatArray:
+def classify(residual: Matrix, variance: Matrix, noise_variance: Vector, rates: Matrix, gate: float) -> Matrix:
     """(n, 3) probability that each reading is good; zero where missing. `rates` (3, 3) are estimated in place.
 
     residual, variance: (n, 3) leave-one-out, from the smoother; noise_variance (3,). gate: sigmas.
@@ -124,7 +123,7 @@ def classify(
 
 
 @kernel
-def label_runs(weight: FloatArray, measurement: FloatArray, longest_isolated: int) -> FloatArray:
+def label_runs(weight: Matrix, measurement: Matrix, longest_isolated: int) -> Matrix:
     """(n, 3) labels as float: 0 good, 1 isolated, 2 patch (a longer run of rejections), 3 missing.
 
     Missing readings within a run of rejections neither end it nor count towards it.

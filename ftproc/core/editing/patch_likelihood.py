@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part
 from ftproc.core.editing.screening import median
+from ftproc.core.signatures import Vector
 
 FloatArray = NDArray[np.float64]
 
@@ -28,7 +29,7 @@ ROUNDS = 6  # of the search for the curve
 
 @kernel
 def log_probability(
-    time: FloatArray, residual: FloatArray, variance: FloatArray, weight: FloatArray, sigma: float, rates: FloatArray
+    time: Vector, residual: Vector, variance: Vector, weight: Vector, sigma: float, rates: Vector
 ) -> float:
     """Log-probability of the rejected readings of one component (n,), and of there being such; without ln sqrt(2 pi).
 

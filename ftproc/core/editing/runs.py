@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel
 from ftproc.core.editing.screening import median
+from ftproc.core.signatures import Flags, Vector
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -48,7 +49,7 @@ def suspicious(time_s: FloatArray, residual: FloatArray, variance: FloatArray, w
 
 
 @kernel
-def _scales(total: FloatArray, longest: int) -> FloatArray:
+def _scales(total: Vector, longest: int) -> Vector:
     """(longest + 1,) robust 1-sigma of the sums over runs of each length, from SCALE_SAMPLES of them or a few more."""
     m = len(total) - 1
     every = max(m // SCALE_SAMPLES, 1)
@@ -63,7 +64,7 @@ def _scales(total: FloatArray, longest: int) -> FloatArray:
 
 
 @kernel
-def _scan(total: FloatArray, scale: FloatArray) -> NDArray[np.bool_]:
+def _scan(total: Vector, scale: Vector) -> Flags:
     """(m,) readings of suspicious runs. total: (m + 1,) sums of u up to each reading; scale: by length of run."""
     m, longest = len(total) - 1, len(scale) - 1
     score, end = np.zeros(m), np.zeros(m, np.int64)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part
 from ftproc.core.model.measurement import wrapped
+from ftproc.core.signatures import Vector
 
 FloatArray = NDArray[np.float64]
 
@@ -102,7 +103,7 @@ def _best_parabola(
 
 
 @kernel
-def screen_component(time: FloatArray, z: FloatArray, window: int, angular: bool) -> tuple[FloatArray, FloatArray]:
+def screen_component(time: Vector, z: Vector, window: int, angular: bool) -> tuple[Vector, Vector]:
     """(n,) share of windows in which each sample lies off the parabola, and (windows,) scale of each window.
 
     time (n,) s, z (n,) reading with NaN where missing, window: samples per window; windows overlap three-fold.
@@ -168,7 +169,7 @@ def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
 
 
 @kernel
-def bar_runs(channel: FloatArray, votes: FloatArray, near: FloatArray, weight: FloatArray) -> None:
+def bar_runs(channel: Vector, votes: Vector, near: Vector, weight: Vector) -> None:
     """Set the weights (n,) of outvoted readings to zero, if their run begins or ends with a jump; missing readings (NaN
     in the channel) neither end a run nor belong to it.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from ftproc.core.filtering.forward import Estimated
 from ftproc.core.filtering.ukf import Filter
 from ftproc.core.model import motion
 from ftproc.core.model.measurement import line_of_sight_sigma
+from ftproc.core.signatures import Layout
 
 FloatArray = NDArray[np.float64]
 
@@ -41,6 +42,7 @@ class Backward(Protocol):
 
 
 BACKWARD = record(Backward)
+Backwards = Annotated[Any, Layout(BACKWARD)]
 
 
 @part

@@ -12,9 +12,21 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part, record, zeros
 from ftproc.core.filtering import ukf
-from ftproc.core.filtering.records import FilterRun, Model, Observations, Row, Sample, Start, between, empty_rows
+from ftproc.core.filtering.records import (
+    FilterRun,
+    Model,
+    Observations,
+    Row,
+    Rows,
+    Sample,
+    Samples,
+    Start,
+    between,
+    empty_rows,
+)
 from ftproc.core.model import jacobian, motion
 from ftproc.core.model.measurement import line_of_sight_sigma
+from ftproc.core.signatures import Layout
 
 FloatArray = NDArray[np.float64]
 
@@ -79,7 +91,9 @@ def _weighted(f: ukf.Filter, sample: Sample, extended: bool, row: Row) -> tuple[
 _update: Update = _weighted  # of the loop below; each recursion has its own
 
 
-def _loop(span: Span, samples: Any, profile: motion.Profile, filters: Any, extra: Any, rows: Any) -> tuple[int, float]:
+def _loop(
+    span: Span, samples: Samples, profile: motion.Profile, filters: ukf.Filters, extra: Any, rows: Rows
+) -> tuple[int, float]:
     """Predict, update, keep what came of it; see `recursion`."""
     f = filters[0]
     likelihood = 0.0
@@ -98,22 +112,23 @@ def _loop(span: Span, samples: Any, profile: motion.Profile, filters: Any, extra
     return span.last, likelihood
 
 
-def recursion(update: Update) -> Recursion:
+def recursion(update: Update, kind: Any) -> Recursion:
     """A recursive filter: the kernel that runs the loop with this update of one sample compiled into it.
 
     The kernel takes a span of the samples, from the state of the filter (an array of one `ukf.Filter`), which it
-    changes, and fills the rows. extra: what else the update needs. It returns the sample at which the track was lost,
-    or the span's end, and the log-likelihood of what was used.
+    changes, and fills the rows. extra: what else the update needs, annotated as `kind`. It returns the sample at which
+    the track was lost, or the span's end, and the log-likelihood of what was used.
 
     The code of the loop is shared; each kernel has an `_update` of its own among its globals. (A closure would say the
     same, but numba keeps no machine code of closures.)
     """
     function = FunctionType(_loop.__code__, {**globals(), "_update": update}, update.__name__)
-    function.__qualname__ = f"{update.__module__}.{update.__name__}"
+    function.__module__, function.__qualname__ = update.__module__, update.__name__
+    function.__annotations__ = {**_loop.__annotations__, "extra": kind}
     return kernel(function)
 
 
-run_weighted = recursion(_weighted)
+run_weighted = recursion(_weighted, bool)
 
 
 class Estimated(Protocol):
@@ -128,10 +143,11 @@ class Estimated(Protocol):
 
 
 ESTIMATED = record(Estimated)
+Estimates = Annotated[Any, Layout(ESTIMATED)]
 
 
 @kernel
-def _extrapolate(sample: int, samples: Any, profile: motion.Profile, filters: Any, rows: Any) -> None:
+def _extrapolate(sample: int, samples: Samples, profile: motion.Profile, filters: ukf.Filters, rows: Estimates) -> None:
     """Fill the rows of the samples before `sample` from the state there, which is changed; no reading is used."""
     f = filters[0]
     for k in range(sample - 1, -1, -1):

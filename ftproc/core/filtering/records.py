@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ftproc.core.compiled import record, zeros
 from ftproc.core.filtering.ukf import FILTER
 from ftproc.core.model.motion import Profile
+from ftproc.core.signatures import Layout
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -41,6 +42,8 @@ class Row(Protocol):
 
 
 SAMPLE, ROW = record(Sample), record(Row)
+Samples = Annotated[Any, Layout(SAMPLE)]
+Rows = Annotated[Any, Layout(ROW)]
 
 
 class Observations(NamedTuple):

@@ -29,9 +29,10 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part, zeros
 from ftproc.core.filtering import backward, ukf
-from ftproc.core.filtering.forward import ESTIMATED, Span, advance, extrapolated
-from ftproc.core.filtering.records import Model, Observations, Sample, Start, between
+from ftproc.core.filtering.forward import ESTIMATED, Estimates, Span, advance, extrapolated
+from ftproc.core.filtering.records import Model, Observations, Sample, Samples, Start, between
 from ftproc.core.model import motion
+from ftproc.core.signatures import Matrix
 
 FloatArray = NDArray[np.float64]
 
@@ -71,9 +72,9 @@ class Memory(NamedTuple):
     """What a sweep works on: `ukf.Filter` records, one for each sample of a block and one for the state before each
     block, and one `backward.Backward`."""
 
-    block: Any
-    before: Any
-    back: Any
+    block: ukf.Filters
+    before: ukf.Filters
+    back: backward.Backwards
 
     @classmethod
     def of(cls, samples: int, first: Any) -> Memory:
@@ -113,7 +114,13 @@ def _copy_state(source: ukf.Filter, target: ukf.Filter) -> None:
 
 @kernel
 def _sweep(
-    span: Span, samples: Any, profile: motion.Profile, memory: Memory, rows: Any, jerk_score: FloatArray, kept: int
+    span: Span,
+    samples: Samples,
+    profile: motion.Profile,
+    memory: Memory,
+    rows: Estimates,
+    jerk_score: Matrix,
+    kept: int,
 ) -> float:
     """Both sweeps over a span; the log-likelihood. Adds to the jerk score (m, 6); fills what is kept of the rows, and
     with residuals alone also the state of the first sample."""

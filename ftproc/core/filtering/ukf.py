@@ -15,13 +15,14 @@ bend of h adds to the measurement noise.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import part, record
 from ftproc.core.model.measurement import MIN_RANGE_M, turn, wrap_angle
+from ftproc.core.signatures import Layout
 
 FloatArray = NDArray[np.float64]
 
@@ -57,6 +58,7 @@ class Filter(Protocol):
 
 
 FILTER = record(Filter)
+Filters = Annotated[Any, Layout(FILTER)]
 
 
 @part

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ftproc.core.compiled import kernel
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.model.measurement import wrapped
+from ftproc.core.signatures import Flags, Indices, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -53,8 +54,8 @@ def merge(log: Observations, starts: list[Start], count: int) -> tuple[Observati
 
 @kernel
 def _means(
-    time: FloatArray, z: FloatArray, weight: FloatArray, begins: NDArray[np.bool_], count: int, longest: float
-) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
+    time: Vector, z: Matrix, weight: Matrix, begins: Flags, count: int, longest: float
+) -> tuple[Vector, Matrix, Matrix, Indices]:
     """Times (m,), means (m, 3) and numbers (m, 3) of groups, and the group of each sample (n,)."""
     n = len(time)
     group = np.zeros(n, np.int64)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import part
+from ftproc.core.signatures import Matrix
 
 FloatArray = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ def isotropic(jerk_psd: float) -> FloatArray:
 class Profile(NamedTuple):
     """The process noise of a log: jerk (m, 6) tensors, each row holding for knot_s seconds from first_s on."""
 
-    jerk: FloatArray
+    jerk: Matrix
     knot_s: float
     first_s: float
 

@@ -12,8 +12,7 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-
-from ftproc.core.compiled import kernel, part
+from numba import njit
 
 HZ = 100
 DT = 1 / HZ
@@ -43,14 +42,14 @@ class Drive(NamedTuple):
     push: np.ndarray
 
 
-@part
+@njit(error_model="numpy")
 def cross(a, b, out):
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@part
+@njit(error_model="numpy")
 def rotation(v, out):
     """exp of the rotation vector (3,), a matrix (3, 3)."""
     angle2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
@@ -69,7 +68,7 @@ def rotation(v, out):
     out[2, 1] += s * v[0]
 
 
-@part
+@njit(error_model="numpy")
 def multiply(a, b, out):
     """out (3, 3) = a b."""
     for i in range(3):
@@ -77,7 +76,7 @@ def multiply(a, b, out):
             out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
 
 
-@part
+@njit(error_model="numpy")
 def surroundings(velocity, place, frame, slowing, radii):
     """For the next step: the turn of the local axes in rad, gravity and Coriolis in m/s; the radii of curvature along
     the meridian and across it in m."""
@@ -96,7 +95,7 @@ def surroundings(velocity, place, frame, slowing, radii):
         slowing[i] *= DT
 
 
-@part
+@njit(error_model="numpy")
 def travel(before, after, radii, place):
     """Move a place by the mean of the velocities before and after one step."""
     latitude = place[0]
@@ -105,7 +104,7 @@ def travel(before, after, radii, place):
     place[2] += DT * 0.5 * (before[2] + after[2])
 
 
-@kernel
+@njit(cache=True, error_model="numpy")
 def navigate(turn, push, gyro_bias, push_bias, attitude, velocity, place, lever, gained):
     """The computer's steps through increments (n, 3), less the biases it knows (rad/s, m/s2); attitude, velocity and
     place in place. Fills lever (3, 3), the integral of the attitude in s, and gained (3,), the pushes in local axes.
@@ -139,7 +138,7 @@ def navigate(turn, push, gyro_bias, push_bias, attitude, velocity, place, lever,
         multiply(back, half, attitude)
 
 
-@kernel
+@njit(cache=True, error_model="numpy")
 def sense(attitude, velocity, place, turn, push):
     """The increments (n, 3) by which `navigate` goes through attitudes (n + 1, 3, 3) and velocities (n + 1, 3), and
     the places (n + 1, 3) that it passes; place[0] is given."""

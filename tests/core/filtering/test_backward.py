@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core.compiled import zeros
 from ftproc.core.filtering import backward
 from ftproc.core.filtering.forward import ESTIMATED
 from ftproc.core.filtering.records import Model
@@ -13,6 +12,7 @@ from ftproc.core.filtering.smoother import score_log, smooth_log
 from ftproc.core.filtering.ukf import FILTER
 from ftproc.core.model import motion
 from tests import naive
+from tests.core.single import one
 from tests.core.tracks import matched
 
 STRAIGHT = {"distance": 1e6, "sigma": np.array([0.1, 1e-7, 2e-7])}  # so far and so exact that h is almost straight
@@ -136,8 +136,8 @@ def test_likelihood_is_highest_near_the_true_noise_and_jerk():
 
 
 def test_a_sigma_is_a_number_even_where_the_covariance_is_none():
-    f, back, rows = zeros(FILTER)[0], zeros(backward.BACKWARD)[0], zeros(ESTIMATED)
+    f, back, row = one(FILTER), one(backward.BACKWARD), one(ESTIMATED)
     f["x"], f["p"] = np.arange(1.0, 10.0), np.diag([-1.0, *np.ones(8)])
     backward.estimate(back, f)
-    backward.store(back, f, rows[0])
-    np.testing.assert_allclose(rows["sigma"][0], [1e-7, *np.ones(8)])
+    backward.store(back, f, row)
+    np.testing.assert_allclose(row["sigma"], [1e-7, *np.ones(8)])

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core.compiled import zeros
 from ftproc.core.filtering.backward import BACKWARD
 from ftproc.core.model import motion
 from tests import naive
-from tests.core.single import filter_at
+from tests.core.single import filter_at, one
 from tests.core.tracks import covariance, random_jerk
 
 INTERVALS = [0.0, 1e-6, 0.05, 1.0, 7.3, 120.0, -0.05, -2.0]
@@ -94,7 +93,7 @@ def test_adjoint_is_the_transpose(interval):
     rng = np.random.default_rng(7)
     r, n = rng.normal(0, 1, 9), covariance(rng, np.ones(9))
     phi = naive.transition(interval)
-    back = zeros(BACKWARD)[0]
+    back = one(BACKWARD)
     back["r"], back["n"] = r, n
     motion.adjoint(back, interval)
     np.testing.assert_allclose(back["r"], phi.T @ r, rtol=1e-12, atol=1e-12)

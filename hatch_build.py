@@ -1,0 +1,130 @@
+"""Compiles the kernels when ftproc is installed: `pip install` (also -e) calls this, `python hatch_build.py` by hand.
+
+numba compiles ahead of time what it compiles at run time otherwise, from the same sources, for any x86-64 (or whatever
+the machine is) rather than for this processor, into one library beside them. Where that fails, for want of a C compiler
+say, the wheel asks for numba.
+
+What numba.pycc leaves to be done: its functions would keep the interpreter's lock, and know no `fastmath` and no error
+model. There is no public option; the flags are set where it makes them.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parent
+CORE = ROOT / "ftproc" / "core"
+GENERIC = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+AT_RUN_TIME = "numba>=0.59"
+
+try:
+    from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+except ImportError:  # called by hand
+    BuildHookInterface = object
+
+
+class CustomBuildHook(BuildHookInterface):  # type: ignore[misc, valid-type]
+    """Puts the library of kernels into the wheel, or numba among its requirements."""
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        done = subprocess.run(
+            [sys.executable, __file__], cwd=ROOT, env=os.environ | GENERIC, capture_output=True, text=True
+        )
+        if done.returncode:
+            self.app.display_warning(f"the kernels are not compiled: {(done.stderr.strip() or '?').splitlines()[-1]}")
+            self.app.display_warning(f"the wheel asks for {AT_RUN_TIME} in their place")
+            build_data["dependencies"].append(AT_RUN_TIME)
+            return
+        build_data["pure_python"] = False
+        build_data["infer_tag"] = True
+        build_data["artifacts"].append(Path(done.stdout.strip()).relative_to(ROOT).as_posix())
+        for notice in importlib.metadata.files("numba") or []:  # its runtime is a part of the library
+            if notice.name.startswith("LICENSE"):
+                build_data["force_include"][str(notice.locate())] = f"ftproc/core/numba-{notice.name}"
+
+
+def library() -> Path:
+    """The library of kernels, made if it is not there; those of other sources are removed."""
+    from ftproc.core import compiled
+
+    made = CORE / (compiled.LIBRARY + sysconfig.get_config_var("EXT_SUFFIX"))
+    if not made.exists() or made.stat().st_mtime < Path(__file__).stat().st_mtime:
+        compile_kernels(made)
+    for old in CORE.glob("_kernels_*"):
+        if old != made:
+            old.unlink()
+    return made
+
+
+def compile_kernels(made: Path) -> None:
+    """Compile all kernels into a library at this path."""
+    import numba.pycc.compiler as inner
+    from numba.core.cpu_options import FastMathOptions
+    from numba.core.typing import signature
+    from numba.pycc import CC
+
+    plain = inner.Flags
+
+    def flags() -> Any:
+        made = plain()
+        made.error_model, made.fastmath = compiled.HOW["error_model"], FastMathOptions(compiled.HOW["fastmath"])
+        made.release_gil = True
+        return made
+
+    from ftproc.core import compiled, signatures
+
+    load(CORE, "ftproc.core")
+    inner.Flags = flags
+    compiler = CC(compiled.LIBRARY, source_module=compiled)
+    for name, function in compiled.KERNELS.items():
+        takes, gives = signatures.signature(function)
+        arguments = [numba_type(hint) for hint in takes.values()]
+        compiler.export(name, signature(numba_type(gives), *arguments))(function)
+    with tempfile.TemporaryDirectory(dir=CORE) as room:  # a reader never sees half a library
+        compiler.output_dir = room
+        compiler.compile()
+        Path(room, compiler.output_file).rename(made)
+
+
+def load(room: Path, name: str) -> None:
+    """Import every module below a folder: each registers its kernels."""
+    import importlib
+
+    for path in sorted(room.iterdir()):
+        if path.is_dir() and (path / "__init__.py").exists():
+            load(path, f"{name}.{path.name}")
+        elif path.suffix == ".py":
+            importlib.import_module(f"{name}.{path.stem}".removesuffix(".__init__"))
+
+
+def numba_type(hint: Any) -> Any:
+    """The type by which numba knows what an annotation describes."""
+    from typing import get_type_hints
+
+    import numba
+    from numba.core import types
+
+    from ftproc.core import signatures
+
+    plain = {float: types.float64, int: types.int64, bool: types.boolean, type(None): types.none}
+    if (layout := signatures.layout_of(hint)) is not None:
+        return types.Array(numba.from_dtype(layout.dtype), layout.ndim, "C")
+    if signatures.is_record(hint):
+        fields = get_type_hints(hint, include_extras=True).values()
+        return types.NamedTuple([numba_type(field) for field in fields], hint)
+    if hint in plain:
+        return plain[hint]
+    return types.Tuple([numba_type(member) for member in signatures.members(hint)])
+
+
+if __name__ == "__main__":
+    os.environ.update(GENERIC, FTPROC_KERNELS="jit")
+    sys.path.insert(0, str(ROOT))
+    print(library())
