@@ -21,7 +21,8 @@ from typing import Any
 
 ROOT = Path(__file__).parent
 CORE = ROOT / "ftproc" / "core"
-GENERIC = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+#: For any processor of the kind; short loops, which P is full of, become vector instructions.
+OPTIONS = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_SLP_VECTORIZE": "1"}
 AT_RUN_TIME = "numba>=0.59"
 
 try:
@@ -35,7 +36,7 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[misc, valid-type]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         done = subprocess.run(
-            [sys.executable, __file__], cwd=ROOT, env=os.environ | GENERIC, capture_output=True, text=True
+            [sys.executable, __file__], cwd=ROOT, env=os.environ | OPTIONS, capture_output=True, text=True
         )
         if done.returncode:
             self.app.display_warning(f"the kernels are not compiled: {(done.stderr.strip() or '?').splitlines()[-1]}")
@@ -125,6 +126,6 @@ def numba_type(hint: Any) -> Any:
 
 
 if __name__ == "__main__":
-    os.environ.update(GENERIC, FTPROC_KERNELS="jit")
+    os.environ.update(OPTIONS, FTPROC_KERNELS="jit")
     sys.path.insert(0, str(ROOT))
     print(library())

@@ -91,6 +91,7 @@ def _run(
             for m in range(models):
                 row.predicted[i] += modes[m].expected * filters[m].x[i]
         any_used = False
+        row.nis = math.nan
         for m in range(models):
             f = filters[m]
             ukf.linearise(f)
@@ -98,7 +99,6 @@ def _run(
             any_used = ukf.use(samples[k].weight, f)
             modes[m].gained = 0.0
             if any_used:
-                ukf.cross_covariance(f)
                 modes[m].nis, modes[m].gained = ukf.update(f)
         likelihood += _weigh_models(modes)
         _store_innovation(filters, modes, any_used, row)

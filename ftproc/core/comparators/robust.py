@@ -85,7 +85,6 @@ def _reweighted(f: ukf.Filter, sample: Sample, weightings: Weightings, row: Row)
     how.p[:] = f.p
     ukf.linearise(f)
     ukf.innovate(sample.measurement, f)
-    ukf.cross_covariance(f)
     store_innovation(f, row)
     for i in range(3):
         how.residual[i] = f.e[i]

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part, record, zeros
 from ftproc.core.filtering import ukf
-from ftproc.core.filtering.forward import recursion, store_innovation
+from ftproc.core.filtering.forward import recursion
 from ftproc.core.filtering.records import Row, Sample
-from ftproc.core.model.measurement import measure, wrap_angle
+from ftproc.core.model.measurement import moves, wrap_angle, wrapped
 from ftproc.core.signatures import Layout
 
 FloatArray = NDArray[np.float64]
@@ -98,19 +98,19 @@ def gate_of(settings: GateSettings) -> Any:
 
 
 @part
-def _decide(f: ukf.Filter, sample: Sample, gate: Gate) -> bool:
-    """Weights of a sample from its innovation; False while any component is in a patch."""
+def _decide(f: ukf.Filter, sample: Sample, gate: Gate, sigma: FloatArray) -> bool:
+    """Weights of a sample from its innovation, of this 1-sigma (3,); False while any component is in a patch."""
     e, used = f.e, f.used
     all_inside = True
     for i in range(3):
         used[i] = 0.0
         if not math.isfinite(e[i]) or sample.weight[i] <= 0:
             continue
-        u = abs(e[i]) / math.sqrt(f.c[i, i] + f.noise[i])
+        u = abs(e[i]) / sigma[i]
         step = e[i] - gate.residual[i]
         if i == 1:
             step = wrap_angle(step)
-        jumped = not abs(step) <= JUMP * math.sqrt(2 * f.noise[i])  # no residual yet (NaN) counts as a jump
+        jumped = not step * step <= 2 * JUMP * JUMP * f.noise[i]  # no residual yet (NaN) counts as a jump
         if gate.in_patch[i] == 0:
             # A smooth departure within the outer gate is a manoeuvre; beyond it no tuned filter is left behind.
             used[i] = igg3(u, gate.full, gate.zero) if jumped or u >= gate.zero else 1.0
@@ -134,20 +134,16 @@ def _decide(f: ukf.Filter, sample: Sample, gate: Gate) -> bool:
 @part
 def _update_by_gain(f: ukf.Filter) -> tuple[float, float]:
     """The paper's letter, K <- K m, with the covariance that any gain has: P - K Pxz' - Pxz K' + K S K'."""
-    x, p, e, used, s, s_inv, pxz, gain = f.x, f.p, f.e, f.used, f.s, f.s_inv, f.pxz, f.gain
+    x, p, e, used, s, pxz, gain = f.x, f.p, f.e, f.used, f.s, f.pxz, np.empty((9, 3))
     for i in range(3):
         for j in range(3):
             s[i, j] = f.c[i, j] + (f.noise[i] if i == j else 0.0)
-    log_det = ukf.invert_used(f)
-    nis = 0.0
-    for i in range(3):
-        for j in range(3):
-            if used[i] > 0 and used[j] > 0:
-                nis += e[i] * s_inv[i, j] * e[j]
+    ukf.cross_covariance(f)
+    nis, log_det = ukf.whiten(f)
+    ukf.gain_of(f, gain)
     for i in range(9):
         for j in range(3):
-            full = pxz[i, 0] * s_inv[0, j] + pxz[i, 1] * s_inv[1, j] + pxz[i, 2] * s_inv[2, j]
-            gain[i, j] = full * used[j]
+            gain[i, j] *= used[j]
             if used[j] > 0:
                 x[i] += gain[i, j] * e[j]
     for i in range(9):
@@ -184,17 +180,18 @@ def _gated(f: ukf.Filter, sample: Sample, gates: Gates, row: Row) -> tuple[float
     gate = gates[0]
     ukf.linearise(f)
     ukf.innovate(sample.measurement, f)
-    all_inside = _decide(f, sample, gate)
-    store_innovation(f, row)
+    for i in range(3):
+        row.innovation_sigma[i] = math.sqrt(f.c[i, i] + f.noise[i])
+    all_inside = _decide(f, sample, gate, row.innovation_sigma)
+    for i in range(3):
+        row.innovation[i], row.weight[i] = f.e[i], f.used[i]
     gained = 0.0
     if f.used[0] > 0 or f.used[1] > 0 or f.used[2] > 0:
-        ukf.cross_covariance(f)
         row.nis, gained = _update_by_gain(f) if gate.gain_form > 0 else ukf.update(f)
-    f.z_hat[0], f.z_hat[1], f.z_hat[2] = measure(f.x[0], f.x[1], f.x[2])
-    ukf.innovate(sample.measurement, f)
+    moved = moves(row.predicted, f.x)
     for i in range(3):
         if math.isfinite(f.e[i]) and sample.weight[i] > 0:
-            gate.residual[i] = f.e[i]
+            gate.residual[i] = wrapped(f.e[i] + f.bend[i] - moved[i], i == 1)
     lost = gate.wait <= 0 and (_diverged(f) or (not all_inside and _overdue(gate, sample.time_s)))
     gate.wait -= 1
     return gained, lost

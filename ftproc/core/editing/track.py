@@ -107,13 +107,15 @@ def filter_and_edit(
 def reacquire(time_s: FloatArray, measurement: FloatArray, noise_variance: FloatArray, sample: int) -> Start | None:
     """A new start at `sample` from the raw readings just before it, if each component's agree with each other."""
     low = max(0, sample + 1 - REACQUIRE_SAMPLES)
-    weight = np.zeros_like(measurement)
+    time, near = time_s[low : sample + 1], measurement[low : sample + 1]
+    weight = np.zeros_like(near)
     for c in range(3):
-        channel = np.ascontiguousarray(measurement[low : sample + 1, c])
+        channel = np.ascontiguousarray(near[:, c])
         seen = np.isfinite(channel)
-        votes, scales = screening.screen_component(time_s[low : sample + 1], channel, REACQUIRE_SAMPLES, c == 1)
+        votes, scales = screening.screen_component(time, channel, REACQUIRE_SAMPLES, c == 1)
         fits = seen & (votes <= 0.5)
         if seen.sum() < 5 or fits.sum() < INLIERS * seen.sum() or scales.min() > 3 * np.sqrt(noise_variance[c]):
             return None
-        weight[low : sample + 1, c] = fits
-    return first_state(Observations(time_s, measurement, weight), noise_variance, sample, slice(low, sample + 1))
+        weight[:, c] = fits
+    found = first_state(Observations(time, near, weight), noise_variance, sample - low, slice(0, len(time)))
+    return found._replace(sample=sample)

@@ -21,19 +21,19 @@ FloatArray = NDArray[np.float64]
 class Backward(Protocol):
     """The record of the backward recursion: r, N, and what a step computes on its way.
 
-    u, m, nk: u, M, N K of the smoother's head. state, cov: of the smoothed estimate (of the covariance only the blocks
+    v, w, nu: v, W, U N of the smoother's head. state, cov: of the smoothed estimate (of the covariance only the blocks
     of position and velocity, and the diagonal). pn: P N. q: coefficients of Q. residual, variance: leave-one-out.
     noise_score: its sum so far. n_first: N+ of the first sample.
     """
 
     r: Annotated[FloatArray, 9]
     n: Annotated[FloatArray, 9, 9]
-    u: Annotated[FloatArray, 3]
-    m: Annotated[FloatArray, 3, 3]
-    nk: Annotated[FloatArray, 9, 3]
+    v: Annotated[FloatArray, 3]
+    w: Annotated[FloatArray, 3, 3]
+    nu: Annotated[FloatArray, 3, 9]
     state: Annotated[FloatArray, 9]
     cov: Annotated[FloatArray, 9, 9]
-    pn: Annotated[FloatArray, 9, 9]
+    pn: Annotated[FloatArray, 9]
     q: Annotated[FloatArray, 3, 3]
     residual: Annotated[FloatArray, 3]
     variance: Annotated[FloatArray, 3]
@@ -50,19 +50,18 @@ def estimate(back: Backward, f: Filter) -> None:
     """The smoothed state x+ + P+ r and its covariance P+ - P+ N P+."""
     x, p, r, n, pn, state, cov = f.x, f.p, back.r, back.n, back.pn, back.state, back.cov
     for i in range(9):
-        total = x[i]
+        p0, p1, p2, p3, p4, p5, p6, p7, p8 = (
+            p[i, 0], p[i, 1], p[i, 2], p[i, 3], p[i, 4], p[i, 5], p[i, 6], p[i, 7], p[i, 8]
+        )  # fmt: skip
+        near = p0 * r[0] + p1 * r[1] + p2 * r[2] + p3 * r[3] + p4 * r[4]
+        state[i] = x[i] + (near + p5 * r[5] + p6 * r[6] + p7 * r[7] + p8 * r[8])
         for j in range(9):
-            total += p[i, j] * r[j]
-            pn[i, j] = 0.0
-        state[i] = total
-        for k in range(9):
-            for j in range(9):
-                pn[i, j] += p[i, k] * n[k, j]
-    for i in range(9):
+            near = p0 * n[0, j] + p1 * n[1, j] + p2 * n[2, j] + p3 * n[3, j] + p4 * n[4, j]
+            pn[j] = near + p5 * n[5, j] + p6 * n[6, j] + p7 * n[7, j] + p8 * n[8, j]
         for j in range(i // 3 * 3 if i < 6 else i, i + 1):
             v = p[i, j]
             for k in range(9):
-                v -= pn[i, k] * p[j, k]
+                v -= pn[k] * p[j, k]
             cov[i, j] = v
             cov[j, i] = v
 
@@ -81,65 +80,82 @@ def store(back: Backward, f: Filter, row: Estimated) -> None:
 def absorb(back: Backward, f: Filter) -> None:
     """Take r and N back over the measurement of a sample; leave the leave-one-out residuals and their variances behind,
     and add to the score of the noise."""
-    r, n, u, m, nk = back.r, back.n, back.u, back.m, back.nk
-    h, e, used, s_inv, gain = f.h, f.e, f.used, f.s_inv, f.gain
+    r, n, v, w, nu = back.r, back.n, back.v, back.w, back.nu
+    y, g, u = f.y, f.g, f.u
     for i in range(3):
-        u[i] = 0.0
-        for j in range(3):
-            if used[j] > 0:
-                u[i] += s_inv[i, j] * e[j]
-        for a in range(9):
-            u[i] -= gain[a, i] * r[a]
-    for a in range(9):
-        s0 = s1 = s2 = 0.0
-        for b in range(9):
-            s0 += n[a, b] * gain[b, 0]
-            s1 += n[a, b] * gain[b, 1]
-            s2 += n[a, b] * gain[b, 2]
-        nk[a, 0], nk[a, 1], nk[a, 2] = s0, s1, s2
+        u0, u1, u2, u3, u4, u5, u6, u7, u8 = (
+            u[i, 0], u[i, 1], u[i, 2], u[i, 3], u[i, 4], u[i, 5], u[i, 6], u[i, 7], u[i, 8]
+        )  # fmt: skip
+        near = u0 * r[0] + u1 * r[1] + u2 * r[2] + u3 * r[3] + u4 * r[4]
+        v[i] = y[i] - (near + u5 * r[5] + u6 * r[6] + u7 * r[7] + u8 * r[8])
+        for j in range(9):
+            near = u0 * n[0, j] + u1 * n[1, j] + u2 * n[2, j] + u3 * n[3, j] + u4 * n[4, j]
+            nu[i, j] = near + u5 * n[5, j] + u6 * n[6, j] + u7 * n[7, j] + u8 * n[8, j]
     for i in range(3):
         for j in range(i + 1):
-            v = s_inv[i, j]
+            t = 1.0 if i == j else 0.0
             for a in range(9):
-                v += gain[a, i] * nk[a, j]
-            m[i, j] = v
-            m[j, i] = v
-    for i in range(3):
-        for a in range(3):
-            r[a] += h[i, a] * u[i]
+                t += u[i, a] * nu[j, a]
+            w[i, j] = t
+            w[j, i] = t
+    for a in range(3):
+        r[a] += g[0, a] * v[0] + g[1, a] * v[1] + g[2, a] * v[2]
     # H sees the position only, so only the rows and columns of the position change; both sides of the diagonal are
     # written from one number, because what rounding leaves of asymmetry would grow from sample to sample.
-    for a in range(3, 9):
-        for b in range(3):
-            v = n[a, b]
-            for i in range(3):
-                v -= nk[a, i] * h[i, b]
-            n[a, b] = v
-            n[b, a] = v
+    for b in range(3):
+        for a in range(3, 9):
+            t = n[b, a] - nu[0, a] * g[0, b] - nu[1, a] * g[1, b] - nu[2, a] * g[2, b]
+            n[b, a] = t
+            n[a, b] = t
     for a in range(3):
         for b in range(a + 1):
-            v = n[a, b]
+            t = n[a, b]
             for i in range(3):
-                v -= nk[a, i] * h[i, b] + h[i, a] * nk[b, i]
+                t -= nu[i, a] * g[i, b] + g[i, a] * nu[i, b]
                 for j in range(3):
-                    v += h[i, a] * m[i, j] * h[j, b]
-            n[a, b] = v
-            n[b, a] = v
+                    t += g[i, a] * w[i, j] * g[j, b]
+            n[a, b] = t
+            n[b, a] = t
+    _leave_out(back, f)
+
+
+@part
+def _leave_out(back: Backward, f: Filter) -> None:
+    """Residual and variance of each component without itself, and the score of the noise, from v and W, and from r and
+    N before the measurement."""
+    v, w, root = back.v, back.w, f.root
     for i in range(3):
-        if not math.isfinite(e[i]):
+        if not math.isfinite(f.e[i]):
             back.residual[i] = back.variance[i] = math.nan
-        elif used[i] > 0:
-            back.residual[i] = u[i] / m[i, i]
-            back.variance[i] = 1 / m[i, i] + f.noise[i] * (1 - 1 / used[i])
-            back.noise_score[i] += 0.5 * (u[i] * u[i] - m[i, i]) * f.noise[i] / used[i]
+        elif f.used[i] > 0:
+            pull = root[0, i] * v[0] + root[1, i] * v[1] + root[2, i] * v[2]
+            m = 0.0
+            for j in range(3):
+                m += root[j, i] * (w[j, 0] * root[0, i] + w[j, 1] * root[1, i] + w[j, 2] * root[2, i])
+            back.residual[i] = pull / m
+            back.variance[i] = 1 / m + f.noise[i] * (1 - 1 / f.used[i])
+            back.noise_score[i] += 0.5 * (pull * pull - m) * f.noise[i] / f.used[i]
         else:  # not used: what all the rest predicts is the smoothed estimate itself
-            predicted, spread = 0.0, f.c[i, i]
-            for j in range(9):
-                predicted += f.pxz[j, i] * r[j]
-                for k in range(9):
-                    spread -= f.pxz[j, i] * n[j, k] * f.pxz[k, i]
-            back.residual[i] = e[i] - predicted
-            back.variance[i] = max(spread, 0.0) + f.noise[i]
+            _predict_reading(back, f, i)
+
+
+@part
+def _predict_reading(back: Backward, f: Filter, i: int) -> None:
+    """The same of a component that is not used; P H' before the measurement is P+ H' + U'U H'."""
+    p, h, u, column = f.p, f.h, f.u, back.pn
+    u0 = u[0, 0] * h[i, 0] + u[0, 1] * h[i, 1] + u[0, 2] * h[i, 2]
+    u1 = u[1, 0] * h[i, 0] + u[1, 1] * h[i, 1] + u[1, 2] * h[i, 2]
+    u2 = u[2, 0] * h[i, 0] + u[2, 1] * h[i, 1] + u[2, 2] * h[i, 2]
+    for a in range(9):
+        after = p[a, 0] * h[i, 0] + p[a, 1] * h[i, 1] + p[a, 2] * h[i, 2]
+        column[a] = after + u[0, a] * u0 + u[1, a] * u1 + u[2, a] * u2
+    predicted, spread = 0.0, f.c[i, i]
+    for a in range(9):
+        predicted += column[a] * back.r[a]
+        for b in range(9):
+            spread -= column[a] * back.n[a, b] * column[b]
+    back.residual[i] = f.e[i] - predicted
+    back.variance[i] = max(spread, 0.0) + f.noise[i]
 
 
 @part

@@ -83,7 +83,6 @@ def _weighted(f: ukf.Filter, sample: Sample, extended: bool, row: Row) -> tuple[
     store_innovation(f, row)
     if not any_used:
         return 0.0, False
-    ukf.cross_covariance(f)
     row.nis, gained = ukf.update(f)
     return gained, False
 
@@ -103,6 +102,7 @@ def _loop(
             advance(f, samples, k, profile)
         for i in range(9):
             row.predicted[i] = f.x[i]
+        row.nis = math.nan
         gained, lost = _update(f, sample, extra, row)
         likelihood += gained
         store(f, row)
@@ -132,45 +132,55 @@ run_weighted = recursion(_weighted, bool)
 
 
 class Estimated(Protocol):
-    """What the whole record, or a way back, says of one sample; see `smoother.SmootherRun`."""
+    """What the whole record, or a way back, says of the state at one sample; see `smoother.SmootherRun`."""
 
     state: Annotated[FloatArray, 9]
     sigma: Annotated[FloatArray, 9]
     los_sigma: Annotated[FloatArray, 6]
+
+
+class Left(Protocol):
+    """What it leaves of the readings of one sample: residuals and their variances, and NIS."""
+
     residual: Annotated[FloatArray, 3]
     residual_variance: Annotated[FloatArray, 3]
     nis: float
 
 
-ESTIMATED = record(Estimated)
+ESTIMATED, LEFT = record(Estimated), record(Left)
 Estimates = Annotated[Any, Layout(ESTIMATED)]
+Residuals = Annotated[Any, Layout(LEFT)]
 
 
 @kernel
-def _extrapolate(sample: int, samples: Samples, profile: motion.Profile, filters: ukf.Filters, rows: Estimates) -> None:
-    """Fill the rows of the samples before `sample` from the state there, which is changed; no reading is used."""
+def _extrapolate(
+    samples: Samples, profile: motion.Profile, filters: ukf.Filters, estimates: Estimates, residuals: Residuals
+) -> None:
+    """Fill the estimates and residuals of the samples before the first that has none, from the state there, which is
+    changed; no reading is used."""
     f = filters[0]
-    for k in range(sample - 1, -1, -1):
-        row, time_s = rows[k], samples[k].time_s
+    for k in range(len(estimates) - 1, -1, -1):
+        row, left, time_s = estimates[k], residuals[k], samples[k].time_s
         motion.predict(f, time_s - samples[k + 1].time_s, profile.jerk[motion.knot_index(time_s, profile)])
         ukf.linearise(f)
         ukf.innovate(samples[k].measurement, f)
         for i in range(3):
-            row.residual[i] = f.e[i]
-            row.residual_variance[i] = f.c[i, i] + f.noise[i] if math.isfinite(f.e[i]) else math.nan
+            left.residual[i] = f.e[i]
+            left.residual_variance[i] = f.c[i, i] + f.noise[i] if math.isfinite(f.e[i]) else math.nan
+        left.nis = math.nan
         for i in range(9):
             row.state[i] = f.x[i]
             row.sigma[i] = math.sqrt(max(f.p[i, i], 0.0))
         line_of_sight_sigma(f.x, f.p, row.los_sigma)
 
 
-def extrapolated(log: Observations, model: Model, start: Start) -> Any:
-    """`Estimated` records of the samples before a start, from the state there back in time; no reading is used."""
-    rows = zeros(ESTIMATED, start.sample)
-    rows["nis"] = np.nan
+def extrapolated(log: Observations, model: Model, start: Start) -> tuple[Any, Any]:
+    """`Estimated` and `Left` records of the samples before a start, from the state there back in time; no reading is
+    used."""
+    estimates, residuals = zeros(ESTIMATED, start.sample), zeros(LEFT, start.sample)
     if start.sample:
-        _extrapolate(start.sample, log.samples(), model.profile(log.time_s), model.filter(start), rows)
-    return rows
+        _extrapolate(log.samples(), model.profile(log.time_s), model.filter(start), estimates, residuals)
+    return estimates, residuals
 
 
 def filter_log(log: Observations, model: Model, starts: list[Start], extended: bool = False) -> FilterRun:
@@ -193,8 +203,9 @@ def run_log(run: Recursion, log: Observations, model: Model, starts: list[Start]
 
 def lead_in(log: Observations, model: Model, start: Start, rows: Any) -> None:
     """Fill the rows before the first start."""
-    before, found = rows[: start.sample], extrapolated(log, model, start)
+    before, (found, left) = rows[: start.sample], extrapolated(log, model, start)
     for name in ("state", "sigma", "los_sigma"):
         before[name] = found[name]
-    before["predicted"], before["innovation"] = found["state"], found["residual"]
-    before["innovation_sigma"] = np.sqrt(found["residual_variance"])
+    before["predicted"], before["innovation"] = found["state"], left["residual"]
+    before["innovation_sigma"] = np.sqrt(left["residual_variance"])
+    before["nis"] = np.nan

@@ -146,6 +146,4 @@ class FilterRun(NamedTuple):
 
 def empty_rows(n: int) -> Any:
     """`Row` records (n,) for a kernel to fill."""
-    rows = zeros(ROW, n)
-    rows["nis"] = np.nan
-    return rows
+    return zeros(ROW, n)

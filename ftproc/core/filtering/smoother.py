@@ -1,17 +1,17 @@
 """The fixed-interval smoother, and what the same backward pass tells about outliers, noise and manoeuvres.
 
-Rauch-Tung-Striebel estimates in Bryson-Frazier form (the dynamics are linear, so the two are equal): with
-u = S^-1 e - K' r, M = S^-1 + K' N K, going backward
+Rauch-Tung-Striebel estimates in Bryson-Frazier form (the dynamics are linear, so the two are equal), with the whitened
+innovations of `ukf`: with v = y - U r, W = I + U N U', going backward
 
-    r <- r + H' u            N <- N - H'(K'N) - (NK)H + H' M H          over a measurement
+    r <- r + G' v            N <- N - G'(U N) - (N U')G + G' W G        over a measurement
     r <- Phi' r              N <- Phi' N Phi                            over an interval
     x^s = x+ + P+ r+         P^s = P+ - P+ N+ P+
 
 No covariance is inverted. From the same quantities come, at no further cost (de Jong 1988, 1989; Koopman and
 Shephard 1992):
 
-* the leave-one-out residual of each used component, u_i / M_ii with variance 1 / M_ii (what the rest of the record
-  predicts for it), exact to rounding;
+* with u = L^-T v and M = L^-T W L^-1, the leave-one-out residual of each used component, u_i / M_ii with variance
+  1 / M_ii (what the rest of the record predicts for it), exact to rounding;
 * the score of the likelihood by each noise variance, 1/2 sum(u_i^2 - M_ii), and by each element of each piece of
   the jerk tensor, 1/2 sum of c(T) contracted with (r r' - N).
 
@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part, zeros
 from ftproc.core.filtering import backward, ukf
-from ftproc.core.filtering.forward import ESTIMATED, Estimates, Span, advance, extrapolated
+from ftproc.core.filtering.forward import ESTIMATED, LEFT, Estimates, Residuals, Span, advance, extrapolated
 from ftproc.core.filtering.records import Model, Observations, Sample, Samples, Start, between
 from ftproc.core.model import motion
 from ftproc.core.signatures import Matrix
@@ -70,20 +70,22 @@ SCORES, RESIDUALS, STATES = 0, 1, 2  # what is kept of each sample: nothing, res
 
 class Memory(NamedTuple):
     """What a sweep works on: `ukf.Filter` records, one for each sample of a block and one for the state before each
-    block, and one `backward.Backward`."""
+    block, and one `backward.Backward`; and what it fills, sample by sample of the log."""
 
     block: ukf.Filters
     before: ukf.Filters
     back: backward.Backwards
+    estimates: Estimates
+    residuals: Residuals
 
     @classmethod
-    def of(cls, samples: int, first: Any) -> Memory:
+    def of(cls, samples: int, first: Any, estimates: Any, residuals: Any) -> Memory:
         """For a span of so many samples that begins with a filter (an array of one record)."""
         before = zeros(ukf.FILTER, -(-samples // BLOCK))
         before[:1] = first
         block = zeros(ukf.FILTER, min(samples, BLOCK))
         block["noise"] = first["noise"][0]
-        return cls(block, before, zeros(backward.BACKWARD))
+        return cls(block, before, zeros(backward.BACKWARD), estimates, residuals)
 
 
 @part
@@ -93,15 +95,8 @@ def _take_in(f: ukf.Filter, sample: Sample) -> tuple[float, float]:
     ukf.linearise(f)
     ukf.innovate(sample.measurement, f)
     any_used = ukf.use(sample.weight, f)
-    ukf.cross_covariance(f)
-    if any_used:
-        return ukf.update(f)
-    for i in range(3):
-        for j in range(3):
-            f.s_inv[i, j] = 0.0
-        for j in range(9):
-            f.gain[j, i] = 0.0
-    return math.nan, 0.0
+    nis, gained = ukf.update(f)
+    return (nis, gained) if any_used else (math.nan, 0.0)
 
 
 @part
@@ -114,17 +109,12 @@ def _copy_state(source: ukf.Filter, target: ukf.Filter) -> None:
 
 @kernel
 def _sweep(
-    span: Span,
-    samples: Samples,
-    profile: motion.Profile,
-    memory: Memory,
-    rows: Estimates,
-    jerk_score: Matrix,
-    kept: int,
+    span: Span, samples: Samples, profile: motion.Profile, memory: Memory, jerk_score: Matrix, kept: int
 ) -> float:
-    """Both sweeps over a span; the log-likelihood. Adds to the jerk score (m, 6); fills what is kept of the rows, and
-    with residuals alone also the state of the first sample."""
+    """Both sweeps over a span; the log-likelihood. Adds to the jerk score (m, 6); fills what is kept. At the end `back`
+    holds the state of the first sample, if anything is kept."""
     block, before, back = memory.block, memory.before, memory.back[0]
+    estimates, residuals = memory.estimates, memory.residuals
     f = block[0]
     _copy_state(before[0], f)
     for b in range(1, len(before)):
@@ -145,19 +135,20 @@ def _sweep(
             nis, gained = _take_in(f, samples[k])
             likelihood += gained
             if kept >= RESIDUALS:
-                rows[k].nis = nis
+                residuals[k].nis = nis
         for k in range(high - 1, low - 1, -1):
             f = block[k - low]
             if kept == STATES or (kept == RESIDUALS and k == span.first):
                 backward.estimate(back, f)
-                backward.store(back, f, rows[k])
+            if kept == STATES:
+                backward.store(back, f, estimates[k])
             if k == span.first:
                 back.n_first[:] = back.n
             backward.absorb(back, f)
             if kept >= RESIDUALS:
                 for i in range(3):
-                    rows[k].residual[i] = back.residual[i]
-                    rows[k].residual_variance[i] = back.variance[i]
+                    residuals[k].residual[i] = back.residual[i]
+                    residuals[k].residual_variance[i] = back.variance[i]
             if k > span.first:
                 interval = samples[k].time_s - samples[k - 1].time_s
                 backward.score_jerk(back, interval, jerk_score[motion.knot_index(samples[k].time_s, profile)])
@@ -189,26 +180,27 @@ class Scores(NamedTuple):
 
 
 class _Swept(NamedTuple):
-    """What the sweeps over a log leave behind; rows: `Estimated` records, of one sample where only scores are kept."""
+    """What the sweeps over a log leave behind: `Estimated` and `Left` records of each sample, as far as they are kept."""
 
     scores: Scores
-    rows: Any
+    estimates: Any
+    residuals: Any
     heads: tuple[Start, ...]
 
 
 def _swept(log: Observations, model: Model, starts: list[Start], kept: int) -> _Swept:
     n = len(log.time_s)
     samples, profile = log.samples(), model.profile(log.time_s)
-    rows = zeros(ESTIMATED, 1 if kept == SCORES else n)
+    estimates, residuals = zeros(ESTIMATED, n if kept == STATES else 0), zeros(LEFT, n if kept != SCORES else 0)
     noise, jerk, likelihood, heads = np.zeros(3), np.zeros_like(model.jerk), 0.0, []
     for start, stop in between(starts, n):
-        memory = Memory.of(stop - start.sample, model.filter(start))
-        likelihood += _sweep(Span(start.sample, stop, start.sample), samples, profile, memory, rows, jerk, kept)
+        memory = Memory.of(stop - start.sample, model.filter(start), estimates, residuals)
+        likelihood += _sweep(Span(start.sample, stop, start.sample), samples, profile, memory, jerk, kept)
         noise += memory.back["noise_score"][0]
         if kept != SCORES:
             covariance = smoothed_covariance(memory.block["p"][0], memory.back["n_first"][0])
-            heads.append(Start(start.sample, rows["state"][start.sample].copy(), covariance))
-    return _Swept(Scores(likelihood, noise, jerk), rows, tuple(heads))
+            heads.append(Start(start.sample, memory.back["state"][0].copy(), covariance))
+    return _Swept(Scores(likelihood, noise, jerk), estimates, residuals, tuple(heads))
 
 
 def score_log(log: Observations, model: Model, starts: list[Start]) -> Scores:
@@ -220,11 +212,15 @@ def smooth_log(log: Observations, model: Model, starts: list[Start], residuals_o
     """Smooth the whole log; the record on each side of a start separately. Samples before the first start are
     extrapolated.
 
-    residuals_only: states and sigmas are left undefined, which saves a third of the time.
+    residuals_only: states and sigmas are left out (of no sample), which saves a third of the time.
     """
-    scores, rows, heads = _swept(log, model, starts, RESIDUALS if residuals_only else STATES)
-    rows[: heads[0].sample] = extrapolated(log, model, heads[0])
-    fields = {name: np.ascontiguousarray(rows[name]) for name in ESTIMATED.names or ()}
+    scores, estimates, residuals, heads = _swept(log, model, starts, RESIDUALS if residuals_only else STATES)
+    first = heads[0].sample
+    before, residuals[:first] = extrapolated(log, model, heads[0])
+    if not residuals_only:
+        estimates[:first] = before
+    fields = {name: estimates[name] for name in ESTIMATED.names or ()}
+    fields |= {name: np.ascontiguousarray(residuals[name]) for name in LEFT.names or ()}
     return SmootherRun(
         **fields, log_likelihood=scores.log_likelihood, noise_score=scores.noise, jerk_score=scores.jerk, heads=heads
     )

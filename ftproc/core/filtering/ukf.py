@@ -10,6 +10,12 @@ only 7 differ in h: the centre and three pairs. With d+-_j = h(x +- 3 L_j) - h(x
 
 which are the 19-point results to rounding. H is the statistical linearisation of h, and C - H P H' >= 0 is what the
 bend of h adds to the measurement noise.
+
+The update is done with whitened innovations. With S = C + R = L L',
+
+    y = L^-1 e     G = L^-1 H     U = G P     x+ = x + U' y     P+ = P - U' U     NIS = y' y
+
+which equals the form with the gain K = U' L^-1 in fewer steps, and leaves P symmetric to the last bit.
 """
 
 from __future__ import annotations
@@ -21,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import part, record
-from ftproc.core.model.measurement import MIN_RANGE_M, turn, wrap_angle
+from ftproc.core.model.measurement import MIN_RANGE_M, SMALL_TURN, small_turn, turn, wrap_angle
 from ftproc.core.signatures import Layout
 
 FloatArray = NDArray[np.float64]
@@ -36,8 +42,9 @@ class Filter(Protocol):
 
     x, p: state and covariance, SI units. noise: variance of each component. q: coefficients of Q. z_hat: predicted
     measurement. e: innovation. used: weight of each component, zero for none. h: H on the position. c: C of the
-    module's head. s, s_inv: innovation covariance of the components used, and its inverse. pxz: P H'. gain. factor, b:
-    of the transform.
+    module's head. s: innovation covariance. root: L^-1, whose rows and columns are zero for components not used. y, g,
+    u: of the head. pxz: P H', where it is asked for. factor: of the position block of P. d: by pair of sigma points, component
+    and side. bend: its mean, h(x) to z_hat.
     """
 
     x: Annotated[FloatArray, 9]
@@ -50,11 +57,14 @@ class Filter(Protocol):
     h: Annotated[FloatArray, 3, 3]
     c: Annotated[FloatArray, 3, 3]
     s: Annotated[FloatArray, 3, 3]
-    s_inv: Annotated[FloatArray, 3, 3]
+    root: Annotated[FloatArray, 3, 3]
+    y: Annotated[FloatArray, 3]
+    g: Annotated[FloatArray, 3, 3]
+    u: Annotated[FloatArray, 3, 9]
     pxz: Annotated[FloatArray, 9, 3]
-    gain: Annotated[FloatArray, 9, 3]
     factor: Annotated[FloatArray, 3, 3]
-    b: Annotated[FloatArray, 3, 3]
+    d: Annotated[FloatArray, 3, 3, 2]
+    bend: Annotated[FloatArray, 3]
 
 
 FILTER = record(Filter)
@@ -63,18 +73,20 @@ Filters = Annotated[Any, Layout(FILTER)]
 
 @part
 def position_factor(f: Filter) -> None:
-    """Lower Cholesky factor of the position block; a pivot lost to rounding is floored, never taken the root of."""
+    """Lower Cholesky factor of the position block; a pivot lost to rounding is floored, never taken the root of. With
+    the roots last (L D L') no division waits for one."""
     p, factor = f.p, f.factor
     floor = 1e-12 * (p[0, 0] + p[1, 1] + p[2, 2]) + 1e-300
-    for i in range(3):
-        for j in range(i + 1):
-            s = p[i, j]
-            for k in range(j):
-                s -= factor[i, k] * factor[j, k]
-            if i == j:
-                factor[i, i] = math.sqrt(max(s, floor))
-            else:
-                factor[i, j] = s / factor[j, j]
+    d0 = max(p[0, 0], floor)
+    i0 = 1 / d0
+    d1 = max(p[1, 1] - p[1, 0] * p[1, 0] * i0, floor)
+    i1 = 1 / d1
+    rest = p[2, 1] - p[2, 0] * p[1, 0] * i0
+    d2 = max(p[2, 2] - p[2, 0] * p[2, 0] * i0 - rest * rest * i1, floor)
+    r0, r1 = math.sqrt(d0), math.sqrt(d1)
+    factor[0, 0], factor[1, 1], factor[2, 2] = r0, r1, math.sqrt(d2)
+    factor[1, 0], factor[2, 0] = p[1, 0] * i0 * r0, p[2, 0] * i0 * r0
+    factor[2, 1] = rest * i1 * r1
 
 
 @part
@@ -84,60 +96,78 @@ def linearise(f: Filter) -> None:
     When P is so wide (a long coast) that the points would straddle the station, alpha is made smaller, which draws
     the points together; at alpha = 1 the formulas are those of the module's head.
     """
-    x, p, factor, b, z_hat, h, c = f.x, f.p, f.factor, f.b, f.z_hat, f.h, f.c
+    x, p, factor, d, bend, z_hat, h, c = f.x, f.p, f.factor, f.d, f.bend, f.z_hat, f.h, f.c
     position_factor(f)
-    px, py, pz = x[0], x[1], x[2]
-    ground = math.sqrt(px * px + py * py)
-    slant = max(math.sqrt(px * px + py * py + pz * pz), MIN_RANGE_M)
+    ground = math.sqrt(x[0] * x[0] + x[1] * x[1])
+    slant = max(math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]), MIN_RANGE_M)
     widest = math.sqrt(p[0, 0] + p[1, 1] + p[2, 2])
     spread = SPREAD
     if spread * widest > MAX_SPREAD_IN_RANGES * slant:
         spread = MAX_SPREAD_IN_RANGES * slant / widest
+    _deviations(f, ground, slant, spread)
+    if not spread * widest < SMALL_TURN * ground:
+        _wide_deviations(f, ground, spread)
     alpha2 = spread * spread / (SPREAD * SPREAD)
     weight = 0.5 / (spread * spread)
-    m0 = m1 = m2 = 0.0
-    c00 = c01 = c02 = c11 = c12 = c22 = 0.0
-    for j in range(3):
-        dx = spread * factor[0, j]
-        dy = spread * factor[1, j]
-        dz = spread * factor[2, j]
-        # Deviations from the centre point, directly as angles between directions: already wrapped.
-        ux, uy, uz = px + dx, py + dy, pz + dz
-        vx, vy, vz = px - dx, py - dy, pz - dz
-        ug2, vg2 = ux * ux + uy * uy, vx * vx + vy * vy
-        ug, vg = math.sqrt(ug2), math.sqrt(vg2)
-        u0 = max(math.sqrt(ug2 + uz * uz), MIN_RANGE_M) - slant
-        v0 = max(math.sqrt(vg2 + vz * vz), MIN_RANGE_M) - slant
-        u1 = turn(px * uy - py * ux, px * ux + py * uy)
-        v1 = turn(px * vy - py * vx, px * vx + py * vy)
-        u2 = turn(ground * uz - pz * ug, ground * ug + pz * uz)
-        v2 = turn(ground * vz - pz * vg, ground * vg + pz * vz)
-        m0 += u0 + v0
-        m1 += u1 + v1
-        m2 += u2 + v2
-        c00 += u0 * u0 + v0 * v0
-        c01 += u0 * u1 + v0 * v1
-        c02 += u0 * u2 + v0 * v2
-        c11 += u1 * u1 + v1 * v1
-        c12 += u1 * u2 + v1 * v2
-        c22 += u2 * u2 + v2 * v2
-        b[j, 0] = (u0 - v0) / (2 * spread)
-        b[j, 1] = (u1 - v1) / (2 * spread)
-        b[j, 2] = (u2 - v2) / (2 * spread)
-    m0 *= weight
-    m1 *= weight
-    m2 *= weight
-    z_hat[0], z_hat[1], z_hat[2] = slant + m0, math.atan2(py, px) + m1, math.atan2(pz, ground) + m2
-    c[0, 0] = weight * c00 - alpha2 * m0 * m0
-    c[1, 1] = weight * c11 - alpha2 * m1 * m1
-    c[2, 2] = weight * c22 - alpha2 * m2 * m2
-    c[0, 1] = c[1, 0] = weight * c01 - alpha2 * m0 * m1
-    c[0, 2] = c[2, 0] = weight * c02 - alpha2 * m0 * m2
-    c[1, 2] = c[2, 1] = weight * c12 - alpha2 * m1 * m2
+    for i in range(3):
+        bend[i] = weight * ((d[0, i, 0] + d[0, i, 1]) + (d[1, i, 0] + d[1, i, 1]) + (d[2, i, 0] + d[2, i, 1]))
+    z_hat[0] = slant + bend[0]
+    z_hat[1] = math.atan2(x[1], x[0]) + bend[1]
+    z_hat[2] = math.atan2(x[2], ground) + bend[2]
+    for i in range(3):
+        for j in range(i + 1):
+            v = 0.0
+            for k in range(3):
+                v += d[k, i, 0] * d[k, j, 0] + d[k, i, 1] * d[k, j, 1]
+            v = weight * v - alpha2 * bend[i] * bend[j]
+            c[i, j] = v
+            c[j, i] = v
+    half = 0.5 / spread
+    i0, i1, i2 = 1 / factor[0, 0], 1 / factor[1, 1], 1 / factor[2, 2]
     for i in range(3):  # H' = L^-T B by back substitution, one component at a time
-        h[i, 2] = b[2, i] / factor[2, 2]
-        h[i, 1] = (b[1, i] - factor[2, 1] * h[i, 2]) / factor[1, 1]
-        h[i, 0] = (b[0, i] - factor[1, 0] * h[i, 1] - factor[2, 0] * h[i, 2]) / factor[0, 0]
+        b0, b1, b2 = (
+            half * (d[0, i, 0] - d[0, i, 1]),
+            half * (d[1, i, 0] - d[1, i, 1]),
+            half * (d[2, i, 0] - d[2, i, 1]),
+        )
+        h[i, 2] = b2 * i2
+        h[i, 1] = (b1 - factor[2, 1] * h[i, 2]) * i1
+        h[i, 0] = (b0 - factor[1, 0] * h[i, 1] - factor[2, 0] * h[i, 2]) * i0
+
+
+@part
+def _deviations(f: Filter, ground: float, slant: float, spread: float) -> None:
+    """What the sigma points on both sides of x differ in h, if the directions to them differ by small angles.
+
+    The columns of the factor begin with zeros: the second pair moves along y and z, the third along z alone.
+    """
+    x, factor, d = f.x, f.factor, f.d
+    px, py, pz = x[0], x[1], x[2]
+    for j in range(3):
+        for side in range(2):
+            by = spread if side == 0 else -spread
+            ux = px + by * factor[0, j] if j < 1 else px
+            uy = py + by * factor[1, j] if j < 2 else py
+            uz = pz + by * factor[2, j]
+            square = ux * ux + uy * uy
+            along = math.sqrt(square) if j < 2 else ground
+            d[j, 0, side] = max(math.sqrt(square + uz * uz), MIN_RANGE_M) - slant
+            d[j, 1, side] = small_turn((px * uy - py * ux) / (px * ux + py * uy)) if j < 2 else 0.0
+            d[j, 2, side] = small_turn((ground * uz - pz * along) / (ground * along + pz * uz))
+
+
+@part
+def _wide_deviations(f: Filter, ground: float, spread: float) -> None:
+    """The same of the angles where they may be large: as angles between directions, already wrapped."""
+    x, factor, d = f.x, f.factor, f.d
+    px, py, pz = x[0], x[1], x[2]
+    for j in range(3):
+        for side in range(2):
+            by = spread if side == 0 else -spread
+            ux, uy, uz = px + by * factor[0, j], py + by * factor[1, j], pz + by * factor[2, j]
+            along = math.sqrt(ux * ux + uy * uy)
+            d[j, 1, side] = turn(px * uy - py * ux, px * ux + py * uy)
+            d[j, 2, side] = turn(ground * uz - pz * along, ground * along + pz * uz)
 
 
 @part
@@ -162,31 +192,38 @@ def use(weight: FloatArray, f: Filter) -> bool:
 
 
 @part
-def invert_used(f: Filter) -> float:
-    """Inverse of the rows and columns of S whose weight is positive, zero elsewhere; returns ln det of them.
+def whiten(f: Filter) -> tuple[float, float]:
+    """Fill L^-1, y, G and U from S, e, H and P for the components whose weight is positive; NIS and ln det S of these.
 
-    Embedding the inverse of the sub-matrix in zeros makes one formula serve all seven missing patterns.
+    Zeros in the rows and columns of L^-1 make one formula serve all seven missing patterns.
     """
-    s, used, out = f.s, f.used, f.s_inv
+    s, used, e, h, p, root, y, g, u = f.s, f.used, f.e, f.h, f.p, f.root, f.y, f.g, f.u
     on0, on1, on2 = used[0] > 0, used[1] > 0, used[2] > 0
-    a = math.sqrt(s[0, 0]) if on0 else 1.0
-    b = s[1, 0] / a if on0 and on1 else 0.0
-    c = s[2, 0] / a if on0 and on2 else 0.0
-    d = math.sqrt(s[1, 1] - b * b) if on1 else 1.0
-    e = (s[2, 1] - c * b) / d if on1 and on2 else 0.0
-    g = math.sqrt(s[2, 2] - c * c - e * e) if on2 else 1.0
-    # Inverse of the lower factor [[a,0,0],[b,d,0],[c,e,g]], then its Gram matrix.
-    ia, id_, ig = 1 / a, 1 / d, 1 / g
-    ib = -b * ia * id_
-    ie = -e * id_ * ig
-    ic = -(c * ia + e * ib) * ig
-    out[0, 0] = ia * ia + ib * ib + ic * ic if on0 else 0.0
-    out[1, 1] = id_ * id_ + ie * ie if on1 else 0.0
-    out[2, 2] = ig * ig if on2 else 0.0
-    out[0, 1] = out[1, 0] = ib * id_ + ic * ie if on0 and on1 else 0.0
-    out[0, 2] = out[2, 0] = ic * ig if on0 and on2 else 0.0
-    out[1, 2] = out[2, 1] = ie * ig if on1 and on2 else 0.0
-    return 2 * math.log(a * d * g)
+    # S = M D M' with ones on the diagonal of M; the roots come last, so that no division waits for one.
+    d0 = s[0, 0] if on0 else 1.0
+    i0 = 1 / d0
+    m10, m20 = (s[1, 0] * i0 if on0 and on1 else 0.0), (s[2, 0] * i0 if on0 and on2 else 0.0)
+    d1 = s[1, 1] - s[1, 0] * m10 if on1 else 1.0
+    i1 = 1 / d1
+    m21 = (s[2, 1] - s[2, 0] * m10) * i1 if on1 and on2 else 0.0
+    d2 = s[2, 2] - s[2, 0] * m20 - m21 * m21 * d1 if on2 else 1.0
+    r00 = math.sqrt(i0) if on0 else 0.0
+    r11 = math.sqrt(i1) if on1 else 0.0
+    r22 = math.sqrt(1 / d2) if on2 else 0.0
+    r10 = -m10 * r11
+    r20, r21 = (m10 * m21 - m20) * r22, -m21 * r22
+    root[0, 0], root[1, 0], root[1, 1], root[2, 0], root[2, 1], root[2, 2] = r00, r10, r11, r20, r21, r22
+    root[0, 1] = root[0, 2] = root[1, 2] = 0.0
+    e0, e1, e2 = (e[0] if on0 else 0.0), (e[1] if on1 else 0.0), (e[2] if on2 else 0.0)
+    y[0], y[1], y[2] = r00 * e0, r10 * e0 + r11 * e1, r20 * e0 + r21 * e1 + r22 * e2
+    for i in range(3):
+        g[0, i] = r00 * h[0, i]
+        g[1, i] = r10 * h[0, i] + r11 * h[1, i]
+        g[2, i] = r20 * h[0, i] + r21 * h[1, i] + r22 * h[2, i]
+    for i in range(3):
+        for j in range(9):
+            u[i, j] = g[i, 0] * p[0, j] + g[i, 1] * p[1, j] + g[i, 2] * p[2, j]
+    return y[0] * y[0] + y[1] * y[1] + y[2] * y[2], math.log(d0 * d1 * d2)
 
 
 @part
@@ -204,12 +241,12 @@ def _times_h(p: FloatArray, h: FloatArray, pxz: FloatArray) -> None:
 
 @part
 def update(f: Filter) -> tuple[float, float]:
-    """Measurement update in place with the components whose `used` weight m is positive, at noise variance R/m.
+    """Measurement update in place with the components whose `used` weight m is positive, at noise variance R/m; without
+    any, nothing changes.
 
-    Takes e, used, H, C and P_xz of the record, fills S, its inverse and the gain. Returns NIS and the log-likelihood of
-    the innovation (without the constant).
+    Takes e, used, H and C of the record. Returns NIS and the log-likelihood of the innovation (without the constant).
     """
-    x, p, e, used, c, s, s_inv, pxz, gain = f.x, f.p, f.e, f.used, f.c, f.s, f.s_inv, f.pxz, f.gain
+    x, p, used, c, s, y, u = f.x, f.p, f.used, f.c, f.s, f.y, f.u
     stiff = False
     for i in range(3):
         for j in range(3):
@@ -218,34 +255,34 @@ def update(f: Filter) -> tuple[float, float]:
             extra = f.noise[i] / used[i]
             s[i, i] += extra
             stiff = stiff or c[i, i] > 1e7 * extra
-    log_det = invert_used(f)
-    nis = 0.0
-    for i in range(3):
-        if used[i] > 0:
-            for j in range(3):
-                if used[j] > 0:
-                    nis += e[i] * s_inv[i, j] * e[j]
+    nis, log_det = whiten(f)
+    if stiff:
+        cross_covariance(f)
     for i in range(9):
-        for j in range(3):
-            gain[i, j] = pxz[i, 0] * s_inv[0, j] + pxz[i, 1] * s_inv[1, j] + pxz[i, 2] * s_inv[2, j]
-    for j in range(3):
-        if used[j] > 0:
-            for i in range(9):
-                x[i] += gain[i, j] * e[j]
+        x[i] += u[0, i] * y[0] + u[1, i] * y[1] + u[2, i] * y[2]
     for i in range(9):
-        for j in range(i + 1):
-            v = p[i, j] - gain[i, 0] * pxz[j, 0] - gain[i, 1] * pxz[j, 1] - gain[i, 2] * pxz[j, 2]
-            p[i, j] = v
-            p[j, i] = v
+        for j in range(9):
+            p[i, j] = p[i, j] - u[0, i] * u[0, j] - u[1, i] * u[1, j] - u[2, i] * u[2, j]
     if stiff:
         _restore_joseph(f)
     return nis, -0.5 * (log_det + nis)
 
 
 @part
+def gain_of(f: Filter, gain: FloatArray) -> None:
+    """K = U' L^-1 (9, 3)."""
+    for i in range(9):
+        for j in range(3):
+            gain[i, j] = f.u[0, i] * f.root[0, j] + f.u[1, i] * f.root[1, j] + f.u[2, i] * f.root[2, j]
+
+
+@part
 def _restore_joseph(f: Filter) -> None:
-    """Turn P - K P_xz' (already in p) into the Joseph form, which keeps P >= 0 when the prior dwarfs the noise."""
-    p, used, h, c, pxz, gain = f.p, f.used, f.h, f.c, f.pxz, f.gain
+    """Turn P - U'U (already in p) into the Joseph form, which keeps P >= 0 when the prior dwarfs the noise; P_xz is that
+    of the prior."""
+    p, used, h, c, pxz = f.p, f.used, f.h, f.c, f.pxz
+    gain = np.empty((9, 3))
+    gain_of(f, gain)
     residue = np.empty((9, 3))  # (I - K H) P H': zero in exact arithmetic but for the measurement noise
     _times_h(p, h, residue)
     rest = np.zeros((3, 3))  # S - H P- H': noise and bend of h

@@ -16,6 +16,7 @@ FloatArray = NDArray[np.float64]
 
 MIN_RANGE_M = 1.0  # below this the direction of the target has no meaning
 TWO_PI = 2 * math.pi
+SMALL_TURN = 0.04  # of a distance: a point moved by less is seen at less than 0.05 rad from where it was
 
 
 @part
@@ -43,14 +44,31 @@ def measure(x: float, y: float, z: float) -> tuple[float, float, float]:
 
 
 @part
+def small_turn(tangent: float) -> float:
+    """atan(tangent) by its series, to rounding where |tangent| < 0.05."""
+    q = tangent * tangent
+    q2 = q * q
+    return tangent * ((1 - q * (1 / 3)) + q2 * ((1 / 5 - q * (1 / 7)) + q2 * (1 / 9 - q * (1 / 11))))
+
+
+@part
 def turn(cross: float, dot: float) -> float:
-    """atan2(cross, dot) in rad: the angle between two directions, by its series where it is small (to rounding)."""
+    """atan2(cross, dot) in rad: the angle between two directions."""
     if not abs(cross) < 0.05 * dot:
         return math.atan2(cross, dot)
-    t = cross / dot
-    q = t * t
-    tail = 1 / 7 - q * (1 / 9 - q * (1 / 11 - q * (1 / 13)))
-    return t * (1 - q * (1 / 3 - q * (1 / 5 - q * tail)))
+    return small_turn(cross / dot)
+
+
+@part
+def moves(before: FloatArray, after: FloatArray) -> tuple[float, float, float]:
+    """h(after) - h(before) of two states: m, rad, rad."""
+    ground0 = math.sqrt(before[0] * before[0] + before[1] * before[1])
+    ground1 = math.sqrt(after[0] * after[0] + after[1] * after[1])
+    slant0 = max(math.sqrt(ground0 * ground0 + before[2] * before[2]), MIN_RANGE_M)
+    slant1 = max(math.sqrt(ground1 * ground1 + after[2] * after[2]), MIN_RANGE_M)
+    azimuth = turn(before[0] * after[1] - before[1] * after[0], before[0] * after[0] + before[1] * after[1])
+    elevation = turn(ground0 * after[2] - before[2] * ground1, ground0 * ground1 + before[2] * after[2])
+    return slant1 - slant0, azimuth, elevation
 
 
 @part
@@ -59,14 +77,10 @@ def line_of_sight_sigma(x: FloatArray, p: FloatArray, out: FloatArray) -> None:
     ground = max(math.sqrt(x[0] * x[0] + x[1] * x[1]), 1e-9)
     slant = math.sqrt(ground * ground + x[2] * x[2])
     ca, sa, ce, se = x[0] / ground, x[1] / ground, ground / slant, x[2] / slant
-    for axis in range(3):
-        u, v, w = -sa, ca, 0.0
-        if axis == 0:
-            u, v, w = ca * ce, sa * ce, se
-        elif axis == 2:
-            u, v, w = -ca * se, -sa * se, ce
-        for b in range(2):
-            o = 3 * b
-            variance = u * u * p[o, o] + v * v * p[o + 1, o + 1] + w * w * p[o + 2, o + 2]
-            variance += 2 * (u * v * p[o, o + 1] + u * w * p[o, o + 2] + v * w * p[o + 1, o + 2])
-            out[o + axis] = math.sqrt(max(variance, 0.0))
+    for o in (0, 3):
+        xx, yy, zz = p[o, o], p[o + 1, o + 1], p[o + 2, o + 2]
+        xy, up_along = 2 * ca * sa * p[o, o + 1], 2 * ce * se * (ca * p[o, o + 2] + sa * p[o + 1, o + 2])
+        along = ca * ca * xx + sa * sa * yy + xy  # the horizontal direction
+        out[o] = math.sqrt(max(ce * ce * along + se * se * zz + up_along, 0.0))
+        out[o + 1] = math.sqrt(max(sa * sa * xx + ca * ca * yy - xy, 0.0))
+        out[o + 2] = math.sqrt(max(se * se * along + ce * ce * zz - up_along, 0.0))

@@ -64,11 +64,13 @@ def noise_coefficients(interval: float, out: FloatArray) -> None:
     """The 3 x 3 matrix of Q per unit of jerk density; a negative interval goes back in time."""
     t = interval
     sign = 1.0 if t >= 0 else -1.0
-    out[0, 0] = sign * t**5 / 20
-    out[0, 1] = out[1, 0] = sign * t**4 / 8
-    out[0, 2] = out[2, 0] = sign * t**3 / 6
-    out[1, 1] = sign * t**3 / 3
-    out[1, 2] = out[2, 1] = sign * t * t / 2
+    t2 = t * t
+    t3 = sign * t2 * t
+    out[0, 0] = t3 * t2 * (1 / 20)
+    out[0, 1] = out[1, 0] = t3 * t * (1 / 8)
+    out[0, 2] = out[2, 0] = t3 * (1 / 6)
+    out[1, 1] = t3 * (1 / 3)
+    out[1, 2] = out[2, 1] = sign * t2 * 0.5
     out[2, 2] = sign * t
 
 
@@ -87,9 +89,8 @@ def predict(f: Moving, interval: float, jerk: FloatArray) -> None:
         x[i + 3] += t * x[i + 6]
     noise_coefficients(t, c)
     for i in range(3):
-        for j in range(3):
-            low, high = min(i, j), max(i, j)
-            q = jerk[low * (5 - low) // 2 + high]
+        for j in range(i, 3):
+            q = jerk[i * (5 - i) // 2 + j]
             pa = p[i, 6 + j] + t * p[3 + i, 6 + j] + h * p[6 + i, 6 + j]
             pv = p[i, 3 + j] + t * p[3 + i, 3 + j] + h * p[6 + i, 3 + j]
             pp = p[i, j] + t * p[3 + i, j] + h * p[6 + i, j]
@@ -97,15 +98,16 @@ def predict(f: Moving, interval: float, jerk: FloatArray) -> None:
             vv = p[3 + i, 3 + j] + t * p[6 + i, 3 + j]
             vp = p[3 + i, j] + t * p[6 + i, j]
             aa, av, ap = p[6 + i, 6 + j], p[6 + i, 3 + j], p[6 + i, j]
-            p[i, j] = pp + t * pv + h * pa + q * c[0, 0]
-            p[i, 3 + j] = pv + t * pa + q * c[0, 1]
-            p[i, 6 + j] = pa + q * c[0, 2]
-            p[3 + i, j] = vp + t * vv + h * va + q * c[1, 0]
-            p[3 + i, 3 + j] = vv + t * va + q * c[1, 1]
-            p[3 + i, 6 + j] = va + q * c[1, 2]
-            p[6 + i, j] = ap + t * av + h * aa + q * c[2, 0]
-            p[6 + i, 3 + j] = av + t * aa + q * c[2, 1]
-            p[6 + i, 6 + j] = aa + q * c[2, 2]
+            p[i, j] = p[j, i] = pp + t * pv + h * pa + q * c[0, 0]
+            p[i, 3 + j] = p[3 + j, i] = pv + t * pa + q * c[0, 1]
+            p[i, 6 + j] = p[6 + j, i] = pa + q * c[0, 2]
+            p[3 + i, 3 + j] = p[3 + j, 3 + i] = vv + t * va + q * c[1, 1]
+            p[3 + i, 6 + j] = p[6 + j, 3 + i] = va + q * c[1, 2]
+            p[6 + i, 6 + j] = p[6 + j, 6 + i] = aa + q * c[2, 2]
+            if i != j:
+                p[3 + i, j] = p[j, 3 + i] = vp + t * vv + h * va + q * c[1, 0]
+                p[6 + i, j] = p[j, 6 + i] = ap + t * av + h * aa + q * c[2, 0]
+                p[6 + i, 3 + j] = p[3 + j, 6 + i] = av + t * aa + q * c[2, 1]
 
 
 @part
