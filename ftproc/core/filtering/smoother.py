@@ -180,7 +180,7 @@ class Scores(NamedTuple):
 
 
 class _Swept(NamedTuple):
-    """What the sweeps over a log leave behind: `Estimated` and `Left` records of each sample, as far as they are kept."""
+    """What the sweeps over a log leave behind: `Estimated` and `Left` records of its samples, where they are kept."""
 
     scores: Scores
     estimates: Any

@@ -43,8 +43,8 @@ class Filter(Protocol):
     x, p: state and covariance, SI units. noise: variance of each component. q: coefficients of Q. z_hat: predicted
     measurement. e: innovation. used: weight of each component, zero for none. h: H on the position. c: C of the
     module's head. s: innovation covariance. root: L^-1, whose rows and columns are zero for components not used. y, g,
-    u: of the head. pxz: P H', where it is asked for. factor: of the position block of P. d: by pair of sigma points, component
-    and side. bend: its mean, h(x) to z_hat.
+    u: of the head. pxz: P H', where it is asked for. factor: of the position block of P. d: by pair of sigma points,
+    component and side. bend: its mean, h(x) to z_hat.
     """
 
     x: Annotated[FloatArray, 9]
@@ -278,8 +278,8 @@ def gain_of(f: Filter, gain: FloatArray) -> None:
 
 @part
 def _restore_joseph(f: Filter) -> None:
-    """Turn P - U'U (already in p) into the Joseph form, which keeps P >= 0 when the prior dwarfs the noise; P_xz is that
-    of the prior."""
+    """Turn P - U'U (already in p) into the Joseph form, which keeps P >= 0 when the prior dwarfs the noise; P_xz is
+    that of the prior."""
     p, used, h, c, pxz = f.p, f.used, f.h, f.c, f.pxz
     gain = np.empty((9, 3))
     gain_of(f, gain)
