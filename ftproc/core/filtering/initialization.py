@@ -4,13 +4,16 @@ gates need (a wrong one locks them out), done on a whole window."""
 from __future__ import annotations
 
 import itertools
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core.compiled import kernel
 from ftproc.core.filtering.records import Observations, Start
-from ftproc.core.model.frames import line_of_sight_axes, to_cartesian, wrap
+from ftproc.core.model.measurement import wrapped
+from ftproc.core.signatures import Indices, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
 
@@ -50,7 +53,7 @@ def find_starts(log: Observations, noise_variance: FloatArray, jerk_psd: float |
     time_s, measurement, weight = log
     starts = [first_start(log, noise_variance)]
     good = (weight > 0) & np.isfinite(measurement)
-    interval_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
+    interval_s = float(np.median(time_s[1:] - time_s[:-1])) if len(time_s) > 1 else 0.0
     gaps = gaps_of(time_s, good, shortest_gap(interval_s))
     edges = [*sorted(gaps), len(time_s)]
     for low, high in itertools.pairwise(edges):
@@ -80,15 +83,17 @@ def gaps_of(
     its end: gaps between samples, and those in which one component has no good reading. good (n, 3).
 
     last_good_s: (3,) when each component was seen before the first sample; NaN for never."""
-    interval = np.diff(time_s)
+    interval = time_s[1:] - time_s[:-1]
     found = {int(k) + 1: (float(interval[k]), WIDEST_BRIDGE) for k in np.flatnonzero(interval > longest_s)}
     for c in range(3):
         seen = np.flatnonzero(good[:, c])
         if not seen.size:
             continue
-        blind = np.diff(time_s[seen], prepend=time_s[seen[0]] if last_good_s is None else last_good_s[c])
-        for k in np.flatnonzero(blind > longest_s):
-            found.setdefault(int(seen[k]), (float(blind[k]), WIDEST_BLIND_BRIDGE))
+        times = time_s[seen]
+        for k in np.flatnonzero(times[1:] - times[:-1] > longest_s) + 1:
+            found.setdefault(int(seen[k]), (float(times[k] - times[k - 1]), WIDEST_BLIND_BRIDGE))
+        if last_good_s is not None and times[0] - last_good_s[c] > longest_s:
+            found.setdefault(int(seen[0]), (float(times[0] - last_good_s[c]), WIDEST_BLIND_BRIDGE))
     return found
 
 
@@ -112,59 +117,101 @@ def first_state(log: Observations, noise_variance: FloatArray, sample: int, with
     come at the same instants. The covariance is inflated.
     Raises ValueError with the component's index when a component has no good reading in the span.
     """
+    time, z, weight = (np.ascontiguousarray(each) for each in log)
     lines = []
     for c in range(3):
-        good = np.flatnonzero((log.weight[within, c] > 0) & np.isfinite(log.measurement[within, c])) + within.start
-        if len(good) == 0:
+        chosen = _nearest(time, z, weight, sample, within.start, within.stop, c)
+        if len(chosen) == 0:
             raise ValueError(c)
-        here = int(np.searchsorted(good, sample))
-        good = good[max(here - SAMPLES, 0) : here + SAMPLES]  # the nearest are among these
-        away = np.abs(log.time_s[good] - log.time_s[sample])
-        nearest = np.argsort(away, kind="stable")[:SAMPLES]
-        close = away[nearest] <= away[nearest[0]] + LONGEST_FIT_S
-        chosen = np.sort(good[nearest[close | (np.arange(len(nearest)) < 2)]])
-        z = log.measurement[chosen, c]
-        if c == 1:
-            z = z[0] + np.cumsum(np.r_[0.0, wrap(np.diff(z))])
-        lines.append(_line(log.time_s[chosen] - log.time_s[sample], z, float(np.sqrt(noise_variance[c]))))
+        found = _line(time, z, chosen, sample, c, math.sqrt(noise_variance[c]))
+        lines.append(_Line(*found))
     return _to_state(sample, lines)
 
 
-def _line(t: FloatArray, z: FloatArray, sigma: float) -> _Line:
-    """The line at t = 0 through readings (m,) at times (m,) from the start.
+@kernel
+def _nearest(time: Vector, z: Matrix, weight: Matrix, sample: int, first: int, last: int, c: int) -> Indices:
+    """Up to SAMPLES good readings of a component nearest in time to `sample` among the samples [first, last), in their
+    order; all but two of them close together."""
+    near = np.empty(2 * SAMPLES, np.int64)
+    count = 0
+    k = sample - 1
+    while k >= first and count < SAMPLES:
+        if weight[k, c] > 0 and math.isfinite(z[k, c]):
+            near[count] = k
+            count += 1
+        k -= 1
+    near[:count] = near[:count][::-1].copy()
+    before, k = count, max(sample, first)
+    while k < last and count < before + SAMPLES:
+        if weight[k, c] > 0 and math.isfinite(z[k, c]):
+            near[count] = k
+            count += 1
+        k += 1
+    shortest = math.inf
+    for i in range(count):
+        shortest = min(shortest, abs(time[near[i]] - time[sample]))
+    low, high = 0, count
+    while high - low > 2:  # drop the farther end, until there are few enough and all are close
+        left, right = abs(time[near[low]] - time[sample]), abs(time[near[high - 1]] - time[sample])
+        if high - low <= SAMPLES and max(left, right) <= shortest + LONGEST_FIT_S:
+            break
+        if left > right:
+            low += 1
+        else:
+            high -= 1
+    return near[low:high].copy()
+
+
+@kernel
+def _line(
+    time: Vector, z: Matrix, chosen: Indices, sample: int, c: int, sigma: float
+) -> tuple[float, float, float, float, float, float]:
+    """The line through the chosen readings at the time of `sample`, as a `_Line`.
 
     The scatter about the line stands for what it misses of a curve, so it is not averaged down; too few readings
     to show a curve leave it to the acceleration that must be allowed for.
     """
-    lead = float(np.abs(t).min())
-    span = float(np.ptp(t))
+    m = len(chosen)
+    t, v = np.empty(m), np.empty(m)
+    lead, middle, mean = math.inf, 0.0, 0.0
+    for i in range(m):
+        t[i] = time[chosen[i]] - time[sample]
+        v[i] = z[chosen[i], c] if i == 0 else v[i - 1] + wrapped(z[chosen[i], c] - z[chosen[i - 1], c], c == 1)
+        lead = min(lead, abs(t[i]))
+        middle += t[i] / m
+        mean += v[i] / m
+    span = t[m - 1] - t[0]
     if span <= 0:
-        return _Line(float(z.mean()), 0.0, sigma, np.inf, 0.0, lead)
-    middle = float(t.mean())
-    spread = float(((t - middle) ** 2).sum())
-    rate = float(((t - middle) * (z - z.mean())).sum()) / spread
-    value = float(z.mean()) - rate * middle
-    scatter = max(sigma, float(np.abs(z - value - rate * t).max()))
+        return mean, 0.0, sigma, math.inf, 0.0, lead
+    spread = slope = 0.0
+    for i in range(m):
+        spread += (t[i] - middle) ** 2
+        slope += (t[i] - middle) * (v[i] - mean)
+    rate = slope / spread
+    value = mean - rate * middle
+    scatter = sigma
+    for i in range(m):
+        scatter = max(scatter, abs(v[i] - value - rate * t[i]))
     rate_sigma = 4 * scatter / span
-    unseen_s = span if len(t) < CURVE else 0.0
-    return _Line(value, rate, float(np.hypot(scatter, rate_sigma * lead)), rate_sigma, unseen_s, lead)
+    return value, rate, math.hypot(scatter, rate_sigma * lead), rate_sigma, span if m < CURVE else 0.0, lead
 
 
 def _to_state(sample: int, lines: list[_Line]) -> Start:
     """From range, azimuth, elevation and their rates to a Cartesian state with its covariance."""
     values, rates, value_sigma, rate_sigma, unseen_s, lead_s = np.array(lines).T.copy()
-    slant = values[0] = max(values[0], 1.0)
-    position = to_cartesian(values)
-    axes = line_of_sight_axes(position[None])[0]
-    scale = np.array([1.0, slant * np.cos(values[2]), slant])  # m per m, rad, rad along radial, cross, up
+    slant = max(float(values[0]), 1.0)
+    ca, sa, ce, se = math.cos(values[1]), math.sin(values[1]), math.cos(values[2]), math.sin(values[2])
+    axes = np.array([[ca * ce, sa * ce, se], [-sa, ca, 0.0], [-ca * se, -sa * se, ce]])  # radial, cross, up
+    scale = np.array([1.0, slant * ce, slant])  # m per m, rad, rad along these
     curve = ACCELERATION_MPS2 * (unseen_s**2 / 8 + lead_s**2 / 2)
     along = np.minimum(scale * value_sigma + curve, WIDEST_IN_RANGES * slant)
     known = np.isfinite(rate_sigma)
     drift = np.where(known, scale * np.where(known, rate_sigma, 0.0), SPEED_MPS)
     speed_sigma = np.minimum(drift + ACCELERATION_MPS2 * (unseen_s / 2 + lead_s), SPEED_MPS)
     covariance = np.zeros((9, 9))
-    covariance[:3, :3] = axes.T @ np.diag((INFLATION * along) ** 2) @ axes
-    covariance[3:6, 3:6] = axes.T @ np.diag((INFLATION * speed_sigma) ** 2) @ axes
+    covariance[:3, :3] = axes.T * (INFLATION * along) ** 2 @ axes
+    covariance[3:6, 3:6] = axes.T * (INFLATION * speed_sigma) ** 2 @ axes
     covariance[6:, 6:] = np.eye(3) * ACCELERATION_MPS2**2
-    velocity = axes.T @ (scale * rates)
-    return Start(sample, np.r_[position, velocity, np.zeros(3)], covariance)
+    state = np.zeros(9)
+    state[:3], state[3:6] = slant * axes[0], axes.T @ (scale * rates)
+    return Start(sample, state, covariance)

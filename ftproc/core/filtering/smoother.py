@@ -197,7 +197,7 @@ def _swept(log: Observations, model: Model, starts: list[Start], kept: int) -> _
         memory = Memory.of(stop - start.sample, model.filter(start), estimates, residuals)
         likelihood += _sweep(Span(start.sample, stop, start.sample), samples, profile, memory, jerk, kept)
         noise += memory.back["noise_score"][0]
-        if kept != SCORES:
+        if kept == STATES or (kept == RESIDUALS and start.sample > 0):
             covariance = smoothed_covariance(memory.block["p"][0], memory.back["n_first"][0])
             heads.append(Start(start.sample, memory.back["state"][0].copy(), covariance))
     return _Swept(Scores(likelihood, noise, jerk), estimates, residuals, tuple(heads))
@@ -212,13 +212,13 @@ def smooth_log(log: Observations, model: Model, starts: list[Start], residuals_o
     """Smooth the whole log; the record on each side of a start separately. Samples before the first start are
     extrapolated.
 
-    residuals_only: states and sigmas are left out (of no sample), which saves a third of the time.
+    residuals_only: states and sigmas are left out (of no sample), which saves a third of the time, and most heads.
     """
     scores, estimates, residuals, heads = _swept(log, model, starts, RESIDUALS if residuals_only else STATES)
-    first = heads[0].sample
-    before, residuals[:first] = extrapolated(log, model, heads[0])
-    if not residuals_only:
-        estimates[:first] = before
+    first = starts[0].sample
+    if first > 0:
+        before, residuals[:first] = extrapolated(log, model, heads[0])
+        estimates[:first] = before[: len(estimates)]
     fields = {name: estimates[name] for name in ESTIMATED.names or ()}
     fields |= {name: np.ascontiguousarray(residuals[name]) for name in LEFT.names or ()}
     return SmootherRun(
