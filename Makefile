@@ -48,7 +48,7 @@ $(foreach log,$(logs),$(if $(word 2,$(log-of-$(call stem,$(log)))),\
 $(if $(logs),,$(error LOGS: there is no log among "$(LOGS)"))
 endif
 
-.PHONY: help run test trust fuzz oldest audit samples model bench reproduce clean install FORCE
+.PHONY: help run test kernels trust fuzz oldest audit samples model bench reproduce clean install FORCE
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /make \1	/p' Makefile | expand -t 16
@@ -103,7 +103,11 @@ test: $(developer) ## lint, types and the whole test suite
 	$(bin)/ruff check .
 	$(bin)/ruff format --check .
 	$(bin)/mypy
-	$(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal
+	FTPROC_KERNELS=compiled $(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal
+
+kernels: $(developer) ## the tests of the kernels as numba compiles them now, and as plain Python
+	FTPROC_KERNELS=jit $(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal tests/core
+	FTPROC_KERNELS=python $(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal tests/core
 
 samples: $(installed) ## make sample_data/ anew (fixed seeds: the same bytes)
 	@mkdir -p sample_data

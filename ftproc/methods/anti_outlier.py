@@ -63,7 +63,8 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Usual | No
     smoothed = edited.smoothed if settings.smooth else None
     slow = edited.slow_noise if usual is None else usual.slow_noise
     label = preparing.labels(edited.weight, readings.measurement)
-    return Estimate(run, label, edited.model, smoothed, preparing.re_initialized(starts), edited.settled, slow)
+    again = preparing.re_initialized(starts)
+    return Estimate(run, label, edited.model, smoothed, again, edited.settled, slow, unexamined=edited.unexamined)
 
 
 class Usual(NamedTuple):

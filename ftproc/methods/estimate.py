@@ -76,7 +76,7 @@ class Estimate(NamedTuple):
     settled: whether two-pass editing's decisions stood still; None where there were none to make. slow_noise: the
     noise is correlated too slowly to be distinguished from motion, so the sigmas are too small. cleaned: (n, 3)
     readings of a method that works on range, azimuth and elevation one by one; NaN there and in its run means not
-    estimated.
+    estimated. unexamined: places where two-pass editing looked for no alternative, its search having been cut short.
     """
 
     run: FilterRun
@@ -87,6 +87,7 @@ class Estimate(NamedTuple):
     settled: bool | None = None
     slow_noise: bool = False
     cleaned: FloatArray | None = None
+    unexamined: int = 0
 
     @property
     def smoothed_run(self) -> FilterRun:

@@ -35,7 +35,7 @@ class RunStatistics:
         self.times: list[FloatArray] = []
         self.sigmas: list[FloatArray] = []
         self.jerk: list[FloatArray] = []
-        self.reacquired, self.slow_noise = 0, False
+        self.reacquired, self.slow_noise, self.unexamined = 0, False, 0
         self.converged: bool | None = None
         self.largest_m, self.outside, self.rows, self.parts = 0.0, 0.0, 0, 0
 
@@ -63,6 +63,7 @@ class RunStatistics:
         if estimate.settled is not None:
             self.converged = estimate.settled and self.converged is not False
         self.slow_noise |= estimate.slow_noise
+        self.unexamined += estimate.unexamined
         self.largest_m = max(self.largest_m, float(np.linalg.norm(correction[:, :3], axis=1).max(initial=0.0)))
         self.outside += outside * len(time_s)
         self.rows += len(time_s)
@@ -120,6 +121,7 @@ class RunStatistics:
             "reacquired": self.reacquired,
             "editing_converged": self.converged,
             "slow_noise": self.slow_noise,
+            "editing_places_unexamined": self.unexamined,
             "correction_largest_m": self.largest_m,
             "correction_outside_training": self.outside / max(self.rows, 1),
         }

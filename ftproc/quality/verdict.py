@@ -103,6 +103,10 @@ def _editing(s: Mapping[str, Any]) -> Iterator[Remark]:
             yield Remark(level, f"{100 * share:.0f} % of the {name} readings are rejected as outliers")
     if s["editing_converged"] is False:
         yield Remark(SUSPECT, "the outlier decisions did not converge: inspect the flagged readings")
+    if s["editing_places_unexamined"]:
+        places = s["editing_places_unexamined"]
+        text = f"the search for likelier outlier decisions was cut short: {places} places were not examined"
+        yield Remark(SUSPECT, text)
     if s["reacquired"]:
         often = {1: "once", 2: "twice"}.get(s["reacquired"], f"{s['reacquired']} times")
         yield Remark(SUSPECT, f"re-initialized {often} (track loss, or a gap too long to bridge)")

@@ -1,4 +1,4 @@
-"""`python -m tests.bench [samples] [accuracy] [methods] [correction] [speed] [scale] [pages] [training]`: tables of the
+"""`python -m tests.bench [samples] [accuracy] [methods] [correction] [speed] [start] [scale] [pages] [training]`: tables of the
 README and the guide, as Markdown on standard output and in out/bench.md."""
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from itertools import chain
 from pathlib import Path
 
-from tests.bench import accuracy, correction, methods, pages, samples, scale, speed, training
+from tests.bench import accuracy, correction, methods, pages, samples, scale, speed, start, training
 
 TABLES = {
     "samples": samples,
@@ -16,6 +16,7 @@ TABLES = {
     "methods": methods,
     "correction": correction,
     "speed": speed,
+    "start": start,
     "scale": scale,
     "pages": pages,
     "training": training,

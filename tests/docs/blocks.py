@@ -109,6 +109,7 @@ BLOCKS = {
     "correction": table("python -m tests.bench correction", note=DIGITS),
     "starts": session(STUDY, slow=True),
     "speed": table("python -m tests.bench speed", note=TIMES, without="bound"),
+    "start": table("python -m tests.bench start", note=TIMES, without="bound"),
     "scale": table("FTPROC_BENCH_ROWS=1e7 python -m tests.bench scale", note=TIMES, without="bound"),
     "reliability": table("python -m tests.trust", note=COUNTS),
     "reference": Block(("python -m tests.docs.reference",), _as_it_is),

@@ -31,6 +31,7 @@ AROUND = 80  # samples on each side that the comparison looks at
 ROUNDS = 5
 MARGIN = 5.0  # by which the log-probability of another decision must be better
 MOST = 100  # comparisons in one look
+WORK, WORK_PER_SAMPLE = 150_000, 60  # samples that one search may smooth, and for each sample of the log
 STEPS = 14  # of filling a hole, or of taking out what stands out most
 FITS = 2.5  # sigmas off at which a reading is taken into a hole
 SURE, ALMOST = 1.5, 1.3  # times the noise, or the smallest sigma in the hole: where the track is known well enough
@@ -72,6 +73,22 @@ class Island(NamedTuple):
         return Island(self.component, *(place - samples for place in self[1:]))
 
 
+class Search:
+    """A search for alternatives in a log of so many samples. tried: islands that were examined; they are examined again
+    only if they have changed. unexamined: those that no work was left for; work is counted in samples that are
+    smoothed, not in seconds, so that a result does not depend on the machine."""
+
+    def __init__(self, samples: int) -> None:
+        self.tried: set[Island] = set()
+        self.unexamined: set[Island] = set()
+        self.work = WORK + WORK_PER_SAMPLE * samples
+
+    def take(self, island: Island) -> bool:
+        """Whether there is work left for an island."""
+        (self.tried if self.work > 0 else self.unexamined).add(island)
+        return self.work > 0
+
+
 class Step(NamedTuple):
     """Decisions (n, 3), and the log-probability of the readings and of the decisions themselves."""
 
@@ -79,13 +96,13 @@ class Step(NamedTuple):
     likelihood: float
 
 
-def try_alternatives(log: Neighbourhood, weight: FloatArray, tried: set[Island]) -> FloatArray:
-    """The decisions (n, 3), replaced by others where these are likelier. tried: islands that were examined before; they
-    are examined again only if they have changed, and those examined now are added."""
+def try_alternatives(log: Neighbourhood, weight: FloatArray, search: Search) -> FloatArray:
+    """The decisions (n, 3), replaced by others where these are likelier."""
     result = weight.copy()
-    new = [island for island in islands(log.time_s, weight, log.possible) if island not in tried]
+    new = [island for island in islands(log.time_s, weight, log.possible) if island not in search.tried]
     for island in new[:MOST]:
-        tried.add(island)
+        if not search.take(island):
+            continue
         low = max(island.first - AROUND, 0)
         near = slice(low, island.last + AROUND)
         part = log.part(near)
@@ -93,6 +110,7 @@ def try_alternatives(log: Neighbourhood, weight: FloatArray, tried: set[Island])
             steps = [*_decisions(part, result[near]), *_alternatives(part, result[near], island.shifted(low))]
         except ValueError:  # a component has too few readings there
             continue
+        search.work -= len(steps) * len(part.time_s)
         likeliest = max(steps, key=lambda step: step.likelihood)
         if likeliest.likelihood > steps[0].likelihood + MARGIN:
             result[near] = likeliest.weight

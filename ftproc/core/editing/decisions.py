@@ -52,7 +52,8 @@ class Record(NamedTuple):
 
 class Decision(NamedTuple):
     """Weights (n, 3), the model and starts they were made with, the estimated outlier rates (3, 3), how many rounds it
-    took, whether they stand still, and whether the noise is correlated too slowly to be distinguished from motion."""
+    took, whether they stand still, whether the noise is correlated too slowly to be distinguished from motion, and for
+    how many places no work was left to look for alternatives."""
 
     weight: FloatArray
     model: Model
@@ -61,6 +62,7 @@ class Decision(NamedTuple):
     rounds: int = 0
     settled: bool = False
     slow_noise: bool = False
+    unexamined: int = 0
 
 
 def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
@@ -80,7 +82,9 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
         weight = decided
         rounds += 1
         starts = find_starts(record.weighted(weight), model.noise_variance, float(model.jerk[0, 0]))
-    return Decision(weight, model, starts, rates, initial.rounds + rounds, settled)
+    return initial._replace(
+        weight=weight, model=model, starts=starts, rates=rates, rounds=initial.rounds + rounds, settled=settled
+    )
 
 
 def allow_for_colour(record: Record, decision: Decision) -> Decision:

@@ -43,7 +43,7 @@ def reassess(record: Record, decision: Decision) -> Decision:
     widened = _widened(marked)
     if len(widened) <= SHORT_LOG and widened.mean() > MOST:
         return _until_settled(record, decision, profile)
-    weight = decision.weight.copy()
+    weight, unexamined = decision.weight.copy(), 0
     # A span is too short to tell the noise from.
     known = record._replace(fixed=record.fixed._replace(noise=np.ones(3, bool)))
     for span in _spans(widened):
@@ -53,8 +53,10 @@ def reassess(record: Record, decision: Decision) -> Decision:
         except ValueError:  # a component has too few readings there
             continue
         initial = Decision(weight[span], calm, starts, decision.rates)
-        weight[span] = _until_settled(part, initial, None).weight
-    return decision._replace(weight=weight, starts=_starts(record, weight, calm), model=profile)
+        decided = _until_settled(part, initial, None)
+        weight[span] = decided.weight
+        unexamined += decided.unexamined
+    return decision._replace(weight=weight, starts=_starts(record, weight, calm), model=profile, unexamined=unexamined)
 
 
 def _profile(record: Record, decision: Decision) -> Model:
@@ -73,26 +75,27 @@ def _until_settled(record: Record, decision: Decision, profile: Model | None) ->
     left is taken for theirs, ever fewer are left.
     """
     first = decision.weight
-    tried: set[alternatives.Island] = set()
-    tried_at = np.inf
+    search, tried_at = alternatives.Search(len(record.time_s)), np.inf
     for _ in range(ROUNDS):
         profile = profile or _profile(record, decision)
         calm = median_level(profile)
         level = float(calm.jerk[0, 0])
         if not tried_at / OTHER_LEVEL < level < tried_at * OTHER_LEVEL:
-            tried, tried_at = set(), level
+            tried_at = level
+            search.tried.clear()
         suspects = _suspects(record, decision, calm, profile)
         whole = alternatives.Neighbourhood(
             record.time_s, record.measurement, record.possible, calm, decision.rates, record.gate
         )
-        weight = alternatives.try_alternatives(whole, np.where(suspects, 0.0, decision.weight), tried)
+        weight = alternatives.try_alternatives(whole, np.where(suspects, 0.0, decision.weight), search)
         if not _stands_out(record.time_s, profile).any() and (weight == decision.weight).all():
             break
         again = decide(record, decision._replace(weight=weight, model=calm), tune_first=False)
         if (again.weight == decision.weight).all() or (again.weight.sum(0) < LEAST_KEPT * first.sum(0)).any():
             break
         decision, profile = again, None
-    return decision._replace(model=profile or _profile(record, decision))
+    unexamined = len(search.unexamined - search.tried)
+    return decision._replace(model=profile or _profile(record, decision), unexamined=unexamined)
 
 
 def _stands_out(time_s: FloatArray, profile: Model) -> NDArray[np.bool_]:

@@ -47,7 +47,8 @@ class Edited(NamedTuple):
     weight: (n, 3) 1 good, 0 rejected or missing. model: noise and jerk profile. starts: for the next pass.
     smoothed: the smoother's run with these. rates: (3, 3) estimated outlier rates per component.
     rounds: how many passes it took; settled: whether the decisions stood still. slow_noise: the noise is correlated,
-    but so slowly that it cannot be distinguished from motion; the sigmas are then too small.
+    but so slowly that it cannot be distinguished from motion; the sigmas are then too small. unexamined: places where
+    no alternative was looked for, because the search was cut short.
     """
 
     weight: FloatArray
@@ -58,6 +59,7 @@ class Edited(NamedTuple):
     rounds: int
     settled: bool
     slow_noise: bool
+    unexamined: int
 
 
 def screen(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -120,7 +122,7 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
         decision = decision._replace(model=with_allowance(found))
     d = decision
     smoothed = smooth_log(log, d.model, d.starts)
-    return Edited(d.weight, d.model, d.starts, smoothed, d.rates, d.rounds, d.settled, d.slow_noise)
+    return Edited(d.weight, d.model, d.starts, smoothed, d.rates, d.rounds, d.settled, d.slow_noise, d.unexamined)
 
 
 def smoothed_starts(smoothed: SmootherRun) -> list[Start]:

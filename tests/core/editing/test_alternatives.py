@@ -28,7 +28,7 @@ def followed(component=0, begin=190, end=215, flank=8, sigmas=12.0):
 @pytest.mark.parametrize("component", range(3))
 def test_patch_that_was_followed_is_given_up(component):
     log, wrong, right = followed(component)
-    found = alternatives.try_alternatives(log, wrong, set())
+    found = alternatives.try_alternatives(log, wrong, alternatives.Search(len(wrong)))
     np.testing.assert_array_equal(found[190:215, component], 0.0)
     assert (found == right).mean() > 0.998
 
@@ -45,18 +45,33 @@ def test_far_patch_beside_other_outliers_is_given_up(component):
         right[outlier, component] = wrong[outlier, component] = 0.0
     log.measurement[240:250, component] += noise * np.array([70, -40, 55, -80, 30, 90, -60, 45, -75, 65])
     right[240:250, component] = wrong[240:250, component] = 0.0
-    found = alternatives.try_alternatives(log, wrong, set())
+    found = alternatives.try_alternatives(log, wrong, alternatives.Search(len(wrong)))
     np.testing.assert_array_equal(found[165:255, component], right[165:255, component])
 
 
 def test_islands_are_tried_once():
     log, wrong, _ = followed()
-    tried = set(alternatives.islands(log.time_s, wrong, log.possible))
-    np.testing.assert_array_equal(alternatives.try_alternatives(log, wrong, tried), wrong)
-    (again,) = tried
-    tried = {again._replace(end=again.end - 1)}
-    assert (alternatives.try_alternatives(log, wrong, tried) != wrong).any()
-    assert again in tried
+    search = alternatives.Search(len(wrong))
+    search.tried = set(alternatives.islands(log.time_s, wrong, log.possible))
+    np.testing.assert_array_equal(alternatives.try_alternatives(log, wrong, search), wrong)
+    (again,) = search.tried
+    search.tried = {again._replace(end=again.end - 1)}
+    assert (alternatives.try_alternatives(log, wrong, search) != wrong).any()
+    assert again in search.tried
+
+
+def test_a_search_ends_when_its_work_is_done():
+    log, wrong, _ = followed()
+    search = alternatives.Search(len(wrong))
+    before = search.work
+    alternatives.try_alternatives(log, wrong, search)
+    assert before - 40 * len(wrong) < search.work < before
+    assert not search.unexamined
+    search.work = 0
+    search.tried.clear()
+    np.testing.assert_array_equal(alternatives.try_alternatives(log, wrong, search), wrong)
+    assert search.unexamined == set(alternatives.islands(log.time_s, wrong, log.possible))
+    assert not search.tried
 
 
 def test_the_worst_go_first_and_take_no_good_ones_with_them():
@@ -85,11 +100,11 @@ def test_hole_is_filled_from_its_edges_and_not_with_the_patch(component):
 @pytest.mark.parametrize("component", range(3))
 def test_right_decisions_stay(component):
     log, _, right = followed(component)
-    np.testing.assert_array_equal(alternatives.try_alternatives(log, right, set()), right)
+    np.testing.assert_array_equal(alternatives.try_alternatives(log, right, alternatives.Search(len(right))), right)
     two = right.copy()  # good readings between two real patches are no patch
     two[225:235, component] = 0.0
     log.measurement[225:235, component] += 20 * np.sqrt(log.model.noise_variance[component])
-    np.testing.assert_array_equal(alternatives.try_alternatives(log, two, set()), two)
+    np.testing.assert_array_equal(alternatives.try_alternatives(log, two, alternatives.Search(len(two))), two)
 
 
 def test_islands_lie_between_two_rejected_runs():
@@ -132,4 +147,4 @@ def test_neighbourhood_that_says_too_little_is_left():
     log.measurement[:, 2] = np.nan
     log = log._replace(possible=np.isfinite(log.measurement))
     wrong = wrong * log.possible
-    np.testing.assert_array_equal(alternatives.try_alternatives(log, wrong, set()), wrong)
+    np.testing.assert_array_equal(alternatives.try_alternatives(log, wrong, alternatives.Search(len(wrong))), wrong)
