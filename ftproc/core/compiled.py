@@ -29,6 +29,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.core import signatures
 from ftproc.errors import InstallationError
@@ -144,7 +145,15 @@ def record(kind: type) -> np.dtype[np.void]:
 def zeros(layout: np.dtype[np.void], count: int = 1) -> Any:
     """`count` records in one array, all zero. For kernels fields are attributes; elsewhere `records["x"]` is the array
     (count, ...) of a field."""
-    made = np.zeros(count, layout)
+    return _for_kernels(np.zeros(count, layout))
+
+
+def empty(layout: np.dtype[np.void], count: int) -> Any:
+    """The same, with whatever the memory holds."""
+    return _for_kernels(np.empty(count, layout))
+
+
+def _for_kernels(made: NDArray[np.void]) -> Any:
     return made.view(np.recarray) if WAY == "python" else made
 
 

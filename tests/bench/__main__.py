@@ -1,5 +1,5 @@
-"""`python -m tests.bench [samples] [accuracy] [methods] [correction] [speed] [start] [scale] [pages] [training]`: tables of the
-README and the guide, as Markdown on standard output and in out/bench.md."""
+"""`python -m tests.bench [samples] [accuracy] [methods] [correction] [speed] [start] [scale] [pages] [training]`:
+tables of the README and the guide, as Markdown on standard output and in out/bench.md."""
 
 from __future__ import annotations
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +52,7 @@ def find_starts(log: Observations, noise_variance: FloatArray, jerk_psd: float |
     time_s, measurement, weight = log
     starts = [first_start(log, noise_variance)]
     good = (weight > 0) & np.isfinite(measurement)
-    interval_s = float(np.median(time_s[1:] - time_s[:-1])) if len(time_s) > 1 else 0.0
+    interval_s = _median(time_s[1:] - time_s[:-1]) if len(time_s) > 1 else 0.0
     gaps = gaps_of(time_s, good, shortest_gap(interval_s))
     edges = [*sorted(gaps), len(time_s)]
     for low, high in itertools.pairwise(edges):
@@ -62,6 +61,12 @@ def find_starts(log: Observations, noise_variance: FloatArray, jerk_psd: float |
         if jerk_psd is None or too_long(gaps[low], measurement[low:high, 0][good[low:high, 0]], jerk_psd):
             starts.append(first_state(log, noise_variance, low, slice(low, high)))
     return starts
+
+
+def _median(values: FloatArray) -> float:
+    """numpy's, in a tenth of the time where there are few values."""
+    middle = [(len(values) - 1) // 2, len(values) // 2]
+    return float(np.partition(values, middle)[middle].mean())
 
 
 def too_long(gap: tuple[float, float], range_m: FloatArray, jerk_psd: float) -> bool:
@@ -97,19 +102,6 @@ def gaps_of(
     return found
 
 
-class _Line(NamedTuple):
-    """A line through the readings of one component: value and rate at the start and their 1-sigma (infinite for the
-    rate when all readings are of one instant); then the time over which a curve may have gone unseen, s: between the
-    readings, and from them to the start."""
-
-    value: float
-    rate: float
-    value_sigma: float
-    rate_sigma: float
-    unseen_s: float
-    lead_s: float
-
-
 def first_state(log: Observations, noise_variance: FloatArray, sample: int, within: slice) -> Start:
     """Start at `sample` from lines through the good readings nearest to it, among the samples of `within`.
 
@@ -118,14 +110,13 @@ def first_state(log: Observations, noise_variance: FloatArray, sample: int, with
     Raises ValueError with the component's index when a component has no good reading in the span.
     """
     time, z, weight = (np.ascontiguousarray(each) for each in log)
-    lines = []
+    lines = np.empty((3, 6))
     for c in range(3):
         chosen = _nearest(time, z, weight, sample, within.start, within.stop, c)
         if len(chosen) == 0:
             raise ValueError(c)
-        found = _line(time, z, chosen, sample, c, math.sqrt(noise_variance[c]))
-        lines.append(_Line(*found))
-    return _to_state(sample, lines)
+        _line(time, z, chosen, sample, c, math.sqrt(noise_variance[c]), lines[c])
+    return Start(sample, *_to_state(lines))
 
 
 @kernel
@@ -163,13 +154,13 @@ def _nearest(time: Vector, z: Matrix, weight: Matrix, sample: int, first: int, l
 
 
 @kernel
-def _line(
-    time: Vector, z: Matrix, chosen: Indices, sample: int, c: int, sigma: float
-) -> tuple[float, float, float, float, float, float]:
-    """The line through the chosen readings at the time of `sample`, as a `_Line`.
+def _line(time: Vector, z: Matrix, chosen: Indices, sample: int, c: int, sigma: float, line: Vector) -> None:
+    """The line through the chosen readings at the time of `sample`.
 
-    The scatter about the line stands for what it misses of a curve, so it is not averaged down; too few readings
-    to show a curve leave it to the acceleration that must be allowed for.
+    line (6,): value and rate there and their 1-sigma (infinite for the rate when all readings are of one instant); then
+    the time over which a curve may have gone unseen, s: between the readings, and from them to the sample. The scatter
+    about the line stands for what it misses of a curve, so it is not averaged down; too few readings to show a curve
+    leave it to the acceleration that must be allowed for.
     """
     m = len(chosen)
     t, v = np.empty(m), np.empty(m)
@@ -181,8 +172,9 @@ def _line(
         middle += t[i] / m
         mean += v[i] / m
     span = t[m - 1] - t[0]
+    line[0], line[1], line[2], line[3], line[4], line[5] = mean, 0.0, sigma, math.inf, 0.0, lead
     if span <= 0:
-        return mean, 0.0, sigma, math.inf, 0.0, lead
+        return
     spread = slope = 0.0
     for i in range(m):
         spread += (t[i] - middle) ** 2
@@ -192,26 +184,40 @@ def _line(
     scatter = sigma
     for i in range(m):
         scatter = max(scatter, abs(v[i] - value - rate * t[i]))
-    rate_sigma = 4 * scatter / span
-    return value, rate, math.hypot(scatter, rate_sigma * lead), rate_sigma, span if m < CURVE else 0.0, lead
+    line[0], line[1], line[3], line[4] = value, rate, 4 * scatter / span, span if m < CURVE else 0.0
+    line[2] = math.hypot(scatter, line[3] * lead)
 
 
-def _to_state(sample: int, lines: list[_Line]) -> Start:
-    """From range, azimuth, elevation and their rates to a Cartesian state with its covariance."""
-    values, rates, value_sigma, rate_sigma, unseen_s, lead_s = np.array(lines).T.copy()
-    slant = max(float(values[0]), 1.0)
-    ca, sa, ce, se = math.cos(values[1]), math.sin(values[1]), math.cos(values[2]), math.sin(values[2])
-    axes = np.array([[ca * ce, sa * ce, se], [-sa, ca, 0.0], [-ca * se, -sa * se, ce]])  # radial, cross, up
-    scale = np.array([1.0, slant * ce, slant])  # m per m, rad, rad along these
-    curve = ACCELERATION_MPS2 * (unseen_s**2 / 8 + lead_s**2 / 2)
-    along = np.minimum(scale * value_sigma + curve, WIDEST_IN_RANGES * slant)
-    known = np.isfinite(rate_sigma)
-    drift = np.where(known, scale * np.where(known, rate_sigma, 0.0), SPEED_MPS)
-    speed_sigma = np.minimum(drift + ACCELERATION_MPS2 * (unseen_s / 2 + lead_s), SPEED_MPS)
-    covariance = np.zeros((9, 9))
-    covariance[:3, :3] = axes.T * (INFLATION * along) ** 2 @ axes
-    covariance[3:6, 3:6] = axes.T * (INFLATION * speed_sigma) ** 2 @ axes
-    covariance[6:, 6:] = np.eye(3) * ACCELERATION_MPS2**2
-    state = np.zeros(9)
-    state[:3], state[3:6] = slant * axes[0], axes.T @ (scale * rates)
-    return Start(sample, state, covariance)
+@kernel
+def _to_state(lines: Matrix) -> tuple[Vector, Matrix]:
+    """From range, azimuth, elevation and their rates, rows of `_Line`s (3, 6), to a Cartesian state with its
+    covariance."""
+    slant, azimuth, elevation = max(lines[0, 0], 1.0), lines[1, 0], lines[2, 0]
+    ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
+    axes = np.empty((3, 3))  # radial, cross, up
+    axes[0, 0], axes[0, 1], axes[0, 2] = ca * ce, sa * ce, se
+    axes[1, 0], axes[1, 1], axes[1, 2] = -sa, ca, 0.0
+    axes[2, 0], axes[2, 1], axes[2, 2] = -ca * se, -sa * se, ce
+    state, covariance = np.zeros(9), np.zeros((9, 9))
+    for k in range(3):
+        scale = 1.0 if k == 0 else slant * (ce if k == 1 else 1.0)  # m per m, rad, rad along these
+        rate, value_sigma, rate_sigma, unseen_s, lead_s = (
+            lines[k, 1],
+            lines[k, 2],
+            lines[k, 3],
+            lines[k, 4],
+            lines[k, 5],
+        )
+        curve = ACCELERATION_MPS2 * (unseen_s**2 / 8 + lead_s**2 / 2)
+        along = INFLATION * min(scale * value_sigma + curve, WIDEST_IN_RANGES * slant)
+        drift = scale * rate_sigma if math.isfinite(rate_sigma) else SPEED_MPS
+        speed = INFLATION * min(drift + ACCELERATION_MPS2 * (unseen_s / 2 + lead_s), SPEED_MPS)
+        for i in range(3):
+            state[i] += slant * axes[0, i] if k == 0 else 0.0
+            state[3 + i] += axes[k, i] * scale * rate
+            for j in range(3):
+                covariance[i, j] += axes[k, i] * along**2 * axes[k, j]
+                covariance[3 + i, 3 + j] += axes[k, i] * speed**2 * axes[k, j]
+    for i in range(6, 9):
+        covariance[i, i] = ACCELERATION_MPS2**2
+    return state, covariance

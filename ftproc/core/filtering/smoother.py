@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import kernel, part, zeros
+from ftproc.core.compiled import empty, kernel, part, zeros
 from ftproc.core.filtering import backward, ukf
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Estimates, Residuals, Span, advance, extrapolated
 from ftproc.core.filtering.records import Model, Observations, Sample, Samples, Start, between
@@ -81,9 +81,9 @@ class Memory(NamedTuple):
     @classmethod
     def of(cls, samples: int, first: Any, estimates: Any, residuals: Any) -> Memory:
         """For a span of so many samples that begins with a filter (an array of one record)."""
-        before = zeros(ukf.FILTER, -(-samples // BLOCK))
+        before = empty(ukf.FILTER, -(-samples // BLOCK))
         before[:1] = first
-        block = zeros(ukf.FILTER, min(samples, BLOCK))
+        block = empty(ukf.FILTER, min(samples, BLOCK))
         block["noise"] = first["noise"][0]
         return cls(block, before, zeros(backward.BACKWARD), estimates, residuals)
 

@@ -87,6 +87,7 @@ def position_factor(f: Filter) -> None:
     factor[0, 0], factor[1, 1], factor[2, 2] = r0, r1, math.sqrt(d2)
     factor[1, 0], factor[2, 0] = p[1, 0] * i0 * r0, p[2, 0] * i0 * r0
     factor[2, 1] = rest * i1 * r1
+    factor[0, 1] = factor[0, 2] = factor[1, 2] = 0.0
 
 
 @part
