@@ -105,7 +105,7 @@ def _converted(f: ukf.Filter, sample: Sample, conversions: Conversions, row: Row
     _axes(math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation), h)
     v.scale[0] = 1.0
     v.scale[1], v.scale[2] = slant * max(math.cos(elevation), MIN_COS_ELEVATION), slant  # m per rad
-    ukf.cross_covariance(f)
+    ukf.cross_covariance(f.p, f.h, f.pxz)
     for i in range(3):
         f.e[i] = v.along[i] - (h[i, 0] * x[0] + h[i, 1] * x[1] + h[i, 2] * x[2])
         for j in range(3):

@@ -138,7 +138,7 @@ def _update_by_gain(f: ukf.Filter) -> tuple[float, float]:
     for i in range(3):
         for j in range(3):
             s[i, j] = f.c[i, j] + (f.noise[i] if i == j else 0.0)
-    ukf.cross_covariance(f)
+    ukf.cross_covariance(f.p, f.h, f.pxz)
     nis, log_det = ukf.whiten(f)
     ukf.gain_of(f, gain)
     for i in range(9):

@@ -126,14 +126,9 @@ def linearise(f: Filter) -> None:
     half = 0.5 / spread
     i0, i1, i2 = 1 / factor[0, 0], 1 / factor[1, 1], 1 / factor[2, 2]
     for i in range(3):  # H' = L^-T B by back substitution, one component at a time
-        b0, b1, b2 = (
-            half * (d[0, i, 0] - d[0, i, 1]),
-            half * (d[1, i, 0] - d[1, i, 1]),
-            half * (d[2, i, 0] - d[2, i, 1]),
-        )
-        h[i, 2] = b2 * i2
-        h[i, 1] = (b1 - factor[2, 1] * h[i, 2]) * i1
-        h[i, 0] = (b0 - factor[1, 0] * h[i, 1] - factor[2, 0] * h[i, 2]) * i0
+        h[i, 2] = half * (d[2, i, 0] - d[2, i, 1]) * i2
+        h[i, 1] = (half * (d[1, i, 0] - d[1, i, 1]) - factor[2, 1] * h[i, 2]) * i1
+        h[i, 0] = (half * (d[0, i, 0] - d[0, i, 1]) - factor[1, 0] * h[i, 1] - factor[2, 0] * h[i, 2]) * i0
 
 
 @part
@@ -228,13 +223,8 @@ def whiten(f: Filter) -> tuple[float, float]:
 
 
 @part
-def cross_covariance(f: Filter) -> None:
+def cross_covariance(p: FloatArray, h: FloatArray, pxz: FloatArray) -> None:
     """P_xz = P H' for an H that sees the position only."""
-    _times_h(f.p, f.h, f.pxz)
-
-
-@part
-def _times_h(p: FloatArray, h: FloatArray, pxz: FloatArray) -> None:
     for i in range(9):
         for j in range(3):
             pxz[i, j] = p[i, 0] * h[j, 0] + p[i, 1] * h[j, 1] + p[i, 2] * h[j, 2]
@@ -258,7 +248,7 @@ def update(f: Filter) -> tuple[float, float]:
             stiff = stiff or c[i, i] > 1e7 * extra
     nis, log_det = whiten(f)
     if stiff:
-        cross_covariance(f)
+        cross_covariance(f.p, f.h, f.pxz)
     for i in range(9):
         x[i] += u[0, i] * y[0] + u[1, i] * y[1] + u[2, i] * y[2]
     for i in range(9):
@@ -285,7 +275,7 @@ def _restore_joseph(f: Filter) -> None:
     gain = np.empty((9, 3))
     gain_of(f, gain)
     residue = np.empty((9, 3))  # (I - K H) P H': zero in exact arithmetic but for the measurement noise
-    _times_h(p, h, residue)
+    cross_covariance(p, h, residue)
     rest = np.zeros((3, 3))  # S - H P- H': noise and bend of h
     for i in range(3):
         for j in range(3):
