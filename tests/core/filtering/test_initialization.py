@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.editing import two_pass
-from ftproc.core.filtering.initialization import find_starts, first_start, first_state
+from ftproc.core.filtering.initialization import LONGEST_FIT_S, SAMPLES, _nearest, find_starts, first_start, first_state
 from ftproc.core.filtering.records import Observations
 from ftproc.core.model.frames import from_cartesian, wrap
 from tests.core.tracks import SIGMA, matched
@@ -155,6 +155,32 @@ def test_position_sigma_stays_well_below_the_range():
     z = from_cartesian(np.array([[40.0, 30.0, 10.0]]))
     start = first_start(log(np.zeros(1), z), np.array([1e4, 1.0, 1.0]))
     assert np.sqrt(np.linalg.eigvalsh(start.covariance[:3, :3]).max()) < 0.5 * 51
+
+
+def nearest_reference(time, good, sample, first, last):
+    """The nearest readings by sorting all of them."""
+    found = np.flatnonzero(good[first:last]) + first
+    here = int(np.searchsorted(found, sample))
+    found = found[max(here - SAMPLES, 0) : here + SAMPLES]
+    away = np.abs(time[found] - time[sample])
+    order = np.argsort(away, kind="stable")[:SAMPLES]
+    close = away[order] <= away[order[0]] + LONGEST_FIT_S
+    return np.sort(found[order[close | (np.arange(len(order)) < 2)]])
+
+
+def test_the_nearest_readings_are_chosen():
+    rng = np.random.default_rng(21)
+    for _ in range(200):
+        n = int(rng.integers(1, 60))
+        time = np.cumsum(rng.choice([0.1, 1.0, 5.0, 30.0], n))
+        weight, z = rng.choice([0.0, 1.0, 1.0], (n, 3)), rng.normal(size=(n, 3))
+        z[rng.random((n, 3)) < 0.2] = np.nan
+        first, last = sorted(rng.integers(0, n + 1, 2))
+        good = (weight[:, 1] > 0) & np.isfinite(z[:, 1])
+        if good[first:last].any():
+            sample = int(rng.integers(first, last))
+            found = _nearest(time, z, weight, sample, int(first), int(last), 1)
+            np.testing.assert_array_equal(found, nearest_reference(time, good, sample, first, last))
 
 
 def interrupted(gap, n=80, after=60):
