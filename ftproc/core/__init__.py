@@ -1,5 +1,5 @@
 """The numerical core: arrays in, arrays out.
 
-Rooms from the ground up: `model`, `filtering`, `identification`, `editing`, `comparators`; `compiled` and `threads`
-serve all. Each may call those before it; none knows a file, a table or the command line.
+Rooms from the ground up: `model`, `filtering`, `identification`, `editing`, `comparators`; `signatures`,
+`compiled` and `threads` serve all. Each may call those before it; none knows a file, a table or the command line.
 """
