@@ -37,7 +37,8 @@ def pool(recipe: Recipe, jobs: int, notify: Notify | None) -> Iterator[Submit]:
     def submit(task: Task) -> Callable[[], Outcome]:
         alone = partial(_alone, context, task, recipe, shared)
         try:
-            return partial(_outcome, executor.submit(_work, task), alone)
+            with _unheard():
+                return partial(_outcome, executor.submit(_work, task), alone)
         except BrokenProcessPool:
             return alone
 
@@ -48,6 +49,19 @@ def pool(recipe: Recipe, jobs: int, notify: Notify | None) -> Iterator[Submit]:
         raise
     finally:
         executor.shutdown(wait=True, cancel_futures=True)
+
+
+@contextlib.contextmanager
+def _unheard() -> Iterator[None]:
+    """Processes started inside never hear Ctrl-C, not even before they can ignore it; this one hears it afterwards."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _outcome(future: Future[Outcome], alone: Callable[[], Outcome]) -> Outcome:
@@ -66,7 +80,9 @@ def _alone(context: Any, task: Task, recipe: Recipe, shared: _Shared) -> Outcome
     """In a separate worker, which shows the log that kills it."""
     with _executor(context, 1, recipe, shared) as executor:
         try:
-            return executor.submit(_work, task).result()
+            with _unheard():
+                future = executor.submit(_work, task)
+            return future.result()
         except BrokenProcessPool as error:
             return Outcome(task, failure=Failure(f"{task.log}: {_DIED}", 1, str(error)))
 

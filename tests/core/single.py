@@ -27,7 +27,7 @@ def transform(x, p):
     """z^, C, P_xz and H of the kernel."""
     f = filter_at(x, p)
     ukf.linearise(f)
-    ukf.cross_covariance(f.p, f.h, f.pxz)
+    ukf.cross_covariance(f["p"], f["h"], f["pxz"])
     return f["z_hat"], f["c"], f["pxz"], f["h"]
 
 
@@ -35,7 +35,7 @@ def update(x, p, z, noise, weight):
     """x+, P+, NIS and log-likelihood of the kernel; the last two of an update that uses nothing mean nothing."""
     f = filter_at(x, p, noise)
     ukf.linearise(f)
-    ukf.cross_covariance(f.p, f.h, f.pxz)
+    ukf.cross_covariance(f["p"], f["h"], f["pxz"])
     ukf.innovate(z, f)
     ukf.use(weight, f)
     return f["x"], f["p"], *ukf.update(f)
