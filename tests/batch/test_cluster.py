@@ -125,14 +125,14 @@ def test_all_workers_dead(two_workers, flights, monkeypatch):
     for worker in two_workers.workers:
         worker.kill()
         worker.wait()
-    monkeypatch.setattr(cluster, "PATIENCE_S", 0.5)
+    monkeypatch.setattr(cluster, "PATIENCE_S", 3.0)
     with pytest.raises(UsageError, match=r"it has no workers. Start one with `dask worker tcp://127.0.0.1:\d+ "):
         next(run.run(_tasks(flights, "none"), Recipe(), scheduler=two_workers.address))
 
 
 def test_the_scheduler_stops(two_workers, flights, monkeypatch):
     """After the last test it has no workers, so the log waits when it is killed."""
-    monkeypatch.setattr(cluster, "PATIENCE_S", 0.5)
+    monkeypatch.setattr(cluster, "PATIENCE_S", 3.0)
     monkeypatch.setattr(cluster, "_check_workers", lambda client, address: two_workers.scheduler.kill())
     (outcome,) = run.run(_tasks(flights[:1], "none"), Recipe(), scheduler=two_workers.address)
     assert outcome.failure is not None
