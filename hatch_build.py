@@ -59,7 +59,7 @@ def library() -> Path:
     if not made.exists() or made.stat().st_mtime < Path(__file__).stat().st_mtime:
         compile_kernels(made)
     for old in CORE.glob("_kernels_*"):
-        if old != made:
+        if not old.name.startswith(compiled.LIBRARY):  # that of another Python stays
             old.unlink()
     return made
 
@@ -107,7 +107,7 @@ def load(room: Path, name: str) -> None:
 
 def numba_type(hint: Any) -> Any:
     """The type by which numba knows what an annotation describes."""
-    from typing import get_type_hints
+    from typing import get_args, get_type_hints
 
     import numba
     from numba.core import types
@@ -122,7 +122,7 @@ def numba_type(hint: Any) -> Any:
         return types.NamedTuple([numba_type(field) for field in fields], hint)
     if hint in plain:
         return plain[hint]
-    return types.Tuple([numba_type(member) for member in signatures.members(hint)])
+    return types.Tuple([numba_type(member) for member in get_args(hint)])
 
 
 if __name__ == "__main__":

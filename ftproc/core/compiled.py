@@ -63,7 +63,7 @@ def _library() -> Any:
     """The library that belongs to these sources, or None."""
     try:
         return importlib.import_module(f"ftproc.core.{LIBRARY}")
-    except ModuleNotFoundError:
+    except ImportError:  # not there, or not one that can be loaded
         return None
 
 
@@ -76,15 +76,15 @@ def _choose(wanted: str) -> tuple[str, Any]:
         return "compiled", library
     if wanted == "compiled":
         raise InstallationError(f"FTPROC_KERNELS asks for compiled kernels, but {_missing()}. {CURE}")
-    if wanted == "" and importlib.util.find_spec("numba") is None:
-        raise InstallationError(f"{_missing()}, and there is no numba. {CURE}")
+    if wanted != "python" and importlib.util.find_spec("numba") is None:
+        raise InstallationError(f"{'FTPROC_KERNELS is jit' if wanted else _missing()}, and there is no numba. {CURE}")
     return wanted or "jit", None
 
 
 def _missing() -> str:
     """Why the library cannot be used."""
     if any(ROOM.glob("_kernels_*")):
-        return f"the compiled kernels in {ROOM} are not of these sources or not for this Python"
+        return f"the compiled kernels in {ROOM} are not of these sources, not for this Python, or damaged"
     return f"there are no compiled kernels in {ROOM}"
 
 

@@ -8,7 +8,7 @@ because machine code looks at nothing. A number is `float`, `int` or `bool`; an 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,11 +42,6 @@ def signature(function: Callable[..., Any]) -> tuple[dict[str, Any], Any]:
     hints = get_type_hints(function, include_extras=True)
     returned = hints.pop("return")
     return hints, returned
-
-
-def members(hint: Any) -> tuple[Any, ...]:
-    """The annotations of what a tuple that is returned holds."""
-    return get_args(hint)
 
 
 class Check:

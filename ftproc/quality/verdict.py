@@ -104,8 +104,9 @@ def _editing(s: Mapping[str, Any]) -> Iterator[Remark]:
     if s["editing_converged"] is False:
         yield Remark(SUSPECT, "the outlier decisions did not converge: inspect the flagged readings")
     if s["editing_places_unexamined"]:
-        places = s["editing_places_unexamined"]
-        text = f"the search for likelier outlier decisions was cut short: {places} places were not examined"
+        count = s["editing_places_unexamined"]
+        places = "1 place was" if count == 1 else f"{count} places were"
+        text = f"the search for likelier outlier decisions was cut short: {places} not examined"
         yield Remark(SUSPECT, text)
     if s["reacquired"]:
         often = {1: "once", 2: "twice"}.get(s["reacquired"], f"{s['reacquired']} times")

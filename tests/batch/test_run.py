@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from ftproc.batch import run
+from ftproc.batch import processes, run
 from ftproc.batch.tasks import Task
 from ftproc.config.recipe import Recipe
 from ftproc.errors import ModelError
@@ -100,6 +100,15 @@ def test_a_worker_that_dies_takes_only_its_own_log_with_it(tmp_path):
     assert first.failure.message.startswith(f"{stuck}: its worker process died")
     assert second.failure is None
     assert (tmp_path / "b.csv").exists()
+
+
+def test_a_process_started_for_work_is_deaf_to_ctrl_c_from_its_first_moment():
+    code = "import signal; print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))"
+    heard = [sys.executable, "-c", code]
+    with processes._unheard():
+        inside = subprocess.run(heard, capture_output=True, text=True, check=True).stdout
+    outside = subprocess.run(heard, capture_output=True, text=True, check=True).stdout
+    assert (inside, outside) == ("True\n", "False\n")
 
 
 def test_ctrl_c_stops_all_workers_and_leaves_only_whole_files(tmp_path):

@@ -16,7 +16,7 @@ from tests.bench.scale import LIBRARIES, made
 ROOT = Path(__file__).parents[2]
 HEADER = ("what", "time", "ratio", "to", "bound")
 ROUNDS = 9
-WORST = "offset=20:8-40:8-200,ramp=6:10-30:20-200"  # some 40 % of the readings lie in patches
+WORST = "offset=18:8-40:8-200,ramp=5:10-30:20-200"  # 40 % of the readings of each component lie in patches
 COMPILER = ("numba", "llvmlite")
 
 

@@ -66,13 +66,22 @@ def test_a_library_of_other_sources_never_runs(copy, tmp_path):
     source.write_text(source.read_text() + "\n# changed\n")
     refused = copy(FTPROC_KERNELS="compiled")
     assert refused.returncode == 1
-    assert "are not of these sources or not for this Python" in refused.stderr.splitlines()[-1]
+    assert "are not of these sources, not for this Python, or damaged" in refused.stderr.splitlines()[-1]
     assert "Install a C compiler" in refused.stderr.splitlines()[-1]
     for said in (1, 0):  # numba keeps what it has compiled
         done = copy()
         assert done.stderr == ""
         assert done.stdout.splitlines()[-1] == "jit [2.0, 2.0, 2.0]"
         assert done.stdout.count("announced: ") == said
+
+
+@needs_library
+def test_a_file_that_is_no_library_is_refused(copy, tmp_path):
+    for library in (tmp_path / "ftproc" / "core").glob("_kernels_*"):
+        library.write_bytes(b"no library")
+    refused = copy(FTPROC_KERNELS="compiled")
+    assert refused.returncode == 1
+    assert "not for this Python, or damaged. Install" in refused.stderr.splitlines()[-1]
 
 
 def test_what_numba_keeps_belongs_to_the_sources(copy, tmp_path):
@@ -97,6 +106,8 @@ def test_without_library_and_numba(copy, tmp_path):
     assert done.returncode == 1
     last = done.stderr.splitlines()[-1]
     assert "there are no compiled kernels in" in last
+    asked = copy(hidden + SCRIPT, FTPROC_KERNELS="jit").stderr.splitlines()[-1]
+    assert "FTPROC_KERNELS is jit, and there is no numba. Install a C compiler" in asked
     assert "and there is no numba. Install a C compiler and then ftproc again" in last
 
 

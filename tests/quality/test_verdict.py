@@ -58,6 +58,7 @@ OFF = {"innovation_ratio": 1.5, "innovation_bounds": [0.8, 1.2], "verdict": "ove
         ({"sigmas_published": False}, {}, SUSPECT, "the method publishes no sigmas, so nothing tests its estimate"),
         ({"editing_converged": False}, {}, SUSPECT, "did not converge"),
         ({"editing_places_unexamined": 3}, {}, SUSPECT, "cut short: 3 places were not examined"),
+        ({"editing_places_unexamined": 1}, {}, SUSPECT, "cut short: 1 place was not examined"),
         ({"reacquired": 1}, {}, SUSPECT, "re-initialized once (track loss, or a gap too long to bridge)"),
         ({"reacquired": 2}, {}, SUSPECT, "re-initialized twice (track loss"),
         ({"reacquired": 3}, {}, SUSPECT, "re-initialized 3 times (track loss"),

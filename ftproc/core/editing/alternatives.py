@@ -75,8 +75,8 @@ class Island(NamedTuple):
 
 class Search:
     """A search for alternatives in a log of so many samples. tried: islands that were examined; they are examined again
-    only if they have changed. unexamined: those that no work was left for; work is counted in samples that are
-    smoothed, not in seconds, so that a result does not depend on the machine."""
+    only if they have changed. unexamined: those beyond the MOST of a look, and those that no work was left for; work is
+    counted in samples that are smoothed, not in seconds, so that a result does not depend on the machine."""
 
     def __init__(self, samples: int) -> None:
         self.tried: set[Island] = set()
@@ -100,6 +100,7 @@ def try_alternatives(log: Neighbourhood, weight: FloatArray, search: Search) -> 
     """The decisions (n, 3), replaced by others where these are likelier."""
     result = weight.copy()
     new = [island for island in islands(log.time_s, weight, log.possible) if island not in search.tried]
+    search.unexamined.update(new[MOST:])
     for island in new[:MOST]:
         if not search.take(island):
             continue

@@ -60,13 +60,18 @@ def test_islands_are_tried_once():
     assert again in search.tried
 
 
-def test_a_search_ends_when_its_work_is_done():
+def test_a_search_ends_when_its_work_is_done(monkeypatch):
     log, wrong, _ = followed()
     search = alternatives.Search(len(wrong))
     before = search.work
     alternatives.try_alternatives(log, wrong, search)
     assert before - 40 * len(wrong) < search.work < before
     assert not search.unexamined
+    monkeypatch.setattr(alternatives, "MOST", 0)
+    many = alternatives.Search(len(wrong))
+    alternatives.try_alternatives(log, wrong, many)
+    assert many.unexamined == search.tried
+    monkeypatch.undo()
     search.work = 0
     search.tried.clear()
     np.testing.assert_array_equal(alternatives.try_alternatives(log, wrong, search), wrong)
