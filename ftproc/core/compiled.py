@@ -26,6 +26,7 @@ import importlib.util
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FunctionType
 from typing import Any, TypeVar, cast, get_type_hints
 
 import numpy as np
@@ -133,6 +134,16 @@ def part(function: F) -> F:
 
         return cast(F, njit(**HOW)(function))
     return function
+
+
+def variant(function: Callable[..., Any], module: str, name: str, **different: Any) -> Callable[..., Any]:
+    """A function of the same code with some annotations different, or other globals (`_...`), for a kernel of its own. (A
+    closure would say the same, but numba keeps no machine code of closures.)"""
+    names = {key: value for key, value in different.items() if key.startswith("_")}
+    made = FunctionType(function.__code__, {**function.__globals__, **names}, name)
+    made.__module__, made.__qualname__ = module, name
+    made.__annotations__ = {**function.__annotations__, **{k: v for k, v in different.items() if k not in names}}
+    return made
 
 
 def record(kind: type) -> np.dtype[np.void]:

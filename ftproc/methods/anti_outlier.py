@@ -79,14 +79,14 @@ def usual_of(record: Recording, settings: FilterSettings) -> Usual | None:
     found = [e for e in threads.in_order(partial(_span, record, settings), record.spans()) if e is not None]
     if not found:
         return None
-    correlation = np.median([edited.model.correlation for edited in found], 0)
-    variance = np.median([edited.model.reading_variance for edited in found], 0)
+    variance, wander = (
+        np.median([getattr(edited.model, name) for edited in found], 0) for name in ("noise_variance", "wander_variance")
+    )
+    fade = np.exp(np.median([np.log(edited.model.fade_s) for edited in found], 0))
     levels = np.array([median_level(edited.model).jerk for edited in found])
     jerk = np.exp(np.median(np.log(levels[:, 0, [0, 5]]), 0))
     model = Model(
-        variance * (1 + correlation) / (1 - correlation),
-        jerk[0] * HORIZONTAL[None] + jerk[1] * VERTICAL[None],
-        correlation=correlation,
+        variance, jerk[0] * HORIZONTAL[None] + jerk[1] * VERTICAL[None], wander_variance=wander, fade_s=fade
     )
     return Usual(model, bool(np.median([edited.slow_noise for edited in found]) > 0.5))
 

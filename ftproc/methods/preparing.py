@@ -12,7 +12,7 @@ from ftproc.core.filtering import forward
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import smooth_log
-from ftproc.core.identification.likelihood import Fixed, fit_level
+from ftproc.core.identification.likelihood import Fixed, first_jerk, fit_level
 from ftproc.core.model.motion import isotropic
 from ftproc.methods.estimate import Estimate, Readings, Recording
 from ftproc.records import MISSING, FlagArray, FloatArray
@@ -71,8 +71,8 @@ def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[S
     weight, sigma = trusted(readings, settings)
     known = what_is_known(readings, settings)
     log = readings.weighted(weight)
-    guess = Model(sigma**2, isotropic(known.jerk_psd or 1.0))
-    starts = find_starts(log, guess.noise_variance, known.jerk_psd)
+    guess = Model(sigma**2, isotropic(known.jerk_psd or first_jerk(log, sigma**2)))
+    starts = find_starts(log, guess.noise_variance, float(guess.jerk[0, 0]))
     model = fit_level(log, starts, guess, Fixed(np.isfinite(known.sigma), known.jerk_psd is not None))
     return model, find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
 

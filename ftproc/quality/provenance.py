@@ -58,7 +58,7 @@ def describe(
             "noise_range_m": float(sigma[0]),
             "noise_azimuth_rad": float(sigma[1]),
             "noise_elevation_rad": float(sigma[2]),
-            "noise_correlation": [float(r) for r in statistics.model.correlation],
+            "noise_correlation": [float(r) for r in statistics.model.correlation(statistics.interval_s)],
             **_motion(statistics),
         },
         "model_sha256": None if model is None else sha256(model),

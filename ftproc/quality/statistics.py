@@ -93,7 +93,7 @@ class RunStatistics:
             components[name] = {
                 **self.components[c].counts(),
                 f"noise_{UNITS[c]}": noise if c not in absent else None,
-                "noise_correlation": float(model.correlation[c]),
+                "noise_correlation": float(model.correlation(self.interval_s)[c]),
                 **self.components[c].consistency(noise),
             }
         psd = np.concatenate(self.jerk)

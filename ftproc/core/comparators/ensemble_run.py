@@ -14,7 +14,7 @@ from ftproc.core.editing.track import RETRY_SAMPLES, reacquire
 from ftproc.core.filtering.forward import lead_in
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start, between, empty_rows
 from ftproc.core.model.frames import line_of_sight_axes
-from ftproc.core.model.measurement import MIN_RANGE_M
+from ftproc.core.model.measurement import NO_RANGE_M
 
 FloatArray = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def measure(members: FloatArray) -> FloatArray:
     x, y, z = members[:, 0], members[:, 1], members[:, 2]
     ground = np.sqrt(x * x + y * y)
     readings = np.empty((len(members), 3))
-    readings[:, 0] = np.maximum(np.sqrt(ground * ground + z * z), MIN_RANGE_M)
+    readings[:, 0] = np.maximum(np.sqrt(ground * ground + z * z), NO_RANGE_M)
     readings[:, 1] = np.arctan2(y, x)
     readings[:, 2] = np.arctan2(z, ground)
     return readings

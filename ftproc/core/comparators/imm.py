@@ -95,7 +95,7 @@ def _run(
         for m in range(models):
             f = filters[m]
             ukf.linearise(f)
-            ukf.innovate(samples[k].measurement, f)
+            ukf.innovate(samples[k], f)
             any_used = ukf.use(samples[k].weight, f)
             modes[m].gained = 0.0
             if any_used:
@@ -156,7 +156,7 @@ class Jumps(NamedTuple):
 def filter_log(log: Observations, model: Model, starts: list[Start], jumps: Jumps) -> tuple[FilterRun, FloatArray]:
     """Run the filters over the whole log, re-initialized at each start; and the probability (n, m) of each model.
     Samples before the first start are extrapolated. model: the noise; its jerk serves for that extrapolation only."""
-    samples, rows = log.samples(), empty_rows(len(log.time_s))
+    samples, rows = log.samples(model.noise_variance), empty_rows(len(log.time_s))
     models, likelihood = len(jumps.jerk), 0.0
     probability = np.full((len(log.time_s), models), np.nan)
     for start, stop in between(starts, len(log.time_s)):

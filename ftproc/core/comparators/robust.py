@@ -84,7 +84,7 @@ def _reweighted(f: ukf.Filter, sample: Sample, weightings: Weightings, row: Row)
     how.x[:] = f.x
     how.p[:] = f.p
     ukf.linearise(f)
-    ukf.innovate(sample.measurement, f)
+    ukf.innovate(sample, f)
     store_innovation(f, row)
     for i in range(3):
         how.residual[i] = f.e[i]

@@ -71,11 +71,11 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
     rounds, settled = 0, False
     while rounds < MAX_ROUNDS and not settled:
         log = record.weighted(weight)
-        if rounds < TUNING_ROUNDS and (tune_first or rounds > 0) and not model.correlation.any():
+        if rounds < TUNING_ROUNDS and (tune_first or rounds > 0) and not model.coloured:
             model = fit_level(log, starts, model, record.fixed, record.sigma)
         smoothed = smooth_log(log, model, starts, residuals_only=True)
-        variance = smoothed.residual_variance - model.noise_variance + model.reading_variance
-        good = outlier_chain.classify(smoothed.residual, variance, model.reading_variance, rates, record.gate)
+        noise = model.reading_variance
+        good = outlier_chain.classify(smoothed.residual, smoothed.residual_variance, noise, rates, record.gate)
         sure = np.where((weight > 0) | (rounds < TUNING_ROUNDS), 0.5, READMITTED)
         decided = _keep_most(((good > sure) & record.possible).astype(float), record.screened)
         settled = int((decided != weight).sum()) <= STILL * weight.size and (rounds > 0 or not tune_first)
@@ -88,16 +88,15 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
 
 
 def allow_for_colour(record: Record, decision: Decision) -> Decision:
-    """The decisions made again with correlated noise, if the noise is correlated; where it is so slowly that it cannot
-    be distinguished from motion, the decision says so."""
+    """The decisions made again with correlated noise, if the noise is correlated."""
     log, starts = record.weighted(decision.weight), decision.starts
     smoothed = smooth_log(log, decision.model, starts, residuals_only=True)
-    if not coloured_noise.is_correlated(smoothed, decision.weight, decision.model.noise_variance):
+    if not coloured_noise.may_be(log, smoothed, decision.model):
         return decision
-    model = coloured_noise.fit_coloured(log, starts, median_level(decision.model), record.fixed)
-    if not model.correlation.any():
-        return decision._replace(slow_noise=True)
-    return decide(record, decision._replace(model=model), tune_first=False)
+    found = coloured_noise.fit_coloured(log, starts, median_level(decision.model), record.fixed)
+    if found is None:
+        return decision
+    return decide(record, decision._replace(model=found.model), tune_first=False)
 
 
 def _keep_most(decided: FloatArray, screened: FloatArray) -> FloatArray:

@@ -35,8 +35,7 @@ ZERO_AT = 1.5  # of the gate C: no weight from k1 = 6 sigma on
 JUMP = 4.0  # sigmas of a difference of two readings that make a jump
 SETTLE = 2  # samples within the gate, after the jump back, that end a patch
 FLOOR = 1e-3  # weights below it are zero
-MAX_SPEED_MPS = 2e4
-MAX_ACCELERATION_MPS2 = 2e3
+DIVERGED = 100.0  # ranges that the target would fly within the longest patch
 
 
 class GateSettings(NamedTuple):
@@ -167,11 +166,12 @@ def _overdue(gate: Gate, now_s: float) -> bool:
 
 
 @part
-def _diverged(f: ukf.Filter) -> bool:
-    """Whether speed or acceleration are those of nothing that flies."""
+def _diverged(f: ukf.Filter, range_m: float, longest_patch_s: float) -> bool:
+    """Whether speed or acceleration are those of nothing that is where it was measured to be (range_m, or NaN)."""
     speed2 = f.x[3] * f.x[3] + f.x[4] * f.x[4] + f.x[5] * f.x[5]
     acceleration2 = f.x[6] * f.x[6] + f.x[7] * f.x[7] + f.x[8] * f.x[8]
-    return not (speed2 < MAX_SPEED_MPS**2 and acceleration2 < MAX_ACCELERATION_MPS2**2)
+    most = DIVERGED * abs(range_m) / longest_patch_s
+    return speed2 > most * most or acceleration2 > (most / longest_patch_s) ** 2 or not math.isfinite(f.x[0])
 
 
 @part
@@ -179,7 +179,7 @@ def _gated(f: ukf.Filter, sample: Sample, gates: Gates, row: Row) -> tuple[float
     """The update of a sample through the gate; a component whose weight is zero in the log is barred."""
     gate = gates[0]
     ukf.linearise(f)
-    ukf.innovate(sample.measurement, f)
+    ukf.innovate(sample, f)
     for i in range(3):
         row.innovation_sigma[i] = math.sqrt(f.c[i, i] + f.noise[i])
     all_inside = _decide(f, sample, gate, row.innovation_sigma)
@@ -192,7 +192,8 @@ def _gated(f: ukf.Filter, sample: Sample, gates: Gates, row: Row) -> tuple[float
     for i in range(3):
         if math.isfinite(f.e[i]) and sample.weight[i] > 0:
             gate.residual[i] = wrapped(f.e[i] + f.bend[i] - moved[i], i == 1)
-    lost = gate.wait <= 0 and (_diverged(f) or (not all_inside and _overdue(gate, sample.time_s)))
+    diverged = _diverged(f, sample.measurement[0], gate.longest_patch_s)
+    lost = gate.wait <= 0 and (diverged or (not all_inside and _overdue(gate, sample.time_s)))
     gate.wait -= 1
     return gained, lost
 

@@ -20,6 +20,7 @@ from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Start
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification.profile import fit_profile, median_level
+from ftproc.core.identification.scales import scales_of
 
 FloatArray = NDArray[np.float64]
 
@@ -129,8 +130,10 @@ def _suspects(record: Record, decision: Decision, calm: Model, profile: Model) -
     """(n, 3) readings that are good so far, in runs that are off together if the flight is calm, and off at once at
     both ends even if it is not."""
     weight, starts = decision.weight, decision.starts
-    smoothed = smooth_log(record.weighted(weight), calm, starts, residuals_only=True)
-    suspects = runs.suspicious(record.time_s, smoothed.residual, smoothed.residual_variance, weight)
+    log = record.weighted(weight)
+    smoothed = smooth_log(log, calm, starts, residuals_only=True)
+    memory_s = scales_of(log, calm.noise_variance).memory_s(float(calm.jerk[0, 0]))
+    suspects = runs.suspicious(record.time_s, smoothed.residual, smoothed.residual_variance, weight, memory_s)
     if suspects.any():
         without = smooth_log(record.weighted(np.where(suspects, 0.0, weight)), profile, starts, residuals_only=True)
         suspects = runs.confirmed(suspects, without.residual, without.residual_variance)

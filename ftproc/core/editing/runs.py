@@ -18,7 +18,8 @@ from ftproc.core.signatures import Flags, Vector
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-SHORTEST, LONGEST, LONGEST_S = 2, 48, 6.0  # readings in a run and its seconds: what lasts longer may be a manoeuvre
+SHORTEST, LONGEST, MEMORIES = 2, 48, 4.0  # readings in a run, and memories of the filter: what lasts longer may be a
+# manoeuvre
 SURE = 5.0  # robust sigmas of the sum that make a run suspicious
 SCALE_SAMPLES = 2000  # sums of each length from which their scale is taken
 FEWEST = 100  # readings, for the scale to mean anything
@@ -31,10 +32,13 @@ def runs_of(flag: NDArray[np.bool_]) -> IntArray:
     return edges
 
 
-def suspicious(time_s: FloatArray, residual: FloatArray, variance: FloatArray, weight: FloatArray) -> NDArray[np.bool_]:
+def suspicious(
+    time_s: FloatArray, residual: FloatArray, variance: FloatArray, weight: FloatArray, memory_s: float
+) -> NDArray[np.bool_]:
     """(n, 3) readings in runs that are off together.
 
     time_s (n,). residual, variance: (n, 3) leave-one-out, of the smoother; weight (n, 3), zero for readings not used.
+    memory_s: of its filter, see `identification.scales`.
     """
     found = np.zeros(residual.shape, bool)
     for c in range(3):
@@ -42,7 +46,7 @@ def suspicious(time_s: FloatArray, residual: FloatArray, variance: FloatArray, w
         if len(used) < FEWEST:
             continue
         interval = float(np.median(np.diff(time_s[used])))
-        longest = LONGEST if interval <= 0 else int(np.clip(LONGEST_S / interval, SHORTEST, LONGEST))
+        longest = LONGEST if interval <= 0 else int(np.clip(MEMORIES * memory_s / interval, SHORTEST, LONGEST))
         total = np.r_[0.0, np.cumsum(residual[used, c] / variance[used, c])]
         found[used, c] = _scan(total, _scales(total, longest))
     return found

@@ -43,7 +43,7 @@ class GatedRecursion:
 
     def __init__(self, log: Observations, model: Model, settings: gate.GateSettings, rows: Any) -> None:
         self.log, self.model, self.settings, self.rows = log, model, settings, rows
-        self.samples, self.profile = log.samples(), model.profile(log.time_s)
+        self.samples, self.profile = log.samples(model.noise_variance), model.profile(log.time_s)
         self.starts: list[Start] = []
         self.log_likelihood = 0.0
 

@@ -15,9 +15,9 @@ from ftproc.core.editing import jump_patches, outlier_chain, screening
 from ftproc.core.editing.decisions import Decision, Record, allow_for_colour, decide
 from ftproc.core.editing.reassessment import reassess
 from ftproc.core.filtering.initialization import find_starts
-from ftproc.core.filtering.records import Model, Start
+from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
-from ftproc.core.identification.likelihood import NOISE_FLOOR, Fixed
+from ftproc.core.identification.likelihood import Fixed, first_jerk, noise_floor
 from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.model.frames import unwrap
 from ftproc.core.model.motion import isotropic
@@ -26,7 +26,6 @@ FloatArray = NDArray[np.float64]
 
 SHORT_WINDOW = 11  # samples: sees jumps, and little else
 WINDOWS = (31, 75)  # samples: the short one follows manoeuvres, the long one sees through patches
-FIRST_JERK = 1.0  # m^2/s^5, where the search begins
 FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
 PROFILE_STEPS = 4  # of the search for the jerk profile, once the decisions are made
 START_INFLATION = 2.0  # on the covariance of a smoothed state that starts a filter over the same record
@@ -64,13 +63,11 @@ class Edited(NamedTuple):
 
 def screen(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(n, 3) weights after screening each component alone, and (3,) noise 1-sigma."""
-    weight = np.isfinite(measurement).astype(float)
-    sigma = NOISE_FLOOR.copy()
+    weight, sigma = np.isfinite(measurement).astype(float), np.zeros(3)
     for c in range(3):
         channel = np.ascontiguousarray(measurement[:, c])
-        weight[:, c], scale = _screen_channel(time_s, channel, c == 1)
-        sigma[c] = max(scale, sigma[c])
-    return weight, sigma
+        weight[:, c], sigma[c] = _screen_channel(time_s, channel, c == 1)
+    return weight, np.maximum(sigma, noise_floor(Observations(time_s, measurement, weight), sigma**2))
 
 
 def _screen_channel(time_s: FloatArray, channel: FloatArray, angular: bool) -> tuple[FloatArray, float]:
@@ -107,10 +104,10 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
     possible = np.isfinite(measurement) & ~stuck_readings(measurement, sigma)
     fixed = Fixed(np.isfinite(known.sigma) | (segment_of is not None), jerk_psd is not None)
     record = Record(time_s, measurement, possible, screened * possible, sigma, fixed, known.gate)
-    first_jerk = FIRST_JERK if jerk_psd is None else jerk_psd
-    model = segment_of or Model(np.where(fixed.noise, known.sigma, sigma) ** 2, isotropic(first_jerk))
+    log, noise = record.weighted(record.screened), np.where(fixed.noise, known.sigma, sigma) ** 2
+    model = segment_of or Model(noise, isotropic(first_jerk(log, noise) if jerk_psd is None else jerk_psd))
     rates = np.tile(np.array(outlier_chain.START_RATES), (3, 1))
-    starts = find_starts(record.weighted(record.screened), model.noise_variance, jerk_psd)
+    starts = find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
     decision = decide(record, Decision(record.screened, model, starts, rates), tune_first=True)
     if jerk_psd is None:
         decision = reassess(record, decision)
@@ -119,7 +116,7 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
     log = record.weighted(decision.weight)
     if jerk_psd is None:
         found = fit_profile(log, decision.starts, decision.model, PROFILE_STEPS)
-        decision = decision._replace(model=with_allowance(found))
+        decision = decision._replace(model=with_allowance(log, found))
     d = decision
     smoothed = smooth_log(log, d.model, d.starts)
     return Edited(d.weight, d.model, d.starts, smoothed, d.rates, d.rounds, d.settled, d.slow_noise, d.unexamined)

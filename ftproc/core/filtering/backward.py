@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import part, record
 from ftproc.core.filtering.forward import Estimated
-from ftproc.core.filtering.ukf import Filter
+from ftproc.core.filtering.ukf import OFFSETS, Filter
 from ftproc.core.model import motion
 from ftproc.core.model.measurement import line_of_sight_sigma
 from ftproc.core.signatures import Layout
@@ -23,7 +23,8 @@ class Backward(Protocol):
 
     v, w, nu: v, W, U N of the smoother's head. state, cov: of the smoothed estimate (of the covariance only the blocks
     of position and velocity, and the diagonal). pn: P N. q: coefficients of Q. residual, variance: leave-one-out.
-    noise_score: its sum so far. n_first: N+ of the first sample.
+    noise_score, wander_score: sums so far, of the white noise and of the offsets' variances. n_first: N+ of the first
+    sample.
     """
 
     r: Annotated[FloatArray, 9]
@@ -38,11 +39,25 @@ class Backward(Protocol):
     residual: Annotated[FloatArray, 3]
     variance: Annotated[FloatArray, 3]
     noise_score: Annotated[FloatArray, 3]
+    wander_score: Annotated[FloatArray, 3]
     n_first: Annotated[FloatArray, 9, 9]
 
 
-BACKWARD = record(Backward)
+class Coloured(Backward, Protocol):
+    """The same of a state that ends with the offsets of the measurements."""
+
+    r: Annotated[FloatArray, 12]
+    n: Annotated[FloatArray, 12, 12]
+    nu: Annotated[FloatArray, 3, 12]
+    state: Annotated[FloatArray, 12]
+    cov: Annotated[FloatArray, 12, 12]
+    pn: Annotated[FloatArray, 12]
+    n_first: Annotated[FloatArray, 12, 12]
+
+
+BACKWARD, COLOURED = record(Backward), record(Coloured)
 Backwards = Annotated[Any, Layout(BACKWARD)]
+ColouredBackwards = Annotated[Any, Layout(COLOURED)]
 
 
 @part
@@ -55,12 +70,16 @@ def estimate(back: Backward, f: Filter) -> None:
         )  # fmt: skip
         near = p0 * r[0] + p1 * r[1] + p2 * r[2] + p3 * r[3] + p4 * r[4]
         state[i] = x[i] + (near + p5 * r[5] + p6 * r[6] + p7 * r[7] + p8 * r[8])
-        for j in range(9):
+        for j in range(len(x)):
             near = p0 * n[0, j] + p1 * n[1, j] + p2 * n[2, j] + p3 * n[3, j] + p4 * n[4, j]
             pn[j] = near + p5 * n[5, j] + p6 * n[6, j] + p7 * n[7, j] + p8 * n[8, j]
+        for k in range(OFFSETS, len(x)):
+            state[i] += p[i, k] * r[k]
+            for j in range(len(x)):
+                pn[j] += p[i, k] * n[k, j]
         for j in range(i // 3 * 3 if i < 6 else i, i + 1):
             v = p[i, j]
-            for k in range(9):
+            for k in range(len(x)):
                 v -= pn[k] * p[j, k]
             cov[i, j] = v
             cov[j, i] = v
@@ -88,13 +107,17 @@ def absorb(back: Backward, f: Filter) -> None:
         )  # fmt: skip
         near = u0 * r[0] + u1 * r[1] + u2 * r[2] + u3 * r[3] + u4 * r[4]
         v[i] = y[i] - (near + u5 * r[5] + u6 * r[6] + u7 * r[7] + u8 * r[8])
-        for j in range(9):
+        for j in range(len(r)):
             near = u0 * n[0, j] + u1 * n[1, j] + u2 * n[2, j] + u3 * n[3, j] + u4 * n[4, j]
             nu[i, j] = near + u5 * n[5, j] + u6 * n[6, j] + u7 * n[7, j] + u8 * n[8, j]
+        for k in range(OFFSETS, len(r)):
+            v[i] -= u[i, k] * r[k]
+            for j in range(len(r)):
+                nu[i, j] += u[i, k] * n[k, j]
     for i in range(3):
         for j in range(i + 1):
             t = 1.0 if i == j else 0.0
-            for a in range(9):
+            for a in range(len(r)):
                 t += u[i, a] * nu[j, a]
             w[i, j] = t
             w[j, i] = t
@@ -107,6 +130,8 @@ def absorb(back: Backward, f: Filter) -> None:
             t = n[b, a] - nu[0, a] * g[0, b] - nu[1, a] * g[1, b] - nu[2, a] * g[2, b]
             n[b, a] = t
             n[a, b] = t
+    if len(r) > OFFSETS:
+        _absorb_offsets(back, f)
     for a in range(3):
         for b in range(a + 1):
             t = n[a, b]
@@ -117,6 +142,38 @@ def absorb(back: Backward, f: Filter) -> None:
             n[a, b] = t
             n[b, a] = t
     _leave_out(back, f)
+
+
+@part
+def _absorb_offsets(back: Backward, f: Filter) -> None:
+    """What the offsets, which H sees by a unit matrix, add to `absorb`: their rows and columns of r and N, against all
+    of the state. (nu is still that of before; N's position block is yet to be changed.)"""
+    r, n, v, w, nu, g, root = back.r, back.n, back.v, back.w, back.nu, f.g, f.root
+    for b in range(3):
+        at = OFFSETS + b
+        r[at] += root[0, b] * v[0] + root[1, b] * v[1] + root[2, b] * v[2]
+        for a in range(3, OFFSETS):
+            t = n[at, a] - nu[0, a] * root[0, b] - nu[1, a] * root[1, b] - nu[2, a] * root[2, b]
+            n[at, a] = t
+            n[a, at] = t
+    for b in range(3):
+        at = OFFSETS + b
+        for a in range(3):
+            t = n[at, a]
+            for i in range(3):
+                t -= nu[i, a] * root[i, b] + g[i, a] * nu[i, at]
+                for j in range(3):
+                    t += g[i, a] * w[i, j] * root[j, b]
+            n[at, a] = t
+            n[a, at] = t
+        for a in range(b + 1):
+            t = n[at, OFFSETS + a]
+            for i in range(3):
+                t -= nu[i, OFFSETS + a] * root[i, b] + root[i, a] * nu[i, at]
+                for j in range(3):
+                    t += root[i, a] * w[i, j] * root[j, b]
+            n[at, OFFSETS + a] = t
+            n[OFFSETS + a, at] = t
 
 
 @part
@@ -146,13 +203,17 @@ def _predict_reading(back: Backward, f: Filter, i: int) -> None:
     u0 = u[0, 0] * h[i, 0] + u[0, 1] * h[i, 1] + u[0, 2] * h[i, 2]
     u1 = u[1, 0] * h[i, 0] + u[1, 1] * h[i, 1] + u[1, 2] * h[i, 2]
     u2 = u[2, 0] * h[i, 0] + u[2, 1] * h[i, 1] + u[2, 2] * h[i, 2]
-    for a in range(9):
+    if len(p) > OFFSETS:
+        u0, u1, u2 = u0 + u[0, OFFSETS + i], u1 + u[1, OFFSETS + i], u2 + u[2, OFFSETS + i]
+    for a in range(len(p)):
         after = p[a, 0] * h[i, 0] + p[a, 1] * h[i, 1] + p[a, 2] * h[i, 2]
+        if len(p) > OFFSETS:
+            after += p[a, OFFSETS + i]
         column[a] = after + u[0, a] * u0 + u[1, a] * u1 + u[2, a] * u2
     predicted, spread = 0.0, f.c[i, i]
-    for a in range(9):
+    for a in range(len(p)):
         predicted += column[a] * back.r[a]
-        for b in range(9):
+        for b in range(len(p)):
             spread -= column[a] * back.n[a, b] * column[b]
     back.residual[i] = f.e[i] - predicted
     back.variance[i] = max(spread, 0.0) + f.noise[i]
@@ -172,3 +233,13 @@ def score_jerk(back: Backward, interval: float, score: FloatArray) -> None:
                     total += c[a, b] * (r[3 * a + i] * r[3 * b + j] - n[3 * a + i, 3 * b + j])
             score[k] += 0.5 * total if i == j else total
             k += 1
+
+
+@part
+def score_wander(back: Backward, f: Filter, interval: float) -> None:
+    """Add to the score of the offsets' variances, by their logarithms: over an interval, or of the first state
+    (infinite)."""
+    for i in range(OFFSETS, len(back.r)):
+        fade = math.exp(-interval / f.fade_s[i - OFFSETS])
+        added = (1 - fade * fade) * f.wander[i - OFFSETS]
+        back.wander_score[i - OFFSETS] += 0.5 * added * (back.r[i] * back.r[i] - back.n[i, i])

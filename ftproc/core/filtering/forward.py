@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from types import FunctionType
 from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import kernel, part, record, zeros
+from ftproc.core.compiled import kernel, part, record, variant, zeros
 from ftproc.core.filtering import ukf
 from ftproc.core.filtering.records import (
     FilterRun,
@@ -50,7 +49,9 @@ Recursion = Callable[[Span, Any, motion.Profile, Any, Any, Any], tuple[int, floa
 def advance(f: ukf.Filter, samples: Any, k: int, profile: motion.Profile) -> None:
     """Predict from sample k - 1 to sample k."""
     time_s = samples[k].time_s
-    motion.predict(f, time_s - samples[k - 1].time_s, profile.jerk[motion.knot_index(time_s, profile)])
+    interval = time_s - samples[k - 1].time_s
+    motion.predict(f, interval, profile.jerk[motion.knot_index(time_s, profile)])
+    motion.wander(f, interval)
 
 
 @part
@@ -77,8 +78,8 @@ def _weighted(f: ukf.Filter, sample: Sample, extended: bool, row: Row) -> tuple[
     if extended:
         jacobian.linearise(f)
     else:
-        ukf.linearise(f)
-    ukf.innovate(sample.measurement, f)
+        ukf.expect(f)
+    ukf.innovate(sample, f)
     any_used = ukf.use(sample.weight, f)
     store_innovation(f, row)
     if not any_used:
@@ -112,23 +113,22 @@ def _loop(
     return span.last, likelihood
 
 
-def recursion(update: Update, kind: Any) -> Recursion:
+def recursion(update: Update, kind: Any, filters: Any = ukf.Filters) -> Recursion:
     """A recursive filter: the kernel that runs the loop with this update of one sample compiled into it.
 
     The kernel takes a span of the samples, from the state of the filter (an array of one `ukf.Filter`), which it
-    changes, and fills the rows. extra: what else the update needs, annotated as `kind`. It returns the sample at which
+    changes, and fills the rows. extra: what else the update needs, annotated as `kind`. filters: annotation of the
+    filter's record. It returns the sample at which
     the track was lost, or the span's end, and the log-likelihood of what was used.
 
-    The code of the loop is shared; each kernel has an `_update` of its own among its globals. (A closure would say the
-    same, but numba keeps no machine code of closures.)
+    The code of the loop is shared; each kernel has an `_update` of its own among its globals.
     """
-    function = FunctionType(_loop.__code__, {**globals(), "_update": update}, update.__name__)
-    function.__module__, function.__qualname__ = update.__module__, update.__name__
-    function.__annotations__ = {**_loop.__annotations__, "extra": kind}
-    return kernel(function)
+    name = update.__name__ + ("_coloured" if filters is ukf.ColouredFilters else "")
+    return kernel(variant(_loop, update.__module__, name, extra=kind, filters=filters, _update=update))
 
 
 run_weighted = recursion(_weighted, bool)
+_run_coloured = recursion(_weighted, bool, ukf.ColouredFilters)
 
 
 class Estimated(Protocol):
@@ -152,8 +152,7 @@ Estimates = Annotated[Any, Layout(ESTIMATED)]
 Residuals = Annotated[Any, Layout(LEFT)]
 
 
-@kernel
-def _extrapolate(
+def _extrapolated(
     samples: Samples, profile: motion.Profile, filters: ukf.Filters, estimates: Estimates, residuals: Residuals
 ) -> None:
     """Fill the estimates and residuals of the samples before the first that has none, from the state there, which is
@@ -161,9 +160,11 @@ def _extrapolate(
     f = filters[0]
     for k in range(len(estimates) - 1, -1, -1):
         row, left, time_s = estimates[k], residuals[k], samples[k].time_s
-        motion.predict(f, time_s - samples[k + 1].time_s, profile.jerk[motion.knot_index(time_s, profile)])
-        ukf.linearise(f)
-        ukf.innovate(samples[k].measurement, f)
+        interval = time_s - samples[k + 1].time_s
+        motion.predict(f, interval, profile.jerk[motion.knot_index(time_s, profile)])
+        motion.wander(f, interval)
+        ukf.expect(f)
+        ukf.innovate(samples[k], f)
         for i in range(3):
             left.residual[i] = f.e[i]
             left.residual_variance[i] = f.c[i, i] + f.noise[i] if math.isfinite(f.e[i]) else math.nan
@@ -174,12 +175,20 @@ def _extrapolate(
         line_of_sight_sigma(f.x, f.p, row.los_sigma)
 
 
+_extrapolate = kernel(variant(_extrapolated, __name__, "_extrapolate"))
+_extrapolate_coloured = kernel(
+    variant(_extrapolated, __name__, "_extrapolate_coloured", filters=ukf.ColouredFilters)
+)
+
+
 def extrapolated(log: Observations, model: Model, start: Start) -> tuple[Any, Any]:
     """`Estimated` and `Left` records of the samples before a start, from the state there back in time; no reading is
     used."""
     estimates, residuals = zeros(ESTIMATED, start.sample), zeros(LEFT, start.sample)
     if start.sample:
-        _extrapolate(log.samples(), model.profile(log.time_s), model.filter(start), estimates, residuals)
+        extrapolate = _extrapolate_coloured if model.coloured else _extrapolate
+        samples = log.samples(model.noise_variance)
+        extrapolate(samples, model.profile(log.time_s), model.filter(start), estimates, residuals)
     return estimates, residuals
 
 
@@ -188,12 +197,13 @@ def filter_log(log: Observations, model: Model, starts: list[Start], extended: b
 
     extended: linearise by the Jacobian (EKF) instead of the unscented transform.
     """
-    return run_log(run_weighted, log, model, starts, extended)
+    return run_log(_run_coloured if model.coloured else run_weighted, log, model, starts, extended)
 
 
 def run_log(run: Recursion, log: Observations, model: Model, starts: list[Start], extra: Any) -> FilterRun:
     """A run over the whole log by a recursion that is re-initialized at each start; extra: see `recursion`."""
-    samples, profile, rows = log.samples(), model.profile(log.time_s), empty_rows(len(log.time_s))
+    samples, profile = log.samples(model.noise_variance), model.profile(log.time_s)
+    rows = empty_rows(len(log.time_s))
     likelihood = 0.0
     for start, stop in between(starts, len(log.time_s)):
         likelihood += run(Span(start.sample, stop, start.sample), samples, profile, model.filter(start), extra, rows)[1]

@@ -9,47 +9,52 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import kernel
+from ftproc.core.compiled import kernel, part
 from ftproc.core.filtering.records import Observations, Start
 from ftproc.core.model.measurement import wrapped
 from ftproc.core.signatures import Indices, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
 
-SAMPLES = 15  # good readings of each component wanted for the first fit,
-LONGEST_FIT_S = 20.0  # if they lie so close together
-LONGEST_REACH_S = 3.0  # back from the first good readings to the first sample
-GAP_INTERVALS, GAP_S = 20, 5.0  # median intervals and seconds: a longer one is a gap
+SAMPLES = 15  # good readings of each component wanted for the first fit, fewer if they lie on no parabola
+CURVE = 5  # readings that show a curve
+FITS = 4.0  # sigmas from the parabola that a reading of the first fit may be off
+GAP_INTERVALS = 20  # median intervals: a longer one is a gap
 WIDEST_BRIDGE = 0.06  # of the range, over a gap of all components
 WIDEST_BLIND_BRIDGE = 0.2  # of the range, over a gap of one component: the others hold the track meanwhile
 FEWEST_READINGS = 8  # of each component after a gap, for a start of its own
-CURVE = 5  # readings that show a curve
 INFLATION = 3.0  # on every sigma of the first state: its readings are filtered again, so it must weigh little
-ACCELERATION_MPS2 = 30.0  # 1-sigma of an acceleration about which nothing is known
-SPEED_MPS = 1000.0  # 1-sigma of a speed about which nothing is known
 WIDEST_IN_RANGES = 0.1  # the position must not be so vague that the target may be behind the station
+ONE_SECOND = 1.0  # in which a target may have passed its own range, if all its readings are of one instant
 
 
 def first_start(log: Observations, noise_variance: FloatArray) -> Start:
-    """The start of a log: at its first sample, or, when that would mean reaching back far, where every component has
-    been seen once. Errors as in `first_state`."""
+    """The start of a log: at its first sample, or, where its position would be too vague there, where every component
+    has been seen once. Errors as in `first_state`."""
     good = (log.weight > 0) & np.isfinite(log.measurement)
     if not good.any(0).all():
         raise ValueError(int(np.argmin(good.any(0))))
-    sample = int(good.argmax(0).max())
-    if log.time_s[sample] - log.time_s[0] <= LONGEST_REACH_S:
-        sample = 0
-    return first_state(log, noise_variance, sample, slice(0, len(log.time_s)))
+    everything = slice(0, len(log.time_s))
+    start = first_state(log, noise_variance, 0, everything)
+    seen = int(good.argmax(0).max())
+    if seen > 0 and not _vague(start) <= INFLATION * WIDEST_BRIDGE:
+        start = first_state(log, noise_variance, seen, everything)
+    return start
 
 
-def find_starts(log: Observations, noise_variance: FloatArray, jerk_psd: float | None) -> list[Start]:
+def _vague(start: Start) -> float:
+    """1-sigma of a start's position, in ranges."""
+    return float(np.sqrt(np.trace(start.covariance[:3, :3])) / np.linalg.norm(start.state[:3]))
+
+
+def find_starts(log: Observations, noise_variance: FloatArray, jerk_psd: float) -> list[Start]:
     """The start of a log, and one more after every gap that is too long to bridge.
 
     A gap of G seconds is too long when the position has by its end become uncertain by a noticeable share of the range,
-    sqrt(q G^5 / 20) > WIDEST_BRIDGE R: a filter that came through it would linearise about a wrong place. With
-    jerk_psd None (m^2/s^5, not known yet) every gap is taken to be so. Errors as in `first_state`.
+    sqrt(q G^5 / 20) > WIDEST_BRIDGE R: a filter that came through it would linearise about a wrong place. jerk_psd: q,
+    m^2/s^5. Errors as in `first_state`.
     """
-    time_s, measurement, weight = log
+    time_s, measurement, weight = log[:3]
     starts = [first_start(log, noise_variance)]
     good = (weight > 0) & np.isfinite(measurement)
     interval_s = _median(time_s[1:] - time_s[:-1]) if len(time_s) > 1 else 0.0
@@ -58,7 +63,7 @@ def find_starts(log: Observations, noise_variance: FloatArray, jerk_psd: float |
     for low, high in itertools.pairwise(edges):
         if low <= starts[-1].sample or (good[low:high].sum(0) < FEWEST_READINGS).any():
             continue
-        if jerk_psd is None or too_long(gaps[low], measurement[low:high, 0][good[low:high, 0]], jerk_psd):
+        if too_long(gaps[low], measurement[low:high, 0][good[low:high, 0]], jerk_psd):
             starts.append(first_state(log, noise_variance, low, slice(low, high)))
     return starts
 
@@ -78,7 +83,7 @@ def too_long(gap: tuple[float, float], range_m: FloatArray, jerk_psd: float) -> 
 
 def shortest_gap(interval_s: float) -> float:
     """Seconds without readings beyond which a log of this median interval has a gap."""
-    return max(GAP_INTERVALS * interval_s, GAP_S)
+    return GAP_INTERVALS * interval_s
 
 
 def gaps_of(
@@ -103,26 +108,26 @@ def gaps_of(
 
 
 def first_state(log: Observations, noise_variance: FloatArray, sample: int, within: slice) -> Start:
-    """Start at `sample` from lines through the good readings nearest to it, among the samples of `within`.
+    """Start at `sample` from parabolas through the good readings nearest to it, among the samples of `within`.
 
     log: weights of zero for rejected readings. noise_variance (3,). Components are fitted one by one, so they need not
     come at the same instants. The covariance is inflated.
     Raises ValueError with the component's index when a component has no good reading in the span.
     """
-    time, z, weight = (np.ascontiguousarray(each) for each in log)
-    lines = np.empty((3, 6))
+    time, z, weight = (np.ascontiguousarray(each) for each in log[:3])
+    fits, spans = np.empty((3, 6)), np.empty(3)
     for c in range(3):
         chosen = _nearest(time, z, weight, sample, within.start, within.stop, c)
         if len(chosen) == 0:
             raise ValueError(c)
-        _line(time, z, chosen, sample, c, math.sqrt(noise_variance[c]), lines[c])
-    return Start(sample, *_to_state(lines))
+        spans[c] = _fit(time, z, chosen, sample, c, math.sqrt(noise_variance[c]), fits[c])
+    return Start(sample, *_to_state(fits, float(spans.max())))
 
 
 @kernel
 def _nearest(time: Vector, z: Matrix, weight: Matrix, sample: int, first: int, last: int, c: int) -> Indices:
-    """Up to SAMPLES good readings of a component nearest in time to `sample` among the samples [first, last), in their
-    order; all but two of them close together."""
+    """The SAMPLES good readings of a component nearest in time to `sample` among the samples [first, last), or as many
+    as there are, in their order."""
     near = np.empty(2 * SAMPLES, np.int64)
     count = 0
     k = sample - 1
@@ -138,15 +143,9 @@ def _nearest(time: Vector, z: Matrix, weight: Matrix, sample: int, first: int, l
             near[count] = k
             count += 1
         k += 1
-    shortest = math.inf
-    for i in range(count):
-        shortest = min(shortest, abs(time[near[i]] - time[sample]))
     low, high = 0, count
-    while high - low > 2:  # drop the farther end, until there are few enough and all are close
-        left, right = abs(time[near[low]] - time[sample]), abs(time[near[high - 1]] - time[sample])
-        if high - low <= SAMPLES and max(left, right) <= shortest + LONGEST_FIT_S:
-            break
-        if left > right:
+    while high - low > SAMPLES:
+        if abs(time[near[low]] - time[sample]) > abs(time[near[high - 1]] - time[sample]):
             low += 1
         else:
             high -= 1
@@ -154,70 +153,114 @@ def _nearest(time: Vector, z: Matrix, weight: Matrix, sample: int, first: int, l
 
 
 @kernel
-def _line(time: Vector, z: Matrix, chosen: Indices, sample: int, c: int, sigma: float, line: Vector) -> None:
-    """The line through the chosen readings at the time of `sample`.
+def _fit(time: Vector, z: Matrix, chosen: Indices, sample: int, c: int, sigma: float, fit: Vector) -> float:
+    """The parabola through the chosen readings at the time of `sample`: value, rate and its change there, and the 1-sigma
+    of each, in fit (6,). Returns the seconds over which the readings extend; without any, rates are unknown (infinite
+    sigmas).
 
-    line (6,): value and rate there and their 1-sigma (infinite for the rate when all readings are of one instant); then
-    the time over which a curve may have gone unseen, s: between the readings, and from them to the sample. The scatter
-    about the line stands for what it misses of a curve, so it is not averaged down; too few readings to show a curve
-    leave it to the acceleration that must be allowed for.
+    Readings on both sides of a manoeuvre lie on no parabola: then the farthest are left out, one by one. The scatter
+    about it stands for what it misses of the motion, so it is not averaged down. Too few readings to show a curve
+    lie on a line, and leave it open that the target has turned.
     """
     m = len(chosen)
-    t, v = np.empty(m), np.empty(m)
-    lead, middle, mean = math.inf, 0.0, 0.0
+    t, v, away = np.empty(m), np.empty(m), np.empty(m)
     for i in range(m):
         t[i] = time[chosen[i]] - time[sample]
         v[i] = z[chosen[i], c] if i == 0 else v[i - 1] + wrapped(z[chosen[i], c] - z[chosen[i - 1], c], c == 1)
-        lead = min(lead, abs(t[i]))
+    low, high = 0, m
+    scatter = sigma
+    while True:
+        span = t[high - 1] - t[low]
+        curved = high - low >= CURVE
+        _least_squares(t[low:high], v[low:high], curved and span > 0, span, fit)
+        scatter = sigma
+        for i in range(low, high):
+            away[i] = abs(v[i] - fit[0] - t[i] * (fit[1] + 0.5 * t[i] * fit[2]))
+            scatter = max(scatter, away[i])
+        if high - low <= CURVE or scatter <= FITS * sigma:
+            break
+        if abs(t[low]) > abs(t[high - 1]):
+            low += 1
+        else:
+            high -= 1
+    lead = min(abs(t[low]), abs(t[high - 1])) if t[low] * t[high - 1] > 0 else 0.0
+    fit[3], fit[4], fit[5] = scatter, math.inf, math.inf
+    if lead > 0:
+        fit[3] = math.inf
+    if span > 0:
+        fit[4] = 6 * scatter / span
+        fit[5] = 12 * scatter / (span * span) + (0.0 if curved else (abs(fit[1]) + fit[4]) / span)
+        fit[4] += fit[5] * lead
+        fit[3] = scatter + lead * fit[4]
+    return span
+
+
+@part
+def _least_squares(t: FloatArray, v: FloatArray, curved: bool, span: float, fit: FloatArray) -> None:
+    """Fill fit[:3] with value, slope and second derivative at t = 0 of the parabola through (t, v), or of the line, or
+    of the mean, if there is no span. Orthogonal polynomials about the middle."""
+    m = len(t)
+    middle = mean = 0.0
+    for i in range(m):
         middle += t[i] / m
-        mean += v[i] / m
-    span = t[m - 1] - t[0]
-    line[0], line[1], line[2], line[3], line[4], line[5] = mean, 0.0, sigma, math.inf, 0.0, lead
+        mean += (v[i] - v[0]) / m
+    mean += v[0]
+    fit[0], fit[1], fit[2] = mean, 0.0, 0.0
     if span <= 0:
         return
-    spread = slope = 0.0
+    s2 = s3 = slope = 0.0
     for i in range(m):
-        spread += (t[i] - middle) ** 2
-        slope += (t[i] - middle) * (v[i] - mean)
-    rate = slope / spread
-    value = mean - rate * middle
-    scatter = sigma
+        d = t[i] - middle
+        s2 += d * d
+        s3 += d * d * d
+        slope += d * (v[i] - mean)
+    slope /= s2
+    fit[0], fit[1] = mean - slope * middle, slope
+    if not curved:
+        return
+    tilt, level = s3 / s2, s2 / m
+    size = bend = 0.0
     for i in range(m):
-        scatter = max(scatter, abs(v[i] - value - rate * t[i]))
-    line[0], line[1], line[3], line[4] = value, rate, 4 * scatter / span, span if m < CURVE else 0.0
-    line[2] = math.hypot(scatter, line[3] * lead)
+        d = t[i] - middle
+        shape = d * d - tilt * d - level
+        size += shape * shape
+        bend += shape * (v[i] - mean)
+    if size > 1e-9 * level * level * m:  # not all at two instants
+        bend /= size
+        fit[0] += bend * (middle * middle + tilt * middle - level)
+        fit[1] -= bend * (2 * middle + tilt)
+        fit[2] = 2 * bend
 
 
 @kernel
-def _to_state(lines: Matrix) -> tuple[Vector, Matrix]:
-    """From range, azimuth, elevation and their rates, rows of `_Line`s (3, 6), to a Cartesian state with its
-    covariance."""
-    slant, azimuth, elevation = max(lines[0, 0], 1.0), lines[1, 0], lines[2, 0]
+def _to_state(fits: Matrix, span: float) -> tuple[Vector, Matrix]:
+    """From range, azimuth, elevation with their first and second derivatives, rows of `_fit` (3, 6), to a Cartesian
+    state with its covariance. span: the longest of the fits, s."""
+    slant, azimuth, elevation = fits[0, 0] if fits[0, 0] > 0 else fits[0, 3], fits[1, 0], fits[2, 0]
     ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
     axes = np.empty((3, 3))  # radial, cross, up
     axes[0, 0], axes[0, 1], axes[0, 2] = ca * ce, sa * ce, se
     axes[1, 0], axes[1, 1], axes[1, 2] = -sa, ca, 0.0
     axes[2, 0], axes[2, 1], axes[2, 2] = -ca * se, -sa * se, ce
+    away, around, rising = fits[0, 1], fits[1, 1], fits[2, 1]
+    turning = np.empty(3)  # acceleration along these axes
+    turning[0] = fits[0, 2] - slant * (rising * rising + (around * ce) ** 2)
+    turning[1] = ce * (slant * fits[1, 2] + 2 * away * around) - 2 * slant * around * rising * se
+    turning[2] = slant * fits[2, 2] + 2 * away * rising + slant * around * around * se * ce
+    unknown = slant / (span if span > 0 else ONE_SECOND)  # a speed that would have taken it past its own range
     state, covariance = np.zeros(9), np.zeros((9, 9))
     for k in range(3):
         scale = 1.0 if k == 0 else slant * (ce if k == 1 else 1.0)  # m per m, rad, rad along these
-        rate, value_sigma, rate_sigma, unseen_s, lead_s = (
-            lines[k, 1],
-            lines[k, 2],
-            lines[k, 3],
-            lines[k, 4],
-            lines[k, 5],
-        )
-        curve = ACCELERATION_MPS2 * (unseen_s**2 / 8 + lead_s**2 / 2)
-        along = INFLATION * min(scale * value_sigma + curve, WIDEST_IN_RANGES * slant)
-        drift = scale * rate_sigma if math.isfinite(rate_sigma) else SPEED_MPS
-        speed = INFLATION * min(drift + ACCELERATION_MPS2 * (unseen_s / 2 + lead_s), SPEED_MPS)
+        along = INFLATION * min(scale * fits[k, 3], WIDEST_IN_RANGES * slant)
+        speed = INFLATION * (scale * fits[k, 4] if math.isfinite(fits[k, 4]) else unknown)
+        bend = INFLATION * (scale * fits[k, 5] if math.isfinite(fits[k, 5]) else unknown * unknown / slant)
+        known = math.isfinite(fits[k, 5])
         for i in range(3):
             state[i] += slant * axes[0, i] if k == 0 else 0.0
-            state[3 + i] += axes[k, i] * scale * rate
+            state[3 + i] += axes[k, i] * scale * fits[k, 1]
+            state[6 + i] += axes[k, i] * turning[k] if known else 0.0
             for j in range(3):
                 covariance[i, j] += axes[k, i] * along**2 * axes[k, j]
                 covariance[3 + i, 3 + j] += axes[k, i] * speed**2 * axes[k, j]
-    for i in range(6, 9):
-        covariance[i, i] = ACCELERATION_MPS2**2
+                covariance[6 + i, 6 + j] += axes[k, i] * bend**2 * axes[k, j]
     return state, covariance

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import record, zeros
-from ftproc.core.filtering.ukf import FILTER
+from ftproc.core.filtering.ukf import COLOURED, FILTER
 from ftproc.core.model.motion import Profile
 from ftproc.core.signatures import Layout
 
@@ -20,11 +20,12 @@ IntArray = NDArray[np.int64]
 
 class Sample(Protocol):
     """One row of a log: measurement m, rad, rad, NaN where missing; the weight of each component in [0, 1], zero for
-    one that is not used."""
+    one that is not used; the variance of its noise at full weight."""
 
     time_s: float
     measurement: Annotated[FloatArray, 3]
     weight: Annotated[FloatArray, 3]
+    noise: Annotated[FloatArray, 3]
 
 
 class Row(Protocol):
@@ -48,21 +49,24 @@ Rows = Annotated[Any, Layout(ROW)]
 
 class Observations(NamedTuple):
     """A log as the filters see it: time_s (n,), measurement (n, 3) slant range m, azimuth and elevation rad, NaN where
-    missing, and the weight (n, 3) in [0, 1] of each reading, zero for one that is not used."""
+    missing, the weight (n, 3) in [0, 1] of each reading, zero for one that is not used, and how many times the variance
+    of its component's noise that of each reading is (n, 3), None for once."""
 
     time_s: FloatArray
     measurement: FloatArray
     weight: FloatArray
+    excess: FloatArray | None = None
 
     def part(self, rows: slice | IntArray) -> Observations:
         """Some of the samples."""
-        return Observations(self.time_s[rows], self.measurement[rows], self.weight[rows])
+        excess = None if self.excess is None else self.excess[rows]
+        return Observations(self.time_s[rows], self.measurement[rows], self.weight[rows], excess)
 
-    def samples(self) -> Any:
-        """The same as an array (n,) of `Sample` records."""
+    def samples(self, noise_variance: FloatArray) -> Any:
+        """The same as an array (n,) of `Sample` records, with noise (3,) m^2, rad^2, rad^2."""
         samples = zeros(SAMPLE, len(self.time_s))
-        for name, values in self._asdict().items():
-            samples[name] = values
+        samples["time_s"], samples["measurement"], samples["weight"] = self.time_s, self.measurement, self.weight
+        samples["noise"] = noise_variance if self.excess is None else noise_variance * self.excess
         return samples
 
 
@@ -82,31 +86,44 @@ def between(starts: list[Start], samples: int) -> Iterator[tuple[Start, int]]:
 class Model(NamedTuple):
     """The noise of the measurements, and of the motion.
 
-    noise_variance: (3,) m^2, rad^2, rad^2. jerk: (m, 6) tensor of the jerk density, m^2/s^5, each row holding for
-    `knot_s` seconds from the first sample on. correlation: (3,) of the noise between neighbouring samples; where it is
-    not zero, noise_variance is the larger variance of white noise that has the same effect (see
-    `identification.coloured_noise`).
+    noise_variance: (3,) of white noise, m^2, rad^2, rad^2. jerk: (m, 6) tensor of the jerk density, m^2/s^5, each row
+    holding for `knot_s` seconds from the first sample on. wander_variance, fade_s: (3,) of the noise that is correlated
+    in time (first-order Gauss-Markov), which adds to the white; zero for none.
     """
 
     noise_variance: FloatArray
     jerk: FloatArray
     knot_s: float = math.inf
-    correlation: FloatArray = np.zeros(3)
+    wander_variance: FloatArray = np.zeros(3)
+    fade_s: FloatArray = np.ones(3)
+
+    @property
+    def coloured(self) -> bool:
+        """Whether some of the noise is correlated in time."""
+        return bool(self.wander_variance.any())
 
     @property
     def reading_variance(self) -> FloatArray:
         """(3,) variance of the noise of a single reading."""
-        variance: FloatArray = self.noise_variance * (1 - self.correlation) / (1 + self.correlation)
+        variance: FloatArray = self.noise_variance + self.wander_variance
         return variance
+
+    def correlation(self, interval_s: float) -> FloatArray:
+        """(3,) of the noise of readings that are so far apart."""
+        found: FloatArray = self.wander_variance / self.reading_variance * np.exp(-interval_s / self.fade_s)
+        return found
 
     def profile(self, time_s: FloatArray) -> Profile:
         """The process noise of a log with these times."""
         return Profile(self.jerk, self.knot_s, float(time_s[0]))
 
     def filter(self, start: Start) -> Any:
-        """An array of one `ukf.Filter` record at a start."""
-        filters = zeros(FILTER)
-        filters["x"][0], filters["p"][0], filters["noise"][0] = start.state, start.covariance, self.noise_variance
+        """An array of one `ukf.Filter` record at a start; of one `ukf.Coloured` if some noise is correlated."""
+        filters = zeros(COLOURED if self.coloured else FILTER)
+        filters["x"][0, :9], filters["p"][0, :9, :9] = start.state, start.covariance
+        filters["wander"][0], filters["fade_s"][0] = self.wander_variance, self.fade_s
+        if self.coloured:
+            filters["p"][0, 9:, 9:] = np.diag(self.wander_variance)
         return filters
 
 

@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import empty, kernel, part, zeros
+from ftproc.core.compiled import empty, kernel, part, variant, zeros
 from ftproc.core.filtering import backward, ukf
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Estimates, Residuals, Span, advance, extrapolated
 from ftproc.core.filtering.records import Model, Observations, Sample, Samples, Start, between
@@ -78,22 +78,33 @@ class Memory(NamedTuple):
     estimates: Estimates
     residuals: Residuals
 
-    @classmethod
-    def of(cls, samples: int, first: Any, estimates: Any, residuals: Any) -> Memory:
-        """For a span of so many samples that begins with a filter (an array of one record)."""
-        before = empty(ukf.FILTER, -(-samples // BLOCK))
-        before[:1] = first
-        block = empty(ukf.FILTER, min(samples, BLOCK))
-        block["noise"] = first["noise"][0]
-        return cls(block, before, zeros(backward.BACKWARD), estimates, residuals)
+
+class ColouredMemory(NamedTuple):
+    """The same of a state that ends with the offsets of the measurements."""
+
+    block: ukf.ColouredFilters
+    before: ukf.ColouredFilters
+    back: backward.ColouredBackwards
+    estimates: Estimates
+    residuals: Residuals
+
+
+def _memory(samples: int, first: Any, estimates: Any, residuals: Any) -> Any:
+    """For a span of so many samples that begins with a filter (an array of one record)."""
+    coloured = first.dtype == ukf.COLOURED
+    before, block = empty(first.dtype, -(-samples // BLOCK)), empty(first.dtype, min(samples, BLOCK))
+    before[:1] = first
+    block["wander"], block["fade_s"] = first["wander"][0], first["fade_s"][0]
+    back = zeros(backward.COLOURED if coloured else backward.BACKWARD)
+    return (ColouredMemory if coloured else Memory)(block, before, back, estimates, residuals)
 
 
 @part
 def _take_in(f: ukf.Filter, sample: Sample) -> tuple[float, float]:
     """Update by a sample; NIS, NaN where nothing is used, and the log-likelihood. All that the way back needs stays in
     the record."""
-    ukf.linearise(f)
-    ukf.innovate(sample.measurement, f)
+    ukf.expect(f)
+    ukf.innovate(sample, f)
     any_used = ukf.use(sample.weight, f)
     nis, gained = ukf.update(f)
     return (nis, gained) if any_used else (math.nan, 0.0)
@@ -101,14 +112,13 @@ def _take_in(f: ukf.Filter, sample: Sample) -> tuple[float, float]:
 
 @part
 def _copy_state(source: ukf.Filter, target: ukf.Filter) -> None:
-    for i in range(9):
+    for i in range(len(source.x)):
         target.x[i] = source.x[i]
-        for j in range(9):
+        for j in range(len(source.x)):
             target.p[i, j] = source.p[i, j]
 
 
-@kernel
-def _sweep(
+def _swept_through(
     span: Span, samples: Samples, profile: motion.Profile, memory: Memory, jerk_score: Matrix, kept: int
 ) -> float:
     """Both sweeps over a span; the log-likelihood. Adds to the jerk score (m, 6); fills what is kept. At the end `back`
@@ -152,30 +162,39 @@ def _sweep(
             if k > span.first:
                 interval = samples[k].time_s - samples[k - 1].time_s
                 backward.score_jerk(back, interval, jerk_score[motion.knot_index(samples[k].time_s, profile)])
+                backward.score_wander(back, f, interval)
                 motion.adjoint(back, interval)
+                motion.wander_back(back, interval, f.fade_s)
+            else:
+                backward.score_wander(back, f, math.inf)
     return likelihood
 
 
+_sweep = kernel(variant(_swept_through, __name__, "_sweep"))
+_sweep_coloured = kernel(variant(_swept_through, __name__, "_sweep_coloured", memory=ColouredMemory))
+
+
 def smoothed_covariance(p: FloatArray, n: FloatArray) -> FloatArray:
-    """P - P N P as L (I - L' N L) L' with P = L L' and eigenvalues kept positive whatever the rounding. (9, 9).
+    """P - P N P as L (I - L' N L) L' with P = L L' and eigenvalues kept positive whatever the rounding. (m, m).
 
     Of a run that has diverged, P itself.
     """
     if not (np.isfinite(p).all() and np.isfinite(n).all()):
         return p
     scale = np.sqrt(np.diag(p))
-    factor = scale[:, None] * np.linalg.cholesky(p / np.outer(scale, scale) + 1e-12 * np.eye(9))
-    share, turn = np.linalg.eigh(np.eye(9) - factor.T @ n @ factor)
+    factor = scale[:, None] * np.linalg.cholesky(p / np.outer(scale, scale) + 1e-12 * np.eye(len(p)))
+    share, turn = np.linalg.eigh(np.eye(len(p)) - factor.T @ n @ factor)
     half = factor @ turn * np.sqrt(np.maximum(share, 1e-12))
     result: FloatArray = half @ half.T
     return result
 
 
 class Scores(NamedTuple):
-    """The likelihood of a model and its slope: noise (3,) by ln(variance), jerk (m, 6) by each element."""
+    """The likelihood of a model and its slope: noise and wander (3,) by ln(variance), jerk (m, 6) by each element."""
 
     log_likelihood: float
     noise: FloatArray
+    wander: FloatArray
     jerk: FloatArray
 
 
@@ -190,17 +209,19 @@ class _Swept(NamedTuple):
 
 def _swept(log: Observations, model: Model, starts: list[Start], kept: int) -> _Swept:
     n = len(log.time_s)
-    samples, profile = log.samples(), model.profile(log.time_s)
+    samples, profile = log.samples(model.noise_variance), model.profile(log.time_s)
+    sweep = _sweep_coloured if model.coloured else _sweep
     estimates, residuals = zeros(ESTIMATED, n if kept == STATES else 0), zeros(LEFT, n if kept != SCORES else 0)
-    noise, jerk, likelihood, heads = np.zeros(3), np.zeros_like(model.jerk), 0.0, []
+    noise, wander, jerk, likelihood, heads = np.zeros(3), np.zeros(3), np.zeros_like(model.jerk), 0.0, []
     for start, stop in between(starts, n):
-        memory = Memory.of(stop - start.sample, model.filter(start), estimates, residuals)
-        likelihood += _sweep(Span(start.sample, stop, start.sample), samples, profile, memory, jerk, kept)
+        memory = _memory(stop - start.sample, model.filter(start), estimates, residuals)
+        likelihood += sweep(Span(start.sample, stop, start.sample), samples, profile, memory, jerk, kept)
         noise += memory.back["noise_score"][0]
+        wander += memory.back["wander_score"][0]
         if kept == STATES or (kept == RESIDUALS and start.sample > 0):
-            covariance = smoothed_covariance(memory.block["p"][0], memory.back["n_first"][0])
-            heads.append(Start(start.sample, memory.back["state"][0].copy(), covariance))
-    return _Swept(Scores(likelihood, noise, jerk), estimates, residuals, tuple(heads))
+            covariance = smoothed_covariance(memory.block["p"][0], memory.back["n_first"][0])[:9, :9]
+            heads.append(Start(start.sample, memory.back["state"][0, :9].copy(), covariance))
+    return _Swept(Scores(likelihood, noise, wander, jerk), estimates, residuals, tuple(heads))
 
 
 def score_log(log: Observations, model: Model, starts: list[Start]) -> Scores:

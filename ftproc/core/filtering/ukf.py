@@ -16,6 +16,9 @@ The update is done with whitened innovations. With S = C + R = L L',
     y = L^-1 e     G = L^-1 H     U = G P     x+ = x + U' y     P+ = P - U' U     NIS = y' y
 
 which equals the form with the gain K = U' L^-1 in fewer steps, and leaves P symmetric to the last bit.
+
+Noise that is correlated in time is part of the state where the record is `Coloured`: z = h(x) + b + v with an offset b
+of each component that wanders (Gauss-Markov, see `motion.wander`). What is said of H above then holds for [H, I].
 """
 
 from __future__ import annotations
@@ -27,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import part, record
-from ftproc.core.model.measurement import MIN_RANGE_M, SMALL_TURN, small_turn, turn, wrap_angle
+from ftproc.core.model.measurement import NO_RANGE_M, SMALL_TURN, small_turn, turn, wrap_angle
 from ftproc.core.signatures import Layout
 
 FloatArray = NDArray[np.float64]
@@ -40,8 +43,8 @@ ROUNDING = 1e-15  # of a number, below which its last digits say nothing
 class Filter(Protocol):
     """The record of a filter: its state, and what one measurement update computes on its way.
 
-    x, p: state and covariance, SI units. noise: variance of each component. q: coefficients of Q. z_hat: predicted
-    measurement. e: innovation. used: weight of each component, zero for none. h: H on the position. c: C of the
+    x, p: state and covariance, SI units. noise: variance of the white noise of each component, of this sample. wander,
+    fade_s: variance and correlation time of its offset. q: coefficients of Q. z_hat: predicted measurement. e: innovation. used: weight of each component, zero for none. h: H on the position. c: C of the
     module's head. s: innovation covariance. root: L^-1, whose rows and columns are zero for components not used. y, g,
     u: of the head. pxz: P H', where it is asked for. factor: of the position block of P. d: by pair of sigma points,
     component and side. bend: its mean, h(x) to z_hat.
@@ -50,6 +53,8 @@ class Filter(Protocol):
     x: Annotated[FloatArray, 9]
     p: Annotated[FloatArray, 9, 9]
     noise: Annotated[FloatArray, 3]
+    wander: Annotated[FloatArray, 3]
+    fade_s: Annotated[FloatArray, 3]
     q: Annotated[FloatArray, 3, 3]
     z_hat: Annotated[FloatArray, 3]
     e: Annotated[FloatArray, 3]
@@ -67,8 +72,19 @@ class Filter(Protocol):
     bend: Annotated[FloatArray, 3]
 
 
-FILTER = record(Filter)
+class Coloured(Filter, Protocol):
+    """The record of a filter whose state ends with the offsets of range, azimuth and elevation."""
+
+    x: Annotated[FloatArray, 12]
+    p: Annotated[FloatArray, 12, 12]
+    u: Annotated[FloatArray, 3, 12]
+    pxz: Annotated[FloatArray, 12, 3]
+
+
+FILTER, COLOURED = record(Filter), record(Coloured)
 Filters = Annotated[Any, Layout(FILTER)]
+ColouredFilters = Annotated[Any, Layout(COLOURED)]
+OFFSETS = 9  # where these begin
 
 
 @part
@@ -100,7 +116,7 @@ def linearise(f: Filter) -> None:
     x, p, factor, d, bend, z_hat, h, c = f.x, f.p, f.factor, f.d, f.bend, f.z_hat, f.h, f.c
     position_factor(f)
     ground = math.sqrt(x[0] * x[0] + x[1] * x[1])
-    slant = max(math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]), MIN_RANGE_M)
+    slant = max(math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]), NO_RANGE_M)
     widest = math.sqrt(p[0, 0] + p[1, 1] + p[2, 2])
     spread = SPREAD
     if spread * widest > MAX_SPREAD_IN_RANGES * slant:
@@ -147,7 +163,7 @@ def _deviations(f: Filter, ground: float, slant: float, spread: float) -> None:
             uz = pz + by * factor[2, j]
             square = ux * ux + uy * uy
             along = math.sqrt(square) if j < 2 else ground
-            d[j, 0, side] = max(math.sqrt(square + uz * uz), MIN_RANGE_M) - slant
+            d[j, 0, side] = max(math.sqrt(square + uz * uz), NO_RANGE_M) - slant
             d[j, 1, side] = small_turn((px * uy - py * ux) / (px * ux + py * uy)) if j < 2 else 0.0
             d[j, 2, side] = small_turn((ground * uz - pz * along) / (ground * along + pz * uz))
 
@@ -167,12 +183,27 @@ def _wide_deviations(f: Filter, ground: float, spread: float) -> None:
 
 
 @part
-def innovate(z: FloatArray, f: Filter) -> None:
-    """e = z - z^ with the azimuth wrapped; NaN where z (3,) is missing."""
-    e, z_hat = f.e, f.z_hat
-    e[0] = z[0] - z_hat[0]
-    e[1] = z[1] - z_hat[1]
-    e[2] = z[2] - z_hat[2]
+def expect(f: Filter) -> None:
+    """The unscented transform with the offsets, if the state has such: z^ = h + b, and C with their covariances."""
+    linearise(f)
+    p, h, c, z_hat = f.p, f.h, f.c, f.z_hat
+    if len(f.x) > OFFSETS:
+        for i in range(3):
+            z_hat[i] += f.x[OFFSETS + i]
+            for j in range(3):
+                v = p[OFFSETS + i, OFFSETS + j]
+                for k in range(3):
+                    v += h[i, k] * p[k, OFFSETS + j] + h[j, k] * p[k, OFFSETS + i]
+                c[i, j] += v
+
+
+@part
+def innovate(sample: Any, f: Filter) -> None:
+    """Take the reading of a sample and its noise: e = z - z^ with the azimuth wrapped; NaN where z is missing."""
+    e, z, z_hat = f.e, sample.measurement, f.z_hat
+    for i in range(3):
+        f.noise[i] = sample.noise[i]
+        e[i] = z[i] - z_hat[i]
     if math.isfinite(e[1]):
         e[1] = wrap_angle(e[1])
 
@@ -217,17 +248,21 @@ def whiten(f: Filter) -> tuple[float, float]:
         g[1, i] = r10 * h[0, i] + r11 * h[1, i]
         g[2, i] = r20 * h[0, i] + r21 * h[1, i] + r22 * h[2, i]
     for i in range(3):
-        for j in range(9):
+        for j in range(len(f.x)):
             u[i, j] = g[i, 0] * p[0, j] + g[i, 1] * p[1, j] + g[i, 2] * p[2, j]
+            for k in range(OFFSETS, len(f.x)):
+                u[i, j] += root[i, k - OFFSETS] * p[k, j]
     return y[0] * y[0] + y[1] * y[1] + y[2] * y[2], math.log(d0 * d1 * d2)
 
 
 @part
 def cross_covariance(p: FloatArray, h: FloatArray, pxz: FloatArray) -> None:
-    """P_xz = P H' for an H that sees the position only."""
-    for i in range(9):
+    """P_xz = P H' for an H that sees the position, and the offsets if there are such."""
+    for i in range(len(p)):
         for j in range(3):
             pxz[i, j] = p[i, 0] * h[j, 0] + p[i, 1] * h[j, 1] + p[i, 2] * h[j, 2]
+            if len(p) > OFFSETS:
+                pxz[i, j] += p[i, OFFSETS + j]
 
 
 @part
@@ -249,10 +284,10 @@ def update(f: Filter) -> tuple[float, float]:
     nis, log_det = whiten(f)
     if stiff:
         cross_covariance(f.p, f.h, f.pxz)
-    for i in range(9):
+    for i in range(len(f.x)):
         x[i] += u[0, i] * y[0] + u[1, i] * y[1] + u[2, i] * y[2]
-    for i in range(9):
-        for j in range(9):
+    for i in range(len(f.x)):
+        for j in range(len(f.x)):
             p[i, j] = p[i, j] - u[0, i] * u[0, j] - u[1, i] * u[1, j] - u[2, i] * u[2, j]
     if stiff:
         _restore_joseph(f)
@@ -261,8 +296,8 @@ def update(f: Filter) -> tuple[float, float]:
 
 @part
 def gain_of(f: Filter, gain: FloatArray) -> None:
-    """K = U' L^-1 (9, 3)."""
-    for i in range(9):
+    """K = U' L^-1, one row for each number of the state."""
+    for i in range(len(f.x)):
         for j in range(3):
             gain[i, j] = f.u[0, i] * f.root[0, j] + f.u[1, i] * f.root[1, j] + f.u[2, i] * f.root[2, j]
 
@@ -272,9 +307,9 @@ def _restore_joseph(f: Filter) -> None:
     """Turn P - U'U (already in p) into the Joseph form, which keeps P >= 0 when the prior dwarfs the noise; P_xz is
     that of the prior."""
     p, used, h, c, pxz = f.p, f.used, f.h, f.c, f.pxz
-    gain = np.empty((9, 3))
+    gain = np.empty((len(f.x), 3))
     gain_of(f, gain)
-    residue = np.empty((9, 3))  # (I - K H) P H': zero in exact arithmetic but for the measurement noise
+    residue = np.empty((len(f.x), 3))  # (I - K H) P H': zero in exact arithmetic but for the measurement noise
     cross_covariance(p, h, residue)
     rest = np.zeros((3, 3))  # S - H P- H': noise and bend of h
     for i in range(3):
@@ -282,9 +317,11 @@ def _restore_joseph(f: Filter) -> None:
             rest[i, j] = c[i, j]
             for k in range(3):
                 rest[i, j] -= h[i, k] * pxz[k, j]
+            if len(f.x) > OFFSETS:
+                rest[i, j] -= pxz[OFFSETS + i, j]
         if used[i] > 0:
             rest[i, i] = max(rest[i, i], 0.0) + f.noise[i] / used[i]
-    for i in range(9):
+    for i in range(len(f.x)):
         for j in range(i + 1):
             v = p[i, j]
             for k in range(3):
@@ -292,6 +329,6 @@ def _restore_joseph(f: Filter) -> None:
                 v += (spread - residue[i, k]) * gain[j, k]
             p[i, j] = v
             p[j, i] = v
-    for i in range(9):  # what is left of a variance is not known better than what was taken from it
+    for i in range(len(f.x)):  # what is left of a variance is not known better than what was taken from it
         taken = gain[i, 0] * pxz[i, 0] + gain[i, 1] * pxz[i, 1] + gain[i, 2] * pxz[i, 2]
         p[i, i] = max(p[i, i], ROUNDING * abs(taken))

@@ -1,117 +1,141 @@
 """Noise that is correlated from sample to sample, which a white-noise likelihood takes for motion.
 
-For first-order (Gauss-Markov) noise of variance sigma^2 and correlation rho between neighbours, a filter that is
-slow against the noise sees white noise of variance R = sigma^2 (1 + rho) / (1 - rho): its long-run average is the
-same. With R in place of sigma^2 the estimate keeps its gain and its sigmas stay honest. sigma^2 and rho are found by
-a fixed point: with r the smoothed residual and a = H P^s H' its loss to the fit,
-
-    sigma^2 = mean(r_k^2 + a_k),    rho sigma^2 = mean(r_k r_{k+1} + sqrt(a_k a_{k+1}))
-
-and the jerk density by the likelihood of every m-th sample, thinned until neighbours know nothing of each other.
+Each component's noise is white noise of variance r plus a first-order Gauss-Markov offset of variance w and correlation
+time tau, which is part of the state (`ukf.Coloured`). r, w, tau and the jerk density are found together by maximum
+likelihood: motion is smooth and common to the three components, such an offset is neither. The scores by r, w and the
+jerk are exact; those by tau are differences.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import SmootherRun, smooth_log
-from ftproc.core.identification.likelihood import Fixed, fit_level
+from ftproc.core.filtering.smoother import SmootherRun, score_log
+from ftproc.core.identification import optimizer
+from ftproc.core.identification.likelihood import (
+    VERTICAL_PRECISION,
+    Fixed,
+    fit_level,
+    jerk_bounds,
+    representative,
+    shaped,
+)
+from ftproc.core.identification.scales import Scales, scales_of
 
 FloatArray = NDArray[np.float64]
 
-LEAST = 0.15  # correlation of neighbours that is worth modelling ...
-LEAST_IN_SIGMAS = 5.0  # ... if so many of its own standard errors away from zero
-MOST = 0.98
-FEWEST_INDEPENDENT = 30  # readings of each component that the correlation must leave worth of
-GROWTH = 60.0  # times the variance that white noise would have
-INDEPENDENT = 0.1  # correlation left between the samples that remain after thinning
-FEWEST = 60  # samples that must remain
-FEWEST_PAIRS = 200  # neighbours, for their correlation to be asked for
-ITERATIONS = 8
+LEAST = 0.1  # correlation of neighbours from which the noise may not be white ...
+LEAST_IN_SIGMAS = 3.0  # ... if so many of its own standard errors away from zero
+FEWEST_PAIRS = 30  # neighbours, for their correlation to be asked for
 BLOCKS = 9  # stretches of a log whose correlations are compared
+SHORT_MEMORY = 4.0  # intervals: a filter with a shorter one follows noise that is correlated, so its residuals show none
+FIRST_FADES = (1.5, 6.0, 25.0)  # intervals: correlation times with which the search begins,
+FIRST_CALMS = (1.0, 1e-3)  # and shares of the jerk that white noise leads to
+FIRST_STEPS, STEPS = 5, 15
+SHORTEST_FADE, LONGEST_FADE = 0.3, 0.5  # intervals, and spans of the log
+STEP = 1e-3  # of ln(tau), for differences
+LARGEST = 1e4  # times the variance that white noise would have
+NEGLIGIBLE = 0.02  # share of a component's variance
+LEAST_GAIN = 8.0  # in log-likelihood, for each component whose noise is called correlated
 
 
-def moments(smoothed: SmootherRun, weight: FloatArray, noise_variance: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(3,) variance of the readings' noise and (3,) its correlation between neighbouring samples.
+class Coloured(NamedTuple):
+    """A model with correlated noise and how much likelier (in log-likelihood) it is than that of white noise."""
 
-    noise_variance: (3,) R that the smoother was given.
-    """
-    variance, correlation = noise_variance.copy(), np.zeros(3)
-    for c, (square, product) in enumerate(_products(smoothed, weight, noise_variance)):
-        if len(product) >= FEWEST_PAIRS:
-            variance[c] = square.mean()
-            correlation[c] = product.mean() / variance[c]
-    return variance, correlation
+    model: Model
+    gain: float
 
 
-def is_correlated(smoothed: SmootherRun, weight: FloatArray, noise_variance: FloatArray) -> bool:
-    """Whether some component's noise is correlated beyond doubt.
+def may_be(log: Observations, smoothed: SmootherRun, model: Model) -> bool:
+    """Whether correlated noise is worth asking for, of a smoother run with a model of white noise.
 
     By the median of the correlations of BLOCKS stretches of the log: a patch that the smoother has followed looks like
-    correlated noise, but only where it is."""
-    for square, product in _products(smoothed, weight, noise_variance):
-        if len(product) < FEWEST_PAIRS:
+    correlated noise, but only where it is. And where the filter's memory is so short that it would follow such noise.
+    """
+    scales = scales_of(log, model.noise_variance)
+    if scales.memory_s(float(np.median(model.jerk[:, 0]))) < SHORT_MEMORY * scales.interval_s:
+        return True
+    used = log.weight > 0
+    share = model.noise_variance / smoothed.residual_variance  # of the reading in its own smoothed residual
+    residual = smoothed.residual * share
+    lost = model.noise_variance * np.maximum(1 - share, 0.0)
+    for c in range(3):
+        both = used[1:, c] & used[:-1, c]
+        if both.sum() < FEWEST_PAIRS:
             continue
-        typical = np.median(
-            [
-                pairs.mean() / alone.mean()
-                for pairs, alone in zip(np.array_split(product, BLOCKS), np.array_split(square, BLOCKS), strict=True)
-            ]
-        )
+        r, a = residual[:, c], lost[:, c]
+        square, product = (r * r + a)[used[:, c]], (r[1:] * r[:-1] + np.sqrt(a[1:] * a[:-1]))[both]
+        blocks = zip(np.array_split(product, BLOCKS), np.array_split(square, BLOCKS), strict=True)
+        typical = np.median([pairs.mean() / alone.mean() for pairs, alone in blocks])
         if typical > max(LEAST, LEAST_IN_SIGMAS / math.sqrt(len(square))):
             return True
     return False
 
 
-def _products(
-    smoothed: SmootherRun, weight: FloatArray, noise_variance: FloatArray
-) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Of each component, what estimates sigma^2 at each reading used, and rho sigma^2 at each pair of neighbours."""
-    used = weight > 0
-    share = noise_variance / smoothed.residual_variance  # of the reading in its own smoothed residual
-    residual = smoothed.residual * share
-    lost = noise_variance * np.maximum(1 - share, 0.0)
-    for c in range(3):
-        both = used[1:, c] & used[:-1, c]
-        r, a = residual[:, c], lost[:, c]
-        square = (r * r + a)[used[:, c]]
-        yield square, (r[1:] * r[:-1] + np.sqrt(a[1:] * a[:-1]))[both]
+def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fixed) -> Coloured | None:
+    """The likeliest model with correlated noise and a single jerk level, from one that took it for white; None if white
+    noise explains the log as well."""
+    part, starts = representative(log, starts, white.noise_variance, float(white.jerk[0, 0]))
+    scales = scales_of(part, white.noise_variance)
+    search = _Search(part, starts, white, fixed, scales)
+    tries = [search.run(search.first(fade, calm), FIRST_STEPS) for fade in FIRST_FADES for calm in FIRST_CALMS]
+    theta = search.run(min(tries, key=lambda theta: search.cost(theta)[0]), STEPS)
+    model = search.model(theta)
+    correlated = model.wander_variance > NEGLIGIBLE * model.reading_variance
+    model = model._replace(wander_variance=np.where(correlated, model.wander_variance, 0.0))
+    level = fit_level(part, starts, white, fixed)
+    gain = score_log(part, model, starts).log_likelihood - score_log(part, level, starts).log_likelihood
+    return Coloured(model, gain) if correlated.any() and gain > LEAST_GAIN * correlated.sum() else None
 
 
-def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fixed) -> Model:
-    """A model with correlated noise, from one that took it for white; that one if none is believable."""
-    given = white.noise_variance
-    model, variance = white, white.noise_variance
-    run = smooth_log(log, white, starts, residuals_only=True)
-    correlation = np.maximum(moments(run, log.weight, given)[1], 0.0)
-    for _ in range(2):
-        model = _fit_thinned(log, starts, model._replace(noise_variance=variance), correlation, fixed)
-        for _ in range(ITERATIONS):
-            model = model._replace(
-                noise_variance=variance * (1 + correlation) / (1 - correlation), correlation=correlation
-            )
-            run = smooth_log(log, model, starts, residuals_only=True)
-            if not math.isfinite(run.log_likelihood):  # the filter diverged among so few readings
-                return white
-            variance, correlation = moments(run, log.weight, model.noise_variance)
-            variance = np.where(fixed.noise, given, variance)
-            correlation = np.clip(correlation, 0.0, MOST)
-    # Slow motion and slow noise look alike; where the search ends among the slowest, it has mistaken one for the other.
-    independent = (log.weight > 0).sum(0) * (1 - correlation) / (1 + correlation)
-    believable = (independent > FEWEST_INDEPENDENT) & (variance < GROWTH * given)
-    return model if believable.all() else white
+class _Search:
+    """The likelihood of a log as a function of ln r, ln w, ln tau (3 each), ln(jerk) and ln(vertical / horizontal)."""
 
+    def __init__(self, log: Observations, starts: list[Start], white: Model, fixed: Fixed, scales: Scales) -> None:
+        self.log, self.starts, self.white, self.scales = log, starts, white, scales
+        given = np.log(white.noise_variance)
+        low, high = jerk_bounds(scales)
+        level = np.array([math.log(white.jerk[0, 0]), math.log(white.jerk[0, 5] / white.jerk[0, 0])])
+        if fixed.jerk:
+            low = high = level
+        fades = np.log(np.array([SHORTEST_FADE * scales.interval_s, LONGEST_FADE * scales.span_s]))
+        fewest = math.log(NEGLIGIBLE) - math.log(LARGEST)
+        most = np.where(fixed.noise, 0.0, math.log(LARGEST))
+        self.lower = np.r_[given + fewest, given + fewest, np.full(3, fades[0]), low]
+        self.upper = np.r_[given + np.minimum(most, 1.0), given + most, np.full(3, max(fades)), high]
+        used = float((log.weight > 0).sum(0).mean())
+        self.curvature = used * np.r_[np.full(3, 0.3), np.full(3, 0.1), np.full(3, 0.05), 0.05, 0.02]
 
-def _fit_thinned(log: Observations, starts: list[Start], model: Model, correlation: FloatArray, fixed: Fixed) -> Model:
-    """Noise and jerk by the likelihood of every m-th sample, which is nearly white."""
-    highest = float(np.clip(correlation.max(), INDEPENDENT, MOST))
-    every = min(math.ceil(math.log(INDEPENDENT) / math.log(highest)), max(len(log.time_s) // FEWEST, 1))
-    thinned = np.zeros_like(log.weight)
-    thinned[::every] = log.weight[::every]
-    guess = model._replace(correlation=np.zeros(3))
-    return fit_level(log._replace(weight=thinned), starts, guess, fixed)
+    def first(self, fade: float, calm: float) -> FloatArray:
+        """Where a search begins: with half of the noise correlated over `fade` intervals, and so much of the jerk."""
+        given, jerk = np.log(0.5 * self.white.noise_variance), self.white.jerk[0]
+        motion = [math.log(calm * jerk[0]), math.log(jerk[5] / jerk[0])]
+        return np.clip(np.r_[given, given, np.full(3, math.log(fade * self.scales.interval_s)), motion],
+                       self.lower, self.upper)  # fmt: skip
+
+    def model(self, theta: FloatArray) -> Model:
+        """The model of some parameters."""
+        white, wander, fade = np.exp(theta[:9]).reshape(3, 3)
+        return Model(white, shaped(theta[9:10], theta[10]), wander_variance=wander, fade_s=fade)
+
+    def cost(self, theta: FloatArray) -> tuple[float, FloatArray]:
+        """Minus the log-likelihood, and its slope."""
+        model = self.model(theta)
+        found = score_log(self.log, model, self.starts)
+        by_axis, pull = found.jerk[0] * model.jerk[0], VERTICAL_PRECISION * theta[10]
+        fades = np.zeros(3)
+        for c in range(3):
+            moved = theta.copy()
+            moved[6 + c] += STEP
+            fades[c] = (score_log(self.log, self.model(moved), self.starts).log_likelihood - found.log_likelihood) / STEP
+        slope = -np.r_[found.noise, found.wander, fades, by_axis.sum(), by_axis[5] - pull]
+        return -found.log_likelihood + 0.5 * pull * theta[10], slope
+
+    def run(self, theta: FloatArray, steps: int) -> FloatArray:
+        """The likeliest parameters, after so many steps at most."""
+        return optimizer.minimise(self.cost, theta, self.curvature, self.lower, self.upper, steps, tolerance=0.05)

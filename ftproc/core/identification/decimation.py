@@ -1,8 +1,7 @@
 """Neighbouring readings merged into one, where a log is far denser than the filter's memory is long.
 
-A track that wanders with jerk density q, seen with noise sigma every T seconds, is averaged by its filter over about
-(sigma^2 T / q)^(1/6) seconds. The mean of the readings within a fraction of that says as much about noise and motion
-as they do one by one, at a fraction of the cost.
+The mean of the readings within a fraction of the filter's memory (see `scales`) says as much about noise and motion as
+they do one by one, at a fraction of the cost.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel
 from ftproc.core.filtering.records import Model, Observations, Start
+from ftproc.core.identification.scales import Scales
 from ftproc.core.model.measurement import wrapped
 from ftproc.core.signatures import Flags, Indices, Matrix, Vector
 
@@ -26,14 +26,13 @@ CALMER = 0.9  # share of the flight with less jerk than the memory is computed f
 ROUNDING = 0.01  # of a reading: times are rounded, and must not decide where the number comes out even
 
 
-def how_many(time_s: FloatArray, range_m: float, model: Model, knot_s: float) -> int:
-    """Neighbours that may be merged: 1 for a sparse log."""
-    interval = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
-    if interval <= 0:
+def how_many(scales: Scales, model: Model, knot_s: float) -> int:
+    """Neighbours that may be merged: 1 for a sparse log, and where noise is correlated."""
+    if model.coloured:
         return 1
-    noise = float((model.noise_variance * np.array([1.0, range_m**2, range_m**2])).min())
-    memory = (noise * interval / float(np.quantile(model.jerk[:, 0], CALMER))) ** (1 / 6)
-    wanted = SHARE * min(memory, knot_s / 10) / interval
+    noise = float(scales.noise_m.min()) ** 2
+    memory = (noise * scales.interval_s / float(np.quantile(model.jerk[:, 0], CALMER))) ** (1 / 6)
+    wanted = SHARE * min(memory, knot_s / 10) / scales.interval_s
     return int(np.clip(wanted + ROUNDING, 1, MOST))
 
 
@@ -42,7 +41,7 @@ def merge(log: Observations, starts: list[Start], count: int) -> tuple[Observati
     interval = float(np.median(np.diff(log.time_s)))
     begins = np.zeros(len(log.time_s), bool)
     begins[[start.sample for start in starts]] = True
-    time, z, number, group = _means(*log, begins, count, 1.5 * count * interval)
+    time, z, number, group = _means(*log[:3], begins, count, 1.5 * count * interval)
     moved = []
     for start in starts:
         sample = int(group[start.sample])

@@ -16,17 +16,20 @@ from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import optimizer
+from ftproc.core.identification.scales import Scales, scales_of
+from ftproc.core.model.motion import isotropic
 
 FloatArray = NDArray[np.float64]
 
 LEVEL_STEPS = 12  # of the search for one level
 SPANS, SPAN = 6, 400  # of samples: what stands for a long log when one noise and one jerk level are looked for
-NOISE_FLOOR = np.array([1e-3, 5e-6, 5e-6])  # 1-sigma m, rad, rad: no tracker is better; below, rounding decides
+NOISE_FLOOR = 1e-4  # of the other components' noise, in metres: below it a component counts as exact
 NOISE_GROWTH = 3.0  # times the noise that the search begins with: more of it is a diverged track, not noise
 NOISE_SHRINKS = 4.0  # less of it comes of readings left out until the rest fits
-NOISE_ALLOWED = np.array([1.0, 1e-4, 1e-4])  # 1-sigma m, rad, rad that are never too much: a component computed from
-# another shows no noise at all to begin with
-JERK_SIDES = ((1e-7, -1), (1e7, 1))  # m^2/s^5: lowest and highest
+NOISE_ALLOWED = 1e-4  # 1-sigma, in ranges or rad, that is never too much: a component computed from another shows no
+# noise at all to begin with
+MEMORIES = (0.1, 3.0)  # intervals and spans of the log: the shortest and the longest memory of a filter
+FIRST_MEMORIES = (2.0, 5.0, 12.0, 30.0)  # intervals, of which the likeliest is where the search for the jerk begins
 RATIO_BOUND = 6.0  # on |ln(vertical / horizontal jerk)|
 VERTICAL_PRECISION = 0.5  # with which ln(vertical / horizontal jerk) is drawn to zero
 HORIZONTAL = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.0])
@@ -42,7 +45,7 @@ class Fixed(NamedTuple):
 
 
 def representative(
-    log: Observations, starts: list[Start], noise_variance: FloatArray
+    log: Observations, starts: list[Start], noise_variance: FloatArray, jerk_psd: float
 ) -> tuple[Observations, list[Start]]:
     """The whole log if it is short, else SPANS spans spread evenly over it, each with its own start."""
     n = len(log.time_s)
@@ -53,7 +56,7 @@ def representative(
     for first in np.linspace(0, n - SPAN, SPANS).astype(int):
         span = np.arange(first, first + SPAN)
         try:
-            inside = find_starts(log.part(span), noise_variance, None)
+            inside = find_starts(log.part(span), noise_variance, jerk_psd)
         except ValueError:  # a component has no good reading in this span
             continue
         skipped = inside[0].sample
@@ -61,6 +64,26 @@ def representative(
         found += [start._replace(sample=start.sample + shift) for start in inside]
         chosen.append(span[skipped:])
     return (log.part(np.concatenate(chosen)), found) if found else (log, starts)
+
+
+def first_jerk(log: Observations, noise_variance: FloatArray) -> float:
+    """The jerk density, m^2/s^5, with which a search begins: the likeliest of a few."""
+    scales = scales_of(log, noise_variance)
+
+    def likelihood(jerk_psd: float) -> float:
+        starts = find_starts(log, noise_variance, jerk_psd)
+        part, starts = representative(log, starts, noise_variance, jerk_psd)
+        found = score_log(part, Model(noise_variance, isotropic(jerk_psd)), starts).log_likelihood
+        return found if math.isfinite(found) else -math.inf
+
+    return max((scales.jerk_psd(memory * scales.interval_s) for memory in FIRST_MEMORIES), key=likelihood)
+
+
+def noise_floor(log: Observations, noise_variance: FloatArray) -> FloatArray:
+    """(3,) 1-sigma m, rad, rad below which the noise of a component counts as zero."""
+    scales = scales_of(log, noise_variance)
+    floor: FloatArray = NOISE_FLOOR * float(np.median(scales.noise_m)) / np.array([1.0, scales.range_m, scales.range_m])
+    return floor
 
 
 def fit_level(
@@ -76,13 +99,16 @@ def fit_level(
     """
     if fixed.noise.all() and fixed.jerk:
         return guess
-    part, starts = representative(log, starts, guess.noise_variance)
+    part, starts = representative(log, starts, guess.noise_variance, float(guess.jerk[0, 0]))
+    scales = scales_of(log, guess.noise_variance)
     log_noise = np.log(guess.noise_variance)
     expected = np.sqrt(guess.noise_variance) if expected_sigma is None else expected_sigma
-    floor = 2 * np.log(np.maximum(NOISE_FLOOR, expected / NOISE_SHRINKS if expected_sigma is not None else 0.0))
-    ceiling = 2 * np.log(np.maximum(NOISE_GROWTH * expected, NOISE_ALLOWED))
+    exact = noise_floor(log, expected**2)
+    floor = 2 * np.log(np.maximum(exact, expected / NOISE_SHRINKS if expected_sigma is not None else 0.0))
+    allowed = NOISE_ALLOWED * np.array([scales.range_m, 1.0, 1.0])
+    ceiling = 2 * np.log(np.maximum(NOISE_GROWTH * expected, allowed))
     log_jerk = np.array([math.log(guess.jerk[0, 0]), math.log(guess.jerk[0, 5] / guess.jerk[0, 0])])
-    lowest, highest = (np.array([math.log(bound), side * RATIO_BOUND]) for bound, side in JERK_SIDES)
+    lowest, highest = jerk_bounds(scales)
     lower = np.r_[np.where(fixed.noise, log_noise, floor), log_jerk if fixed.jerk else lowest]
     upper = np.r_[np.where(fixed.noise, log_noise, ceiling), log_jerk if fixed.jerk else highest]
     used = np.maximum((part.weight > 0).sum(0), 1)
@@ -99,6 +125,13 @@ def fit_level(
     curvature = np.r_[used / 2, used.mean() / 20, used.mean() / 60]
     theta = optimizer.minimise(cost, theta, curvature, lower, upper, LEVEL_STEPS, tolerance=0.05)
     return Model(np.exp(theta[:3]), shaped(theta[3:4], theta[4]))
+
+
+def jerk_bounds(scales: Scales) -> tuple[FloatArray, FloatArray]:
+    """The lowest and the highest ln(jerk density) and ln(vertical / horizontal), (2,) each."""
+    shortest, longest = MEMORIES[0] * scales.interval_s, MEMORIES[1] * scales.span_s
+    low, high = math.log(scales.jerk_psd(longest)), math.log(scales.jerk_psd(shortest))
+    return np.array([low, -RATIO_BOUND]), np.array([high, RATIO_BOUND])
 
 
 def shaped(log_jerk: FloatArray, log_ratio: float) -> FloatArray:

@@ -16,22 +16,20 @@ from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import decimation, optimizer
 from ftproc.core.identification.likelihood import (
     ISOTROPIC,
-    JERK_SIDES,
-    RATIO_BOUND,
     VERTICAL_PRECISION,
+    jerk_bounds,
     shaped,
 )
+from ftproc.core.identification.scales import scales_of
 
 FloatArray = NDArray[np.float64]
 
 KNOT_SAMPLES = 10  # samples to a knot of the jerk profile ...
-KNOT_SECONDS = 4.0  # ... but never less than so many seconds,
+KNOT_MEMORIES = 7.0  # ... but never less than so many memories of the filter,
 MAX_KNOTS = 4000  # nor more than so many knots
 WALK_PRECISION = 1.0  # of the random walk of ln(jerk) from knot to knot
 ALLOWANCE = 1.4  # on the likeliest jerk: too little makes sigmas dishonest, a little too much costs almost nothing
-CALMEST = 3e-4  # m^2/s^5 along any axis: no aircraft flies more smoothly than the air it is in. With 1e-5 for the
-# smoother its errors on zuo2021-outliers are smaller by 15 %, but on cruises and overhead passes only 95 % are inside 3
-# sigma, in place of 98
+LONGEST_MEMORY = 1.0  # knots: less jerk than gives the filter such a memory shows in no knot, so none has less
 
 
 def fit_profile(log: Observations, starts: list[Start], level: Model, steps: int) -> Model:
@@ -41,13 +39,14 @@ def fit_profile(log: Observations, starts: list[Start], level: Model, steps: int
     One ratio of vertical to horizontal jerk holds for the whole flight: aircraft turn harder than they pitch, and
     range and angles see the two differently.
     """
-    span = float(log.time_s[-1] - log.time_s[0])
-    interval = float(np.median(np.diff(log.time_s))) if len(log.time_s) > 1 else 1.0
-    knot_s = max(KNOT_SECONDS, KNOT_SAMPLES * interval, span / MAX_KNOTS)
-    knots = max(math.ceil(span / knot_s), 1)
+    scales = scales_of(log, level.noise_variance)
+    knot_s = level.knot_s
+    if not math.isfinite(knot_s):
+        memory_s = scales.memory_s(float(level.jerk[0, 0]))
+        knot_s = max(KNOT_MEMORIES * memory_s, KNOT_SAMPLES * scales.interval_s, scales.span_s / MAX_KNOTS)
+    knots = max(math.ceil(scales.span_s / knot_s), 1)
 
-    slant = float(np.nanmedian(log.measurement[:, 0]))
-    merged = decimation.how_many(log.time_s, slant, level, knot_s)
+    merged = decimation.how_many(scales, level, knot_s)
     if merged > 1:
         log, starts = decimation.merge(log, starts, merged)
 
@@ -66,7 +65,7 @@ def fit_profile(log: Observations, starts: list[Start], level: Model, steps: int
 
     ratio = math.log(level.jerk[0, 5] / level.jerk[0, 0])
     theta = np.r_[np.broadcast_to(np.log(level.jerk[:, 0]), knots), ratio]
-    low, high = (np.r_[np.full(knots, math.log(bound)), side * RATIO_BOUND] for bound, side in JERK_SIDES)
+    low, high = (np.r_[np.full(knots, bound), side] for bound, side in jerk_bounds(scales))
     curvature = np.r_[np.full(knots, 2.0), 0.7 * knots]
     return unpack(optimizer.minimise(cost, theta, curvature, low, high, steps, tolerance=0.1 * knots**0.5))
 
@@ -77,6 +76,9 @@ def median_level(model: Model) -> Model:
     return model._replace(jerk=level * model.jerk[:1] / model.jerk[0, 0], knot_s=np.inf)
 
 
-def with_allowance(model: Model) -> Model:
-    """The model with a little more jerk than is likeliest, and nowhere less than CALMEST."""
-    return model._replace(jerk=np.maximum(ALLOWANCE * model.jerk, CALMEST * ISOTROPIC))
+def with_allowance(log: Observations, model: Model) -> Model:
+    """The model with a little more jerk than is likeliest, and nowhere less than shows in a knot of its profile."""
+    scales = scales_of(log, model.noise_variance)
+    knot_s = min(model.knot_s, scales.span_s)
+    least = scales.jerk_psd(LONGEST_MEMORY * knot_s)
+    return model._replace(jerk=np.maximum(ALLOWANCE * model.jerk, least * ISOTROPIC))

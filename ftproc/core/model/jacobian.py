@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import part
-from ftproc.core.model.measurement import MIN_RANGE_M, measure
+from ftproc.core.model.measurement import NO_RANGE_M, measure
 
 FloatArray = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class Linearised(Protocol):
 def jacobian(x: FloatArray, h: FloatArray) -> None:
     """Rows R, A, E of eq. 4 on the position columns (its others are zero), at the state x (9,)."""
     ground = math.hypot(x[0], x[1])
-    slant = max(math.hypot(ground, x[2]), MIN_RANGE_M)
+    slant = max(math.hypot(ground, x[2]), NO_RANGE_M)
     ground = max(ground, MIN_COS_ELEVATION * slant)
     ca, sa, ce, se = x[0] / ground, x[1] / ground, ground / slant, x[2] / slant
     h[0, 0], h[0, 1], h[0, 2] = ca * ce, sa * ce, se

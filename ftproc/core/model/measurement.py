@@ -14,7 +14,7 @@ from ftproc.core.compiled import part
 
 FloatArray = NDArray[np.float64]
 
-MIN_RANGE_M = 1.0  # below this the direction of the target has no meaning
+NO_RANGE_M = 1e-150  # stands in for a range of zero, by which nothing can be divided
 TWO_PI = 2 * math.pi
 SMALL_TURN = 0.04  # of a distance: a point moved by less is seen at less than 0.05 rad from where it was
 
@@ -40,7 +40,7 @@ def measure(x: float, y: float, z: float) -> tuple[float, float, float]:
     """h(x): slant range m, azimuth rad, elevation rad."""
     ground2 = x * x + y * y
     slant = math.sqrt(ground2 + z * z)
-    return max(slant, MIN_RANGE_M), math.atan2(y, x), math.atan2(z, math.sqrt(ground2))
+    return max(slant, NO_RANGE_M), math.atan2(y, x), math.atan2(z, math.sqrt(ground2))
 
 
 @part
@@ -64,8 +64,8 @@ def moves(before: FloatArray, after: FloatArray) -> tuple[float, float, float]:
     """h(after) - h(before) of two states: m, rad, rad."""
     ground0 = math.sqrt(before[0] * before[0] + before[1] * before[1])
     ground1 = math.sqrt(after[0] * after[0] + after[1] * after[1])
-    slant0 = max(math.sqrt(ground0 * ground0 + before[2] * before[2]), MIN_RANGE_M)
-    slant1 = max(math.sqrt(ground1 * ground1 + after[2] * after[2]), MIN_RANGE_M)
+    slant0 = max(math.sqrt(ground0 * ground0 + before[2] * before[2]), NO_RANGE_M)
+    slant1 = max(math.sqrt(ground1 * ground1 + after[2] * after[2]), NO_RANGE_M)
     azimuth = turn(before[0] * after[1] - before[1] * after[0], before[0] * after[0] + before[1] * after[1])
     elevation = turn(ground0 * after[2] - before[2] * ground1, ground0 * ground1 + before[2] * after[2])
     return slant1 - slant0, azimuth, elevation

@@ -13,6 +13,7 @@ from Q(T1) and Q(T2), so gaps and jittered times need no special case. In three 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -33,7 +34,7 @@ class Moving(Protocol):
 
 
 class Adjoint(Protocol):
-    """r (9,) and N (9, 9) of the backward recursion."""
+    """r (9,) and N (9, 9) of the backward recursion; with the offsets, (12,) and (12, 12)."""
 
     r: FloatArray
     n: FloatArray
@@ -87,6 +88,10 @@ def predict(f: Moving, interval: float, jerk: FloatArray) -> None:
     for i in range(3):
         x[i] += t * x[i + 3] + h * x[i + 6]
         x[i + 3] += t * x[i + 6]
+        for j in range(9, len(x)):
+            p[i, j] += t * p[i + 3, j] + h * p[i + 6, j]
+            p[i + 3, j] += t * p[i + 6, j]
+            p[j, i], p[j, i + 3] = p[i, j], p[i + 3, j]
     noise_coefficients(t, c)
     for i in range(3):
         for j in range(i, 3):
@@ -110,6 +115,44 @@ def predict(f: Moving, interval: float, jerk: FloatArray) -> None:
                 p[6 + i, 3 + j] = p[3 + j, 6 + i] = av + t * aa + q * c[2, 1]
 
 
+class Wandering(Protocol):
+    """x and P of a record whose state ends with three offsets that wander, their variances and correlation times."""
+
+    x: FloatArray
+    p: FloatArray
+    wander: FloatArray
+    fade_s: FloatArray
+
+
+@part
+def wander(f: Wandering, interval: float) -> None:
+    """The offsets b of the measurements after an interval, in place, and their covariances with the motion:
+    b <- exp(-|T| / tau) b + w, where the variance of w keeps that of b (Gauss-Markov)."""
+    n = len(f.x)
+    for i in range(9, n):
+        fade = math.exp(-abs(interval) / f.fade_s[i - 9])
+        f.x[i] *= fade
+        for j in range(n):
+            if j != i:
+                f.p[i, j] *= fade
+                f.p[j, i] = f.p[i, j]
+        f.p[i, i] = fade * fade * f.p[i, i] + (1 - fade * fade) * f.wander[i - 9]
+
+
+@part
+def wander_back(b: Adjoint, interval: float, fade_s: FloatArray) -> None:
+    """The backward counterpart of `wander` for r and N."""
+    n = len(b.r)
+    for i in range(9, n):
+        fade = math.exp(-abs(interval) / fade_s[i - 9])
+        b.r[i] *= fade
+        for j in range(n):
+            if j != i:
+                b.n[i, j] *= fade
+                b.n[j, i] = b.n[i, j]
+        b.n[i, i] *= fade * fade
+
+
 @part
 def adjoint(b: Adjoint, interval: float) -> None:
     """r <- Phi' r and N <- Phi' N Phi in place: the backward counterpart of `predict`."""
@@ -119,6 +162,10 @@ def adjoint(b: Adjoint, interval: float) -> None:
     for i in range(3):
         r[i + 6] += t * r[i + 3] + h * r[i]
         r[i + 3] += t * r[i]
+        for j in range(9, len(r)):
+            n[i + 6, j] += t * n[i + 3, j] + h * n[i, j]
+            n[i + 3, j] += t * n[i, j]
+            n[j, i + 6], n[j, i + 3] = n[i + 6, j], n[i + 3, j]
     for i in range(3):
         for j in range(3):
             pp, vp, ap = n[i, j], n[3 + i, j], n[6 + i, j]
