@@ -1,0 +1,47 @@
+"""What a log says of its own scales: its interval, its noise in metres, and the memory of a filter over it.
+
+A track that wanders with jerk density q, seen with noise sigma every T seconds, is averaged by its filter over about
+(sigma^2 T / q)^(1/6) seconds. That time, the filter's memory, is the yardstick of everything that depends on how fast the
+target moves; so a flight and its copy in other units of length and time give the same result in these units.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.filtering.records import Observations
+
+FloatArray = NDArray[np.float64]
+
+FINEST = 1e-9  # of the range: no noise is smaller
+
+
+class Scales(NamedTuple):
+    """interval_s: typical. span_s: of the whole log. range_m: typical. noise_m: (3,) 1-sigma of the components along
+    and across the line of sight."""
+
+    interval_s: float
+    span_s: float
+    range_m: float
+    noise_m: FloatArray
+
+    def memory_s(self, jerk_psd: float) -> float:
+        """The memory of a filter for this jerk density, m^2/s^5."""
+        return float((np.median(self.noise_m) ** 2 * self.interval_s / jerk_psd) ** (1 / 6))
+
+    def jerk_psd(self, memory_s: float) -> float:
+        """The jerk density, m^2/s^5, that gives a filter this memory."""
+        return float(np.median(self.noise_m) ** 2 * self.interval_s / memory_s**6)
+
+
+def scales_of(log: Observations, noise_variance: FloatArray) -> Scales:
+    """The scales of a log with this noise (3,) m^2, rad^2, rad^2."""
+    ranges = log.measurement[:, 0][log.weight[:, 0] > 0]
+    range_m = float(np.nanmedian(ranges)) if np.isfinite(ranges).any() else 1.0
+    times = np.diff(log.time_s)
+    interval = float(np.median(times[times > 0])) if (times > 0).any() else 1.0
+    noise = np.maximum(np.sqrt(noise_variance) * np.array([1.0, range_m, range_m]), FINEST * range_m)
+    return Scales(interval, max(float(log.time_s[-1] - log.time_s[0]), interval), range_m, noise)
