@@ -54,28 +54,24 @@ def parts(record: Recording, settings: FilterSettings) -> Iterator[Part]:
         yield Part(estimate(record.whole(), settings), 0, 0, len(record))
 
 
-def edited_twice(readings: Readings, settings: FilterSettings, usual: Usual | None = None) -> Estimate:
+def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | None = None) -> Estimate:
     """Two-pass editing. usual: of a segment, what is usual in the log, see `core.editing.two_pass`."""
     known = preparing.what_is_known(readings, settings)
-    edited = two_pass.edit(readings.time_s, readings.measurement, known, usual and usual.model)
+    edited = two_pass.edit(readings.time_s, readings.measurement, known, usual)
     starts = two_pass.smoothed_starts(edited.smoothed)
-    run = forward.filter_log(readings.weighted(edited.weight), edited.model, starts)
+    run = forward.filter_log(edited.log, edited.model, starts)
     smoothed = edited.smoothed if settings.smooth else None
-    slow = edited.slow_noise if usual is None else usual.slow_noise
     label = preparing.labels(edited.weight, readings.measurement)
     again = preparing.re_initialized(starts)
-    return Estimate(run, label, edited.model, smoothed, again, edited.settled, slow, unexamined=edited.unexamined)
+    decision = edited.decision
+    return Estimate(
+        run, label, edited.model, smoothed, again, decision.settled, unexamined=decision.unexamined,
+        stamp_s=decision.stamp_s, drifts=decision.drifts,
+    )  # fmt: skip
 
 
-class Usual(NamedTuple):
-    """What spans of a log say of all of it: noise and typical jerk, and whether the noise passes for motion."""
-
-    model: Model
-    slow_noise: bool
-
-
-def usual_of(record: Recording, settings: FilterSettings) -> Usual | None:
-    """The medians over spans spread over a log; None if no span could be edited."""
+def usual_of(record: Recording, settings: FilterSettings) -> Model | None:
+    """Noise and typical jerk of a log: the medians over spans spread over it; None if no span could be edited."""
     found = [e for e in threads.in_order(partial(_span, record, settings), record.spans()) if e is not None]
     if not found:
         return None
@@ -85,10 +81,8 @@ def usual_of(record: Recording, settings: FilterSettings) -> Usual | None:
     fade = np.exp(np.median([np.log(edited.model.fade_s) for edited in found], 0))
     levels = np.array([median_level(edited.model).jerk for edited in found])
     jerk = np.exp(np.median(np.log(levels[:, 0, [0, 5]]), 0))
-    model = Model(
-        variance, jerk[0] * HORIZONTAL[None] + jerk[1] * VERTICAL[None], wander_variance=wander, fade_s=fade
-    )
-    return Usual(model, bool(np.median([edited.slow_noise for edited in found]) > 0.5))
+    tensor = jerk[0] * HORIZONTAL[None] + jerk[1] * VERTICAL[None]
+    return Model(variance, tensor, wander_variance=wander, fade_s=fade)
 
 
 def _span(record: Recording, settings: FilterSettings, rows: slice) -> two_pass.Edited | None:
@@ -107,7 +101,7 @@ def segments(record: Recording) -> list[tuple[int, int]]:
     return [(int(low), int(high)) for low, high in itertools.pairwise(edges)]
 
 
-def _segment(record: Recording, settings: FilterSettings, usual: Usual | None, span: tuple[int, int]) -> Part:
+def _segment(record: Recording, settings: FilterSettings, usual: Model | None, span: tuple[int, int]) -> Part:
     """The estimate of samples [low, high) of a log, made with the readings around them.
 
     Where these do not tell where the track is (a component is missing for long), the margins are widened.

@@ -73,9 +73,8 @@ class Estimate(NamedTuple):
 
     run: the recursive filter. label: (n, 3) good, isolated, patch, missing. model: noise and jerk used.
     smoothed: the smoother's run when it was asked for. reacquired: samples at which the filter was re-initialized.
-    settled: whether two-pass editing's decisions stood still; None where there were none to make. slow_noise: the
-    noise is correlated too slowly to be distinguished from motion, so the sigmas are too small. cleaned: (n, 3)
-    readings of a method that works on range, azimuth and elevation one by one; NaN there and in its run means not
+    settled: whether two-pass editing's decisions stood still; None where there were none to make. stamp_s: 1-sigma of
+    the time stamps. drifts: whether the noise's variance drifts. cleaned: (n, 3) readings of a method that works on range, azimuth and elevation one by one; NaN there and in its run means not
     estimated. unexamined: places where two-pass editing looked for no alternative, its search having been cut short.
     """
 
@@ -85,7 +84,8 @@ class Estimate(NamedTuple):
     smoothed: SmootherRun | None = None
     reacquired: tuple[int, ...] = ()
     settled: bool | None = None
-    slow_noise: bool = False
+    stamp_s: float = 0.0
+    drifts: bool = False
     cleaned: FloatArray | None = None
     unexamined: int = 0
 

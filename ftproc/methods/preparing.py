@@ -56,7 +56,7 @@ def trusted(readings: Readings, settings: FilterSettings) -> tuple[FloatArray, F
     weights are those of the screening, and serve to find noise and jerk.
     """
     time_s, measurement, _ = readings
-    weight, sigma = two_pass.screen(time_s, measurement)
+    weight, sigma, _ = two_pass.screen(time_s, measurement)
     known = what_is_known(readings, settings)
     with contextlib.suppress(ValueError):  # too few readings in the head: the screening has to do
         head = two_pass.edit(time_s[:HEAD], measurement[:HEAD], known)

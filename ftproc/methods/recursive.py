@@ -138,7 +138,7 @@ class _Gaps:
             if k >= high:
                 break
             window = slice(k, min(following, k + AHEAD))
-            weight, _ = two_pass.screen(time_s[window], measurement[window])
+            weight, _, _ = two_pass.screen(time_s[window], measurement[window])
             usable = (weight > 0) & good[window]
             if (usable.sum(0) < initialization.FEWEST_READINGS).any():
                 continue

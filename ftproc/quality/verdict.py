@@ -35,6 +35,11 @@ def remarks(s: Mapping[str, Any]) -> list[Remark]:
     if correlation > 0:
         text = f"the noise is correlated between samples (coefficient up to {correlation:.2f}); the sigmas allow for it"
         found.append(Remark(CONSISTENT, text))
+    if s["time_stamp_sigma_s"] > 0:
+        text = f"the time stamps are off by {1000 * s['time_stamp_sigma_s']:.3g} ms (1 sigma); the sigmas allow for it"
+        found.append(Remark(CONSISTENT, text))
+    if s["noise_drifts"]:
+        found.append(Remark(CONSISTENT, "the variance of the noise changes along the log; the sigmas follow it"))
     if s.get("correction_lost_by_smoothing"):
         text = "the model corrects the filter only: the smoothed estimate is not corrected"
         found.append(Remark(CONSISTENT, text))
@@ -90,8 +95,9 @@ def _sigmas(s: Mapping[str, Any]) -> Iterator[Remark]:
         if predicted is not None and predicted > consistency.POORLY_PREDICTED:
             yield Remark(SUSPECT, f"{name} is poorly observable: its predicted sigma is {predicted:.0f} times the "
                                   "measurement noise, so the gate detects only much larger outliers")  # fmt: skip
-    if s["slow_noise"] and not s["not_observable"]:
-        text = "the noise is correlated too slowly to be separated from motion: the published sigmas are too small"
+    if s["slow_noise_s"] and not s["not_observable"]:
+        text = f"the noise is correlated over {s['slow_noise_s']:.3g} s, too slowly to be separated from motion: the " \
+               "published sigmas rest on few independent readings"  # fmt: skip
         yield Remark(UNRELIABLE, text)
 
 

@@ -40,7 +40,8 @@ APART = 6  # samples between readings that are taken out at once
 
 class Neighbourhood(NamedTuple):
     """A stretch of the log and what decides in it: time_s (n,), measurement (n, 3), possible (n, 3) the readings that
-    may be good at all, the model (of a single jerk level), rates (3, 3) of outliers, the gate in sigmas."""
+    may be good at all, the model (of a single jerk level), rates (3, 3) of outliers, the gate in sigmas; excess: see
+    `Observations`."""
 
     time_s: FloatArray
     measurement: FloatArray
@@ -48,14 +49,17 @@ class Neighbourhood(NamedTuple):
     model: Model
     rates: FloatArray
     gate: float
+    excess: FloatArray | None = None
 
     def weighted(self, weight: FloatArray) -> Observations:
         """The log with weights (n, 3)."""
-        return Observations(self.time_s, self.measurement, weight)
+        return Observations(self.time_s, self.measurement, weight, self.excess)
 
     def part(self, near: slice) -> Neighbourhood:
         """The readings of a slice."""
-        return self._replace(time_s=self.time_s[near], measurement=self.measurement[near], possible=self.possible[near])
+        excess = None if self.excess is None else self.excess[near]
+        arrays = (self.time_s[near], self.measurement[near], self.possible[near])
+        return self._replace(time_s=arrays[0], measurement=arrays[1], possible=arrays[2], excess=excess)
 
 
 class Island(NamedTuple):

@@ -12,7 +12,7 @@ from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import smooth_log
-from ftproc.core.identification import coloured_noise
+from ftproc.core.identification import coloured_noise, uneven_noise
 from ftproc.core.identification.likelihood import Fixed, fit_level
 from ftproc.core.identification.profile import median_level
 
@@ -28,7 +28,9 @@ FEWEST_KEPT = 0.5  # share of what screening trusts that must survive the decisi
 
 class Record(NamedTuple):
     """What stays the same while decisions are made: the log, the readings that may be good at all (n, 3), what
-    screening trusts (n, 3) and the noise 1-sigma (3,) that it saw, what the user has fixed, and the gate in sigmas."""
+    screening trusts (n, 3) and the noise 1-sigma (3,) that it saw, what the user has fixed, the gate in sigmas, the
+    1-sigma (3,) that rounding alone makes, and how many times the variance of its component that of each reading is
+    (n, 3; None for once)."""
 
     time_s: FloatArray
     measurement: FloatArray
@@ -37,23 +39,25 @@ class Record(NamedTuple):
     sigma: FloatArray
     fixed: Fixed
     gate: float
+    rounding: FloatArray
+    excess: FloatArray | None = None
 
     def weighted(self, weight: FloatArray) -> Observations:
         """The log with weights (n, 3)."""
-        return Observations(self.time_s, self.measurement, weight)
+        return Observations(self.time_s, self.measurement, weight, self.excess)
 
     def part(self, span: slice) -> Record:
         """The record of a stretch of the log."""
         return self._replace(
             time_s=self.time_s[span], measurement=self.measurement[span], possible=self.possible[span],
-            screened=self.screened[span],
+            screened=self.screened[span], excess=None if self.excess is None else self.excess[span],
         )  # fmt: skip
 
 
 class Decision(NamedTuple):
     """Weights (n, 3), the model and starts they were made with, the estimated outlier rates (3, 3), how many rounds it
-    took, whether they stand still, whether the noise is correlated too slowly to be distinguished from motion, and for
-    how many places no work was left to look for alternatives."""
+    took, whether they stand still, for how many places no work was left to look for alternatives, the 1-sigma of the time
+    stamps, s, and whether the noise drifts."""
 
     weight: FloatArray
     model: Model
@@ -61,8 +65,9 @@ class Decision(NamedTuple):
     rates: FloatArray
     rounds: int = 0
     settled: bool = False
-    slow_noise: bool = False
     unexamined: int = 0
+    stamp_s: float = 0.0
+    drifts: bool = False
 
 
 def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
@@ -72,7 +77,7 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
     while rounds < MAX_ROUNDS and not settled:
         log = record.weighted(weight)
         if rounds < TUNING_ROUNDS and (tune_first or rounds > 0) and not model.coloured:
-            model = fit_level(log, starts, model, record.fixed, record.sigma)
+            model = fit_level(log, starts, model, record.fixed, record.sigma, record.rounding)
         smoothed = smooth_log(log, model, starts, residuals_only=True)
         noise = model.reading_variance
         good = outlier_chain.classify(smoothed.residual, smoothed.residual_variance, noise, rates, record.gate)
@@ -85,6 +90,29 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
     return initial._replace(
         weight=weight, model=model, starts=starts, rates=rates, rounds=initial.rounds + rounds, settled=settled
     )
+
+
+def allow_for_late_stamps(record: Record, decision: Decision) -> tuple[Record, Decision]:
+    """The record with noise that grows with the rates of the readings, and the decisions made again, if time stamps
+    are late now and then."""
+    smoothed = smooth_log(record.weighted(decision.weight), decision.model, decision.starts)
+    excess, stamp_s = uneven_noise.late_stamps(record.weighted(decision.weight), smoothed, decision.model)
+    if excess is None:
+        return record, decision
+    record = record._replace(excess=excess if record.excess is None else excess * record.excess)
+    return record, decide(record, decision._replace(stamp_s=stamp_s), tune_first=True)
+
+
+def allow_for_drift(record: Record, decision: Decision) -> tuple[Record, Decision]:
+    """The record with noise whose variance drifts, and the decisions made again, if it does."""
+    log = record.weighted(decision.weight)
+    smoothed = smooth_log(log, decision.model, decision.starts, residuals_only=True)
+    drifting = uneven_noise.drift(log, smoothed)
+    if drifting is None:
+        return record, decision
+    record = record._replace(excess=drifting if record.excess is None else drifting * record.excess)
+    again = decide(record, decision._replace(model=median_level(decision.model), drifts=True), tune_first=True)
+    return record, again
 
 
 def allow_for_colour(record: Record, decision: Decision) -> Decision:

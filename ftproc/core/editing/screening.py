@@ -25,6 +25,7 @@ APART = 64  # numbers between scratch arrays: where they might overlap, compiled
 SHORTEST_STUCK = 3  # equal readings in a row
 STUCK_ODDS = 1e-3  # expected number of chance runs in a log that would be called stuck
 MOST_STUCK = 0.2  # share of a component
+ON_GRID, MOSTLY_ON_GRID = 0.05, 0.95  # of a rounding step that a value may be off a multiple, and share that is not
 
 
 @part
@@ -103,10 +104,13 @@ def _best_parabola(
 
 
 @kernel
-def screen_component(time: Vector, z: Vector, window: int, angular: bool) -> tuple[Vector, Vector]:
+def screen_component(
+    time: Vector, z: Vector, window: int, angular: bool, least_sigma: float
+) -> tuple[Vector, Vector]:
     """(n,) share of windows in which each sample lies off the parabola, and (windows,) scale of each window.
 
     time (n,) s, z (n,) reading with NaN where missing, window: samples per window; windows overlap three-fold.
+    least_sigma: that the noise has at least.
     """
     seen = np.flatnonzero(np.isfinite(z))
     m = len(seen)
@@ -128,7 +132,7 @@ def screen_component(time: Vector, z: Vector, window: int, angular: bool) -> tup
     typical = np.median(scales)
     for w in range(count):
         low = min(w * stride, m - window)
-        limit = CUT * max(scales[w], 0.7 * typical)
+        limit = CUT * max(scales[w], 0.7 * typical, least_sigma)
         for i in range(window):
             looks[seen[low + i]] += 1
             if abs(residuals[margin + w, i]) > limit:
@@ -194,3 +198,24 @@ def bar_runs(channel: Vector, votes: Vector, near: Vector, weight: Vector) -> No
             for k in range(begin, end):
                 weight[seen[k]] = 0.0
         begin = end
+
+
+def rounding_step(channel: FloatArray) -> float:
+    """The step to which the readings (n,) of a component are rounded, NaN where missing; zero if to none that shows.
+
+    The largest of a few differences between neighbouring values of which nearly all values are whole multiples.
+    """
+    values = np.unique(channel[np.isfinite(channel)])
+    if len(values) < 2:
+        return 0.0
+    steps = np.diff(values)
+    steps = np.sort(steps[steps > 1e-12 * np.abs(values).max()])
+    if not len(steps):
+        return 0.0
+    middle = values[len(values) // 2]
+    for share in (0.5, 0.2, 0.05, 0.0):
+        step = float(steps[int(share * (len(steps) - 1))])
+        multiple = (values - middle) / step
+        if np.mean(np.abs(multiple - np.round(multiple)) < ON_GRID) >= MOSTLY_ON_GRID:
+            return step
+    return 0.0

@@ -112,7 +112,7 @@ def reacquire(time_s: FloatArray, measurement: FloatArray, noise_variance: Float
     for c in range(3):
         channel = np.ascontiguousarray(near[:, c])
         seen = np.isfinite(channel)
-        votes, scales = screening.screen_component(time, channel, REACQUIRE_SAMPLES, c == 1)
+        votes, scales = screening.screen_component(time, channel, REACQUIRE_SAMPLES, c == 1, 0.0)
         fits = seen & (votes <= 0.5)
         if seen.sum() < 5 or fits.sum() < INLIERS * seen.sum() or scales.min() > 3 * np.sqrt(noise_variance[c]):
             return None

@@ -6,18 +6,27 @@ leave-one-out residuals -> again, until the decisions stand still; then a jerk p
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing import jump_patches, outlier_chain, screening
-from ftproc.core.editing.decisions import Decision, Record, allow_for_colour, decide
+from ftproc.core.editing.decisions import (
+    Decision,
+    Record,
+    allow_for_colour,
+    allow_for_drift,
+    allow_for_late_stamps,
+    decide,
+)
 from ftproc.core.editing.reassessment import reassess
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
-from ftproc.core.identification.likelihood import Fixed, first_jerk, noise_floor
+from ftproc.core.identification import uneven_noise
+from ftproc.core.identification.likelihood import Fixed, first_jerk, without_noise
 from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.model.frames import unwrap
 from ftproc.core.model.motion import isotropic
@@ -26,6 +35,7 @@ FloatArray = NDArray[np.float64]
 
 SHORT_WINDOW = 11  # samples: sees jumps, and little else
 WINDOWS = (31, 75)  # samples: the short one follows manoeuvres, the long one sees through patches
+COARSE = 0.5  # of a component's noise: rounding that makes so much of it decides how its readings repeat
 FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
 PROFILE_STEPS = 4  # of the search for the jerk profile, once the decisions are made
 START_INFLATION = 2.0  # on the covariance of a smoothed state that starts a filter over the same record
@@ -43,43 +53,50 @@ class Known(NamedTuple):
 class Edited(NamedTuple):
     """The decisions and what they rest on.
 
-    weight: (n, 3) 1 good, 0 rejected or missing. model: noise and jerk profile. starts: for the next pass.
-    smoothed: the smoother's run with these. rates: (3, 3) estimated outlier rates per component.
-    rounds: how many passes it took; settled: whether the decisions stood still. slow_noise: the noise is correlated,
-    but so slowly that it cannot be distinguished from motion; the sigmas are then too small. unexamined: places where
-    no alternative was looked for, because the search was cut short.
+    log: with weights (n, 3), 1 good, 0 rejected or missing. model: noise and jerk profile. starts: for the next pass.
+    smoothed: the smoother's run with these. decision: the last one, with the model that it was made with.
     """
 
-    weight: FloatArray
+    log: Observations
     model: Model
     starts: list[Start]
     smoothed: SmootherRun
-    rates: FloatArray
-    rounds: int
-    settled: bool
-    slow_noise: bool
-    unexamined: int
+    decision: Decision
+
+    @property
+    def weight(self) -> FloatArray:
+        """(n, 3) 1 good, 0 rejected or missing."""
+        return self.log.weight
 
 
-def screen(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(n, 3) weights after screening each component alone, and (3,) noise 1-sigma."""
-    weight, sigma = np.isfinite(measurement).astype(float), np.zeros(3)
+def screen(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """(n, 3) weights after screening each component alone, (3,) noise 1-sigma, and which components show none (3,)."""
+    weight, sigma, least = np.isfinite(measurement).astype(float), np.zeros(3), rounding_sigma(measurement)
     for c in range(3):
         channel = np.ascontiguousarray(measurement[:, c])
-        weight[:, c], sigma[c] = _screen_channel(time_s, channel, c == 1)
-    return weight, np.maximum(sigma, noise_floor(Observations(time_s, measurement, weight), sigma**2))
+        weight[:, c], sigma[c] = _screen_channel(time_s, channel, c == 1, float(least[c]))
+    exact, sigma = without_noise(Observations(time_s, measurement, weight), sigma)
+    return weight, sigma, exact
 
 
-def _screen_channel(time_s: FloatArray, channel: FloatArray, angular: bool) -> tuple[FloatArray, float]:
+def rounding_sigma(measurement: FloatArray) -> FloatArray:
+    """(3,) 1-sigma m, rad, rad that the rounding of the readings (n, 3) makes: step / sqrt(12)."""
+    steps = [screening.rounding_step(measurement[:, c]) for c in range(3)]
+    return np.array(steps) / math.sqrt(12)
+
+
+def _screen_channel(
+    time_s: FloatArray, channel: FloatArray, angular: bool, least_sigma: float
+) -> tuple[FloatArray, float]:
     """(n,) weights and the noise 1-sigma of one component."""
     seen = np.isfinite(channel).astype(float)
-    near, scales = screening.screen_component(time_s, channel, SHORT_WINDOW, angular)
-    weight, sigma = seen.copy(), 0.0
+    near, scales = screening.screen_component(time_s, channel, SHORT_WINDOW, angular, least_sigma)
+    weight, sigma = seen.copy(), least_sigma
     for window in WINDOWS:
-        votes, scales = screening.screen_component(time_s, channel, window, angular)
+        votes, scales = screening.screen_component(time_s, channel, window, angular, least_sigma)
         screening.bar_runs(channel, votes, near, weight)
         if window == WINDOWS[0] and len(scales):
-            sigma = float(np.median(scales))
+            sigma = max(float(np.median(scales)), least_sigma)
     weight[jump_patches.find(time_s, unwrap(channel) if angular else channel, weight, sigma) > 0] = 0.0
     # A component that swings too fast for parabolas loses half of itself: then only the short window is believed.
     for alternative in (np.where(near > 0.5, 0.0, seen), seen):
@@ -100,17 +117,23 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
     search starts. Raises ValueError when a component has no reading that agrees with its neighbours.
     """
     jerk_psd = known.jerk_psd
-    screened, sigma = screen(time_s, measurement)
+    screened, sigma, exact = screen(time_s, measurement)
     possible = np.isfinite(measurement) & ~stuck_readings(measurement, sigma)
-    fixed = Fixed(np.isfinite(known.sigma) | (segment_of is not None), jerk_psd is not None)
-    record = Record(time_s, measurement, possible, screened * possible, sigma, fixed, known.gate)
-    log, noise = record.weighted(record.screened), np.where(fixed.noise, known.sigma, sigma) ** 2
+    possible[:, 0] &= measurement[:, 0] > 0  # no target is at the station, or behind it
+    fixed = Fixed(np.isfinite(known.sigma) | exact | (segment_of is not None), jerk_psd is not None)
+    rounding = rounding_sigma(measurement)
+    coarse = np.where(rounding > COARSE * sigma, np.sqrt(12) * rounding, 0.0)
+    excess = uneven_noise.repeated(measurement, coarse)
+    record = Record(time_s, measurement, possible, screened * possible, sigma, fixed, known.gate, rounding, excess)
+    log, noise = record.weighted(record.screened), np.where(np.isfinite(known.sigma), known.sigma, sigma) ** 2
     model = segment_of or Model(noise, isotropic(first_jerk(log, noise) if jerk_psd is None else jerk_psd))
     rates = np.tile(np.array(outlier_chain.START_RATES), (3, 1))
     starts = find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
     decision = decide(record, Decision(record.screened, model, starts, rates), tune_first=True)
+    record, decision = allow_for_late_stamps(record, decision)
     if jerk_psd is None:
         decision = reassess(record, decision)
+    record, decision = allow_for_drift(record, decision)
     if segment_of is None:
         decision = allow_for_colour(record, decision)
     log = record.weighted(decision.weight)
@@ -119,7 +142,7 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
         decision = decision._replace(model=with_allowance(log, found))
     d = decision
     smoothed = smooth_log(log, d.model, d.starts)
-    return Edited(d.weight, d.model, d.starts, smoothed, d.rates, d.rounds, d.settled, d.slow_noise, d.unexamined)
+    return Edited(log, d.model, d.starts, smoothed, d)
 
 
 def smoothed_starts(smoothed: SmootherRun) -> list[Start]:

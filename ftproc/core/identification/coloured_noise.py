@@ -25,6 +25,7 @@ from ftproc.core.identification.likelihood import (
     representative,
     shaped,
 )
+from ftproc.core.identification.profile import fit_profile, median_level
 from ftproc.core.identification.scales import Scales, scales_of
 
 FloatArray = NDArray[np.float64]
@@ -36,7 +37,7 @@ BLOCKS = 9  # stretches of a log whose correlations are compared
 SHORT_MEMORY = 4.0  # intervals: a filter with a shorter one follows noise that is correlated, so its residuals show none
 FIRST_FADES = (1.5, 6.0, 25.0)  # intervals: correlation times with which the search begins,
 FIRST_CALMS = (1.0, 1e-3)  # and shares of the jerk that white noise leads to
-FIRST_STEPS, STEPS = 5, 15
+FIRST_STEPS, STEPS, PROFILE_STEPS = 5, 15, 4
 SHORTEST_FADE, LONGEST_FADE = 0.3, 0.5  # intervals, and spans of the log
 STEP = 1e-3  # of ln(tau), for differences
 LARGEST = 1e4  # times the variance that white noise would have
@@ -88,8 +89,10 @@ def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fi
     model = search.model(theta)
     correlated = model.wander_variance > NEGLIGIBLE * model.reading_variance
     model = model._replace(wander_variance=np.where(correlated, model.wander_variance, 0.0))
-    level = fit_level(part, starts, white, fixed)
+    level = fit_profile(part, starts, fit_level(part, starts, white, fixed), PROFILE_STEPS)
+    model = fit_profile(part, starts, model, PROFILE_STEPS)
     gain = score_log(part, model, starts).log_likelihood - score_log(part, level, starts).log_likelihood
+    model = median_level(model)
     return Coloured(model, gain) if correlated.any() and gain > LEAST_GAIN * correlated.sum() else None
 
 
@@ -105,9 +108,10 @@ class _Search:
             low = high = level
         fades = np.log(np.array([SHORTEST_FADE * scales.interval_s, LONGEST_FADE * scales.span_s]))
         fewest = math.log(NEGLIGIBLE) - math.log(LARGEST)
-        most = np.where(fixed.noise, 0.0, math.log(LARGEST))
-        self.lower = np.r_[given + fewest, given + fewest, np.full(3, fades[0]), low]
-        self.upper = np.r_[given + np.minimum(most, 1.0), given + most, np.full(3, max(fades)), high]
+        fewest, most = np.where(fixed.noise, 0.0, fewest), np.where(fixed.noise, 0.0, math.log(LARGEST))
+        none = np.where(fixed.noise, math.log(NEGLIGIBLE) - 1.0, 0.0)  # noise that is specified is white
+        self.lower = np.r_[given + fewest, given + fewest + none, np.full(3, fades[0]), low]
+        self.upper = np.r_[given + np.minimum(most, 1.0), given + most + none, np.full(3, max(fades)), high]
         used = float((log.weight > 0).sum(0).mean())
         self.curvature = used * np.r_[np.full(3, 0.3), np.full(3, 0.1), np.full(3, 0.05), 0.05, 0.02]
 

@@ -48,7 +48,11 @@ def merge(log: Observations, starts: list[Start], count: int) -> tuple[Observati
         late = float(time[sample] - log.time_s[start.sample])
         step = np.kron(np.array([[1.0, late, late**2 / 2], [0.0, 1.0, late], [0.0, 0.0, 1.0]]), np.eye(3))
         moved.append(Start(sample, step @ start.state, step @ start.covariance @ step.T))
-    return Observations(time, z, number), moved
+    excess = None
+    if log.excess is not None:
+        size = np.bincount(group)[:, None]
+        excess = np.stack([np.bincount(group, log.excess[:, c]) for c in range(3)], 1) / size
+    return Observations(time, z, number, excess), moved
 
 
 @kernel

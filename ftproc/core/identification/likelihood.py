@@ -23,7 +23,8 @@ FloatArray = NDArray[np.float64]
 
 LEVEL_STEPS = 12  # of the search for one level
 SPANS, SPAN = 6, 400  # of samples: what stands for a long log when one noise and one jerk level are looked for
-NOISE_FLOOR = 1e-4  # of the other components' noise, in metres: below it a component counts as exact
+NOISE_FLOOR = 1e-4  # of the components' median noise, in metres: one that shows less was not measured,
+EXACT = 0.3  # and is taken to be this much better than the others: nothing moves exactly
 NOISE_GROWTH = 3.0  # times the noise that the search begins with: more of it is a diverged track, not noise
 NOISE_SHRINKS = 4.0  # less of it comes of readings left out until the rest fits
 NOISE_ALLOWED = 1e-4  # 1-sigma, in ranges or rad, that is never too much: a component computed from another shows no
@@ -79,11 +80,13 @@ def first_jerk(log: Observations, noise_variance: FloatArray) -> float:
     return max((scales.jerk_psd(memory * scales.interval_s) for memory in FIRST_MEMORIES), key=likelihood)
 
 
-def noise_floor(log: Observations, noise_variance: FloatArray) -> FloatArray:
-    """(3,) 1-sigma m, rad, rad below which the noise of a component counts as zero."""
-    scales = scales_of(log, noise_variance)
-    floor: FloatArray = NOISE_FLOOR * float(np.median(scales.noise_m)) / np.array([1.0, scales.range_m, scales.range_m])
-    return floor
+def without_noise(log: Observations, sigma: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
+    """(3,) which components show no noise at all, because they were not measured, and (3,) 1-sigma m, rad, rad: those
+    given, and what is assumed for these."""
+    scales = scales_of(log, sigma**2)
+    unit, typical = np.array([1.0, scales.range_m, scales.range_m]), float(np.median(scales.noise_m))
+    exact = sigma * unit < NOISE_FLOOR * typical
+    return exact, np.where(exact, EXACT * typical / unit, sigma)
 
 
 def fit_level(
@@ -92,10 +95,12 @@ def fit_level(
     guess: Model,
     fixed: Fixed,
     expected_sigma: FloatArray | None = None,
+    least_sigma: FloatArray | float = 0.0,
 ) -> Model:
     """The likeliest noise variances and single jerk density with its vertical share, starting from `guess`.
 
-    fixed: what stays as guessed. expected_sigma: (3,) noise that NOISE_GROWTH counts from, if not the guess.
+    fixed: what stays as guessed. expected_sigma: (3,) noise that NOISE_GROWTH counts from, if not the guess. least_sigma:
+    (3,) that it cannot be below.
     """
     if fixed.noise.all() and fixed.jerk:
         return guess
@@ -103,8 +108,9 @@ def fit_level(
     scales = scales_of(log, guess.noise_variance)
     log_noise = np.log(guess.noise_variance)
     expected = np.sqrt(guess.noise_variance) if expected_sigma is None else expected_sigma
-    exact = noise_floor(log, expected**2)
-    floor = 2 * np.log(np.maximum(exact, expected / NOISE_SHRINKS if expected_sigma is not None else 0.0))
+    smallest = NOISE_FLOOR * float(np.median(scales.noise_m)) / np.array([1.0, scales.range_m, scales.range_m])
+    smallest = np.maximum(smallest, least_sigma)
+    floor = 2 * np.log(np.maximum(smallest, expected / NOISE_SHRINKS if expected_sigma is not None else 0.0))
     allowed = NOISE_ALLOWED * np.array([scales.range_m, 1.0, 1.0])
     ceiling = 2 * np.log(np.maximum(NOISE_GROWTH * expected, allowed))
     log_jerk = np.array([math.log(guess.jerk[0, 0]), math.log(guess.jerk[0, 5] / guess.jerk[0, 0])])

@@ -25,7 +25,7 @@ from ftproc.core.identification.scales import scales_of
 FloatArray = NDArray[np.float64]
 
 KNOT_SAMPLES = 10  # samples to a knot of the jerk profile ...
-KNOT_MEMORIES = 7.0  # ... but never less than so many memories of the filter,
+KNOT_MEMORIES = 2.0  # ... but never less than so many memories of the filter,
 MAX_KNOTS = 4000  # nor more than so many knots
 WALK_PRECISION = 1.0  # of the random walk of ln(jerk) from knot to knot
 ALLOWANCE = 1.4  # on the likeliest jerk: too little makes sigmas dishonest, a little too much costs almost nothing
