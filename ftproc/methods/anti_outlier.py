@@ -13,14 +13,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
 from ftproc.core import threads
 from ftproc.core.editing import two_pass
 from ftproc.core.filtering import forward
-from ftproc.core.filtering.records import Model
+from ftproc.core.filtering.records import FilterRun, Model
+from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 from ftproc.core.identification.likelihood import HORIZONTAL, VERTICAL
 from ftproc.core.identification.profile import median_level
 from ftproc.methods import preparing, recursive
@@ -59,15 +59,31 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     known = preparing.what_is_known(readings, settings)
     edited = two_pass.edit(readings.time_s, readings.measurement, known, usual)
     starts = two_pass.smoothed_starts(edited.smoothed)
-    run = forward.filter_log(edited.log, edited.model, starts)
-    smoothed = edited.smoothed if settings.smooth else None
+    run, smoothed = forward.filter_log(edited.log, edited.model, starts), edited.smoothed
+    if edited.decision.alternative is not None:
+        run, smoothed = _worse_of(edited, run, edited.decision.alternative)
     label = preparing.labels(edited.weight, readings.measurement)
     again = preparing.re_initialized(starts)
     decision = edited.decision
     return Estimate(
-        run, label, edited.model, smoothed, again, decision.settled, unexamined=decision.unexamined,
-        stamp_s=decision.stamp_s, drifts=decision.drifts,
+        run, label, edited.model, smoothed if settings.smooth else None, again, decision.settled, unexamined=decision.unexamined,
+        stamp_s=decision.stamp_s, drifts=decision.drifts, alternative=decision.alternative,
     )  # fmt: skip
+
+
+def _worse_of(edited: two_pass.Edited, run: FilterRun, other: Model) -> tuple[FilterRun, SmootherRun]:
+    """The filter's and the smoother's run, each sigma the larger of theirs and of those that another model gives."""
+    smoothed = smooth_log(edited.log, other, edited.starts)
+    filtered = forward.filter_log(edited.log, other, two_pass.smoothed_starts(smoothed))
+    return (
+        run._replace(
+            sigma=np.maximum(run.sigma, filtered.sigma), los_sigma=np.maximum(run.los_sigma, filtered.los_sigma)
+        ),
+        edited.smoothed._replace(
+            sigma=np.maximum(edited.smoothed.sigma, smoothed.sigma),
+            los_sigma=np.maximum(edited.smoothed.los_sigma, smoothed.los_sigma),
+        ),
+    )
 
 
 def usual_of(record: Recording, settings: FilterSettings) -> Model | None:

@@ -74,7 +74,8 @@ class Estimate(NamedTuple):
     run: the recursive filter. label: (n, 3) good, isolated, patch, missing. model: noise and jerk used.
     smoothed: the smoother's run when it was asked for. reacquired: samples at which the filter was re-initialized.
     settled: whether two-pass editing's decisions stood still; None where there were none to make. stamp_s: 1-sigma of
-    the time stamps. drifts: whether the noise's variance drifts. cleaned: (n, 3) readings of a method that works on range, azimuth and elevation one by one; NaN there and in its run means not
+    the time stamps. drifts: whether the noise's variance drifts. alternative: a model with correlated noise
+    that explains the log as well, and that the sigmas allow for. cleaned: (n, 3) readings of a method that works on range, azimuth and elevation one by one; NaN there and in its run means not
     estimated. unexamined: places where two-pass editing looked for no alternative, its search having been cut short.
     """
 
@@ -86,6 +87,7 @@ class Estimate(NamedTuple):
     settled: bool | None = None
     stamp_s: float = 0.0
     drifts: bool = False
+    alternative: Model | None = None
     cleaned: FloatArray | None = None
     unexamined: int = 0
 

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from ftproc.methods.estimate import Estimate
 
 UNITS = ("m", "rad", "rad")
-INDEPENDENT = 20.0  # correlation times that a log must last for noise and motion to be separated
 GAP_INTERVALS = 3.0  # median intervals that make a gap
 MOST_KEPT = 250_000  # samples whose sigmas are kept; of more, the largest of every few
 _LABELS = {"good": GOOD, "isolated": ISOLATED, "patch": PATCH, "missing": MISSING}
@@ -37,6 +36,7 @@ class RunStatistics:
         self.sigmas: list[FloatArray] = []
         self.jerk: list[FloatArray] = []
         self.reacquired, self.unexamined, self.stamp_s, self.drifts = 0, 0, 0.0, False
+        self.slow_noise_s = 0.0
         self.converged: bool | None = None
         self.largest_m, self.outside, self.rows, self.parts = 0.0, 0.0, 0, 0
 
@@ -65,6 +65,9 @@ class RunStatistics:
             self.converged = estimate.settled and self.converged is not False
         self.stamp_s = max(self.stamp_s, estimate.stamp_s)
         self.drifts |= estimate.drifts
+        if estimate.alternative is not None:
+            other = estimate.alternative
+            self.slow_noise_s = max(self.slow_noise_s, float(other.fade_s[other.wander_variance > 0].max()))
         self.unexamined += estimate.unexamined
         self.largest_m = max(self.largest_m, float(np.linalg.norm(correction[:, :3], axis=1).max(initial=0.0)))
         self.outside += outside * len(time_s)
@@ -85,12 +88,6 @@ class RunStatistics:
         chosen = self.every * np.arange(groups) + size.reshape(groups, self.every).argmax(1)
         self.times.append(time_s[chosen])
         self.sigmas.append(sigma_m[chosen])
-
-    def _slow_noise_s(self) -> float:
-        """The longest correlation time, s, of noise that is too slow to be separated from motion; zero for none."""
-        duration_s = float(self.log.time_s[-1] - self.log.time_s[0])
-        times = self.model.fade_s[self.model.wander_variance > 0]
-        return float(times[times > duration_s / INDEPENDENT].max(initial=0.0))
 
     def summary(self) -> dict[str, Any]:
         """The figures with the verdict on them, JSON-serialisable; units are in the names."""
@@ -128,7 +125,7 @@ class RunStatistics:
             "sigmas_published": bool(np.isfinite(sigma_m).any()),
             "reacquired": self.reacquired,
             "editing_converged": self.converged,
-            "slow_noise_s": self._slow_noise_s(),
+            "slow_noise_s": self.slow_noise_s,
             "time_stamp_sigma_s": self.stamp_s,
             "noise_drifts": self.drifts,
             "editing_places_unexamined": self.unexamined,

@@ -96,9 +96,9 @@ def _sigmas(s: Mapping[str, Any]) -> Iterator[Remark]:
             yield Remark(SUSPECT, f"{name} is poorly observable: its predicted sigma is {predicted:.0f} times the "
                                   "measurement noise, so the gate detects only much larger outliers")  # fmt: skip
     if s["slow_noise_s"] and not s["not_observable"]:
-        text = f"the noise is correlated over {s['slow_noise_s']:.3g} s, too slowly to be separated from motion: the " \
-               "published sigmas rest on few independent readings"  # fmt: skip
-        yield Remark(UNRELIABLE, text)
+        text = f"noise that is correlated over {s['slow_noise_s']:.3g} s explains the log as well as motion does: the " \
+               "sigmas allow for both, the estimate follows the motion"  # fmt: skip
+        yield Remark(SUSPECT, text)
 
 
 def _editing(s: Mapping[str, Any]) -> Iterator[Remark]:

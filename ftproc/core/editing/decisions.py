@@ -57,7 +57,7 @@ class Record(NamedTuple):
 class Decision(NamedTuple):
     """Weights (n, 3), the model and starts they were made with, the estimated outlier rates (3, 3), how many rounds it
     took, whether they stand still, for how many places no work was left to look for alternatives, the 1-sigma of the time
-    stamps, s, and whether the noise drifts."""
+    stamps, s, whether the noise drifts, and a model with correlated noise that explains the log as well."""
 
     weight: FloatArray
     model: Model
@@ -68,6 +68,7 @@ class Decision(NamedTuple):
     unexamined: int = 0
     stamp_s: float = 0.0
     drifts: bool = False
+    alternative: Model | None = None
 
 
 def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
@@ -95,12 +96,19 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
 def allow_for_late_stamps(record: Record, decision: Decision) -> tuple[Record, Decision]:
     """The record with noise that grows with the rates of the readings, and the decisions made again, if time stamps
     are late now and then."""
-    smoothed = smooth_log(record.weighted(decision.weight), decision.model, decision.starts)
-    excess, stamp_s = uneven_noise.late_stamps(record.weighted(decision.weight), smoothed, decision.model)
-    if excess is None:
+    log, fixed = record.weighted(decision.weight), record.fixed.noise
+    smoothed = smooth_log(log, decision.model, decision.starts)
+    variance, stamp_variance = uneven_noise.stamp_variance(log, smoothed, decision.model)
+    if stamp_variance == 0.0:
         return record, decision
-    record = record._replace(excess=excess if record.excess is None else excess * record.excess)
-    return record, decide(record, decision._replace(stamp_s=stamp_s), tune_first=True)
+    variance = np.where(fixed, decision.model.noise_variance, np.maximum(variance, record.rounding**2))
+    excess = 1 + stamp_variance * uneven_noise.rates(smoothed.state) ** 2 / variance
+    record = record._replace(
+        sigma=np.sqrt(variance), excess=excess if record.excess is None else excess * record.excess
+    )
+    model = decision.model._replace(noise_variance=variance)
+    found = decision._replace(model=model, stamp_s=float(np.sqrt(stamp_variance)))
+    return record, decide(record, found, tune_first=True)
 
 
 def allow_for_drift(record: Record, decision: Decision) -> tuple[Record, Decision]:
@@ -116,15 +124,16 @@ def allow_for_drift(record: Record, decision: Decision) -> tuple[Record, Decisio
 
 
 def allow_for_colour(record: Record, decision: Decision) -> Decision:
-    """The decisions made again with correlated noise, if the noise is correlated."""
+    """The decisions made again with correlated noise, if the noise is correlated; where such a model is as good as that
+    of white noise, or cannot be separated from motion, it is an alternative."""
     log, starts = record.weighted(decision.weight), decision.starts
     smoothed = smooth_log(log, decision.model, starts, residuals_only=True)
     if not coloured_noise.may_be(log, smoothed, decision.model):
         return decision
     found = coloured_noise.fit_coloured(log, starts, median_level(decision.model), record.fixed)
-    if found is None:
-        return decision
-    return decide(record, decision._replace(model=found.model), tune_first=False)
+    if found.believed:
+        return decide(record, decision._replace(model=found.model), tune_first=False)
+    return decision._replace(alternative=found.model) if found.possible and found.model.coloured else decision
 
 
 def _keep_most(decided: FloatArray, screened: FloatArray) -> FloatArray:

@@ -181,7 +181,7 @@ def smoothed_covariance(p: FloatArray, n: FloatArray) -> FloatArray:
     """
     if not (np.isfinite(p).all() and np.isfinite(n).all()):
         return p
-    scale = np.sqrt(np.diag(p))
+    scale = np.sqrt(np.where(np.diag(p) > 0, np.diag(p), 1.0))
     factor = scale[:, None] * np.linalg.cholesky(p / np.outer(scale, scale) + 1e-12 * np.eye(len(p)))
     share, turn = np.linalg.eigh(np.eye(len(p)) - factor.T @ n @ factor)
     half = factor @ turn * np.sqrt(np.maximum(share, 1e-12))

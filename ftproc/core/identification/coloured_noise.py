@@ -43,13 +43,16 @@ STEP = 1e-3  # of ln(tau), for differences
 LARGEST = 1e4  # times the variance that white noise would have
 NEGLIGIBLE = 0.02  # share of a component's variance
 LEAST_GAIN = 8.0  # in log-likelihood, for each component whose noise is called correlated
+INDEPENDENT = 20.0  # correlation times that a log must last for noise and motion to be separated
 
 
 class Coloured(NamedTuple):
-    """A model with correlated noise and how much likelier (in log-likelihood) it is than that of white noise."""
+    """A model with correlated noise. believed: it is much likelier than that of white noise, and the log lasts long
+    enough to separate such noise from motion. possible: it is about as likely."""
 
     model: Model
-    gain: float
+    believed: bool
+    possible: bool
 
 
 def may_be(log: Observations, smoothed: SmootherRun, model: Model) -> bool:
@@ -78,9 +81,8 @@ def may_be(log: Observations, smoothed: SmootherRun, model: Model) -> bool:
     return False
 
 
-def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fixed) -> Coloured | None:
-    """The likeliest model with correlated noise and a single jerk level, from one that took it for white; None if white
-    noise explains the log as well."""
+def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fixed) -> Coloured:
+    """The likeliest model with correlated noise and a single jerk level, from one that took it for white."""
     part, starts = representative(log, starts, white.noise_variance, float(white.jerk[0, 0]))
     scales = scales_of(part, white.noise_variance)
     search = _Search(part, starts, white, fixed, scales)
@@ -92,8 +94,9 @@ def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fi
     level = fit_profile(part, starts, fit_level(part, starts, white, fixed), PROFILE_STEPS)
     model = fit_profile(part, starts, model, PROFILE_STEPS)
     gain = score_log(part, model, starts).log_likelihood - score_log(part, level, starts).log_likelihood
-    model = median_level(model)
-    return Coloured(model, gain) if correlated.any() and gain > LEAST_GAIN * correlated.sum() else None
+    likelier = gain > LEAST_GAIN * int(correlated.sum())
+    slowest = float(model.fade_s[correlated].max(initial=0.0))
+    return Coloured(median_level(model), likelier and slowest < scales.span_s / INDEPENDENT, gain > -LEAST_GAIN)
 
 
 class _Search:
