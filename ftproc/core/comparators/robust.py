@@ -88,7 +88,7 @@ def _reweighted(f: ukf.Filter, sample: Sample, weightings: Weightings, row: Row)
     store_innovation(f, row)
     for i in range(3):
         how.residual[i] = f.e[i]
-        how.variance[i] = f.c[i, i] + f.noise[i]
+        how.variance[i] = f.c[i, i] + f.noise[i] + f.late[i] * f.late[i]
     nis, gained = math.nan, 0.0
     for _ in range(ITERATIONS):
         if not _weigh(f, how):

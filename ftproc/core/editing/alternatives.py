@@ -19,7 +19,7 @@ from ftproc.core.editing import outlier_chain, patch_likelihood
 from ftproc.core.editing.patch_likelihood import SHORTEST_RUN
 from ftproc.core.editing.runs import runs_of
 from ftproc.core.filtering.initialization import find_starts
-from ftproc.core.filtering.records import Model, Observations
+from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 
 FloatArray = NDArray[np.float64]
@@ -40,7 +40,7 @@ APART = 6  # samples between readings that are taken out at once
 
 class Neighbourhood(NamedTuple):
     """A stretch of the log and what decides in it: time_s (n,), measurement (n, 3), possible (n, 3) the readings that
-    may be good at all, the model (of a single jerk level), rates (3, 3) of outliers, the gate in sigmas; excess: see
+    may be good at all, the model (of a single jerk level), rates (3, 3) of outliers, the gate in sigmas; uneven: see
     `Observations`."""
 
     time_s: FloatArray
@@ -49,17 +49,17 @@ class Neighbourhood(NamedTuple):
     model: Model
     rates: FloatArray
     gate: float
-    excess: FloatArray | None = None
+    uneven: Uneven | None = None
 
     def weighted(self, weight: FloatArray) -> Observations:
         """The log with weights (n, 3)."""
-        return Observations(self.time_s, self.measurement, weight, self.excess)
+        return Observations(self.time_s, self.measurement, weight, self.uneven)
 
     def part(self, near: slice) -> Neighbourhood:
         """The readings of a slice."""
-        excess = None if self.excess is None else self.excess[near]
+        uneven = None if self.uneven is None else self.uneven.part(near)
         arrays = (self.time_s[near], self.measurement[near], self.possible[near])
-        return self._replace(time_s=arrays[0], measurement=arrays[1], possible=arrays[2], excess=excess)
+        return self._replace(time_s=arrays[0], measurement=arrays[1], possible=arrays[2], uneven=uneven)
 
 
 class Island(NamedTuple):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.initialization import find_starts
-from ftproc.core.filtering.records import Model, Observations, Start
+from ftproc.core.filtering.records import Model, Observations, Start, Uneven
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification import coloured_noise, uneven_noise
 from ftproc.core.identification.likelihood import Fixed, fit_level
@@ -23,14 +23,15 @@ TUNING_ROUNDS = 3
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after these rounds: some would
 # alternate for ever, each time changing what the smoother says of themselves
 STILL = 1e-4  # share of the readings that may still change sides when the decisions stand still
+IMPRECISE = 0.1  # share of the variance that late time stamps make by which they move the components apart: the rates at
+# which these change are not known better, and do not stay the same
 FEWEST_KEPT = 0.5  # share of what screening trusts that must survive the decisions, in each component
 
 
 class Record(NamedTuple):
     """What stays the same while decisions are made: the log, the readings that may be good at all (n, 3), what
     screening trusts (n, 3) and the noise 1-sigma (3,) that it saw, what the user has fixed, the gate in sigmas, the
-    1-sigma (3,) that rounding alone makes, and how many times the variance of its component that of each reading is
-    (n, 3; None for once)."""
+    1-sigma (3,) that rounding alone makes, and how the noise of single readings differs, if it does."""
 
     time_s: FloatArray
     measurement: FloatArray
@@ -40,17 +41,17 @@ class Record(NamedTuple):
     fixed: Fixed
     gate: float
     rounding: FloatArray
-    excess: FloatArray | None = None
+    uneven: Uneven | None = None
 
     def weighted(self, weight: FloatArray) -> Observations:
         """The log with weights (n, 3)."""
-        return Observations(self.time_s, self.measurement, weight, self.excess)
+        return Observations(self.time_s, self.measurement, weight, self.uneven)
 
     def part(self, span: slice) -> Record:
         """The record of a stretch of the log."""
         return self._replace(
             time_s=self.time_s[span], measurement=self.measurement[span], possible=self.possible[span],
-            screened=self.screened[span], excess=None if self.excess is None else self.excess[span],
+            screened=self.screened[span], uneven=None if self.uneven is None else self.uneven.part(span),
         )  # fmt: skip
 
 
@@ -102,10 +103,10 @@ def allow_for_late_stamps(record: Record, decision: Decision) -> tuple[Record, D
     if stamp_variance == 0.0:
         return record, decision
     variance = np.where(fixed, decision.model.noise_variance, np.maximum(variance, record.rounding**2))
-    excess = 1 + stamp_variance * uneven_noise.rates(smoothed.state) ** 2 / variance
-    record = record._replace(
-        sigma=np.sqrt(variance), excess=excess if record.excess is None else excess * record.excess
-    )
+    uneven = record.uneven or Uneven.none(len(record.time_s))
+    late = np.sqrt(stamp_variance) * uneven_noise.rates(smoothed.state)
+    times = uneven.times + IMPRECISE * late**2 / variance
+    record = record._replace(sigma=np.sqrt(variance), uneven=Uneven(times, late))
     model = decision.model._replace(noise_variance=variance)
     found = decision._replace(model=model, stamp_s=float(np.sqrt(stamp_variance)))
     return record, decide(record, found, tune_first=True)
@@ -118,7 +119,8 @@ def allow_for_drift(record: Record, decision: Decision) -> tuple[Record, Decisio
     drifting = uneven_noise.drift(log, smoothed)
     if drifting is None:
         return record, decision
-    record = record._replace(excess=drifting if record.excess is None else drifting * record.excess)
+    uneven = record.uneven or Uneven.none(len(record.time_s))
+    record = record._replace(uneven=Uneven(uneven.times * drifting, uneven.late * np.sqrt(drifting)))
     again = decide(record, decision._replace(model=median_level(decision.model), drifts=True), tune_first=True)
     return record, again
 

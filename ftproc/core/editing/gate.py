@@ -181,7 +181,7 @@ def _gated(f: ukf.Filter, sample: Sample, gates: Gates, row: Row) -> tuple[float
     ukf.linearise(f)
     ukf.innovate(sample, f)
     for i in range(3):
-        row.innovation_sigma[i] = math.sqrt(f.c[i, i] + f.noise[i])
+        row.innovation_sigma[i] = math.sqrt(f.c[i, i] + f.noise[i] + f.late[i] * f.late[i])
     all_inside = _decide(f, sample, gate, row.innovation_sigma)
     for i in range(3):
         row.innovation[i], row.weight[i] = f.e[i], f.used[i]

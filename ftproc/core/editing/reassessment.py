@@ -86,7 +86,7 @@ def _until_settled(record: Record, decision: Decision, profile: Model | None) ->
             search.tried.clear()
         suspects = _suspects(record, decision, calm, profile)
         whole = alternatives.Neighbourhood(
-            record.time_s, record.measurement, record.possible, calm, decision.rates, record.gate, record.excess
+            record.time_s, record.measurement, record.possible, calm, decision.rates, record.gate, record.uneven
         )
         weight = alternatives.try_alternatives(whole, np.where(suspects, 0.0, decision.weight), search)
         if not _stands_out(record.time_s, profile).any() and (weight == decision.weight).all():

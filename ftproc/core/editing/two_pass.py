@@ -123,8 +123,8 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
     fixed = Fixed(np.isfinite(known.sigma) | exact | (segment_of is not None), jerk_psd is not None)
     rounding = rounding_sigma(measurement)
     coarse = np.where(rounding > COARSE * sigma, np.sqrt(12) * rounding, 0.0)
-    excess = uneven_noise.repeated(measurement, coarse)
-    record = Record(time_s, measurement, possible, screened * possible, sigma, fixed, known.gate, rounding, excess)
+    uneven = uneven_noise.repeated(measurement, coarse)
+    record = Record(time_s, measurement, possible, screened * possible, sigma, fixed, known.gate, rounding, uneven)
     log, noise = record.weighted(record.screened), np.where(np.isfinite(known.sigma), known.sigma, sigma) ** 2
     model = segment_of or Model(noise, isotropic(first_jerk(log, noise) if jerk_psd is None else jerk_psd))
     rates = np.tile(np.array(outlier_chain.START_RATES), (3, 1))

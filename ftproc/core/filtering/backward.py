@@ -216,7 +216,7 @@ def _predict_reading(back: Backward, f: Filter, i: int) -> None:
         for b in range(len(p)):
             spread -= column[a] * back.n[a, b] * column[b]
     back.residual[i] = f.e[i] - predicted
-    back.variance[i] = max(spread, 0.0) + f.noise[i]
+    back.variance[i] = max(spread, 0.0) + f.noise[i] + f.late[i] * f.late[i]
 
 
 @part

@@ -68,7 +68,7 @@ def store_innovation(f: ukf.Filter, row: Row) -> None:
     """Keep the innovation, its sigma and the weights."""
     for i in range(3):
         row.innovation[i] = f.e[i]
-        row.innovation_sigma[i] = math.sqrt(f.c[i, i] + f.noise[i])
+        row.innovation_sigma[i] = math.sqrt(f.c[i, i] + f.noise[i] + f.late[i] * f.late[i])
         row.weight[i] = f.used[i]
 
 
@@ -167,7 +167,7 @@ def _extrapolated(
         ukf.innovate(samples[k], f)
         for i in range(3):
             left.residual[i] = f.e[i]
-            left.residual_variance[i] = f.c[i, i] + f.noise[i] if math.isfinite(f.e[i]) else math.nan
+            left.residual_variance[i] = f.c[i, i] + f.noise[i] + f.late[i] * f.late[i] if math.isfinite(f.e[i]) else math.nan
         left.nis = math.nan
         for i in range(9):
             row.state[i] = f.x[i]

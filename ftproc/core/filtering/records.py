@@ -20,12 +20,14 @@ IntArray = NDArray[np.int64]
 
 class Sample(Protocol):
     """One row of a log: measurement m, rad, rad, NaN where missing; the weight of each component in [0, 1], zero for
-    one that is not used; the variance of its noise at full weight."""
+    one that is not used; the variance of its noise at full weight, and the 1-sigma that a late time stamp adds to all
+    three at once."""
 
     time_s: float
     measurement: Annotated[FloatArray, 3]
     weight: Annotated[FloatArray, 3]
     noise: Annotated[FloatArray, 3]
+    late: Annotated[FloatArray, 3]
 
 
 class Row(Protocol):
@@ -47,26 +49,46 @@ Samples = Annotated[Any, Layout(SAMPLE)]
 Rows = Annotated[Any, Layout(ROW)]
 
 
+class Uneven(NamedTuple):
+    """How the noise of single readings differs from that of their component. times: (n, 3) how many times its variance.
+    late: (n, 3) m, rad, rad that a time stamp late by its 1-sigma adds to the three readings of a sample, by the rates at
+    which they change."""
+
+    times: FloatArray
+    late: FloatArray
+
+    @classmethod
+    def none(cls, samples: int) -> Uneven:
+        """That of readings which do not differ."""
+        return cls(np.ones((samples, 3)), np.zeros((samples, 3)))
+
+    def part(self, rows: slice | IntArray) -> Uneven:
+        """Of some of the samples."""
+        return Uneven(self.times[rows], self.late[rows])
+
+
 class Observations(NamedTuple):
     """A log as the filters see it: time_s (n,), measurement (n, 3) slant range m, azimuth and elevation rad, NaN where
-    missing, the weight (n, 3) in [0, 1] of each reading, zero for one that is not used, and how many times the variance
-    of its component's noise that of each reading is (n, 3), None for once."""
+    missing, the weight (n, 3) in [0, 1] of each reading, zero for one that is not used, and how the noise of single
+    readings differs, if it does."""
 
     time_s: FloatArray
     measurement: FloatArray
     weight: FloatArray
-    excess: FloatArray | None = None
+    uneven: Uneven | None = None
 
     def part(self, rows: slice | IntArray) -> Observations:
         """Some of the samples."""
-        excess = None if self.excess is None else self.excess[rows]
-        return Observations(self.time_s[rows], self.measurement[rows], self.weight[rows], excess)
+        uneven = None if self.uneven is None else self.uneven.part(rows)
+        return Observations(self.time_s[rows], self.measurement[rows], self.weight[rows], uneven)
 
     def samples(self, noise_variance: FloatArray) -> Any:
         """The same as an array (n,) of `Sample` records, with noise (3,) m^2, rad^2, rad^2."""
         samples = zeros(SAMPLE, len(self.time_s))
         samples["time_s"], samples["measurement"], samples["weight"] = self.time_s, self.measurement, self.weight
-        samples["noise"] = noise_variance if self.excess is None else noise_variance * self.excess
+        samples["noise"] = noise_variance
+        if self.uneven is not None:
+            samples["noise"], samples["late"] = noise_variance * self.uneven.times, self.uneven.late
         return samples
 
 

@@ -43,8 +43,9 @@ ROUNDING = 1e-15  # of a number, below which its last digits say nothing
 class Filter(Protocol):
     """The record of a filter: its state, and what one measurement update computes on its way.
 
-    x, p: state and covariance, SI units. noise: variance of the white noise of each component, of this sample. wander,
-    fade_s: variance and correlation time of its offset. q: coefficients of Q. z_hat: predicted measurement. e: innovation. used: weight of each component, zero for none. h: H on the position. c: C of the
+    x, p: state and covariance, SI units. noise, late: of this sample, see `records.Sample`. wander, fade_s: variance
+    and correlation time of the offset of each component. q: coefficients of Q. z_hat: predicted measurement. e:
+    innovation. used: weight of each component, zero for none. h: H on the position. c: C of the
     module's head. s: innovation covariance. root: L^-1, whose rows and columns are zero for components not used. y, g,
     u: of the head. pxz: P H', where it is asked for. factor: of the position block of P. d: by pair of sigma points,
     component and side. bend: its mean, h(x) to z_hat.
@@ -53,6 +54,7 @@ class Filter(Protocol):
     x: Annotated[FloatArray, 9]
     p: Annotated[FloatArray, 9, 9]
     noise: Annotated[FloatArray, 3]
+    late: Annotated[FloatArray, 3]
     wander: Annotated[FloatArray, 3]
     fade_s: Annotated[FloatArray, 3]
     q: Annotated[FloatArray, 3, 3]
@@ -203,6 +205,7 @@ def innovate(sample: Any, f: Filter) -> None:
     e, z, z_hat = f.e, sample.measurement, f.z_hat
     for i in range(3):
         f.noise[i] = sample.noise[i]
+        f.late[i] = sample.late[i]
         e[i] = z[i] - z_hat[i]
     if math.isfinite(e[1]):
         e[1] = wrap_angle(e[1])
@@ -266,6 +269,14 @@ def cross_covariance(p: FloatArray, h: FloatArray, pxz: FloatArray) -> None:
 
 
 @part
+def shared_noise(f: Filter, i: int, j: int) -> float:
+    """What a late time stamp adds to the covariance of the noise of two components."""
+    if f.late[i] == 0.0 or not f.used[i] * f.used[j] > 0:
+        return 0.0
+    return f.late[i] * f.late[j] / math.sqrt(f.used[i] * f.used[j])
+
+
+@part
 def update(f: Filter) -> tuple[float, float]:
     """Measurement update in place with the components whose `used` weight m is positive, at noise variance R/m; without
     any, nothing changes.
@@ -276,7 +287,7 @@ def update(f: Filter) -> tuple[float, float]:
     stiff = False
     for i in range(3):
         for j in range(3):
-            s[i, j] = c[i, j]
+            s[i, j] = c[i, j] + shared_noise(f, i, j)
         if used[i] > 0:
             extra = f.noise[i] / used[i]
             s[i, i] += extra
@@ -314,7 +325,7 @@ def _restore_joseph(f: Filter) -> None:
     rest = np.zeros((3, 3))  # S - H P- H': noise and bend of h
     for i in range(3):
         for j in range(3):
-            rest[i, j] = c[i, j]
+            rest[i, j] = c[i, j] + shared_noise(f, i, j)
             for k in range(3):
                 rest[i, j] -= h[i, k] * pxz[k, j]
             if len(f.x) > OFFSETS:

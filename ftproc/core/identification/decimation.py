@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel
-from ftproc.core.filtering.records import Model, Observations, Start
+from ftproc.core.filtering.records import Model, Observations, Start, Uneven
 from ftproc.core.identification.scales import Scales
 from ftproc.core.model.measurement import wrapped
 from ftproc.core.signatures import Flags, Indices, Matrix, Vector
@@ -48,11 +48,12 @@ def merge(log: Observations, starts: list[Start], count: int) -> tuple[Observati
         late = float(time[sample] - log.time_s[start.sample])
         step = np.kron(np.array([[1.0, late, late**2 / 2], [0.0, 1.0, late], [0.0, 0.0, 1.0]]), np.eye(3))
         moved.append(Start(sample, step @ start.state, step @ start.covariance @ step.T))
-    excess = None
-    if log.excess is not None:
+    uneven = None
+    if log.uneven is not None:
         size = np.bincount(group)[:, None]
-        excess = np.stack([np.bincount(group, log.excess[:, c]) for c in range(3)], 1) / size
-    return Observations(time, z, number, excess), moved
+        means = (np.stack([np.bincount(group, each[:, c]) for c in range(3)], 1) / size for each in log.uneven)
+        uneven = Uneven(*means)
+    return Observations(time, z, number, uneven), moved
 
 
 @kernel

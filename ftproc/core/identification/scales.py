@@ -43,5 +43,7 @@ def scales_of(log: Observations, noise_variance: FloatArray) -> Scales:
     range_m = float(np.nanmedian(ranges)) if np.isfinite(ranges).any() else 1.0
     times = np.diff(log.time_s)
     interval = float(np.median(times[times > 0])) if (times > 0).any() else 1.0
+    if log.uneven is not None:
+        noise_variance = np.median(noise_variance * log.uneven.times + log.uneven.late**2, 0)
     noise = np.maximum(np.sqrt(noise_variance) * np.array([1.0, range_m, range_m]), FINEST * range_m)
     return Scales(interval, max(float(log.time_s[-1] - log.time_s[0]), interval), range_m, noise)
