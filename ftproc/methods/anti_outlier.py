@@ -61,7 +61,7 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     starts = two_pass.smoothed_starts(edited.smoothed)
     run, smoothed = forward.filter_log(edited.log, edited.model, starts), edited.smoothed
     if edited.decision.alternative is not None:
-        run, smoothed = _worse_of(edited, run, edited.decision.alternative)
+        run, smoothed = _worse_of(edited, run, edited.decision.alternative.model)
     label = preparing.labels(edited.weight, readings.measurement)
     again = preparing.re_initialized(starts)
     decision = edited.decision

@@ -9,6 +9,7 @@ import numpy as np
 
 from ftproc.core.filtering.records import FilterRun, Model, Observations
 from ftproc.core.filtering.smoother import SmootherRun
+from ftproc.core.identification.coloured_noise import Coloured
 from ftproc.records import FlagArray, FloatArray, forget, thinned
 
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: stands in for a component that is missing throughout
@@ -87,7 +88,7 @@ class Estimate(NamedTuple):
     settled: bool | None = None
     stamp_s: float = 0.0
     drifts: bool = False
-    alternative: Model | None = None
+    alternative: Coloured | None = None
     cleaned: FloatArray | None = None
     unexamined: int = 0
 

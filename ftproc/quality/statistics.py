@@ -36,7 +36,7 @@ class RunStatistics:
         self.sigmas: list[FloatArray] = []
         self.jerk: list[FloatArray] = []
         self.reacquired, self.unexamined, self.stamp_s, self.drifts = 0, 0, 0.0, False
-        self.slow_noise_s = 0.0
+        self.slow_noise_s, self.slow_noise_likelier = 0.0, False
         self.converged: bool | None = None
         self.largest_m, self.outside, self.rows, self.parts = 0.0, 0.0, 0, 0
 
@@ -66,7 +66,8 @@ class RunStatistics:
         self.stamp_s = max(self.stamp_s, estimate.stamp_s)
         self.drifts |= estimate.drifts
         if estimate.alternative is not None:
-            other = estimate.alternative
+            other, likelier = estimate.alternative.model, estimate.alternative.likelier
+            self.slow_noise_likelier |= likelier
             self.slow_noise_s = max(self.slow_noise_s, float(other.fade_s[other.wander_variance > 0].max()))
         self.unexamined += estimate.unexamined
         self.largest_m = max(self.largest_m, float(np.linalg.norm(correction[:, :3], axis=1).max(initial=0.0)))
@@ -126,6 +127,7 @@ class RunStatistics:
             "reacquired": self.reacquired,
             "editing_converged": self.converged,
             "slow_noise_s": self.slow_noise_s,
+            "slow_noise_likelier": self.slow_noise_likelier,
             "time_stamp_sigma_s": self.stamp_s,
             "noise_drifts": self.drifts,
             "editing_places_unexamined": self.unexamined,

@@ -96,9 +96,11 @@ def _sigmas(s: Mapping[str, Any]) -> Iterator[Remark]:
             yield Remark(SUSPECT, f"{name} is poorly observable: its predicted sigma is {predicted:.0f} times the "
                                   "measurement noise, so the gate detects only much larger outliers")  # fmt: skip
     if s["slow_noise_s"] and not s["not_observable"]:
-        text = f"noise that is correlated over {s['slow_noise_s']:.3g} s explains the log as well as motion does: the " \
-               "sigmas allow for both, the estimate follows the motion"  # fmt: skip
-        yield Remark(SUSPECT, text)
+        likelier = s["slow_noise_likelier"]
+        better = "better than motion does, but cannot be separated from it" if likelier else "as well as motion does"
+        text = f"noise that is correlated over {s['slow_noise_s']:.3g} s explains the log {better}: the sigmas allow for " \
+               "both, the estimate follows the motion"  # fmt: skip
+        yield Remark(UNRELIABLE if likelier else SUSPECT, text)
 
 
 def _editing(s: Mapping[str, Any]) -> Iterator[Remark]:

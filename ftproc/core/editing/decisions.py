@@ -25,6 +25,8 @@ READMITTED = 0.8  # probability of being good from which a rejected reading is u
 STILL = 1e-4  # share of the readings that may still change sides when the decisions stand still
 IMPRECISE = 0.1  # share of the variance that late time stamps make by which they move the components apart: the rates at
 # which these change are not known better, and do not stay the same
+TAILS, RARE = 0.5, 0.01  # share of what lies outside the gate that lies just outside, and of all readings, to be tails
+GATE_STEP, WIDEST_GATE = 1.1, 2.5  # by which a gate is widened, and times itself at most
 FEWEST_KEPT = 0.5  # share of what screening trusts that must survive the decisions, in each component
 
 
@@ -69,7 +71,7 @@ class Decision(NamedTuple):
     unexamined: int = 0
     stamp_s: float = 0.0
     drifts: bool = False
-    alternative: Model | None = None
+    alternative: coloured_noise.Coloured | None = None
 
 
 def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
@@ -112,6 +114,26 @@ def allow_for_late_stamps(record: Record, decision: Decision) -> tuple[Record, D
     return record, decide(record, found, tune_first=True)
 
 
+def allow_for_tails(record: Record, decision: Decision) -> tuple[Record, Decision]:
+    """The record with a wider gate, and the decisions made again, if most of what is rejected lies just outside it: then
+    the noise has tails, and it is they that are rejected."""
+    log = record.weighted(decision.weight)
+    smoothed = smooth_log(log, decision.model, decision.starts, residuals_only=True)
+    off = (np.abs(smoothed.residual) / np.sqrt(smoothed.residual_variance))[record.possible]
+    gate = record.gate
+    while gate < WIDEST_GATE * record.gate and _in_tails(off, gate) > TAILS * max((off > gate).sum(), RARE * len(off)):
+        gate *= GATE_STEP
+    if gate == record.gate:
+        return record, decision
+    record = record._replace(gate=gate)
+    return record, decide(record, decision, tune_first=True)
+
+
+def _in_tails(off: FloatArray, gate: float) -> int:
+    """How many residuals (m,), in sigmas, lie outside a gate, but not twice as far."""
+    return int(((off > gate) & (off < 2 * gate)).sum())
+
+
 def allow_for_drift(record: Record, decision: Decision) -> tuple[Record, Decision]:
     """The record with noise whose variance drifts, and the decisions made again, if it does."""
     log = record.weighted(decision.weight)
@@ -133,9 +155,9 @@ def allow_for_colour(record: Record, decision: Decision) -> Decision:
     if not coloured_noise.may_be(log, smoothed, decision.model):
         return decision
     found = coloured_noise.fit_coloured(log, starts, median_level(decision.model), record.fixed)
-    if found.believed:
+    if found.likelier and found.separable:
         return decide(record, decision._replace(model=found.model), tune_first=False)
-    return decision._replace(alternative=found.model) if found.possible and found.model.coloured else decision
+    return decision._replace(alternative=found) if found.possible else decision
 
 
 def _keep_most(decided: FloatArray, screened: FloatArray) -> FloatArray:

@@ -19,6 +19,7 @@ from ftproc.core.editing.decisions import (
     allow_for_colour,
     allow_for_drift,
     allow_for_late_stamps,
+    allow_for_tails,
     decide,
 )
 from ftproc.core.editing.reassessment import reassess
@@ -131,6 +132,7 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
     starts = find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
     decision = decide(record, Decision(record.screened, model, starts, rates), tune_first=True)
     record, decision = allow_for_late_stamps(record, decision)
+    record, decision = allow_for_tails(record, decision)
     if jerk_psd is None:
         decision = reassess(record, decision)
     record, decision = allow_for_drift(record, decision)

@@ -47,12 +47,13 @@ INDEPENDENT = 20.0  # correlation times that a log must last for noise and motio
 
 
 class Coloured(NamedTuple):
-    """A model with correlated noise. believed: it is much likelier than that of white noise, and the log lasts long
-    enough to separate such noise from motion. possible: it is about as likely."""
+    """A model with correlated noise. likelier: it is much likelier than that of white noise; possible: or about as
+    likely. separable: the log lasts long enough to tell such noise from motion."""
 
     model: Model
-    believed: bool
+    likelier: bool
     possible: bool
+    separable: bool
 
 
 def may_be(log: Observations, smoothed: SmootherRun, model: Model) -> bool:
@@ -94,9 +95,13 @@ def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fi
     level = fit_profile(part, starts, fit_level(part, starts, white, fixed), PROFILE_STEPS)
     model = fit_profile(part, starts, model, PROFILE_STEPS)
     gain = score_log(part, model, starts).log_likelihood - score_log(part, level, starts).log_likelihood
-    likelier = gain > LEAST_GAIN * int(correlated.sum())
     slowest = float(model.fade_s[correlated].max(initial=0.0))
-    return Coloured(median_level(model), likelier and slowest < scales.span_s / INDEPENDENT, gain > -LEAST_GAIN)
+    return Coloured(
+        median_level(model),
+        likelier=bool(correlated.any()) and gain > LEAST_GAIN * int(correlated.sum()),
+        possible=bool(correlated.any()) and gain > -LEAST_GAIN,
+        separable=slowest < scales.span_s / INDEPENDENT,
+    )
 
 
 class _Search:
