@@ -6,6 +6,7 @@ import numpy as np
 
 from ftproc.core.compiled import WAY, zeros
 from ftproc.core.filtering import ukf
+from ftproc.core.filtering.records import SAMPLE
 from tests import naive
 from tests.core.tracks import covariance
 
@@ -16,11 +17,18 @@ def one(layout):
     return records[0] if WAY == "jit" else records.view(np.recarray)[0]
 
 
-def filter_at(x, p, noise=0.0):
+def filter_at(x, p):
     """The record of a filter in this state."""
     f = one(ukf.FILTER)
-    f["x"], f["p"], f["noise"] = x, p, noise
+    f["x"], f["p"] = x, p
     return f
+
+
+def sample_of(z, noise, weight=1.0, late=0.0):
+    """The record of a reading."""
+    sample = one(SAMPLE)
+    sample["measurement"], sample["noise"], sample["weight"], sample["late"] = z, noise, weight, late
+    return sample
 
 
 def transform(x, p):
@@ -31,12 +39,12 @@ def transform(x, p):
     return f["z_hat"], f["c"], f["pxz"], f["h"]
 
 
-def update(x, p, z, noise, weight):
+def update(x, p, z, noise, weight, late=0.0):
     """x+, P+, NIS and log-likelihood of the kernel; the last two of an update that uses nothing mean nothing."""
-    f = filter_at(x, p, noise)
+    f = filter_at(x, p)
     ukf.linearise(f)
     ukf.cross_covariance(f["p"], f["h"], f["pxz"])
-    ukf.innovate(z, f)
+    ukf.innovate(sample_of(z, noise, late=late), f)
     ukf.use(weight, f)
     return f["x"], f["p"], *ukf.update(f)
 

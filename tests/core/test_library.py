@@ -150,7 +150,7 @@ def test_wrong_records():
         outlier_kalman(np.arange(4.0), z, tuple(walk), 3.0, 0.1, True)
     with pytest.raises(TypeError, match=r"model\.x0 must be a 1-dimensional array of float64, not a 2-dim"):
         outlier_kalman(np.arange(4.0), z, walk._replace(x0=z), 3.0, 0.1, True)
-    samples = Observations(np.arange(4.0), z, z).samples()
+    samples = Observations(np.arange(4.0), z, z).samples(np.ones(3))
     with pytest.raises(TypeError, match="filters must be a 1-dimensional array of records of x, p, noise"):
         run_weighted(Span(0, 4, 0), samples, Profile(np.zeros((1, 6)), 1.0, 0.0), samples, False, empty_rows(4))
 

@@ -48,8 +48,9 @@ OFF = {"innovation_ratio": 1.5, "innovation_bounds": [0.8, 1.2], "verdict": "ove
         ({}, {"good": 60, "patch": 40, "isolated": 0}, SUSPECT, "40 % of the range readings are rejected as outliers"),
         ({}, {"good": 60, "patch": 40, "isolated": 40}, UNRELIABLE, "57 % of the range readings are rejected"),
         ({}, {"predicted_sigma_ratio": 9.0}, SUSPECT, "range is poorly observable: its predicted sigma is 9 times"),
-        ({"slow_noise": True}, {}, UNRELIABLE, "correlated too slowly to be separated from motion"),
-        ({"slow_noise": True, "not_observable": ["elevation"]}, {}, SUSPECT, "elevation missing throughout"),
+        ({"slow_noise_s": 3.0, "slow_noise_likelier": True}, {}, UNRELIABLE, "over 3 s explains the log better than"),
+        ({"slow_noise_s": 3.0}, {}, SUSPECT, "noise that is correlated over 3 s explains the log as well as motion"),
+        ({"slow_noise_s": 3.0, "not_observable": ["elevation"]}, {}, SUSPECT, "elevation missing throughout"),
         ({"poorly_observable": LARGE[:1]}, {}, SUSPECT, "the position is poorly observable from 3 to 5 s: 1 sigma up "
                                                         "to 80 m"),
         ({"poorly_observable": [{**LARGE[0], "to_s": 3.0}]}, {}, SUSPECT, "the position is poorly observable at 3 s"),
@@ -78,7 +79,7 @@ def test_one_fault(good, changes, part, level, reason):
 
 def test_the_worst_level_decides_and_gives_the_reasons(good):
     few = {"good": 3, "isolated": 0, "patch": 0}
-    found = judged(good, few, slow_noise=True, reacquired=4)
+    found = judged(good, few, slow_noise_s=3.0, slow_noise_likelier=True, reacquired=4)
     assert found["verdict"] == UNRELIABLE
     assert len(found["reasons"]) == 1
     assert len(judged(good, few, reacquired=4)["reasons"]) == 2

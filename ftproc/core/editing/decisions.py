@@ -3,6 +3,7 @@ between."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +26,8 @@ READMITTED = 0.8  # probability of being good from which a rejected reading is u
 STILL = 1e-4  # share of the readings that may still change sides when the decisions stand still
 IMPRECISE = 0.1  # share of the variance that late time stamps make by which they move the components apart: the rates at
 # which these change are not known better, and do not stay the same
-TAILS, RARE = 0.5, 0.01  # share of what lies outside the gate that lies just outside, and of all readings, to be tails
+TAILS, RARE = 0.5, 0.005  # share of what lies outside the gate that lies just outside, and of all readings, to be tails
+NORMALLY, FADING = 3.0, 1.0  # times as many as a normal distribution has there, and as farther out
 GATE_STEP, WIDEST_GATE = 1.1, 2.5  # by which a gate is widened, and times itself at most
 FEWEST_KEPT = 0.5  # share of what screening trusts that must survive the decisions, in each component
 
@@ -99,17 +101,19 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
 def allow_for_late_stamps(record: Record, decision: Decision) -> tuple[Record, Decision]:
     """The record with noise that grows with the rates of the readings, and the decisions made again, if time stamps
     are late now and then."""
-    log, fixed = record.weighted(decision.weight), record.fixed.noise
+    log = record.weighted(decision.weight)
     smoothed = smooth_log(log, decision.model, decision.starts)
     variance, stamp_variance = uneven_noise.stamp_variance(log, smoothed, decision.model)
     if stamp_variance == 0.0:
         return record, decision
-    variance = np.where(fixed, decision.model.noise_variance, np.maximum(variance, record.rounding**2))
     uneven = record.uneven or Uneven.none(len(record.time_s))
     late = np.sqrt(stamp_variance) * uneven_noise.rates(smoothed.state)
-    times = uneven.times + IMPRECISE * late**2 / variance
-    record = record._replace(sigma=np.sqrt(variance), uneven=Uneven(times, late))
-    model = decision.model._replace(noise_variance=variance)
+    variance = np.maximum(variance, record.rounding**2)
+    variance = np.where(record.fixed.noise, decision.model.noise_variance, variance)
+    record = record._replace(
+        sigma=np.sqrt(variance), uneven=Uneven(uneven.times + IMPRECISE * late**2 / variance, late)
+    )
+    model = median_level(decision.model)._replace(noise_variance=variance)
     found = decision._replace(model=model, stamp_s=float(np.sqrt(stamp_variance)))
     return record, decide(record, found, tune_first=True)
 
@@ -119,9 +123,9 @@ def allow_for_tails(record: Record, decision: Decision) -> tuple[Record, Decisio
     the noise has tails, and it is they that are rejected."""
     log = record.weighted(decision.weight)
     smoothed = smooth_log(log, decision.model, decision.starts, residuals_only=True)
-    off = (np.abs(smoothed.residual) / np.sqrt(smoothed.residual_variance))[record.possible]
-    gate = record.gate
-    while gate < WIDEST_GATE * record.gate and _in_tails(off, gate) > TAILS * max((off > gate).sum(), RARE * len(off)):
+    off = np.abs(smoothed.residual) / np.sqrt(smoothed.residual_variance)
+    off, gate = np.where(record.possible, off, 0.0), record.gate
+    while gate < WIDEST_GATE * record.gate and _has_tails(off, gate, int(record.possible.sum())):
         gate *= GATE_STEP
     if gate == record.gate:
         return record, decision
@@ -129,9 +133,14 @@ def allow_for_tails(record: Record, decision: Decision) -> tuple[Record, Decisio
     return record, decide(record, decision, tune_first=True)
 
 
-def _in_tails(off: FloatArray, gate: float) -> int:
-    """How many residuals (m,), in sigmas, lie outside a gate, but not twice as far."""
-    return int(((off > gate) & (off < 2 * gate)).sum())
+def _has_tails(off: FloatArray, gate: float, count: int) -> bool:
+    """Whether most residuals (n, 3), in sigmas, that lie outside a gate are alone and not twice as far, ever fewer with the
+    distance, and these are too many, among so many readings, for a normal distribution."""
+    outside = np.pad(off > gate, ((1, 1), (0, 0)))
+    alone = outside[1:-1] & ~outside[:-2] & ~outside[2:]
+    near, far = (int((alone & (off > low * gate) & (off < math.sqrt(2) * low * gate)).sum()) for low in (1, math.sqrt(2)))
+    normal = NORMALLY * count * math.erfc(gate / math.sqrt(2))
+    return near > FADING * far and near + far > max(TAILS * int(outside.sum()), RARE * count, normal)
 
 
 def allow_for_drift(record: Record, decision: Decision) -> tuple[Record, Decision]:

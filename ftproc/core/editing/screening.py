@@ -205,17 +205,18 @@ def rounding_step(channel: FloatArray) -> float:
 
     The largest of a few differences between neighbouring values of which nearly all values are whole multiples.
     """
-    values = np.unique(channel[np.isfinite(channel)])
+    readings = channel[np.isfinite(channel)]
+    values = np.unique(readings)
     if len(values) < 2:
         return 0.0
     steps = np.diff(values)
     steps = np.sort(steps[steps > 1e-12 * np.abs(values).max()])
     if not len(steps):
         return 0.0
-    middle = values[len(values) // 2]
+    middle = float(np.sort(readings)[len(readings) // 2])
     for share in (0.5, 0.2, 0.05, 0.0):
         step = float(steps[int(share * (len(steps) - 1))])
-        multiple = (values - middle) / step
+        multiple = (readings - middle) / step
         if np.mean(np.abs(multiple - np.round(multiple)) < ON_GRID) >= MOSTLY_ON_GRID:
             return step
     return 0.0

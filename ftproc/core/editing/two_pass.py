@@ -75,7 +75,7 @@ def screen(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, Flo
     weight, sigma, least = np.isfinite(measurement).astype(float), np.zeros(3), rounding_sigma(measurement)
     for c in range(3):
         channel = np.ascontiguousarray(measurement[:, c])
-        weight[:, c], sigma[c] = _screen_channel(time_s, channel, c == 1, float(least[c]))
+        weight[:, c], sigma[c] = _screen_channel(time_s, channel, c == 1, math.sqrt(2) * float(least[c]))
     exact, sigma = without_noise(Observations(time_s, measurement, weight), sigma)
     return weight, sigma, exact
 

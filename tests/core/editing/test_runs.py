@@ -54,7 +54,7 @@ def test_search_is_the_plain_one(seed):
     for begin, end, size in ((50, 62, 2.5), (140, 145, -5.0), (300, 330, 1.5)):
         u[begin:end] += size
     residual = np.tile(u[:, None], (1, 3))
-    found = runs.suspicious(0.1 * np.arange(400), residual, np.ones((400, 3)), np.ones((400, 3)))
+    found = runs.suspicious(0.1 * np.arange(400), residual, np.ones((400, 3)), np.ones((400, 3)), 10.0)
     total = np.r_[0.0, np.cumsum(u)]
     sums = [np.sort(np.abs(total[n:] - total[:-n])) for n in range(2, 49)]
     scale = np.r_[np.inf, np.inf, [1.4826 * s[len(s) // 2] for s in sums]]
@@ -65,7 +65,7 @@ def test_search_is_the_plain_one(seed):
 def test_noise_alone_is_no_run():
     rng = np.random.default_rng(1)
     found = runs.suspicious(
-        0.1 * np.arange(3000), rng.standard_normal((3000, 3)), np.ones((3000, 3)), np.ones((3000, 3))
+        0.1 * np.arange(3000), rng.standard_normal((3000, 3)), np.ones((3000, 3)), np.ones((3000, 3)), 10.0
     )
     assert found.mean() < 0.005
 
@@ -74,14 +74,14 @@ def test_long_runs_are_no_patches_at_one_reading_a_second():
     """Six seconds: what lasts longer at a low rate may be a turn."""
     u = np.random.default_rng(2).standard_normal((400, 3))
     u[100:130] += 3.0
-    fast, slow = (runs.suspicious(dt * np.arange(400), u, np.ones((400, 3)), np.ones((400, 3))) for dt in (0.1, 1.0))
+    fast, slow = (runs.suspicious(dt * np.arange(400), u, np.ones((400, 3)), np.ones((400, 3)), 1.5) for dt in (0.1, 1.0))
     assert fast[100:130].all()
     assert np.diff(runs.runs_of(slow[:, 0])).max() <= 6
 
 
 def test_too_few_readings_say_nothing():
     u = np.ones((runs.FEWEST - 1, 3))
-    assert not runs.suspicious(np.arange(len(u)) * 0.1, u, np.ones_like(u), np.ones_like(u)).any()
+    assert not runs.suspicious(np.arange(len(u)) * 0.1, u, np.ones_like(u), np.ones_like(u), 10.0).any()
 
 
 def test_curve_is_not_confirmed_but_a_step_is():

@@ -11,7 +11,7 @@ from tests import naive
 
 
 def flagged(time, z, window=31, angular=False):
-    return screen_component(time, z, window, angular)[0] > 0.5
+    return screen_component(time, z, window, angular, 0.0)[0] > 0.5
 
 
 def parabola(n, dt=0.1):
@@ -26,7 +26,7 @@ def test_scale_is_that_of_the_best_parabola_through_three_samples():
     for _ in range(60):
         t, z = np.cumsum(rng.uniform(0.5, 2, 5)), rng.standard_normal(5)
         best = naive.least_median_parabola(t, z)
-        scale = screen_component(t, z, 5, False)[1][0] / (1.4826 * (1 + 5 / 2))
+        scale = screen_component(t, z, 5, False, 0.0)[1][0] / (1.4826 * (1 + 5 / 2))
         assert scale >= best * (1 - 1e-9) - 1e-12
         exact += scale <= best * (1 + 1e-9) + 1e-12
     assert exact >= 55
@@ -45,7 +45,7 @@ def test_clean_parabola_with_noise_is_left_alone():
 def test_scales_tell_the_noise():
     rng = np.random.default_rng(3)
     t, z = parabola(2000)
-    scales = screen_component(t, z + 5 * rng.standard_normal(2000), 31, False)[1]
+    scales = screen_component(t, z + 5 * rng.standard_normal(2000), 31, False, 0.0)[1]
     assert np.median(scales) == pytest.approx(5, rel=0.3)
 
 
@@ -92,7 +92,7 @@ def test_hovering_at_the_cut():
     t = 0.1 * np.arange(300)
     z = wrap(np.pi + 1e-4 * rng.standard_normal(300))
     z[[40, 170]] = wrap(z[[40, 170]] + 0.002)
-    votes, scales = screen_component(t, z, 31, True)
+    votes, scales = screen_component(t, z, 31, True, 0.0)
     assert scales.max() < 3e-4
     assert (votes[[40, 170]] > 0.5).all()
     assert (votes > 0.5).sum() < 5
@@ -116,7 +116,7 @@ def test_missing_readings_are_stepped_over():
 def test_too_few_readings_are_not_judged(readings):
     z = np.full(20, np.nan)
     z[:readings] = 1.0
-    votes, scales = screen_component(np.arange(20.0), z, 31, False)
+    votes, scales = screen_component(np.arange(20.0), z, 31, False, 0.0)
     assert not votes.any()
     assert len(scales) == 0
 
@@ -129,7 +129,7 @@ def test_duplicate_times_do_no_harm():
     flag = flagged(t, z)
     assert flag[[50, 51, 300]].all()
     assert flag.mean() < 0.03
-    votes, scales = screen_component(np.zeros(40), rng.standard_normal(40), 31, False)
+    votes, scales = screen_component(np.zeros(40), rng.standard_normal(40), 31, False, 0.0)
     assert not votes.any()  # all at one instant: no parabola, but a scatter
     assert ((scales > 0.5) & (scales < 2)).all()
 
@@ -217,7 +217,7 @@ def test_the_outcome_does_not_hang_on_where_in_memory_the_scratch_lies():
     for _ in range(3000):
         left_behind = [np.ones(size) for size in draw.integers(1, 40, draw.integers(1, 30))]
         del left_behind
-        votes, scales = screen_component(time.copy(), reading.copy(), 11, False)
+        votes, scales = screen_component(time.copy(), reading.copy(), 11, False, 0.0)
         found.add(votes.tobytes() + scales.tobytes())
     assert len(found) == 1
 
@@ -226,7 +226,7 @@ def test_the_outcome_does_not_hang_on_where_in_memory_the_scratch_lies():
 def test_readings_of_one_instant_scatter_about_their_median(angular):
     reading = np.pi + 1e-3 * np.random.default_rng(1).standard_normal(11)
     reading[4] += 0.5
-    votes, (scale,) = screen_component(np.full(11, 7.0), wrap(reading) if angular else reading, 11, angular)
+    votes, (scale,) = screen_component(np.full(11, 7.0), wrap(reading) if angular else reading, 11, angular, 0.0)
     off = np.abs(reading - np.median(reading))
     assert scale == pytest.approx(1.4826 * (1 + 5 / 8) * np.median(off), rel=1e-9)
     assert votes[4] == 1.0

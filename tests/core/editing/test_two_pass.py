@@ -41,7 +41,7 @@ def test_clean_flight_is_left_alone(scenario, seed):
     edited = edit(flight)
     assert (edited.weight == 0).mean() < 0.001
     np.testing.assert_allclose(np.sqrt(edited.model.noise_variance), flight.sigma, rtol=0.1)
-    assert edited.settled
+    assert edited.decision.settled
     assert inside(flight, edited) > 0.95
 
 
@@ -83,7 +83,7 @@ def test_rounded_readings_are_kept():
     flight = simulate("cruise", seed=1, duration_s=60.0, outliers="range.round=2m,azimuth.round=0.2mrad")
     rejected, _, good = flags(flight, edited := edit(flight))
     assert rejected[good].mean() < 0.002
-    assert edited.settled
+    assert edited.decision.settled
 
 
 def test_gate_decides_how_much_is_kept():
@@ -118,7 +118,7 @@ def test_missing_readings_have_no_weight_and_decisions_are_all_or_nothing():
     edited = edit(flight)
     assert not edited.weight[~np.isfinite(flight.log.measurement)].any()
     assert set(np.unique(edited.weight)) <= {0.0, 1.0}
-    assert edited.rounds <= decisions.MAX_ROUNDS
+    assert edited.decision.rounds <= decisions.MAX_ROUNDS
 
 
 def test_smoothed_start_is_the_head_with_a_wider_covariance():
@@ -133,7 +133,7 @@ def test_smoothed_start_is_the_head_with_a_wider_covariance():
 
 def test_screening_trusts_most_of_a_clean_log_and_finds_its_noise():
     a = matched(2, 600, q=1e-2)
-    weight, sigma = two_pass.screen(a.time, a.z)
+    weight, sigma, _ = two_pass.screen(a.time, a.z)
     assert weight.mean() > 0.95
     np.testing.assert_allclose(sigma**2, a.model.noise_variance, rtol=0.6)
 

@@ -76,7 +76,7 @@ def test_covariance_stays_positive_over_a_million_steps():
     z = np.stack([np.full(n, 4000.0), (turn + np.pi) % (2 * np.pi) - np.pi, np.full(n, 0.3)], 1)
     z[::7, 0] = np.nan
     z[3::11, 1] = np.nan
-    samples = Observations(time, z, np.isfinite(z).astype(float)).samples()
+    samples = Observations(time, z, np.isfinite(z).astype(float)).samples(SIGMA**2)
     model = Model(SIGMA**2, motion.isotropic(5.0))
     state = np.r_[4000 * np.cos(0.3), 0, 4000 * np.sin(0.3), np.zeros(6)]
     filters = model.filter(Start(0, state, np.diag(np.repeat([10.0, 500.0, 60.0], 3) ** 2)))

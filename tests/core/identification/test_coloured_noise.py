@@ -1,4 +1,4 @@
-"""Noise that is correlated from sample to sample: seen, measured, and the sigmas stay honest."""
+"""Noise that is correlated from sample to sample: part of the state, found, and the sigmas stay honest."""
 
 from __future__ import annotations
 
@@ -6,108 +6,112 @@ import numpy as np
 import pytest
 
 from ftproc.core.editing import two_pass
-from ftproc.core.filtering.smoother import smooth_log
-from ftproc.core.identification import coloured_noise
-from ftproc.core.model.frames import from_cartesian
-from tests.core.tracks import SIGMA, matched
+from ftproc.core.filtering.forward import filter_log
+from ftproc.core.filtering.smoother import score_log, smooth_log
+from tests.core.tracks import matched
 from tests.simulated import simulate
 
-pytestmark = pytest.mark.compiled
-
 UNKNOWN = np.full(3, np.nan)
+SHARES = np.array([0.7, 2.0, 0.4])  # variance of the offsets, in that of the white noise
+FADES = np.array([0.8, 2.5, 0.3])  # s
 
 
-def edited(correlation_s, seed):
-    spec = f"correlation={correlation_s}" if correlation_s else "none"
-    flight = simulate("cruise", seed=seed, duration_s=150.0, outliers=spec)
+def coloured(a, wander=SHARES, fade=FADES):
+    """The model of a track with offsets."""
+    return a.model._replace(wander_variance=wander * a.model.noise_variance, fade_s=fade)
+
+
+def test_offsets_that_fade_at_once_are_white_noise():
+    """Between two samples nothing of them is left: the filter is that of the sum of the two noises."""
+    a = matched(1, 200, missing=0.3, irregular=True)
+    model = coloured(a, fade=np.full(3, 1e-4))
+    white = a.model._replace(noise_variance=a.model.noise_variance * (1 + SHARES))
+    one, other = smooth_log(a.log, model, a.starts), smooth_log(a.log, white, a.starts)
+    assert one.log_likelihood == pytest.approx(other.log_likelihood, rel=1e-12)
+    np.testing.assert_allclose(one.state, other.state, rtol=1e-7, atol=1e-7)
+    np.testing.assert_allclose(one.sigma, other.sigma, rtol=1e-7)
+    np.testing.assert_allclose(one.residual, other.residual, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(one.residual_variance, other.residual_variance, rtol=1e-7)
+    ahead = [filter_log(a.log, each, a.starts) for each in (model, white)]
+    np.testing.assert_allclose(ahead[0].sigma, ahead[1].sigma, rtol=1e-7)
+
+
+def test_leave_one_out_residuals_are_those_of_a_run_without_the_reading():
+    """The smoothed prediction of a reading that is left out; its offset is predicted with it."""
+    a = matched(3, 60, missing=0.2)
+    model = coloured(a)
+    run = smooth_log(a.log, model, a.starts)
+    for k, c in ((5, 0), (30, 1), (44, 2), (59, 1)):
+        if a.weight[k, c] == 0:
+            continue
+        weight = a.weight.copy()
+        weight[k, c] = 0.0
+        without = smooth_log(a.log._replace(weight=weight), model, a.starts)
+        sigma = np.sqrt(without.residual_variance[k, c])
+        assert run.residual[k, c] == pytest.approx(without.residual[k, c], abs=0.01 * sigma)
+        assert run.residual_variance[k, c] == pytest.approx(without.residual_variance[k, c], rel=0.01)
+
+
+def test_scores_are_the_slopes_of_the_likelihood():
+    a = matched(2, 150, missing=0.2, irregular=True)
+    model = coloured(a)
+    scores = score_log(a.log, model, a.starts)
+    step = 1e-4
+    for name, score in (("noise_variance", scores.noise), ("wander_variance", scores.wander)):
+        for c in range(3):
+            value = []
+            for sign in (1, -1):
+                changed = getattr(model, name).copy()
+                changed[c] *= np.exp(sign * step)
+                value.append(score_log(a.log, model._replace(**{name: changed}), a.starts).log_likelihood)
+            assert score[c] == pytest.approx((value[0] - value[1]) / (2 * step), rel=2e-2, abs=2e-2)
+    value = [score_log(a.log, model._replace(jerk=model.jerk * np.exp(s * step)), a.starts).log_likelihood for s in (1, -1)]
+    assert (scores.jerk * model.jerk).sum() == pytest.approx((value[0] - value[1]) / (2 * step), rel=2e-2, abs=2e-2)
+
+
+def edited(samples, seed, name="cruise", duration_s=150.0):
+    """A flight at 10 Hz with noise that is correlated over so many samples."""
+    spec = f"correlation={0.1 * samples}" if samples else "none"
+    flight = simulate(name, seed=seed, duration_s=duration_s, dt_s=0.1, outliers=spec)
     return flight, two_pass.edit(flight.log.time_s, flight.log.measurement, two_pass.Known(UNKNOWN, None, 4.0))
 
 
-@pytest.mark.parametrize("correlation_s", [0.3, 0.5])
+def inside(flight, found):
+    """Share of the samples within three published sigmas in every axis."""
+    error = found.smoothed.state[:, :3] - flight.truth.position_m
+    return (np.abs(error) < 3 * found.smoothed.sigma[:, :3]).all(1).mean()
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("samples", [2.0, 10.0])
 @pytest.mark.parametrize("seed", range(2))
-def test_correlated_noise_is_found_and_sigmas_stay_honest(correlation_s, seed):
-    flight, found = edited(correlation_s, seed)
-    np.testing.assert_allclose(found.model.correlation, np.exp(-0.1 / correlation_s), atol=0.06)
-    np.testing.assert_allclose(np.sqrt(found.model.reading_variance), flight.sigma, rtol=0.15)
+def test_correlated_noise_is_found_and_sigmas_stay_honest(samples, seed):
+    flight, found = edited(samples, seed)
+    np.testing.assert_allclose(found.model.correlation(0.1), np.exp(-1 / samples), atol=0.08)
+    np.testing.assert_allclose(np.sqrt(found.model.reading_variance), flight.sigma, rtol=0.25)
     assert (found.weight == 0).mean() < 0.01
-    error = found.smoothed.state[:, :3] - flight.truth.position_m
-    assert (np.abs(error) < 3 * found.smoothed.sigma[:, :3]).all(1).mean() > 0.95
-    assert 0.3 < np.mean((error / found.smoothed.sigma[:, :3]) ** 2) < 1.5
+    assert inside(flight, found) > 0.95
 
 
-def test_noise_of_a_second_has_honest_sigmas():
-    """A correlation of 0.9 between neighbours."""
-    flight, found = edited(1.0, 0)
-    error = found.smoothed.state[:, :3] - flight.truth.position_m
-    assert (np.abs(error) < 3 * found.smoothed.sigma[:, :3]).all(1).mean() > 0.9
-    assert not found.slow_noise
+@pytest.mark.compiled
+@pytest.mark.parametrize("name", ["cruise", "radar", "calibration"])
+def test_noise_that_cannot_be_separated_from_motion_widens_the_sigmas(name):
+    """With a correlation over 2 s of 20 the estimate may follow the noise, and the sigmas allow for that."""
+    flight, found = edited(20.0, 3, name, 20.0)
+    assert found.decision.alternative is not None or found.model.coloured
 
 
-def test_noise_that_passes_for_motion_is_reported():
-    """A correlation of 0.95: what remains of the log are too few independent readings to tell it from motion."""
-    assert edited(2.0, 0)[1].slow_noise
-
-
+@pytest.mark.compiled
 @pytest.mark.parametrize("seed", range(3))
 def test_white_noise_is_not_called_correlated(seed):
-    assert not edited(0.0, seed)[1].model.correlation.any()
+    flight, found = edited(0, seed)
+    assert not found.model.coloured
+    assert found.decision.alternative is None
 
 
-def test_moments_of_white_and_of_correlated_noise():
-    """The true model and a slow target: variance and correlation come out as they went in."""
-    a = matched(1, 3000, q=1e-3)
-    rng = np.random.default_rng(1)
-    noise = rng.standard_normal((3000, 3))
-    for rho in (0.0, 0.6):
-        coloured = noise.copy()
-        for k in range(1, 3000):
-            coloured[k] = rho * coloured[k - 1] + np.sqrt(1 - rho**2) * noise[k]
-        a = a._replace(z=from_cartesian(a.truth[:, :3]) + SIGMA * coloured)
-        variance = SIGMA**2 * (1 + rho) / (1 - rho)
-        model = a.model._replace(noise_variance=variance)
-        run = smooth_log(a.log, model, a.starts)
-        found, correlation = coloured_noise.moments(run, a.weight, variance)
-        np.testing.assert_allclose(found / SIGMA**2, 1, atol=0.15)
-        np.testing.assert_allclose(correlation, rho, atol=0.06)
-
-
-def test_short_record_is_not_judged():
-    a = matched(2, 40)
-    run = smooth_log(a.log, a.model, a.starts)
-    variance, correlation = coloured_noise.moments(run, a.weight, a.model.noise_variance)
-    np.testing.assert_array_equal(variance, a.model.noise_variance)
-    np.testing.assert_array_equal(correlation, 0)
-
-
-def markov(correlation, n):
-    """(n, 3) noise of unit variance, each component with a correlation of its own."""
-    noise = np.random.default_rng(4).standard_normal((n, 3))
-    for k in range(1, n):
-        noise[k] = correlation * noise[k - 1] + np.sqrt(1 - correlation**2) * noise[k]
-    return noise
-
-
-def smoothed(noise):
-    """The run of a smoother that takes such noise for white, its weights and the noise variances it was given."""
-    a = matched(1, len(noise), q=1e-3)
-    a = a._replace(z=from_cartesian(a.truth[:, :3]) + SIGMA * noise)
-    return smooth_log(a.log, a.model, a.starts), a.weight, a.model.noise_variance
-
-
-@pytest.mark.parametrize(
-    ("correlation", "n", "verdict"),
-    [((0.0, 0.0, 0.0), 1000, False), ((0.1, 0.1, 0.1), 20_000, False), ((0.0, 0.4, 0.0), 1000, True),
-     ((0.4, 0.4, 0.4), 150, False), ((-0.7, -0.7, -0.7), 1000, False)],
-)  # fmt: skip
-def test_correlation_must_be_large_and_beyond_doubt(correlation, n, verdict):
-    assert coloured_noise.is_correlated(*smoothed(markov(np.array(correlation), n))) == verdict
-
-
+@pytest.mark.compiled
 def test_patches_are_no_correlated_noise():
-    """Three of them, that nobody has found, make the correlation of the whole log large, but not that of most of it."""
-    noise = markov(0.0, 2000)
-    for begin in (300, 900, 1500):
-        noise[begin : begin + 40] += 4.0
-    run = smoothed(noise)
-    assert coloured_noise.moments(*run)[1].min() > 1.5 * coloured_noise.LEAST
-    assert not coloured_noise.is_correlated(*run)
+    flight = simulate("manoeuvre", seed=4, duration_s=100.0, outliers="patch=3:10-40:8-40")
+    assert not two_pass.edit(
+        flight.log.time_s, flight.log.measurement, two_pass.Known(UNKNOWN, None, 4.0)
+    ).model.coloured
