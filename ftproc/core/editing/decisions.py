@@ -27,6 +27,7 @@ STILL = 1e-4  # share of the readings that may still change sides when the decis
 IMPRECISE = 0.1  # share of the variance that late time stamps make by which they move the components apart: the rates at
 # which these change are not known better, and do not stay the same
 TAILS, RARE = 0.5, 0.005  # share of what lies outside the gate that lies just outside, and of all readings, to be tails
+MOST_IN_TAILS = 0.05  # share of all readings: of more, nobody knows whether they are tails or outliers
 NORMALLY, FADING = 3.0, 1.0  # times as many as a normal distribution has there, and as farther out
 GATE_STEP, WIDEST_GATE = 1.1, 2.5  # by which a gate is widened, and times itself at most
 FEWEST_KEPT = 0.5  # share of what screening trusts that must survive the decisions, in each component
@@ -140,7 +141,8 @@ def _has_tails(off: FloatArray, gate: float, count: int) -> bool:
     alone = outside[1:-1] & ~outside[:-2] & ~outside[2:]
     near, far = (int((alone & (off > low * gate) & (off < math.sqrt(2) * low * gate)).sum()) for low in (1, math.sqrt(2)))
     normal = NORMALLY * count * math.erfc(gate / math.sqrt(2))
-    return near > FADING * far and near + far > max(TAILS * int(outside.sum()), RARE * count, normal)
+    few = int(outside.sum()) <= MOST_IN_TAILS * count
+    return few and near > FADING * far and near + far > max(TAILS * int(outside.sum()), RARE * count, normal)
 
 
 def allow_for_drift(record: Record, decision: Decision) -> tuple[Record, Decision]:

@@ -147,8 +147,8 @@ def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
     """(n,) true where a reading repeats the one before it for so long that noise cannot explain it.
 
     channel: (n,) one component, NaN where missing; sigma: its noise. Two neighbours of a reading rounded to steps of
-    D agree by chance with probability about D / (2 sqrt(pi) sigma), so a coarse instrument is allowed long runs and
-    a fine one almost none. The first reading of a run is good. A component of which a fifth is repeats is one that is
+    D agree by chance with probability about D / (2 sqrt(pi) sigma), and while the target stands in the middle of a step
+    as often as the log shows, so a coarse instrument is allowed long runs and a fine one almost none. The first reading of a run is good. A component of which a fifth is repeats is one that is
     sampled faster than it measures, not stuck.
     """
     found = np.zeros(len(channel), bool)
@@ -160,6 +160,7 @@ def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
     steps = steps[steps > 1e-12 * np.abs(values).max()]
     step = float(steps.min()) if len(steps) else np.inf
     chance = step / (2 * np.sqrt(np.pi) * sigma) if np.isfinite(sigma) else np.inf
+    chance = max(chance, float(np.mean(values[1:] == values[:-1])))
     if chance >= 1:
         return found
     repeats_needed = max(np.log(STUCK_ODDS / len(seen)) / np.log(max(chance, 1e-300)), SHORTEST_STUCK - 1)
