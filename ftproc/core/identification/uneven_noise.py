@@ -1,0 +1,121 @@
+"""Noise that is not the same for all readings of a component: late time stamps, drifting variance, coarse rounding.
+
+What is found is how many times the variance of a component's noise that of each reading is. Time stamps that are off by
+sigma_t add (sigma_t dz/dt)^2, the same sigma_t for the three components; the variance may drift with elevation, range
+or signal, so slowly that the residuals of a stretch show it; and a reading that repeats the one before, because the target
+has not moved by a rounding step, says nothing new.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.filtering.records import Model, Observations, Uneven
+from ftproc.core.filtering.smoother import SmootherRun
+from ftproc.core.identification import optimizer
+
+FloatArray = NDArray[np.float64]
+
+TAILS = 4.0  # degrees of freedom of the distribution that outliers hardly move
+LEAST_GAIN, SHARE = 15.0, 0.1  # in log-likelihood, and for each sample, for late stamps to be believed
+STEPS = 30
+WINDOW = 60  # readings from which a variance is taken
+FEWEST_WINDOWS = 6
+CHI2_MEDIAN, MEDIAN_SPREAD = 0.45494, 2.66  # of chi-square with one degree: median, and sqrt(n) sigma of its estimate's log
+LEAST_DRIFT = 0.15  # 1-sigma of ln(variance) over the windows, beyond chance
+LARGEST_DRIFT = 3.0  # of ln(variance)
+GOES_BACK = 0.2  # share of the changes of a rounded reading that go back to the value before: more of them is noise
+SURELY_CHANCE, MOST_REPEATS = 0.05, 0.98  # expected number of longer runs that noise makes; share of repeats
+
+
+def rates(state: FloatArray) -> FloatArray:
+    """(n, 3) rates of range m/s, azimuth and elevation rad/s of states (n, 9)."""
+    (x, y, z), (vx, vy, vz) = state[:, :3].T, state[:, 3:6].T
+    ground = np.maximum(np.hypot(x, y), 1e-300)
+    slant = np.hypot(ground, z)
+    outward = (x * vx + y * vy) / ground
+    found: FloatArray = np.stack(
+        [(x * vx + y * vy + z * vz) / slant, (x * vy - y * vx) / ground**2, (ground * vz - z * outward) / slant**2], 1
+    )
+    return found
+
+
+def stamp_variance(log: Observations, smoothed: SmootherRun, model: Model) -> tuple[FloatArray, float]:
+    """(3,) variances of the noise, and that of the time stamps, s^2; zero if the residuals show none.
+
+    By maximum likelihood of the leave-one-out residuals of all readings, with Student's distribution, because the
+    readings that are taken for outliers may be late ones.
+    """
+    used = np.isfinite(smoothed.residual) & np.isfinite(smoothed.residual_variance)
+    uneven = log.uneven or Uneven.none(len(log.time_s))
+    noise = model.noise_variance * uneven.times + uneven.late**2
+    square = np.where(used, smoothed.residual, 0.0) ** 2
+    predicted = np.where(used, np.maximum(smoothed.residual_variance - noise, 0.0), 1.0)
+    speed2 = rates(smoothed.state) ** 2
+    typical = float(np.median(model.noise_variance / np.maximum(np.mean(speed2, 0), 1e-300)))
+
+    def cost(theta: FloatArray) -> tuple[float, FloatArray]:
+        white, stamps = np.exp(theta[:3]), math.exp(theta[3])
+        variance = predicted + white + stamps * speed2
+        ratio = square / (TAILS * variance)
+        each = np.where(used, 0.5 * np.log(variance) + 0.5 * (TAILS + 1) * np.log1p(ratio), 0.0)
+        slope = np.where(used, 0.5 - 0.5 * (TAILS + 1) * ratio / (1 + ratio), 0.0) / variance
+        return float(each.sum()), np.r_[(slope * white).sum(0), (slope * stamps * speed2).sum()]
+
+    first = np.log(np.r_[model.noise_variance, typical])
+    reach = np.r_[np.full(3, 12.0), 12.0]
+    curvature = np.r_[used.sum(0) / 4 + 1.0, used.sum() / 8 + 1.0]
+
+    def likeliest(start: FloatArray, low: FloatArray) -> tuple[float, FloatArray]:
+        found = optimizer.minimise(cost, start, curvature, low, first + reach, STEPS, 0.01)
+        return cost(found)[0], found
+
+    without = first - np.r_[0.0, 0.0, 0.0, 35.0]
+    plain, _ = likeliest(without, np.r_[first[:3] - 12.0, without[3]])
+    tries = [likeliest(first - np.r_[0.0, 0.0, 0.0, less], first - 35.0) for less in (0.0, 4.0)]
+    best, found = min(tries, key=lambda each: each[0])
+    return np.exp(found[:3]), math.exp(found[3]) if plain - best > max(LEAST_GAIN, SHARE * len(used)) else 0.0
+
+
+def drift(log: Observations, smoothed: SmootherRun) -> FloatArray | None:
+    """(n, 3) how many times the variance of a component that of each reading is, where it drifts; None if in none."""
+    found = np.ones_like(log.weight)
+    for c in range(3):
+        seen = np.flatnonzero((log.weight[:, c] > 0) & np.isfinite(smoothed.residual_variance[:, c]))
+        count = len(seen) // WINDOW
+        if count < FEWEST_WINDOWS:
+            continue
+        square = smoothed.residual[seen, c] ** 2 / smoothed.residual_variance[seen, c]
+        windows = np.array_split(np.arange(len(seen)), count)
+        level = np.log([np.median(square[w]) / CHI2_MEDIAN for w in windows])
+        chance = MEDIAN_SPREAD**2 / WINDOW
+        drifting = float(np.var(level)) - chance
+        if drifting < max(LEAST_DRIFT**2, 3 * chance * math.sqrt(2 / count)):
+            continue
+        even = np.convolve(np.pad(level, 1, mode="edge"), [0.25, 0.5, 0.25], "valid")
+        even = np.clip(even - np.median(even), -LARGEST_DRIFT, LARGEST_DRIFT) * drifting / (drifting + 0.375 * chance)
+        middle = np.array([log.time_s[seen[w]].mean() for w in windows])
+        found[:, c] = np.exp(np.interp(log.time_s, middle, even))
+    return found if (found != 1).any() else None
+
+
+def repeated(measurement: FloatArray, step: FloatArray) -> Uneven | None:
+    """As many times the variance as the run of equal readings is long that a reading belongs to, where it is longer than
+    chance makes it; None if nowhere. step (3,): of rounding, zero for none."""
+    uneven = Uneven.none(len(measurement))
+    found = uneven.times
+    for c in np.flatnonzero(step > 0):
+        seen = np.flatnonzero(np.isfinite(measurement[:, c]))
+        values = measurement[seen, c]
+        begins = np.flatnonzero(np.r_[True, np.abs(np.diff(values)) > 0.5 * step[c]])
+        length, levels = np.diff(np.r_[begins, len(values)]), values[begins]
+        back = np.mean(np.abs(levels[2:] - levels[:-2]) < 0.5 * step[c]) if len(levels) > 2 else 1.0
+        chance = 1.0
+        if back > GOES_BACK:  # noise decides between two values
+            share = min(max(1 - len(begins) / len(values), 1e-3), MOST_REPEATS)
+            chance += math.log(SURELY_CHANCE / len(values)) / math.log(share)
+        found[seen, c] = np.repeat(np.where(length > chance, length, 1), length)
+    return uneven if (found != 1).any() else None

@@ -1,0 +1,142 @@
+"""Noise that is not the same for all readings: late stamps, drift, rounding, tails."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.core.editing import screening, two_pass
+from ftproc.core.filtering.records import Uneven
+from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.identification import uneven_noise
+from ftproc.core.model.frames import from_cartesian, wrap
+from tests import naive
+from tests.core.single import random_problem, update
+from tests.core.tracks import matched
+from tests.simulated import simulate
+
+KNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
+
+
+def circle(seed, n=1500, dt=0.1, late_s=0.0, sigma=(0.01, 2e-5, 2e-5), tails=None):
+    """A drone on a wandering circle 80 m away that stands still now and then, and its readings with late stamps."""
+    rng = np.random.default_rng(seed)
+    fine = np.arange(-20, n * dt + 20, 0.01)
+    speed = np.clip(np.convolve(rng.normal(0, 60, len(fine)), np.ones(600) / 600, "same"), 0, None)
+    angle = np.cumsum(speed) * 0.01 / 40
+    path = np.stack([80 + 30 * np.cos(angle), 30 * np.sin(angle), 20 + 5 * np.sin(0.7 * angle)], 1)
+    time = dt * np.arange(n)
+    seen = time + late_s * rng.standard_normal(n)
+    position, moved = (np.stack([np.interp(t, fine, p) for p in path.T], 1) for t in (time, seen))
+    noise = rng.standard_normal((n, 3)) if tails is None else rng.standard_t(tails, (n, 3))
+    z = from_cartesian(moved) + np.array(sigma) * noise
+    return time, np.stack([z[:, 0], wrap(z[:, 1]), z[:, 2]], 1), position
+
+
+def test_rates_are_the_derivatives_of_the_readings():
+    rng = np.random.default_rng(1)
+    state = np.hstack([rng.normal(0, 100, (50, 3)), rng.normal(0, 5, (50, 3)), np.zeros((50, 3))])
+    step = 1e-5
+    ahead, behind = (from_cartesian(state[:, :3] + sign * step * state[:, 3:6]) for sign in (1, -1))
+    change = ahead - behind
+    change[:, 1] = wrap(change[:, 1])
+    np.testing.assert_allclose(uneven_noise.rates(state), change / (2 * step), rtol=1e-5, atol=1e-9)
+
+
+def test_a_late_stamp_is_noise_that_the_components_share():
+    """The update with the covariance R + l l' of the readings, for every pattern of missing ones."""
+    rng = np.random.default_rng(2)
+    for _ in range(50):
+        x, p, z, noise = random_problem(rng)
+        late = rng.normal(size=3) * np.sqrt(noise) * 3
+        weight = rng.choice([0.0, 1.0], 3)
+        if not weight.any():
+            continue
+        found = update(x, p, z, noise, weight, late)
+        z_hat, c, pxz = naive.unscented(x, p)
+        on = weight > 0
+        s = (c + np.diag(noise) + np.outer(late, late))[np.ix_(on, on)]
+        gain = pxz[:, on] @ np.linalg.inv(s)
+        sigma = np.sqrt(np.diag(p))
+        expected = x + gain @ naive.difference(z, z_hat)[on]
+        np.testing.assert_allclose(found[0] / sigma, expected / sigma, rtol=1e-7, atol=1e-7)
+        np.testing.assert_allclose(found[1] / np.outer(sigma, sigma), (p - gain @ s @ gain.T) / np.outer(sigma, sigma), atol=1e-9)
+
+
+@pytest.mark.compiled
+def test_late_stamps_are_found_and_are_no_outliers():
+    time, z, truth = circle(7, late_s=0.01)
+    found = two_pass.edit(time, z, KNOWN)
+    assert found.decision.stamp_s == pytest.approx(0.01, rel=0.3)
+    error = np.abs(found.smoothed.state[:, :3] - truth)
+    assert (error < 3 * found.smoothed.sigma[:, :3]).mean() > 0.9
+
+
+@pytest.mark.compiled
+def test_good_clocks_have_no_late_stamps():
+    assert two_pass.edit(*circle(2)[:2], KNOWN).decision.stamp_s == 0.0
+    flight = simulate("manoeuvre", seed=1, duration_s=60.0)
+    assert two_pass.edit(flight.log.time_s, flight.log.measurement, KNOWN).decision.stamp_s == 0.0
+
+
+@pytest.mark.compiled
+def test_noise_that_grows_along_the_log_is_followed():
+    flight = simulate("cruise", seed=5, duration_s=300.0, outliers="none")
+    rng = np.random.default_rng(0)
+    growth = np.linspace(1, 5, len(flight.log.time_s))[:, None]
+    z = from_cartesian(flight.truth.position_m) + flight.sigma * growth * rng.standard_normal((len(growth), 3))
+    found = two_pass.edit(flight.log.time_s, z, KNOWN)
+    assert found.decision.drifts
+    sigma = np.sqrt(found.model.noise_variance * found.log.uneven.times)
+    np.testing.assert_allclose(sigma[[200, 1500, 2800]] / (flight.sigma * growth[[200, 1500, 2800]]), 1, atol=0.35)
+    assert (found.weight == 0).mean() < 0.01
+
+
+@pytest.mark.compiled
+def test_tails_are_no_outliers():
+    flight = simulate("manoeuvre", seed=2, duration_s=60.0, outliers="tails=3")
+    found = two_pass.edit(flight.log.time_s, flight.log.measurement, KNOWN)
+    assert (found.weight == 0).mean() < 0.02
+
+
+@pytest.mark.parametrize("step", [7.234, 1e-3, 0.1 * np.pi / 180])
+def test_rounding_step_is_found(step):
+    rng = np.random.default_rng(4)
+    values = np.cumsum(rng.normal(0, 3 * step, 500)) + 1000 * step
+    rounded = step * np.round(values / step)
+    assert screening.rounding_step(rounded) == pytest.approx(step, rel=1e-6)
+    rounded[::50] += rng.normal(0, 50 * step, 10)  # outliers need not lie on the grid
+    assert screening.rounding_step(rounded) == pytest.approx(step, rel=1e-6)
+    assert screening.rounding_step(values) < 1e-2 * step
+    assert screening.rounding_step(np.full(5, 3.0)) == 0.0
+
+
+@pytest.mark.compiled
+def test_two_values_of_a_standing_target_are_no_outliers():
+    """A transponder whose range is rounded to steps that are larger than the noise."""
+    rng = np.random.default_rng(5)
+    time, n = 4.0 * np.arange(300), 300
+    step = 7.234
+    z = np.stack([step * np.round((25_000 + rng.normal(0, 2, n)) / step), 0.5 + 1e-3 * rng.standard_normal(n),
+                  0.02 + 2e-4 * rng.standard_normal(n)], 1)  # fmt: skip
+    assert len(np.unique(z[:, 0])) <= 3
+    found = two_pass.edit(time, z, KNOWN)
+    assert (found.weight[:, 0] == 0).mean() < 0.01
+    assert np.sqrt(found.model.noise_variance[0]) >= step / np.sqrt(12) * 0.999
+
+
+def test_repeats_count_once_where_chance_does_not_make_them():
+    step = np.array([1.0, 0.0, 0.0])
+    z = np.zeros((200, 3))
+    z[:, 0] = np.arange(200) // 20  # moves by a step in twenty readings, without noise
+    found = uneven_noise.repeated(z, step)
+    assert isinstance(found, Uneven)
+    np.testing.assert_array_equal(found.times[:, 0], 20)
+    np.testing.assert_array_equal(found.times[:, 1:], 1)
+    z[:, 0] = np.random.default_rng(1).integers(0, 3, 200)
+    assert uneven_noise.repeated(z, step) is None
+
+
+def test_drift_of_even_noise_is_none():
+    a = matched(4, 3000)
+    assert uneven_noise.drift(a.log, smooth_log(a.log, a.model, a.starts, residuals_only=True)) is None
