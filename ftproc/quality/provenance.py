@@ -43,6 +43,7 @@ def describe(
         "convention": CONVENTION[log.frame],
         "station": {**asdict(log.station), "in_words": in_words(log.station)},
         "epoch": log.epoch,
+        "understood": dict(log.understood),
         "settings": {
             "editing": method.editing(settings),
             "smooth": settings.smooth,
