@@ -39,8 +39,8 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
 @click.option(
     "--elevation-from",
     type=click.Choice(["horizon", "zenith"]),
-    default="horizon",
-    help="Zero of the elevation; zenith: the log has zenith angles.",
+    help="Zero of the elevation; zenith: the log has zenith angles. [default: zenith if the column is called so, else "
+    "horizon]",
 )
 @options.units("Units of columns whose names state none, such as range=km,azimuth=deg. [default: s, m, rad]")
 @click.option(

@@ -14,7 +14,7 @@ from tests.files.conftest import Make, refused
     [
         (
             "t,A\n0,380\n",
-            '"A" lies beyond 380, which is no azimuth in rad. Say --units azimuth=grad or --units azimuth=mil',
+            '"A" lies beyond 380, which is no azimuth in rad. Say --units azimuth=grad.',
         ),
         ("t,Hz,V\n0,180,15\n", "Say --units azimuth=deg,elevation=deg or --units azimuth=grad,elevation=grad"),
         ("t,A\n0,3200\n", "Say --units azimuth=mil6000 or --units azimuth=mil6300 or --units azimuth=mil."),

@@ -73,7 +73,7 @@ def seconds(
             return _ticks_to_seconds(column.cast(pa.int64()), column.type.unit), ""
         if not pa.types.is_time(column.type):
             return since_midnight(column, origin)
-    return to_si(numbers(column, origin)), ""
+    return unrolled(to_si(numbers(column, origin)))[0], ""
 
 
 def stamped(text: pa.ChunkedArray, origin: Origin) -> Clock:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from ftproc.files.reading.formats import layout
 
 _FOOTER = 30  # lines at the end of a file, at most
+_COMMENT = re.compile(rb"(?m)^[ \t]*(?:#|%|//|!)[^\r\n]*(?:\r\n|\r|\n|\Z)")
 _LAST = 4096  # bytes in which the last line is looked for
 
 
@@ -15,9 +16,13 @@ def rows_only(body: memoryview, names: Sequence[str], separator: str, widths: Se
     """The rows without comment lines among them and lines of text below them; and in words what was left out."""
     words, comments = "", 0
     if has_comments(body):
-        data, comments = re.subn(rb"(?m)^[ \t]*(?:#|%|//|!)[^\r\n]*(?:\r\n|\r|\n|\Z)", b"", body)
-        body = memoryview(data)
-        words += f", {comments} comment lines among the rows"
+        found = [line for line in _COMMENT.finditer(body) if not _is_row(line[0], names, separator, widths)]
+        ends = [0, *(line.end() for line in found)]
+        starts = [*(line.start() for line in found), len(body)]
+        comments = len(found)
+        if comments:
+            body = memoryview(b"".join(body[low:high] for low, high in zip(ends, starts, strict=True)))
+            words += f", {comments} comment lines among the rows"
     end = len(body)
     footer = 0
     while footer < _FOOTER:
@@ -29,6 +34,12 @@ def rows_only(body: memoryview, names: Sequence[str], separator: str, widths: Se
         footer += 1
     words += f", {footer} lines below the table" if footer else ""
     return body[:end], words
+
+
+def _is_row(line: bytes, names: Sequence[str], separator: str, widths: Sequence[int]) -> bool:
+    """Whether a line that begins as comments do is a row with a bad first cell, such as #VALUE!."""
+    cells = layout.split(line.decode("utf-8", "replace").strip(), separator, widths)
+    return len(cells) == len(names) and layout.is_data(cells[1:])
 
 
 def has_comments(body: memoryview) -> bool:

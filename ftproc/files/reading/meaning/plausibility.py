@@ -115,9 +115,10 @@ def _common_unit(
     if possible[:1] == ["deg"] and not surveyors and not (azimuth and azimuth.most > 360):
         grad = say.replace("UNIT", "grad")
         return "deg", f"{names} beyond any radians, taken for degrees: if they are gon, say --units {grad}"
+    likely = [unit for unit in possible if unit in ("deg", "grad")] or possible
     first = next(iter(bare))
     half = bare[first].half
-    answers = " or ".join(f"--units {say.replace('UNIT', unit)}" for unit in possible) or f"--units {say}"
+    answers = " or ".join(f"--units {say.replace('UNIT', unit)}" for unit in likely) or f"--units {say}"
     raise InputError(
         f'{source}: no unit is stated for {names}, and half of column "{found[first].name}" lies beyond {half:.4g}, '
         f"which is no {first} in rad. Say {answers}."
