@@ -36,6 +36,8 @@ def unrolled(time_s: FloatArray, only: float | None = None) -> tuple[FloatArray,
     only: the one period that the clock is known to have. A single glitch, or a file whose rows are out of order, is
     left as it is.
     """
+    if (time_s[1:] >= time_s[:-1]).all():
+        return time_s, ()
     row = np.flatnonzero(~np.isnan(time_s))
     time = time_s[row]
     for period, what in _ROLLOVERS.items():

@@ -267,7 +267,7 @@ def _first_line(source: str, data: bytes) -> tuple[list[str], str, int]:
 def in_blocks(path: Path, head: CsvText) -> Iterator[CsvText]:
     """The rows of a file in blocks of whole lines; `head` comes from `split` of its beginning.
 
-    Raises InputError where a row may span lines, where lines are no rows, or where only the whole file can tell what a
+    Raises InputError where a row may span lines, or where only the whole file can tell what a
     point means.
     """
     with path.open("rb") as stream:
@@ -290,8 +290,8 @@ def in_blocks(path: Path, head: CsvText) -> Iterator[CsvText]:
 def _block(head: CsvText, body: memoryview) -> Iterator[CsvText]:
     if not re.search(rb"[^\r\n]", body):
         return
-    if b'"' in bytes(body) or trimming.has_comments(body):
-        raise InputError(f"{head.source}: comment lines, or quotation marks, in which a line may end.")
+    if b'"' in bytes(body):
+        raise InputError(f"{head.source}: quotation marks, in which a line may end.")
     yield head._replace(body=body, odd_quotes=False)
 
 

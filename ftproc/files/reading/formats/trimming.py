@@ -15,7 +15,7 @@ _LAST = 4096  # bytes in which the last line is looked for
 def rows_only(body: memoryview, names: Sequence[str], separator: str, widths: Sequence[int]) -> tuple[memoryview, str]:
     """The rows without comment lines among them and lines of text below them; and in words what was left out."""
     words, comments = "", 0
-    if has_comments(body):
+    if _has_comments(body):
         found = [line for line in _COMMENT.finditer(body) if not _is_row(line[0], names, separator, widths)]
         ends = [0, *(line.end() for line in found)]
         starts = [*(line.start() for line in found), len(body)]
@@ -42,10 +42,10 @@ def _is_row(line: bytes, names: Sequence[str], separator: str, widths: Sequence[
     return len(cells) == len(names) and layout.is_data(cells[1:])
 
 
-def has_comments(body: memoryview) -> bool:
+def _has_comments(body: memoryview) -> bool:
     """Whether a line of the rows is a comment."""
     whole = body.tobytes()
-    marks = [mark for mark in (b"#", b"%", b"//", b"!") if mark in whole]
+    marks = [mark for mark in (b"#", b"%", b"/", b"!") if mark in whole]
     return bool(marks) and re.search(rb"(?m)^[ \t]*(?:#|%|//|!)", body) is not None
 
 

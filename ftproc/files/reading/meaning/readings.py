@@ -69,14 +69,11 @@ def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) 
 
 def without_sentinels(values: FloatArray, described: Column) -> tuple[FloatArray, tuple[str, ...]]:
     """(n,) values without the numbers that mean "no reading", and a note on each such number."""
-    known = values[np.isfinite(values)]
-    if not known.size:
+    if not len(values):
         return values, ()
-    low, high = float(known.min()), float(known.max())
+    low, high = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
     notes = []
-    for number in NUMBERS:
-        if not low <= number <= high:
-            continue
+    for number in (number for number in NUMBERS if low <= number <= high):
         found = values == number
         count = int(np.count_nonzero(found))
         if count and _stands_out(values, found, number, described.quantity == "range" and number < 0):
