@@ -254,8 +254,11 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
         expected = f"{article} {quantity} in {column.unit.name}{timestamp}"
         origin = Origin(header.source, column.name, expected, header.decimal_comma)
         if quantity == "time":
-            several_parts = dict(zip(column.roles, mine, strict=True))
-            clock = joint.read(several_parts, origin) if len(mine) > 1 else times.read(mine[0], origin, column)
+            if len(mine) > 1:
+                units = dict(zip(column.roles, column.written, strict=True))
+                clock = joint.read(dict(zip(column.roles, mine, strict=True)), origin, units)
+            else:
+                clock = times.read(mine[0], origin, column)
             quantities[quantity] = clock.time_s
             continue
         found_here = readings.read(mine, origin, column)

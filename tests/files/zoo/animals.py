@@ -40,6 +40,11 @@ def texts() -> Iterator[Animal]:
     head = "Time;Slant Range;Azimuth;Elevation\n(s);(m);(gon);(gon)"
     text = lines(head, F.t, F.r, DEG_A / 0.9, DEG_E / 0.9, separator=";").replace(".", ",")
     yield Animal("decimal commas and units", written("a.csv", text), NORTH, 0)
+    head = "Station,Alpha\nLat,48.1\nLon,11.3\nHeight,600\n\nTime (s),Range (m),Azimuth (deg),Elevation (deg)"
+    yield Animal("keys and values above", written("a.csv", lines(head, F.t, F.r, DEG_A, DEG_E)), NORTH, 0)
+    head = "  TIME    RANGE    AZIMUTH   ELEV\n  (SEC)   (YDS)    (DEG)     (DEG)\n  -----   -----    ------    -----"
+    ruled = lines(head, F.t, F.r / 0.9144, DEG_A, DEG_E, separator="   ")
+    yield Animal("a rule under the units", written("a.txt", ruled), NORTH, 0)
     columns = {"columns": "time=1,range=2,azimuth=3,elevation=4"}
     bare = lines("", F.t, F.r, F.a, F.e)
     yield Animal("no names", written("a.csv", bare), first_s=0, asks="--columns time=1,range=2", answer=columns)
@@ -54,7 +59,7 @@ def texts() -> Iterator[Animal]:
     yield Animal("bars", written("a.txt", PLAIN.replace(",", "|")), first_s=0)
     for encoding in ("utf-16", "utf-16-le", "utf-32", "utf-8-sig"):
         yield Animal(encoding, written("a.csv", PLAIN.encode(encoding)), first_s=0)
-    latin = lines("Zeit (s);Range (m);Azimut;Azimuth [°];Elevation [°];Höhe", F.t, F.r, F.t, DEG_A, DEG_E, F.t,
+    latin = lines("Zeit (s);Range (m);Bemerkung;Azimuth [°];Elevation [°];Höhe", F.t, F.r, F.t, DEG_A, DEG_E, F.t,
                   separator=";")  # fmt: skip
     yield Animal("Latin-1", written("a.csv", latin.encode("latin-1")), NORTH, 0)
     yield Animal("separators at the ends", written("a.csv", PLAIN.replace("\n", ",\n")), first_s=0)
@@ -117,6 +122,8 @@ def times() -> Iterator[Animal]:
     turned = (604790.0 + F.t) % 604800
     weeks = [f"{2316 + int(k > 19)},{s!r}" for k, s in enumerate(turned.tolist())]
     yield _timed("over the end of the GPS week", "Week,TOW", weeks, first_s=604790.0, utc="2024-06-01T23:59:32")
+    itow = [f"2316,{s * 1e3!r}" for s in tow.tolist()]
+    yield _timed("GPS week and milliseconds", "WN,iTOW [ms]", itow, first_s=tow[0], utc=FIRST_UTC)
     yield _timed("seconds of the week", "TOW", tow, first_s=tow[0])
     unix = moments.astype(np.int64)
     for power, name in ((0, "us"), (3, "ms"), (6, "s")):
@@ -142,8 +149,7 @@ def times() -> Iterator[Animal]:
 
 
 def _named(name: str, head: str, *columns: Any, **more: Any) -> Animal:
-    options = {**NORTH, **more.pop("options", {})}
-    return Animal(name, written("a.csv", lines(head, *columns)), options, 0, **more)
+    return Animal(name, written("a.csv", lines(head, *columns)), NORTH, **more)
 
 
 def names() -> Iterator[Animal]:
@@ -173,6 +179,12 @@ def names() -> Iterator[Animal]:
         cells = (dms(F.a, pattern.replace('"', '""')), dms(F.e, pattern.replace('"', '""')))
         quoted = [[f'"{cell}"' for cell in column] for column in cells]
         yield _named(f"degrees with {label}", "t,range (m),Azimuth,Elevation", F.t, F.r, *quoted)
+    digits = (dms(F.a, "{d:03d}{m:02d}{s:05.2f}"), dms(F.e, "{d:02d}{m:02d}{s:05.2f}"))
+    yield _named("degrees as digits", "t,R,AZ (dddmmss.s),EL (ddmmss.s)", F.t, F.r, *digits)
+    head = "Radar1_Time,Radar1_Range_m,Radar1_Az_deg,Radar1_El_deg"
+    yield _named("the radar in every name", head, F.t, F.r, DEG_A, DEG_E)
+    yield _named("German", "Zeit,Schrägentfernung,Azimut,Höhenwinkel", F.t, F.r, DEG_A, DEG_E)
+    yield _named("two times", "Time (UTC),Time (s),Range,Az,El", clock(F.moments()), F.t, F.r, DEG_A, DEG_E)
     split = [dms(angle, "{d},{m},{s:.2f}") for angle in (F.a, F.e)]
     head = "t,R,Az deg,Az min,Az sec,El deg,El min,El sec"
     yield _named("degrees in three columns", head, F.t, F.r, *split)

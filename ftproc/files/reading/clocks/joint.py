@@ -11,17 +11,19 @@ from ftproc.files import arrow, leap_seconds
 from ftproc.files.reading.clocks import notations, numeric, times
 from ftproc.files.reading.clocks.clock import DAY_S, WEEK_S, Clock, unrolled
 from ftproc.files.reading.meaning.numbers import Origin, as_text, numbers, parsed, without_text
+from ftproc.files.units import Unit, unit_named
 from ftproc.records import FloatArray, IntArray
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 
-def read(columns: Mapping[str, pa.ChunkedArray], origin: Origin) -> Clock:
-    """The clock of several columns {role: column}, see `meaning.parts`. Raises InputError as `read`."""
+def read(columns: Mapping[str, pa.ChunkedArray], origin: Origin, units: Mapping[str, str]) -> Clock:
+    """The clock of several columns {role: column}, see `meaning.parts`. units: as written in their names. Raises
+    InputError as `times.read`."""
     if "week" in columns:
-        return _gps(columns, origin)
-    clock = _own_moments(columns["time"], origin) if "time" in columns else None
+        return _gps(columns, origin, unit_named("time", units["tow"]))
+    clock = _own_moments(columns["time"], origin, unit_named("time", units["time"])) if "time" in columns else None
     if isinstance(clock, Clock):
         return clock
     second = clock if clock is not None else _parts_of_day(columns, origin)
@@ -34,12 +36,14 @@ def read(columns: Mapping[str, pa.ChunkedArray], origin: Origin) -> Clock:
     return times.counted(day, second, dated, words, notes)
 
 
-def _gps(columns: Mapping[str, pa.ChunkedArray], origin: Origin) -> Clock:
+def _gps(columns: Mapping[str, pa.ChunkedArray], origin: Origin, unit: Unit | None) -> Clock:
     week, second = numbers(columns["week"], origin), numbers(columns["tow"], origin)
     known = week[np.isfinite(week)]
     if not known.size:
         raise origin.nothing("a GPS week")
-    if np.nanmedian(second) > 2 * WEEK_S:
+    if unit is not None:
+        second = unit.to_si(second)
+    elif np.nanmedian(second) > 2 * WEEK_S:
         second = second / 1e3
     first = int(known.min())
     notes: tuple[str, ...] = ()
@@ -52,7 +56,7 @@ def _gps(columns: Mapping[str, pa.ChunkedArray], origin: Origin) -> Clock:
     return Clock(whole, leap_seconds.gps_epoch(first), words, notes)
 
 
-def _own_moments(column: pa.ChunkedArray, origin: Origin) -> FloatArray | Clock:
+def _own_moments(column: pa.ChunkedArray, origin: Origin, unit: Unit | None) -> FloatArray | Clock:
     """(n,) seconds of the day of a time beside a date; or its clock, if it has dates of its own."""
     import pyarrow as pa
 
@@ -67,6 +71,8 @@ def _own_moments(column: pa.ChunkedArray, origin: Origin) -> FloatArray | Clock:
         values = parsed(text, origin.decimal_comma)
         if values is None:
             return _of_day_or_stamped(text, origin)
+    if unit is not None:
+        return unit.to_si(values)
     known = values[np.isfinite(values)]
     if known.size and known.max() <= 1.0:  # Excel's fraction of a day
         return np.round(values * DAY_S, 6)

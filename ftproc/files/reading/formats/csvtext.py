@@ -28,6 +28,7 @@ MISSING_WORDS = (
 )
 
 _HEAD = 1 << 20  # bytes of a large file that contain its header line
+_PLAIN_ROWS = 20  # under the names, that are looked at before a file counts as plain
 _BLOCK = 8 << 20  # bytes of a large file that are parsed at once
 _SEPARATOR_NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks", "": "fixed widths"}
 
@@ -216,7 +217,7 @@ def _plain(data: bytes) -> tuple[list[str], str, int] | None:
     if len(names) < 2 or layout.is_comment(line) or any(re.match(r"[+-]?\.?\d", name) for name in names):
         return None
     place = found.end()
-    for _ in range(3):
+    for _ in range(_PLAIN_ROWS):
         row = _LINE.match(data, place)
         if row is None or not row[1].strip():
             break

@@ -31,6 +31,7 @@ _WITH_BLANKS = re.compile(
     r"|\d\S*\s?[A-Za-z°%/]+"
     r')\s*"?'
 )
+_RULE = re.compile(r"[-=_+*#|,;\s]*[-=_]{2,}[-=_+*#|,;\s]*")
 _NOTHING = re.compile(r"\s*[\"']?(nan|null|none|n/?a|nil|[-*?.]+|)[\"']?\s*", re.IGNORECASE)
 
 
@@ -120,11 +121,15 @@ def _with_names(
     width = len(rows[filled[start]])
     block = [lines[number] for number in filled[start : start + 50]]
     top = start
-    while top and (is_data(rows[filled[top - 1]], strictly=True) or _is_empty_row(rows[filled[top - 1]], width)):
+    while (
+        top
+        and not _RULE.fullmatch(lines[filled[top - 1]])
+        and (is_data(rows[filled[top - 1]], strictly=True) or _is_empty_row(rows[filled[top - 1]], width))
+    ):
         top -= 1
     units: list[str] = []
     place = top - 1
-    while place >= 0 and re.fullmatch(r"[-=_+*#|,;\s]+", lines[filled[place]]):  # a rule under the names
+    while place >= 0 and _RULE.fullmatch(lines[filled[place]]):  # a rule under the names
         place -= 1
     if place >= 0:
         cells = _heading(lines[filled[place]], separator, width, block, widths)
@@ -173,6 +178,8 @@ def _heading(line: str, separator: str, width: int, block: Sequence[str], widths
         ways += [re.split(r"\s{2,}|\t", bare.strip()), _joined_brackets(bare), _aligned(bare, block, width)]
         ways += [[cell.strip() for cell in bare.split(mark)] for mark in (",", ";", "|") if mark in bare]
         ways += [["Date", *way] for way in (bare.split(), _joined_brackets(bare)) if _begins_with_date(block)]
+    elif separator == "\t":
+        ways += [bare.split(), _joined_brackets(bare)]
     for cells in ways:
         if len(cells) == width:
             return cells

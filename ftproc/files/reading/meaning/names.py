@@ -55,12 +55,16 @@ class Name(NamedTuple):
         for rank, aliases in ((1, ALIASES), (2, WEAK_ALIASES)):
             if self.stem in aliases[quantity]:
                 return rank
-        core = "".join(word for word in self.words if word not in QUALIFIERS)
+        core = self.core()
         return 2 if core in (*ALIASES[quantity], *WEAK_ALIASES[quantity]) and core != self.stem else 0
+
+    def core(self) -> str:
+        """The stem without words that say nothing about the quantity, such as `radar1`."""
+        return "".join(word for word in self.words if word.rstrip("0123456789") not in QUALIFIERS)
 
     def is_zenith(self) -> bool:
         """Whether it names zenith angles."""
-        core = "".join(word for word in self.words if word not in QUALIFIERS)
+        core = self.core()
         return not self.foreign and bool({self.stem, core} & set(ZENITH_ALIASES))
 
 
@@ -73,7 +77,7 @@ def taken_apart(text: str, unit: str = "") -> Name:
     if bracketed:
         inside = bracketed[2]
         known = next((part for part in (inside, *re.split(r"[\s,;]+", inside)) if _is_unit(part)), "")
-        squeezed = re.sub(r"[^a-z]", "", inside.lower()).removesuffix("sss")
+        squeezed = _squeezed(inside)
         if known:
             plain, found = bracketed[1], known
         elif squeezed in NOTATIONS or "hh" in squeezed or "dd" in squeezed or "yy" in squeezed:
@@ -89,7 +93,7 @@ def taken_apart(text: str, unit: str = "") -> Name:
     if unit:
         inside = unit.strip().strip("()[]{}<>").strip()
         foreign = inside.lower() in _FOREIGN
-        squeezed = re.sub(r"[^a-z]", "", inside.lower()).removesuffix("sss")
+        squeezed = _squeezed(inside)
         if _is_unit(inside):
             found = inside
         elif squeezed in NOTATIONS or "hh" in squeezed or "dd" in squeezed:
@@ -100,6 +104,11 @@ def taken_apart(text: str, unit: str = "") -> Name:
     if not found and not foreign:
         found = _asterix_unit(words[-1] if words else "", context)
     return Name(text, stem, words, found, notation, foreign)
+
+
+def _squeezed(text: str) -> str:
+    """A notation such as `hh:mm:ss.sss` as hhmmss."""
+    return re.sub(r"s{2,}$", "ss", re.sub(r"[^a-z]", "", text.lower()))
 
 
 def _is_unit(word: str) -> bool:
@@ -143,7 +152,8 @@ def _words(text: str) -> tuple[str, tuple[str, ...], str]:
     context, _, last = text.rpartition("/") if "/" in text else text.rpartition(".")
     if not re.sub(r"[^A-Za-z]", "", last):
         context, last = "", text
-    spaced = _CAMEL.sub(" ", last).lower()
+    spaced = unicodedata.normalize("NFKD", _CAMEL.sub(" ", last)).lower()
+    spaced = "".join(letter for letter in spaced if not unicodedata.combining(letter))
     words = tuple(word for word in _NOT_WORDS.split(spaced) if word)
     if len(words) > 1 and words[0].isdigit():  # such as 048_040_RHO
         digits = [k for k, word in enumerate(words) if word.isdigit()]

@@ -20,7 +20,7 @@ _TIME = {
     "month": ("month", "mon", "mo", "utcmonth"),
     "day": ("day", "dd", "dom", "dayofmonth", "utcday"),
     "hour": ("hour", "hours", "hr", "hrs", "hh", "h", "utchour"),
-    "minute": ("minute", "minutes", "min", "mins", "mi", "mn", "utcminute", "utcmin"),
+    "minute": ("minute", "minutes", "min", "mins", "mi", "mn", "mm", "utcminute", "utcmin"),
     "second": ("second", "seconds", "sec", "secs", "ss", "s", "utcsecond", "utcsec"),
 }
 #: Times that do not count from a midnight, and parts of one.

@@ -23,7 +23,8 @@ WORDS = (
     *("NODATA", "\\N", "n.a.", "N.A.", "x", "X", "blank", "BLANK", "no track", "NO TRACK", "unknown", "dropout"),
 )
 #: Numbers that mean "no reading" where they stand out.
-NUMBERS = tuple(sign * (10.0**digits - 10.0**-k) for digits in range(2, 8) for k in range(4) for sign in (1, -1))
+_NINES = tuple(10.0**digits - 10.0**-k for digits in range(2, 8) for k in range(4))
+NUMBERS = tuple(sign * value for value in (*_NINES, 32768.0, 1e10, 1e20, 1e30, 1e35, 1e37) for sign in (1, -1))
 
 _FAR = 20.0  # typical steps from the neighbours, for a number that stands out among others
 _DMS = (

@@ -30,7 +30,8 @@ class Column(NamedTuple):
 
     positions: in the file, one for each of `roles`: ("value",), ("date", "time"), ("deg", "min", "sec"), ...
     key: the stem of the name, by which clocks are told apart. notation: from the name, such as `dms`. why: the column
-    was taken. others: columns that could be the quantity too. zenith: the name is that of a zenith angle.
+    was taken. others: columns that could be the quantity too. zenith: the name is that of a zenith angle. written:
+    the units in the names of several columns.
     """
 
     quantity: str
@@ -45,6 +46,7 @@ class Column(NamedTuple):
     why: str = "its name"
     others: tuple[str, ...] = ()
     zenith: bool = False
+    written: tuple[str, ...] = ()
 
     @property
     def position(self) -> int:
@@ -120,7 +122,8 @@ class _Table(NamedTuple):
         unit = self.units.get(quantity)
         chosen = UNITS[quantity][unit] if unit else si_unit(quantity)
         name = " + ".join(self.names[place] for place in places)
-        return Column(quantity, places, name, chosen, unit is not None, False, tuple(roles), why=why)
+        written = tuple(self.apart[place].unit for place in places)
+        return Column(quantity, places, name, chosen, unit is not None, False, tuple(roles), why=why, written=written)
 
 
 def remarks(names: Sequence[str], found: Mapping[str, Column], timestamps: bool) -> tuple[str, ...]:
@@ -184,8 +187,8 @@ def _recognised(table: _Table, quantity: str, free: Sequence[int]) -> Column | N
         return None
     for place in fits:
         _refuse_twice(table.source, names, names[place])
-    stems = {table.apart[place].stem for place in fits}
-    if len(fits) > 1 and (quantity != "time" or len(stems) < len(fits)):
+    kinds = {(name.stem, name.unit, name.notation) for name in (table.apart[place] for place in fits)}
+    if len(fits) > 1 and (quantity != "time" or len(kinds) < len(fits)):
         raise InputError(
             f"{table.source}: columns {' and '.join(names[place] for place in fits)} could each be the {quantity}. "
             f"Say which one it is with --columns {quantity}={names[fits[0]]}."
