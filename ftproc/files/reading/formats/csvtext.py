@@ -183,7 +183,7 @@ class CsvText(NamedTuple):
 
 def split(source: str, data: bytes, widths: Sequence[int] = (), cut: bool = False) -> CsvText:
     """The layout of `data`, of a whole file or the beginning of one (`cut`). Raises InputError unless it is text."""
-    text = encoding.as_utf8(source, data, cut)
+    text = encoding.as_utf8(source, data, cut and len(data) >= _HEAD)
     if not text.data.strip():
         raise InputError(f"{source}: the file is empty; expected a header line and rows.")
     plain = None if widths else _plain(text.data)
