@@ -70,18 +70,27 @@ def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) 
 
 def without_sentinels(values: FloatArray, described: Column) -> tuple[FloatArray, tuple[str, ...]]:
     """(n,) values without the numbers that mean "no reading", and a note on each such number."""
-    if not len(values):
-        return values, ()
-    low, high = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
-    notes = []
-    for number in (number for number in NUMBERS if low <= number <= high):
+    notes: list[str] = []
+    while (number := _sentinel(values, described.quantity)) is not None:
         found = values == number
         count = int(np.count_nonzero(found))
-        if count and _stands_out(values, found, number, described.quantity == "range" and number < 0):
-            values = np.where(found, np.nan, values)
-            times = "once" if count == 1 else f"{count} times"
-            notes.append(f'"{described.name}" is {number:.10g} {times}, which is taken for a missing reading')
+        values = np.where(found, np.nan, values)
+        times = "once" if count == 1 else f"{count} times"
+        notes.append(f'"{described.name}" is {number:.10g} {times}, which is taken for a missing reading')
     return values, tuple(notes)
+
+
+def _sentinel(values: FloatArray, quantity: str) -> float | None:
+    """The first of NUMBERS that stands out, or None."""
+    if not len(values):
+        return None
+    low, high = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
+    for number in NUMBERS:
+        if low <= number <= high:
+            found = values == number
+            if found.any() and _stands_out(values, found, number, quantity == "range" and number < 0):
+                return number
+    return None
 
 
 def _stands_out(values: FloatArray, found: np.ndarray, number: float, impossible: bool) -> bool:
