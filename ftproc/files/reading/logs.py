@@ -44,12 +44,14 @@ class _Plan(NamedTuple):
 
 
 class _Converted(NamedTuple):
-    """quantities: in SI units. found: the columns with the units that their cells show. notes: what was done."""
+    """quantities: in SI units. found: the columns with the units that their cells show. notes: what was done.
+    undecided: see `readings.Readings`."""
 
     quantities: dict[str, FloatArray]
     found: Found
     clock: Clock
     notes: tuple[str, ...]
+    undecided: bool
 
 
 def read(
@@ -135,7 +137,12 @@ def _in_blocks(plan: _Plan) -> MeasurementLog | None:
     def convert(table: pa.Table) -> tuple[dict[str, FloatArray], str]:
         converted = _converted(header, plan.found, table.columns)
         clock = converted.clock
-        if converted.notes or converted.found != plan.found or (clocks and clock.words != clocks[0].words):
+        if (
+            converted.notes
+            or converted.undecided
+            or converted.found != plan.found
+            or (clocks and clock.words != clocks[0].words)
+        ):
             raise InputError("only the whole file shows what its cells mean")
         clocks[:] = clocks or [clock._replace(time_s=clock.time_s[:0])]
         return converted.quantities, clock.epoch
@@ -244,6 +251,7 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
     quantities: dict[str, FloatArray] = {}
     decided = dict(found)
     notes: list[str] = []
+    undecided = False
     clock = Clock(np.empty(0), "", "")
     place = 0
     for quantity, column in found.items():
@@ -265,7 +273,8 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
         decided[quantity] = found_here.column
         quantities[quantity] = found_here.column.unit.to_si(found_here.values)
         notes += found_here.notes
-    return _Converted(quantities, decided, clock, tuple(notes))
+        undecided = undecided or found_here.undecided
+    return _Converted(quantities, decided, clock, tuple(notes), undecided)
 
 
 def _in_time_order(source: str, quantities: Mapping[str, FloatArray], extra: pa.Table | None) -> MeasurementLog:

@@ -36,11 +36,13 @@ _MOST_TURN = 720.0  # deg
 
 
 class Readings(NamedTuple):
-    """values: (n,) in the unit of `column`, NaN where missing. notes: what was done to the cells."""
+    """values: (n,) in the unit of `column`, NaN where missing. notes: what was done to the cells.
+    undecided: one of NUMBERS is left, which may stand out among more rows."""
 
     values: FloatArray
     column: Column
     notes: tuple[str, ...] = ()
+    undecided: bool = False
 
 
 def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) -> Readings:
@@ -65,7 +67,9 @@ def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) 
     if described.notation in ("dms", "ddmmss", "dddmmss", "dmmss") and described.quantity != "range":
         return Readings(_from_digits(values), _in_degrees(described), words)
     values, sentinels = without_sentinels(values, described)
-    return Readings(values, described, (*words, *sentinels))
+    low, high = (float(end.reduce(values)) for end in (np.fmin, np.fmax)) if len(values) else (0.0, 0.0)
+    undecided = any(bool((values == number).any()) for number in NUMBERS if low <= number <= high)
+    return Readings(values, described, (*words, *sentinels), undecided)
 
 
 def without_sentinels(values: FloatArray, described: Column) -> tuple[FloatArray, tuple[str, ...]]:
