@@ -137,8 +137,8 @@ def part(function: F) -> F:
 
 
 def variant(function: Callable[..., Any], module: str, name: str, **different: Any) -> Callable[..., Any]:
-    """A function of the same code with some annotations different, or other globals (`_...`), for a kernel of its own. (A
-    closure would say the same, but numba keeps no machine code of closures.)"""
+    """A function of the same code with some annotations different, or other globals (`_...`), for a kernel of its own.
+    (A closure would say the same, but numba keeps no machine code of closures.)"""
     names = {key: value for key, value in different.items() if key.startswith("_")}
     made = FunctionType(function.__code__, {**function.__globals__, **names}, name)
     made.__module__, made.__qualname__ = module, name

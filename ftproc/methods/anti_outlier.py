@@ -66,8 +66,8 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     again = preparing.re_initialized(starts)
     decision = edited.decision
     return Estimate(
-        run, label, edited.model, smoothed if settings.smooth else None, again, decision.settled, unexamined=decision.unexamined,
-        stamp_s=decision.stamp_s, drifts=decision.drifts, alternative=decision.alternative,
+        run, label, edited.model, smoothed if settings.smooth else None, again, decision.settled,
+        unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts, alternative=decision.alternative,
     )  # fmt: skip
 
 
@@ -92,7 +92,8 @@ def usual_of(record: Recording, settings: FilterSettings) -> Model | None:
     if not found:
         return None
     variance, wander = (
-        np.median([getattr(edited.model, name) for edited in found], 0) for name in ("noise_variance", "wander_variance")
+        np.median([getattr(edited.model, name) for edited in found], 0)
+        for name in ("noise_variance", "wander_variance")
     )
     fade = np.exp(np.median([np.log(edited.model.fade_s) for edited in found], 0))
     levels = np.array([median_level(edited.model).jerk for edited in found])

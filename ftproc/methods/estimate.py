@@ -76,8 +76,9 @@ class Estimate(NamedTuple):
     smoothed: the smoother's run when it was asked for. reacquired: samples at which the filter was re-initialized.
     settled: whether two-pass editing's decisions stood still; None where there were none to make. stamp_s: 1-sigma of
     the time stamps. drifts: whether the noise's variance drifts. alternative: a model with correlated noise
-    that explains the log as well, and that the sigmas allow for. cleaned: (n, 3) readings of a method that works on range, azimuth and elevation one by one; NaN there and in its run means not
-    estimated. unexamined: places where two-pass editing looked for no alternative, its search having been cut short.
+    that explains the log as well, and that the sigmas allow for. cleaned: (n, 3) readings of a method that works on
+    range, azimuth and elevation one by one; NaN there and in its run means not estimated. unexamined: places where
+    two-pass editing looked for no alternative, its search having been cut short.
     """
 
     run: FilterRun

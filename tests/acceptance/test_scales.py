@@ -19,7 +19,9 @@ def in_units(log, length, duration):
     return replace(log, time_s=log.time_s * duration, measurement=log.measurement * np.array([length, 1.0, 1.0]))
 
 
-@pytest.mark.parametrize(("scenario", "outliers"), [("manoeuvre", None), ("radar", None), ("cruise", "correlation=0.5")])
+@pytest.mark.parametrize(
+    ("scenario", "outliers"), [("manoeuvre", None), ("radar", None), ("cruise", "correlation=0.5")]
+)
 @pytest.mark.parametrize(("length", "duration"), [(1e-3, 1.0), (1e3, 100.0), (0.05, 0.1)])
 def test_a_flight_in_other_units(scenario, outliers, length, duration):
     log = simulate(scenario, seed=3, duration_s=300.0 if scenario == "radar" else 40.0, outliers=outliers).log

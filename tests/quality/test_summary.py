@@ -185,7 +185,9 @@ def test_text_reports_reacquisition_and_correction():
         trajectory, metadata={**trajectory.metadata, "summary": {**figures(trajectory), "editing_converged": False}}
     )
     assert "did not converge" in summary.text(undecided.metadata)
-    slow = replace(trajectory, metadata={**trajectory.metadata, "summary": {**figures(trajectory), "slow_noise_s": 3.0}})
+    slow = replace(
+        trajectory, metadata={**trajectory.metadata, "summary": {**figures(trajectory), "slow_noise_s": 3.0}}
+    )
     assert "correlated over 3 s explains the log as well as motion does" in summary.text(slow.metadata)
 
 

@@ -24,7 +24,9 @@ TUNING_ROUNDS = 3
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after these rounds: some would
 # alternate for ever, each time changing what the smoother says of themselves
 STILL = 1e-4  # share of the readings that may still change sides when the decisions stand still
-IMPRECISE = 0.1  # share of the variance that late time stamps make by which they move the components apart: the rates at
+IMPRECISE = (
+    0.1  # share of the variance that late time stamps make by which they move the components apart: the rates at
+)
 # which these change are not known better, and do not stay the same
 TAILS, RARE = 0.5, 0.005  # share of what lies outside the gate that lies just outside, and of all readings, to be tails
 MOST_IN_TAILS = 0.05  # share of all readings: of more, nobody knows whether they are tails or outliers
@@ -62,8 +64,8 @@ class Record(NamedTuple):
 
 class Decision(NamedTuple):
     """Weights (n, 3), the model and starts they were made with, the estimated outlier rates (3, 3), how many rounds it
-    took, whether they stand still, for how many places no work was left to look for alternatives, the 1-sigma of the time
-    stamps, s, whether the noise drifts, and a model with correlated noise that explains the log as well."""
+    took, whether they stand still, for how many places no work was left to look for alternatives, the 1-sigma of the
+    time stamps, s, whether the noise drifts, and a model with correlated noise that explains the log as well."""
 
     weight: FloatArray
     model: Model
@@ -120,8 +122,8 @@ def allow_for_late_stamps(record: Record, decision: Decision) -> tuple[Record, D
 
 
 def allow_for_tails(record: Record, decision: Decision) -> tuple[Record, Decision]:
-    """The record with a wider gate, and the decisions made again, if most of what is rejected lies just outside it: then
-    the noise has tails, and it is they that are rejected."""
+    """The record with a wider gate, and the decisions made again, if most of what is rejected lies just outside it:
+    then the noise has tails, and it is they that are rejected."""
     log = record.weighted(decision.weight)
     smoothed = smooth_log(log, decision.model, decision.starts, residuals_only=True)
     off = np.abs(smoothed.residual) / np.sqrt(smoothed.residual_variance)
@@ -135,11 +137,13 @@ def allow_for_tails(record: Record, decision: Decision) -> tuple[Record, Decisio
 
 
 def _has_tails(off: FloatArray, gate: float, count: int) -> bool:
-    """Whether most residuals (n, 3), in sigmas, that lie outside a gate are alone and not twice as far, ever fewer with the
-    distance, and these are too many, among so many readings, for a normal distribution."""
+    """Whether most residuals (n, 3), in sigmas, that lie outside a gate are alone and not twice as far, ever fewer with
+    the distance, and these are too many, among so many readings, for a normal distribution."""
     outside = np.pad(off > gate, ((1, 1), (0, 0)))
     alone = outside[1:-1] & ~outside[:-2] & ~outside[2:]
-    near, far = (int((alone & (off > low * gate) & (off < math.sqrt(2) * low * gate)).sum()) for low in (1, math.sqrt(2)))
+    near, far = (
+        int((alone & (off > low * gate) & (off < math.sqrt(2) * low * gate)).sum()) for low in (1, math.sqrt(2))
+    )
     normal = NORMALLY * count * math.erfc(gate / math.sqrt(2))
     few = int(outside.sum()) <= MOST_IN_TAILS * count
     return few and near > FADING * far and near + far > max(TAILS * int(outside.sum()), RARE * count, normal)

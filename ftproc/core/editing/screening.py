@@ -104,9 +104,7 @@ def _best_parabola(
 
 
 @kernel
-def screen_component(
-    time: Vector, z: Vector, window: int, angular: bool, least_sigma: float
-) -> tuple[Vector, Vector]:
+def screen_component(time: Vector, z: Vector, window: int, angular: bool, least_sigma: float) -> tuple[Vector, Vector]:
     """(n,) share of windows in which each sample lies off the parabola, and (windows,) scale of each window.
 
     time (n,) s, z (n,) reading with NaN where missing, window: samples per window; windows overlap three-fold.
@@ -148,8 +146,8 @@ def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
 
     channel: (n,) one component, NaN where missing; sigma: its noise. Two neighbours of a reading rounded to steps of
     D agree by chance with probability about D / (2 sqrt(pi) sigma), and while the target stands in the middle of a step
-    as often as the log shows, so a coarse instrument is allowed long runs and a fine one almost none. The first reading of a run is good. A component of which a fifth is repeats is one that is
-    sampled faster than it measures, not stuck.
+    as often as the log shows, so a coarse instrument is allowed long runs and a fine one almost none. The first reading
+    of a run is good. A component of which a fifth is repeats is one that is sampled faster than it measures, not stuck.
     """
     found = np.zeros(len(channel), bool)
     seen = np.flatnonzero(np.isfinite(channel))

@@ -167,7 +167,9 @@ def _extrapolated(
         ukf.innovate(samples[k], f)
         for i in range(3):
             left.residual[i] = f.e[i]
-            left.residual_variance[i] = f.c[i, i] + f.noise[i] + f.late[i] * f.late[i] if math.isfinite(f.e[i]) else math.nan
+            left.residual_variance[i] = (
+                f.c[i, i] + f.noise[i] + f.late[i] * f.late[i] if math.isfinite(f.e[i]) else math.nan
+            )
         left.nis = math.nan
         for i in range(9):
             row.state[i] = f.x[i]
@@ -176,9 +178,7 @@ def _extrapolated(
 
 
 _extrapolate = kernel(variant(_extrapolated, __name__, "_extrapolate"))
-_extrapolate_coloured = kernel(
-    variant(_extrapolated, __name__, "_extrapolate_coloured", filters=ukf.ColouredFilters)
-)
+_extrapolate_coloured = kernel(variant(_extrapolated, __name__, "_extrapolate_coloured", filters=ukf.ColouredFilters))
 
 
 def extrapolated(log: Observations, model: Model, start: Start) -> tuple[Any, Any]:

@@ -154,8 +154,8 @@ def _nearest(time: Vector, z: Matrix, weight: Matrix, sample: int, first: int, l
 
 @kernel
 def _fit(time: Vector, z: Matrix, chosen: Indices, sample: int, c: int, sigma: float, fit: Vector) -> float:
-    """The parabola through the chosen readings at the time of `sample`: value, rate and its change there, and the 1-sigma
-    of each, in fit (6,). Returns the seconds over which the readings extend; without any, rates are unknown (infinite
+    """The parabola through the chosen readings at the time of `sample`: value, rate and its change there, and the
+    1-sigma of each, in fit (6,). Returns the seconds over which the readings extend; without any, rates are unknown (infinite
     sigmas).
 
     Readings on both sides of a manoeuvre lie on no parabola: then the farthest are left out, one by one. The scatter
@@ -192,7 +192,7 @@ def _fit(time: Vector, z: Matrix, chosen: Indices, sample: int, c: int, sigma: f
         fit[5] = 12 * scatter / (span * span) + (0.0 if curved else (abs(fit[1]) + fit[4]) / span)
         fit[4] += fit[5] * lead
         fit[3] = scatter + lead * fit[4]
-    return span
+    return float(span)
 
 
 @part

@@ -51,8 +51,8 @@ Rows = Annotated[Any, Layout(ROW)]
 
 class Uneven(NamedTuple):
     """How the noise of single readings differs from that of their component. times: (n, 3) how many times its variance.
-    late: (n, 3) m, rad, rad that a time stamp late by its 1-sigma adds to the three readings of a sample, by the rates at
-    which they change."""
+    late: (n, 3) m, rad, rad that a time stamp late by its 1-sigma adds to the three readings of a sample, by the rates
+    at which they change."""
 
     times: FloatArray
     late: FloatArray

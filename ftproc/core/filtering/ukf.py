@@ -273,7 +273,7 @@ def shared_noise(f: Filter, i: int, j: int) -> float:
     """What a late time stamp adds to the covariance of the noise of two components."""
     if f.late[i] == 0.0 or not f.used[i] * f.used[j] > 0:
         return 0.0
-    return f.late[i] * f.late[j] / math.sqrt(f.used[i] * f.used[j])
+    return float(f.late[i] * f.late[j] / math.sqrt(f.used[i] * f.used[j]))
 
 
 @part

@@ -34,7 +34,9 @@ LEAST = 0.1  # correlation of neighbours from which the noise may not be white .
 LEAST_IN_SIGMAS = 3.0  # ... if so many of its own standard errors away from zero
 FEWEST_PAIRS = 30  # neighbours, for their correlation to be asked for
 BLOCKS = 9  # stretches of a log whose correlations are compared
-SHORT_MEMORY = 4.0  # intervals: a filter with a shorter one follows noise that is correlated, so its residuals show none
+SHORT_MEMORY = (
+    4.0  # intervals: a filter with a shorter one follows noise that is correlated, so its residuals show none
+)
 FIRST_FADES = (1.5, 6.0, 25.0)  # intervals: correlation times with which the search begins,
 FIRST_CALMS = (1.0, 1e-3)  # and shares of the jerk that white noise leads to
 FIRST_STEPS, STEPS, PROFILE_STEPS = 5, 15, 4
@@ -115,8 +117,8 @@ class _Search:
         if fixed.jerk:
             low = high = level
         fades = np.log(np.array([SHORTEST_FADE * scales.interval_s, LONGEST_FADE * scales.span_s]))
-        fewest = math.log(NEGLIGIBLE) - math.log(LARGEST)
-        fewest, most = np.where(fixed.noise, 0.0, fewest), np.where(fixed.noise, 0.0, math.log(LARGEST))
+        fewest = np.where(fixed.noise, 0.0, math.log(NEGLIGIBLE / LARGEST))
+        most = np.where(fixed.noise, 0.0, math.log(LARGEST))
         none = np.where(fixed.noise, math.log(NEGLIGIBLE) - 1.0, 0.0)  # noise that is specified is white
         self.lower = np.r_[given + fewest, given + fewest + none, np.full(3, fades[0]), low]
         self.upper = np.r_[given + np.minimum(most, 1.0), given + most + none, np.full(3, max(fades)), high]
@@ -127,8 +129,8 @@ class _Search:
         """Where a search begins: with half of the noise correlated over `fade` intervals, and so much of the jerk."""
         given, jerk = np.log(0.5 * self.white.noise_variance), self.white.jerk[0]
         motion = [math.log(calm * jerk[0]), math.log(jerk[5] / jerk[0])]
-        return np.clip(np.r_[given, given, np.full(3, math.log(fade * self.scales.interval_s)), motion],
-                       self.lower, self.upper)  # fmt: skip
+        theta = np.r_[given, given, np.full(3, math.log(fade * self.scales.interval_s)), motion]
+        return np.asarray(np.clip(theta, self.lower, self.upper), np.float64)
 
     def model(self, theta: FloatArray) -> Model:
         """The model of some parameters."""
@@ -144,7 +146,9 @@ class _Search:
         for c in range(3):
             moved = theta.copy()
             moved[6 + c] += STEP
-            fades[c] = (score_log(self.log, self.model(moved), self.starts).log_likelihood - found.log_likelihood) / STEP
+            fades[c] = (
+                score_log(self.log, self.model(moved), self.starts).log_likelihood - found.log_likelihood
+            ) / STEP
         slope = -np.r_[found.noise, found.wander, fades, by_axis.sum(), by_axis[5] - pull]
         return -found.log_likelihood + 0.5 * pull * theta[10], slope
 

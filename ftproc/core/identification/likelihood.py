@@ -99,8 +99,8 @@ def fit_level(
 ) -> Model:
     """The likeliest noise variances and single jerk density with its vertical share, starting from `guess`.
 
-    fixed: what stays as guessed. expected_sigma: (3,) noise that NOISE_GROWTH counts from, if not the guess. least_sigma:
-    (3,) that it cannot be below.
+    fixed: what stays as guessed. expected_sigma: (3,) noise that NOISE_GROWTH counts from, if not the guess.
+    least_sigma: (3,) that it cannot be below.
     """
     if fixed.noise.all() and fixed.jerk:
         return guess

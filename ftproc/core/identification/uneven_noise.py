@@ -2,8 +2,8 @@
 
 What is found is how many times the variance of a component's noise that of each reading is. Time stamps that are off by
 sigma_t add (sigma_t dz/dt)^2, the same sigma_t for the three components; the variance may drift with elevation, range
-or signal, so slowly that the residuals of a stretch show it; and a reading that repeats the one before, because the target
-has not moved by a rounding step, says nothing new.
+or signal, so slowly that the residuals of a stretch show it; and a reading that repeats the one before, because the
+target has not moved by a rounding step, says nothing new.
 """
 
 from __future__ import annotations
@@ -24,7 +24,10 @@ LEAST_GAIN, SHARE = 15.0, 0.1  # in log-likelihood, and for each sample, for lat
 STEPS = 30
 WINDOW = 60  # readings from which a variance is taken
 FEWEST_WINDOWS = 6
-CHI2_MEDIAN, MEDIAN_SPREAD = 0.45494, 2.66  # of chi-square with one degree: median, and sqrt(n) sigma of its estimate's log
+CHI2_MEDIAN, MEDIAN_SPREAD = (
+    0.45494,
+    2.66,
+)  # of chi-square with one degree: median, and sqrt(n) sigma of its estimate's log
 LEAST_DRIFT = 0.15  # 1-sigma of ln(variance) over the windows, beyond chance
 LARGEST_DRIFT = 3.0  # of ln(variance)
 GOES_BACK = 0.2  # share of the changes of a rounded reading that go back to the value before: more of them is noise
@@ -103,8 +106,8 @@ def drift(log: Observations, smoothed: SmootherRun) -> FloatArray | None:
 
 
 def repeated(measurement: FloatArray, step: FloatArray) -> Uneven | None:
-    """As many times the variance as the run of equal readings is long that a reading belongs to, where it is longer than
-    chance makes it; None if nowhere. step (3,): of rounding, zero for none."""
+    """As many times the variance as the run of equal readings is long that a reading belongs to, where it is longer
+    than chance makes it; None if nowhere. step (3,): of rounding, zero for none."""
     uneven = Uneven.none(len(measurement))
     found = uneven.times
     for c in np.flatnonzero(step > 0):

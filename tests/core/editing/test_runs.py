@@ -74,7 +74,9 @@ def test_long_runs_are_no_patches_at_one_reading_a_second():
     """Six seconds: what lasts longer at a low rate may be a turn."""
     u = np.random.default_rng(2).standard_normal((400, 3))
     u[100:130] += 3.0
-    fast, slow = (runs.suspicious(dt * np.arange(400), u, np.ones((400, 3)), np.ones((400, 3)), 1.5) for dt in (0.1, 1.0))
+    fast, slow = (
+        runs.suspicious(dt * np.arange(400), u, np.ones((400, 3)), np.ones((400, 3)), 1.5) for dt in (0.1, 1.0)
+    )
     assert fast[100:130].all()
     assert np.diff(runs.runs_of(slow[:, 0])).max() <= 6
 

@@ -233,9 +233,7 @@ def test_start_after_a_gap_rests_on_its_own_side_only():
     np.testing.assert_array_equal(one.state, other.state)
 
 
-@pytest.mark.parametrize(
-    ("seconds", "jerk", "again"), [(4.0, 100.0, False), (20.0, 1e-3, False), (20.0, 100.0, True)]
-)
+@pytest.mark.parametrize(("seconds", "jerk", "again"), [(4.0, 100.0, False), (20.0, 1e-3, False), (20.0, 100.0, True)])
 @pytest.mark.parametrize("component", range(3))
 def test_filter_is_re_initialized_after_one_component_was_blind_too_long(component, seconds, jerk, again):
     """The others hold the track, so the gap may be longer; a filter that comes out of it would be lost."""

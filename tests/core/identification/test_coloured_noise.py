@@ -65,7 +65,9 @@ def test_scores_are_the_slopes_of_the_likelihood():
                 changed[c] *= np.exp(sign * step)
                 value.append(score_log(a.log, model._replace(**{name: changed}), a.starts).log_likelihood)
             assert score[c] == pytest.approx((value[0] - value[1]) / (2 * step), rel=2e-2, abs=2e-2)
-    value = [score_log(a.log, model._replace(jerk=model.jerk * np.exp(s * step)), a.starts).log_likelihood for s in (1, -1)]
+    value = [
+        score_log(a.log, model._replace(jerk=model.jerk * np.exp(s * step)), a.starts).log_likelihood for s in (1, -1)
+    ]
     assert (scores.jerk * model.jerk).sum() == pytest.approx((value[0] - value[1]) / (2 * step), rel=2e-2, abs=2e-2)
 
 
@@ -97,14 +99,14 @@ def test_correlated_noise_is_found_and_sigmas_stay_honest(samples, seed):
 @pytest.mark.parametrize("name", ["cruise", "radar", "calibration"])
 def test_noise_that_cannot_be_separated_from_motion_widens_the_sigmas(name):
     """With a correlation over 2 s of 20 the estimate may follow the noise, and the sigmas allow for that."""
-    flight, found = edited(20.0, 3, name, 20.0)
+    _, found = edited(20.0, 3, name, 20.0)
     assert found.decision.alternative is not None or found.model.coloured
 
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("seed", range(3))
 def test_white_noise_is_not_called_correlated(seed):
-    flight, found = edited(0, seed)
+    _, found = edited(0, seed)
     assert not found.model.coloured
     assert found.decision.alternative is None
 

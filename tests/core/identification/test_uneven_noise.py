@@ -60,7 +60,9 @@ def test_a_late_stamp_is_noise_that_the_components_share():
         sigma = np.sqrt(np.diag(p))
         expected = x + gain @ naive.difference(z, z_hat)[on]
         np.testing.assert_allclose(found[0] / sigma, expected / sigma, rtol=1e-7, atol=1e-7)
-        np.testing.assert_allclose(found[1] / np.outer(sigma, sigma), (p - gain @ s @ gain.T) / np.outer(sigma, sigma), atol=1e-9)
+        np.testing.assert_allclose(
+            found[1] / np.outer(sigma, sigma), (p - gain @ s @ gain.T) / np.outer(sigma, sigma), atol=1e-9
+        )
 
 
 @pytest.mark.compiled
