@@ -148,7 +148,7 @@ $(oldest): pyproject.toml tests/requirements-oldest.txt
 	  { echo 'The oldest versions need Python 3.11: make oldest PYTHON=/path/to/python3.11' >&2; exit 1; }
 	@$(PYTHON) -m venv $(VENV)-oldest
 	@$(VENV)-oldest/bin/python -m pip install --quiet --disable-pip-version-check \
-	  -c tests/requirements-oldest.txt -e '.[geo,formats,report,wavelet]' pytest hypothesis
+	  -c tests/requirements-oldest.txt -e '.[geo,formats,hdf5,report,wavelet]' pytest hypothesis
 	@touch $@
 
 audit: $(developer) ## whether a vulnerability of one of the tested versions is known to PyPI

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ from ftproc import pipeline
 from ftproc.config.reading import load
 from ftproc.config.recipe import Recipe
 from ftproc.correction import model_file
-from ftproc.files.writing import geodesy
+from ftproc.files.writing import clock, geodesy
 from ftproc.records import MeasurementLog, Trajectory, Truth
 from ftproc.settings import PACKAGED, FilterSettings, TrainSettings
 
@@ -25,14 +26,17 @@ if TYPE_CHECKING:
 
 
 def read_log(source: Any, *, config: str | Path | None = None, **options: Any) -> MeasurementLog:
-    """A log from a file (.csv, .csv.gz, .parquet, .feather), a pandas DataFrame or a pyarrow Table.
+    """A log from a file of any kind that `ftproc filter` reads, a pandas DataFrame or a pyarrow Table.
 
     config: a station file. options: units, columns, azimuth_from, keep_columns, station (see
-    `ftproc.files.reading.logs.read`); they win over it. Raises InputError, UsageError.
+    `ftproc.files.reading.logs.read`), widths, where, target (as on the command line); they win over it. The log's
+    `understood` says how the file was understood. Raises InputError, UsageError.
     """
     from ftproc.files.reading import logs
 
-    return logs.read(source, **{**_recipe(config).reading(), **options})
+    extracting = {name: options.pop(name) for name in ("widths", "where", "target") if name in options}
+    recipe = replace(_recipe(config), **extracting)
+    return logs.read(source, **{**recipe.reading(), **options})
 
 
 def filter_log(
@@ -54,7 +58,7 @@ def filter_log(
     if isinstance(model, str):
         model = model_file.named(recipe.model if model == PACKAGED else model)
     read = log if isinstance(log, MeasurementLog) else read_log(log, config=config)
-    return geodesy.located(pipeline.filter_log(read, settings, model), settings)
+    return clock.stamped(geodesy.located(pipeline.filter_log(read, settings, model), settings), read)
 
 
 def train(

@@ -43,7 +43,8 @@ class MeasurementLog:
     rows_in_file, rows_without_time, rows_out_of_order, duplicate_times: counts and row numbers of what was read.
     extra: the other columns of the file, row for row with `time_s`; only if they were asked for.
     station: what is known of the instrument, already applied. epoch: the instant of time zero (ISO 8601) or "".
-    remarks: how the file was understood, for the user.
+    remarks: how the file was understood, for the user. understood: the same in full, see
+    `files.reading.understanding`.
     """
 
     name: str
@@ -59,6 +60,7 @@ class MeasurementLog:
     station: Station = field(default_factory=Station)
     epoch: str = ""
     remarks: tuple[str, ...] = ()
+    understood: Mapping[str, Any] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -24,7 +24,7 @@ class Station:
     azimuth_from: str = "x"  # x | north: the axis that the azimuth is counted from, see ftproc.files.conventions
     azimuth_sense: str | None = None  # clockwise | anticlockwise from above; None: north clockwise, x anticlockwise
     azimuth_zero_rad: float = 0.0  # azimuth where the instrument reads zero
-    elevation_from: str = "horizon"  # horizon | zenith
+    elevation_from: str | None = None  # horizon | zenith; None: zenith if the column's name says so, else horizon
     bias: tuple[float, float, float] = (0.0, 0.0, 0.0)  # reading minus truth: range m, azimuth rad, elevation rad
     time_offset_s: float = 0.0  # added to every time
     refraction: Air | None = None  # for the elevation of an optical instrument; None: no correction

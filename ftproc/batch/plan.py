@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ftproc.batch.tasks import Task
@@ -13,16 +14,22 @@ from ftproc.files.writing import atomic
 INDEX = "index.html"
 _REPORT = "--report"
 _PAGES = (".html", ".htm")
-#: Ending of the trajectory's name by that of the log's.
-_SUFFIX = {".csv": ".csv", ".csv.gz": ".csv", ".parquet": ".parquet", ".feather": ".feather"}
+#: Ending of the trajectory's name by that of the log's, where it is not .csv.
+_SUFFIX = {".parquet": ".parquet", ".feather": ".feather"}
+_PACKED = (".gz", ".bz2", ".xz", ".zst", ".zip")
 
 
 def tasks(
-    logs: Sequence[str], output: str | None, methods: Sequence[str] | None = None, inputs: Sequence[str] = ()
+    logs: Sequence[str],
+    output: str | None,
+    methods: Sequence[str] | None = None,
+    inputs: Sequence[str] = (),
+    targets: Mapping[str, Sequence[str]] | None = None,
 ) -> list[Task]:
-    """One task per log, or per log and method, with its output; makes the directory.
+    """One task per log, or per log, target and method, with its output; makes the directory.
 
     methods: names of methods, which the names of the outputs then contain. inputs: other files not to be overwritten.
+    targets: COLUMN=VALUE of the targets of each log, whose values the names of the outputs then contain.
     Raises UsageError, OutputError.
     """
     if "-" in logs and len(logs) > 1:
@@ -32,8 +39,13 @@ def tasks(
         if methods:
             raise UsageError("--method all writes several trajectories: name a directory with -o.")
     else:
-        directory = _directory(output, several=len(logs) > 1 or bool(methods))
-    planned = [_task(log, output, directory, method) for log in logs for method in (methods or (None,))]
+        directory = _directory(output, several=len(logs) > 1 or bool(methods) or bool(targets))
+    planned = [
+        _task(log, output, directory, method, target)
+        for log in logs
+        for target in (targets or {}).get(log, ("",))
+        for method in (methods or (None,))
+    ]
     _check(planned, [*logs, *inputs])
     if directory is not None and not remote.is_uri(directory):
         _make(Path(directory))
@@ -58,16 +70,25 @@ def _directory(output: str, several: bool) -> str | None:
     return output
 
 
-def _task(log: str, output: str | None, directory: str | None, method: str | None) -> Task:
+def _task(log: str, output: str | None, directory: str | None, method: str | None, target: str) -> Task:
     if output is not None and directory is None:
-        return Task(log, output, method)
+        return Task(log, output, method, target=target)
     if log == "-" and output is None:
-        return Task(log, "-", method)  # in a pipe, out of a pipe
+        return Task(log, "-", method, target=target)  # in a pipe, out of a pipe
     name = "stdin.csv" if log == "-" else Path(log).name
-    kind = layout.table_kind(name) or ".csv"
-    stem = name[: -len(kind)] if layout.table_kind(name) else Path(name).stem
-    middle = f".{method}" if method else ""
-    return Task(log, remote.within(directory or ".", f"{stem}{middle}.trajectory{_SUFFIX[kind]}"), method)
+    stem, kind = _stem_and_kind(name)
+    value = re.sub(r"[^\w+-]", "_", target.partition("=")[2])
+    middle = "".join(f".{part}" for part in (value, method) if part)
+    written = remote.within(directory or ".", f"{stem}{middle}.trajectory{_SUFFIX.get(kind, '.csv')}")
+    return Task(log, written, method, target=target)
+
+
+def _stem_and_kind(name: str) -> tuple[str, str]:
+    """The name of a log without its endings, and the last of these that is not one of packing: flight.csv.gz, .csv."""
+    path = Path(name.partition("#")[0])
+    if path.suffix.lower() in _PACKED and path.stem:
+        path = Path(path.stem)
+    return path.stem, path.suffix.lower()
 
 
 def _check(tasks: Sequence[Task], inputs: Sequence[str]) -> None:

@@ -28,13 +28,14 @@ Notify = Callable[[str], None]
 class Task:
     """One log to filter and the file of its trajectory; either may be `-`. method: instead of the recipe's. report: the
     file of the HTML page, if there is one. place: the directory of relative names, when it is not the worker's current
-    one."""
+    one. target: COLUMN=VALUE, instead of the recipe's."""
 
     log: str
     output: str
     method: str | None = None
     report: str | None = None
     place: str = ""
+    target: str = ""
 
     def at(self, name: str) -> str:
         """The file of that name, as the worker finds it."""
@@ -43,12 +44,14 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a task: its summary as text and as a dictionary, or its failure; and its duration."""
+    """The outcome of a task: its summary as text and as a dictionary, or its failure; how its log was understood; and
+    its duration."""
 
     task: Task
     text: str = ""
     summary: Mapping[str, Any] = field(default_factory=dict)
     failure: Failure | None = None
+    understood: Mapping[str, Any] = field(default_factory=dict)
     elapsed_s: float = 0.0
 
 
@@ -63,13 +66,13 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
     from ftproc.core import compiled
     from ftproc.correction import model_file
     from ftproc.files.reading import logs
-    from ftproc.files.writing import geodesy, trajectories
+    from ftproc.files.writing import clock, geodesy, trajectories
     from ftproc.methods import registry
     from ftproc.quality import summary
 
     started = time.perf_counter()
     try:
-        log = logs.read(task.at(task.log), **recipe.reading())
+        log = logs.read(task.at(task.log), **recipe.reading(task.target))
         if task.place:
             log = replace(log, name=task.log)  # as the user named it
         settings = replace(recipe.settings, method=task.method or recipe.settings.method)
@@ -79,7 +82,7 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
             model = model_for(registry.named(task.method), recipe.model)
         filtering = pipeline.Filtering(log, settings, model)
         with compiled.announced(notify), _forwarded(task.log, notify):
-            parts = (geodesy.located(part, settings) for part in filtering.parts())
+            parts = (clock.stamped(geodesy.located(part, settings), log) for part in filtering.parts())
             if task.report is None:
                 trajectories.write_parts(parts, lambda: filtering.metadata, task.at(task.output))
             else:
@@ -89,7 +92,8 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
                 report.write(trajectory, task.at(task.report))
         metadata = filtering.metadata
         elapsed_s = time.perf_counter() - started
-        return Outcome(task, summary.text(metadata), summary.as_dict(metadata), elapsed_s=elapsed_s)
+        said = summary.text(metadata), summary.as_dict(metadata)
+        return Outcome(task, *said, understood=log.understood, elapsed_s=elapsed_s)
     except BrokenPipeError:
         raise
     except Exception as error:

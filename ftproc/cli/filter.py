@@ -39,12 +39,27 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
 @click.option(
     "--elevation-from",
     type=click.Choice(["horizon", "zenith"]),
-    default="horizon",
-    help="Zero of the elevation; zenith: the log has zenith angles.",
+    help="Zero of the elevation; zenith: the log has zenith angles. [default: zenith if the column is called so, else "
+    "horizon]",
 )
 @options.units("Units of columns whose names state none, such as range=km,azimuth=deg. [default: s, m, rad]")
 @click.option(
-    "--columns", metavar="NAME=COLUMN,...", help="Names of columns that are not recognized, such as time=T0,range=RNG."
+    "--columns",
+    metavar="NAME=COLUMN,...",
+    help="Names of columns that are not recognized, or their numbers from 1, such as time=T0,range=RNG or time=1.",
+)
+@click.option("--widths", metavar="N,N,...", help="Widths of the columns of a text without separators, in characters.")
+@click.option(
+    "--where",
+    multiple=True,
+    metavar="CONDITION",
+    help="Read only rows that meet it, such as quality>=5 or mode=auto; may be given several times.",
+)
+@click.option(
+    "--target",
+    metavar="COLUMN=VALUE|COLUMN",
+    help="One of several targets in a file, such as track=7; a COLUMN alone: a trajectory of each of its values; none: "
+    "there is one target, however the rows look.",
 )
 @click.option("--keep-columns/--no-keep-columns", help="Copy the log's other columns to the trajectory.")
 @click.option(
@@ -71,13 +86,17 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     help="Form of the printed summary of each trajectory; on stderr when the trajectory goes to stdout.",
 )
 @options.report("a trajectory, its readings and residuals, and the verdict")
+@click.option(
+    "--explain", is_flag=True, help="Print how each log is understood, with its first rows, and filter nothing."
+)
 @click.option("--list-methods", is_flag=True, help="List the methods, and filter nothing.")
-def command(list_methods: bool, write_config: bool, **options: Any) -> None:
+def command(list_methods: bool, write_config: bool, explain: bool, **options: Any) -> None:
     """Find the outliers of LOGs, and estimate the target's trajectory with its uncertainty.
 
-    A LOG is a .csv, .csv.gz, .parquet or .feather file (or a URI of one) with time, range, azimuth and elevation, or -
-    for CSV on standard input. Measurement noise and process noise are estimated from the log. A bad log does not stop
-    the others; the exit code is then 1.
+    A LOG is a text file (.csv, .txt, .tsv, .dat), .parquet, .feather, .arrow, .xlsx, .jsonl, .h5 or .mat, even packed
+    (.gz, .bz2, .xz, .zst, .zip), or a URI of one, with time, range, azimuth and elevation; or - for text on standard
+    input. A sheet or group in it stands behind #: flight.h5#radar. Measurement noise and process noise are estimated
+    from the log. A bad log does not stop the others; the exit code is then 1.
     """
     ctx = click.get_current_context()
     if list_methods:
@@ -89,7 +108,14 @@ def command(list_methods: bool, write_config: bool, **options: Any) -> None:
 
         click.echo(filtering.station_file(ctx), nl=False)
     elif not options["logs"]:
-        raise click.UsageError("Name at least one log.", ctx)
+        from ftproc.cli import explaining
+
+        click.echo(f"{ctx.command_path}: {explaining.first_commands()}", err=True)
+        ctx.exit(2)
+    elif explain:
+        from ftproc.cli import explaining, filtering
+
+        ctx.exit(explaining.explain(options["logs"], filtering.recipe(ctx), options["summary"], ctx.meta[DEBUG]))
     else:
         start_quickly()
         from ftproc.cli import filtering

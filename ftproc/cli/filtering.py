@@ -12,12 +12,13 @@ from click.core import ParameterSource
 
 from ftproc.batch import plan, run
 from ftproc.batch.tasks import Outcome, model_for
+from ftproc.cli import explaining
 from ftproc.cli.progress import Progress
 from ftproc.config import reading, writing
 from ftproc.config.recipe import Recipe
-from ftproc.errors import UsageError, printable
+from ftproc.errors import InputError, UsageError, printable
 from ftproc.files import conventions
-from ftproc.files.options import parse_columns, parse_units
+from ftproc.files.options import ABSENT, parse_columns, parse_units, parse_where, parse_widths
 from ftproc.files.writing import geodesy, maps
 from ftproc.methods import registry
 from ftproc.quality.summary import line
@@ -61,6 +62,8 @@ def _options(ctx: click.Context) -> dict[str, Any]:
     for name, parse in (("units", parse_units), ("columns", parse_columns)):  # quantities not named here: the file's
         if name in options:
             options[name] = {**kept.get(name, {}), **parse(stated.get(name))}
+    parse_widths(options.get("widths"))
+    parse_where(options.get("where"))
     if options.get("method", ALL) != ALL:
         registry.named(options["method"])
     return options
@@ -75,7 +78,8 @@ def filter_logs(request: Request, recipe: Recipe, debug: bool) -> int:
     methods = _applicable(recipe) if recipe.settings.method == ALL else None
     named = (name for name in (recipe.model, request.config) if isinstance(name, str))
     inputs = [name for name in named if name not in (PACKAGED, NO_MODEL)]
-    tasks = plan.tasks(request.logs, request.output, methods, inputs)
+    targets = _targets(request.logs, recipe)
+    tasks = plan.tasks(request.logs, request.output, methods, inputs, targets)
     for task in tasks:
         maps.check(task.output, recipe.settings.site)
     pages, index = plan.pages([task.output for task in tasks], request.report, [*request.logs, *inputs])
@@ -99,6 +103,25 @@ def filter_logs(request: Request, recipe: Recipe, debug: bool) -> int:
     return failures[0] if len(done) == 1 and failures else int(bool(failures))
 
 
+def _targets(logs: Sequence[str], recipe: Recipe) -> dict[str, list[str]] | None:
+    """COLUMN=VALUE of each target in each log, if the option names a column; None if it does not. The value of a log
+    that cannot be read is left out: reading it again gives the message."""
+    from ftproc.files.reading.logs import targets
+
+    column = recipe.target
+    if column in ("", ABSENT) or "=" in column:
+        return None
+    if "-" in logs:
+        raise UsageError("--target COLUMN reads a log twice, which standard input does not allow; name a file.")
+    found = {}
+    for log in logs:
+        try:
+            found[log] = [f"{column}={value}" for value in targets(log, column, parse_widths(recipe.widths))]
+        except InputError:
+            found[log] = [column]
+    return found
+
+
 def _applicable(recipe: Recipe) -> list[str]:
     """The methods that can be run; reports why the others are left out."""
     found = []
@@ -117,6 +140,8 @@ def _notify(text: str) -> None:
 
 
 def _show(outcome: Outcome, summary: str, debug: bool) -> None:
+    if debug and outcome.understood:
+        click.echo(explaining.text(outcome.task.log, outcome.understood), err=True)
     if outcome.failure is not None:
         if debug:
             click.echo(outcome.failure.trace, err=True)
@@ -138,9 +163,13 @@ def _write_index(done: Sequence[Outcome], index: str) -> None:
 
 
 def _written(outcome: Outcome) -> dict[str, str]:
-    """The file of the trajectory and, if there is one, of the page."""
-    report = outcome.task.report
-    return {"output": outcome.task.output, **({} if report is None else {"report": report})}
+    """The target, the file of the trajectory and, if there is one, of the page."""
+    report, target = outcome.task.report, outcome.task.target
+    return {
+        **({"target": target} if target else {}),
+        "output": outcome.task.output,
+        **({} if report is None else {"report": report}),
+    }
 
 
 def _show_json(done: Sequence[Outcome]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from ftproc.config.kinds import Kind, file_name, flag, method, number, positive, text, whole, words
+from ftproc.config.kinds import Kind, file_name, flag, method, number, positive, text, whole, widths, words
 from ftproc.files.units import UNITS
 from ftproc.records import COMPONENTS
 from ftproc.settings import Air, FilterSettings
@@ -34,6 +34,7 @@ class Key(NamedTuple):
 
 SECTIONS: Mapping[str, str] = {
     "site": "The position of the station, for latitudes, earth-centred coordinates and maps.",
+    "file": "How the log is written.",
     "time": "Each quantity: its column in the log, and what is known of the instrument.",
     "range": "",
     "azimuth": "",
@@ -66,6 +67,7 @@ _FROM_X = "x: A = atan2(y, x); north: then x is north, y east"
 _SENSE = "seen from above; left out: clockwise from north, anticlockwise from x"
 _OFFSET = "added to every time"
 _ZERO = "azimuth where it reads zero"
+_WIDTHS = "of fixed-width columns, in characters"
 _GEOID = "height of the geoid above the ellipsoid, for KML"
 _MODEL = "packaged, none, or a file beside this one"
 _PATCH = "longest patch of outliers expected (forward editing)"
@@ -78,6 +80,7 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
         "geoid_m": Key("geoid_m", number(-150, 150), 46.2, _GEOID),
         "datum": Key("datum", words("WGS-84"), "WGS-84", "no other is understood", default="WGS-84"),
     },
+    "file": {"widths": Key("widths", widths, "10,12,12,12", _WIDTHS)},
     "time": {
         **_column("time", "UTC"),
         "offset": Key("time_offset_s", number(), 12.0, _OFFSET, quantity="time", default=0.0, example_unit="ms"),
@@ -92,7 +95,7 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
     },
     "elevation": {
         **_column("elevation", "EL"),
-        "from": Key("elevation_from", words("horizon", "zenith"), "horizon", "or zenith angles", default="horizon"),
+        "from": Key("elevation_from", words("horizon", "zenith"), "horizon", "left out: as the column is called"),
         **_errors("elevation", 0.2, 0.1),
     },
     "refraction": {

@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from ftproc.errors import nearest
+from ftproc.errors import UsageError, nearest
+from ftproc.files.options import parse_widths
 
 #: The value as the options hold it, or a ValueError that says what was expected.
 Kind = Callable[[object], Any]
@@ -70,6 +71,17 @@ def text(value: object) -> str:
     if not isinstance(value, str) or not value.strip():
         raise ValueError("a text in quotes")
     return value
+
+
+def widths(value: object) -> str:
+    """The widths of columns, as text such as "10,12,12,12" or as a list of whole numbers."""
+    expected = 'widths such as "10,12,12,12"'
+    if not isinstance(value, str | list):
+        raise ValueError(expected)
+    try:
+        return ",".join(map(str, parse_widths(value)))
+    except UsageError as error:
+        raise ValueError(expected) from error
 
 
 def file_name(value: object) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
+from ftproc.files.options import Extract, parse_where, parse_widths
 from ftproc.settings import PACKAGED, Air, FilterSettings, Station
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ _SETTINGS = {"jerk": "jerk_psd_m2ps5", "max_patch": "max_patch_s"}
 @dataclass(frozen=True)
 class Recipe:
     """What is done with every log. model: `packaged`, `none`, a path or a loaded model. units, columns, station,
-    keep_columns: as in `files.reading.logs.read`."""
+    keep_columns: as in `files.reading.logs.read`. widths, where, target: as the options of these names."""
 
     settings: FilterSettings = field(default_factory=FilterSettings)
     model: str | Model = PACKAGED
@@ -27,6 +28,9 @@ class Recipe:
     columns: str | Mapping[str, str] | None = None
     station: Station = field(default_factory=Station)
     keep_columns: bool = False
+    widths: str | Sequence[int] | None = None
+    where: Sequence[str] = ()
+    target: str = ""
 
     @classmethod
     def of(cls, options: Mapping[str, Any]) -> Recipe:
@@ -39,9 +43,11 @@ class Recipe:
         found: Recipe = _picked(cls, known)
         return found
 
-    def reading(self) -> dict[str, Any]:
-        """The arguments for `files.reading.logs.read`."""
-        return {name: getattr(self, name) for name in ("units", "columns", "station", "keep_columns")}
+    def reading(self, target: str = "") -> dict[str, Any]:
+        """The arguments for `files.reading.logs.read`. target: instead of the recipe's."""
+        plain = {name: getattr(self, name) for name in ("units", "columns", "station", "keep_columns")}
+        extract = Extract(parse_widths(self.widths), parse_where(self.where), target or self.target)
+        return {**plain, "extract": extract}
 
 
 def _picked(kind: type[Any], known: Mapping[str, Any]) -> Any:

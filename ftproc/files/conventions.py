@@ -34,7 +34,7 @@ def check(station: Station) -> None:
     """Raise UsageError for values that are not understood."""
     for name, words in _CHOICES.items():
         value = getattr(station, name)
-        if value not in words:
+        if value not in words and not (value is None and name == "elevation_from"):
             option = "--" + name.replace("_", "-")
             raise UsageError(f'{option}: "{value}" is not understood; say {" or ".join(words)}.')
     if station.azimuth_sense not in (None, *_OWN_SENSE.values()):

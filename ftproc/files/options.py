@@ -1,27 +1,77 @@
-"""The options that describe the columns of a log: `--units` and `--columns`."""
+"""The options that describe what is read of a log: `--units`, `--columns`, `--widths`, `--where`, `--target`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from ftproc.errors import UsageError, nearest
-from ftproc.files.units import ALIASES, QUANTITIES, SPELT_OUT, UNITS, Unit
+from ftproc.files.units import ALIASES, QUANTITIES, UNITS, unit_named
 
 #: `--columns range=none`: the file has no such quantity, whatever its columns are called.
 ABSENT = "none"
 
 _EXAMPLES = {"--units": "range=km,azimuth=deg", "--columns": "time=T0,range=RNG"}
 
+_CONDITION = re.compile(r"\s*(.+?)\s*(<=|>=|==|!=|=|<|>)\s*(.*?)\s*")
+_MOST_WIDTH = 10_000  # characters
+
+
+class Condition(NamedTuple):
+    """A row counts if its cell of `column` passes `test` (<, <=, =, !=, >=, >) against `value`."""
+
+    column: str
+    test: str
+    value: str
+
+    def __str__(self) -> str:
+        return f"{self.column}{self.test}{self.value}"
+
+
+class Extract(NamedTuple):
+    """What of a file is read. widths: of the columns of a text, in characters. where: conditions on its rows. target:
+    COLUMN=VALUE for one of several, or `none`: there is only one, however the rows look."""
+
+    widths: tuple[int, ...] = ()
+    where: tuple[Condition, ...] = ()
+    target: str = ""
+
+
+def parse_widths(given: str | Sequence[int] | None) -> tuple[int, ...]:
+    """The `--widths` option -> the widths of the columns in characters. Raises UsageError."""
+    parts = given.split(",") if isinstance(given, str) else given or ()
+    try:
+        widths = tuple(int(part) for part in parts)
+    except (TypeError, ValueError):
+        widths = (0,)
+    if any(not 0 < width <= _MOST_WIDTH for width in widths):
+        raise UsageError(f'--widths: "{given}" is not a list of whole numbers above zero, such as 8,10,10,8.')
+    return widths
+
+
+def parse_where(given: Sequence[str] | str | None) -> tuple[Condition, ...]:
+    """The `--where` options -> conditions. Raises UsageError for what is not COLUMN<VALUE or the like."""
+    found = []
+    for text in [given] if isinstance(given, str) else given or ():
+        parts = _CONDITION.fullmatch(text)
+        if parts is None or not parts[3]:
+            raise UsageError(f'--where: "{text}" is not a condition such as quality>=5 or mode=auto.')
+        found.append(Condition(parts[1], parts[2].replace("==", "="), parts[3]))
+    return tuple(found)
+
 
 def parse_units(given: str | Mapping[str, str] | None) -> dict[str, str]:
     """The `--units` option -> {quantity: unit name}. Raises UsageError for a quantity or unit not known."""
-    found = {quantity: name.lower() for quantity, name in _pairs("--units", given).items()}
-    for quantity, name in found.items():
-        if name not in UNITS[quantity]:
+    found = {}
+    for quantity, word in _pairs("--units", given).items():
+        unit = unit_named(quantity, word)
+        if unit is None:
             raise UsageError(
-                f'--units: "{name}" is not a unit of {quantity}; understood are '
-                f"{', '.join(UNITS[quantity])}{_nearest_unit(name, UNITS[quantity])}"
+                f'--units: "{word}" is not a unit of {quantity}; understood are '
+                f"{', '.join(UNITS[quantity])}{nearest(word, UNITS[quantity])}"
             )
+        found[quantity] = unit.name
     return found
 
 
@@ -72,9 +122,3 @@ def _quantity(option: str, key: str) -> str:
         f'{option}: "{key.strip()}" is not a quantity of a log; expected {", ".join(QUANTITIES)}'
         f"{nearest(wanted, QUANTITIES)}"
     )
-
-
-def _nearest_unit(word: str, known: Mapping[str, Unit]) -> str:
-    """As `nearest`, also for a unit that is spelt out: metres, degrees."""
-    spelt = next((unit for unit, stem in SPELT_OUT.items() if unit in known and word.lower().startswith(stem)), None)
-    return nearest(spelt or word, known)

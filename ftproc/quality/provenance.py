@@ -41,8 +41,13 @@ def describe(
         "log": log.name,
         "frame": log.frame,
         "convention": CONVENTION[log.frame],
-        "station": {**asdict(log.station), "in_words": in_words(log.station)},
+        "station": {
+            **asdict(log.station),
+            "elevation_from": log.station.elevation_from or "horizon",
+            "in_words": in_words(log.station),
+        },
         "epoch": log.epoch,
+        "understood": dict(log.understood),
         "settings": {
             "editing": method.editing(settings),
             "smooth": settings.smooth,

@@ -201,7 +201,6 @@ def test_debug_shows_where_a_log_failed(run, here):
 @pytest.mark.parametrize(
     ("args", "sentence"),
     [
-        ([], "Name at least one log."),
         (["flight.csv", "--method", "ekff"], "there is no method 'ekff'; did you mean 'ekf'?"),
         (["flight.csv", "--noise", "1,2"], '"1,2" is not three numbers, R,A,E in m, rad, rad'),
         (["flight.csv", "--noise", "0,1,1"], "a sigma of zero means readings without error"),

@@ -65,7 +65,13 @@ def test_every_key_is_understood():
     said = {(section, key.rpartition("_")[0] if key.rpartition("_")[0] in KEYS[section] else key)
             for section, keys in tomllib.loads(FULL).items() for key in keys}  # fmt: skip
     unsaid = {(section, name) for section, name, _ in every()} - said
-    assert unsaid == {("azimuth", "column"), ("azimuth", "unit"), ("azimuth", "sigma"), ("elevation", "unit")}
+    assert unsaid == {
+        ("file", "widths"),
+        ("azimuth", "column"),
+        ("azimuth", "unit"),
+        ("azimuth", "sigma"),
+        ("elevation", "unit"),
+    }
     found = config.Recipe.of(config.parse(FULL, "s.toml"))
     assert found.settings == FilterSettings(
         "ukf", "forward", True, (3.048, None, pytest.approx(20 * math.pi / 648000)), 5.0, 3.5, 9.0, 150, 7, True,
@@ -90,6 +96,7 @@ def test_defaults_that_a_comment_shows_are_the_real_ones():
     usual = tuple(f"# {name} = " for _, name, key in every() if key.default)
     lines = [line.removeprefix("# ") if line.startswith(usual) else line for line in config.dump({}).splitlines()]
     said = config.parse("\n".join(lines), "s.toml")
+    assert said.pop("elevation_from") == "horizon"  # has no default, but a key called like the azimuth's
     assert {"method", "gate", "editing", "model", "azimuth_from", "temperature_c", "pressure_hpa"} <= set(said)
     assert config.Recipe.of(said) == Recipe()
 
@@ -115,7 +122,8 @@ OPTIONS = st.fixed_dictionaries(
         "azimuth_from": st.just("north"),
         "azimuth_sense": st.sampled_from(["clockwise", "anticlockwise"]),
         "azimuth_zero_rad": numbers,
-        "elevation_from": st.just("zenith"),
+        "elevation_from": st.sampled_from(["horizon", "zenith"]),
+        "widths": st.just("10,8,12"),
         "refraction": st.just(True),
         "temperature_c": st.floats(-90, 14),
         "pressure_hpa": st.floats(300, 1000),
@@ -159,16 +167,20 @@ def test_a_model_lies_beside_its_file(tmp_path, monkeypatch):
         ("[range]\nbais_m = 1", '[range] has no key "bais_m"; did you mean "bias_m"? Its keys are: column, unit, '
          "sigma_UNIT, bias_UNIT."),
         ("[azimut]\nzero_deg = 1", 'there is no section "azimut"; did you mean "azimuth"? The sections: [site], '
-         "[time], [range], [azimuth], [elevation], [refraction], [filter]."),
+         "[file], [time], [range], [azimuth], [elevation], [refraction], [filter]."),
+        ("[file]\nwidths = '8,x'", '[file] widths = "8,x": expected widths such as "10,12,12,12".'),
         ("gate = 3", '"gate" stands outside of its section; write it below [filter].'),
         ("unit = 'm'", '"unit" stands outside of its section; write it below [time] or [range] or [azimuth] or '
          "[elevation]."),
-        ("nonsense = 3", 'there is no key "nonsense". The sections: [site], [time], [range], [azimuth], [elevation], '
+        ("nonsense = 3", 'there is no key "nonsense". The sections: [site], [file], [time], [range], [azimuth], '
+         '[elevation], '
          "[refraction], [filter]."),
         ("site = 3", '"site" is a section: write [site], and its keys below it.'),
-        ("[range]\nbias_yd = 1", '[range] "bias_yd" must end in its unit: bias_m, bias_km, bias_ft, bias_nmi, bias_nm; '
+        ("[range]\nbias_ell = 1", '[range] "bias_ell" must end in its unit: bias_m, bias_km, bias_ft, bias_nmi, '
+         'bias_nm, bias_mi, bias_yd, bias_kyd, bias_kft, bias_cm, bias_mm; '
          'did you mean "bias_m"?'),
-        ("[range]\nbias = 1", '[range] "bias" must end in its unit: bias_m, bias_km, bias_ft, bias_nmi, bias_nm; did '
+        ("[range]\nbias = 1", '[range] "bias" must end in its unit: bias_m, bias_km, bias_ft, bias_nmi, '
+         'bias_nm, bias_mi, bias_yd, bias_kyd, bias_kft, bias_cm, bias_mm; did '
          'you mean "bias_m"?'),
         ("[range]\nbias_m = 1\nbias_ft = 3", "[range] has bias in two units; leave one out."),
         ("[site]\nlat_deg = 98\nlon_deg = 1\nheight_m = 1", "[site] lat_deg = 98: expected a number from -90 to 90."),
@@ -183,8 +195,8 @@ def test_a_model_lies_beside_its_file(tmp_path, monkeypatch):
          'did you mean "ekf".'),
         ("[azimuth]\nsense = 'clokwise'", '[azimuth] sense = "clokwise": expected "clockwise" or "anticlockwise"; did '
          'you mean "clockwise"?'),
-        ("[azimuth]\nunit = 'km'", '[azimuth] unit = "km": expected "rad" or "deg" or "mrad" or "mil" or "grad" or '
-         '"gon" or "mgon" or "arcsec".'),
+        ("[azimuth]\nunit = 'km'", '[azimuth] unit = "km": expected "rad" or "deg" or "mrad" or "mil" or "mil6300" or '
+         '"mil6000" or "grad" or "gon" or "mgon" or "arcmin" or "arcsec".'),
         ("[azimuth]\nbias_deg = 'x'", '[azimuth] bias_deg = "x": expected a number.'),
         ("[range]\ncolumn = ''", '[range] column = "": expected a text in quotes.'),
         ("[refraction]\npressure_hpa = 101325", "[refraction] pressure_hpa = 101325: expected a number from 300 to "

@@ -109,16 +109,19 @@ def table(**columns):
     return pa.table({"time_s": [0.0, 1.0], "range_m": [5.0, 6.0], **columns})
 
 
-def test_zenith_angles_are_not_taken_for_missing_elevations():
-    with pytest.raises(InputError) as caught:
-        logs.read(table(zenith_gon=[90.0, 80.0]))
-    assert str(caught.value) == (
-        '<table>: column "zenith_gon" looks like a zenith angle. Say --columns elevation=zenith_gon '
-        "--elevation-from zenith, or --columns elevation=none if it is something else."
-    )
-    station = Station(elevation_from="zenith")
-    found = logs.read(table(zenith_gon=[90.0, 80.0]), columns="elevation=zenith_gon", station=station)
+def test_a_column_of_zenith_angles_is_known_by_its_name():
+    found = logs.read(table(zenith_gon=[90.0, 80.0]))
+    assert found.station.elevation_from == "zenith"
+    assert "elevation from zenith angles" in found.understood["conventions"]
     np.testing.assert_allclose(found.measurement[:, 2], [math.pi / 20, math.pi / 10], rtol=1e-12)
+    for elevation_from in ("zenith", None):
+        station = Station(elevation_from=elevation_from)
+        again = logs.read(table(zenith_gon=[90.0, 80.0]), columns="elevation=zenith_gon", station=station)
+        np.testing.assert_array_equal(again.measurement, found.measurement)
+    other = logs.read(table(zenith_gon=[90.0, 80.0]), station=Station(elevation_from="horizon"))
+    np.testing.assert_allclose(other.measurement[:, 2], [math.pi * 0.45, math.pi * 0.4], rtol=1e-12)
+    without = logs.read(table(zenith_gon=[90.0, 80.0]), columns="elevation=none")
+    assert "elevation" not in without.understood["columns"]
 
 
 def test_a_zenith_angle_may_be_more_than_a_right_angle_but_not_two():

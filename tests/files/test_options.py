@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from ftproc.errors import UsageError
-from ftproc.files.options import parse_columns, parse_units
+from ftproc.files.options import Condition, parse_columns, parse_units, parse_where, parse_widths
 
 
 def test_units_from_text_and_from_a_mapping_are_the_same() -> None:
@@ -24,11 +24,11 @@ def test_columns_from_text_and_from_a_mapping_are_the_same() -> None:
 @pytest.mark.parametrize(
     ("parse", "text", "sentence"),
     [
-        (parse_units, "range=yd", '--units: "yd" is not a unit of range; understood are m, km, ft, nmi, nm'),
+        (parse_units, "range=ell", '--units: "ell" is not a unit of range; understood are m, km, ft, nmi, nm'),
         (
             parse_units,
             "azimuth=dge",
-            'rad, deg, mrad, mil, grad, gon, mgon, arcsec; did you mean "deg',
+            'rad, deg, mrad, mil, mil6300, mil6000, grad, gon, mgon, arcmin, arcsec; did you mean "deg',
         ),
         (parse_units, "azimuth=m", '--units: "m" is not a unit of azimuth'),
         (
@@ -54,3 +54,26 @@ def test_the_fault_of_an_option_is_named(parse: Callable[[str], object], text: s
     with pytest.raises(UsageError) as caught:
         parse(text)
     assert sentence in str(caught.value)
+
+
+def test_units_may_be_spelt_out() -> None:
+    assert parse_units("range=Kilometres,az=degrees,time=milliseconds") == {
+        "range": "km",
+        "azimuth": "deg",
+        "time": "ms",
+    }
+
+
+def test_conditions_on_rows_and_widths() -> None:
+    assert parse_where(("quality >= 5", "mode=auto", "a b!=x")) == (
+        Condition("quality", ">=", "5"),
+        Condition("mode", "=", "auto"),
+        Condition("a b", "!=", "x"),
+    )
+    assert parse_widths("8, 10,9") == parse_widths([8, 10, 9]) == (8, 10, 9)
+    for text in ("quality", "quality>=", "=5"):
+        with pytest.raises(UsageError, match="is not a condition such as quality>=5"):
+            parse_where(text)
+    for text in ("8,x", "0,5", "8,-1", "8,,9"):
+        with pytest.raises(UsageError, match="is not a list of whole numbers above zero"):
+            parse_widths(text)

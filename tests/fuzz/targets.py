@@ -31,7 +31,7 @@ from ftproc.files.writing import flights
 from ftproc.files.writing.trajectories import write as write_trajectory
 from ftproc.records import MeasurementLog
 from tests.fuzz import kernel
-from tests.trust import bad_files, bad_logs, bad_models, bad_stations, bad_truths, cases
+from tests.trust import bad_files, bad_logs, bad_models, bad_stations, bad_times, bad_truths, cases
 
 _LONGEST_NAME = 100
 _LARGEST_SEED = 30_000  # bytes; from small inputs a fuzzer learns faster
@@ -203,7 +203,7 @@ def _trajectories() -> Iterator[bytes]:
         yield (line + "\n" + "\n".join(",".join("1" for _ in line.split(",")) for _ in range(3)) + "\n").encode()
 
 
-_TEXTS = (bad_logs.all_cases, bad_files.all_cases)
+_TEXTS = (bad_logs.all_cases, bad_times.all_cases, bad_files.all_cases)
 
 
 @cache

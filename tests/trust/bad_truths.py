@@ -52,18 +52,18 @@ def all_cases() -> Iterator[Case]:
     for content, what in (
         (b"", "empty"),
         (b"x", "no column"),
-        (text().encode("utf-16"), "UTF-16"),
         (text()[:-40].encode(), "row 39"),
         (",".join(COLUMNS).encode(), "no rows"),
         (text().encode()[:200] + bytes(5000), "NUL bytes"),
         (b"PAR1", "Parquet"),
     ):
         yield Case("truth", f"file of {len(content)} bytes {content[:9]!r}", written(content, NAME), (what,))
+    yield Case("truth", "UTF-16", written(text().encode("utf-16"), NAME), None, _right)
     yield Case("truth", "gzip cut", written(gzip.compress(text().encode())[:-3], NAME + ".gz"), ("cut short",))
     turned = "time_s,x_m,y_m,z_m\n" + "".join(f"{(86_380 + k) % 86_400},1,2,{k}\n" for k in range(60))
-    yield Case("truth", "midnight", written(turned, NAME), ("midnight", "row 20"))
+    yield Case("truth", "midnight", written(turned, NAME), None, lambda truth: truth.time_s[-1] == 86_439)
     for cell in ("1e308", "-1e308"):
         for column in range(4):
             yield Case("truth", f"{COLUMNS[column]} {cell}", written(text(7, column, cell), NAME), either=True)
     yield Case("truth", "one row", written("time_s,x_m,y_m,z_m\n0,1,2,3\n", NAME), None, lambda truth: len(truth) == 1)
-    yield Case("truth", "called .txt", written(text(), "t.txt"), ("supported are",))
+    yield Case("truth", "called .txt", written(text(), "t.txt"), None, _right)

@@ -7,10 +7,10 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.trust import bad_files, bad_logs, bad_models, bad_stations, bad_truths
+from tests.trust import bad_files, bad_logs, bad_models, bad_stations, bad_times, bad_truths
 from tests.trust.cases import Case, judge
 
-TABLES = (bad_logs, bad_files, bad_models, bad_truths, bad_stations)
+TABLES = (bad_logs, bad_times, bad_files, bad_models, bad_truths, bad_stations)
 
 
 def all_cases() -> Iterator[Case]:

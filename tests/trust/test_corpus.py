@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from ftproc.errors import InputError, printable
-from tests.trust import bad_logs, cases, corpus
+from tests.trust import cases, corpus
 
 MANY = 300
 MOST_MEMORY_KB = 3 << 20
@@ -78,7 +78,7 @@ def _limited() -> None:
 @pytest.mark.parametrize("name", ["gzip bomb", "utf-16", "midnight from 86380.0", "10,000 columns kept", "1e308"])
 def test_whole_processes(name: str, tmp_path: Path) -> None:
     """A handful as a user meets them: exit code, one line, no traceback."""
-    case = next(case for case in bad_logs.all_cases() if case.name.endswith(name))
+    case = next(case for case in corpus.all_cases() if case.name.endswith(name))
     path = case.make(tmp_path)
     extra = ["--keep-columns"] if case.options else []
     done = _filter(tmp_path, [str(path), "-o", "out.csv", *extra], preexec_fn=_limited)

@@ -11,7 +11,7 @@ from tests.fuzz import targets
 from tests.trust import audit
 
 ROOT = Path(__file__).parents[2]
-OF_THE_USER = ("cluster", "geo", "formats", "report", "wavelet")
+OF_THE_USER = ("cluster", "geo", "formats", "report", "wavelet", "hdf5")
 
 
 def listed(name: str) -> dict[str, str]:

@@ -1,4 +1,5 @@
 """Files in: columns, units and times, up to a checked record; messages for what is wrong.
 
-`logs`, `truth` and `trajectories` are the entries, `formats` opens the files. Calls `files`, not `files.writing`.
+`logs`, `truth` and `trajectories` are the entries. `formats` opens files, `meaning` finds columns, units and targets,
+`clocks` reads the times, `understanding` says how. Calls `files`, not `files.writing`.
 """

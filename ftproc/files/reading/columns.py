@@ -9,10 +9,10 @@ import numpy as np
 
 from ftproc.errors import InputError, nearest, row_named
 from ftproc.files.layout import OUTLIER
+from ftproc.files.reading.clocks.times import seconds
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.numbers import Origin, numbers
-from ftproc.files.reading.schema import listed
-from ftproc.files.reading.times import seconds
+from ftproc.files.reading.meaning.numbers import Origin, numbers
+from ftproc.files.reading.meaning.schema import listed
 from ftproc.records import FlagArray, FloatArray
 
 if TYPE_CHECKING:

@@ -3,28 +3,55 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ftproc.errors import InputError
 from ftproc.files import conventions
-from ftproc.files.options import parse_columns, parse_units
-from ftproc.files.reading import large, plausibility, schema
+from ftproc.files.options import ABSENT, Condition, Extract, parse_columns, parse_units, parse_where
+from ftproc.files.reading import large, understanding
+from ftproc.files.reading.clocks import joint, times
+from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.numbers import Origin, numbers
-from ftproc.files.reading.times import seconds
-from ftproc.records import FloatArray, MeasurementLog
+from ftproc.files.reading.meaning import plausibility, readings, rows, schema, several
+from ftproc.files.reading.meaning.numbers import Origin
+from ftproc.records import FloatArray, IntArray, MeasurementLog
 from ftproc.settings import Station
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 Found = Mapping[str, schema.Column]
+
+
+class _Plan(NamedTuple):
+    """What is read of a table, and how. others: positions of the columns that are kept beside."""
+
+    header: TableHeader
+    found: Found
+    station: Station
+    conditions: tuple[Condition, ...] = ()
+    others: tuple[int, ...] = ()
+    one_target: bool = False
+
+    def positions(self) -> list[int]:
+        """Of the columns of all quantities, in their order."""
+        return [place for column in self.found.values() for place in column.positions]
+
+
+class _Converted(NamedTuple):
+    """quantities: in SI units. found: the columns with the units that their cells show. notes: what was done.
+    undecided: see `readings.Readings`."""
+
+    quantities: dict[str, FloatArray]
+    found: Found
+    clock: Clock
+    notes: tuple[str, ...]
+    undecided: bool
 
 
 def read(
@@ -35,72 +62,181 @@ def read(
     azimuth_from: str | None = None,
     keep_columns: bool = False,
     station: Station | None = None,
+    extract: Extract | None = None,
 ) -> MeasurementLog:
     """Read and check one log; angles become rad, lengths m, times s, rows come in time order.
 
-    source: path of a .csv, .csv.gz, .parquet or .feather file, `-` for CSV on standard input, a pyarrow Table or a
+    source: path of a file of a kind that `formats.tables` lists, `-` for text on standard input, a pyarrow Table or a
     pandas DataFrame.
     units: such as `{"range": "km"}` or `"range=km,azimuth=deg"`, for columns whose name states no unit.
-    columns: such as `{"time": "T0"}` or `"time=T0,range=RNG"`; `none` for a quantity that the file lacks.
+    columns: such as `{"time": "T0"}` or `"time=T0,range=RNG"`, also numbers from 1; `none` for a quantity that the
+    file lacks.
     azimuth_from: `x` (A = atan2(y, x), the default) or `north`, which makes the frame `north-east-up`.
     keep_columns: carry the file's other columns through as `extra`.
     station: what else is known of the instrument, see `conventions`.
+    extract: which of several targets, conditions on rows, widths of columns.
 
     Rows are counted from 0 without the header, in messages as in `row`; empty lines do not count. Rows without a time
     are listed and left out. Readings of any size stay in: editing judges outliers, such as a negative range.
     Timestamps become seconds since 00:00 UTC of the day of the earliest one.
 
-    Raises InputError for a file that cannot be read or is no log, UsageError for options that are not understood.
+    Raises InputError for a file that cannot be read or is no log, or whose meaning is open (the message has the option
+    that settles it); UsageError for options that are not understood.
     """
-    station = station or Station()
+    station, extract = station or Station(), extract or Extract()
     if azimuth_from is not None:
         station = replace(station, azimuth_from=azimuth_from)
     conventions.check(station)
     unit_of, column_of = parse_units(units), parse_columns(columns)
-    header = tables.read_header(source)
-    found = schema.resolve(header.source, header.names, unit_of, column_of)
-    wanted = [column.position for column in found.values()]
-    others = [place for place in range(len(header.names)) if keep_columns and place not in wanted]
-    _check_others(header, others)
-    if not others and station.refraction is None:  # refraction needs ranges of other blocks
-        log = _in_blocks(header, found, station)
+    header = tables.read_header(source, extract.widths)
+    found = schema.resolve(header.source, header.names, unit_of, column_of, header.units)
+    plan = _Plan(header, found, station, _conditions(header, extract), one_target=bool(extract.target))
+    if keep_columns:
+        wanted = plan.positions()
+        plan = plan._replace(others=tuple(place for place in range(len(header.names)) if place not in wanted))
+        _check_others(header, plan.others)
+    if not (plan.others or plan.conditions) and station.refraction is None:  # refraction needs ranges of other blocks
+        log = _in_blocks(plan)
         if log is not None:
             return log
-    return _at_once(header, found, station, others)
+    return _at_once(plan)
 
 
-def _in_blocks(header: TableHeader, found: Found, station: Station) -> MeasurementLog | None:
+def targets(source: tables.Source, column: str, widths: tuple[int, ...] = ()) -> tuple[str, ...]:
+    """The values of a column that tells targets apart, the first first. Raises InputError."""
+    header = tables.read_header(source, widths)
+    place = rows.position(header.source, header.names, column, "--target")
+    cells = rows.cells(header.load([], [place]).column(0))
+    values = tuple(dict.fromkeys(cell for cell in cells.tolist() if cell))
+    if not 0 < len(values) <= several.MOST_TARGETS:
+        raise InputError(
+            f'{header.source}: column "{column}" has {len(values)} values, which are no targets; name another column.'
+        )
+    return values
+
+
+def _conditions(header: TableHeader, extract: Extract) -> tuple[Condition, ...]:
+    if extract.target in ("", ABSENT):
+        return extract.where
+    if "=" not in extract.target:
+        rows.position(header.source, header.names, extract.target, "--target")
+        raise InputError(
+            f"{header.source}: --target {extract.target} is for a trajectory of each; name one value of it."
+        )
+    return (*extract.where, *parse_where(extract.target))
+
+
+def _in_blocks(plan: _Plan) -> MeasurementLog | None:
     """The log of a large file; None if the file is small or must be read at once, see `large`."""
-    blocks = header.blocks([column.position for column in found.values()])
+    header = plan.header
+    blocks = header.blocks(plan.positions())
     if blocks is None:
         return None
-    spooled = large.read(header.source, blocks, partial(_converted, header, found), station)
+    clocks: list[Clock] = []
+
+    def convert(table: pa.Table) -> tuple[dict[str, FloatArray], str]:
+        converted = _converted(header, plan.found, table.columns)
+        clock = converted.clock
+        if (
+            converted.notes
+            or converted.undecided
+            or converted.found != plan.found
+            or (clocks and clock.words != clocks[0].words)
+        ):
+            raise InputError("only the whole file shows what its cells mean")
+        clocks[:] = clocks or [clock._replace(time_s=clock.time_s[:0])]
+        return converted.quantities, clock.epoch
+
+    station = _with_zenith(plan.station, plan.found)
+    spooled = large.read(header.source, blocks, convert, station)
     if spooled is None:
         return None
     log, sample = spooled
-    plausibility.check_units(header.source, sample, found, station.elevation_from)
-    readings = large.readings(sample)[~np.isnan(sample["time"])]
-    return replace(log, remarks=_remarks(header, found, log.epoch, readings, station))
+    judged = plausibility.judged(header.source, sample, plan.found, plan.station)
+    if judged.found != plan.found:
+        return _in_blocks(plan._replace(found=judged.found))
+    timed = large.readings(sample)[~np.isnan(sample["time"])]
+    if several.alternate(timed):
+        return None
+    return _explained(plan, log, clocks[0]._replace(epoch=log.epoch), (), judged.doubts, timed)
 
 
-def _at_once(header: TableHeader, found: Found, station: Station, others: list[int]) -> MeasurementLog:
-    wanted = [column.position for column in found.values()]
-    table = header.load(wanted, others)
+def _at_once(plan: _Plan) -> MeasurementLog:
+    header, found = plan.header, plan.found
+    chosen, wanted = _loaded(plan), plan.positions()
+    table = header.load(wanted, [*chosen[len(wanted) :], *plan.others])
     if table.num_rows == 0:
         raise InputError(f"{header.source}: there are column names but no rows.")
-    quantities, epoch = _converted(header, found, table)
-    plausibility.check_units(header.source, quantities, found, station.elevation_from)
-    extra = table.select(list(range(len(wanted), table.num_columns))) if others else None
-    log = _in_time_order(header.source, quantities, extra)
-    log = replace(log, epoch=epoch, remarks=_remarks(header, found, epoch, log.measurement, station))
-    return conventions.apply(log, station)
+    kept, notes = _kept(plan, table, chosen)
+    converted = _converted(header, found, table.columns if kept is None else table.take(kept).columns)
+    judged = plausibility.judged(header.source, converted.quantities, converted.found, plan.station)
+    quantities = dict(converted.quantities)
+    for quantity, column in judged.found.items():
+        before = converted.found[quantity].unit
+        if column.unit != before:
+            quantities[quantity] = column.unit.to_si(quantities[quantity] * before.divide / before.multiply)
+    extra = table.select(list(range(len(chosen), table.num_columns))) if plan.others else None
+    log = _in_time_order(header.source, quantities, extra if kept is None or extra is None else extra.take(kept))
+    if kept is not None:
+        gone = tuple(int(kept[row]) for row in log.rows_without_time)
+        log = replace(log, row=kept[log.row], rows_without_time=gone, rows_in_file=table.num_rows)
+    plan = plan._replace(found=judged.found)
+    if not plan.one_target:
+        several.refuse(header, judged.found, log)
+    notes = (*notes, *converted.notes, *converted.clock.notes)
+    explained = _explained(plan, replace(log, epoch=converted.clock.epoch), converted.clock, notes, judged.doubts)
+    return conventions.apply(explained, explained.station)
 
 
-def _remarks(header: TableHeader, found: Found, epoch: str, readings: FloatArray, station: Station) -> tuple[str, ...]:
-    return (*schema.remarks(header.names, found, bool(epoch)), *plausibility.doubts(readings, station))
+def _loaded(plan: _Plan) -> list[int]:
+    """Positions of the columns of the quantities, and of the conditions that name others."""
+    found = plan.positions()
+    for condition in plan.conditions:
+        place = rows.position(plan.header.source, plan.header.names, condition.column, "--where or --target")
+        if place not in found:
+            found.append(place)
+    return found
 
 
-def _check_others(header: TableHeader, others: list[int]) -> None:
+def _kept(plan: _Plan, table: pa.Table, chosen: list[int]) -> tuple[IntArray | None, tuple[str, ...]]:
+    """The rows that meet the conditions, None for all, and a note on those that do not."""
+    if not plan.conditions:
+        return None, ()
+    header = plan.header
+    places = {c: rows.position(header.source, header.names, c.column, "--where") for c in plan.conditions}
+    cells = {condition: table.column(chosen.index(place)) for condition, place in places.items()}
+    mask = rows.meeting(header.source, cells, header.decimal_comma)
+    kept = np.flatnonzero(mask)
+    said = " and ".join(str(condition) for condition in plan.conditions)
+    if not kept.size:
+        raise InputError(f"{header.source}: no row meets {said}; check the column and the value.")
+    left_out = len(mask) - len(kept)
+    return kept.astype(np.int64), (f"{left_out} of {len(mask)} rows are left out, which do not meet {said}",)
+
+
+def _with_zenith(station: Station, found: Found) -> Station:
+    """The station with what the name of the elevation's column says."""
+    if station.elevation_from is not None:
+        return station
+    zenith = "elevation" in found and found["elevation"].zenith
+    return replace(station, elevation_from="zenith" if zenith else "horizon")
+
+
+def _explained(
+    plan: _Plan, log: MeasurementLog, clock: Clock, notes: Iterable[str], doubts: Iterable[str],
+    sample: FloatArray | None = None,
+) -> MeasurementLog:  # fmt: skip
+    """The log with its station, and with remarks on how it was understood."""
+    station = _with_zenith(plan.station, plan.found)
+    values = log.measurement if sample is None else sample
+    remarks = schema.remarks(plan.header.names, plan.found, bool(clock.epoch))
+    doubtful = (*doubts, *plausibility.doubts(values, station))
+    said = (*notes, *doubtful)
+    understood = understanding.describe(plan.header, plan.found, clock, station, said)
+    return replace(log, remarks=(*remarks, *said), understood=understood, station=station)
+
+
+def _check_others(header: TableHeader, others: Iterable[int]) -> None:
     counts = Counter(header.names[position] for position in others)
     for name, count in counts.items():
         if count > 1:
@@ -110,19 +246,35 @@ def _check_others(header: TableHeader, others: list[int]) -> None:
             )
 
 
-def _converted(header: TableHeader, found: Found, table: pa.Table) -> tuple[dict[str, FloatArray], str]:
-    """The quantities in SI units, and the instant of time zero (or "")."""
-    quantities, epoch = {}, ""
-    for index, (quantity, column) in enumerate(found.items()):
+def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]) -> _Converted:
+    """The quantities in SI units. columns: of all quantities, in their order."""
+    quantities: dict[str, FloatArray] = {}
+    decided = dict(found)
+    notes: list[str] = []
+    undecided = False
+    clock = Clock(np.empty(0), "", "")
+    place = 0
+    for quantity, column in found.items():
+        mine = columns[place : place + len(column.positions)]
+        place += len(mine)
         article = "an" if quantity in ("azimuth", "elevation") else "a"
         timestamp = " or an ISO-8601 timestamp" if quantity == "time" else ""
         expected = f"{article} {quantity} in {column.unit.name}{timestamp}"
         origin = Origin(header.source, column.name, expected, header.decimal_comma)
         if quantity == "time":
-            quantities[quantity], epoch = seconds(table.column(index), origin, column.unit.to_si)
-        else:
-            quantities[quantity] = column.unit.to_si(numbers(table.column(index), origin))
-    return quantities, epoch
+            if len(mine) > 1:
+                units = dict(zip(column.roles, column.written, strict=True))
+                clock = joint.read(dict(zip(column.roles, mine, strict=True)), origin, units)
+            else:
+                clock = times.read(mine[0], origin, column)
+            quantities[quantity] = clock.time_s
+            continue
+        found_here = readings.read(mine, origin, column)
+        decided[quantity] = found_here.column
+        quantities[quantity] = found_here.column.unit.to_si(found_here.values)
+        notes += found_here.notes
+        undecided = undecided or found_here.undecided
+    return _Converted(quantities, decided, clock, tuple(notes), undecided)
 
 
 def _in_time_order(source: str, quantities: Mapping[str, FloatArray], extra: pa.Table | None) -> MeasurementLog:

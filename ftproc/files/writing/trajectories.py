@@ -85,10 +85,12 @@ def write_parts(parts: Iterable[Trajectory], metadata: Callable[[], Mapping[str,
 
 
 def _can_stream(stretch: Trajectory, target: Target) -> bool:
-    """Whether the file can grow. Extra columns must be float64: a growing Parquet file does not store Arrow types."""
+    """Whether the file can grow. Extra columns must be float64 or times: a growing Parquet file has no Arrow types."""
     import pyarrow as pa
 
-    plain = stretch.extra is None or all(pa.types.is_float64(kind) for kind in stretch.extra.schema.types)
+    plain = stretch.extra is None or all(
+        pa.types.is_float64(kind) or pa.types.is_timestamp(kind) for kind in stretch.extra.schema.types
+    )
     return plain and layout.map_kind(target) is None and str(target) != "-" and tables.can_grow(tables.kind_of(target))
 
 

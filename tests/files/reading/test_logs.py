@@ -147,7 +147,7 @@ def test_options_that_are_not_understood(make: Make) -> None:
     path = make(HEADER + "0,1,1,1\n")
     for options, expected in (
         ({"azimuth_from": "south"}, '--azimuth-from: "south" is not understood; say x or north.'),
-        ({"units": "range=yd"}, '"yd" is not a unit of range'),
+        ({"units": "range=ell"}, '"ell" is not a unit of range'),
         ({"columns": "range"}, '"range" is not QUANTITY=NAME'),
     ):
         with pytest.raises(UsageError) as caught:

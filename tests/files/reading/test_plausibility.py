@@ -13,28 +13,40 @@ from tests.files.conftest import Make, refused
     ("text", "expected"),
     [
         (
-            "t,A,E\n0,180,0.1\n",
-            "it looks like degrees (or gon); use --units azimuth=deg (and elevation=deg if that is so too).",
+            "t,A\n0,380\n",
+            '"A" lies beyond 380, which is no azimuth in rad. Say --units azimuth=grad.',
         ),
-        (
-            "t,A,E\n0,1,45\n",
-            '"E" lies beyond 45 rad, which is no elevation: it looks like degrees (or gon); use --units elevation=deg',
-        ),
-        ("t,A\n0,380\n", "it looks like gradians (gon); use --units azimuth=grad"),
-        (
-            "t,A\n0,100\n1,200\n2,390\n",
-            'half of column "A" lies beyond 200 rad, which is no azimuth: it looks like grad',
-        ),
-        ("t,A\n0,100\n1,200\n2,350\n", "it looks like degrees"),
-        ("t,A\n0,3200\n", "it looks like mils; use --units azimuth=mil"),
+        ("t,Hz,V\n0,180,15\n", "Say --units azimuth=deg,elevation=deg or --units azimuth=grad,elevation=grad"),
+        ("t,A\n0,3200\n", "Say --units azimuth=mil6000 or --units azimuth=mil6300 or --units azimuth=mil."),
         ("t,el_deg\n0,800\n", "lies beyond 800 deg, which is no elevation: it looks like mils"),
-        ("t,A\n0,1e9\n", "it looks like another unit; use --units azimuth=UNIT"),
+        ("t,el_deg\n0,95\n", "it looks like a zenith angle; say --elevation-from zenith."),
+        ("t,el_deg\n0,80\n", "as zenith angles do. Say --elevation-from zenith if they are zenith angles, or"),
+        ("t,A\n0,1e9\n", "which is no azimuth in rad. Say --units azimuth=UNIT."),
         ("t,azimuth_rad\n0,180\n", "use --columns azimuth=azimuth_rad --units azimuth=deg."),
-        ("t,A\n0,\n1,-180\n2,1\n3,-170\n", "it looks like degrees"),
     ],
 )
-def test_angles_in_a_mistaken_unit(make: Make, text: str, expected: str) -> None:
+def test_angles_whose_unit_is_open_are_asked_about(make: Make, text: str, expected: str) -> None:
     assert expected in refused(make(text))
+
+
+@pytest.mark.parametrize(
+    ("text", "azimuth_deg", "elevation_deg"),
+    [
+        ("t,A,E\n0,180,0.1\n", 180, 0.1),
+        ("t,A,E\n0,1,45\n", 1, 45),
+        ("t,A,E\n0,100,5\n1,200,5\n2,350,5\n", 100, 5),
+        ("t,A,E\n0,-170,5\n1,-180,5\n2,1,5\n3,-170,5\n", -170, 5),
+        ("t,A,E\n0,398,5\n1,399,5\n2,0.5,5\n3,1,5\n", 358.2, 4.5),
+        ("t,A,E\n0,6390,80\n1,6398,80\n2,3,80\n3,9,80\n", 359.4375, 4.5),
+        ("t,AZ (mil),EL (mil)\n0,5990,80\n1,5998,80\n2,3,80\n3,9,80\n", 359.4, 4.8),
+    ],
+)
+def test_angles_whose_unit_only_one_reading_allows(
+    make: Make, text: str, azimuth_deg: float, elevation_deg: float
+) -> None:
+    log = logs.read(make(text))
+    assert np.degrees(log.measurement[0, 1:]) == pytest.approx([azimuth_deg, elevation_deg])
+    assert log.remarks
 
 
 def test_the_cures_for_a_mistaken_unit_work(make: Make) -> None:
@@ -46,7 +58,7 @@ def test_the_cures_for_a_mistaken_unit_work(make: Make) -> None:
 
 
 def test_a_few_outliers_are_no_mistaken_unit(make: Make) -> None:
-    log = logs.read(make("t,A,E\n0,1,1\n1,400,80\n2,12,1.5\n"))
+    log = logs.read(make("t,A,E\n0,1,1\n1,400,80\n2,12,1.0\n"))
     assert log.measurement[1, 1:].tolist() == [400, 80]
 
 

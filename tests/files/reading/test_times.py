@@ -1,4 +1,4 @@
-"""Times: timestamps count from midnight; a clock that restarts is refused, a glitch and rows out of order are not."""
+"""Times: timestamps count from midnight; a clock that restarts is continued, a glitch and rows in disorder are left."""
 
 import numpy as np
 import pyarrow as pa
@@ -8,22 +8,25 @@ from hypothesis import strategies as st
 
 from ftproc.errors import InputError
 from ftproc.files.reading import logs
-from ftproc.files.reading.numbers import Origin
-from ftproc.files.reading.times import refuse_rollover
+from ftproc.files.reading.clocks.clock import unrolled
 from tests.files.conftest import Make
 
-ORIGIN = Origin("a.csv", "T0", "a time in s")
 DAY = np.arange(86_000.0, 86_900.0, 10.0) % 86_400
 
 
-def test_the_row_and_the_cure_are_named() -> None:
-    with pytest.raises(InputError) as caught:
-        refuse_rollover(ORIGIN, np.insert(DAY, 3, np.nan))
-    assert str(caught.value) == (
-        'a.csv: row 41 (the first data row is 0), column "T0": the time falls from 86390 s to 0 s, which looks like '
-        "midnight. If so, add 86400 s to the times from this row on, or give timestamps with their date; if the rows "
-        "are only out of order, sort them by time."
-    )
+def test_a_clock_that_restarts_is_continued_and_the_row_named() -> None:
+    time, notes = unrolled(np.insert(DAY, 3, np.nan))
+    assert np.array_equal(time, np.insert(np.arange(86_000.0, 86_900.0, 10.0), 3, np.nan), equal_nan=True)
+    assert notes == ("the clock restarts at midnight, row 41 (the first data row is 0): 86400 s are added",)
+    week = np.arange(604_700.0, 604_900.0, 10.0)
+    assert unrolled(week % 604_800)[0].tolist() == week.tolist()
+    assert unrolled(week % 604_800, 86_400.0)[1] == ()
+
+
+def test_two_midnights() -> None:
+    time = np.arange(0.0, 200_000.0, 300.0)
+    assert unrolled(time % 86_400)[0].tolist() == time.tolist()
+    assert len(unrolled(time % 86_400)[1]) == 2
 
 
 @pytest.mark.parametrize(
@@ -54,7 +57,9 @@ def test_the_row_and_the_cure_are_named() -> None:
     ],
 )
 def test_no_rollover(time: np.ndarray) -> None:
-    refuse_rollover(ORIGIN, time)
+    same, notes = unrolled(time)
+    assert same is time
+    assert notes == ()
 
 
 @pytest.mark.parametrize("zone", ["", "Z", "+00:00"])

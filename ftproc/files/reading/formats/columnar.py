@@ -1,4 +1,4 @@
-"""Parquet and Feather, by pyarrow; messages for damaged files."""
+"""Parquet, Feather and Arrow, by pyarrow; messages for damaged files."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ftproc.files.reading.formats.header import Blocks, TableHeader, of_arrow
 if TYPE_CHECKING:
     import pyarrow as pa
 
+_ARROW_MAGIC = b"ARROW1"
 _BATCH_ROWS = 1 << 18  # of a Parquet file that is read in blocks
 
 
@@ -20,7 +21,8 @@ def parquet(name: str, path: Path) -> TableHeader:
     """A Parquet file. Raises InputError, here or when its columns are loaded, if it is none or damaged."""
     content.read(name, path, limit=1)  # for its messages
     file = _Parquet(name, path)
-    return TableHeader(name, file.names, file.load, metadata=file.schema.metadata or {}, blocks=file.blocks)
+    metadata = file.schema.metadata or {}
+    return TableHeader(name, file.names, file.load, metadata=metadata, blocks=file.blocks, form="Parquet")
 
 
 class _Parquet:
@@ -92,29 +94,41 @@ class _Parquet:
 
 
 def feather(name: str, path: Path) -> TableHeader:
-    """A Feather file (version 2). Raises InputError if it is none or damaged."""
+    """A Feather file (version 2), or an Arrow file or stream. Raises InputError if it is none or damaged."""
     import pyarrow as pa
 
     data = content.read(name, path)
     try:
-        reader = pa.ipc.open_file(pa.py_buffer(data))
-        for field in reader.schema:
+        schema, read = _ipc(data)
+        for field in schema:
             _check_type(name, field)
         batches: list[pa.RecordBatch] = []
         room = content.unpacked_limit(len(data))
-        for number in range(reader.num_record_batches):
-            batches.append(reader.get_batch(number))
+        for batch in read:
+            batches.append(batch)
             batches[-1].validate(full=True)  # a damaged length would be read past the end of the memory
             room -= batches[-1].nbytes
             if room < 0:
                 raise InputError(
                     f"{name}: unpacks to more than {content.MAX_GROWTH} times its packed size; write it again."
                 )
-        return of_arrow(pa.Table.from_batches(batches, reader.schema), name)
+        return of_arrow(pa.Table.from_batches(batches, schema), name, "Arrow")
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise InputError(
-            f"{name}: not a Feather file (version 2), or one cut short or damaged; copy it again ({first_line(error)})."
+            f"{name}: not a Feather file (version 2) or Arrow file, or one cut short or damaged; copy it again "
+            f"({first_line(error)})."
         ) from error
+
+
+def _ipc(data: bytes) -> tuple[pa.Schema, Iterator[pa.RecordBatch]]:
+    """Schema and batches of an Arrow file, or else of an Arrow stream."""
+    import pyarrow as pa
+
+    if not data.startswith(_ARROW_MAGIC):
+        stream = pa.ipc.open_stream(pa.py_buffer(data))
+        return stream.schema, iter(stream)
+    file = pa.ipc.open_file(pa.py_buffer(data))
+    return file.schema, (file.get_batch(number) for number in range(file.num_record_batches))
 
 
 def _check_type(name: str, field: pa.Field) -> None:

@@ -1,15 +1,13 @@
-"""The bytes of a file or of standard input, unpacked within limits; messages for what cannot be read."""
+"""The bytes of a file or of standard input, and limits; messages for what cannot be read."""
 
 from __future__ import annotations
 
-import gzip
-import io
+import itertools
 import stat
 import sys
-import zlib
 from pathlib import Path
 
-from ftproc.errors import InputError
+from ftproc.errors import InputError, nearest
 
 #: Size from which a file is read in blocks: bytes of a CSV file, or of the columns read from a Parquet file.
 LARGE = 32 << 20
@@ -18,6 +16,8 @@ MAX_GROWTH = 200
 GZIP_MAGIC = b"\x1f\x8b"
 
 _MIN_UNPACKED = 64 << 20  # bytes that any packed file may unpack to
+_MOST_BESIDE = 2000  # files that are looked through for a similar name
+_ALIKE = 0.75
 MAX_STDIN = 4 << 30  # bytes
 
 
@@ -29,9 +29,11 @@ def read(name: str, path: Path, limit: int = -1) -> bytes:
         with path.open("rb") as stream:
             data = stream.read(limit)
     except FileNotFoundError as error:
-        raise InputError(f"{name}: there is no such file.") from error
+        raise InputError(f"{name}: there is no such file{_near(path)}") from error
     except IsADirectoryError as error:
-        raise InputError(f"{name}: this is a directory; name a file in it.") from error
+        raise InputError(
+            f"{name}: this is a directory; name a file in it. All of a kind: {name}/*.csv -o OUT/."
+        ) from error
     except PermissionError as error:
         raise InputError(f"{name}: no permission to read it.") from error
     except OSError as error:
@@ -39,6 +41,15 @@ def read(name: str, path: Path, limit: int = -1) -> bytes:
     if not data:
         raise InputError(f"{name}: the file is empty; expected a header line and rows.")
     return data
+
+
+def _near(path: Path) -> str:
+    """`; did you mean ...`, for the file beside it with the most similar name, or a full stop."""
+    try:
+        beside = [entry.name for entry in itertools.islice(path.parent.iterdir(), _MOST_BESIDE) if entry.is_file()]
+    except OSError:
+        return "."
+    return nearest(path.name, beside, _ALIKE) or "."
 
 
 def is_ordinary(path: Path) -> bool:
@@ -58,20 +69,3 @@ def stdin() -> bytes:
 def unpacked_limit(packed: int) -> int:
     """The most bytes that a file of `packed` bytes may unpack to."""
     return max(_MIN_UNPACKED, MAX_GROWTH * packed)
-
-
-def gunzip(name: str, data: bytes) -> bytes:
-    """The content of a gzip file. Raises InputError if it is none, damaged or grows beyond the limit."""
-    limit = unpacked_limit(len(data))
-    try:
-        text = gzip.GzipFile(fileobj=io.BytesIO(data)).read(limit + 1)
-    except EOFError as error:
-        raise InputError(f"{name}: the gzip file is cut short; copy it again.") from error
-    except (gzip.BadGzipFile, zlib.error) as error:
-        raise InputError(f"{name}: not a gzip file, or a damaged one ({error}); copy it again.") from error
-    if len(text) > limit:
-        raise InputError(
-            f"{name}: unpacks to more than {MAX_GROWTH} times its packed size, which no log does. "
-            "If it is a log, unpack it first (gunzip)."
-        )
-    return text

@@ -1,7 +1,7 @@
-"""CSV: encoding, header, separator -> Arrow table; messages for what is wrong with the text.
+"""Text: encoding, layout, separator -> Arrow table; messages for what is wrong with the text.
 
-The separator is the comma, semicolon or tab that is most frequent in the header line. Lines end in LF, CRLF or CR;
-empty lines are skipped and not counted as rows, as in pandas. In a semicolon file numbers may have decimal commas.
+Lines end in LF, CRLF or CR; empty lines and comment lines are skipped and not counted as rows. Where the separator is
+no comma, numbers may have decimal commas.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ftproc.errors import InputError, first_line, row_named
-from ftproc.files.reading.formats import content
+from ftproc.files.reading.formats import content, encoding, layout, trimming
 from ftproc.files.reading.formats.header import Blocks, TableHeader
+from ftproc.files.reading.formats.layout import BLANKS
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -27,60 +28,60 @@ MISSING_WORDS = (
 )
 
 _HEAD = 1 << 20  # bytes of a large file that contain its header line
+_PLAIN_ROWS = 20  # under the names, that are looked at before a file counts as plain
 _BLOCK = 8 << 20  # bytes of a large file that are parsed at once
-
-_MAGIC = {
-    b"\xff\xfe": "is UTF-16 text; save it as UTF-8 (iconv -f UTF-16 -t UTF-8)",
-    b"\xfe\xff": "is UTF-16 text; save it as UTF-8 (iconv -f UTF-16 -t UTF-8)",
-    b"PAR1": "is a Parquet file; give it the name .parquet",
-    b"PK\x03\x04": "is a zip archive or an Excel workbook; unpack it, or export the sheet as CSV",
-}
+_SEPARATOR_NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks", "": "fixed widths"}
 
 
-def csv_file(name: str, path: Path) -> TableHeader:
-    """A .csv file, even gzipped. Of a large one only the header is read now. Raises InputError."""
-    if content.read(name, path, limit=2) != content.GZIP_MAGIC and path.stat().st_size > content.LARGE:
+def text_file(name: str, path: Path, widths: Sequence[int] = ()) -> TableHeader:
+    """A text file. widths: of its columns, in characters. Of a large file only the head is read. Raises InputError."""
+    if path.stat().st_size > content.LARGE and not widths:
         return _large_file(name, path)
-    return csv_bytes(name, content.read(name, path))
+    return text_bytes(name, content.read(name, path), widths)
 
 
-def gzipped_csv(name: str, path: Path) -> TableHeader:
-    """A .csv.gz file. Raises InputError."""
-    return _whole(split(name, content.gunzip(name, content.read(name, path))))
-
-
-def csv_bytes(name: str, data: bytes) -> TableHeader:
-    """The bytes of a CSV file, even gzipped. Raises InputError."""
-    return _whole(split(name, content.gunzip(name, data) if data.startswith(content.GZIP_MAGIC) else data))
-
-
-def _whole(text: CsvText) -> TableHeader:
-    return TableHeader(text.source, text.names, text.load, decimal_comma=text.delimiter == ";")
+def text_bytes(name: str, data: bytes, widths: Sequence[int] = ()) -> TableHeader:
+    """The bytes of a text file. Raises InputError."""
+    text = split(name, data, widths)
+    return TableHeader(
+        text.source, text.names, text.load, decimal_comma=text.delimiter != ",", units=text.units, form=text.form
+    )
 
 
 def _large_file(name: str, path: Path) -> TableHeader:
-    head = split(name, content.read(name, path, limit=_HEAD))
+    head = split(name, content.read(name, path, limit=_HEAD), cut=True)
 
     def load(numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
         return split(name, content.read(name, path)).load(numeric, others)
 
-    def blocks(numeric: Sequence[int]) -> Blocks:
+    def blocks(numeric: Sequence[int]) -> Blocks | None:
+        if head.encoding.startswith("UTF"):
+            return None
         size = path.stat().st_size
         rows = max(bytes(head.body).count(b"\n"), 1) * size // _HEAD
         return Blocks((text.load(numeric, ()) for text in in_blocks(path, head)), rows)
 
-    return TableHeader(name, head.names, load, head.delimiter == ";", blocks=blocks)
+    return TableHeader(name, head.names, load, head.delimiter != ",", blocks=blocks, units=head.units, form=head.form)
 
 
 class CsvText(NamedTuple):
-    """The text of one CSV file, its header line parsed."""
+    """The text of one file, its layout known.
+
+    body: the rows in UTF-8. odd_quotes: an odd number of quotation marks: an unclosed one may swallow all rows after
+    it. body_offset: of the body in the file, bytes. widths: of the columns, or nothing. units: a row of units.
+    encoding: if it is not UTF-8. form: the layout in words.
+    """
 
     source: str
     names: list[str]
     delimiter: str
-    body: memoryview  # the bytes after the header line
-    odd_quotes: bool  # an odd number of quotation marks: an unclosed one may swallow all rows after it
-    body_offset: int = 0  # of the body in the file, bytes
+    body: memoryview
+    odd_quotes: bool
+    body_offset: int = 0
+    widths: Sequence[int] = ()
+    units: Sequence[str] = ()
+    encoding: str = ""
+    form: str = ""
 
     def load(self, numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
         """Columns `numeric`, then `others`, by position.
@@ -92,6 +93,8 @@ class CsvText(NamedTuple):
 
         if not re.search(rb"[^\r\n]", self.body):
             raise InputError(f"{self.source}: there are column names but no rows.")
+        if self.widths:
+            return self._of_widths([*numeric, *others])
         if self.odd_quotes:
             self._refuse_ragged()
         try:
@@ -111,10 +114,11 @@ class CsvText(NamedTuple):
 
         keys = [str(position) for position in range(len(self.names))]
         chosen = [*numeric, *others]
+        body, delimiter = self._delimited()
         table = pyarrow.csv.read_csv(
-            pa.BufferReader(pa.py_buffer(self.body)),
+            pa.BufferReader(pa.py_buffer(body)),
             read_options=pyarrow.csv.ReadOptions(column_names=keys),
-            parse_options=pyarrow.csv.ParseOptions(delimiter=self.delimiter),
+            parse_options=pyarrow.csv.ParseOptions(delimiter=delimiter),
             convert_options=pyarrow.csv.ConvertOptions(
                 include_columns=[keys[position] for position in chosen],
                 column_types={keys[position]: wanted for position in numeric},
@@ -131,10 +135,27 @@ class CsvText(NamedTuple):
                 )
         return table
 
+    def _delimited(self) -> tuple[bytes | memoryview, str]:
+        """The rows with one character between the cells."""
+        if self.delimiter != BLANKS:
+            return self.body, self.delimiter
+        return re.sub(rb"[ \t]+", b"\t", re.sub(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)", b"", self.body)), "\t"
+
+    def _of_widths(self, chosen: Sequence[int]) -> pa.Table:
+        import pandas as pd
+        import pyarrow as pa
+
+        frame = pd.read_fwf(
+            io.BytesIO(self.body), widths=list(self.widths), header=None, dtype=str, keep_default_na=False
+        )
+        arrays = [pa.array([str(cell) for cell in frame[place]], pa.string()) for place in chosen]
+        return pa.Table.from_arrays(arrays, names=[self.names[place] for place in chosen])
+
     def _refuse_ragged(self) -> None:
         """Raise InputError for the first row with a wrong number of cells, found in plain Python."""
-        text = io.TextIOWrapper(io.BytesIO(self.body), encoding="utf-8", errors="replace", newline="")
-        rows = (cells for cells in csv.reader(text, delimiter=self.delimiter) if cells)
+        body, delimiter = self._delimited()
+        text = io.TextIOWrapper(io.BytesIO(body), encoding="utf-8", errors="replace", newline="")
+        rows = (cells for cells in csv.reader(text, delimiter=delimiter) if cells)
         row = -1
         try:
             for row, cells in enumerate(rows):
@@ -152,33 +173,103 @@ class CsvText(NamedTuple):
             )
         if self.delimiter == "," and len(cells) == 2 * expected:
             hint = "If these are decimal commas, write decimal points or separate the cells with semicolons."
+        elif self.delimiter == BLANKS:
+            hint = "Complete the row, or name the widths of the columns in characters, such as --widths 10,12,10,10."
         else:
             hint = "Complete the row or delete it."
         cell = "cell" if len(cells) == 1 else "cells"
         return f"{self.source}: {row_named(row)} has {len(cells)} {cell} where the header has {expected}. {hint}"
 
 
-def split(source: str, data: bytes) -> CsvText:
-    """Parse the header line of `data`. Raises InputError unless it is UTF-8 text with a header line."""
-    for magic, reason in _MAGIC.items():
-        if data.startswith(magic):
-            raise InputError(f"{source}: this {reason}.")
-    start = 3 if data.startswith(b"\xef\xbb\xbf") else 0
-    found = re.compile(rb"[\r\n]*([^\r\n]*)(?:\r\n|\r|\n)?").match(data, start)
-    header = found.group(1) if found else b""
-    if b"\0" in data[:4096]:
-        raise InputError(f"{source}: this is not text in UTF-8 (it has NUL bytes); save it as UTF-8 CSV.")
-    if found is None or not header.strip():
+def split(source: str, data: bytes, widths: Sequence[int] = (), cut: bool = False) -> CsvText:
+    """The layout of `data`, of a whole file or the beginning of one (`cut`). Raises InputError unless it is text."""
+    text = encoding.as_utf8(source, data, cut and len(data) >= _HEAD)
+    if not text.data.strip():
         raise InputError(f"{source}: the file is empty; expected a header line and rows.")
-    names, delimiter = _names(source, header)
-    odd = data.count(b'"', found.end()) % 2 == 1
-    return CsvText(source, names, delimiter, memoryview(data)[found.end() :], odd, found.end())
+    plain = None if widths else _plain(text.data)
+    if plain is not None:
+        names, delimiter, start = plain
+        found = CsvText(source, names, delimiter, memoryview(b""), False)
+    else:
+        found, start = _searched(source, text.data, widths)
+    body = memoryview(text.data)[start:]
+    if not cut:
+        body, dropped = trimming.rows_only(body, found.names, found.delimiter, widths)
+        found = found._replace(form=found.form + dropped)
+    odd = text.data.count(b'"', start) % 2 == 1
+    separated = f"text, separated by {_SEPARATOR_NAMES[found.delimiter]}" if not widths else "text in fixed widths"
+    form = ", ".join(part for part in (text.was and f"{text.was}", separated, found.form) if part)
+    offset = text.skipped + start
+    return found._replace(body=body, odd_quotes=odd, body_offset=offset, encoding=text.was, form=form)
+
+
+_LINE = re.compile(rb"[\r\n]*([^\r\n]*)(?:\r\n|\r|\n)?")
+
+
+def _plain(data: bytes) -> tuple[list[str], str, int] | None:
+    """Names, separator and start of the rows of a file whose first line holds the names; None if that is not plain."""
+    found = _LINE.match(data)
+    if found is None:
+        return None
+    line = found[1].decode("utf-8", "replace")
+    delimiter = max(",;\t", key=line.count)
+    names = layout.split(line, delimiter)
+    if len(names) < 2 or layout.is_comment(line) or any(re.match(r"[+-]?\.?\d", name) for name in names):
+        return None
+    place = found.end()
+    for _ in range(_PLAIN_ROWS):
+        row = _LINE.match(data, place)
+        if row is None or not row[1].strip():
+            break
+        cells = layout.split(row[1].decode("utf-8", "replace"), delimiter)
+        if len(cells) != len(names) or not layout.is_data(cells):
+            return None
+        place = row.end()
+    return None if place == found.end() else (names, delimiter, found.end())
+
+
+def _searched(source: str, data: bytes, widths: Sequence[int]) -> tuple[CsvText, int]:
+    """The text with its layout, and the start of its rows."""
+    lines = re.split(rb"(\r\n|\r|\n)", data[:_HEAD])
+    texts = [line.decode("utf-8", "replace") for line in lines[::2]]
+    found = layout.find(texts, widths)
+    if found is None:
+        names, delimiter, start = _first_line(source, data)
+        return CsvText(source, names, delimiter, memoryview(b""), False), start
+    start = sum(map(len, lines[: 2 * found.first]))
+    names = [name.strip() for name in found.names]
+    parts = [] if found.named else ["no column names"]
+    parts += [f"{found.above} lines above the table"] if found.above else []
+    parts += ["a row of units"] if found.units else []
+    text = CsvText(source, names, found.separator, memoryview(b""), False, widths=widths, units=found.units)
+    return text._replace(form=", ".join(parts)), start
+
+
+def _first_line(source: str, data: bytes) -> tuple[list[str], str, int]:
+    """Names and separator of a file in which no line looks like a row: of its first line."""
+    found = _LINE.match(data)
+    assert found is not None
+    line = found[1].decode("utf-8", "replace")
+    delimiter = max(",;\t", key=line.count)  # the comma if there is none
+    try:
+        names = [name.strip() for name in next(csv.reader([line], delimiter=delimiter))]
+    except (csv.Error, StopIteration) as error:
+        raise InputError(
+            f"{source}: the header line cannot be read as CSV ({error}); correct it, or delete the lines before it."
+        ) from error
+    if len(names) == 1 and re.search(r"\S[ |]+\S", names[0]):
+        raise InputError(
+            f'{source}: the header line "{line[:80]}" has no separator, and no line looks like a row of a log; '
+            "separate the cells with commas, semicolons or tabs."
+        )
+    return names, delimiter, found.end()
 
 
 def in_blocks(path: Path, head: CsvText) -> Iterator[CsvText]:
     """The rows of a file in blocks of whole lines; `head` comes from `split` of its beginning.
 
-    Raises InputError where a row may span lines, or only the whole file can tell what a point means.
+    Raises InputError where a row may span lines, or where only the whole file can tell what a
+    point means.
     """
     with path.open("rb") as stream:
         stream.seek(head.body_offset)
@@ -189,7 +280,7 @@ def in_blocks(path: Path, head: CsvText) -> Iterator[CsvText]:
             rest = data[end:]
             if len(rest) > _BLOCK:
                 raise InputError(f"{head.source}: a line of more than {_BLOCK >> 20} MiB is no row of a log.")
-            if head.delimiter == ";":  # points separate thousands if there is a comma anywhere in the file
+            if head.delimiter != ",":  # points separate thousands if there is a comma anywhere in the file
                 marks |= {mark for mark in (b",", b".") if mark in data}
                 if len(marks) > 1:
                     raise InputError(f"{head.source}: decimal commas and points.")
@@ -207,26 +298,3 @@ def _block(head: CsvText, body: memoryview) -> Iterator[CsvText]:
 
 def _spans_lines(cells: list[str]) -> bool:
     return any("\n" in cell or "\r" in cell for cell in cells)
-
-
-def _names(source: str, header: bytes) -> tuple[list[str], str]:
-    try:
-        line = header.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{source}: the header line is not UTF-8 (Latin-1 or Windows text?); "
-            "save the file as UTF-8 (iconv -f LATIN1 -t UTF-8)."
-        ) from error
-    delimiter = max(",;\t", key=line.count)  # the comma if there is none
-    try:
-        names = [name.strip() for name in next(csv.reader([line], delimiter=delimiter))]
-    except csv.Error as error:
-        raise InputError(
-            f"{source}: the header line cannot be read as CSV ({error}); correct it, or delete the lines before it."
-        ) from error
-    if len(names) == 1 and re.search(r"\S[ |]+\S", names[0]):
-        raise InputError(
-            f'{source}: the header line "{line[:80]}" has no separator; '
-            "separate the cells with commas, semicolons or tabs."
-        )
-    return names, delimiter

@@ -25,6 +25,7 @@ class TableHeader:
     load: (numeric positions, other positions) -> table of these columns, the numeric ones first.
     decimal_comma: numbers may have decimal commas. metadata: key-value pairs of the file.
     blocks: numeric positions -> these columns block by block if the file is large, else None.
+    units: the cells of a row of units under the names, or nothing. form: the kind of file and how it is laid out.
     """
 
     source: str
@@ -33,13 +34,17 @@ class TableHeader:
     decimal_comma: bool = False
     metadata: Mapping[bytes, bytes] = field(default_factory=dict)
     blocks: Callable[[Sequence[int]], Blocks | None] = lambda numeric: None
+    units: Sequence[str] = ()
+    form: str = ""
 
 
-def of_arrow(table: pa.Table, source: str) -> TableHeader:
+def of_arrow(table: pa.Table, source: str, form: str = "", units: Sequence[str] = ()) -> TableHeader:
     """The header of a table in memory."""
     return TableHeader(
         source,
         list(table.column_names),
         lambda numeric, others: table.select([*numeric, *others]),
         metadata=table.schema.metadata or {},
+        units=units,
+        form=form,
     )

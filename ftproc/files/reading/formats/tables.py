@@ -8,11 +8,11 @@ import tempfile
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from ftproc.errors import InputError
 from ftproc.files import layout, remote
-from ftproc.files.reading.formats import columnar, content, csvtext
+from ftproc.files.reading.formats import arrays, columnar, content, csvtext, documents, packing, workbook
 from ftproc.files.reading.formats.header import TableHeader, of_arrow
 
 if TYPE_CHECKING:
@@ -21,43 +21,117 @@ if TYPE_CHECKING:
 
 Source: TypeAlias = "str | Path | pa.Table | pd.DataFrame"
 
+
+def _text(name: str, path: Path, how: How) -> TableHeader:
+    return csvtext.text_file(name, path, how.widths)
+
+
+class How(NamedTuple):
+    """part: the sheet, group or structure named behind #. widths: of the columns of a text, in characters."""
+
+    part: str = ""
+    widths: Sequence[int] = ()
+
+
 #: What a name ends in -> the reader of that kind of file, from its name (for messages) and path.
-FORMATS: Mapping[str, Callable[[str, Path], TableHeader]] = {
-    ".csv": csvtext.csv_file,
-    ".csv.gz": csvtext.gzipped_csv,
-    ".parquet": columnar.parquet,
-    ".feather": columnar.feather,
+FORMATS: Mapping[str, Callable[[str, Path, How], TableHeader]] = {
+    **dict.fromkeys((".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".prn"), _text),
+    ".parquet": lambda name, path, how: columnar.parquet(name, path),
+    **dict.fromkeys((".feather", ".arrow", ".arrows", ".ipc"), lambda name, path, how: columnar.feather(name, path)),
+    **dict.fromkeys((".jsonl", ".ndjson", ".json"), lambda name, path, how: documents.json_file(name, path)),
+    **dict.fromkeys((".xlsx", ".xlsm"), lambda name, path, how: workbook.workbook(name, path, how.part)),
+    **dict.fromkeys((".h5", ".hdf5", ".hdf"), lambda name, path, how: arrays.hdf5(name, path, how.part)),
+    ".mat": lambda name, path, how: arrays.matlab(name, path, how.part),
+}
+#: How files begin whose kind the name may not say.
+_BINARY = (b"PAR1", b"ARROW1", b"PK\x03\x04", b"\x89HDF", b"MATLAB")
+_BINARY_KINDS = (".parquet", ".arrow", ".xlsx", ".h5", ".mat")
+_DEEPEST = 3  # of packed files inside each other
+
+#: Endings of files that are no logs -> the command line that takes them.
+_OTHERS = {
+    ".toml": "this is a station file: ftproc filter LOG --config {name}",
+    ".safetensors": "this is a correction model: ftproc filter LOG --model {name}",
+    ".html": "this is a page; name the log it was made of: ftproc filter LOG --report {name}",
+    ".kml": "this is a map, an output; name the log it was made of: ftproc filter LOG -o {name}",
+    ".geojson": "this is a map, an output; name the log it was made of: ftproc filter LOG -o {name}",
+    ".czml": "this is a map, an output; name the log it was made of: ftproc filter LOG -o {name}",
+    ".xls": "this is an old Excel workbook; save it as .xlsx or .csv",
 }
 
 
-def read_header(source: Source) -> TableHeader:
-    """The header of a file of one of FORMATS, of `-` (CSV on standard input, even gzipped), or of a table in memory.
+def read_header(source: Source, widths: Sequence[int] = ()) -> TableHeader:
+    """The header of a file of one of FORMATS, even packed; of `-` (text on standard input, even packed); or of a table
+    in memory.
 
-    A file may be named by a URI (see `remote`); its local copy lasts as long as the header.
+    A file may be named by a URI (see `remote`), and a sheet or group in it behind #. Copies of packed and remote files
+    last as long as the header. widths: of the columns of a text, in characters.
     Raises InputError for a file that does not exist, cannot be read, is damaged or empty.
     """
     if not isinstance(source, str | Path):
         return _in_memory(source)
-    if str(source) == "-":
-        return csvtext.csv_bytes("<stdin>", content.stdin())
-    name, path = str(source), remote.local(source)
-    if path is not None:
-        return _of_file(name, path)
-    directory = tempfile.mkdtemp()
+    scratch = _Scratch()
     try:
-        header = _of_file(name, remote.fetch(name, Path(directory)))
+        header = _opened(str(source), How("", widths), scratch)
     except BaseException:
-        shutil.rmtree(directory, ignore_errors=True)
+        scratch.remove()
         raise
-    weakref.finalize(header, shutil.rmtree, directory, ignore_errors=True)
+    weakref.finalize(header, scratch.remove)
     return header
 
 
-def _of_file(name: str, path: Path) -> TableHeader:
+class _Scratch:
+    """A directory for copies, made when one is needed."""
+
+    def __init__(self) -> None:
+        self.directory: Path | None = None
+
+    def path(self) -> Path:
+        """A new directory in it."""
+        if self.directory is None:
+            self.directory = Path(tempfile.mkdtemp(prefix="ftproc-"))
+        return Path(tempfile.mkdtemp(dir=self.directory))
+
+    def remove(self) -> None:
+        if self.directory is not None:
+            shutil.rmtree(self.directory, ignore_errors=True)
+
+
+def _opened(name: str, how: How, scratch: _Scratch) -> TableHeader:
+    if name == "-":
+        data = content.stdin()
+        if packing.ending("", data[:8]) is None and not data.startswith(_BINARY):
+            return csvtext.text_bytes("<stdin>", data, how.widths)
+        path = scratch.path() / "stdin"
+        path.write_bytes(data)
+        return _of_file("<stdin>", path, how, scratch)
+    here = remote.local(name)
+    if here is None:
+        return _of_file(name, remote.fetch(name, scratch.path()), how, scratch)
+    whole, mark, part = name.rpartition("#")
+    if mark and not here.exists() and (inner := remote.local(whole)) is not None and inner.exists():
+        return _of_file(name, inner, how._replace(part=part), scratch)
+    return _of_file(name, here, how, scratch)
+
+
+def _of_file(name: str, path: Path, how: How, scratch: _Scratch, deep: int = 0) -> TableHeader:
+    lower = path.name.lower()
+    other = next((cure for ending, cure in _OTHERS.items() if lower.endswith(ending)), None)
+    if other is not None:
+        raise InputError(f"{name}: {other.format(name=name)}.")
+    head = content.read(name, path, limit=8)
+    packed = packing.ending(path.name, head)
+    if packed is not None:
+        if deep > _DEEPEST:
+            raise InputError(f"{name}: packed more than {_DEEPEST} times over; unpack it first.")
+        return _of_file(name, packing.unpacked(name, path, packed, scratch.path()), how, scratch, deep + 1)
     kind = layout.ending(path, FORMATS)
-    if kind is None:
-        raise InputError(f"{name}: this kind of file is not understood; supported are {', '.join(FORMATS)}.")
-    return FORMATS[kind](name, path)
+    return FORMATS[kind or _kind_of(head)](name, path, how)
+
+
+def _kind_of(head: bytes) -> str:
+    """The kind of a file whose name says nothing, by its first bytes."""
+    return next((kind for magic, kind in zip(_BINARY, _BINARY_KINDS, strict=True) if head.startswith(magic)), ".csv")
 
 
 def _in_memory(table: Any) -> TableHeader:

@@ -44,4 +44,4 @@ def test_damaged_feather(tmp_path: Path) -> None:
     tables.write_table(pa.table({"t": [0.0], "R": [1.0]}), path)
     for data in (path.read_bytes()[:200], b"FEA1 of old", b"time_s,x_m\n"):
         path.write_bytes(data)
-        assert "not a Feather file (version 2), or one cut short or damaged;" in refused(path)
+        assert "not a Feather file (version 2) or Arrow file, or one cut short or damaged;" in refused(path)

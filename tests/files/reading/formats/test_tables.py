@@ -29,7 +29,9 @@ def test_files_that_cannot_be_opened(tmp_path: Path, make: Make) -> None:
     assert refused(tmp_path / "none.parquet").endswith("there is no such file.")
     (tmp_path / "dir.csv").mkdir()
     assert "this is a directory; name a file in it." in refused(tmp_path / "dir.csv")
-    assert "supported are .csv, .csv.gz, .parquet, .feather." in refused(make("t,R\n0,1\n", "log.xlsx"))
+    assert "not an Excel workbook (.xlsx), or a damaged one" in refused(make("t,R\n0,1\n", "log.xlsx"))
+    assert 'did you mean "log.xlsx"?' in refused(tmp_path / "lgo.xlsx")
+    assert "this is a station file: ftproc filter LOG --config" in refused(make("", "a.toml"))
     assert "the file is empty" in refused(make(b"", "log.parquet"))
     assert "the file is empty" in refused(make(b"", "log.csv.gz"))
 

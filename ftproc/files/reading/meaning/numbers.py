@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
+_THOUSANDS = r"^[+-]?\d{1,3}(,\d{3})+$"
 
 #: For a cell: None if it is right, else what it is not and (perhaps empty) the cure.
 Check = Callable[[str], tuple[str, str] | None]
@@ -41,6 +42,10 @@ class Origin(NamedTuple):
             f'{self.source}: {row_named(row)}, column "{self.column}": '
             f'"{" ".join(text[:60].split())}" is not {why}; expected {self.expected}. {cure or self.cure}'
         )
+
+    def nothing(self, what: str) -> InputError:
+        """The error for a column in which every cell is missing."""
+        return InputError(f'{self.source}: column "{self.column}" holds no {what}; expected {self.expected}.')
 
     def first_bad_cell(self, text: pa.ChunkedArray, check: Check) -> InputError:
         """The error for the first cell that does not pass `check`."""

@@ -1,0 +1,167 @@
+"""Times in several columns -> seconds: date and time, GPS week and seconds, calendar parts, see `meaning.parts`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ftproc.files import arrow, leap_seconds
+from ftproc.files.reading.clocks import notations, numeric, times
+from ftproc.files.reading.clocks.clock import DAY_S, WEEK_S, Clock, unrolled
+from ftproc.files.reading.meaning.numbers import Origin, as_text, numbers, parsed, without_text
+from ftproc.files.units import Unit, unit_named
+from ftproc.records import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+def read(columns: Mapping[str, pa.ChunkedArray], origin: Origin, units: Mapping[str, str]) -> Clock:
+    """The clock of several columns {role: column}, see `meaning.parts`. units: as written in their names. Raises
+    InputError as `times.read`."""
+    if "week" in columns:
+        return _gps(columns, origin, unit_named("time", units["tow"]))
+    clock = _own_moments(columns["time"], origin, unit_named("time", units["time"])) if "time" in columns else None
+    if isinstance(clock, Clock):
+        return clock
+    second = clock if clock is not None else _parts_of_day(columns, origin)
+    day, dated = _dates(columns, origin)
+    if (day == day[0]).all():
+        second, notes = unrolled(second, DAY_S)
+    else:
+        notes = ()
+    words = f"{' and '.join(columns)} in columns of their own, in s since 00:00 of the first day"
+    return times.counted(day, second, dated, words, notes)
+
+
+def _gps(columns: Mapping[str, pa.ChunkedArray], origin: Origin, unit: Unit | None) -> Clock:
+    week, second = numbers(columns["week"], origin), numbers(columns["tow"], origin)
+    known = week[np.isfinite(week)]
+    if not known.size:
+        raise origin.nothing("a GPS week")
+    if unit is not None:
+        second = unit.to_si(second)
+    elif np.nanmedian(second) > 2 * WEEK_S:
+        second = second / 1e3
+    first = int(known.min())
+    notes: tuple[str, ...] = ()
+    if (known == first).all():
+        second, notes = unrolled(second, WEEK_S)
+    whole = second + (week - first) * WEEK_S
+    words = "GPS week and seconds, in s since the start of the first week"
+    if first < 1024:  # of ten bits, which begin anew every 1024 weeks
+        return Clock(whole, "", f"{words}; weeks below 1024 leave the year open", notes)
+    return Clock(whole, leap_seconds.gps_epoch(first), words, notes)
+
+
+def _own_moments(column: pa.ChunkedArray, origin: Origin, unit: Unit | None) -> FloatArray | Clock:
+    """(n,) seconds of the day of a time beside a date; or its clock, if it has dates of its own."""
+    import pyarrow as pa
+
+    if pa.types.is_time(column.type):
+        return times.time_of_day(column)
+    if pa.types.is_timestamp(column.type):
+        time_s, epoch = times.since_midnight(column, origin)
+        return Clock(time_s, epoch, times.STAMPED)
+    values = without_text(column)
+    if values is None:
+        text = as_text(column)
+        values = parsed(text, origin.decimal_comma)
+        if values is None:
+            return _of_day_or_stamped(text, origin)
+    if unit is not None:
+        return unit.to_si(values)
+    known = values[np.isfinite(values)]
+    if known.size and known.max() <= 1.0:  # Excel's fraction of a day
+        return np.round(values * DAY_S, 6)
+    if known.size and known.max() > DAY_S and numeric.is_hhmmss(values):
+        return numeric.from_hhmmss(values)
+    return values / 1e3 if known.size and DAY_S * 2 < known.max() <= DAY_S * 1e3 else values
+
+
+def _of_day_or_stamped(text: pa.ChunkedArray, origin: Origin) -> FloatArray | Clock:
+    for moments in notations.matching(text, notations.STAMPS).values():
+        if not moments.has_day:
+            return moments.second
+        break
+    return times.stamped(text, origin)
+
+
+def _parts_of_day(columns: Mapping[str, pa.ChunkedArray], origin: Origin) -> FloatArray:
+    hour, minute, second = (numbers(columns[role], origin) for role in ("hour", "minute", "second"))
+    return 3600 * hour + 60 * minute + second
+
+
+def _dates(columns: Mapping[str, pa.ChunkedArray], origin: Origin) -> tuple[IntArray, bool]:
+    """(n,) days, and whether they are days since 1970."""
+    n = len(next(iter(columns.values())))
+    if "date" in columns:
+        return _dates_in_cells(columns["date"], origin)
+    if not {"doy", "day"} & set(columns):
+        return np.zeros(n, np.int64), False
+    import pyarrow as pa
+
+    roles = [role for role in ("year", "doy") if role in columns] if "doy" in columns else ["year", "month", "day"]
+    parts = [_filled(numbers(columns[role], origin)) for role in roles]
+    if len(roles) == 1:
+        return parts[0].astype(np.int64), False
+    cells = ["-".join(str(int(part)) for part in row) for row in zip(*parts, strict=True)]
+    pattern = r"(?P<year>\d+)-(?P<doy>\d+)" if "doy" in roles else notations.DATES["year-month-day"]
+    moments = notations.parsed(pa.chunked_array([pa.array(cells, pa.string())]), pattern)
+    if moments is None or not moments.right.all():
+        row = 0 if moments is None else int(np.argmin(moments.right))
+        raise origin.bad_cell(row, cells[row], "a date")
+    return moments.day, True
+
+
+def _dates_in_cells(column: pa.ChunkedArray, origin: Origin) -> tuple[IntArray, bool]:
+    import pyarrow as pa
+
+    if pa.types.is_timestamp(column.type) or pa.types.is_date(column.type):
+        unit_s = column.cast(pa.timestamp("s"), safe=False).cast(pa.int64()).cast(pa.float64())
+        return _filled(arrow.to_numpy(unit_s) // DAY_S).astype(np.int64), True
+    values = without_text(column)
+    if values is None and (text := as_text(column)) is not None:
+        values = parsed(text, origin.decimal_comma) if not notations.matching(text, notations.DATES) else None
+        if values is None:
+            return _dates_in_text(text, origin)
+    assert values is not None
+    filled = _filled(values)
+    middle = float(np.median(filled))
+    if middle > 19e6:
+        return _dates_in_text(as_text(column), origin)
+    if middle < 367:
+        return filled.astype(np.int64), False
+    start = next(
+        (start for start, low, high in ((25569, 3e4, 4.9e4), (40587, 5.5e4, 7e4)) if low <= middle < high), None
+    )
+    if start is None:
+        raise origin.bad_cell(0, f"{values[0]:g}", "a date")
+    return np.floor(filled - start).astype(np.int64), True
+
+
+def _dates_in_text(text: pa.ChunkedArray, origin: Origin) -> tuple[IntArray, bool]:
+    import pyarrow.compute as pc
+
+    whole = pc.replace_substring_regex(text, r"[T ]00:00:00(\.0+)?$|\.0$", "")
+    fits = notations.matching(whole, notations.DATES)
+    if not fits:
+        near = notations.nearest_fit(whole, notations.DATES)
+        row = notations.first_present(whole) if near is None else int(np.argmin(near[1]))
+        raise origin.bad_cell(row, str(whole[row]), "a date")
+    chosen = times.likeliest(fits)
+    present = ~np.array(whole.is_null().to_pylist(), bool)
+    days = _filled(np.where(present, chosen[0].day, np.nan).astype(float)).astype(np.int64)
+    return days, chosen[0].dated and chosen[1]
+
+
+def _filled(values: FloatArray) -> FloatArray:
+    """The values, each missing one like the one before it; a time without its date keeps the date above it."""
+    present = np.flatnonzero(np.isfinite(values))
+    if not present.size:
+        return np.zeros(len(values))
+    place = np.maximum(np.searchsorted(present, np.arange(len(values)), side="right") - 1, 0)
+    found: FloatArray = values[present[place]]
+    return found

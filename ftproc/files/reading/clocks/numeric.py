@@ -1,0 +1,131 @@
+"""Times that are numbers: which clock counts them, by the name of the column, its unit, and the size of the values."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ftproc.files import leap_seconds
+from ftproc.files.layout import CANONICAL
+from ftproc.files.reading.clocks.clock import DAY_S, WEEK_S, Clock, unrolled
+from ftproc.files.reading.meaning.schema import Column
+from ftproc.records import FloatArray
+
+UNIX_EPOCH = "1970-01-01T00:00:00Z"
+#: Day counts: stems of names -> (day of 1970-01-01, words).
+_DAY_COUNTS = {
+    "mjd": (40587.0, "modified Julian date"),
+    "jd": (2440587.5, "Julian date"),
+    "excel": (25569.0, "Excel date"),
+}
+_STEMS = {
+    **dict.fromkeys(("mjd", "modifiedjuliandate"), "mjd"),
+    **dict.fromkeys(("jd", "juliandate", "julianday"), "jd"),
+    **dict.fromkeys(("excel", "exceldate", "exceltime"), "excel"),
+    **dict.fromkeys(("tow", "sow", "timeofweek", "secondsofweek", "gpstow", "itow"), "week"),
+    **dict.fromkeys(("gps", "gpstime", "timegps", "gpsseconds", "gpst"), "gps"),
+    **dict.fromkeys(("unix", "unixtime", "posix", "posixtime", "epoch", "epochtime"), "unix"),
+    **dict.fromkeys(("timestamp", "unixtimestamp"), "unix"),
+    **dict.fromkeys(("tod", "sod", "timeofday", "secondsofday", "secofday", "utcsod", "utctod", "day"), "day"),
+    **dict.fromkeys(("utc", "utctime", "timeutc", "zulu", "irig", "irigb", "irigtime", "daytime"), "day"),
+}  # fmt: skip
+_UNIX_FROM, _UNIX_TO = 1e8, 1e10  # s: 1973 to 2286
+_SURELY_UNIX = 1.5e9  # s: 2017; from there on seconds since 1980 are in the future
+_GPS_FROM = 3e8
+_SAMPLE = 2000  # times by which the size and the step are judged
+_LARGEST = 1e300  # two larger numbers would overflow in a mean
+_MOST_DAYS_STEP = 5e-4  # in s it would be a rate of 2 kHz, in days it is 43 s
+
+
+def read(values: FloatArray, column: Column) -> Clock:
+    """The clock of (n,) numbers as they stand in the file, NaN where missing."""
+    known = values[np.isfinite(values)]
+    kind = _STEMS.get(column.key, "")
+    if not known.size:
+        return Clock(column.unit.to_si(values), "", "no time is there")
+    if column.unit_is_stated and not (kind in _DAY_COUNTS and column.unit.name == "d"):
+        return _in_seconds(column.unit.to_si(values), kind, column, f"numbers in {column.unit.name}")
+    size, most = _typical(known), float(known.max())
+    counted = _day_count(kind, size, known)
+    if counted:
+        return _of_days(values, *_DAY_COUNTS[counted])
+    for power, name in ((1e9, "ns"), (1e6, "us"), (1e3, "ms")):
+        if kind != "week" and column.name != CANONICAL["time"] and _UNIX_FROM <= size / power < _UNIX_TO:
+            return Clock(values / power, UNIX_EPOCH, f"{name} since 1970 UTC, by the size of the numbers")
+    if _is_hhmmss(kind, column.notation, values, most):
+        seconds, notes = unrolled(from_hhmmss(values), DAY_S)
+        return Clock(seconds, "", "time of day as hhmmss, in s since midnight", notes)
+    period = {"day": DAY_S, "week": WEEK_S, "gps": WEEK_S}.get(kind)
+    if kind in ("day", "week") and period and 2 * period < most <= 1e3 * period:
+        return _in_seconds(values / 1e3, kind, column, "numbers in ms, by their size")
+    return _in_seconds(values, kind, column, "numbers in s")
+
+
+def _typical(known: FloatArray) -> float:
+    some = known[:: 1 + len(known) // _SAMPLE]
+    return float(np.median(np.minimum(np.abs(some), _LARGEST)))
+
+
+def _in_seconds(time_s: FloatArray, kind: str, column: Column, words: str) -> Clock:
+    known = time_s[np.isfinite(time_s)]
+    size = _typical(known)
+    if kind == "gps" and _GPS_FROM <= size < _UNIX_TO:
+        days = leap_seconds.GPS_EPOCH_DAY + int(known.min() // DAY_S)
+        start = np.datetime64("1980-01-06T00:00:00") - np.timedelta64(int(leap_seconds.before(np.array(days))), "s")
+        return Clock(time_s, f"{start}Z", f"{words} since the GPS epoch, 1980-01-06")
+    named_unix = kind == "unix" and _UNIX_FROM <= size < _UNIX_TO
+    if named_unix or (column.name != CANONICAL["time"] and _SURELY_UNIX <= size < _UNIX_TO and kind != "week"):
+        return Clock(time_s, UNIX_EPOCH, f"{words} since 1970 UTC")
+    whole, notes = unrolled(time_s, {"day": DAY_S, "week": WEEK_S}.get(kind))
+    since = {"day": " since midnight", "week": " since the start of the GPS week"}.get(kind, "")
+    if kind == "gps" and known.max() <= WEEK_S:
+        since = " since the start of the GPS week"
+    return Clock(whole, "", f"{words}{since}", notes)
+
+
+def _day_count(kind: str, size: float, known: FloatArray) -> str:
+    """Which of _DAY_COUNTS these are, or ""."""
+    if kind in _DAY_COUNTS:
+        return kind
+    steps = np.abs(np.diff(np.clip(known[:_SAMPLE], -_LARGEST, _LARGEST)))
+    steps = steps[steps > 0]
+    if kind not in ("", "day", "unix") or not steps.size or float(np.median(steps)) >= _MOST_DAYS_STEP:
+        return ""
+    if 2.4e6 <= size < 2.5e6:
+        return "jd"
+    if 3e4 <= size < 4.9e4:
+        return "excel"
+    return "mjd" if 5.5e4 <= size < 7e4 else ""
+
+
+def _of_days(values: FloatArray, of_1970: float, words: str) -> Clock:
+    days = values - of_1970
+    first = float(np.floor(np.nanmin(days)))
+    epoch = f"{np.datetime64(int(first), 'D')}T00:00:00Z"
+    return Clock(np.round((days - first) * DAY_S, 6), epoch, f"{words}, in s since 00:00 of the first day")
+
+
+def is_hhmmss(values: FloatArray) -> bool:
+    """Whether all numbers are possible times of day written as hhmmss."""
+    known = values[np.isfinite(values)]
+    minute, second = np.floor(known / 100) % 100, known % 100
+    return bool(((known >= 0) & (known < 240_000) & (minute < 60) & (second < 60)).all())
+
+
+def _is_hhmmss(kind: str, notation: str, values: FloatArray, most: float) -> bool:
+    if notation.startswith("hhmmss"):
+        return True
+    return kind in ("day", "") and DAY_S < most < 240_000 and is_hhmmss(values) and (kind == "day" or _jumps(values))
+
+
+def _jumps(values: FloatArray) -> bool:
+    """Whether the numbers jump by 40 at each full minute, as hhmmss does."""
+    known = values[np.isfinite(values)]
+    steps = np.diff(known)
+    jumps = np.abs(steps - np.median(steps) - 40) < 1e-3
+    return bool(jumps.any() and (known[1:][jumps] % 100 < np.median(steps) + 1e-3).all())
+
+
+def from_hhmmss(values: FloatArray) -> FloatArray:
+    """(n,) hhmmss -> seconds since midnight."""
+    seconds: FloatArray = 3600 * np.floor(values / 1e4) + 60 * (np.floor(values / 100) % 100) + values % 100
+    return seconds

@@ -1,0 +1,206 @@
+"""The time columns -> seconds: numbers, durations, dates, timestamps, times of day; in one column or several."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ftproc.errors import InputError
+from ftproc.files import arrow, leap_seconds
+from ftproc.files.reading.clocks import notations, numeric
+from ftproc.files.reading.clocks.clock import DAY_S, Clock, unrolled
+from ftproc.files.reading.meaning.numbers import Origin, as_text, not_a_number, numbers, parsed, without_text
+from ftproc.files.reading.meaning.schema import Column
+from ftproc.records import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_DAY_S = 86400
+_MAX_TICKS = 2**63 - 1
+_FIRST_DAY, _LAST_DAY = (int(np.datetime64(day).astype(int)) for day in ("0001-01-01", "9999-12-31"))
+_PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
+STAMPED = "timestamps, in s since 00:00 UTC of the first day"
+_NO_ZONE = ("the timestamps name no time zone and are taken for UTC",)
+
+
+def read(column: pa.ChunkedArray, origin: Origin, described: Column) -> Clock:
+    """The clock of one column of any type.
+
+    Timestamps (UTC unless they name a zone) become seconds since 00:00 UTC of the day of the earliest one: float64
+    resolves 0.1 microsecond for a week, the order of the rows does not matter, and all logs of one day share their
+    origin. Raises InputError for the first cell that is neither a finite number nor a time.
+    """
+    import pyarrow as pa
+
+    kind = column.type
+    if pa.types.is_timestamp(kind) or pa.types.is_date(kind):
+        time_s, epoch = since_midnight(column, origin)
+        return Clock(time_s, epoch, STAMPED)
+    if pa.types.is_time(kind):
+        whole, notes = unrolled(time_of_day(column), DAY_S)
+        return Clock(whole, "", "time of day, in s since midnight", notes)
+    if pa.types.is_duration(kind):
+        return Clock(_ticks_to_seconds(column.cast(pa.int64()), kind.unit), "", "durations")
+    if without_text(column) is None:
+        text = as_text(column)
+        if parsed(text, origin.decimal_comma) is None:
+            return stamped(text, origin)
+        column = text
+    return numeric.read(numbers(column, origin), described)
+
+
+def seconds(
+    column: pa.ChunkedArray, origin: Origin, to_si: Callable[[FloatArray], FloatArray]
+) -> tuple[FloatArray, str]:
+    """(n,) float64 seconds of numbers (through `to_si`) or timestamps, and the instant of time zero or "", for truths
+    and trajectories. Raises InputError as `read`."""
+    import pyarrow as pa
+
+    plain = without_text(column)
+    if (
+        plain is None
+        and not pa.types.is_temporal(column.type)
+        and parsed(as_text(column), origin.decimal_comma) is None
+    ):
+        clock = stamped(as_text(column), origin)
+        return clock.time_s, clock.epoch
+    if plain is None and pa.types.is_temporal(column.type):
+        if pa.types.is_duration(column.type):
+            return _ticks_to_seconds(column.cast(pa.int64()), column.type.unit), ""
+        if not pa.types.is_time(column.type):
+            return since_midnight(column, origin)
+    return unrolled(to_si(numbers(column, origin)))[0], ""
+
+
+def stamped(text: pa.ChunkedArray, origin: Origin) -> Clock:
+    stamps = _timestamps(text)
+    if stamps is not None:
+        time_s, epoch = since_midnight(stamps, origin)
+        zoned = stamps.type.tz is not None
+        return Clock(time_s, epoch, STAMPED, doubts=() if zoned else _NO_ZONE)
+    fits = notations.matching(text, notations.STAMPS)
+    if not fits:
+        raise _no_time(text, origin)
+    moments, sure = likeliest(fits)
+    words = next(name for name, found in fits.items() if found is moments)
+    if moments.zoned and not moments.has_day:
+        words += " (UTC)"
+    if not moments.has_day:
+        whole, notes = unrolled(moments.second, DAY_S)
+        return Clock(whole, "", f"{words}, in s since midnight", notes)
+    doubts: tuple[str, ...] = () if sure else ("day and month cannot be told apart, so the date is left open",)
+    doubts += () if moments.zoned or not (moments.dated and sure) else _NO_ZONE
+    clock = counted(moments.day, moments.second, moments.dated and sure, f"{words}, in s since 00:00 of the first day")
+    return clock._replace(doubts=doubts)
+
+
+def likeliest(fits: Mapping[str, notations.Moments]) -> tuple[notations.Moments, bool]:
+    """The notation in which the days are nearest to each other, and whether no other is as likely."""
+
+    def days(moments: notations.Moments) -> int:
+        known = moments.day[np.isfinite(moments.second)]
+        return int(np.ptp(known)) if known.size else 0
+
+    order = sorted(fits.values(), key=days)
+    same = [found for found in order if days(found) == days(order[0])]
+    return order[0], all(np.array_equal(found.day, order[0].day) for found in same)
+
+
+def counted(day: IntArray, second: FloatArray, dated: bool, words: str, notes: tuple[str, ...] = ()) -> Clock:
+    """Seconds since 00:00 of the first day, leap seconds counted."""
+    known = day[np.isfinite(second)]
+    first = int(known.min()) if known.size else 0
+    time_s = (day - first) * DAY_S + second
+    if not dated:
+        return Clock(time_s, "", words, notes)
+    leaps = leap_seconds.before(day) - leap_seconds.before(np.array(first))
+    return Clock(time_s + leaps, f"{np.datetime64(first, 'D')}T00:00:00Z", words, notes)
+
+
+def _no_time(text: pa.ChunkedArray, origin: Origin) -> InputError:
+    """The error for the first cell that is not a time like the first one."""
+    written = [cell for cell in text.to_pylist() if cell is not None]
+    zone_of_first = _zone(written[0])
+    if zone_of_first is not None:
+        like = f"a timestamp {zone_of_first} time zone like the first one, {written[0]}"
+        return origin.first_bad_cell(text, lambda cell: None if _zone(cell) == zone_of_first else (like, ""))
+    near = notations.nearest_fit(text, notations.STAMPS)
+    if near is not None and not near[1].all():
+        row = int(np.argmin(near[1]))
+        return origin.bad_cell(row, str(text[row]), f"a possible {near[0]} like the first one, {written[0]}")
+    return origin.first_bad_cell(text, not_a_number(text, origin.decimal_comma))
+
+
+def _timestamps(text: pa.ChunkedArray) -> pa.ChunkedArray | None:
+    """The moments of a column in ISO 8601; None if a cell is something else."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    pointed = pc.replace_substring(text, ",", ".")  # ISO 8601 allows both before the fraction
+    for zone in (None, "UTC"):
+        try:
+            return pointed.cast(pa.timestamp("ns", zone))
+        except pa.ArrowInvalid:
+            continue
+    written = [cell for cell in text.to_pylist() if cell is not None]
+    zone_of_first = _zone(written[0])
+    if zone_of_first is None or not all(_zone(cell) == zone_of_first for cell in written):
+        return None
+    # such as 20240531T123456Z
+    moments = [None if cell is None else dt.datetime.fromisoformat(cell) for cell in pointed.to_pylist()]
+    return pa.chunked_array([pa.array(moments, pa.timestamp("us", "UTC" if zone_of_first == "with" else None))])
+
+
+def _zone(text: str) -> str | None:
+    """`with` or `without` a time zone, for an ISO-8601 date and time; None for other text."""
+    try:
+        moment = dt.datetime.fromisoformat(text.replace(",", "."))
+    except ValueError:
+        return None
+    return "without" if moment.tzinfo is None else "with"
+
+
+def time_of_day(column: pa.ChunkedArray) -> FloatArray:
+    import pyarrow as pa
+
+    unit = column.type.unit
+    return _ticks_to_seconds(column.cast(pa.int32() if unit in ("s", "ms") else pa.int64()), unit)
+
+
+def since_midnight(column: pa.ChunkedArray, origin: Origin) -> tuple[FloatArray, str]:
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    if pa.types.is_date(column.type):
+        column = column.cast(pa.timestamp("ms"))
+    unit = column.type.unit
+    per_day = _DAY_S * _PER_SECOND[unit]
+    ticks = column.cast(pa.int64())
+    earliest, latest = (found or 0 for found in pc.min_max(ticks).as_py().values())  # None if every cell is missing
+
+    def refused(tick: int, why: str) -> InputError:
+        return origin.bad_cell(ticks.to_pylist().index(tick), f"{tick} {unit} since 1970", why)
+
+    for tick in (earliest, latest):
+        if not _FIRST_DAY <= tick // per_day <= _LAST_DAY:
+            raise refused(tick, "a time between the years 1 and 9999")
+    midnight = earliest // per_day * per_day
+    if midnight < -_MAX_TICKS or latest - midnight > _MAX_TICKS:
+        raise refused(earliest, f"close enough to the latest time for 64-bit {unit}")
+    day = np.datetime64(earliest // per_day, "D")
+    time_s = _ticks_to_seconds(pc.subtract(ticks, midnight), unit)
+    first, last = (leap_seconds.before(np.array(tick // per_day)) for tick in (earliest, latest))
+    if first != last:
+        known = np.nan_to_num(time_s)
+        time_s = time_s + leap_seconds.before(day.astype(np.int64) + (known // _DAY_S).astype(np.int64)) - first
+    return time_s, f"{day}T00:00:00Z"
+
+
+def _ticks_to_seconds(ticks: pa.ChunkedArray, unit: str) -> FloatArray:
+    import pyarrow as pa
+
+    return arrow.to_numpy(ticks.cast(pa.float64(), safe=False)) / _PER_SECOND[unit]

@@ -1,0 +1,132 @@
+"""JSON: an object per line, an array of objects, columns by name, or records deep in a document (decoded ASTERIX)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ftproc.errors import InputError
+from ftproc.files.reading.formats import content, encoding
+from ftproc.files.reading.formats.header import TableHeader, of_arrow
+
+_DEEPEST = 12  # objects inside each other
+_MOST_COLUMNS = 5000
+_VALUES = ("val", "value")  # keys under which decoders put the value of an item, beside its meaning
+
+
+def json_file(name: str, path: Path) -> TableHeader:
+    """A .json, .jsonl or .ndjson file. Values inside objects get names such as `I040.RHO`. Raises InputError."""
+    text = encoding.as_utf8(name, content.read(name, path)).data.decode()
+    records = _records(name, text)
+    columns: dict[str, list[Any]] = {}
+    for row, record in enumerate(records):
+        for key, value in _flat(record, "", 0):
+            if key not in columns and len(columns) >= _MOST_COLUMNS:
+                raise InputError(f"{name}: the objects have more than {_MOST_COLUMNS} values, which no log has.")
+            cells = columns.setdefault(key, [])
+            if len(cells) <= row:
+                cells += [None] * (row - len(cells))
+                cells.append(value)
+    for cells in columns.values():
+        cells += [None] * (len(records) - len(cells))
+    if not columns:
+        raise InputError(f"{name}: it holds no objects with values; expected one object for each reading.")
+    import pyarrow as pa
+
+    return of_arrow(pa.table({key: _array(cells) for key, cells in columns.items()}), name, "JSON objects")
+
+
+def _array(cells: list[Any]) -> Any:
+    import pyarrow as pa
+
+    try:
+        return pa.array(cells)
+    except (pa.ArrowException, OverflowError):  # numbers and words in one column
+        return pa.array([None if cell is None else str(cell) for cell in cells], pa.string())
+
+
+def _records(name: str, text: str) -> list[Mapping[str, Any]]:
+    """The objects of a document, one for each reading."""
+    try:
+        try:
+            found = json.loads(text)
+        except json.JSONDecodeError:
+            found = _by_line(name, text)
+        records = list(_deepest_list(found)) if not _is_columns(found) else _of_columns(found)
+    except RecursionError as error:
+        raise InputError(f"{name}: this JSON nests too deeply; write one object for each reading.") from error
+    if not records:
+        raise InputError(f"{name}: there are no rows; expected one JSON object for each reading.")
+    return records
+
+
+def _by_line(name: str, text: str) -> list[Any]:
+    found = []
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.strip():
+            try:
+                found.append(json.loads(line))
+            except ValueError as error:
+                raise InputError(
+                    f"{name}: line {number} is not JSON ({error}); expected an object on each line, such as "
+                    '{"time_s": 0.5, "range_m": 5000}. Correct the line or delete it.'
+                ) from error
+    return found
+
+
+def _is_columns(found: Any) -> bool:
+    """Whether an object holds a list, or an object of numbered cells, of the same length for each column."""
+    if not isinstance(found, Mapping) or len(found) < 2:
+        return False
+    sizes = {len(cells) if isinstance(cells, list | Mapping) else -1 for cells in found.values()}
+    flat = all(not isinstance(cell, list | Mapping) for cells in found.values() for cell in _cells(cells)[:1])
+    return len(sizes) == 1 and sizes.pop() > 1 and flat
+
+
+def _cells(cells: Any) -> list[Any]:
+    return list(cells.values()) if isinstance(cells, Mapping) else list(cells) if isinstance(cells, list) else [cells]
+
+
+def _of_columns(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    names = list(found)
+    return [dict(zip(names, row, strict=True)) for row in zip(*map(_cells, found.values()), strict=True)]
+
+
+def _deepest_list(found: Any, depth: int = 0) -> Iterator[Mapping[str, Any]]:
+    """The objects in lists of a document; an object that holds a list of objects gives these."""
+    if depth > _DEEPEST:
+        return
+    if isinstance(found, list):
+        for item in found:
+            yield from _deepest_list(item, depth + 1)
+    elif isinstance(found, Mapping):
+        lists = [key for key, value in found.items() if _holds_records(value)]
+        if not lists:
+            yield found
+        for key in lists:
+            yield from _deepest_list(found[key], depth + 1)
+
+
+def _holds_records(value: Any, depth: int = 0) -> bool:
+    if depth > _DEEPEST:
+        return False
+    if isinstance(value, list):
+        return any(isinstance(item, Mapping) for item in value)
+    return isinstance(value, Mapping) and any(_holds_records(item, depth + 1) for item in value.values())
+
+
+def _flat(value: Any, prefix: str, depth: int) -> Iterator[tuple[str, Any]]:
+    """Name and value of each plain value inside an object."""
+    if isinstance(value, Mapping) and depth < _DEEPEST:
+        inner = next((key for key in _VALUES if key in value), None)
+        if prefix and inner is not None:
+            yield from _flat(value[inner], prefix, depth + 1)
+            return
+        for key, item in value.items():
+            yield from _flat(item, f"{prefix}.{key}" if prefix else str(key), depth + 1)
+    elif not isinstance(value, list | Mapping):
+        yield prefix, value
+    elif isinstance(value, Sequence) and len(value) == 1:
+        yield from _flat(value[0], prefix, depth + 1)

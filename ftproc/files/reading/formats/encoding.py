@@ -1,0 +1,76 @@
+"""Bytes -> UTF-8: byte order marks, UTF-16 and UTF-32 without one, Windows and Latin-1 text."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from ftproc.errors import InputError
+
+_MARKS = (
+    (b"\xef\xbb\xbf", "utf-8", ""),
+    (b"\xff\xfe\x00\x00", "utf-32-le", "UTF-32"),
+    (b"\x00\x00\xfe\xff", "utf-32-be", "UTF-32"),
+    (b"\xff\xfe", "utf-16-le", "UTF-16"),
+    (b"\xfe\xff", "utf-16-be", "UTF-16"),
+)
+#: The share of NUL bytes at each place of four, in text without a mark.
+_BY_NULS = {"utf-32-le": "0111", "utf-32-be": "1110", "utf-16-le": "0101", "utf-16-be": "1010"}
+_SAMPLE = 4096
+_CONTROL = re.compile(rb"[\x00-\x08\x0e-\x19\x1c-\x1f]")
+
+_OTHER_KINDS = {
+    b"PAR1": "is a Parquet file; give it the name .parquet",
+    b"PK\x03\x04": "is a zip archive or an Excel workbook; give it the name .zip or .xlsx",
+    b"ARROW1": "is an Arrow file; give it the name .arrow",
+    b"\x89HDF": "is an HDF5 file; give it the name .h5",
+    b"%PDF": "is a PDF document; save the table in it as CSV",
+    b"\xd0\xcf\x11\xe0": "is an old Office document (it has NUL bytes); save the sheet as .xlsx or CSV",
+}
+
+
+class Utf8(NamedTuple):
+    """data: UTF-8 without a mark. skipped: bytes of the mark. was: the name of another encoding, or ""."""
+
+    data: bytes
+    skipped: int = 0
+    was: str = ""
+
+
+def as_utf8(source: str, data: bytes, cut: bool = False) -> Utf8:
+    """The text in UTF-8. cut: `data` is only the beginning. Raises InputError for what is no text."""
+    for magic, reason in _OTHER_KINDS.items():
+        if data.startswith(magic):
+            raise InputError(f"{source}: this {reason}.")
+    mark, name, word = next((entry for entry in _MARKS if data.startswith(entry[0])), (b"", "", ""))
+    name = name or _by_nuls(data[:_SAMPLE])
+    if name not in ("", "utf-8"):
+        try:
+            return Utf8(data[len(mark) :].decode(name).encode(), len(mark), word or name[:6].upper())
+        except UnicodeDecodeError as error:
+            raise InputError(f"{source}: this is damaged {name[:6].upper()} text; save it as UTF-8.") from error
+    if b"\0" in data[:_SAMPLE]:
+        raise InputError(f"{source}: this is not text in UTF-8 (it has NUL bytes); save it as UTF-8 CSV.")
+    text = data[len(mark) :]
+    if text.isascii() or _is_utf8(text, cut):
+        return Utf8(text, len(mark))
+    if _CONTROL.search(text[:_SAMPLE]):
+        raise InputError(f"{source}: this is not text, or a damaged file; save it as UTF-8 CSV.")
+    return Utf8(text.decode("cp1252", "replace").replace("\ufffd", "?").encode(), 0, "Windows or Latin-1")
+
+
+def _is_utf8(text: bytes, cut: bool) -> bool:
+    try:
+        text.decode()
+    except UnicodeDecodeError as error:
+        return cut and error.start >= len(text) - 3
+    return True
+
+
+def _by_nuls(sample: bytes) -> str:
+    whole = sample[: len(sample) // 4 * 4]
+    if not whole or b"\0" not in whole:
+        return ""
+    share = [whole[k::4].count(0) / len(whole[k::4]) for k in range(4)]
+    pattern = "".join("1" if part > 0.8 else "0" if part < 0.2 else "?" for part in share)
+    return next((name for name, marks in _BY_NULS.items() if marks == pattern), "")

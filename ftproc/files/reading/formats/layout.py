@@ -1,0 +1,215 @@
+"""Where the table is in a text: comment and title lines, the line of names, a row of units, the separator.
+
+The separator is the one by which the most lines in a row have the same number of cells, most of them numbers or times;
+the line of names stands directly above these lines.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ftproc.files.units import QUANTITIES, unit_named
+
+#: How comment lines begin. A semicolon does so too, where it is not the separator.
+COMMENTS = ("#", "%", "//", "!", "*", "REM ", "C ")
+BLANKS = " "  # the separator of columns that are apart by blanks
+_SEPARATORS = ("\t", ";", "|", ",", BLANKS)  # the first of those that fit as well counts
+_MOST_LINES = 2000
+_ENOUGH = 0.9  # of the longest table, for a separator earlier in the list
+
+_CELL = re.compile(r'"?\s*[+-]?[.,]?\d\S*\s*"?')
+#: Cells with blanks inside: a date and a time of day, degrees, minutes and seconds, a date by name, a number and unit.
+_WITH_BLANKS = re.compile(
+    r'"?\s*(?:'
+    r"[+-]?\d[\d./:-]*[T ]+\d{1,2}:\d\S*(?:\s*[AaPp][Mm]|\s*\S{1,6})?"
+    r"|[+-]?\d{1,3}[°d]?\s+\d{1,2}['m]?\s+\d{1,2}(?:[.,]\d*)?[\"s]?"
+    r"|\d{1,2}[ -]\w{3,9}[ -]\d{2,4}.*"
+    r"|\d\S*\s?[A-Za-z°%/]+"
+    r')\s*"?'
+)
+_RULE = re.compile(r"[-=_+*#|,;\s]*[-=_]{2,}[-=_+*#|,;\s]*")
+_NOTHING = re.compile(r"\s*[\"']?(nan|null|none|n/?a|nil|[-*?.]+|)[\"']?\s*", re.IGNORECASE)
+
+
+class Layout(NamedTuple):
+    """names: of the columns, numbers from 1 where the file has none. first: number of the first line of data, among
+    the lines as `lines` numbers them. separator: one character, or BLANKS. units: cells of a row of units. above:
+    lines that are neither. named: there is a line of names. cells: in a row."""
+
+    names: list[str]
+    first: int
+    separator: str
+    units: list[str]
+    above: int
+    named: bool
+    cells: int
+
+
+def find(lines: Sequence[str], widths: Sequence[int] = ()) -> Layout | None:
+    """The layout of a text from its first lines (the empty ones too), or None if no line looks like a row."""
+    filled = [number for number, line in enumerate(lines[:_MOST_LINES]) if line.strip()]
+    tables = {}
+    for separator in ("",) if widths else _SEPARATORS:
+        rows = {number: split(lines[number], separator, widths) for number in filled}
+        start, length = _longest(filled, rows)
+        if length:
+            tables[separator] = (start, length, rows)
+    if not tables:
+        return None
+    most = max(length for _, length, _ in tables.values())
+    separator = next(s for s, (_, length, _) in tables.items() if length >= _ENOUGH * most)
+    start, _, rows = tables[separator]
+    return _with_names(lines, filled, start, separator, rows, widths)
+
+
+def split(line: str, separator: str, widths: Sequence[int] = ()) -> list[str]:
+    """The cells of a line."""
+    if widths:
+        return [line[low:high].strip() for low, high in itertools.pairwise([0, *itertools.accumulate(widths)])]
+    if separator == BLANKS:
+        return line.split()
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
+    except (csv.Error, StopIteration):
+        return [line]
+
+
+def is_data(cells: Sequence[str], strictly: bool = False) -> bool:
+    """Whether at least half (strictly: all) of the cells that hold something are numbers or times."""
+    present = [cell for cell in cells if not _NOTHING.fullmatch(cell)]
+    numbers = sum(bool(_CELL.fullmatch(cell) or _WITH_BLANKS.fullmatch(cell)) for cell in present)
+    return bool(numbers) and (numbers == len(present) if strictly else 2 * numbers >= len(present))
+
+
+def _longest(filled: Sequence[int], rows: dict[int, list[str]]) -> tuple[int, int]:
+    """Index in `filled` of the first of the most consecutive rows with as many cells, and their number."""
+    best, start, length, width = (0, 0), 0, 0, 0
+    for index, number in enumerate(filled):
+        cells = rows[number]
+        fits = len(cells) > 1 and is_data(cells) and not is_comment(cells[0])
+        if fits and len(cells) == width and length:
+            length += 1
+        elif fits:
+            start, length, width = index, 1, len(cells)
+        elif length and _is_empty_row(cells, width):
+            length += 1
+        else:
+            length = 0
+        if length > best[1]:
+            best = (start, length)
+    return best
+
+
+def _is_empty_row(cells: Sequence[str], width: int) -> bool:
+    return len(cells) == width and all(_NOTHING.fullmatch(cell) for cell in cells)
+
+
+def is_comment(text: str) -> bool:
+    """Whether a line that begins so is a comment."""
+    return text.lstrip().startswith(COMMENTS)
+
+
+def _with_names(
+    lines: Sequence[str], filled: Sequence[int], start: int, separator: str, rows: dict[int, list[str]],
+    widths: Sequence[int],
+) -> Layout:  # fmt: skip
+    """The names above the rows; lines between them that hold numbers count as rows too, wrong ones."""
+    width = len(rows[filled[start]])
+    block = [lines[number] for number in filled[start : start + 50]]
+    top = start
+    while (
+        top
+        and not _RULE.fullmatch(lines[filled[top - 1]])
+        and (is_data(rows[filled[top - 1]], strictly=True) or _is_empty_row(rows[filled[top - 1]], width))
+    ):
+        top -= 1
+    units: list[str] = []
+    place = top - 1
+    while place >= 0 and _RULE.fullmatch(lines[filled[place]]):  # a rule under the names
+        place -= 1
+    if place >= 0:
+        cells = _heading(lines[filled[place]], separator, width, block, widths)
+        if cells is not None and _is_units(cells) and place:
+            units, place = cells, place - 1
+    names = None if place < 0 else _heading(lines[filled[place]], separator, width, block, widths)
+    if names is not None and sum(bool(_CELL.fullmatch(name)) for name in names) > len(names) / 2:
+        names = None
+    if names is None and top < start:  # the numbers above belong to something else
+        return _with_names(lines, filled, start, separator, {**rows, **{n: [""] for n in filled[top:start]}}, widths)
+    if names is None and place >= 0 and top - place == 1 and (cells := _mismatched(lines[filled[place]], separator)):
+        names = cells  # the rows have too many or too few cells, and are refused
+    numbers = [str(k + 1) for k in range(width)]
+    found = numbers if names is None else names
+    if len(units) != len(found):
+        units = []
+    first = filled[top]
+    return Layout(found, first, separator, units, max(place, 0) if names is not None else top, names is not None, width)
+
+
+def _mismatched(line: str, separator: str) -> list[str]:
+    """The cells of a line that looks like names, though there are not as many as in a row; else nothing."""
+    cells = split(line, separator)
+    plain = all(re.fullmatch(r"[A-Za-z_]\w*(?: ?[(\[].{1,8}[)\]])?", cell) for cell in cells)
+    return cells if plain and separator != BLANKS and len(cells) > 1 else []
+
+
+def _is_units(cells: Sequence[str]) -> bool:
+    """Whether most cells are names of units."""
+    words = [cell.strip("()[]{} ") for cell in cells]
+    present = [word for word in words if word.strip("-")]
+    known = sum(any(unit_named(quantity, word) is not None for quantity in QUANTITIES) for word in present)
+    brackets = sum(bool(re.fullmatch(r"[(\[].*[)\]]", cell)) for cell in cells)
+    return bool(present) and 2 * max(known, brackets) >= len(present)
+
+
+def _heading(line: str, separator: str, width: int, block: Sequence[str], widths: Sequence[int]) -> list[str] | None:
+    """The cells of a line above the rows if there are as many as in a row; it may begin as comments do."""
+    bare = line
+    mark = next((mark for mark in (*COMMENTS, ";") if line.lstrip().startswith(mark) and mark != separator), "")
+    if mark and not widths:
+        bare = line.replace(mark, "", 1) if separator != BLANKS else line.replace(mark, " " * len(mark), 1)
+        bare = re.sub(r"^(\s*)[#%/]+", r"\1", bare)
+    ways = [split(bare, separator, widths)]
+    if separator == BLANKS:
+        ways += [re.split(r"\s{2,}|\t", bare.strip()), _joined_brackets(bare), _aligned(bare, block, width)]
+        ways += [[cell.strip() for cell in bare.split(mark)] for mark in (",", ";", "|") if mark in bare]
+        ways += [["Date", *way] for way in (bare.split(), _joined_brackets(bare)) if _begins_with_date(block)]
+    elif separator == "\t":
+        ways += [bare.split(), _joined_brackets(bare)]
+    for cells in ways:
+        if len(cells) == width:
+            return cells
+        if len(cells) == width + 1 and not cells[-1]:  # a separator at the end of the names, but not of the rows
+            return cells[:-1]
+        if len(cells) == width - 1 and separator != BLANKS and all(row.rstrip().endswith(separator) for row in block):
+            return [*cells, ""]
+    return None
+
+
+def _begins_with_date(block: Sequence[str]) -> bool:
+    return all(re.match(r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s+\d{1,2}:\d{2}", row) for row in block)
+
+
+def _joined_brackets(line: str) -> list[str]:
+    """The words of a line, each with the bracket that follows it."""
+    cells = re.findall(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?", line)
+    return [str(cell) for cell in cells]
+
+
+def _aligned(line: str, block: Sequence[str], width: int) -> list[str]:
+    """The words of a line by the column of numbers that each stands above."""
+    spans = [[(m.start(), m.end()) for m in re.finditer(r"\S+", row)] for row in block]
+    spans = [row for row in spans if len(row) == width]
+    if not spans:
+        return []
+    middles = [sum(low + high for low, high in column) / (2 * len(spans)) for column in zip(*spans, strict=True)]
+    cells: list[list[str]] = [[] for _ in range(width)]
+    for word in re.finditer(r"\S+", line):
+        centre = (word.start() + word.end()) / 2
+        cells[min(range(width), key=lambda k: abs(middles[k] - centre))].append(word[0])
+    found = [" ".join(words) for words in cells]
+    return found if all(found) else []

@@ -1,0 +1,87 @@
+"""Excel workbooks, by pandas and openpyxl: the sheet named after #, or the first that holds a table."""
+
+from __future__ import annotations
+
+import datetime as dt
+import warnings
+import zipfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from ftproc.errors import InputError, first_line
+from ftproc.files.reading.formats import content, layout
+from ftproc.files.reading.formats.header import TableHeader, of_arrow
+
+
+def workbook(name: str, path: Path, sheet: str = "") -> TableHeader:
+    """An .xlsx file. sheet: its name, else the first with rows. Raises InputError."""
+    content.read(name, path, limit=1)  # for its messages
+    _refuse_bomb(name, path)
+    for title, cells in _sheets(name, path, sheet):
+        lines = ["\t".join(_text(cell) for cell in row) for row in cells]
+        found = layout.find(lines)
+        if found is None or found.separator != "\t":
+            continue
+        rows = [row for row in cells[found.first :] if any(_text(cell) for cell in row)]
+        import pyarrow as pa
+
+        columns = [_column([row[place] for row in rows]) for place in range(found.cells)]
+        table = pa.Table.from_arrays(columns, names=found.names)
+        return of_arrow(table, name, f'Excel workbook, sheet "{title}"', found.units)
+    which = f'sheet "{sheet}" holds' if sheet else "no sheet holds"
+    raise InputError(f"{name}: {which} {'no ' if sheet else 'a '}table of numbers under a line of names.")
+
+
+def _sheets(name: str, path: Path, sheet: str) -> Iterator[tuple[str, list[tuple[Any, ...]]]]:
+    """Title and cells of the sheets."""
+    import pandas as pd
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of openpyxl, on styles
+            with pd.ExcelFile(path, engine="openpyxl") as book:
+                titles = [str(title) for title in book.sheet_names]
+                if sheet and sheet not in titles:
+                    raise InputError(f'{name}: there is no sheet "{sheet}"; its sheets are {", ".join(titles)}.')
+                for title in [sheet] if sheet else titles:
+                    frame = book.parse(title, header=None, dtype=object, keep_default_na=False)
+                    yield title, list(frame.itertuples(index=False, name=None))
+    except ImportError as error:
+        raise InputError(f"{name}: reading .xlsx needs openpyxl: pip install openpyxl; or save it as CSV.") from error
+    except InputError:
+        raise
+    except Exception as error:  # openpyxl raises many kinds for damaged files
+        reason = first_line(error)
+        raise InputError(
+            f"{name}: not an Excel workbook (.xlsx), or a damaged one ({reason}); save it as CSV."
+        ) from error
+
+
+def _refuse_bomb(name: str, path: Path) -> None:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+    except (zipfile.BadZipFile, OSError) as error:
+        raise InputError(f"{name}: not an Excel workbook (.xlsx), or a damaged one; save it as CSV.") from error
+    if size > content.unpacked_limit(path.stat().st_size):
+        raise InputError(f"{name}: unpacks to more than {content.MAX_GROWTH} times its packed size; save it as CSV.")
+
+
+def _text(cell: Any) -> str:
+    return "" if cell is None else str(cell).replace("\t", " ").strip()
+
+
+def _column(cells: Sequence[Any]) -> Any:
+    """One column: numbers, timestamps, times of day, or else texts."""
+    import pyarrow as pa
+
+    present = [None if _text(cell) == "" else cell for cell in cells]
+    kinds = {type(cell) for cell in present if cell is not None}
+    if kinds <= {int, float}:
+        return pa.array([None if cell is None else float(cell) for cell in present], pa.float64())
+    if kinds <= {dt.datetime} or {kind.__name__ for kind in kinds} <= {"datetime", "Timestamp"}:
+        return pa.array(present, pa.timestamp("us"))
+    if kinds == {dt.time}:
+        return pa.array(present, pa.time64("us"))
+    return pa.array([None if cell is None else _text(cell) for cell in present], pa.string())

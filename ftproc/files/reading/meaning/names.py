@@ -1,0 +1,171 @@
+"""The name of a column taken apart: `RNG_KM`, `Az (deg)`, `slantRange/yd`, `CAT048.I040.RHO.val` -> stem and unit."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from typing import NamedTuple
+
+from ftproc.files.units import (
+    ALIASES,
+    ANGLES_BY_UNIT,
+    QUALIFIERS,
+    QUANTITIES,
+    WEAK_ALIASES,
+    ZENITH_ALIASES,
+    unit_named,
+)
+
+_BRACKETS = re.compile(r"(.*?)[\s_.,:/-]*[(\[{<]\s*(.*?)\s*[)\]}>]\s*")
+_LAST = re.compile(r"(.*\S)(?:\s*/\s*|\s+in\s+|\s*,\s*|[\s_.-]+)(\S+)", re.IGNORECASE)
+_CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
+_NOT_WORDS = re.compile(r"[^0-9a-zµμ°]+")
+_VALUE = re.compile(r"[._/](val|value)$", re.IGNORECASE)  # how decoders end the path of a value
+
+#: Units of other quantities, by which a column is known for something else.
+_FOREIGN = frozenset(
+    [
+        *("m/s", "mps", "km/h", "kmh", "kph", "kt", "kts", "knots", "ft/s", "fps", "deg/s", "dps", "rad/s", "mrad/s"),
+        *("hz", "khz", "mhz", "ghz", "db", "dbm", "v", "mv", "w", "k", "c", "degc", "°c", "degf", "hpa", "mbar", "pa"),
+        *("%", "counts", "count", "raw", "m/s2", "m/s^2", "g", "ppm", "fl", "fpm", "ft/min", "nm/h", "rpm", "°/s"),
+    ]
+)
+#: Words in brackets that are notations of a time or an angle.
+NOTATIONS = frozenset(["utc", "gps", "gpst", "hms", "hhmmss", "dms", "ddmmss", "dddmmss", "dmmss", "zulu", "z", "tai"])
+
+
+class Name(NamedTuple):
+    """text: as in the file. stem: small letters and digits. words: of the stem. unit: as written, or "".
+
+    notation: one of NOTATIONS, or "". foreign: the unit is not that of a time, length or angle.
+    """
+
+    text: str
+    stem: str
+    words: tuple[str, ...]
+    unit: str = ""
+    notation: str = ""
+    foreign: bool = False
+
+    def means(self, quantity: str) -> int:
+        """0: not this quantity; 1: by one of its names; 2: by a name that other things have too."""
+        unit = unit_named(quantity, self.unit) if self.unit else None
+        if self.foreign or (self.unit and unit is None) or (self.stem in ANGLES_BY_UNIT and unit is None):
+            return 0
+        for rank, aliases in ((1, ALIASES), (2, WEAK_ALIASES)):
+            if self.stem in aliases[quantity]:
+                return rank
+        core = self.core()
+        return 2 if core in (*ALIASES[quantity], *WEAK_ALIASES[quantity]) and core != self.stem else 0
+
+    def core(self) -> str:
+        """The stem without words that say nothing about the quantity, such as `radar1`."""
+        return "".join(word for word in self.words if word.rstrip("0123456789") not in QUALIFIERS)
+
+    def is_zenith(self) -> bool:
+        """Whether it names zenith angles."""
+        core = self.core()
+        return not self.foreign and bool({self.stem, core} & set(ZENITH_ALIASES))
+
+
+def taken_apart(text: str, unit: str = "") -> Name:
+    """A name, and the cell under it in a row of units (which wins)."""
+    plain = unicodedata.normalize("NFC", text).strip().strip("\"'#%;!").strip()
+    plain = _VALUE.sub("", plain)
+    found, notation, foreign = "", "", False
+    bracketed = _BRACKETS.fullmatch(plain)
+    if bracketed:
+        inside = bracketed[2]
+        known = next((part for part in (inside, *re.split(r"[\s,;]+", inside)) if _is_unit(part)), "")
+        squeezed = _squeezed(inside)
+        if known:
+            plain, found = bracketed[1], known
+        elif squeezed in NOTATIONS or "hh" in squeezed or "dd" in squeezed or "yy" in squeezed:
+            plain, notation = bracketed[1], squeezed
+        elif inside.lower() in _FOREIGN:
+            plain, foreign = bracketed[1], True
+        elif inside:
+            plain, found = bracketed[1], inside
+    elif not _is_name(plain):
+        plain, found, foreign = _suffix(plain)
+        if found in NOTATIONS:
+            found, notation = "", found
+    if unit:
+        inside = unit.strip().strip("()[]{}<>").strip()
+        foreign = inside.lower() in _FOREIGN
+        squeezed = _squeezed(inside)
+        if _is_unit(inside):
+            found = inside
+        elif squeezed in NOTATIONS or "hh" in squeezed or "dd" in squeezed:
+            notation = squeezed
+        elif inside.strip("-"):
+            found = found or ("" if foreign else inside)
+    stem, words, context = _words(plain)
+    if not found and not foreign:
+        found = _asterix_unit(words[-1] if words else "", context)
+    return Name(text, stem, words, found, notation, foreign)
+
+
+def _squeezed(text: str) -> str:
+    """A notation such as `hh:mm:ss.sss` as hhmmss."""
+    return re.sub(r"s{2,}$", "ss", re.sub(r"[^a-z]", "", text.lower()))
+
+
+def _is_unit(word: str) -> bool:
+    return any(unit_named(quantity, word) is not None for quantity in QUANTITIES)
+
+
+def _is_name(text: str) -> bool:
+    """Whether the whole text is a name without a unit: `sec`, `gps_sec`, `epoch`."""
+    key = _NOT_WORDS.sub("", re.split(r"[./]", text.lower())[-1])
+    return any(key in table[quantity] for table in (ALIASES, WEAK_ALIASES) for quantity in QUANTITIES)
+
+
+def _suffix(text: str) -> tuple[str, str, bool]:
+    """Name, unit and whether it is foreign, of a name that may end in its unit: `az_deg`, `elDeg`, `Az°`."""
+    if text.endswith(("°", "º")):
+        return text[:-1], "deg", False
+    found = _LAST.fullmatch(text)
+    if found and found[2].lower() in _FOREIGN and found[2].lower() not in ("raw", "v", "c", "k", "g", "w", "hz"):
+        return found[1], "", True
+    if found:
+        longer = _LAST.fullmatch(found[1])
+        pair = f"{longer[2]} {found[2]}" if longer else ""
+        if longer and pair and _is_unit(pair) and not _is_unit(found[2] + found[2]):
+            return _without_in(longer[1]), pair, False
+        if _is_unit(found[2]):
+            return _without_in(found[1]), found[2], False
+    if found and found[2].lower() in NOTATIONS and found[2].lower() not in ("utc", "gps", "gpst", "z", "zulu"):
+        return found[1], found[2].lower(), False
+    parts = _CAMEL.split(text)
+    if len(parts) > 1 and len(parts[-1]) > 1 and _is_unit(parts[-1]):
+        return "".join(parts[:-1]), parts[-1], False
+    return text, "", False
+
+
+def _without_in(text: str) -> str:
+    return re.sub(r"\s+in$", "", text, flags=re.IGNORECASE)
+
+
+def _words(text: str) -> tuple[str, tuple[str, ...], str]:
+    """Stem and words of the last part of a path such as `CAT048.I040.RHO`, and the path before it."""
+    context, _, last = text.rpartition("/") if "/" in text else text.rpartition(".")
+    if not re.sub(r"[^A-Za-z]", "", last):
+        context, last = "", text
+    spaced = unicodedata.normalize("NFKD", _CAMEL.sub(" ", last)).lower()
+    spaced = "".join(letter for letter in spaced if not unicodedata.combining(letter))
+    words = tuple(word for word in _NOT_WORDS.split(spaced) if word)
+    if len(words) > 1 and words[0].isdigit():  # such as 048_040_RHO
+        digits = [k for k, word in enumerate(words) if word.isdigit()]
+        cut = next((k for k in range(len(words)) if k not in digits), 0)
+        context, words = f"{context}.{'.'.join(words[:cut])}", words[cut:]
+    return "".join(words), words, context.lower()
+
+
+#: Items of ASTERIX category 048 with the units that its standard states.
+_ASTERIX = {("rho", "040"): "nmi", ("theta", "040"): "deg", ("tod", "140"): "s", ("day", "140"): "s"}
+
+
+def _asterix_unit(word: str, context: str) -> str:
+    parts = {part.removeprefix("i") for part in _NOT_WORDS.split(context)}
+    return next((unit for (name, item), unit in _ASTERIX.items() if name == word and item in parts), "")

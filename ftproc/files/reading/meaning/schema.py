@@ -1,0 +1,260 @@
+"""Which column of a file is the time, the range, the azimuth and the elevation, and in what unit.
+
+The rules, first to last:
+1. a column named by `--columns`, by its name or its number from 1; `time=Date+Time` names several;
+2. the canonical name, exactly: `time_s`, `range_m`, `azimuth_rad`, `elevation_rad`. It has priority over bare names,
+   because these may be something else, such as a temperature `T` or an acceleration `A`;
+3. columns that are one quantity together: date and time, GPS week and seconds, degrees, minutes and seconds;
+4. one column by name (`R`, `az`: the unit of `--units`, else judged by its values) or by name and unit (`az_deg`);
+5. one column by a name that other things have too (`DIST`, `V`).
+Two columns that could be the same quantity are an error, not a guess.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from ftproc.errors import InputError, nearest
+from ftproc.files.layout import CANONICAL
+from ftproc.files.options import ABSENT
+from ftproc.files.reading.meaning import parts
+from ftproc.files.reading.meaning.names import Name, taken_apart
+from ftproc.files.units import ALIASES, NOT_UNITS, QUANTITIES, UNITS, Unit, si_unit, unit_named
+
+_OF_A_TRAJECTORY = ("row", "x_m", "vx_mps", "sigma_x_m", "outlier_range", "nis")
+
+
+class Column(NamedTuple):
+    """The column (or columns) of a quantity, its unit, and who stated the unit.
+
+    positions: in the file, one for each of `roles`: ("value",), ("date", "time"), ("deg", "min", "sec"), ...
+    key: the stem of the name, by which clocks are told apart. notation: from the name, such as `dms`. why: the column
+    was taken. others: columns that could be the quantity too. zenith: the name is that of a zenith angle. written:
+    the units in the names of several columns.
+    """
+
+    quantity: str
+    positions: tuple[int, ...]
+    name: str
+    unit: Unit
+    unit_stated_by_user: bool
+    unit_in_name: bool
+    roles: tuple[str, ...] = ("value",)
+    key: str = ""
+    notation: str = ""
+    why: str = "its name"
+    others: tuple[str, ...] = ()
+    zenith: bool = False
+    written: tuple[str, ...] = ()
+
+    @property
+    def position(self) -> int:
+        return self.positions[0]
+
+    @property
+    def unit_is_stated(self) -> bool:
+        return self.unit_stated_by_user or self.unit_in_name or len(self.roles) > 1
+
+
+def resolve(
+    source: str,
+    names: Sequence[str],
+    units: Mapping[str, str],
+    columns: Mapping[str, str],
+    unit_row: Sequence[str] = (),
+) -> dict[str, Column]:
+    """The columns of the log among `names` of file `source`: {quantity: column}, the time first.
+
+    units, columns: as `parse_units` and `parse_columns` return them. unit_row: the cells under the names, if there is
+    such a row.
+    Raises InputError if the time or every component is missing, if two columns fit one quantity, if a column of
+    `--columns` is absent, and if a column's name and `--units` contradict each other.
+    """
+    if not columns and set(_OF_A_TRAJECTORY) <= set(names):
+        raise InputError(f"{source}: this is a trajectory that ftproc wrote, no log: ftproc score {source}.")
+    apart = [taken_apart(name, unit) for name, unit in zip(names, unit_row or [""] * len(names), strict=True)]
+    table = _Table(source, names, apart, units)
+    found: dict[str, Column] = {}
+    taken = {place for name in columns.values() if name != ABSENT for place in table.places(name)}
+    for quantity in QUANTITIES:
+        if columns.get(quantity) == ABSENT:
+            continue
+        if quantity in columns:
+            column: Column | None = _named(table, quantity, columns[quantity])
+        else:
+            column = _recognised(table, quantity, [k for k in range(len(names)) if k not in taken])
+        if column is not None:
+            found[quantity] = column
+            taken |= set(column.positions)
+    _check_complete(source, names, found, columns)
+    return found
+
+
+class _Table(NamedTuple):
+    source: str
+    names: Sequence[str]
+    apart: Sequence[Name]
+    units: Mapping[str, str]
+
+    def places(self, name: str) -> list[int]:
+        """The positions of a column that the user names, by its name, its number, or several joined by +."""
+        if name in self.names:
+            return [self.names.index(name)]
+        if name.isdecimal() and 1 <= int(name) <= len(self.names):
+            return [int(name) - 1]
+        several = [part.strip() for part in name.split("+")]
+        found = [self.places(part) for part in several] if len(several) > 1 else []
+        return [place for part in found for place in part] if all(found) else []
+
+    def column(self, quantity: str, position: int, why: str, others: Sequence[str] = ()) -> Column:
+        _refuse_twice(self.source, self.names, self.names[position])
+        name, unit = self.apart[position], self.units.get(quantity)
+        stated = unit_named(quantity, name.unit) if name.unit else None
+        chosen = UNITS[quantity][unit] if unit else stated or si_unit(quantity)
+        return Column(
+            quantity, (position,), self.names[position], chosen, unit is not None, stated is not None, key=name.stem,
+            notation=name.notation, why=why, others=tuple(others), zenith=quantity == "elevation" and name.is_zenith(),
+        )  # fmt: skip
+
+    def joint(self, quantity: str, roles: Mapping[str, int], why: str) -> Column:
+        places = tuple(roles.values())
+        unit = self.units.get(quantity)
+        chosen = UNITS[quantity][unit] if unit else si_unit(quantity)
+        name = " + ".join(self.names[place] for place in places)
+        written = tuple(self.apart[place].unit for place in places)
+        return Column(quantity, places, name, chosen, unit is not None, False, tuple(roles), why=why, written=written)
+
+
+def remarks(names: Sequence[str], found: Mapping[str, Column], timestamps: bool) -> tuple[str, ...]:
+    """Remarks for the user: units that are assumed, and unused columns that may hold an absent quantity.
+
+    timestamps: the time needs no unit.
+    """
+    lines = []
+    assumed = [
+        f'"{column.name}" in {column.unit.name}'
+        for column in found.values()
+        if not (column.unit_is_stated or (timestamps and column.quantity == "time"))
+    ]
+    if assumed:
+        lines.append(f"no unit is stated, so these are taken to be: {', '.join(assumed)}")
+    absent = [quantity for quantity in QUANTITIES if quantity not in found]
+    used = {place for column in found.values() for place in column.positions}
+    unused = [name for place, name in enumerate(names) if place not in used]
+    if absent and unused:
+        lines.append(f"no column is taken for {' and '.join(absent)}; not used: {listed(unused)}")
+    return tuple(lines)
+
+
+def listed(names: Sequence[str]) -> str:
+    """The columns of a file for a message, at most twenty of them."""
+    shown = ", ".join(names[:20])
+    return f"{shown} and {len(names) - 20} more" if len(names) > 20 else shown
+
+
+def _named(table: _Table, quantity: str, name: str) -> Column:
+    places = table.places(name)
+    if not places:
+        raise InputError(
+            f'{table.source}: there is no column "{name}", which --columns or the station file names for {quantity}'
+            f"{nearest(name, table.names) or '.'} Its columns are: {listed(table.names)}."
+        )
+    if len(places) == 1:
+        return table.column(quantity, places[0], "--columns")
+    roles = parts.together(quantity, [table.apart[place] for place in places])
+    if roles is None:
+        raise InputError(
+            f'{table.source}: the columns "{name}" do not make up one {quantity}; understood are '
+            "Date+Time, Week+Seconds, Day+Time, Hour+Minute+Second and Degrees+Minutes+Seconds."
+        )
+    return table.joint(quantity, {role: places[k] for role, k in roles.items()}, "--columns")
+
+
+def _recognised(table: _Table, quantity: str, free: Sequence[int]) -> Column | None:
+    names, canonical = table.names, CANONICAL[quantity]
+    fits = [place for place in free if table.apart[place].means(quantity) == 1]
+    if any(names[place] == canonical for place in fits):
+        fits = [place for place in fits if table.apart[place].unit]
+    elif (roles := parts.found(quantity, {place: table.apart[place] for place in free})) is not None:
+        return table.joint(quantity, roles, f"their names: {', '.join(roles)}")
+    fits = fits or [place for place in free if table.apart[place].means(quantity) == 2]
+    if not fits:
+        zenith = [place for place in free if quantity == "elevation" and table.apart[place].is_zenith()]
+        if zenith:
+            return table.column(quantity, zenith[0], "its name, that of a zenith angle")
+        _refuse_unknown_unit(table, free, quantity)
+        return None
+    for place in fits:
+        _refuse_twice(table.source, names, names[place])
+    kinds = {(name.stem, name.unit, name.notation) for name in (table.apart[place] for place in fits)}
+    if len(fits) > 1 and (quantity != "time" or len(kinds) < len(fits)):
+        raise InputError(
+            f"{table.source}: columns {' and '.join(names[place] for place in fits)} could each be the {quantity}. "
+            f"Say which one it is with --columns {quantity}={names[fits[0]]}."
+        )
+    name, unit = table.apart[fits[0]], table.units.get(quantity)
+    column = table.column(quantity, fits[0], "its name", [names[place] for place in fits[1:]])
+    stated = unit_named(quantity, name.unit) if name.unit else None
+    if stated and unit and stated.name != unit:
+        raise InputError(
+            f'{table.source}: the name of column "{column.name}" says {stated.name}, but --units says '
+            f"{quantity}={unit}. Leave --units out for it, or insist with --columns {quantity}={column.name} "
+            f"--units {quantity}={unit}."
+        )
+    return column
+
+
+def _refuse_twice(source: str, names: Sequence[str], name: str) -> None:
+    if names.count(name) > 1:
+        raise InputError(
+            f'{source}: column "{name}" is there {names.count(name)} times; '
+            f"rename or delete all but one. Its columns are: {listed(names)}."
+        )
+
+
+def _refuse_unknown_unit(table: _Table, free: Sequence[int], quantity: str) -> None:
+    """A log without a range may be angles-only; one with `range_furlong` is not."""
+    for name, unit in _units_unknown([table.apart[place] for place in free], quantity):
+        raise InputError(
+            f'{table.source}: "{unit}" in column "{name}" is not a unit of {quantity}; understood are '
+            f"{', '.join(UNITS[quantity])}. Convert the column and rename it, "
+            f"or say --columns {quantity}={name} --units {quantity}=UNIT{_or_absent(quantity)}."
+        )
+
+
+def _units_unknown(names: Sequence[Name], quantity: str) -> Iterator[tuple[str, str]]:
+    """Column and unit, where a name of the quantity has a unit that is none of its units."""
+    for name in names:
+        if name.foreign or NOT_UNITS & {*name.words, name.unit.lower()}:
+            continue
+        if name.unit and name.stem in ALIASES[quantity] and len(name.stem) > 1:
+            yield name.text, name.unit
+        elif not name.unit and len(name.words) == 2 and name.words[0] in ALIASES[quantity] and len(name.words[0]) > 1:
+            yield name.text, name.words[1]
+
+
+def _or_absent(quantity: str) -> str:
+    return "" if quantity == "time" else f", or --columns {quantity}={ABSENT} if it is something else"
+
+
+def _check_complete(source: str, names: Sequence[str], found: Mapping[str, Column], columns: Mapping[str, str]) -> None:
+    if "time" in found and len(found) > 1:
+        return
+    if names and list(names) == [str(number) for number in range(1, len(names) + 1)]:
+        order = QUANTITIES if len(names) >= len(QUANTITIES) else ("time", "azimuth", "elevation")
+        raise InputError(
+            f"{source}: there is no line of column names. Say which column is which by their numbers, such as "
+            f"--columns {','.join(f'{q}={k}' for k, q in enumerate(order[: len(names)], 1))}."
+        )
+    wanted = "time" if "time" not in found else "range"
+    what = "no time column" if wanted == "time" else "neither range nor azimuth nor elevation"
+    if {"x_m", "y_m", "z_m"} <= set(names):
+        command = f"ftproc score TRAJECTORY --truth {source}"
+        what = f"x_m, y_m, z_m are columns of a truth, for `{command}`, not of a log: it has {what}"
+    hint = nearest(CANONICAL[wanted], [name for name in names if name not in columns.values()]) or "."
+    raise InputError(
+        f"{source}: {what} (expected {CANONICAL[wanted]} or {' or '.join(ALIASES[wanted][:2])}){hint} "
+        f"Its columns are: {listed(names)}. "
+        f"Name the right ones with --columns {','.join(f'{q}=NAME' for q in QUANTITIES if q not in found)}."
+    )

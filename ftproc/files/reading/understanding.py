@@ -1,0 +1,87 @@
+"""How a log was understood, as a JSON-serialisable dictionary and as five lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ftproc.files import conventions
+from ftproc.files.reading.clocks.clock import Clock
+from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.meaning.schema import Column, listed
+from ftproc.settings import Station
+
+Understood = Mapping[str, Any]
+
+_AXES = {
+    "x": "azimuth anticlockwise from x",
+    "north": "azimuth clockwise from north, x is north and y is east",
+}
+
+
+def describe(
+    header: TableHeader, found: Mapping[str, Column], clock: Clock, station: Station, doubts: Sequence[str]
+) -> dict[str, Any]:
+    """file: kind and layout. columns: of each quantity its column, unit and why. not_used: the other columns. clock and
+    epoch: of the times. conventions: of the angles, and what was corrected. doubts: each with the option that settles
+    it."""
+    used = {place for column in found.values() for place in column.positions}
+    return {
+        "file": header.form or "table",
+        "columns": {quantity: _column(column) for quantity, column in found.items()},
+        "not_used": [name for place, name in enumerate(header.names) if place not in used and name],
+        "clock": clock.words,
+        "epoch": clock.epoch,
+        "conventions": _conventions(station, found),
+        "doubts": [*_others(found), *doubts, *clock.doubts, *_axis(station, found)],
+    }
+
+
+def _column(column: Column) -> dict[str, Any]:
+    stated = "stated by the user" if column.unit_stated_by_user else "in its name" if column.unit_in_name else "assumed"
+    if column.quantity == "time" and not (column.unit_stated_by_user or column.unit_in_name):
+        stated = "see clock"
+    if len(column.roles) > 1:
+        stated = "by its parts"
+    return {"column": column.name, "unit": column.unit.name, "unit_from": stated, "why": column.why}
+
+
+def _conventions(station: Station, found: Mapping[str, Column]) -> list[str]:
+    lines = [_AXES[station.azimuth_from]] if "azimuth" in found else []
+    zenith = station.elevation_from == "zenith"
+    lines += [] if zenith or "elevation" not in found else ["elevation above the horizontal"]
+    return lines + conventions.in_words(station)
+
+
+def _others(found: Mapping[str, Column]) -> list[str]:
+    return [
+        f"{', '.join(column.others)} could be the {quantity} too: if so, say --columns {quantity}={column.others[0]}"
+        for quantity, column in found.items()
+        if column.others
+    ]
+
+
+def _axis(station: Station, found: Mapping[str, Column]) -> list[str]:
+    column = found.get("azimuth")
+    if column is None or station.azimuth_from == "north" or station.azimuth_sense or column.name == "azimuth_rad":
+        return []
+    return ["nothing says where the azimuth counts from: if clockwise from north, say --azimuth-from north"]
+
+
+def lines(understood: Understood) -> list[tuple[str, str]]:
+    """Five lines, each a name and a text."""
+    columns = [
+        f'{quantity} = "{column["column"]}" in {column["unit"]} ({column["unit_from"]})'
+        if quantity != "time" else f'time = "{column["column"]}"'
+        for quantity, column in understood["columns"].items()
+    ]  # fmt: skip
+    unused = listed(understood["not_used"])
+    zero = f"time zero is {understood['epoch']}" if understood["epoch"] else "no date known"
+    clock = f"{understood['clock']}, {zero}"
+    return [
+        ("file", understood["file"]),
+        ("columns", "; ".join(columns) + (f"; not used: {unused}" if unused else "")),
+        ("clock", clock),
+        ("readings", "; ".join(understood["conventions"]) or "as they are"),
+        ("doubtful", "; ".join(understood["doubts"]) or "nothing"),
+    ]
