@@ -19,6 +19,7 @@ from ftproc.errors import UsageError, printable
 from ftproc.files import conventions
 from ftproc.files.options import parse_columns, parse_units
 from ftproc.files.writing import geodesy, maps
+from ftproc.files.writing.trajectories import plain
 from ftproc.methods import registry
 from ftproc.quality.summary import line
 from ftproc.report.style import require_plotly
@@ -85,16 +86,24 @@ def filter_logs(request: Request, recipe: Recipe, debug: bool) -> int:
     if recipe.settings.site is not None:
         _notify(f"positions on the earth: {geodesy.axes(conventions.FRAMES[recipe.station.azimuth_from])}, z is up")
     done: list[Outcome] = []
+    unsaid: OSError | None = None
     with Progress() as progress:
         for outcome in run.run(tasks, recipe, request.jobs, _notify, request.scheduler):
             done.append(outcome)
             progress.clear()
-            _show(outcome, request.summary, debug)
+            try:
+                _show(outcome, request.summary, debug)
+            except BrokenPipeError:
+                raise
+            except OSError as error:  # a full or closed standard output: the other logs do not need it
+                unsaid = error
             progress("filtering", len(done), len(tasks))
     if index is not None:
         _write_index(done, index)
     if request.summary == "json":
         _show_json(done)
+    if unsaid is not None:
+        raise unsaid
     failures = [outcome.failure.exit_code for outcome in done if outcome.failure is not None]
     return failures[0] if len(done) == 1 and failures else int(bool(failures))
 
@@ -145,8 +154,8 @@ def _written(outcome: Outcome) -> dict[str, str]:
 
 def _show_json(done: Sequence[Outcome]) -> None:
     """One object for one trajectory, a list for several."""
-    plain = [
+    found = [
         {"log": o.task.log, "error": o.failure.message} if o.failure else {**o.summary, **_written(o)} for o in done
     ]
     on_stdout = any(o.task.output == "-" for o in done)
-    click.echo(json.dumps(plain[0] if len(plain) == 1 else plain, indent=2), err=on_stdout)
+    click.echo(json.dumps(plain(found[0] if len(found) == 1 else found), indent=2), err=on_stdout)

@@ -221,8 +221,8 @@ def test_decimal_commas_are_read_in_blocks(tmp_path, in_blocks, monkeypatch):
 def test_rows_that_a_parquet_file_claims_but_lacks_are_missed(tmp_path, in_blocks, monkeypatch):
     path = tmp_path / "log.parquet"
     pq.write_table(pa.table(columns()), path)
-    whole, batches = pq.read_table, pq.ParquetFile.iter_batches
-    monkeypatch.setattr(pq, "read_table", lambda *args, **how: whole(*args, **how).slice(0, 2900))
+    whole, batches = pq.ParquetFile.read, pq.ParquetFile.iter_batches
+    monkeypatch.setattr(pq.ParquetFile, "read", lambda *args, **how: whole(*args, **how).slice(0, 2900))
     with pytest.raises(InputError, match="2900 rows where it says 3000"):
         logs.read(path, keep_columns=True, columns={"elevation": "none"})  # as a whole, for the column that is kept
     monkeypatch.setattr(pq.ParquetFile, "iter_batches", lambda *args, **how: list(batches(*args, **how))[:-1])

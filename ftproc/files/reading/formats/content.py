@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import gzip
 import io
+import os
 import stat
 import sys
 import zlib
@@ -48,8 +50,14 @@ def is_ordinary(path: Path) -> bool:
 
 
 def stdin() -> bytes:
-    """All of standard input, which may never end. Raises InputError beyond a limit."""
-    data = sys.stdin.buffer.read(MAX_STDIN + 1)
+    """All of standard input, which may never end. Raises InputError beyond a limit, and when it cannot be read."""
+    try:
+        if sys.stdin is None:
+            raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+        data = sys.stdin.buffer.read(MAX_STDIN + 1)
+    except OSError as error:
+        reason = "is closed" if error.errno == errno.EBADF else f"cannot be read ({error.strerror or error})"
+        raise InputError(f"<stdin>: standard input {reason}; pipe a CSV log into it, or name a file.") from error
     if len(data) > MAX_STDIN:
         raise InputError(f"<stdin>: more than {MAX_STDIN >> 20} MiB without an end; give a Parquet file, or split it.")
     return data
