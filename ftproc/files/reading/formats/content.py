@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import gzip
 import io
@@ -9,7 +10,9 @@ import os
 import stat
 import sys
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 from ftproc.errors import InputError
 
@@ -23,12 +26,13 @@ _MIN_UNPACKED = 64 << 20  # bytes that any packed file may unpack to
 MAX_STDIN = 4 << 30  # bytes
 
 
-def read(name: str, path: Path, limit: int = -1) -> bytes:
-    """The first `limit` bytes of a file, by default all. Raises InputError, also for an empty file."""
+def read(name: str, path: Path, limit: int = -1, known: os.stat_result | None = None) -> bytes:
+    """The first `limit` bytes of a file, by default all. Raises InputError, also for an empty file, and Changed as
+    `unchanged`."""
     try:
         if not is_ordinary(path):
             raise InputError(f"{name}: not an ordinary file (a pipe or a device); give it as - on standard input.")
-        with path.open("rb") as stream:
+        with path.open("rb") as stream, unchanged(name, stream, known):
             data = stream.read(limit)
     except FileNotFoundError as error:
         raise InputError(f"{name}: there is no such file.") from error
@@ -41,6 +45,25 @@ def read(name: str, path: Path, limit: int = -1) -> bytes:
     if not data:
         raise InputError(f"{name}: the file is empty; expected a header line and rows.")
     return data
+
+
+class Changed(InputError):
+    """A file was written to while it was read: what was read may be neither its old nor its new content."""
+
+
+@contextlib.contextmanager
+def unchanged(name: str, stream: BinaryIO, known: os.stat_result | None = None) -> Iterator[None]:
+    """Raises Changed, after the block, when the file became shorter inside or was written anew; a log may grow.
+
+    known: the file as it was before the stream was opened.
+    """
+    before = known or os.fstat(stream.fileno())
+    yield
+    after = os.fstat(stream.fileno())
+    replaced = (after.st_dev, after.st_ino) != (before.st_dev, before.st_ino)
+    rewritten = after.st_size == before.st_size and after.st_mtime_ns != before.st_mtime_ns
+    if replaced or rewritten or after.st_size < before.st_size:
+        raise Changed(f"{name}: the file changed while it was read; wait until it is complete, and run again.")
 
 
 def is_ordinary(path: Path) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -28,6 +29,8 @@ MISSING_WORDS = (
 
 _HEAD = 1 << 20  # bytes of a large file that contain its header line
 _BLOCK = 8 << 20  # bytes of a large file that are parsed at once
+
+_PARSED, _PARSED_OF_A_COLUMN = 1 << 20, 256  # bytes that pyarrow parses at once, the more the more columns there are
 
 _MAGIC = {
     b"\xff\xfe": "is UTF-16 text; save it as UTF-8 (iconv -f UTF-16 -t UTF-8)",
@@ -59,15 +62,15 @@ def _whole(text: CsvText) -> TableHeader:
 
 
 def _large_file(name: str, path: Path) -> TableHeader:
+    before = path.stat()
     head = split(name, content.read(name, path, limit=_HEAD))
 
     def load(numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
-        return split(name, content.read(name, path)).load(numeric, others)
+        return split(name, content.read(name, path, known=before)).load(numeric, others)
 
     def blocks(numeric: Sequence[int]) -> Blocks:
-        size = path.stat().st_size
-        rows = max(bytes(head.body).count(b"\n"), 1) * size // _HEAD
-        return Blocks((text.load(numeric, ()) for text in in_blocks(path, head)), rows)
+        rows = max(bytes(head.body).count(b"\n"), 1) * before.st_size // _HEAD
+        return Blocks((text.load(numeric, ()) for text in in_blocks(path, head, before)), rows)
 
     return TableHeader(name, head.names, load, head.delimiter == ";", blocks=blocks)
 
@@ -113,7 +116,9 @@ class CsvText(NamedTuple):
         chosen = [*numeric, *others]
         table = pyarrow.csv.read_csv(
             pa.BufferReader(pa.py_buffer(self.body)),
-            read_options=pyarrow.csv.ReadOptions(column_names=keys),
+            read_options=pyarrow.csv.ReadOptions(
+                column_names=keys, block_size=max(_PARSED, _PARSED_OF_A_COLUMN * len(keys))
+            ),
             parse_options=pyarrow.csv.ParseOptions(delimiter=self.delimiter),
             convert_options=pyarrow.csv.ConvertOptions(
                 include_columns=[keys[position] for position in chosen],
@@ -175,12 +180,13 @@ def split(source: str, data: bytes) -> CsvText:
     return CsvText(source, names, delimiter, memoryview(data)[found.end() :], odd, found.end())
 
 
-def in_blocks(path: Path, head: CsvText) -> Iterator[CsvText]:
-    """The rows of a file in blocks of whole lines; `head` comes from `split` of its beginning.
+def in_blocks(path: Path, head: CsvText, before: os.stat_result) -> Iterator[CsvText]:
+    """The rows of a file in blocks of whole lines; `head` comes from `split` of its beginning, when it was as `before`.
 
-    Raises InputError where a row may span lines, or only the whole file can tell what a point means.
+    Raises Changed when it is not so any more; InputError where a row may span lines, or only the whole file can tell
+    what a point means.
     """
-    with path.open("rb") as stream:
+    with path.open("rb") as stream, content.unchanged(head.source, stream, before):
         stream.seek(head.body_offset)
         rest, marks = b"", set()
         while data := stream.read(_BLOCK):
