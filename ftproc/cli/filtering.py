@@ -8,10 +8,10 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import click
-from click.core import ParameterSource
 
 from ftproc.batch import plan, run
 from ftproc.batch.tasks import Outcome, model_for
+from ftproc.cli.command import stated
 from ftproc.cli.progress import Progress
 from ftproc.config import reading, writing
 from ftproc.config.recipe import Recipe
@@ -26,6 +26,7 @@ from ftproc.report.style import require_plotly
 from ftproc.settings import NO_MODEL, PACKAGED
 
 ALL = "all"  # --method all
+_ASK_FOR_NOTHING = (("jerk", None), ("model", PACKAGED), ("model", NO_MODEL))
 
 
 class Request(NamedTuple):
@@ -41,8 +42,14 @@ class Request(NamedTuple):
 
 
 def recipe(ctx: click.Context) -> Recipe:
-    """How every log is filtered. Raises UsageError for what is wrong whatever the log."""
-    return Recipe.of(_options(ctx))
+    """How every log is filtered. Raises UsageError for what is wrong whatever the log, and for options on the command
+    line that have no effect."""
+    found = Recipe.of(_options(ctx))
+    method = found.settings.method
+    chosen = list(registry.METHODS.values()) if method == ALL else [registry.named(method)]
+    asked = [name for name, value in stated(ctx).items() if (name, value) not in _ASK_FOR_NOTHING]
+    registry.refuse_idle([f"--{name.replace('_', '-')}" for name in asked], chosen, found.settings)
+    return found
 
 
 def station_file(ctx: click.Context) -> str:
@@ -55,13 +62,12 @@ def station_file(ctx: click.Context) -> str:
 
 def _options(ctx: click.Context) -> dict[str, Any]:
     """The options of the station file and those of the command line, which win."""
-    default = (ParameterSource.DEFAULT, ParameterSource.DEFAULT_MAP)
-    stated = {name: value for name, value in ctx.params.items() if ctx.get_parameter_source(name) not in default}
-    kept = reading.load(stated["config"]) if "config" in stated else {}
-    options = {**kept, **stated}
+    given = stated(ctx)
+    kept = reading.load(given["config"]) if "config" in given else {}
+    options = {**kept, **given}
     for name, parse in (("units", parse_units), ("columns", parse_columns)):  # quantities not named here: the file's
         if name in options:
-            options[name] = {**kept.get(name, {}), **parse(stated.get(name))}
+            options[name] = {**kept.get(name, {}), **parse(given.get(name))}
     if options.get("method", ALL) != ALL:
         registry.named(options["method"])
     return options

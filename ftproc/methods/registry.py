@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ftproc.errors import UsageError
 from ftproc.records import EDITED, PAST, WHOLE
@@ -24,11 +24,12 @@ MAIN = FilterSettings.method
 
 @dataclass(frozen=True)
 class Method:
-    """causal: the estimate of a sample needs no later one, once noise and start are set (two-pass editing, the
-    default of the main method, uses the whole record to decide what is an outlier). corrected: the network
-    works on its output; own_model: only one trained for this very method. smooths: --smooth can be had. needs: a
-    module that must be installed, and the extra that brings it. random: it draws random numbers, so --particles and
-    --seed matter. in_parts: how a log of any length is filtered in stretches; without, it is filtered as a whole."""
+    """causal: the estimate of a sample needs no later one, once noise and start are set (two-pass editing, the default
+    of the main method, uses the whole record to decide what is an outlier). corrected: the network works on its
+    output; own_model: only one trained for this very method. smooths: --smooth can be had. needs: a module that must
+    be installed, and the extra that brings it. random: it draws random numbers, so --particles and --seed matter.
+    jerk: process noise is white jerk. in_parts: how a log of any length is filtered in stretches; without, it is
+    filtered as a whole."""
 
     name: str
     title: str
@@ -41,6 +42,7 @@ class Method:
     smooths: bool = True
     needs: tuple[str, str] | None = None
     random: bool = False
+    jerk: bool = True
     in_parts: Parts | None = None
 
     def parts(self, record: Recording, settings: FilterSettings) -> Iterator[Part]:
@@ -112,23 +114,23 @@ METHODS: dict[str, Method] = {
         Method("mcc-ukf", "UKF by maximum correntropy", "Chen et al. 2017",
                True, True, False, _from("robust", "correntropy")),
         Method("gate", "readings that jump are dropped", "Yu et al., range tests",
-               True, True, False, _from("range_test", "gate"), smooths=False),
+               True, True, False, _from("range_test", "gate"), smooths=False, jerk=False),
         Method("gate-improved", "the same, with the first reading checked", "Yu et al., range tests",
-               True, True, False, _from("range_test", "gate", check_first=True), smooths=False),
+               True, True, False, _from("range_test", "gate", check_first=True), smooths=False, jerk=False),
         Method("ls4", "readings off the line through the last four replaced", "Yu et al., range tests",
-               True, True, False, _from("range_test", "four_points"), smooths=False),
+               True, True, False, _from("range_test", "four_points"), smooths=False, jerk=False),
         Method("outlier-kf", "anti-outlier Kalman filter, channel by channel", "Yu et al., range tests",
-               True, True, False, _from("range_test", "outlier_kalman"), smooths=False),
+               True, True, False, _from("range_test", "outlier_kalman"), smooths=False, jerk=False),
         Method("outlier-kf-improved", "the same, first reading checked, gains apart", "Yu et al., range tests",
-               True, True, False, _from("range_test", "outlier_kalman", improved=True), smooths=False),
+               True, True, False, _from("range_test", "outlier_kalman", improved=True), smooths=False, jerk=False),
         Method("ls-window-kf", "outliers repaired by a line, Kalman filter", "Zhang and Zhang, reliable KF",
-               True, True, False, _from("reliable", "window_kalman"), smooths=False),
+               True, True, False, _from("reliable", "window_kalman"), smooths=False, jerk=False),
         Method("rkf", "the same, with noises that adapt (regularised)", "Zhang and Zhang, reliable KF",
-               True, True, False, _from("reliable", "reliable"), smooths=False),
+               True, True, False, _from("reliable", "reliable"), smooths=False, jerk=False),
         Method("rkf-literal", "the same to the letter: gives back its input", "Zhang and Zhang, reliable KF",
-               True, True, False, _from("reliable", "reliable", literal=True), smooths=False),
+               True, True, False, _from("reliable", "reliable", literal=True), smooths=False, jerk=False),
         Method("wavelet-akf", "adaptive Kalman filter, then wavelets", "Wu and Ran 2021",
-               False, True, False, _from("wavelet"), smooths=False, needs=("pywt", "PyWavelets>=1.5")),
+               False, True, False, _from("wavelet"), smooths=False, jerk=False, needs=("pywt", "PyWavelets>=1.5")),
         Method("enkf", "ensemble Kalman filter", "Evensen 1994",
                True, False, False, _from("ensemble", method="enkf"), smooths=False, random=True),
         Method("enpf", "particle filter with an EnKF for its proposals", "Shao et al. 2020",
@@ -139,6 +141,42 @@ METHODS: dict[str, Method] = {
                True, True, False, _from("ensemble", method="renpf"), smooths=False, random=True),
     )
 }  # fmt: skip
+
+
+class Use(NamedTuple):
+    """Where an option has an effect: a test, and the same in words."""
+
+    by: Callable[[Method, FilterSettings], bool]
+    words: str
+
+
+def _recursive(method: Method, settings: FilterSettings) -> bool:
+    return method.name == MAIN and settings.editing == "forward"
+
+
+_ENSEMBLES = "it is for the methods enkf, enpf, enpf-chi2 and renpf"
+
+#: The options that only some ways of filtering use, by their names on the command line.
+USES = {
+    "--editing": Use(lambda m, s: m.name == MAIN, f"it is for {MAIN}; the others have editing of their own, or none"),
+    "--jerk": Use(lambda m, s: m.jerk, "process noise in m2/s5 is for methods that estimate acceleration"),
+    "--max-patch": Use(
+        lambda m, s: _recursive(m, s) or (m.random and m.handles_outliers),
+        f"it is for {MAIN} with --editing forward, for enpf-chi2 and for renpf",
+    ),
+    "--model": Use(lambda m, s: m.corrected, f"a network corrects {MAIN}, ga-bpnn-ukf-plain and bpnn-ekf"),
+    "--particles": Use(lambda m, s: m.random, _ENSEMBLES),
+    "--seed": Use(lambda m, s: m.random, _ENSEMBLES),
+    "--weight-form": Use(_recursive, f"it is for {MAIN} with --editing forward"),
+}
+
+
+def refuse_idle(stated: Iterable[str], methods: Sequence[Method], settings: FilterSettings) -> None:
+    """Raise UsageError for the first of the options stated that none of the methods uses with these settings."""
+    for option in stated:
+        if option in USES and not any(USES[option].by(method, settings) for method in methods):
+            with_what = f"{methods[0].name} here" if len(methods) == 1 else "these methods"
+            raise UsageError(f"{option} does nothing with {with_what}: {USES[option].words}. Leave it out.")
 
 
 def named(name: str) -> Method:
