@@ -139,8 +139,11 @@
     }
   }
 
-  for (const link of document.querySelectorAll("a[data-from]")) {
-    link.addEventListener("click", function () { zoom(link.dataset.from, link.dataset.to); });
+  for (const button of document.querySelectorAll("button[data-from]")) {
+    button.addEventListener("click", function () {
+      zoom(button.dataset.from, button.dataset.to);
+      document.getElementById("readings").scrollIntoView();
+    });
   }
 
   addEventListener("beforeprint", function () {

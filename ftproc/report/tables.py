@@ -68,20 +68,20 @@ def summary(view: View) -> str:
 
 
 def patches(view: View) -> str:
-    """The outlier patches, each a link that zooms all figures over time to it."""
+    """The outlier patches, each a button that zooms all figures over time to it."""
     found = found_patches(view)
     if not found:
         return ""
     rows = [
-        (f'<a href="#readings" data-from="{p.start_s!r}" data-to="{p.end_s!r}">{p.start_s:,.2f}</a>', f"{p.end_s:,.2f}",
+        (f'<button data-from="{p.start_s!r}" data-to="{p.end_s!r}">{p.start_s:,.2f}</button>', f"{p.end_s:,.2f}",
          p.component, f"{p.readings:,}", "-" if p.size != p.size else f"{p.size:+,.3g} {p.unit}")
         for p in sorted(found, key=lambda p: -p.readings)[:MOST_PATCHES]
     ]  # fmt: skip
-    note = "A start is a link that zooms all figures over time to the patch. Size: median of reading minus estimate."
+    note = "A click on a start zooms all figures over time to the patch. Size: median of reading minus estimate."
     if len(found) > MOST_PATCHES:
         note = f"The {MOST_PATCHES} longest of {len(found):,}. {note}"
     body = table(("start, s", "end, s", "component", "readings", "size"), rows, "numbers patches", links=1)
-    whole = '<a href="#readings" data-from="" data-to="">Show the whole log.</a>'
+    whole = '<button data-from="" data-to="">Show the whole log.</button>'
     return f'<section><h2>Outlier patches</h2>{body}<p class="note">{note} {whole}</p></section>'
 
 
