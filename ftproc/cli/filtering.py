@@ -26,7 +26,7 @@ from ftproc.report.style import require_plotly
 from ftproc.settings import NO_MODEL, PACKAGED
 
 ALL = "all"  # --method all
-_ASK_FOR_NOTHING = (("jerk", None), ("model", PACKAGED), ("model", NO_MODEL))
+_ASK_FOR_NOTHING = (("model", PACKAGED), ("model", NO_MODEL))
 
 
 class Request(NamedTuple):

@@ -104,7 +104,7 @@ def _refuse_idle(ctx: click.Context) -> None:
     simulated = ctx.params["scenario"] is not None
     refuse_with(ctx, *(("--scenario", ("units", "columns")) if simulated else ("--log", ("flights",))))
     method = registry.named(ctx.params["method"])
-    asked = [f"--{name}" for name, value in stated(ctx).items() if name in ("editing", "jerk") and value is not None]
+    asked = ["--editing"] if "editing" in stated(ctx) else []
     registry.refuse_idle(asked, [method], FilterSettings(editing=ctx.params["editing"]))
     if method.own_model:
         refuse_with(ctx, f"{method.name}, which starts from random weights", ("population", "generations"))

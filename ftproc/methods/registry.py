@@ -28,8 +28,7 @@ class Method:
     of the main method, uses the whole record to decide what is an outlier). corrected: the network works on its
     output; own_model: only one trained for this very method. smooths: --smooth can be had. needs: a module that must
     be installed, and the extra that brings it. random: it draws random numbers, so --particles and --seed matter.
-    jerk: process noise is white jerk. in_parts: how a log of any length is filtered in stretches; without, it is
-    filtered as a whole."""
+    in_parts: how a log of any length is filtered in stretches; without, it is filtered as a whole."""
 
     name: str
     title: str
@@ -42,7 +41,6 @@ class Method:
     smooths: bool = True
     needs: tuple[str, str] | None = None
     random: bool = False
-    jerk: bool = True
     in_parts: Parts | None = None
 
     def parts(self, record: Recording, settings: FilterSettings) -> Iterator[Part]:
@@ -114,23 +112,23 @@ METHODS: dict[str, Method] = {
         Method("mcc-ukf", "UKF by maximum correntropy", "Chen et al. 2017",
                True, True, False, _from("robust", "correntropy")),
         Method("gate", "readings that jump are dropped", "Yu et al., range tests",
-               True, True, False, _from("range_test", "gate"), smooths=False, jerk=False),
+               True, True, False, _from("range_test", "gate"), smooths=False),
         Method("gate-improved", "the same, with the first reading checked", "Yu et al., range tests",
-               True, True, False, _from("range_test", "gate", check_first=True), smooths=False, jerk=False),
+               True, True, False, _from("range_test", "gate", check_first=True), smooths=False),
         Method("ls4", "readings off the line through the last four replaced", "Yu et al., range tests",
-               True, True, False, _from("range_test", "four_points"), smooths=False, jerk=False),
+               True, True, False, _from("range_test", "four_points"), smooths=False),
         Method("outlier-kf", "anti-outlier Kalman filter, channel by channel", "Yu et al., range tests",
-               True, True, False, _from("range_test", "outlier_kalman"), smooths=False, jerk=False),
+               True, True, False, _from("range_test", "outlier_kalman"), smooths=False),
         Method("outlier-kf-improved", "the same, first reading checked, gains apart", "Yu et al., range tests",
-               True, True, False, _from("range_test", "outlier_kalman", improved=True), smooths=False, jerk=False),
+               True, True, False, _from("range_test", "outlier_kalman", improved=True), smooths=False),
         Method("ls-window-kf", "outliers repaired by a line, Kalman filter", "Zhang and Zhang, reliable KF",
-               True, True, False, _from("reliable", "window_kalman"), smooths=False, jerk=False),
+               True, True, False, _from("reliable", "window_kalman"), smooths=False),
         Method("rkf", "the same, with noises that adapt (regularised)", "Zhang and Zhang, reliable KF",
-               True, True, False, _from("reliable", "reliable"), smooths=False, jerk=False),
+               True, True, False, _from("reliable", "reliable"), smooths=False),
         Method("rkf-literal", "the same to the letter: gives back its input", "Zhang and Zhang, reliable KF",
-               True, True, False, _from("reliable", "reliable", literal=True), smooths=False, jerk=False),
+               True, True, False, _from("reliable", "reliable", literal=True), smooths=False),
         Method("wavelet-akf", "adaptive Kalman filter, then wavelets", "Wu and Ran 2021",
-               False, True, False, _from("wavelet"), smooths=False, jerk=False, needs=("pywt", "PyWavelets>=1.5")),
+               False, True, False, _from("wavelet"), smooths=False, needs=("pywt", "PyWavelets>=1.5")),
         Method("enkf", "ensemble Kalman filter", "Evensen 1994",
                True, False, False, _from("ensemble", method="enkf"), smooths=False, random=True),
         Method("enpf", "particle filter with an EnKF for its proposals", "Shao et al. 2020",
@@ -159,7 +157,6 @@ _ENSEMBLES = "it is for the methods enkf, enpf, enpf-chi2 and renpf"
 #: The options that only some ways of filtering use, by their names on the command line.
 USES = {
     "--editing": Use(lambda m, s: m.name == MAIN, f"it is for {MAIN}; the others have editing of their own, or none"),
-    "--jerk": Use(lambda m, s: m.jerk, "process noise in m2/s5 is for methods that estimate acceleration"),
     "--max-patch": Use(
         lambda m, s: _recursive(m, s) or (m.random and m.handles_outliers),
         f"it is for {MAIN} with --editing forward, for enpf-chi2 and for renpf",

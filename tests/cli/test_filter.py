@@ -257,7 +257,6 @@ def test_jobs_and_scheduler_exclude_each_other(run):
         (["--particles", "50"], "--particles does nothing with ga-bpnn-ukf here: it is for the methods enkf, enpf"),
         (["--seed", "1", "--method", "ukf"], "--seed does nothing with ukf here"),
         (["--editing", "forward", "--method", "huber-ukf"], "--editing does nothing with huber-ukf here"),
-        (["--jerk", "1", "--method", "gate"], "--jerk does nothing with gate here: process noise in m2/s5 is for"),
         (["--model", "m.safetensors", "--method", "ukf"], "--model does nothing with ukf here: a network corrects"),
         (["--method", "all", "--weight-form", "gain", "-o", "out/"], "--weight-form does nothing with these methods"),
     ],
@@ -273,7 +272,6 @@ def test_options_that_do_nothing_are_refused(run, args, sentence):
 @pytest.mark.parametrize(
     "args",
     [
-        ["--jerk", "auto", "--method", "gate"],
         ["--model", "none", "--method", "ukf"],
         ["--editing", "forward", "--max-patch", "3", "--weight-form", "gain"],
         ["--config", "s.toml"],

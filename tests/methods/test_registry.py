@@ -111,7 +111,6 @@ def test_only_options_that_change_something_are_accepted():
     log = simulation.simulate("manoeuvre", seed=1, duration_s=40.0).log
     changes = {
         "--editing": ({"editing": "forward"}, {"editing": "none"}, {"editing": "two-pass"}),
-        "--jerk": ({"jerk_psd_m2ps5": 3.0},),
         "--particles": ({"particles": 50},),
         "--seed": ({"seed": 5},),
         "--weight-form": ({"gain_form": True},),
