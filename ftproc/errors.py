@@ -97,7 +97,7 @@ def row_named(row: int) -> str:
     return f"row {row} (the first data row is 0)"
 
 
-def first_line(error: Exception) -> str:
+def first_line(error: BaseException) -> str:
     """What an error of another library says, short enough for a sentence; its kind if it says nothing."""
     return str(error).splitlines()[0][:200] if str(error) else type(error).__name__
 
@@ -114,6 +114,7 @@ def interruption(error: BaseException) -> BaseException | None:
 
 
 _NO_MEMORY = ("Cannot allocate memory", "bad_alloc", "malloc of size", "realloc of size")
+_NUMBA_CACHE = "numba/core/caching.py"  # where numba reads and writes it, in a traceback
 _NO_PROCESS = ("Resource temporarily unavailable", "can't start new thread")
 
 
@@ -166,6 +167,10 @@ def failure(error: BaseException, source: str | None = None) -> Failure:
     if isinstance(error, RuntimeError) and "no locator available" in str(error):
         cure = "Set NUMBA_CACHE_DIR to a directory that can be written to."
         return Failure(f"the compiled kernels cannot be kept anywhere. {cure}", 1, trace)
+    if _NUMBA_CACHE in trace.replace("\\", "/"):
+        cure = "Delete its .nbi and .nbc files, or set NUMBA_CACHE_DIR to another directory."
+        reason = first_line(error)
+        return Failure(f"numba's cache of kernels is damaged, or cannot be kept ({reason}). {cure}", 1, trace)
     if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
         return Failure("too many files are open. Raise the limit (ulimit -n), or use fewer --jobs.", 1, trace)
     if isinstance(error, OSError) and error.strerror:

@@ -8,6 +8,7 @@ import json
 import os
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -170,3 +171,19 @@ def test_an_empty_name(flight: Path, option: str) -> None:
     done = shell(flight.parent, f"ftproc {command} flight.csv {option} ''")
     assert done.returncode == 2
     assert "the name of a file is empty" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "error", ["EOFError('Ran out of input')", "OSError(28, 'No space left on device')", "ValueError('unpickled')"]
+)
+def test_a_damaged_or_full_cache_of_kernels_is_not_blamed_on_the_log(error: str) -> None:
+    """As numba raises it, while it reads or writes its cache."""
+    load = compile(f"def load():\n    raise {error}\n", "/lib/numba/core/caching.py", "exec")
+    names: dict[str, Any] = {}
+    exec(load, names)
+    with pytest.raises(Exception, match=r".") as caught:
+        names["load"]()
+    message = failure(caught.value, "a.csv").message
+    assert message.startswith("numba's cache of kernels is damaged, or cannot be kept (")
+    assert "set NUMBA_CACHE_DIR to another directory" in message
+    assert "a.csv" not in message
