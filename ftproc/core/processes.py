@@ -19,7 +19,7 @@ from typing import Any
 CONTEXT = multiprocessing.get_context("spawn")
 
 GRACE_S = 5.0  # for a worker to remove its partial output
-_OF_A_TERMINAL = {getattr(signal, name) for name in ("SIGINT", "SIGHUP", "SIGQUIT") if hasattr(signal, name)}
+_HELD = {getattr(signal, name) for name in ("SIGINT", "SIGHUP", "SIGQUIT", "SIGTERM") if hasattr(signal, name)}
 
 
 class Workers:
@@ -56,11 +56,11 @@ class Workers:
 @contextlib.contextmanager
 def unheard() -> Iterator[None]:
     """Processes started inside, also that with which multiprocessing follows its locks, never hear what a terminal
-    sends to all of them, and end through this process, which hears it afterwards."""
+    sends to all of them, and end through this process. It hears signals afterwards: a start is not cut in two."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _OF_A_TERMINAL)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _HELD)
     try:
         yield
     finally:
@@ -73,6 +73,8 @@ def _begin(alive: Connection, prepare: Callable[..., None] | None, arguments: tu
     def begin() -> None:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # where `unheard` does nothing
         signal.signal(signal.SIGTERM, _ended)
+        if hasattr(signal, "pthread_sigmask"):
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
         threading.Thread(target=_follow, args=(alive,), daemon=True).start()
         if prepare is not None:
             prepare(*arguments)

@@ -124,8 +124,8 @@ def test_workers_end_with_the_process_that_started_them(tmp_path, end, group):
     with subprocess.Popen(
         command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:
-        workers = _until(lambda: len(_children(process.pid)) > 2 and _children(process.pid))
-        _until((tmp_path / "out").exists)
+        _until(lambda: sum("libarrow" in Path(f"/proc/{pid}/maps").read_text() for pid in _children(process.pid)) == 2)
+        workers = _children(process.pid)
         (os.killpg if group else os.kill)(process.pid, end)
         err = process.communicate(timeout=60)[1]
     assert process.returncode == (-9 if end == signal.SIGKILL else 128 + end)
