@@ -111,7 +111,7 @@ def test_only_options_that_change_something_are_accepted():
     log = simulation.simulate("manoeuvre", seed=1, duration_s=40.0).log
     changes = {
         "--editing": ({"editing": "forward"}, {"editing": "none"}, {"editing": "two-pass"}),
-        "--particles": ({"particles": 50},),
+        "--particles": ({"particles": 95},),
         "--seed": ({"seed": 5},),
         "--weight-form": ({"gain_form": True},),
     }
@@ -127,7 +127,7 @@ def test_only_options_that_change_something_are_accepted():
         if name != registry.MAIN and not method.own_model
     ]
     for name, editing in modes:
-        plain = FilterSettings(method=name, editing=editing, particles=30)
+        plain = FilterSettings(method=name, editing=editing, particles=90)
         before = made(plain)
         for option, ways in changes.items():
             used = registry.USES[option].by(registry.METHODS[name], plain)
