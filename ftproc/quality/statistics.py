@@ -37,7 +37,8 @@ class RunStatistics:
         self.jerk: list[FloatArray] = []
         self.reacquired, self.slow_noise, self.unexamined = 0, False, 0
         self.converged: bool | None = None
-        self.largest_m, self.outside, self.rows, self.parts = 0.0, 0.0, 0, 0
+        self.largest_m, self.largest_sigma = 0.0, 0.0
+        self.outside, self.rows, self.parts = 0.0, 0, 0
 
     def add(self, time_s: FloatArray, estimate: Estimate, correction: FloatArray, outside: float) -> None:
         """Add a part: time_s (n,), its estimate, correction (n, 6), and the share outside the network's training."""
@@ -65,6 +66,9 @@ class RunStatistics:
         self.slow_noise |= estimate.slow_noise
         self.unexamined += estimate.unexamined
         self.largest_m = max(self.largest_m, float(np.linalg.norm(correction[:, :3], axis=1).max(initial=0.0)))
+        changed, sigma = np.abs(correction), best_sigma[:, : correction.shape[1]]
+        ratio = np.divide(changed, sigma, out=np.zeros_like(changed), where=changed > 0)
+        self.largest_sigma = max(self.largest_sigma, float(np.nanmax(ratio, initial=0.0)))
         self.outside += outside * len(time_s)
         self.rows += len(time_s)
         self.parts += 1
@@ -123,6 +127,7 @@ class RunStatistics:
             "slow_noise": self.slow_noise,
             "editing_places_unexamined": self.unexamined,
             "correction_largest_m": self.largest_m,
+            "correction_largest_sigma": self.largest_sigma,
             "correction_outside_training": self.outside / max(self.rows, 1),
         }
         return figures | {"trust": verdict.verdict(verdict.remarks(figures))}
