@@ -3,8 +3,9 @@ and the cure."""
 
 from __future__ import annotations
 
+import errno
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 
@@ -14,6 +15,11 @@ def printable(text: str) -> str:
     Names come from foreign files: they must not move the cursor, change colours or reverse the line.
     """
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def encodable(text: str) -> str:
+    """`text` with bytes of file names that are not UTF-8 escaped as `\\udcff`, so that any file can hold it."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 _HEAD, _TAIL = 700, 400  # characters that are shown of a longer sentence
@@ -91,7 +97,7 @@ def row_named(row: int) -> str:
     return f"row {row} (the first data row is 0)"
 
 
-def first_line(error: Exception) -> str:
+def first_line(error: BaseException) -> str:
     """What an error of another library says, short enough for a sentence; its kind if it says nothing."""
     return str(error).splitlines()[0][:200] if str(error) else type(error).__name__
 
@@ -104,7 +110,36 @@ def interruption(error: BaseException) -> BaseException | None:
     cause: BaseException | None = error
     while isinstance(cause, Exception):
         cause = cause.__cause__
-    return cause
+    return cause if isinstance(cause, KeyboardInterrupt | SystemExit) else None
+
+
+_NO_MEMORY = ("Cannot allocate memory", "bad_alloc", "malloc of size", "realloc of size")
+_NUMBA_CACHE = "numba/core/caching.py"  # where numba reads and writes it, in a traceback
+_NO_PROCESS = ("Resource temporarily unavailable", "can't start new thread")
+
+
+def _causes(error: BaseException) -> Iterator[BaseException]:
+    """An error, and those that it was raised from."""
+    cause: BaseException | None = error
+    while cause is not None:
+        yield cause
+        cause = cause.__cause__
+
+
+def _short_of_memory(error: BaseException) -> bool:
+    """Whether memory is at the bottom of an error, whatever it says itself; or there are no more processes."""
+    return any(words in str(error) for words in _NO_PROCESS) or any(
+        isinstance(cause, MemoryError)
+        or (not isinstance(cause, FtprocError) and any(words in str(cause) for words in _NO_MEMORY))
+        for cause in _causes(error)
+    )
+
+
+def stdout_fault(error: OSError) -> str:
+    """The sentence for a standard output that takes nothing more."""
+    if error.errno == errno.EBADF:
+        return "standard output is closed, so the result is lost; leave it open, or send it to a file."
+    return f"standard output: {(error.strerror or str(error)).lower()}, so the result is lost; send it elsewhere."
 
 
 @dataclass(frozen=True)
@@ -120,19 +155,26 @@ def failure(error: BaseException, source: str | None = None) -> Failure:
     """The message for any error; it names `source` unless the error names it."""
     import traceback
 
-    if isinstance(error, MemoryError):
+    short = _short_of_memory(error)
+    if short:
         traceback.clear_frames(error.__traceback__)  # frees the memory for the next log
     trace = "".join(traceback.format_exception(error))
     about = f"{source}: " if source else ""
+    if short:
+        return Failure(f"{about}there is not enough memory for it. Use fewer --jobs, or split the log.", 1, trace)
     if isinstance(error, FtprocError):
         return Failure(str(error), error.exit_code, trace)
-    if isinstance(error, MemoryError) or "Resource temporarily unavailable" in str(error):
-        return Failure(f"{about}there is not enough memory for it. Use fewer --jobs, or split the log.", 1, trace)
     if isinstance(error, RuntimeError) and "no locator available" in str(error):
         cure = "Set NUMBA_CACHE_DIR to a directory that can be written to."
         return Failure(f"the compiled kernels cannot be kept anywhere. {cure}", 1, trace)
+    if _NUMBA_CACHE in trace.replace("\\", "/"):
+        cure = "Delete its .nbi and .nbc files, or set NUMBA_CACHE_DIR to another directory."
+        reason = first_line(error)
+        return Failure(f"numba's cache of kernels is damaged, or cannot be kept ({reason}). {cure}", 1, trace)
+    if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
+        return Failure("too many files are open. Raise the limit (ulimit -n), or use fewer --jobs.", 1, trace)
     if isinstance(error, OSError) and error.strerror:
-        place = error.filename or source or "standard output"
-        return Failure(f"{place}: {error.strerror.lower()}.", 1, trace)
+        place = error.filename or source
+        return Failure(f"{place}: {error.strerror.lower()}." if place else stdout_fault(error), 1, trace)
     kind = f"{type(error).__name__}: {error}".splitlines()[0][:200]
     return Failure(f"{about}internal error ({kind}); run again with --debug and report it.", 1, trace)

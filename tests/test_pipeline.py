@@ -12,7 +12,7 @@ from ftproc import __version__, pipeline
 from ftproc.core.model.frames import from_cartesian
 from ftproc.correction import apply, model_file
 from ftproc.correction.apply import Correction
-from ftproc.correction.model import Model
+from ftproc.correction.model import MOST_SIGMA, Model
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import registry
 from ftproc.quality.summary import text
@@ -93,6 +93,17 @@ def test_packaged_correction_is_bounded_by_the_sigmas(flight):
 def test_plain_filters_are_not_corrected(flight, method):
     model = Model({"filter": constant("instrument", 1e-4, bound=1e9)})
     assert not pipeline.filter_log(flight.log, FilterSettings(method=method), model).correction.any()
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_a_model_that_states_its_own_bound_is_not_believed(flight, smooth):
+    stage = constant("window" if not smooth else "instrument", 1e9, bound=1e6)
+    model = Model({"filter": stage, "smoother": stage})
+    corrected = pipeline.filter_log(flight.log, FilterSettings(smooth=smooth), model)
+    assert np.abs(corrected.correction / corrected.sigma).max() < 2 * MOST_SIGMA
+    trust = corrected.metadata["summary"]["trust"]
+    assert trust["verdict"] != "consistent"
+    assert any("check that the model is of this instrument" in reason for reason in trust["reasons"])
 
 
 def test_each_stage_is_corrected_by_its_own_network(flight):

@@ -16,7 +16,7 @@ MOST_FILES, MOST_LINES, MOST_PARAMETERS = 14, 300, 7
 FLOORS = (
     ("errors", "settings"),
     ("records", "__init__"),
-    ("core.signatures", "core.threads"),
+    ("core.signatures", "core.threads", "core.processes"),
     ("core.compiled",),
     ("core.model",),
     ("core.filtering",),

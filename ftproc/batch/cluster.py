@@ -6,15 +6,19 @@ with each task: a worker could have cached an older one of the same name.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import importlib.metadata
 import logging
 import os
+import socket
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
 from dataclasses import replace
 from functools import partial
 from typing import Any
+from urllib.parse import urlsplit
 
 import ftproc
 from ftproc.batch.tasks import Outcome, Submit, Task, filter_one
@@ -24,7 +28,9 @@ from ftproc.correction import model_file
 from ftproc.errors import Failure, UsageError, failure
 from ftproc.settings import NO_MODEL
 
+REACHED_S = 1.0  # for the machine of a scheduler to accept a connection
 PATIENCE_S = 10.0  # for a scheduler to answer, and for a first worker
+_PROTOCOLS = ("tcp", "tls", "ws", "wss")
 _START = "Start one with `dask worker {0} --nthreads 1`, and more for more logs at a time."
 _CURE = 'install the same there: pip install "ftproc=={0}".'
 
@@ -44,6 +50,7 @@ def require_distributed() -> Any:
 def pool(recipe: Recipe, address: str) -> Iterator[Submit]:
     """All workers of the scheduler at `address`. Raises UsageError when it does not answer, has no worker, or has one
     with another version of ftproc."""
+    _reach(address)
     distributed = require_distributed()
     carried = replace(recipe, model=model_file.named(recipe.model) or NO_MODEL)
     with _quiet(), contextlib.closing(_connect(distributed, address)) as client:
@@ -66,13 +73,57 @@ def pool(recipe: Recipe, address: str) -> Iterator[Submit]:
 
 
 def _connect(distributed: Any, address: str) -> Any:
+    """A client, made only when a scheduler has answered: one that has not takes long to give up, and prints errors."""
     try:
+        asyncio.run(_greet(distributed, address))
         return distributed.Client(address, timeout=PATIENCE_S, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        raise UsageError(
-            f"--scheduler {address}: no Dask scheduler answers there within {PATIENCE_S:g} s. Start one with "
-            f"`dask scheduler`; it prints its address, such as tcp://10.0.0.1:8786."
-        ) from error
+    except Exception:  # whatever answers may send anything: taken for a length, it may exceed the memory
+        raise _unanswered(address, f"no Dask scheduler answers there within {PATIENCE_S:g} s") from None
+
+
+async def _greet(distributed: Any, address: str) -> None:
+    security = distributed.Security().get_connection_args("client")
+    greeting = distributed.comm.connect(address, timeout=PATIENCE_S, **security)
+    (await asyncio.wait_for(greeting, PATIENCE_S)).abort()  # its own limit holds for each attempt
+
+
+def _reach(address: str) -> None:
+    """Raises UsageError unless `address` is one, and its machine accepts a connection."""
+    host, port = _host_and_port(address)
+    found: list[Exception | None] = []
+
+    def look() -> None:
+        try:
+            with socket.create_connection((host, port), timeout=REACHED_S):
+                found.append(None)
+        except (OSError, UnicodeError) as error:
+            found.append(error)
+
+    looking = threading.Thread(target=look, daemon=True)  # names are looked up without a limit of time
+    looking.start()
+    looking.join(REACHED_S)
+    if not found or isinstance(found[0], TimeoutError):
+        raise _unanswered(address, f"nothing answers there within {REACHED_S:g} s")
+    if found[0] is not None:
+        reason = (getattr(found[0], "strerror", None) or str(found[0])).lower()
+        raise _unanswered(address, f"no connection to it ({reason})") from found[0]
+
+
+def _host_and_port(address: str) -> tuple[str, int]:
+    """Raises UsageError for what is no address."""
+    parts = urlsplit(address if "://" in address else f"tcp://{address}")
+    try:
+        port = parts.port
+    except ValueError:
+        port = None
+    if not parts.hostname or port is None or parts.scheme not in _PROTOCOLS:
+        raise _unanswered(address, "this is no address of a scheduler")
+    return parts.hostname, port
+
+
+def _unanswered(address: str, why: str) -> UsageError:
+    cure = "Start one with `dask scheduler`; it prints its address, such as tcp://10.0.0.1:8786."
+    return UsageError(f"--scheduler {address}: {why}. {cure}")
 
 
 def _check_workers(client: Any, address: str) -> None:

@@ -110,6 +110,9 @@ def _make(directory: Path, option: str = "-o") -> None:
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except FileExistsError as error:
+        if not directory.is_file():
+            cure = "end the name of a file in its kind, such as .csv; for no file, use -o - > /dev/null."
+            raise OutputError(f"{directory}: this is a device, not a directory; {cure}") from error
         raise OutputError(f"{directory}: this is a file, not a directory; give another name with {option}.") from error
     except OSError as error:
         reason = (error.strerror or str(error)).lower()

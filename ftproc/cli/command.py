@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 DEBUG = "--debug"
@@ -44,6 +45,20 @@ def write_examples(formatter: click.HelpFormatter, examples: str) -> None:
     """The last section of a help; its lines are not wrapped, so that they can be copied."""
     lines = "".join(f"  {line.strip()}\n" for line in examples.strip().splitlines())
     formatter.write(f"\nExamples:\n{lines}")
+
+
+def stated(ctx: click.Context) -> dict[str, Any]:
+    """The options and arguments on the command line, by name."""
+    default = (ParameterSource.DEFAULT, ParameterSource.DEFAULT_MAP)
+    return {name: value for name, value in ctx.params.items() if ctx.get_parameter_source(name) not in default}
+
+
+def refuse_with(ctx: click.Context, option: str, useless: Iterable[str]) -> None:
+    """Raise a usage error if one of the `useless` options, by name, is stated: they do nothing with `option`."""
+    given = stated(ctx)
+    for parameter in ctx.command.params:
+        if parameter.name in useless and given.get(parameter.name):
+            raise click.UsageError(f"{parameter.opts[0]} does nothing with {option}. Leave it out.", ctx)
 
 
 def start_quickly() -> None:

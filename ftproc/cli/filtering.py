@@ -8,11 +8,11 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import click
-from click.core import ParameterSource
 
 from ftproc.batch import plan, run
 from ftproc.batch.tasks import Outcome, model_for
 from ftproc.cli import explaining
+from ftproc.cli.command import stated
 from ftproc.cli.progress import Progress
 from ftproc.config import reading, writing
 from ftproc.config.recipe import Recipe
@@ -20,12 +20,14 @@ from ftproc.errors import InputError, UsageError, printable
 from ftproc.files import conventions
 from ftproc.files.options import ABSENT, parse_columns, parse_units, parse_where, parse_widths
 from ftproc.files.writing import geodesy, maps
+from ftproc.files.writing.trajectories import plain
 from ftproc.methods import registry
 from ftproc.quality.summary import line
 from ftproc.report.style import require_plotly
 from ftproc.settings import NO_MODEL, PACKAGED
 
 ALL = "all"  # --method all
+_ASK_FOR_NOTHING = (("model", PACKAGED), ("model", NO_MODEL))
 
 
 class Request(NamedTuple):
@@ -41,8 +43,14 @@ class Request(NamedTuple):
 
 
 def recipe(ctx: click.Context) -> Recipe:
-    """How every log is filtered. Raises UsageError for what is wrong whatever the log."""
-    return Recipe.of(_options(ctx))
+    """How every log is filtered. Raises UsageError for what is wrong whatever the log, and for options on the command
+    line that have no effect."""
+    found = Recipe.of(_options(ctx))
+    method = found.settings.method
+    chosen = list(registry.METHODS.values()) if method == ALL else [registry.named(method)]
+    asked = [name for name, value in stated(ctx).items() if (name, value) not in _ASK_FOR_NOTHING]
+    registry.refuse_idle([f"--{name.replace('_', '-')}" for name in asked], chosen, found.settings)
+    return found
 
 
 def station_file(ctx: click.Context) -> str:
@@ -55,13 +63,12 @@ def station_file(ctx: click.Context) -> str:
 
 def _options(ctx: click.Context) -> dict[str, Any]:
     """The options of the station file and those of the command line, which win."""
-    default = (ParameterSource.DEFAULT, ParameterSource.DEFAULT_MAP)
-    stated = {name: value for name, value in ctx.params.items() if ctx.get_parameter_source(name) not in default}
-    kept = reading.load(stated["config"]) if "config" in stated else {}
-    options = {**kept, **stated}
+    given = stated(ctx)
+    kept = reading.load(given["config"]) if "config" in given else {}
+    options = {**kept, **given}
     for name, parse in (("units", parse_units), ("columns", parse_columns)):  # quantities not named here: the file's
         if name in options:
-            options[name] = {**kept.get(name, {}), **parse(stated.get(name))}
+            options[name] = {**kept.get(name, {}), **parse(given.get(name))}
     parse_widths(options.get("widths"))
     parse_where(options.get("where"))
     if options.get("method", ALL) != ALL:
@@ -89,16 +96,24 @@ def filter_logs(request: Request, recipe: Recipe, debug: bool) -> int:
     if recipe.settings.site is not None:
         _notify(f"positions on the earth: {geodesy.axes(conventions.FRAMES[recipe.station.azimuth_from])}, z is up")
     done: list[Outcome] = []
+    unsaid: OSError | None = None
     with Progress() as progress:
         for outcome in run.run(tasks, recipe, request.jobs, _notify, request.scheduler):
             done.append(outcome)
             progress.clear()
-            _show(outcome, request.summary, debug)
+            try:
+                _show(outcome, request.summary, debug)
+            except BrokenPipeError:
+                raise
+            except OSError as error:  # a full or closed standard output: the other logs do not need it
+                unsaid = error
             progress("filtering", len(done), len(tasks))
     if index is not None:
         _write_index(done, index)
     if request.summary == "json":
         _show_json(done)
+    if unsaid is not None:
+        raise unsaid
     failures = [outcome.failure.exit_code for outcome in done if outcome.failure is not None]
     return failures[0] if len(done) == 1 and failures else int(bool(failures))
 
@@ -174,8 +189,8 @@ def _written(outcome: Outcome) -> dict[str, str]:
 
 def _show_json(done: Sequence[Outcome]) -> None:
     """One object for one trajectory, a list for several."""
-    plain = [
+    found = [
         {"log": o.task.log, "error": o.failure.message} if o.failure else {**o.summary, **_written(o)} for o in done
     ]
     on_stdout = any(o.task.output == "-" for o in done)
-    click.echo(json.dumps(plain[0] if len(plain) == 1 else plain, indent=2), err=on_stdout)
+    click.echo(json.dumps(plain(found[0] if len(found) == 1 else found), indent=2), err=on_stdout)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import signal
 import sys
 import traceback
 from typing import Any
@@ -11,12 +10,13 @@ from typing import Any
 import click
 
 from ftproc import __version__
+from ftproc.cli import process
 from ftproc.cli.command import CONTEXT, DEBUG, debug_option, write_examples
 from ftproc.errors import failure, interruption, nearest
 
 COMMANDS = ("simulate", "train", "filter", "score")
 
-INTERRUPTED, TERMINATED = 130, 143  # what a shell reports for Ctrl-C and for `kill`
+INTERRUPTED = 130  # what a shell reports for Ctrl-C
 
 _ALIKE = 0.65  # of options, whose dashes alone make any two somewhat alike
 
@@ -57,13 +57,14 @@ class Program(click.Group):
         extra["standalone_mode"] = False
         try:
             code = super().main(arguments, prog_name or "ftproc", **extra)
-            sys.stdout.flush()  # raises for a full disk behind a redirection
+            if not code:
+                sys.stdout.flush()  # raises for a full disk behind a redirection
         except (Exception, KeyboardInterrupt) as error:
             stop = interruption(error)
             if isinstance(stop, SystemExit):
                 raise stop from None
             code = _report(stop or error, DEBUG in arguments)  # not from the context: parsing may have failed
-            _empty_stdout()
+        process.empty_stdout()
         sys.exit(code if isinstance(code, int) else 0)
 
 
@@ -98,20 +99,6 @@ def _usage(error: click.ClickException) -> str:
     return f"{path}: {message}{'' if message.endswith(('.', '?')) else '.'} See {path} -h."
 
 
-def _empty_stdout() -> None:
-    """Discard what a standard output that is full or closed did not take: Python would try again at exit, and fail."""
-    import os
-
-    try:
-        sys.stdout.flush()
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _terminated(signum: int, frame: object) -> None:
-    sys.exit(TERMINATED)  # runs every `finally`, so that no partial output remains
-
-
 @click.group("ftproc", cls=Program, context_settings=CONTEXT)
 @click.version_option(__version__, message="%(prog)s %(version)s")
 def cli() -> None:
@@ -128,5 +115,6 @@ cli.params.append(debug_option())
 
 def main() -> None:
     """The console script."""
-    signal.signal(signal.SIGTERM, _terminated)
+    process.open_streams()
+    process.end_by_signals()
     cli.main()

@@ -81,8 +81,15 @@ def _triple(text: Any) -> tuple[float, float, float] | None:
     return (values[0], values[1], values[2])
 
 
+class _File(click.Path):
+    def convert(self, value: Any, parameter: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if not value:
+            self.fail("the name of a file is empty.", parameter, ctx)
+        return super().convert(value, parameter, ctx)
+
+
 #: The name of a file, which shells complete.
-FILE = click.Path()
+FILE = _File()
 
 
 def _starting(names: Iterable[str], incomplete: str) -> list[str]:
@@ -139,7 +146,7 @@ def report(what: str) -> Callable[[F], F]:
         f"Write an HTML page that shows {what}; it opens in any browser, without a network. FILE.html for one, or a "
         'directory for a page of each and an index.html that lists them. Needs plotly: pip install "plotly>=6.0".'
     )
-    return click.option("--report", metavar="FILE.html|DIR", help=text)
+    return click.option("--report", type=FILE, metavar="FILE.html|DIR", help=text)
 
 
 def units(text: str) -> Callable[[F], F]:

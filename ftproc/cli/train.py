@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from ftproc.cli import options
-from ftproc.cli.command import Command
+from ftproc.cli.command import Command, refuse_with, stated
 from ftproc.settings import TrainSettings
 
 _EXAMPLES = """
@@ -83,15 +83,31 @@ def command(show: str | None, **options: Any) -> None:
     Prints the model's card: its effect on flights that it was not trained on, which may be none. Filter with the same
     --editing, --noise and --jerk as here.
     """
+    ctx = click.get_current_context()
     if show is not None:
         from ftproc.correction import model, model_file
 
         click.echo(model.card(model_file.load(show)))
         return
     _check(options)
+    _refuse_idle(ctx)
     from ftproc.cli import training
 
     training.run(training.Request(**options))
+
+
+def _refuse_idle(ctx: click.Context) -> None:
+    """Raises UsageError for options on the command line that have no effect."""
+    from ftproc.methods import registry
+    from ftproc.settings import FilterSettings
+
+    simulated = ctx.params["scenario"] is not None
+    refuse_with(ctx, *(("--scenario", ("units", "columns")) if simulated else ("--log", ("flights",))))
+    method = registry.named(ctx.params["method"])
+    asked = ["--editing"] if "editing" in stated(ctx) else []
+    registry.refuse_idle(asked, [method], FilterSettings(editing=ctx.params["editing"]))
+    if method.own_model:
+        refuse_with(ctx, f"{method.name}, which starts from random weights", ("population", "generations"))
 
 
 def _check(options: Mapping[str, Any]) -> None:

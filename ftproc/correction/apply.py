@@ -54,7 +54,7 @@ def bounded(los: LineOfSight, stage: Stage, output: FloatArray) -> FloatArray:
     if len(rows):
         los = los.rows(rows)
         along = los.from_cartesian(stage.features.to_cartesian(los, output[rows]))
-        limit = stage.bound_sigma * los.sigma
+        limit = stage.bound * los.sigma
         values[rows] = los.to_cartesian(np.clip(along, -limit, limit))
     return values
 

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from ftproc.correction.envelope import Envelope, Normaliser
 from ftproc.correction.features import Features
 from ftproc.correction.network import Shape, Weights
@@ -15,6 +17,7 @@ from ftproc.records import FloatArray
 from ftproc.settings import TrainSettings
 
 SCHEMA = 2
+MOST_SIGMA = 50.0  # no correction is larger, whatever the file says
 FILTER, SMOOTHER = "filter", "smoother"
 STAGES = (FILTER, SMOOTHER)
 
@@ -25,7 +28,8 @@ class Stage:
 
     weights: network on normalised inputs and targets. gain: (6,) in [0, 1] per applied output, zero where held-out data
     show no significant improvement. bound_sigma: (6,) bound on the correction along each line-of-sight axis, in the
-    stage's own sigmas. fingerprint: SHA-256 of the training, validation and test arrays.
+    stage's own sigmas, as trained; `bound` is the one that holds. fingerprint: SHA-256 of the training, validation and
+    test arrays.
     """
 
     features: Features
@@ -42,6 +46,11 @@ class Stage:
     def shape(self) -> Shape:
         hidden, inputs = self.weights.w1.shape
         return Shape(inputs, hidden, len(self.weights.b2), self.weights.direct.size > 0)
+
+    @property
+    def bound(self) -> FloatArray:
+        """(6,) the bound in sigmas: of the training, at most the program's."""
+        return np.minimum(self.bound_sigma, MOST_SIGMA)
 
     @property
     def helps(self) -> bool:
@@ -89,7 +98,7 @@ def _stage_card(name: str, stage: Stage) -> list[str]:
     return [
         f"{name}: feature set {stage.features.name!r}, {network}",
         f"data: sha256 {stage.fingerprint}",
-        f"bounded to {_range(stage.bound_sigma)} sigma; zero while coasting, just after (re-)initialization and "
+        f"bounded to {_range(stage.bound)} sigma; zero while coasting, just after (re-)initialization and "
         "outside the range of the training data",
         *verdict,
     ]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ftproc.errors import UsageError
 from ftproc.records import EDITED, PAST, WHOLE
@@ -24,11 +24,11 @@ MAIN = FilterSettings.method
 
 @dataclass(frozen=True)
 class Method:
-    """causal: the estimate of a sample needs no later one, once noise and start are set (two-pass editing, the
-    default of the main method, uses the whole record to decide what is an outlier). corrected: the network
-    works on its output; own_model: only one trained for this very method. smooths: --smooth can be had. needs: a
-    module that must be installed, and the extra that brings it. random: it draws random numbers, so --particles and
-    --seed matter. in_parts: how a log of any length is filtered in stretches; without, it is filtered as a whole."""
+    """causal: the estimate of a sample needs no later one, once noise and start are set (two-pass editing, the default
+    of the main method, uses the whole record to decide what is an outlier). corrected: the network works on its
+    output; own_model: only one trained for this very method. smooths: --smooth can be had. needs: a module that must
+    be installed, and the extra that brings it. random: it draws random numbers, so --particles and --seed matter.
+    in_parts: how a log of any length is filtered in stretches; without, it is filtered as a whole."""
 
     name: str
     title: str
@@ -139,6 +139,41 @@ METHODS: dict[str, Method] = {
                True, True, False, _from("ensemble", method="renpf"), smooths=False, random=True),
     )
 }  # fmt: skip
+
+
+class Use(NamedTuple):
+    """Where an option has an effect: a test, and the same in words."""
+
+    by: Callable[[Method, FilterSettings], bool]
+    words: str
+
+
+def _recursive(method: Method, settings: FilterSettings) -> bool:
+    return method.name == MAIN and settings.editing == "forward"
+
+
+_ENSEMBLES = "it is for the methods enkf, enpf, enpf-chi2 and renpf"
+
+#: The options that only some ways of filtering use, by their names on the command line.
+USES = {
+    "--editing": Use(lambda m, s: m.name == MAIN, f"it is for {MAIN}; the others have editing of their own, or none"),
+    "--max-patch": Use(
+        lambda m, s: _recursive(m, s) or (m.random and m.handles_outliers),
+        f"it is for {MAIN} with --editing forward, for enpf-chi2 and for renpf",
+    ),
+    "--model": Use(lambda m, s: m.corrected, f"a network corrects {MAIN}, ga-bpnn-ukf-plain and bpnn-ekf"),
+    "--particles": Use(lambda m, s: m.random, _ENSEMBLES),
+    "--seed": Use(lambda m, s: m.random, _ENSEMBLES),
+    "--weight-form": Use(_recursive, f"it is for {MAIN} with --editing forward"),
+}
+
+
+def refuse_idle(stated: Iterable[str], methods: Sequence[Method], settings: FilterSettings) -> None:
+    """Raise UsageError for the first of the options stated that none of the methods uses with these settings."""
+    for option in stated:
+        if option in USES and not any(USES[option].by(method, settings) for method in methods):
+            with_what = f"{methods[0].name} here" if len(methods) == 1 else "these methods"
+            raise UsageError(f"{option} does nothing with {with_what}: {USES[option].words}. Leave it out.")
 
 
 def named(name: str) -> Method:

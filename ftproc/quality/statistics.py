@@ -38,7 +38,8 @@ class RunStatistics:
         self.reacquired, self.unexamined, self.stamp_s, self.drifts = 0, 0, 0.0, False
         self.slow_noise_s, self.slow_noise_likelier = 0.0, False
         self.converged: bool | None = None
-        self.largest_m, self.outside, self.rows, self.parts = 0.0, 0.0, 0, 0
+        self.largest_m, self.largest_sigma = 0.0, 0.0
+        self.outside, self.rows, self.parts = 0.0, 0, 0
 
     def add(self, time_s: FloatArray, estimate: Estimate, correction: FloatArray, outside: float) -> None:
         """Add a part: time_s (n,), its estimate, correction (n, 6), and the share outside the network's training."""
@@ -71,6 +72,9 @@ class RunStatistics:
             self.slow_noise_s = max(self.slow_noise_s, float(other.fade_s[other.wander_variance > 0].max()))
         self.unexamined += estimate.unexamined
         self.largest_m = max(self.largest_m, float(np.linalg.norm(correction[:, :3], axis=1).max(initial=0.0)))
+        changed, sigma = np.abs(correction), best_sigma[:, : correction.shape[1]]
+        ratio = np.divide(changed, sigma, out=np.zeros_like(changed), where=changed > 0)
+        self.largest_sigma = max(self.largest_sigma, float(np.nanmax(ratio, initial=0.0)))
         self.outside += outside * len(time_s)
         self.rows += len(time_s)
         self.parts += 1
@@ -132,6 +136,7 @@ class RunStatistics:
             "noise_drifts": self.drifts,
             "editing_places_unexamined": self.unexamined,
             "correction_largest_m": self.largest_m,
+            "correction_largest_sigma": self.largest_sigma,
             "correction_outside_training": self.outside / max(self.rows, 1),
         }
         return figures | {"trust": verdict.verdict(verdict.remarks(figures))}

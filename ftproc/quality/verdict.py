@@ -11,6 +11,7 @@ CONSISTENT, SUSPECT, UNRELIABLE = "consistent", "suspect", "unreliable"
 LEVELS = (CONSISTENT, SUSPECT, UNRELIABLE)  # from good to bad
 FEWEST_GOOD = 20  # readings of a component, for a test of its sigmas
 UNRELIABLE_RATIO = 2.0  # innovation ratio over its upper bound, from which the sigmas mean nothing
+MANY_SIGMAS = 5.0  # of a network's correction, from which only an error of the instrument can be its reason
 MANY_REJECTED, TOO_MANY_REJECTED = 0.25, 0.5  # share of a component's readings. With a third of all readings outliers,
 # one flight in five diverges, and nearly all of these have more than a quarter rejected.
 
@@ -45,7 +46,11 @@ def remarks(s: Mapping[str, Any]) -> list[Remark]:
         found.append(Remark(CONSISTENT, text))
     if s["correction_largest_m"] > 0:
         outside = f"none for the {100 * s['correction_outside_training']:.1f} % of samples outside its training data"
-        found.append(Remark(CONSISTENT, f"network correction up to {s['correction_largest_m']:.3g} m; {outside}"))
+        size = f"up to {s['correction_largest_m']:.3g} m, {s['correction_largest_sigma']:.2g} sigma"
+        if s["correction_largest_sigma"] > MANY_SIGMAS:
+            text = f"network correction {size}: more than noise explains; check that the model is of this instrument"
+            found.append(Remark(SUSPECT, text))
+        found.append(Remark(CONSISTENT, f"network correction {size}; {outside}"))
     return found
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ftproc.errors import UsageError
+from ftproc.errors import UsageError, encodable
 from ftproc.files.writing import atomic
 from ftproc.report.style import require_plotly
 
@@ -33,7 +33,7 @@ def write(trajectory: Trajectory, target: Target, truth: Truth | None = None) ->
 
     text = page(trajectory, truth)
     with atomic.replacing(target) as stream:
-        stream.write(text.encode())
+        stream.write(encodable(text).encode())
 
 
 def plot(trajectory: Trajectory, what: str = "track") -> go.Figure:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import html
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
+from ftproc.errors import encodable
 from ftproc.files.layout import Target
 from ftproc.files.writing import atomic
 from ftproc.quality import verdict
@@ -35,14 +37,14 @@ def write(entries: Sequence[Entry], target: Target) -> None:
     count = counted(len(entries) - failed, "report") + (f", {failed} failed" if failed else "")
     body = f"<h1>{count}</h1>{tables.table(_HEADER, map(_cells, entries), 'index', links=3)}"
     with atomic.replacing(target) as stream:
-        stream.write(document("Reports", body).encode())
+        stream.write(encodable(document("Reports", body)).encode())
 
 
 def _cells(entry: Entry) -> tuple[str, ...]:
     """The first three cells are HTML."""
     name = html.escape(entry.log)
     if entry.page is not None:
-        name = f'<a href="./{html.escape(quote(PurePath(entry.page).name))}">{name}</a>'
+        name = f'<a href="./{html.escape(quote(os.fsencode(PurePath(entry.page).name)))}">{name}</a>'
     s = entry.summary
     if entry.failure is not None or "trust" not in s:
         return (name, "", _badge("failed" if entry.failure else "unknown", GREY), "", "", "", entry.failure or "")

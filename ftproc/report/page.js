@@ -4,7 +4,7 @@
 (function () {
   const PAPER = 680; // CSS pixels between the margins of an A4 or Letter page
   const LOWER = 0.7; // share of the height, so that two figures fit a page
-  const BROAD = 1.4; // width over height from which the whole space is visible with its labels
+  const BROAD = 1.6; // width over height from which the whole space is visible with its labels
   const COLUMNS = 400; // of a figure; in each the lowest and the highest mark of a kind are drawn
   const config = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
   const places = Array.from(document.querySelectorAll("figure"));
@@ -124,6 +124,26 @@
       size = { ...size, "scene.camera.eye": moved(scene.camera.eye, place.away / before) };
     }
     Plotly.relayout(place, size);
+  }
+
+  // Shows these seconds, and as much around them, in all figures over the whole time; without them the whole log.
+  function zoom(from, to) {
+    const room = Math.max(to - from, 1);
+    for (const place of places) {
+      if (!place.data || place.id === "worst" || place.id === "ground" || place.layout.scene) continue;
+      place.whole = place.whole || place.layout.xaxis.range.slice();
+      const range = from === "" ? place.whole : [Number(from) - room, Number(to) + room];
+      const update = {};
+      for (const name in place.layout) if (/^xaxis\d*$/.test(name)) update[name + ".range"] = range.slice();
+      Plotly.relayout(place, update);
+    }
+  }
+
+  for (const button of document.querySelectorAll("button[data-from]")) {
+    button.addEventListener("click", function () {
+      zoom(button.dataset.from, button.dataset.to);
+      document.getElementById("readings").scrollIntoView();
+    });
   }
 
   addEventListener("beforeprint", function () {

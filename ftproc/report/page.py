@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from ftproc.records import Trajectory, Truth
 from ftproc.report import tables
 from ftproc.report.drawing import Drawn
-from ftproc.report.readings import readings, residuals
+from ftproc.report.patches import WORST_S
+from ftproc.report.readings import readings, residuals, worst_seconds
 from ftproc.report.timeplots import correction, errors, motion, nis, sigmas
 from ftproc.report.track import ground, track
 from ftproc.report.view import View, view
@@ -40,6 +41,7 @@ FIGURES: dict[str, Callable[[View], Drawn]] = {
     "track": track,
     "ground": ground,
     "readings": readings,
+    "worst": worst_seconds,
     "residuals": residuals,
     "nis": nis,
     "sigmas": sigmas,
@@ -49,8 +51,9 @@ FIGURES: dict[str, Callable[[View], Drawn]] = {
 
 #: The sections with figures: title and names of the figures, side by side.
 _SECTIONS = (
-    ("Track", ("track", "ground")),
+    ("Track", ("ground", "track")),
     ("Readings", ("readings",)),
+    (f"The {WORST_S:g} seconds with most outliers", ("worst",)),
     ("Residuals", ("residuals",)),
     ("Normalised innovation squared", ("nis",)),
     ("Uncertainty", ("sigmas",)),
@@ -65,6 +68,7 @@ def page(trajectory: Trajectory, truth: Truth | None = None) -> str:
     parts = [tables.heading(shown), tables.banner(shown), tables.summary(shown)]
     if truth is not None:
         parts.append(_section("Against the truth", [("errors", errors(shown))], tables.score(shown)))
+    parts.append(tables.patches(shown))
     for title, names in _SECTIONS:
         parts.append(_section(title, [(name, FIGURES[name](shown)) for name in names]))
     parts.append(tables.provenance(shown))

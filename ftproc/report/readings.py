@@ -10,6 +10,7 @@ import numpy as np
 from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, FloatArray, IntArray
 from ftproc.report import drawing, style
 from ftproc.report.drawing import Drawn
+from ftproc.report.patches import worst
 from ftproc.report.thinning import MOST_MARKED
 from ftproc.report.view import View
 
@@ -53,6 +54,15 @@ def readings(view: View) -> Drawn:
     if view.reading is None:
         where = f"{NOT_KNOWN} Outliers are marked at the estimate."
     return Drawn(figure, f"{where} {note}".strip())
+
+
+def worst_seconds(view: View) -> Drawn:
+    """The same, of the seconds with most outliers only."""
+    found = worst(view)
+    if found is None:
+        return Drawn(None, "There are no outliers, or the whole log is as short.")
+    first, last = np.searchsorted(view.trajectory.time_s, found).tolist()
+    return readings(view.part(slice(first, max(last, first + 1))))
 
 
 def residuals(view: View) -> Drawn:

@@ -67,14 +67,16 @@ LAYOUT: dict[str, Any] = {
     "paper_bgcolor": "white",
     "plot_bgcolor": "white",
     "font": {"family": "system-ui, 'Segoe UI', Helvetica, Arial, sans-serif", "size": 12, "color": BLACK},
-    "margin": {"l": 88, "r": 16, "t": 36, "b": 46},
+    "margin": {"l": 88, "r": 44, "t": 36, "b": 46},
+    "modebar": {"orientation": "v"},  # in the right margin, clear of the legend
     "legend": {
         "orientation": "h",
         "x": 0,
         "y": 1,
-        "yanchor": "bottom",
+        "yref": "container",  # at the top of the figure: the plots give way to as many lines as there are
+        "yanchor": "top",
         "itemsizing": "constant",
-        "itemwidth": 44,  # px: room for a dash and a half
+        "itemwidth": 40,  # px: room for a dash and a half
         "bgcolor": "rgba(0,0,0,0)",
     },
     "hovermode": "closest",

@@ -10,10 +10,12 @@ from typing import Any
 from ftproc.quality import summary as figures
 from ftproc.quality import verdict
 from ftproc.records import COMPONENTS, Trajectory
+from ftproc.report.patches import patches as found_patches
 from ftproc.report.style import GREY, VERDICT
 from ftproc.report.view import View
 from ftproc.scoring import render
 
+MOST_PATCHES = 200  # that are listed
 _LONGEST_LIST = 6  # values; a longer list is shown by its extremes
 
 
@@ -63,6 +65,24 @@ def summary(view: View) -> str:
     notes = figures.notes(s)
     body = table(figures.HEADER, rows, "numbers") + _pairs(figures.facts(s)) + _list(notes)
     return f"<section><h2>Summary</h2>{body}</section>"
+
+
+def patches(view: View) -> str:
+    """The outlier patches, each a button that zooms all figures over time to it."""
+    found = found_patches(view)
+    if not found:
+        return ""
+    rows = [
+        (f'<button data-from="{p.start_s!r}" data-to="{p.end_s!r}">{p.start_s:,.2f}</button>', f"{p.end_s:,.2f}",
+         p.component, f"{p.readings:,}", "-" if p.size != p.size else f"{p.size:+,.3g} {p.unit}")
+        for p in sorted(found, key=lambda p: -p.readings)[:MOST_PATCHES]
+    ]  # fmt: skip
+    note = "A click on a start zooms all figures over time to the patch. Size: median of reading minus estimate."
+    if len(found) > MOST_PATCHES:
+        note = f"The {MOST_PATCHES} longest of {len(found):,}. {note}"
+    body = table(("start, s", "end, s", "component", "readings", "size"), rows, "numbers patches", links=1)
+    whole = '<button data-from="" data-to="">Show the whole log.</button>'
+    return f'<section><h2>Outlier patches</h2>{body}<p class="note">{note} {whole}</p></section>'
 
 
 def score(view: View) -> str:

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 COLUMNS = 2000  # intervals of time, in each of which the extremes of x, y and z are drawn
-FLATTEST = 0.2  # height over width of the figure in space; the heights of a flatter flight are enlarged
+FLATTEST = 0.2  # height over width of the figure in space; the heights of a flatter flight are enlarged,
+MOST_ENLARGED = 10.0  # at most so many times: below that, room above and under it is shown
 LOW = 0.4  # share of the width, up to which an axis has few numbers
 NEAR = 1.0  # widths of the flight; a station within this distance is drawn too
 HEIGHT = 460
@@ -35,7 +36,9 @@ def track(view: View) -> Drawn:
     x, y, z = _path(view)
     size = np.array([np.nanmax(v) - np.nanmin(v) for v in (x, y, z)])
     widest = max(float(size.max()), 1e-9)
+    size[2] = max(size[2], FLATTEST / MOST_ENLARGED * widest)
     share = np.maximum(size / widest, [0.02, 0.02, FLATTEST])
+    middle, room = (np.nanmin(z) + np.nanmax(z)) / 2, 0.52 * size[2]
     scale = FILLING / float(np.linalg.norm(share))
     names = _names(view)
     go = require_plotly()
@@ -52,8 +55,9 @@ def track(view: View) -> Drawn:
             for a, length in zip("xyz", share, strict=True)}  # fmt: skip
     scene = {**axes, "aspectmode": "manual", "aspectratio": dict(zip("xyz", scale * share, strict=True)),
              "camera": {"eye": {"x": -1.1, "y": -1.3, "z": 0.8}, "center": {"x": 0, "y": 0, "z": -0.12}}}  # fmt: skip
+    figure.update_scenes(zaxis_range=[float(middle - room), float(middle + room)])
     figure.update_layout(**{**style.LAYOUT, "margin": {"l": 0, "r": 0, "t": 30, "b": 0}}, scene=scene, height=HEIGHT)
-    raised = share[2] * widest / size[2] if size[2] > 0 else 1.0
+    raised = share[2] * widest / size[2]
     factor = float(f"{raised:.2g}")
     note = "equal scales" if raised < 1.01 else f"heights enlarged {factor:g} times against x and y"
     return Drawn(figure, f"In space: {note}. Drag to turn it.")

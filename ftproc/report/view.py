@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,18 @@ class View:
     components_used: FloatArray
     error: FloatArray | None = None
     score: Score | None = None
+
+    def part(self, rows: slice) -> View:
+        """Some of its rows, for the figure of the readings."""
+        whole = self.trajectory
+        trajectory = replace(
+            whole, row=whole.row[rows], time_s=whole.time_s[rows], measurement=whole.measurement[rows],
+            state=whole.state[rows], sigma=whole.sigma[rows], outlier=whole.outlier[rows], nis=whole.nis[rows],
+            correction=whole.correction[rows], extra=None, diagnostics=None,
+        )  # fmt: skip
+        reading = None if self.reading is None else self.reading[rows]
+        timeline = Timeline.of(trajectory.time_s)
+        return View(trajectory, timeline, self.cleaned[rows], reading, self.components_used[rows])
 
     @property
     def diagnostics(self) -> Diagnostics | None:

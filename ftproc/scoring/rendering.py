@@ -9,8 +9,9 @@ from collections.abc import Callable, Sequence
 from pathlib import PurePath
 from typing import Any
 
-from ftproc.errors import UsageError
+from ftproc.errors import UsageError, encodable
 from ftproc.files.writing.csvtext import no_formula
+from ftproc.files.writing.trajectories import plain
 from ftproc.scoring import comparison
 from ftproc.scoring.figures import Score
 
@@ -67,12 +68,12 @@ def render(scores: Sequence[Score], format: str = "table") -> str:
         raise UsageError(f'There is no score format "{format}"; choose one of {", ".join(FORMATS)}.')
     if not scores:
         raise UsageError("There is nothing to score; name at least one trajectory.")
-    return FORMATS[format](scores)
+    return encodable(FORMATS[format](scores))
 
 
 def _json(scores: Sequence[Score]) -> str:
-    plain = [score.as_dict() for score in scores]
-    return json.dumps(plain[0] if len(plain) == 1 else plain, indent=2, allow_nan=False) + "\n"
+    found = [score.as_dict() for score in scores]
+    return json.dumps(plain(found[0] if len(found) == 1 else found), indent=2, allow_nan=False) + "\n"
 
 
 def _csv(scores: Sequence[Score]) -> str:

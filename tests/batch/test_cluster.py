@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -173,20 +175,83 @@ def test_a_log_that_kills_every_worker_is_named():
     assert "KilledWorker" in outcome.failure.trace
 
 
-def test_no_scheduler_answers(flights, monkeypatch):
-    monkeypatch.setattr(cluster, "PATIENCE_S", 0.3)
+def _refused(flights: list[str], address: str) -> str:
+    with pytest.raises(UsageError) as caught:
+        next(run.run(_tasks(flights, "none"), Recipe(), scheduler=address))
+    assert str(caught.value).startswith(f"--scheduler {address}: ")
+    assert str(caught.value).endswith(
+        "Start one with `dask scheduler`; it prints its address, such as tcp://10.0.0.1:8786."
+    )
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "",
+        "foo",
+        "tcp://foo",
+        "nonsense://here:1",
+        "http://127.0.0.1:8786",
+        "no address at all",
+        "h:99999",
+        "h:x",
+        "::1",
+    ],
+)
+def test_what_is_no_address(flights, address):
+    assert "this is no address of a scheduler" in _refused(flights, address)
+
+
+def test_a_scheduler_that_is_not_there(flights):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))  # and never listens
-        address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
-        for wrong in (address, "nonsense://here", "no address at all"):
-            with pytest.raises(UsageError, match=f"--scheduler {wrong}: no Dask scheduler answers there within 0.3 s"):
-                next(run.run(_tasks(flights, "none"), Recipe(), scheduler=wrong))
+        sentence = _refused(flights, f"127.0.0.1:{taken.getsockname()[1]}")
+    assert "no connection to it (connection refused)" in sentence
+    for nowhere in ("nowhere.invalid:8786", "nowhere..invalid:8786"):
+        assert "no connection to it (" in _refused(flights, nowhere)
+
+
+def test_a_name_that_is_looked_up_for_long(flights, monkeypatch):
+    gone = threading.Event()
+
+    def looked_up(*_: object, **__: object) -> None:
+        gone.wait(60)
+        raise OSError
+
+    monkeypatch.setattr(cluster, "REACHED_S", 0.1)
+    monkeypatch.setattr(socket, "create_connection", looked_up)
+    assert "nothing answers there within 0.1 s" in _refused(flights, "10.0.0.1:8786")
+    gone.set()
+
+
+@pytest.mark.parametrize("said", [b"\0", b"HTTP/1.1 400 Bad Request\r\n\r\n" * 9])
+def test_what_answers_is_no_scheduler(flights, monkeypatch, said, capfd):
+    """It says nothing; or something that is taken for a length."""
+    monkeypatch.setattr(cluster, "PATIENCE_S", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer() -> None:
+            with contextlib.suppress(OSError):
+                while True:
+                    connection, _ = server.accept()
+                    connection.sendall(said)
+                    held.append(connection)
+
+        held: list[socket.socket] = []
+        threading.Thread(target=answer, daemon=True).start()
+        sentence = _refused(flights, f"tcp://127.0.0.1:{server.getsockname()[1]}")
+    for connection in held:
+        connection.close()
+    assert "no Dask scheduler answers there within 0.5 s" in sentence
+    assert capfd.readouterr().err == ""
 
 
 def test_without_distributed(flights, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(UsageError, match=r"--scheduler needs distributed, which is not installed: pip install"):
-        next(run.run(_tasks(flights, "none"), Recipe(), scheduler="tcp://127.0.0.1:1"))
+    missing = pytest.raises(UsageError, match=r"--scheduler needs distributed, which is not installed: pip install")
+    with socket.create_server(("127.0.0.1", 0)) as server, missing:
+        next(run.run(_tasks(flights, "none"), Recipe(), scheduler=f"127.0.0.1:{server.getsockname()[1]}"))
 
 
 def _start(folder: Path, module: str, *args: str) -> subprocess.Popen[bytes]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from ftproc.errors import ModelError
 from ftproc.files.writing import flights
 from ftproc.simulation import simulate
 
+PROGRAM = str(Path(sys.prefix) / "bin" / "ftproc")
 COUNT = 40  # logs of a batch that is stopped after the first
 
 
@@ -105,18 +107,51 @@ def test_a_worker_that_dies_takes_only_its_own_log_with_it(tmp_path):
 def test_a_process_started_for_work_is_deaf_to_ctrl_c_from_its_first_moment():
     code = "import signal; print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))"
     heard = [sys.executable, "-c", code]
-    with processes._unheard():
+    with processes.unheard():
         inside = subprocess.run(heard, capture_output=True, text=True, check=True).stdout
     outside = subprocess.run(heard, capture_output=True, text=True, check=True).stdout
     assert (inside, outside) == ("True\n", "False\n")
 
 
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGHUP, signal.SIGTERM])
+@pytest.mark.parametrize("group", [False, True])
+def test_workers_end_with_the_process_that_started_them(tmp_path, end, group):
+    """Also in the middle of a log; only what kills at once leaves a partial file."""
+    flights.write_log(simulate("manoeuvre", duration_s=1200.0, seed=1).log, tmp_path / "0.parquet")
+    for number in range(1, 4):
+        shutil.copy(tmp_path / "0.parquet", tmp_path / f"{number}.parquet")
+    command = [PROGRAM, "filter", *(f"{n}.parquet" for n in range(4)), "--jobs", "2", "-o", "out"]
+    with subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        _until(lambda: sum("libarrow" in Path(f"/proc/{pid}/maps").read_text() for pid in _children(process.pid)) == 2)
+        workers = _children(process.pid)
+        (os.killpg if group else os.kill)(process.pid, end)
+        err = process.communicate(timeout=60)[1]
+    assert process.returncode == (-9 if end == signal.SIGKILL else 128 + end)
+    assert "Traceback" not in err
+    _until(lambda: not [pid for pid in workers if Path(f"/proc/{pid}").exists()])
+    if end != signal.SIGKILL:
+        assert not list(tmp_path.glob("out/.*"))
+
+
+def _children(pid: int) -> list[int]:
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def _until(found):
+    deadline = time.monotonic() + 60
+    while not (value := found()):
+        assert time.monotonic() < deadline, "timed out"
+        time.sleep(0.02)
+    return value
+
+
 def test_ctrl_c_stops_all_workers_and_leaves_only_whole_files(tmp_path):
     for number in range(COUNT):
         flights.write_log(simulate("manoeuvre", duration_s=30.0, seed=number).log, tmp_path / f"{number}.parquet")
-    program = str(Path(sys.prefix) / "bin" / "ftproc")
     names = [f"{number}.parquet" for number in range(COUNT)]
-    command = [program, "filter", *names, "--jobs", "2", "-o", "out"]
+    command = [PROGRAM, "filter", *names, "--jobs", "2", "-o", "out"]
     with subprocess.Popen(
         command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -150,7 +151,7 @@ def test_all_methods(run, flight):
 def test_all_methods_that_apply(run, flight, monkeypatch):
     """Without PyWavelets, with the smoother, and with a model for one of them: each gets what suits it."""
     monkeypatch.setattr(registry, "find_spec", lambda name: None)
-    train = ("--population", "4", "--generations", "1", "--epochs", "3", "--flights", "3")
+    train = ("--epochs", "3", "--flights", "3")
     assert run("train", "--method", "bpnn-ekf", "--scenario", "radar", *train, "-o", "m.safetensors").code == 0
     result = run("filter", flight, "--method", "all", "--smooth", "--model", "m.safetensors", "-o", "d")
     assert result.code == 0
@@ -244,3 +245,37 @@ def test_jobs_and_scheduler_exclude_each_other(run):
     assert result.err == (
         "ftproc: --jobs is for processes on this machine, --scheduler for a cluster; give one of the two.\n"
     )
+
+
+@pytest.mark.parametrize(
+    ("args", "sentence"),
+    [
+        (["--weight-form", "gain"], "--weight-form does nothing with ga-bpnn-ukf here: it is for ga-bpnn-ukf with"),
+        (["--max-patch", "3"], "--max-patch does nothing with ga-bpnn-ukf here: it is for ga-bpnn-ukf with --editing"),
+        (["--max-patch", "3", "--method", "enkf"], "--max-patch does nothing with enkf here"),
+        (["--particles", "50"], "--particles does nothing with ga-bpnn-ukf here: it is for the methods enkf, enpf"),
+        (["--seed", "1", "--method", "ukf"], "--seed does nothing with ukf here"),
+        (["--editing", "forward", "--method", "huber-ukf"], "--editing does nothing with huber-ukf here"),
+        (["--model", "m.safetensors", "--method", "ukf"], "--model does nothing with ukf here: a network corrects"),
+        (["--method", "all", "--weight-form", "gain", "-o", "out/"], "--weight-form does nothing with these methods"),
+    ],
+)  # fmt: skip
+def test_options_that_do_nothing_are_refused(run, args, sentence):
+    done = run("filter", "flight.csv", *args)
+    assert done.code == 2
+    assert sentence in done.err
+    assert done.err.rstrip().endswith("Leave it out.")
+    assert len(done.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ["--model", "none", "--method", "ukf"],
+        ["--editing", "forward", "--max-patch", "3", "--weight-form", "gain"],
+        ["--config", "s.toml"],
+    ],
+)
+def test_options_that_ask_for_nothing_and_those_of_a_station_file_are_not(run, flight, args):
+    Path("s.toml").write_text("[filter]\nmax_patch_s = 3\nparticles = 50\n")
+    assert run("filter", flight, *args, "-o", "x.csv").code == 0

@@ -189,7 +189,10 @@ def test_a_reader_that_leaves_early_is_no_error(shell):
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a disk that is always full")
 def test_a_full_disk_behind_stdout(shell):
     result = shell("ftproc simulate --scenario zuo2021 -o - > /dev/full")
-    assert (result.code, result.err) == (1, "ftproc: standard output: no space left on device.\n")
+    assert (result.code, result.err) == (
+        1,
+        "ftproc: standard output: no space left on device, so the result is lost; send it elsewhere.\n",
+    )
 
 
 def test_pipes(shell):

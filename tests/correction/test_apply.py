@@ -12,7 +12,7 @@ from ftproc.correction.apply import correct
 from ftproc.correction.envelope import Envelope, Normaliser
 from ftproc.correction.feature_sets import FEATURES, named
 from ftproc.correction.features import SETTLING, LineOfSight
-from ftproc.correction.model import Stage
+from ftproc.correction.model import MOST_SIGMA, Stage
 from ftproc.correction.network import Weights
 from tests.correction import fake
 
@@ -110,3 +110,11 @@ def test_an_empty_run() -> None:
     found = correct(fake.run(np.random.default_rng(0), n=0), constant("window", 1.0))
     assert found.values.shape == (0, 6)
     assert found.outside == 0.0
+
+
+@pytest.mark.parametrize("stated", [1e3, 1e6, 1e300])
+def test_the_largest_bound_is_the_programs(stated: float) -> None:
+    filtered = fake.run(np.random.default_rng(1))
+    values = correct(filtered, constant("window", 1e9, bound=stated)).values
+    along = LineOfSight.of(filtered, 0, 600).from_cartesian(values) / filtered.los_sigma
+    assert np.abs(along).max() == pytest.approx(MOST_SIGMA)

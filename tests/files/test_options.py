@@ -33,7 +33,7 @@ def test_columns_from_text_and_from_a_mapping_are_the_same() -> None:
         (parse_units, "azimuth=m", '--units: "m" is not a unit of azimuth'),
         (
             parse_units,
-            "azimut=deg",
+            "azimth=deg",
             '; did you mean "azimuth"?',
         ),
         (parse_units, "km", '--units: "km" is not QUANTITY=NAME, as in range=km,azimuth=deg'),

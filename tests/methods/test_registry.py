@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ftproc import pipeline
+from ftproc import pipeline, simulation
 from ftproc.correction.training.flights import train_flights
 from ftproc.errors import UsageError
 from ftproc.methods import registry
@@ -104,3 +104,31 @@ def test_a_model_for_the_ekf_corrects_the_ekf_and_only_that():
     np.testing.assert_allclose(corrected.state[:, :6] - corrected.correction, plain.state[:, :6], atol=1e-9)
     with pytest.raises(UsageError, match=r"^ga-bpnn-ukf cannot use a model that was trained for bpnn-ekf; "):
         pipeline.filter_log(log, FilterSettings(), model)
+
+
+def test_only_options_that_change_something_are_accepted():
+    """Each option with each method and way of editing: refused where the trajectory stays the same, bit for bit."""
+    log = simulation.simulate("manoeuvre", seed=1, duration_s=40.0).log
+    changes = {
+        "--editing": ({"editing": "forward"}, {"editing": "none"}, {"editing": "two-pass"}),
+        "--particles": ({"particles": 95},),
+        "--seed": ({"seed": 5},),
+        "--weight-form": ({"gain_form": True},),
+    }
+
+    def made(settings: FilterSettings) -> bytes:
+        found = pipeline.filter_log(log, settings)
+        return found.state.tobytes() + found.sigma.tobytes() + found.outlier.tobytes()
+
+    modes = [(registry.MAIN, way) for way in ("two-pass", "forward", "none")]
+    modes += [
+        (name, "two-pass")
+        for name, method in registry.METHODS.items()
+        if name != registry.MAIN and not method.own_model
+    ]
+    for name, editing in modes:
+        plain = FilterSettings(method=name, editing=editing, particles=90)
+        before = made(plain)
+        for option, ways in changes.items():
+            used = registry.USES[option].by(registry.METHODS[name], plain)
+            assert used == any(made(replace(plain, **way)) != before for way in ways), (name, editing, option)

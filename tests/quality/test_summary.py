@@ -176,10 +176,15 @@ def test_text_reports_reacquisition_and_correction():
         trajectory,
         metadata={
             **trajectory.metadata,
-            "summary": {**figures(trajectory), "correction_largest_m": 1.25, "correction_outside_training": 0.125},
+            "summary": {
+                **figures(trajectory),
+                "correction_largest_m": 1.25,
+                "correction_largest_sigma": 0.5,
+                "correction_outside_training": 0.125,
+            },
         },
     )
-    text = "network correction up to 1.25 m; none for the 12.5 % of samples outside its training data"
+    text = "network correction up to 1.25 m, 0.5 sigma; none for the 12.5 % of samples outside its training data"
     assert text in summary.text(corrected.metadata)
     undecided = replace(
         trajectory, metadata={**trajectory.metadata, "summary": {**figures(trajectory), "editing_converged": False}}

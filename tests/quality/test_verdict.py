@@ -63,7 +63,8 @@ OFF = {"innovation_ratio": 1.5, "innovation_bounds": [0.8, 1.2], "verdict": "ove
         ({"reacquired": 1}, {}, SUSPECT, "re-initialized once (track loss, or a gap too long to bridge)"),
         ({"reacquired": 2}, {}, SUSPECT, "re-initialized twice (track loss"),
         ({"reacquired": 3}, {}, SUSPECT, "re-initialized 3 times (track loss"),
-        ({"correction_largest_m": 2.0}, {}, CONSISTENT, None),
+        ({"correction_largest_m": 2.0, "correction_largest_sigma": 4.9}, {}, CONSISTENT, None),
+        ({"correction_largest_m": 2.0, "correction_largest_sigma": 5.1}, {}, SUSPECT, "up to 2 m, 5.1 sigma: more"),
     ],
 )  # fmt: skip
 def test_one_fault(good, changes, part, level, reason):

@@ -47,7 +47,7 @@ def test_everything_is_drawn_without_an_error(usual):
         " f.querySelectorAll('.scatterlayer .trace, canvas').length])"
     )
     assert [name for name, *_ in drawn] == [
-        "errors", "track", "ground", "readings", "residuals", "nis", "sigmas", "motion",
+        "errors", "ground", "track", "readings", "worst", "residuals", "nis", "sigmas", "motion",
     ]  # fmt: skip
     assert all(traces > 0 and width > 300 and marks > 0 for _, traces, width, marks in drawn)
 
@@ -167,3 +167,39 @@ def test_printing_fits_the_paper_and_restores_the_window(usual):
     paper = page.pdf(format="A4", prefer_css_page_size=True)
     pages = paper.count(b"/Type /Page\n") or len(re.findall(rb"/Type\s*/Page\b", paper))
     assert 3 <= pages <= 8
+
+
+def test_the_link_of_a_patch_zooms_all_figures_over_time(usual):
+    page = usual.page
+    ranges = (
+        "() => ['readings', 'residuals', 'nis', 'sigmas', 'motion', 'errors'].map(name =>"
+        " document.getElementById(name)._fullLayout.xaxis.range.map(Number))"
+    )
+    whole = page.evaluate(ranges)
+    link = page.locator("button[data-from]").first
+    start, end = (float(link.get_attribute(name)) for name in ("data-from", "data-to"))
+    link.click()
+    page.wait_for_function(f"() => ({ranges})().every(r => r[0] < {start} && r[1] > {end} && r[1] - r[0] < 20)")
+    page.locator("button[data-from='']").click()
+    page.wait_for_function(f"() => JSON.stringify(({ranges})()) === JSON.stringify({whole})")
+
+
+@pytest.mark.parametrize("medium", ["wide", "telephone", "print"])
+def test_no_legend_lies_on_a_plot(show, medium):
+    page = show(filtered(), flight().truth).page
+    if medium == "telephone":
+        page.set_viewport_size({"width": 390, "height": 844})
+        page.wait_for_function("() => document.getElementById('readings')._fullLayout.width < 390", timeout=5000)
+    elif medium == "print":
+        page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.wait_for_timeout(500)
+    found = page.evaluate(
+        "() => Array.from(document.querySelectorAll('figure')).filter(f => f.querySelector('.legendtext')"
+        " && f.querySelector('.nsewdrag')).map(f => [f.id,"
+        " Math.max(...Array.from(f.querySelectorAll('.legendtext'), t => t.getBoundingClientRect().bottom)),"
+        " Math.min(...Array.from(f.querySelectorAll('.nsewdrag'), d => d.getBoundingClientRect().top))])"
+    )
+    assert len(found) > 4
+    for name, bottom, top in found:
+        assert bottom <= top + 2, name
+    page.close()

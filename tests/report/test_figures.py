@@ -41,7 +41,7 @@ def test_every_figure_of_every_kind_of_trajectory(make, what):
 
 def test_which_figures_there_are_without_range_or_readings():
     there = {what for what in FIGURES if drawn(angles_only(), what).figure is not None}
-    assert there == {"readings", "residuals", "nis"}
+    assert there == {"readings", "worst", "residuals", "nis"}
     axes = drawn(angles_only(), "readings").figure.layout
     assert [axes.yaxis.title.text, axes.yaxis2.title.text] == ["A, deg", "E, deg"]
     read = replace(filtered(), diagnostics=None)
@@ -138,7 +138,8 @@ def test_ground_track_is_drawn_at_equal_scales_with_north_up():
 
 
 def test_track_says_how_much_heights_are_enlarged():
-    flat = replace(filtered(), state=filtered().state * [1, 1, 0.01, 1, 1, 1, 1, 1, 1])
+    low = 0.05 * np.ptp(filtered().state[:, :2], axis=0).max() / np.ptp(filtered().state[:, 2])
+    flat = replace(filtered(), state=filtered().state * [1, 1, low, 1, 1, 1, 1, 1, 1])
     found = drawn(flat, "track")
     ratio = found.figure.layout.scene.aspectratio
     size = np.ptp(flat.state[:, :3], axis=0)

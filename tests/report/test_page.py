@@ -108,7 +108,7 @@ def figures(text):
 
 def test_figures_are_json_and_have_their_places(text):
     found = figures(text)
-    assert list(found) == ["track", "ground", "readings", "residuals", "nis", "sigmas", "motion"]
+    assert list(found) == ["ground", "track", "readings", "worst", "residuals", "nis", "sigmas", "motion"]
     places = [attributes["id"] for tag, attributes in Elements(text).found if tag == "figure"]
     assert places == list(found)
     x = found["motion"]["data"][0]["x"]
@@ -136,7 +136,7 @@ def test_several_reasons_are_a_list():
 
 def test_page_without_position_says_so():
     text = page(angles_only())
-    assert list(figures(text)) == ["readings", "residuals", "nis"]
+    assert list(figures(text)) == ["readings", "worst", "residuals", "nis"]
     assert "There is no position to draw" in text
     assert "range missing throughout: position and velocity are not observable" in text
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from ftproc.errors import InputError
 from ftproc.files import conventions
+from ftproc.files.reading.formats.content import Changed
 from ftproc.files.reading.formats.header import Blocks
 from ftproc.records import COMPONENTS, FloatArray, IntArray, MeasurementLog
 from ftproc.settings import Station
@@ -35,7 +36,8 @@ class Spooled(NamedTuple):
 
 def read(source: str, blocks: Blocks, convert: Convert, station: Station) -> Spooled | None:
     """The log in the convention of `station`, or None if it must be read at once: its rows are out of time order, or a
-    fault needs the whole file for its message. Raises InputError if the disk of the temporary files is full."""
+    fault needs the whole file for its message. Raises InputError if the disk of the temporary files is full, or the
+    file changed while it was read."""
     with _Spool() as spool:
         return _into(spool, source, blocks, convert, station)
 
@@ -56,12 +58,19 @@ def _into(spool: _Spool, source: str, blocks: Blocks, convert: Convert, station:
             quantities["time"] = times.continued(quantities["time"], epoch)
             spool.add(conventions.apply(_timed(source, quantities), station), len(table))
             sampled.append({name: values[::every].copy() for name, values in quantities.items()})
+    except Changed:
+        raise
     except (InputError, _OutOfOrder):
         return None
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
             raise
         place = tempfile.gettempdir()
+        if error.errno == errno.EFBIG:
+            raise InputError(
+                f"{source}: a log of this size needs temporary files larger than the system allows here (ulimit -f); "
+                "raise the limit, or split the log."
+            ) from error
         raise InputError(
             f"{source}: a log of this size needs temporary files in {place}, which is full; make room there, or name "
             "another directory with TMPDIR."

@@ -251,15 +251,13 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
     quantities: dict[str, FloatArray] = {}
     decided = dict(found)
     notes: list[str] = []
-    undecided = False
     clock = Clock(np.empty(0), "", "")
-    place = 0
+    place, undecided = 0, False
     for quantity, column in found.items():
         mine = columns[place : place + len(column.positions)]
         place += len(mine)
-        article = "an" if quantity in ("azimuth", "elevation") else "a"
         timestamp = " or an ISO-8601 timestamp" if quantity == "time" else ""
-        expected = f"{article} {quantity} in {column.unit.name}{timestamp}"
+        expected = f"{'an' if quantity[0] in 'ae' else 'a'} {quantity} in {column.unit.name}{timestamp}"
         origin = Origin(header.source, column.name, expected, header.decimal_comma)
         if quantity == "time":
             if len(mine) > 1:

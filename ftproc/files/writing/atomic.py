@@ -6,13 +6,16 @@ import contextlib
 import errno
 import os
 import secrets
+import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from ftproc.errors import OutputError
+from ftproc.errors import OutputError, stdout_fault
 from ftproc.files import remote
 from ftproc.files.layout import Target
+
+_LONGEST_NAME = 200  # bytes of the target's name in that of its temporary file
 
 
 def refuse_overwriting(target: Target, inputs: Iterable[Target], option: str = "-o") -> None:
@@ -33,11 +36,14 @@ def check_target(target: Target) -> None:
     path = remote.local(target)
     if path is None or str(target) == "-":
         return
-    if path.is_dir():
-        raise _output_error(path, IsADirectoryError(errno.EISDIR, ""))
-    directory = path.absolute().parent
-    if not directory.is_dir():
-        raise _output_error(path, OSError(errno.ENOTDIR if directory.exists() else errno.ENOENT, ""))
+    try:
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, "")
+        directory = _resolved(path).parent
+        if not directory.is_dir():
+            raise OSError(errno.ENOTDIR if directory.exists() else errno.ENOENT, "")
+    except OSError as error:
+        raise _output_error(path, error) from error
 
 
 @contextlib.contextmanager
@@ -66,6 +72,21 @@ def replacing(target: Target) -> Iterator[BinaryIO]:
         raise _output_error(near, error) from error
 
 
+@contextlib.contextmanager
+def standard_output() -> Iterator[BinaryIO]:
+    """Standard output for a result. Raises OutputError when it is full or closed, BrokenPipeError when its reader has
+    left, which the caller handles."""
+    try:
+        if sys.stdout is None:
+            raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+        yield sys.stdout.buffer
+        sys.stdout.buffer.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise OutputError(stdout_fault(error)) from error
+
+
 def sync(stream: BinaryIO) -> None:
     """Flush `stream` to the disk (a full disk shows here at the latest)."""
     stream.flush()
@@ -73,7 +94,8 @@ def sync(stream: BinaryIO) -> None:
 
 
 def _beside(path: Path) -> Iterator[BinaryIO]:
-    temporary = path.with_name(f".{path.name[:200]}.{secrets.token_hex(4)}.tmp")
+    name = os.fsdecode(os.fsencode(path.name)[:_LONGEST_NAME])
+    temporary = path.with_name(f".{name}.{secrets.token_hex(4)}.tmp")
     # O_EXCL: never through an existing link. 0o666: the user's umask decides, as for any new file.
     descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     try:
@@ -127,6 +149,9 @@ def _same_file(one: Path, other: Path) -> bool:
 
 def _output_error(path: Path, error: OSError) -> OutputError:
     directory = path.parent
+    with contextlib.suppress(OSError):
+        if path.is_symlink():
+            directory = _resolved(path).parent
     reasons = {
         errno.ENOENT: f"there is no directory {directory}; create it first (mkdir -p {directory}).",
         errno.ENOTDIR: f"{directory} is not a directory; choose another place.",
@@ -137,6 +162,7 @@ def _output_error(path: Path, error: OSError) -> OutputError:
         errno.ENOSPC: "the disk is full; nothing was written. Make room or choose another place.",
         errno.EDQUOT: "the disk quota is used up; nothing was written. Make room or choose another place.",
         errno.ELOOP: "this is a symbolic link to itself; delete it, or give another name.",
+        errno.ENAMETOOLONG: "the name is too long for the file system; give a shorter one.",
         errno.EFBIG: "the file is larger than the system allows; nothing was written. Choose another place.",
     }
     reason = reasons.get(error.errno or 0, f"cannot be written ({error.strerror or error}).")

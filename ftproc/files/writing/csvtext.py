@@ -14,7 +14,7 @@ from ftproc.files import arrow
 if TYPE_CHECKING:
     import pyarrow as pa
 
-_ROWS_AT_ONCE = 65536  # of text held in memory
+_CELLS_AT_ONCE = 1 << 21  # of text held in memory
 _NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
 _FORMULA = r"^[=+\-@\t\r]"
 
@@ -28,9 +28,10 @@ def pieces(table: pa.Table, with_header: bool = True) -> Iterator[bytes]:
         header = io.StringIO()
         csv.writer(header, lineterminator="\n").writerow(map(no_formula, table.column_names))
         yield header.getvalue().encode()
-    options = pyarrow.csv.WriteOptions(include_header=False, batch_size=_ROWS_AT_ONCE)
-    for start in range(0, table.num_rows, _ROWS_AT_ONCE):
-        rows = table.slice(start, _ROWS_AT_ONCE)
+    at_once = max(_CELLS_AT_ONCE // max(table.num_columns, 1), 1)
+    options = pyarrow.csv.WriteOptions(include_header=False, batch_size=at_once)
+    for start in range(0, table.num_rows, at_once):
+        rows = table.slice(start, at_once)
         sink = pa.BufferOutputStream()
         try:
             cleaned = pa.Table.from_arrays([_for_csv(column) for column in rows.columns], table.column_names)

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from ftproc.errors import InputError, UsageError
+from ftproc.errors import InputError, UsageError, encodable
 from ftproc.files import layout
 from ftproc.files.layout import Target
 from ftproc.records import FloatArray, Trajectory
@@ -73,7 +73,7 @@ def _track(trajectory: Trajectory, kind: str) -> Track:
         raise InputError(f"{trajectory.name}: no position could be estimated, so there is nothing to draw on a map.")
     how = "smoothed" if settings.get("smooth") else "filtered"
     return Track(
-        _NOT_XML.sub("?", Path(trajectory.name).name),
+        _NOT_XML.sub("?", encodable(Path(trajectory.name).name)),
         f"{how} by {metadata['method']}, ftproc {metadata['version']}",
         trajectory.time_s[estimated], place[estimated], _pieces(place, estimated), (site[1], site[0], site[2]),
         settings.get("geoid_m"), str(metadata.get("epoch", "")),

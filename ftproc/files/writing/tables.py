@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import gzip
-import sys
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, cast
 
@@ -36,9 +35,8 @@ def write_table(table: pa.Table, target: Target) -> None:
     """
     kind = kind_of(target)
     if str(target) == "-":
-        for piece in csvtext.pieces(table):
-            sys.stdout.buffer.write(piece)
-        sys.stdout.buffer.flush()
+        with atomic.standard_output() as stream:
+            stream.writelines(csvtext.pieces(table))
         return
     with atomic.replacing(target) as stream:
         write_stream(table, stream, kind)

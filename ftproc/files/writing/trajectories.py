@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
+from ftproc.errors import encodable
 from ftproc.files import arrow, layout
 from ftproc.files.layout import METADATA_KEY, Target, sidecar
 from ftproc.files.writing import atomic, maps, tables
@@ -103,17 +104,17 @@ def _write_sidecar(beside: Target, stream: BinaryIO, metadata: Mapping[str, Any]
 
 
 def _to_json(metadata: Mapping[str, Any], indent: int | None) -> bytes:
-    return json.dumps(_plain(metadata), indent=indent, ensure_ascii=False, allow_nan=False).encode()
+    return json.dumps(plain(metadata), indent=indent, ensure_ascii=False, allow_nan=False).encode()
 
 
-def _plain(value: Any) -> Any:
-    """numpy values, tuples and paths -> JSON types; NaN and infinity, which JSON lacks, -> null."""
+def plain(value: Any) -> Any:
+    """numpy values, tuples, paths and names -> JSON types; NaN and infinity, which JSON lacks, -> null."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {encodable(str(key)): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, float) and not np.isfinite(value):
         return None
-    return str(value) if isinstance(value, Path) else value
+    return encodable(str(value)) if isinstance(value, Path | str) else value

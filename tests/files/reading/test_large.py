@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import tempfile
 from dataclasses import fields
 
@@ -221,10 +222,68 @@ def test_decimal_commas_are_read_in_blocks(tmp_path, in_blocks, monkeypatch):
 def test_rows_that_a_parquet_file_claims_but_lacks_are_missed(tmp_path, in_blocks, monkeypatch):
     path = tmp_path / "log.parquet"
     pq.write_table(pa.table(columns()), path)
-    whole, batches = pq.read_table, pq.ParquetFile.iter_batches
-    monkeypatch.setattr(pq, "read_table", lambda *args, **how: whole(*args, **how).slice(0, 2900))
+    whole, batches = pq.ParquetFile.read, pq.ParquetFile.iter_batches
+    monkeypatch.setattr(pq.ParquetFile, "read", lambda *args, **how: whole(*args, **how).slice(0, 2900))
     with pytest.raises(InputError, match="2900 rows where it says 3000"):
         logs.read(path, keep_columns=True, columns={"elevation": "none"})  # as a whole, for the column that is kept
     monkeypatch.setattr(pq.ParquetFile, "iter_batches", lambda *args, **how: list(batches(*args, **how))[:-1])
     with pytest.raises(InputError, match="2900 rows where it says 3000"):
         logs.read(path)  # in blocks, and then as a whole
+
+
+def changed(path, how):
+    """What another program does to a log that is being read."""
+    content_before = path.read_bytes()
+    if how == "shorter":
+        os.truncate(path, len(content_before) // 2)
+    elif how == "cut in a row":
+        os.truncate(path, len(content_before) // 2 + 7)
+    elif how == "empty":
+        os.truncate(path, 0)
+    elif how == "rewritten":
+        path.write_bytes(content_before.replace(b"9", b"8"))
+        os.utime(path, (0, 0))
+    elif how == "replaced":
+        other = path.with_name("other")
+        other.write_bytes(content_before)
+        other.replace(path)
+    else:
+        path.write_bytes(content_before + content_before.splitlines(keepends=True)[-1])
+
+
+@pytest.mark.parametrize("how", ["shorter", "cut in a row", "empty", "rewritten"])
+@pytest.mark.parametrize("large_file", [True, False])
+def test_a_log_that_changes_while_it_is_read_is_refused(tmp_path, monkeypatch, request, how, large_file):
+    path = tmp_path / "log.csv"
+    path.write_text(text(columns()))
+    if large_file:
+        request.getfixturevalue("in_blocks")
+        add = large._Spool.add
+        monkeypatch.setattr(large._Spool, "add", lambda *block: (add(*block), changed(path, how)))
+    else:
+        stat = os.fstat
+        looked = []
+
+        def fstat(descriptor):
+            found = stat(descriptor)
+            looked.append(descriptor)
+            if len(looked) == 3:  # the header's two looks are over; the file is open and about to be read
+                changed(path, how)
+            return found
+
+        monkeypatch.setattr(content.os, "fstat", fstat)
+    with pytest.raises(InputError, match=r"log\.csv: the file (changed while it was read; wait|is empty)"):
+        logs.read(path)
+
+
+@pytest.mark.parametrize(("how", "rows"), [("replaced", None), ("longer", ROWS)])
+def test_a_log_that_is_replaced_or_grows(tmp_path, monkeypatch, in_blocks, how, rows):
+    path = tmp_path / "log.csv"
+    path.write_text(text(columns()))
+    blocks = csvtext.in_blocks
+    monkeypatch.setattr(csvtext, "in_blocks", lambda *given: (changed(path, how), *blocks(*given))[1:])
+    if rows is None:
+        with pytest.raises(InputError, match=r"log\.csv: the file changed while it was read"):
+            logs.read(path)
+    else:
+        assert len(logs.read(path)) >= rows

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,11 +35,18 @@ class _Parquet:
 
         self.name, self.path = name, path
         try:
-            footer = pq.read_metadata(path)
+            with self._opened() as file:
+                footer = pq.read_metadata(file)
             self.rows, self.schema = footer.num_rows, footer.schema.to_arrow_schema()
             self.names: list[str] = list(self.schema.names)
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             raise self._damaged(error) from error
+
+    def _opened(self) -> pa.OSFile:
+        """The file, whose name need not be UTF-8."""
+        import pyarrow as pa
+
+        return pa.OSFile(os.fsencode(self.path))
 
     def load(self, numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
         import pyarrow as pa
@@ -47,7 +55,9 @@ class _Parquet:
         chosen = [self.names[position] for position in (*numeric, *others)]
         self._refuse_bomb(len(numeric))
         try:
-            table = pq.read_table(self.path, columns=chosen, partitioning=None, page_checksum_verification=True)
+            # Without threads: where there is no memory for them, pyarrow would wait for ever.
+            with self._opened() as file:
+                table = pq.ParquetFile(file, page_checksum_verification=True).read(chosen, use_threads=False)
             table.validate(full=True)  # finds text that is not UTF-8, on which later steps would fail
             self._refuse_loss(table.num_rows)
             return table.select(chosen)
@@ -67,8 +77,9 @@ class _Parquet:
 
         rows = 0
         try:
-            with pq.ParquetFile(self.path, page_checksum_verification=True) as file:
-                for batch in file.iter_batches(_BATCH_ROWS, columns=chosen):
+            with self._opened() as file:
+                parquet = pq.ParquetFile(file, page_checksum_verification=True)
+                for batch in parquet.iter_batches(_BATCH_ROWS, columns=chosen):
                     batch.validate(full=True)
                     rows += len(batch)
                     yield pa.Table.from_batches([batch]).select(chosen)

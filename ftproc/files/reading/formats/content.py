@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import itertools
+import os
 import stat
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 from ftproc.errors import InputError, nearest
 
@@ -21,12 +26,13 @@ _ALIKE = 0.75
 MAX_STDIN = 4 << 30  # bytes
 
 
-def read(name: str, path: Path, limit: int = -1) -> bytes:
-    """The first `limit` bytes of a file, by default all. Raises InputError, also for an empty file."""
+def read(name: str, path: Path, limit: int = -1, known: os.stat_result | None = None) -> bytes:
+    """The first `limit` bytes of a file, by default all. Raises InputError, also for an empty file, and Changed as
+    `unchanged`."""
     try:
         if not is_ordinary(path):
             raise InputError(f"{name}: not an ordinary file (a pipe or a device); give it as - on standard input.")
-        with path.open("rb") as stream:
+        with path.open("rb") as stream, unchanged(name, stream, known):
             data = stream.read(limit)
     except FileNotFoundError as error:
         raise InputError(f"{name}: there is no such file{_near(path)}") from error
@@ -52,6 +58,25 @@ def _near(path: Path) -> str:
     return nearest(path.name, beside, _ALIKE) or "."
 
 
+class Changed(InputError):
+    """A file was written to while it was read: what was read may be neither its old nor its new content."""
+
+
+@contextlib.contextmanager
+def unchanged(name: str, stream: BinaryIO, known: os.stat_result | None = None) -> Iterator[None]:
+    """Raises Changed, after the block, when the file became shorter inside or was written anew; a log may grow.
+
+    known: the file as it was before the stream was opened.
+    """
+    before = known or os.fstat(stream.fileno())
+    yield
+    after = os.fstat(stream.fileno())
+    replaced = (after.st_dev, after.st_ino) != (before.st_dev, before.st_ino)
+    rewritten = after.st_size == before.st_size and after.st_mtime_ns != before.st_mtime_ns
+    if replaced or rewritten or after.st_size < before.st_size:
+        raise Changed(f"{name}: the file changed while it was read; wait until it is complete, and run again.")
+
+
 def is_ordinary(path: Path) -> bool:
     """Whether reading comes to an end without waiting. True for a directory too: `open` has the message for it."""
     mode = path.stat().st_mode
@@ -59,8 +84,14 @@ def is_ordinary(path: Path) -> bool:
 
 
 def stdin() -> bytes:
-    """All of standard input, which may never end. Raises InputError beyond a limit."""
-    data = sys.stdin.buffer.read(MAX_STDIN + 1)
+    """All of standard input, which may never end. Raises InputError beyond a limit, and when it cannot be read."""
+    try:
+        if sys.stdin is None:
+            raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+        data = sys.stdin.buffer.read(MAX_STDIN + 1)
+    except OSError as error:
+        reason = "is closed" if error.errno == errno.EBADF else f"cannot be read ({error.strerror or error})"
+        raise InputError(f"<stdin>: standard input {reason}; pipe a CSV log into it, or name a file.") from error
     if len(data) > MAX_STDIN:
         raise InputError(f"<stdin>: more than {MAX_STDIN >> 20} MiB without an end; give a Parquet file, or split it.")
     return data

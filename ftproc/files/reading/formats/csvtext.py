@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -31,6 +32,7 @@ _HEAD = 1 << 20  # bytes of a large file that contain its header line
 _PLAIN_ROWS = 20  # under the names, that are looked at before a file counts as plain
 _BLOCK = 8 << 20  # bytes of a large file that are parsed at once
 _SEPARATOR_NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks", "": "fixed widths"}
+_PARSED, _PARSED_OF_A_COLUMN = 1 << 20, 256  # bytes that pyarrow parses at once, the more the more columns there are
 
 
 def text_file(name: str, path: Path, widths: Sequence[int] = ()) -> TableHeader:
@@ -49,17 +51,17 @@ def text_bytes(name: str, data: bytes, widths: Sequence[int] = ()) -> TableHeade
 
 
 def _large_file(name: str, path: Path) -> TableHeader:
+    before = path.stat()
     head = split(name, content.read(name, path, limit=_HEAD), cut=True)
 
     def load(numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
-        return split(name, content.read(name, path)).load(numeric, others)
+        return split(name, content.read(name, path, known=before)).load(numeric, others)
 
     def blocks(numeric: Sequence[int]) -> Blocks | None:
         if head.encoding.startswith("UTF"):
             return None
-        size = path.stat().st_size
-        rows = max(bytes(head.body).count(b"\n"), 1) * size // _HEAD
-        return Blocks((text.load(numeric, ()) for text in in_blocks(path, head)), rows)
+        rows = max(bytes(head.body).count(b"\n"), 1) * before.st_size // _HEAD
+        return Blocks((text.load(numeric, ()) for text in in_blocks(path, head, before)), rows)
 
     return TableHeader(name, head.names, load, head.delimiter != ",", blocks=blocks, units=head.units, form=head.form)
 
@@ -117,7 +119,9 @@ class CsvText(NamedTuple):
         body, delimiter = self._delimited()
         table = pyarrow.csv.read_csv(
             pa.BufferReader(pa.py_buffer(body)),
-            read_options=pyarrow.csv.ReadOptions(column_names=keys),
+            read_options=pyarrow.csv.ReadOptions(
+                column_names=keys, block_size=max(_PARSED, _PARSED_OF_A_COLUMN * len(keys))
+            ),
             parse_options=pyarrow.csv.ParseOptions(delimiter=delimiter),
             convert_options=pyarrow.csv.ConvertOptions(
                 include_columns=[keys[position] for position in chosen],
@@ -203,12 +207,9 @@ def split(source: str, data: bytes, widths: Sequence[int] = (), cut: bool = Fals
     return found._replace(body=body, odd_quotes=odd, body_offset=offset, encoding=text.was, form=form)
 
 
-_LINE = re.compile(rb"[\r\n]*([^\r\n]*)(?:\r\n|\r|\n)?")
-
-
 def _plain(data: bytes) -> tuple[list[str], str, int] | None:
     """Names, separator and start of the rows of a file whose first line holds the names; None if that is not plain."""
-    found = _LINE.match(data)
+    found = layout.LINE.match(data)
     if found is None:
         return None
     line = found[1].decode("utf-8", "replace")
@@ -218,7 +219,7 @@ def _plain(data: bytes) -> tuple[list[str], str, int] | None:
         return None
     place = found.end()
     for _ in range(_PLAIN_ROWS):
-        row = _LINE.match(data, place)
+        row = layout.LINE.match(data, place)
         if row is None or not row[1].strip():
             break
         cells = layout.split(row[1].decode("utf-8", "replace"), delimiter)
@@ -234,7 +235,7 @@ def _searched(source: str, data: bytes, widths: Sequence[int]) -> tuple[CsvText,
     texts = [line.decode("utf-8", "replace") for line in lines[::2]]
     found = layout.find(texts, widths)
     if found is None:
-        names, delimiter, start = _first_line(source, data)
+        names, delimiter, start = layout.first_line(source, data)
         return CsvText(source, names, delimiter, memoryview(b""), False), start
     start = sum(map(len, lines[: 2 * found.first]))
     names = [name.strip() for name in found.names]
@@ -245,33 +246,13 @@ def _searched(source: str, data: bytes, widths: Sequence[int]) -> tuple[CsvText,
     return text._replace(form=", ".join(parts)), start
 
 
-def _first_line(source: str, data: bytes) -> tuple[list[str], str, int]:
-    """Names and separator of a file in which no line looks like a row: of its first line."""
-    found = _LINE.match(data)
-    assert found is not None
-    line = found[1].decode("utf-8", "replace")
-    delimiter = max(",;\t", key=line.count)  # the comma if there is none
-    try:
-        names = [name.strip() for name in next(csv.reader([line], delimiter=delimiter))]
-    except (csv.Error, StopIteration) as error:
-        raise InputError(
-            f"{source}: the header line cannot be read as CSV ({error}); correct it, or delete the lines before it."
-        ) from error
-    if len(names) == 1 and re.search(r"\S[ |]+\S", names[0]):
-        raise InputError(
-            f'{source}: the header line "{line[:80]}" has no separator, and no line looks like a row of a log; '
-            "separate the cells with commas, semicolons or tabs."
-        )
-    return names, delimiter, found.end()
+def in_blocks(path: Path, head: CsvText, before: os.stat_result) -> Iterator[CsvText]:
+    """The rows of a file in blocks of whole lines; `head` comes from `split` of its beginning, when it was as `before`.
 
-
-def in_blocks(path: Path, head: CsvText) -> Iterator[CsvText]:
-    """The rows of a file in blocks of whole lines; `head` comes from `split` of its beginning.
-
-    Raises InputError where a row may span lines, or where only the whole file can tell what a
-    point means.
+    Raises Changed when it is not so any more; InputError where a row may span lines, or only the whole file can tell
+    what a point means.
     """
-    with path.open("rb") as stream:
+    with path.open("rb") as stream, content.unchanged(head.source, stream, before):
         stream.seek(head.body_offset)
         rest, marks = b"", set()
         while data := stream.read(_BLOCK):

@@ -12,6 +12,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from ftproc.errors import InputError
 from ftproc.files.units import QUANTITIES, unit_named
 
 #: How comment lines begin. A semicolon does so too, where it is not the separator.
@@ -21,6 +22,7 @@ _SEPARATORS = ("\t", ";", "|", ",", BLANKS)  # the first of those that fit as we
 _MOST_LINES = 2000
 _ENOUGH = 0.9  # of the longest table, for a separator earlier in the list
 
+LINE = re.compile(rb"[\r\n]*([^\r\n]*)(?:\r\n|\r|\n)?")
 _CELL = re.compile(r'"?\s*[+-]?[.,]?\d\S*\s*"?')
 #: Cells with blanks inside: a date and a time of day, degrees, minutes and seconds, a date by name, a number and unit.
 _WITH_BLANKS = re.compile(
@@ -213,3 +215,23 @@ def _aligned(line: str, block: Sequence[str], width: int) -> list[str]:
         cells[min(range(width), key=lambda k: abs(middles[k] - centre))].append(word[0])
     found = [" ".join(words) for words in cells]
     return found if all(found) else []
+
+
+def first_line(source: str, data: bytes) -> tuple[list[str], str, int]:
+    """Names and separator of a file in which no line looks like a row: of its first line."""
+    found = LINE.match(data)
+    assert found is not None
+    line = found[1].decode("utf-8", "replace")
+    delimiter = max(",;\t", key=line.count)  # the comma if there is none
+    try:
+        names = [name.strip() for name in next(csv.reader([line], delimiter=delimiter))]
+    except (csv.Error, StopIteration) as error:
+        raise InputError(
+            f"{source}: the header line cannot be read as CSV ({error}); correct it, or delete the lines before it."
+        ) from error
+    if len(names) == 1 and re.search(r"\S[ |]+\S", names[0]):
+        raise InputError(
+            f'{source}: the header line "{line[:80]}" has no separator, and no line looks like a row of a log; '
+            "separate the cells with commas, semicolons or tabs."
+        )
+    return names, delimiter, found.end()
