@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 PACKAGED, NO_MODEL = "packaged", "none"  # values of `model` that are not files
+EPOCHS = {"l-bfgs": 400, "momentum": 1000}  # most that an optimiser of `train` is given, where the user says nothing
 
 Noise = tuple[float | None, float | None, float | None]
 

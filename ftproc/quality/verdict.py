@@ -40,7 +40,8 @@ def remarks(s: Mapping[str, Any]) -> list[Remark]:
         found.append(Remark(CONSISTENT, text))
     if s["correction_largest_m"] > 0:
         outside = f"none for the {100 * s['correction_outside_training']:.1f} % of samples outside its training data"
-        found.append(Remark(CONSISTENT, f"network correction up to {s['correction_largest_m']:.3g} m; {outside}"))
+        kind = "linear" if s.get("correction_linear") else "network"
+        found.append(Remark(CONSISTENT, f"{kind} correction up to {s['correction_largest_m']:.3g} m; {outside}"))
     return found
 
 
