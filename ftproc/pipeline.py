@@ -41,6 +41,7 @@ class Filtering:
         self.log, self.settings, self.model = log, settings, model
         self.method = registry.named(settings.method)
         sanity.check_settings(settings)
+        registry.check_parameters(settings)
         why = registry.obstacle(self.method, settings.smooth, None if model is None else model.made_for)
         if why is not None:
             raise UsageError(why)

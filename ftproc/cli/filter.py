@@ -71,8 +71,14 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     help="Form of the printed summary of each trajectory; on stderr when the trajectory goes to stdout.",
 )
 @options.report("a trajectory, its readings and residuals, and the verdict")
-@click.option("--list-methods", is_flag=True, help="List the methods, and filter nothing.")
-def command(list_methods: bool, write_config: bool, **options: Any) -> None:
+@click.option(
+    "--list-methods",
+    is_flag=False,
+    flag_value="all",
+    metavar="[NAME]",
+    help="List the methods, or the parameters of one, and filter nothing.",
+)
+def command(list_methods: str | None, write_config: bool, **options: Any) -> None:
     """Find the outliers of LOGs, and estimate the target's trajectory with its uncertainty.
 
     A LOG is a .csv, .csv.gz, .parquet or .feather file (or a URI of one) with time, range, azimuth and elevation, or -
@@ -80,10 +86,10 @@ def command(list_methods: bool, write_config: bool, **options: Any) -> None:
     the others; the exit code is then 1.
     """
     ctx = click.get_current_context()
-    if list_methods:
+    if list_methods is not None:
         from ftproc.methods import registry
 
-        click.echo(registry.list_methods())
+        click.echo(registry.list_methods() if list_methods == "all" else registry.describe(list_methods))
     elif write_config:
         from ftproc.cli import filtering
 

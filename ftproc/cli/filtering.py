@@ -20,11 +20,10 @@ from ftproc.files import conventions
 from ftproc.files.options import parse_columns, parse_units
 from ftproc.files.writing import geodesy, maps
 from ftproc.methods import registry
+from ftproc.methods.registry import EVERY
 from ftproc.quality.summary import line
 from ftproc.report.style import require_plotly
 from ftproc.settings import NO_MODEL, PACKAGED
-
-ALL = "all"  # --method all
 
 
 class Request(NamedTuple):
@@ -47,7 +46,7 @@ def recipe(ctx: click.Context) -> Recipe:
 def station_file(ctx: click.Context) -> str:
     """The same as the text of a station file. Raises UsageError."""
     options = _options(ctx)
-    if options.get("method") == ALL:
+    if options.get("method") == EVERY:
         raise UsageError("--method all cannot be kept in a station file; name one method.")
     return writing.dump(options)
 
@@ -61,7 +60,9 @@ def _options(ctx: click.Context) -> dict[str, Any]:
     for name, parse in (("units", parse_units), ("columns", parse_columns)):  # quantities not named here: the file's
         if name in options:
             options[name] = {**kept.get(name, {}), **parse(stated.get(name))}
-    if options.get("method", ALL) != ALL:
+    if kept.get("set") and stated.get("set"):
+        options["set"] = f"{kept['set']},{stated['set']}"  # the last one of a name counts
+    if options.get("method", EVERY) != EVERY:
         registry.named(options["method"])
     return options
 
@@ -72,7 +73,8 @@ def filter_logs(request: Request, recipe: Recipe, debug: bool) -> int:
         raise UsageError("--jobs is for processes on this machine, --scheduler for a cluster; give one of the two.")
     if request.report is not None:
         require_plotly()
-    methods = _applicable(recipe) if recipe.settings.method == ALL else None
+    registry.check_parameters(recipe.settings)
+    methods = _applicable(recipe) if recipe.settings.method == EVERY else None
     named = (name for name in (recipe.model, request.config) if isinstance(name, str))
     inputs = [name for name in named if name not in (PACKAGED, NO_MODEL)]
     tasks = plan.tasks(request.logs, request.output, methods, inputs)

@@ -113,6 +113,7 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
         "gate": Key("gate", positive(), FilterSettings.gate, "in sigmas of the residual", default=FilterSettings.gate),
         "max_patch_s": Key("max_patch", positive(), 5.0, _PATCH),
         "weight_form": Key("weight_form", words("noise", "gain"), "noise", "in forward editing", default="noise"),
+        "set": Key("set", text, "window=6,m=0.01", "parameters of the method, see --list-methods NAME"),
         "particles": Key("particles", whole(20), 100, "of the ensemble and particle filters", default=100),
         "seed": Key("seed", whole(0), 0, "of their random numbers", default=0),
         "ecef": Key("ecef", flag, False, "add earth-centred coordinates", default=False),

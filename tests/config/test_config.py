@@ -53,6 +53,7 @@ editing = "forward"
 jerk_psd_m2ps5 = 5
 gate = 3.5
 max_patch_s = 9
+set = "window=6,m=0.01"
 weight_form = "gain"
 ecef = true
 particles = 150
@@ -69,7 +70,7 @@ def test_every_key_is_understood():
     found = config.Recipe.of(config.parse(FULL, "s.toml"))
     assert found.settings == FilterSettings(
         "ukf", "forward", True, (3.048, None, pytest.approx(20 * math.pi / 648000)), 5.0, 3.5, 9.0, 150, 7, True,
-        (48.0, 11.5, 612.0), True, 46.2,
+        (48.0, 11.5, 612.0), True, 46.2, (("window", 6.0), ("m", 0.01)),
     )  # fmt: skip
     assert found.station == Station(
         "north", "anticlockwise", pytest.approx(math.pi / 2), "zenith",
@@ -128,6 +129,7 @@ OPTIONS = st.fixed_dictionaries(
         "max_patch": numbers,
         "weight_form": st.just("gain"),
         "ecef": st.just(True),
+        "set": names,
         "particles": st.integers(101, 10_000),
         "seed": st.integers(1, 2**31),
         "keep_columns": st.just(True),
