@@ -157,6 +157,16 @@ def test_improved_filter_survives_six_outliers_in_a_row(run):
     np.testing.assert_array_equal(np.flatnonzero(weight[:, 0] == 0), np.arange(15, 15 + run))
 
 
+@pytest.mark.parametrize("order", [0, 1])
+def test_the_second_of_three_components_is_an_azimuth(order):
+    """It crosses the cut; a component that did so without being an angle would jump by a full turn."""
+    turning = 3.0 + 0.02 * TIME
+    z = np.stack([100 + TIME, (turning + np.pi) % (2 * np.pi) - np.pi, 0.01 * TIME], 1)
+    value, *_, weight = kalman(z, z[0], own_only=True, gate=30.0, order=order, window=3)
+    assert weight[:, 1].all()
+    np.testing.assert_allclose(value[3:, 1], turning[3:], atol=0.05)
+
+
 def test_missing_reading_leaves_the_value_and_widens_it():
     z = np.array([[0.0, 0.0], [np.nan, 0.1], [0.0, np.nan]])
     value, variance, innovation, _, weight = kalman(z, (0, 0))
