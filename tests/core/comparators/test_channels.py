@@ -371,3 +371,26 @@ def test_good_readings_after_a_long_patch_do_not_bend_the_polynomial():
     z[30:37] += 400
     *_, weight, _ = walk(z, threshold=12.0, order=1, window=6)
     np.testing.assert_array_equal(np.flatnonzero(weight == 0), np.arange(30, 37))
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_the_unit_of_time_does_not_matter(order):
+    """Thresholds and variances are those of one interval, whatever it lasts."""
+    z = 3 * RNG.standard_normal(60) + 100
+    z[20:24] += 40
+    z[[30, 31]] = np.nan
+    time = np.cumsum(RNG.uniform(0.6, 1.4, 60))
+    found = []
+    for unit in (1.0, 0.05):
+        how = channels.Predictor(order, order + 3, 12.0, 16, unit, False)
+        whole = np.full(2, order), np.full(2, order + 3)
+        model = walks.Walk(np.zeros(2, np.int64), z[[0, 0]], *np.full((3, 2), 9.0), *whole, 16, unit)
+        both = np.stack([z, z], 1)
+        found.append([
+            *walks.repaired_walk(unit * time, z, walks.Repair(walks.WALK, 9.0, 9.0, 0.9, 0.3), how),
+            *walks.outlier_kalman(unit * time, both, model, 4.0, 0.002, True),
+            *channels.least_squares(unit * time, z, how),
+            channels.gate(unit * time, z, how, True),
+        ])  # fmt: skip
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-6)
