@@ -74,12 +74,12 @@ def test_logs_with_columns_and_units_of_their_own(run, here):
 def test_a_linear_model_says_so_on_its_card_and_in_the_summary(run, here):
     circle = PROJECT / "sample_data" / "calibration" / "circle.parquet"
     pair = ("--log", circle, "--truth", circle.with_name("circle.truth.parquet"))
-    made = run("train", *pair, "--features", "instrument", *SMALL, "-o", "m.safetensors")
+    made = run("train", *pair, "--features", "instrument", *SMALL, "-o", "linear.safetensors")
     assert made.code == 0, made.err
     assert made.out.count("feature set 'instrument', linear, 7 inputs to 3 outputs (held-out samples did not need") == 2
     assert "network" not in made.out
     for smooth in ("--smooth", "--no-smooth"):
-        used = run("filter", circle, "--model", "m.safetensors", smooth, "-o", "t.csv")
+        used = run("filter", circle, "--model", "linear.safetensors", smooth, "-o", "t.csv")
         assert "linear correction up to" in used.out
         assert "network correction" not in used.out
 

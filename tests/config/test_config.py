@@ -129,7 +129,7 @@ OPTIONS = st.fixed_dictionaries(
         "max_patch": numbers,
         "weight_form": st.just("gain"),
         "ecef": st.just(True),
-        "set": names,
+        "set": st.sampled_from(["window=6", "m = 0.01, F_range_m=3e2"]),
         "particles": st.integers(101, 10_000),
         "seed": st.integers(1, 2**31),
         "keep_columns": st.just(True),
@@ -180,6 +180,9 @@ def test_a_model_lies_beside_its_file(tmp_path, monkeypatch):
         ("[filter]\nsmooth = 1", "[filter] smooth = 1: expected true or false."),
         ("[filter]\ngate = true", "[filter] gate = true: expected a number above zero."),
         ("[filter]\ngate = 0", "[filter] gate = 0: expected a number above zero."),
+        ("[filter]\nset = 'window'", '[filter] set = "window": expected parameters of a method, such as '
+         '"window=6,m=0.01".'),
+        ("[filter]\nset = 3", "[filter] set = 3: expected a text in quotes."),
         ("[filter]\ngate = inf", "[filter] gate = inf: expected a number above zero."),
         ("[filter]\nmethod = 'ekff'", '[filter] method = "ekff": expected the name of a method, see --list-methods; '
          'did you mean "ekf".'),
