@@ -25,9 +25,13 @@ _AGREE = 0.8  # of the jumps fall on changes of the column that tells targets ap
 
 #: Words in the names of columns that number targets.
 WORDS = frozenset(
-    "track trk target tgt trn tid trackno trackid tracknum tracknumber targetid targetno object objectid obj id code "
-    "icao icao24 callsign squawk beacon ssr mode3a acid acaddr address aircraft tail reg flight vehicle ship mmsi".split()
-)
+    (
+        "track", "trk", "target", "tgt", "trn", "tid", "trackno", "trackid", "tracknum", "tracknumber",
+        "targetid", "targetno", "object", "objectid", "obj", "id", "code", "icao", "icao24", "callsign",
+        "squawk", "beacon", "ssr", "mode3a", "acid", "acaddr", "address", "aircraft", "tail", "reg", "flight",
+        "vehicle", "ship", "mmsi",
+    )
+)  # fmt: skip
 
 
 class Column(NamedTuple):
