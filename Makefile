@@ -110,7 +110,7 @@ kernels: $(developer) ## the tests of the kernels as numba compiles them now, an
 	FTPROC_KERNELS=python $(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal tests/core
 
 samples: $(installed) ## make sample_data/ anew (fixed seeds: the same bytes)
-	@mkdir -p sample_data
+	@mkdir -p sample_data/calibration
 	$(ftproc) simulate --scenario zuo2021-outliers --seed 2021 \
 	  -o sample_data/zuo2021-outliers.csv --truth sample_data/zuo2021-outliers.truth.csv
 	$(ftproc) simulate --scenario manoeuvre --seed 7 --duration 75 \
@@ -119,6 +119,9 @@ samples: $(installed) ## make sample_data/ anew (fixed seeds: the same bytes)
 	$(ftproc) simulate --scenario radar --seed 11 \
 	  --units range=km,azimuth=deg,elevation=deg --azimuth-from north \
 	  -o sample_data/radar.csv --truth sample_data/radar.truth.csv
+	$(ftproc) simulate --scenario calibration --seed 1 --duration 600 --dt 0.5 --instrument-errors \
+	  azimuth_zero_mrad=0.3,elevation_zero_mrad=-0.2,mislevel_mrad=0.6,mislevel_azimuth_rad=0.7,collimation_mrad=0.4,refraction=2.8e-4 \
+	  -o sample_data/calibration/circle.parquet --truth sample_data/calibration/circle.truth.parquet
 	$(ftproc) simulate --scenario zuo2021-outliers --seed 5 --noise 0.02,0.00003,0.00003 --azimuth-from north \
 	  --units azimuth=gon,elevation=gon -o - --truth sample_data/total_station.truth.csv | awk -F, 'BEGIN { OFS = "," } \
 	  NR == 1 { print "t", "SD", "Hz", "V"; next } \

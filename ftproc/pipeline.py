@@ -41,6 +41,7 @@ class Filtering:
         self.log, self.settings, self.model = log, settings, model
         self.method = registry.named(settings.method)
         sanity.check_settings(settings)
+        registry.check_parameters(settings)
         why = registry.obstacle(self.method, settings.smooth, None if model is None else model.made_for)
         if why is not None:
             raise UsageError(why)
@@ -63,13 +64,10 @@ class Filtering:
     def metadata(self) -> dict[str, Any]:
         """Settings, noise, model and summary: everything needed to reproduce the trajectory, and to judge it."""
         summary = self.statistics.summary()
-        summary["correction_lost_by_smoothing"] = bool(
-            self.model
-            and self.method.corrected
-            and self.settings.smooth
-            and self.model.filter.helps
-            and self.model.smoother is None
-        )
+        model = self.model if self.method.corrected else None
+        stage = None if model is None else model.smoother if self.settings.smooth else model.filter
+        summary["correction_linear"] = None if stage is None else stage.linear
+        summary["correction_lost_by_smoothing"] = model is not None and stage is None and model.filter.helps
         return provenance.describe(self.log, self.method, self.settings, self.statistics, self.model, summary)
 
     def _trajectory(self, part: Part) -> Trajectory:
@@ -92,7 +90,7 @@ class Filtering:
             name = self.method.name
             raise InputError(f"{self.log.name}: {name} diverged; give --noise and --jerk, or check the log's units")
         log = self.log.stretch(rows)
-        self.statistics.add(log.time_s, estimate, correction, outside)
+        self.statistics.add(log.time_s, estimate, cleaned, correction, outside)
         return Trajectory(
             log.name, log.row, log.time_s, cleaned, state, sigma, estimate.label, best.nis, correction,
             metadata={"frame": log.frame}, extra=log.extra, diagnostics=_diagnostics(log.measurement, estimate),

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 PACKAGED, NO_MODEL = "packaged", "none"  # values of `model` that are not files
+EPOCHS = {"l-bfgs": 400, "momentum": 1000}  # most that an optimiser of `train` is given, where the user says nothing
 
 Noise = tuple[float | None, float | None, float | None]
+Parameters = tuple[tuple[str, float], ...]
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,11 @@ class FilterSettings:
     site: tuple[float, float, float] | None = None  # latitude deg, longitude deg, height m above the ellipsoid
     ecef: bool = False  # with a site: earth-centred coordinates too
     geoid_m: float | None = None  # height of the geoid above the ellipsoid at the site
+    parameters: Parameters = ()  # of the method, by name; `ftproc filter --list-methods NAME` explains them
+
+    def parameter(self, name: str) -> float | None:
+        """The parameter of the method by its name; None when it is not set."""
+        return dict(self.parameters).get(name)
 
 
 @dataclass(frozen=True)

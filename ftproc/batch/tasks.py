@@ -75,7 +75,9 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
         log = logs.read(task.at(task.log), **recipe.reading(task.target))
         if task.place:
             log = replace(log, name=task.log)  # as the user named it
-        settings = replace(recipe.settings, method=task.method or recipe.settings.method)
+        settings = recipe.settings
+        if task.method is not None:
+            settings = registry.with_own_parameters(settings, task.method)
         if task.method is None:
             model = model_file.named(recipe.model)
         else:

@@ -89,8 +89,14 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
 @click.option(
     "--explain", is_flag=True, help="Print how each log is understood, with its first rows, and filter nothing."
 )
-@click.option("--list-methods", is_flag=True, help="List the methods, and filter nothing.")
-def command(list_methods: bool, write_config: bool, explain: bool, **options: Any) -> None:
+@click.option(
+    "--list-methods",
+    is_flag=False,
+    flag_value="all",
+    metavar="[NAME]",
+    help="List the methods, or the parameters of one, and filter nothing.",
+)
+def command(list_methods: str | None, write_config: bool, explain: bool, **options: Any) -> None:
     """Find the outliers of LOGs, and estimate the target's trajectory with its uncertainty.
 
     A LOG is a text file (.csv, .txt, .tsv, .dat), .parquet, .feather, .arrow, .xlsx, .jsonl, .h5 or .mat, even packed
@@ -99,10 +105,10 @@ def command(list_methods: bool, write_config: bool, explain: bool, **options: An
     from the log. A bad log does not stop the others; the exit code is then 1.
     """
     ctx = click.get_current_context()
-    if list_methods:
+    if list_methods is not None:
         from ftproc.methods import registry
 
-        click.echo(registry.list_methods())
+        click.echo(registry.list_methods() if list_methods == "all" else registry.describe(list_methods))
     elif write_config:
         from ftproc.cli import filtering
 

@@ -22,11 +22,11 @@ from ftproc.files.options import ABSENT, parse_columns, parse_units, parse_where
 from ftproc.files.writing import geodesy, maps
 from ftproc.files.writing.trajectories import plain
 from ftproc.methods import registry
+from ftproc.methods.registry import EVERY
 from ftproc.quality.summary import line
 from ftproc.report.style import require_plotly
 from ftproc.settings import NO_MODEL, PACKAGED
 
-ALL = "all"  # --method all
 _ASK_FOR_NOTHING = (("model", PACKAGED), ("model", NO_MODEL))
 
 
@@ -47,7 +47,7 @@ def recipe(ctx: click.Context) -> Recipe:
     line that have no effect."""
     found = Recipe.of(_options(ctx))
     method = found.settings.method
-    chosen = list(registry.METHODS.values()) if method == ALL else [registry.named(method)]
+    chosen = list(registry.METHODS.values()) if method == EVERY else [registry.named(method)]
     asked = [name for name, value in stated(ctx).items() if (name, value) not in _ASK_FOR_NOTHING]
     registry.refuse_idle([f"--{name.replace('_', '-')}" for name in asked], chosen, found.settings)
     return found
@@ -56,7 +56,7 @@ def recipe(ctx: click.Context) -> Recipe:
 def station_file(ctx: click.Context) -> str:
     """The same as the text of a station file. Raises UsageError."""
     options = _options(ctx)
-    if options.get("method") == ALL:
+    if options.get("method") == EVERY:
         raise UsageError("--method all cannot be kept in a station file; name one method.")
     return writing.dump(options)
 
@@ -69,9 +69,11 @@ def _options(ctx: click.Context) -> dict[str, Any]:
     for name, parse in (("units", parse_units), ("columns", parse_columns)):  # quantities not named here: the file's
         if name in options:
             options[name] = {**kept.get(name, {}), **parse(given.get(name))}
+    if kept.get("set") and given.get("set"):
+        options["set"] = f"{kept['set']},{given['set']}"  # the last one of a name counts
     parse_widths(options.get("widths"))
     parse_where(options.get("where"))
-    if options.get("method", ALL) != ALL:
+    if options.get("method", EVERY) != EVERY:
         registry.named(options["method"])
     return options
 
@@ -82,7 +84,8 @@ def filter_logs(request: Request, recipe: Recipe, debug: bool) -> int:
         raise UsageError("--jobs is for processes on this machine, --scheduler for a cluster; give one of the two.")
     if request.report is not None:
         require_plotly()
-    methods = _applicable(recipe) if recipe.settings.method == ALL else None
+    registry.check_parameters(recipe.settings)
+    methods = _applicable(recipe) if recipe.settings.method == EVERY else None
     named = (name for name in (recipe.model, request.config) if isinstance(name, str))
     inputs = [name for name in named if name not in (PACKAGED, NO_MODEL)]
     targets = _targets(request.logs, recipe)

@@ -167,6 +167,10 @@ def tuned(function: F) -> F:
     return _with(_TUNED, function)
 
 
+def _joined(ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...]) -> str | None:
+    return ",".join(texts) or None
+
+
 def _with(options: tuple[Callable[[Any], Any], ...], function: F) -> F:
     for option in reversed(options):
         function = option(function)
@@ -205,6 +209,11 @@ _TRACKER: tuple[Callable[[Any], Any], ...] = (
         "--max-patch", type=number, metavar="SECONDS",
         help="The longest patch of outliers expected, such as 5; in forward editing a longer one is track loss. "
         "[default: 4 s or 32 samples]",
+    ),
+    click.option(
+        "--set", multiple=True, callback=_joined, metavar="NAME=VALUE",
+        help="A parameter of the method, such as --set window=6, or several: --set F_range_m=60,window=6; "
+        "--list-methods NAME explains those of a method.",
     ),
     click.option(
         "--particles", type=click.IntRange(min=20), default=FilterSettings.particles, metavar="N",

@@ -19,12 +19,13 @@ ftproc simulate --scenario radar --units range=km,azimuth=deg,elevation=deg --az
 
 
 def _scenarios_and_grammar() -> str:
-    from ftproc.simulation import GRAMMAR, list_scenarios
+    from ftproc.simulation import GRAMMAR, INSTRUMENT_GRAMMAR, list_scenarios
 
     scenarios = list_scenarios()
     width = max(map(len, scenarios))
     names = "".join(f"  {name.ljust(width)}  {text}\n" for name, text in scenarios.items())
-    return f"Scenarios:\n{names}\nOutliers (--outliers):\n{GRAMMAR}"
+    instrument = f"Errors of the instrument (--instrument-errors):\n{INSTRUMENT_GRAMMAR}"
+    return f"Scenarios:\n{names}\nOutliers (--outliers):\n{GRAMMAR}\n{instrument}"
 
 
 @click.command(cls=Command, examples=_EXAMPLES, more=_scenarios_and_grammar)
@@ -48,6 +49,12 @@ def _scenarios_and_grammar() -> str:
 @click.option(
     "--outliers", metavar="SPEC", help="Outliers and gaps of the log, or none; see below. [default: scenario's]"
 )
+@click.option(
+    "--instrument-errors",
+    metavar="SPEC",
+    help="Errors of the instrument that repeat, such as mislevel_mrad=0.6,refraction=2.8e-4, or none; see below. "
+    "[default: scenario's]",
+)
 @options.units("Units to write, such as range=km,azimuth=deg; they show in the column names. [default: m, rad, s]")
 @options.azimuth_from(
     "north: azimuth in the survey convention, clockwise from north, from 0 to a full turn. The truth's x is then "
@@ -56,16 +63,18 @@ def _scenarios_and_grammar() -> str:
 @options.output("The log to write: .csv, .csv.gz, .parquet, .feather, or - for CSV on stdout.", "LOG", required=True)
 @click.option("--truth", type=options.FILE, metavar="TRUTH", help="The truth to write: states and outlier flags.")
 def command(
-    scenario: str, output: str, truth: str | None, units: str | None, azimuth_from: str, **changes: Any
-) -> None:
+    scenario: str, output: str, truth: str | None, units: str | None, azimuth_from: str,
+    instrument_errors: str | None, **changes: Any,
+) -> None:  # fmt: skip
     """Make a log as dirty as a real one, with its truth."""
     from ftproc.files.options import parse_units
     from ftproc.files.writing import flights
-    from ftproc.simulation import simulate
+    from ftproc.simulation import parse_instrument, simulate
 
     _check(output, truth)
     parse_units(units)  # errors are reported before any work
-    flight = simulate(scenario, **changes)
+    instrument = None if instrument_errors is None else parse_instrument(instrument_errors)
+    flight = simulate(scenario, instrument=instrument, **changes)
     if truth is not None:  # first, so that both are there when the log is
         flights.write_truth(flight.truth, truth)
     flights.write_log(flight.log, output, units, azimuth_from)

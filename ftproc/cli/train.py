@@ -9,7 +9,7 @@ import click
 
 from ftproc.cli import options
 from ftproc.cli.command import Command, refuse_with, stated
-from ftproc.settings import TrainSettings
+from ftproc.settings import EPOCHS, TrainSettings
 
 _EXAMPLES = """
 ftproc train --scenario radar --flights 4 --population 10 --generations 5 --epochs 30 -o radar.safetensors
@@ -55,11 +55,18 @@ def _number(name: str, least: int, default: int, text: str) -> Callable[[options
 @_number("hidden", 1, TrainSettings.hidden, "Hidden units of the network.")
 @_number("population", 2, TrainSettings.population, "Individuals in the genetic search for the first weights.")
 @_number("generations", 0, TrainSettings.generations, "Generations of the genetic search.")
-@_number(
-    "epochs",
-    0,
-    TrainSettings.epochs,
-    "Most epochs of back-propagation; it stops when held-out samples no longer improve.",
+@click.option(
+    "--optimiser",
+    type=click.Choice(list(EPOCHS)),
+    default=TrainSettings.optimiser,
+    help="Back-propagation by L-BFGS, or by gradient descent with momentum, as Zuo et al. 2021 train.",
+)
+@click.option(
+    "--epochs",
+    type=click.IntRange(min=0),
+    metavar="N",
+    help="Most epochs of back-propagation; it stops when held-out samples no longer improve. "
+    f"[default: {' or '.join(f'{epochs} ({name})' for name, epochs in EPOCHS.items())}]",
 )
 @click.option(
     "--method",

@@ -18,7 +18,7 @@ from ftproc.errors import UsageError
 from ftproc.files.reading import truth as truth_files
 from ftproc.files.writing import atomic
 from ftproc.records import MeasurementLog, Truth
-from ftproc.settings import FilterSettings, Noise, TrainSettings
+from ftproc.settings import EPOCHS, FilterSettings, Noise, TrainSettings
 from ftproc.simulation import simulate
 
 
@@ -35,7 +35,8 @@ class Request(NamedTuple):
     hidden: int
     population: int
     generations: int
-    epochs: int
+    optimiser: str
+    epochs: int | None
     flights: int
     seed: int
     method: str
@@ -50,7 +51,8 @@ class Request(NamedTuple):
     def settings(self) -> TrainSettings:
         return TrainSettings(
             features=self.features, hidden=self.hidden, population=self.population, generations=self.generations,
-            epochs=self.epochs, flights=len(self.logs) or self.flights, seed=self.seed, method=self.method,
+            epochs=EPOCHS[self.optimiser] if self.epochs is None else self.epochs, optimiser=self.optimiser,
+            flights=len(self.logs) or self.flights, seed=self.seed, method=self.method,
         )  # fmt: skip
 
     @property

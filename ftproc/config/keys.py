@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from ftproc.config.kinds import Kind, file_name, flag, method, number, positive, text, whole, widths, words
+from ftproc.config.kinds import Kind, file_name, flag, method, number, parameters, positive, text, whole, widths, words
 from ftproc.files.units import UNITS
 from ftproc.records import COMPONENTS
 from ftproc.settings import Air, FilterSettings
@@ -116,6 +116,7 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
         "gate": Key("gate", positive(), FilterSettings.gate, "in sigmas of the residual", default=FilterSettings.gate),
         "max_patch_s": Key("max_patch", positive(), 5.0, _PATCH),
         "weight_form": Key("weight_form", words("noise", "gain"), "noise", "in forward editing", default="noise"),
+        "set": Key("set", parameters, "window=6,m=0.01", "parameters of the method, see --list-methods NAME"),
         "particles": Key("particles", whole(20), 100, "of the ensemble and particle filters", default=100),
         "seed": Key("seed", whole(0), 0, "of their random numbers", default=0),
         "ecef": Key("ecef", flag, False, "add earth-centred coordinates", default=False),

@@ -91,6 +91,18 @@ def file_name(value: object) -> str:
     return str(value)
 
 
+def parameters(value: object) -> str:
+    """Parameters of a method, NAME=VALUE,..."""
+    from ftproc.errors import UsageError
+    from ftproc.methods.parameters import parse
+
+    try:
+        parse([text(value)])
+    except UsageError as error:
+        raise ValueError('parameters of a method, such as "window=6,m=0.01"') from error
+    return str(value)
+
+
 def flag(value: object) -> bool:
     """true or false."""
     if not isinstance(value, bool):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 from ftproc.files.options import Extract, parse_where, parse_widths
+from ftproc.methods import parameters
 from ftproc.settings import PACKAGED, Air, FilterSettings, Station
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ class Recipe:
     def of(cls, options: Mapping[str, Any]) -> Recipe:
         """The recipe from options as `config.load` returns them, with the defaults for the rest."""
         known = {_SETTINGS.get(name, name): value for name, value in options.items() if value is not None}
+        known["parameters"] = parameters.parse([known["set"]]) if known.get("set") else ()
         known["gain_form"] = known.pop("weight_form", "noise") == "gain"
         air = {name: known[name] for name in ("temperature_c", "pressure_hpa") if name in known}
         known["refraction"] = Air(**air) if known.pop("refraction", False) else None

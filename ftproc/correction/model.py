@@ -57,6 +57,11 @@ class Stage:
         """Whether any output has a gain."""
         return bool(self.gain.any())
 
+    @property
+    def linear(self) -> bool:
+        """Whether the hidden layer adds nothing: the output is linear in the inputs, by the direct connections."""
+        return not (self.weights.w1.any() and self.weights.w2.any())
+
 
 @dataclass(frozen=True)
 class Model:
@@ -94,6 +99,8 @@ def card(model: Model) -> str:
 def _stage_card(name: str, stage: Stage) -> list[str]:
     d, h, o, direct = stage.shape
     network = f"network {d}-{h}-{o}{' and direct connections' if direct else ''}"
+    if stage.linear:
+        network = f"linear, {d} inputs to {o} outputs (held-out samples did not need the {h} hidden units)"
     verdict = ["no verdict on held-out data"] if stage.verdict is None else stage.verdict.sentences()
     return [
         f"{name}: feature set {stage.features.name!r}, {network}",

@@ -7,15 +7,26 @@ import warnings
 
 import numpy as np
 
-from ftproc.core.comparators import ensemble_run
+from ftproc.core.comparators import ensemble_run, particles
 from ftproc.core.filtering.records import FilterRun
 from ftproc.errors import FtprocWarning
 from ftproc.methods import preparing
 from ftproc.methods.estimate import Estimate, Readings
+from ftproc.methods.parameters import Parameter
 from ftproc.records import FloatArray
 from ftproc.settings import FilterSettings
 
 STATES = 9
+JITTER_PARAMETERS = (
+    Parameter("jitter", "spread of resampled members, in Silverman's widths", str(particles.JITTER), 0, 10),
+)
+GATED_PARAMETERS = (
+    *JITTER_PARAMETERS,
+    Parameter(
+        "gate", "share of good readings that pass; the paper's gate is 0.75", str(particles.GATE), 0.01, 1 - 1e-9
+    ),
+)
+CHAINS_PARAMETERS = (Parameter("moves", "of each Markov chain", str(particles.MOVES), 1, 1000, True),)
 FEWEST_PER_STATE = 10  # members, for their covariance to mean something
 LONGEST_PATCH_SAMPLES = 14.5  # after so long without a reading used, the track counts as lost
 # Microseconds per row, as measured: to begin with, for each member, and for each pair of them.
@@ -36,7 +47,8 @@ def estimate(readings: Readings, settings: FilterSettings, method: str) -> Estim
     if longest is None:
         interval = float(np.median(np.diff(readings.time_s))) if len(readings.time_s) > 1 else 0.0
         longest = LONGEST_PATCH_SAMPLES * interval
-    how = ensemble_run.Settings(method, settings.particles, longest, np.random.default_rng(settings.seed))
+    tuned = {name: int(value) if name == "moves" else value for name, value in settings.parameters}
+    how = ensemble_run.Settings(method, settings.particles, longest, np.random.default_rng(settings.seed), tuned)
     run, made = ensemble_run.filter_log(readings.unedited(), model, starts, how)
     label = preparing.labels(_kept(run), readings.measurement)
     return Estimate(run, label, model, None, preparing.re_initialized(made))

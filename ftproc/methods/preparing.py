@@ -49,8 +49,17 @@ def finished(found: Filtered, settings: FilterSettings, kept: FloatArray | None 
     return Estimate(run, label, model, smoothed, re_initialized(starts))
 
 
-def trusted(readings: Readings, settings: FilterSettings) -> tuple[FloatArray, FloatArray]:
-    """(n, 3) weights, zero for readings not to be believed before a filter has run, and (3,) noise 1-sigma.
+class Trusted(NamedTuple):
+    """weight: (n, 3), zero for readings not to be believed before a filter has run. sigma: (3,) noise 1-sigma. start:
+    the smoothed first state, where the head of the log gives one."""
+
+    weight: FloatArray
+    sigma: FloatArray
+    start: Start | None
+
+
+def trusted(readings: Readings, settings: FilterSettings) -> Trusted:
+    """What is believed of a log before a filter has run.
 
     Only the head of the log is edited in two passes, because a recursion cannot repair a wrong start; after it the
     weights are those of the screening, and serve to find noise and jerk.
@@ -58,23 +67,29 @@ def trusted(readings: Readings, settings: FilterSettings) -> tuple[FloatArray, F
     time_s, measurement, _ = readings
     weight, sigma, _ = two_pass.screen(time_s, measurement)
     known = what_is_known(readings, settings)
+    start = None
     with contextlib.suppress(ValueError):  # too few readings in the head: the screening has to do
         head = two_pass.edit(time_s[:HEAD], measurement[:HEAD], known)
         weight[:HEAD] = head.weight
+        start = two_pass.smoothed_starts(head.smoothed)[0]
         if len(time_s) <= HEAD:
             sigma = np.sqrt(head.model.noise_variance)
-    return weight, np.where(np.isfinite(known.sigma), known.sigma, sigma)
+    return Trusted(weight, np.where(np.isfinite(known.sigma), known.sigma, sigma), start)
 
 
 def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[Start]]:
-    """Noise and jerk level, and starts of a log, without deciding on its outliers."""
-    weight, sigma = trusted(readings, settings)
+    """Noise and jerk level, and starts of a log, without deciding on its outliers. The first start is that of two-pass
+    editing, so that all methods have the same."""
+    weight, sigma, first = trusted(readings, settings)
     known = what_is_known(readings, settings)
     log = readings.weighted(weight)
     guess = Model(sigma**2, isotropic(known.jerk_psd or first_jerk(log, sigma**2)))
     starts = find_starts(log, guess.noise_variance, float(guess.jerk[0, 0]))
     model = fit_level(log, starts, guess, Fixed(np.isfinite(known.sigma), known.jerk_psd is not None))
-    return model, find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
+    starts = find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
+    if first is not None and first.sample <= starts[0].sample:
+        starts[0] = first
+    return model, starts
 
 
 def re_initialized(starts: list[Start]) -> tuple[int, ...]:

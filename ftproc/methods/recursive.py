@@ -187,7 +187,7 @@ def _beginning(record: Recording, settings: FilterSettings, model: Model) -> tup
     examined = HEAD
     while True:
         readings = record.part(slice(0, examined))
-        weight, _ = preparing.trusted(readings, settings)
+        weight = preparing.trusted(readings, settings).weight
         try:
             return weight, initialization.first_start(readings.weighted(weight), model.noise_variance)
         except ValueError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
@@ -15,11 +15,13 @@ from ftproc.settings import FilterSettings
 
 if TYPE_CHECKING:
     from ftproc.methods.estimate import Estimate, Part, Readings, Recording
+    from ftproc.methods.parameters import Parameter
 
 Run = Callable[["Readings", FilterSettings], "Estimate"]
 Parts = Callable[["Recording", FilterSettings], Iterator["Part"]]
 
 MAIN = FilterSettings.method
+EVERY = "all"  # --method all
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,8 @@ class Method:
     of the main method, uses the whole record to decide what is an outlier). corrected: the network works on its
     output; own_model: only one trained for this very method. smooths: --smooth can be had. needs: a module that must
     be installed, and the extra that brings it. random: it draws random numbers, so --particles and --seed matter.
-    in_parts: how a log of any length is filtered in stretches; without, it is filtered as a whole."""
+    in_parts: how a log of any length is filtered in stretches; without, it is filtered as a whole. settable: where
+    its parameters are listed, MODULE.NAME in this package."""
 
     name: str
     title: str
@@ -42,6 +45,16 @@ class Method:
     needs: tuple[str, str] | None = None
     random: bool = False
     in_parts: Parts | None = None
+    settable: str | None = None
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The numbers that its paper leaves to the engineer."""
+        if self.settable is None:
+            return ()
+        module, _, name = self.settable.partition(".")
+        found: tuple[Parameter, ...] = getattr(import_module(f"ftproc.methods.{module}"), name)
+        return found
 
     def parts(self, record: Recording, settings: FilterSettings) -> Iterator[Part]:
         """The estimate of a log, in stretches one behind the other. Raises ValueError as `run`."""
@@ -102,41 +115,55 @@ METHODS: dict[str, Method] = {
         Method("bpnn-ekf", "EKF with a network trained from a random start", "Feng, Xu and Shi 2017",
                True, False, True, _from("preparing", "unedited", extended=True), own_model=True),
         Method("kf", "linear Kalman filter on converted measurements", "Lerro and Bar-Shalom 1993",
-               True, False, False, _from("converted"), smooths=False),
+               True, False, False, _from("kalman", "converted"), smooths=False),
         Method("imm-ukf", "interacting models of calm flight and manoeuvres", "Zhang, Li and He 2012",
-               True, False, False, _from("multiple"), smooths=False),
+               True, False, False, _from("kalman", "multiple"), smooths=False, settable="kalman.IMM_PARAMETERS"),
         Method("huber-ukf", "UKF with Huber's weights", "Karlgaard and Schaub 2007",
-               True, True, False, _from("robust", "huber")),
+               True, True, False, _from("robust", "huber"),
+               settable="robust.HUBER_PARAMETERS"),
         Method("student-t-ukf", "UKF with Student's t weights", "Agamennoni et al. 2012",
-               True, True, False, _from("robust", "student")),
+               True, True, False, _from("robust", "student"),
+               settable="robust.STUDENT_PARAMETERS"),
         Method("mcc-ukf", "UKF by maximum correntropy", "Chen et al. 2017",
-               True, True, False, _from("robust", "correntropy")),
+               True, True, False, _from("robust", "correntropy"),
+               settable="robust.CORRENTROPY_PARAMETERS"),
         Method("gate", "readings that jump are dropped", "Yu et al., range tests",
-               True, True, False, _from("range_test", "gate"), smooths=False),
+               True, True, False, _from("range_test", "gate"), smooths=False,
+               settable="range_test.GATE_PARAMETERS"),
         Method("gate-improved", "the same, with the first reading checked", "Yu et al., range tests",
-               True, True, False, _from("range_test", "gate", check_first=True), smooths=False),
+               True, True, False, _from("range_test", "gate", check_first=True), smooths=False,
+               settable="range_test.GATE_PARAMETERS"),
         Method("ls4", "readings off the line through the last four replaced", "Yu et al., range tests",
-               True, True, False, _from("range_test", "four_points"), smooths=False),
+               True, True, False, _from("range_test", "least_squares"), smooths=False,
+               settable="range_test.LINE_PARAMETERS"),
         Method("outlier-kf", "anti-outlier Kalman filter, channel by channel", "Yu et al., range tests",
-               True, True, False, _from("range_test", "outlier_kalman"), smooths=False),
+               True, True, False, _from("range_test", "outlier_kalman"), smooths=False,
+               settable="range_test.KALMAN_PARAMETERS"),
         Method("outlier-kf-improved", "the same, first reading checked, gains apart", "Yu et al., range tests",
-               True, True, False, _from("range_test", "outlier_kalman", improved=True), smooths=False),
+               True, True, False, _from("range_test", "outlier_kalman", improved=True), smooths=False,
+               settable="range_test.KALMAN_PARAMETERS"),
         Method("ls-window-kf", "outliers repaired by a line, Kalman filter", "Zhang and Zhang, reliable KF",
-               True, True, False, _from("reliable", "window_kalman"), smooths=False),
+               True, True, False, _from("reliable", "window_kalman"), smooths=False,
+               settable="reliable.WALK_PARAMETERS"),
         Method("rkf", "the same, with noises that adapt (regularised)", "Zhang and Zhang, reliable KF",
-               True, True, False, _from("reliable", "reliable"), smooths=False),
+               True, True, False, _from("reliable", "reliable"), smooths=False,
+               settable="reliable.RELIABLE_PARAMETERS"),
         Method("rkf-literal", "the same to the letter: gives back its input", "Zhang and Zhang, reliable KF",
-               True, True, False, _from("reliable", "reliable", literal=True), smooths=False),
+               True, True, False, _from("reliable", "reliable", literal=True), smooths=False,
+               settable="reliable.REPAIR_PARAMETERS"),
         Method("wavelet-akf", "adaptive Kalman filter, then wavelets", "Wu and Ran 2021",
                False, True, False, _from("wavelet"), smooths=False, needs=("pywt", "PyWavelets>=1.5")),
         Method("enkf", "ensemble Kalman filter", "Evensen 1994",
                True, False, False, _from("ensemble", method="enkf"), smooths=False, random=True),
         Method("enpf", "particle filter with an EnKF for its proposals", "Shao et al. 2020",
-               True, False, False, _from("ensemble", method="enpf"), smooths=False, random=True),
+               True, False, False, _from("ensemble", method="enpf"), smooths=False, random=True,
+               settable="ensemble.JITTER_PARAMETERS"),
         Method("enpf-chi2", "the same behind a chi-square gate", "Shao et al. 2020",
-               True, True, False, _from("ensemble", method="enpf-chi2"), smooths=False, random=True),
+               True, True, False, _from("ensemble", method="enpf-chi2"), smooths=False, random=True,
+               settable="ensemble.GATED_PARAMETERS"),
         Method("renpf", "particle filter with fuzzy weights and Markov chains", "Shao et al. 2020",
-               True, True, False, _from("ensemble", method="renpf"), smooths=False, random=True),
+               True, True, False, _from("ensemble", method="renpf"), smooths=False, random=True,
+               settable="ensemble.CHAINS_PARAMETERS"),
     )
 }  # fmt: skip
 
@@ -201,6 +228,36 @@ def obstacle(method: Method, smooth: bool, made_for: str | None) -> str | None:
     if method.corrected and made_for is not None and not method.suits(made_for):
         return f"{method.name} cannot use a model that was trained for {made_for}; give another with --model, or none."
     return None
+
+
+def with_own_parameters(settings: FilterSettings, name: str) -> FilterSettings:
+    """The settings for the method of that name, without the parameters that only others have."""
+    own = {parameter.name for parameter in named(name).parameters}
+    return replace(settings, method=name, parameters=tuple(each for each in settings.parameters if each[0] in own))
+
+
+def check_parameters(settings: FilterSettings) -> None:
+    """Raises UsageError for parameters that the settings' method (or, of all, any) does not have, or whose values make
+    no sense."""
+    from ftproc.methods import parameters
+
+    if settings.parameters:
+        methods = METHODS.values() if settings.method == EVERY else [named(settings.method)]
+        known = {parameter.name: parameter for method in methods for parameter in method.parameters}
+        parameters.check(settings.method, list(known.values()), settings.parameters)
+
+
+def describe(name: str) -> str:
+    """What a method is, and its parameters, for the terminal. Raises UsageError for an unknown name."""
+    from ftproc.methods.parameters import described
+
+    method = named(name)
+    lines = [f"{method.name}: {method.title} ({method.source})"]
+    if method.parameters:
+        lines += ["Parameters, for --set NAME=VALUE:", *described(method.parameters)]
+    else:
+        lines += ["It has no parameters of its own; the options of `ftproc filter -h` set what it needs."]
+    return "\n".join(lines)
 
 
 def list_methods() -> str:

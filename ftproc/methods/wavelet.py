@@ -31,7 +31,7 @@ DECADES = np.arange(-6.0, 8.1, 0.5)  # of jerk density over noise variance, s^-5
 
 def estimate(readings: Readings, settings: FilterSettings) -> Estimate:
     """Filter, then denoise. The rates are the filter's."""
-    log = channels.look(readings, settings)
+    log = channels.look(readings, settings, blindly=True)
     parts = [_component(readings, log, c) for c in range(3)]
     value, rate, innovation, sigma, weight = (np.stack(part, 1) for part in zip(*parts, strict=True))
     return channels.estimate(readings, log, Cleaned(value, weight, innovation, sigma, rate=rate))

@@ -59,6 +59,7 @@ def describe(
             "ecef": settings.ecef,
             "noise_specified": settings.noise is not None and None not in settings.noise,
             **({"particles": settings.particles, "seed": settings.seed} if method.random else {}),
+            **({"parameters": dict(settings.parameters)} if settings.parameters else {}),
             "jerk_specified": settings.jerk_psd_m2ps5 is not None,
             "noise_range_m": float(sigma[0]),
             "noise_azimuth_rad": float(sigma[1]),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ftproc.methods.estimate import typical_interval
 from ftproc.quality import consistency, verdict
 from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, FlagArray, FloatArray, MeasurementLog
+from ftproc.scoring.figures import changes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,6 +32,7 @@ class RunStatistics:
         self.interval_s = typical_interval(log.time_s)
         self.components = [_Component(self.every) for _ in COMPONENTS]
         self.gaps, self.longest_gap_s, self.last_time = 0, 0.0, np.nan
+        self.last_cleaned, self.changed, self.changes = np.full((1, 3), np.nan), np.zeros(3), np.zeros(3, int)
         self.nis_sum, self.nis_count, self.used, self.rows_used = 0.0, 0, 0, 0
         self.times: list[FloatArray] = []
         self.sigmas: list[FloatArray] = []
@@ -41,8 +43,11 @@ class RunStatistics:
         self.largest_m, self.largest_sigma = 0.0, 0.0
         self.outside, self.rows, self.parts = 0.0, 0, 0
 
-    def add(self, time_s: FloatArray, estimate: Estimate, correction: FloatArray, outside: float) -> None:
-        """Add a part: time_s (n,), its estimate, correction (n, 6), and the share outside the network's training."""
+    def add(
+        self, time_s: FloatArray, estimate: Estimate, cleaned: FloatArray, correction: FloatArray, outside: float
+    ) -> None:
+        """Add a part: time_s (n,), its estimate, cleaned range, azimuth and elevation (n, 3) as published, correction
+        (n, 6), and the share outside the network's training."""
         run = estimate.run
         best_sigma = (run if estimate.smoothed is None else estimate.smoothed).sigma
         used = run.weight > 0
@@ -53,6 +58,7 @@ class RunStatistics:
             component.add_labels(time_s, estimate.label[:, c])
             component.add_innovations(squares[:, c], run.innovation_sigma[:, c], tested)
         self._add_gaps(time_s)
+        self._add_changes(cleaned)
         finite = np.isfinite(run.nis)
         self.nis_sum += float(run.nis[finite].sum())
         self.nis_count += int(finite.sum())
@@ -85,6 +91,17 @@ class RunStatistics:
         if self.interval_s > 0 and (gaps := interval[interval > GAP_INTERVALS * self.interval_s]).size:
             self.gaps += len(gaps)
             self.longest_gap_s = max(self.longest_gap_s, float(gaps.max()))
+
+    def _add_changes(self, cleaned: FloatArray) -> None:
+        change = changes(np.concatenate([self.last_cleaned, cleaned]))
+        self.changed += np.nansum(change, axis=0)
+        self.changes += np.isfinite(change).sum(axis=0)
+        self.last_cleaned = cleaned[-1:].copy()
+
+    def _average_gradient(self) -> dict[str, float | None]:
+        """F of Zuo et al. 2021, eq. 18; None where no two neighbours have a value."""
+        pairs = zip(COMPONENTS, UNITS, self.changed, self.changes, strict=True)
+        return {f"{name}_{unit}": float(total / count) if count else None for name, unit, total, count in pairs}
 
     def _add_sigmas(self, time_s: FloatArray, sigma_m: FloatArray) -> None:
         groups = -(-len(time_s) // self.every)
@@ -123,6 +140,7 @@ class RunStatistics:
             "longest_gap_s": self.longest_gap_s,
             "components": components,
             "not_observable": [COMPONENTS[c] for c in absent],
+            "average_gradient": self._average_gradient(),
             "jerk_psd_m2ps5": jerk if np.isfinite(psd).all() else None,
             "nis_mean": self.nis_sum / self.nis_count if self.nis_count else None,
             "components_used_mean": float(self.used / max(self.rows_used, 1)),

@@ -47,10 +47,11 @@ def remarks(s: Mapping[str, Any]) -> list[Remark]:
     if s["correction_largest_m"] > 0:
         outside = f"none for the {100 * s['correction_outside_training']:.1f} % of samples outside its training data"
         size = f"up to {s['correction_largest_m']:.3g} m, {s['correction_largest_sigma']:.2g} sigma"
+        kind = "linear" if s.get("correction_linear") else "network"
         if s["correction_largest_sigma"] > MANY_SIGMAS:
-            text = f"network correction {size}: more than noise explains; check that the model is of this instrument"
+            text = f"{kind} correction {size}: more than noise explains; check that the model is of this instrument"
             found.append(Remark(SUSPECT, text))
-        found.append(Remark(CONSISTENT, f"network correction {size}; {outside}"))
+        found.append(Remark(CONSISTENT, f"{kind} correction {size}; {outside}"))
     return found
 
 

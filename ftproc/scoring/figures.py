@@ -125,9 +125,14 @@ def average_gradient(measurement: FloatArray) -> Gradient:
 
     Pairs with a missing value are left out of the mean.
     """
+    return Gradient(*(_mean(column) for column in changes(measurement).T))
+
+
+def changes(measurement: FloatArray) -> FloatArray:
+    """(n - 1, 3) size of the change from sample to sample of (n, 3) readings, that of the azimuth wrapped."""
     step = np.diff(measurement, axis=0)
     step[:, 1] = wrap(step[:, 1])
-    return Gradient(*(_mean(np.abs(column)) for column in step.T))
+    return np.abs(step)
 
 
 def _against(trajectory: Trajectory, truth: Truth) -> dict[str, Any]:

@@ -8,18 +8,21 @@ Calls `core.model`, for the measurement, and `records`; writes no file.
 """
 
 from ftproc.simulation.instrument import InstrumentErrors
+from ftproc.simulation.instrument_spec import INSTRUMENT_GRAMMAR, parse_instrument
 from ftproc.simulation.outlier_spec import GRAMMAR, Fault, OutlierSpec, parse_outliers
 from ftproc.simulation.scenarios import Scenario, list_scenarios
 from ftproc.simulation.simulation import Simulation, simulate
 
 __all__ = [
     "GRAMMAR",
+    "INSTRUMENT_GRAMMAR",
     "Fault",
     "InstrumentErrors",
     "OutlierSpec",
     "Scenario",
     "Simulation",
     "list_scenarios",
+    "parse_instrument",
     "parse_outliers",
     "simulate",
 ]

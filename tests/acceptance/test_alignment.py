@@ -102,8 +102,9 @@ def test_report_and_plots_of_a_few_runs(tmp_path):
     runs = {(name, n, bad): [run, run] for name in alignment.FILTERS for n in both for bad in (False, True)}
     text = alignment.report(runs, 12.0)
     assert text.startswith("## Alignment of a strapdown system on the move")
-    assert text.count("| renpf | 150 |") == 2
+    assert text.count("| renpf | 100 |") == 2
     assert "All runs of this section took 12 s." in text
+    assert text.count("holds |") + text.count("does not hold** |") == len(alignment.claims(runs))
     alignment.plots.draw(tmp_path, runs, alignment.ENOUGH_MEMBERS, alignment.PAPER_GATE)
     shown = {line.split("(")[1].rstrip(")") for line in text.splitlines() if line.startswith("![")}
     assert shown == {path.name for path in tmp_path.iterdir()}

@@ -1,7 +1,7 @@
 """The flight of Zuo et al. 2021, section 3.1: 60 s at 1 Hz, range variance 10 m^2; with and without outliers.
 
 The error of a run is the paper's "RMSE" (eqs 20, 21): the mean over the samples of the length of the position error.
-The paper reports 6.6 to 11.9 m for its method on the clean flight.
+The paper reports 6.6 to 11.9 m for its method on the clean flight; bounds here stand a little above what is reached.
 """
 
 from __future__ import annotations
@@ -49,41 +49,53 @@ def errors_of_oracle(share):
     return np.array(found)
 
 
-def test_clean_flight():
-    assert errors(0.0).mean() <= 2.5
+#: m, of the mean over the seeds, by the share of outliers
+BOUNDS = {0.0: 1.6, 0.05: 1.75, 0.1: 1.75, 0.2: 1.9}
+FORWARD = {0.0: 1.7, 0.05: 2.15, 0.1: 2.3, 0.2: 3.3}
+
+
+@pytest.mark.parametrize(("share", "bound"), BOUNDS.items())
+def test_two_pass_editing(share, bound):
+    assert errors(share).mean() <= bound
+    assert errors(share).max() <= 2 * bound
 
 
 @pytest.mark.parametrize("share", SHARES)
 def test_outliers_cost_hardly_more_than_their_deletion(share):
-    assert errors(share).mean() <= 1.25 * errors_of_oracle(share).mean()
+    assert errors(share).mean() <= 1.1 * errors_of_oracle(share).mean()
 
 
-@pytest.mark.parametrize("smooth", [False, True])
 @pytest.mark.parametrize("share", [0.0, *SHARES])
-def test_no_run_is_lost(share, smooth):
-    assert errors(share, smooth).max() < 20
-
-
-@pytest.mark.parametrize("share", SHARES)
 def test_smoother_is_well_below_the_filter(share):
     """Half of it would be too much to ask: the filter begins at the smoothed first state, and has gained by it; and a
     smoother that believes in so calm a flight as this one is overconfident of real ones."""
-    smoothed = errors(share, smooth=True).mean()
-    assert smoothed <= 0.65 * errors(share).mean()
-    assert smoothed <= 1.1
+    smoothed = errors(share, smooth=True)
+    assert smoothed.mean() <= 0.65 * errors(share).mean()
+    assert smoothed.mean() <= 1.1
+    assert smoothed.max() <= 2.0
 
 
-@pytest.mark.parametrize(
-    ("settings", "bound"), [({"editing": "forward"}, 2.5), ({"method": "ukf"}, 2.5), ({"method": "ekf"}, 5.0)], ids=str
-)
-def test_causal_filters_on_the_clean_flight(settings, bound):
-    """So near the station, the bend of h costs the EKF its first seconds."""
-    found = [error((f := flight(seed, 0.0)).log, f.truth.position_m, **settings) for seed in SEEDS]
+@pytest.mark.parametrize("gain_form", [False, True])
+@pytest.mark.parametrize(("share", "bound"), FORWARD.items())
+def test_recursive_editing(share, bound, gain_form):
+    """The paper's gate, with R divided by its weight m and, to the letter, with the gain multiplied by it."""
+    flights = [flight(seed, share) for seed in SEEDS]
+    found = [error(f.log, f.truth.position_m, editing="forward", gain_form=gain_form) for f in flights]
     assert np.mean(found) <= bound
+    assert max(found) <= 2.5 * bound
+
+
+@pytest.mark.parametrize("method", ["ukf", "ekf"])
+def test_filters_without_editing(method):
+    """As good on the clean flight; so far off with outliers that no bound above could be kept without editing."""
+    for share in (0.0, *SHARES):
+        flights = [flight(seed, share) for seed in SEEDS]
+        found = np.mean([error(f.log, f.truth.position_m, method=method) for f in flights])
+        assert found > 15 if share else found <= 1.3
 
 
 def test_no_run_is_lost_at_a_loose_jerk():
     """The flight has none; the user gives the true noise and 0.01 m^2/s^5."""
     given = {"noise": (10**0.5, 2e-4, 2e-4), "jerk_psd_m2ps5": 0.01}
     found = [error((f := flight(seed, 0.1)).log, f.truth.position_m, **given) for seed in SEEDS]
-    assert max(found) < 20
+    assert max(found) < 6

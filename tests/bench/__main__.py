@@ -1,5 +1,5 @@
-"""`python -m tests.bench [samples] [accuracy] [methods] [correction] [speed] [start] [scale] [pages] [training]`:
-tables of the README and the guide, as Markdown on standard output and in out/bench.md."""
+"""`python -m tests.bench [NAME...]`: tables of the README and the guide, as Markdown on standard output and in
+out/bench.md. The names: samples, accuracy, methods, rivals, correction, speed, start, scale, pages, training."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from collections.abc import Iterable, Sequence
 from itertools import chain
 from pathlib import Path
 
-from tests.bench import accuracy, correction, methods, pages, samples, scale, speed, start, training
+from tests.bench import accuracy, correction, methods, pages, rivals, samples, scale, speed, start, training
 
 TABLES = {
     "samples": samples,
     "accuracy": accuracy,
     "methods": methods,
+    "rivals": rivals,
     "correction": correction,
     "speed": speed,
     "start": start,

@@ -279,3 +279,37 @@ def test_options_that_do_nothing_are_refused(run, args, sentence):
 def test_options_that_ask_for_nothing_and_those_of_a_station_file_are_not(run, flight, args):
     Path("s.toml").write_text("[filter]\nmax_patch_s = 3\nparticles = 50\n")
     assert run("filter", flight, *args, "-o", "x.csv").code == 0
+
+
+def test_parameters_of_a_method(run, here):
+    """Set on the command line and in a station file, of which the former wins; explained by --list-methods NAME."""
+    assert run("simulate", "--scenario", "zuo2021-outliers", "-o", "a.csv").code == 0
+    shown = run("filter", "--list-methods", "ls-window-kf")
+    assert (shown.code, shown.err) == (0, "")
+    assert shown.out.startswith("ls-window-kf: outliers repaired by a line, Kalman filter (Zhang and Zhang")
+    assert "  F_range_m " in shown.out
+    (here / "s.toml").write_text('[filter]\nmethod = "ls-window-kf"\nset = "window=8,longest=9"\n')
+    used = run(
+        "filter",
+        "a.csv",
+        "--config",
+        "s.toml",
+        "--set",
+        "window=6",
+        "--set",
+        "F_range_m=30,Q_range_m2=9",
+        "-o",
+        "t.csv",
+    )
+    assert used.code == 0, used.err
+    kept = json.loads((here / "t.json").read_text())["settings"]["parameters"]
+    assert kept == {"window": 6.0, "longest": 9.0, "F_range_m": 30.0, "Q_range_m2": 9.0}
+    for wrong, sentence in (
+        ("windw=3", 'did you mean "window"?'),
+        ("window", "expected NAME=VALUE"),
+        ("window=0", "a whole"),
+    ):
+        refused = run("filter", "a.csv", "--method", "gate", "--set", wrong, "-o", "u.csv")
+        assert (refused.code, refused.out) == (2, "")
+        assert sentence in refused.err
+    assert not (here / "u.csv").exists()

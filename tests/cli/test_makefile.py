@@ -10,9 +10,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.files.reading import logs, truth
 from tests.cli.conftest import Result
 
@@ -212,9 +214,14 @@ def test_clean(make, copy):
 
 def test_samples_are_made_anew(make, copy):
     assert make("samples").code == 0
-    checked_in = {path.name for path in (PROJECT / "sample_data").iterdir() if path.suffix not in (".toml", ".png")}
-    assert {path.name for path in (copy / "sample_data").iterdir()} == checked_in
-    for name in ("zuo2021-outliers.csv", "theodolite.parquet", "radar.csv"):  # other processors round differently
+    checked_in, made = ({path.name for path in (r / "sample_data").rglob("*.*")} for r in (PROJECT, copy))
+    assert made == {name for name in checked_in if not name.endswith((".toml", ".png"))}
+    for name in (
+        "zuo2021-outliers.csv",
+        "theodolite.parquet",
+        "radar.csv",
+        "calibration/circle.parquet",
+    ):  # other processors round differently
         made, kept = (logs.read(root / "sample_data" / name) for root in (copy, PROJECT))
         assert len(made) == len(kept)
         assert abs(made.measurement[0] - kept.measurement[0]).max() < 1e-6
@@ -224,7 +231,11 @@ def test_samples_are_made_anew(make, copy):
 
 def test_samples_are_what_they_say():
     samples = PROJECT / "sample_data"
-    assert sum(path.stat().st_size for path in samples.iterdir()) < 2_000_000
+    assert sum(path.stat().st_size for path in samples.rglob("*")) < 2_000_000
+    circle, flown = (samples / "calibration" / f"circle{kind}.parquet" for kind in ("", ".truth"))
+    off = logs.read(circle).measurement - from_cartesian(truth.read(flown).position_m)
+    assert 2e-4 < np.median(np.abs(wrap(off[:, 1]))) < 3e-3
+    assert 1e-4 < np.median(np.abs(off[:, 2])) < 1e-3
     for name in ("zuo2021-outliers.csv", "theodolite.parquet", "radar.csv"):
         stem = name.split(".")[0]
         real = truth.read(next(samples.glob(f"{stem}.truth.*")))

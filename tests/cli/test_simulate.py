@@ -44,6 +44,16 @@ def test_noise_and_outliers(run, here):
     assert sorted(np.round(off, 6).tolist())[-6:] == [0, 50, 50, 50, 50, 50]
 
 
+def test_errors_of_the_instrument(run, here):
+    """Azimuth: zero-set error, and collimation over cos E; the noise is the same with them as without."""
+    for name, spec in (("perfect", "none"), ("real", "azimuth_zero_mrad=2,collimation_mrad=1")):
+        simulate(run, "calibration", "--duration", 60, "--instrument-errors", spec, "-o", f"{name}.csv")
+    perfect, real = logs.read("perfect.csv").measurement, logs.read("real.csv").measurement
+    off = np.angle(np.exp(1j * (real[:, 1] - perfect[:, 1])))
+    np.testing.assert_allclose(off, 2e-3 + 1e-3 / np.cos(perfect[:, 2]), atol=2e-6)
+    np.testing.assert_array_equal(real[:, [0, 2]], perfect[:, [0, 2]])
+
+
 def test_units_and_azimuth_from_north(run, here):
     """The same flight, written as a survey radar writes it, is understood as the same log."""
     simulate(run, "radar", "--seed", 3, "-o", "si.csv")
@@ -74,6 +84,7 @@ def test_units_and_azimuth_from_north(run, here):
         (["--scenario", "radar", "-o", "a.csv", "--dt", "nan"], '"nan" is not a number above zero'),
         (["--scenario", "radar", "-o", "a.csv", "--duration", "1e9"], "The duration is at most"),
         (["--scenario", "radar", "-o", "a.csv", "--outliers", "isolatd=1"], 'unknown item "isolatd=1"'),
+        (["--scenario", "radar", "-o", "a.csv", "--instrument-errors", "tilt=1"], 'there is no error "tilt"'),
         (["--scenario", "radar", "-o", "a.csv", "--units", "range=ly"], '--units: "ly" is not a unit of range'),
         (["--scenario", "radar", "-o", "a.csv", "--seed", "-1"], "Invalid value for '--seed'"),
     ],

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pandas
 import pytest
 
-from ftproc.correction.training import study
+from ftproc.correction.training import descent, study
 from tests.cli.conftest import Result
 
+PROJECT = Path(__file__).parents[2]
 SMALL = ("--population", 6, "--generations", 2, "--epochs", 5, "--hidden", 4)
 
 
@@ -66,6 +69,35 @@ def test_logs_with_columns_and_units_of_their_own(run, here):
         "there is no column"
         in run("train", *["--log", "odd.csv", "--truth", pair[3]] * 4, *args, "--columns", "range=X").err
     )
+
+
+def test_a_linear_model_says_so_on_its_card_and_in_the_summary(run, here):
+    circle = PROJECT / "sample_data" / "calibration" / "circle.parquet"
+    pair = ("--log", circle, "--truth", circle.with_name("circle.truth.parquet"))
+    made = run("train", *pair, "--features", "instrument", *SMALL, "-o", "linear.safetensors")
+    assert made.code == 0, made.err
+    assert made.out.count("feature set 'instrument', linear, 7 inputs to 3 outputs (held-out samples did not need") == 2
+    assert "network" not in made.out
+    for smooth in ("--smooth", "--no-smooth"):
+        used = run("filter", circle, "--model", "linear.safetensors", smooth, "-o", "t.csv")
+        assert "linear correction up to" in used.out
+        assert "network correction" not in used.out
+
+
+@pytest.mark.parametrize(("optimiser", "epochs"), [("momentum", 1000), ("l-bfgs", 400)])
+def test_the_optimiser_and_its_epochs_are_on_the_card(run, here, monkeypatch, optimiser, epochs):
+    """Where the user says nothing of the epochs, an optimiser gets its own."""
+    asked = []
+    real = descent.descend
+    monkeypatch.setattr(
+        descent, "descend", lambda name, a, b, most, *rest: asked.append((name, most)) or real(name, a, b, 2, *rest)
+    )
+    args = ("--scenario", "radar", "--flights", 3, "--hidden", 2, "--population", 4, "--generations", 1)
+    result = run("train", *args, "--features", "correction", "--optimiser", optimiser, "-o", "m")
+    assert result.code == 0, result.err
+    assert f"epochs {epochs}" in result.out
+    assert f"optimiser {optimiser}" in result.out
+    assert asked == [(optimiser, epochs)]
 
 
 def test_the_study_of_first_weights(run, here):

@@ -53,6 +53,7 @@ editing = "forward"
 jerk_psd_m2ps5 = 5
 gate = 3.5
 max_patch_s = 9
+set = "window=6,m=0.01"
 weight_form = "gain"
 ecef = true
 particles = 150
@@ -75,7 +76,7 @@ def test_every_key_is_understood():
     found = config.Recipe.of(config.parse(FULL, "s.toml"))
     assert found.settings == FilterSettings(
         "ukf", "forward", True, (3.048, None, pytest.approx(20 * math.pi / 648000)), 5.0, 3.5, 9.0, 150, 7, True,
-        (48.0, 11.5, 612.0), True, 46.2,
+        (48.0, 11.5, 612.0), True, 46.2, (("window", 6.0), ("m", 0.01)),
     )  # fmt: skip
     assert found.station == Station(
         "north", "anticlockwise", pytest.approx(math.pi / 2), "zenith",
@@ -136,6 +137,7 @@ OPTIONS = st.fixed_dictionaries(
         "max_patch": numbers,
         "weight_form": st.just("gain"),
         "ecef": st.just(True),
+        "set": st.sampled_from(["window=6", "m = 0.01, F_range_m=3e2"]),
         "particles": st.integers(101, 10_000),
         "seed": st.integers(1, 2**31),
         "keep_columns": st.just(True),
@@ -190,6 +192,9 @@ def test_a_model_lies_beside_its_file(tmp_path, monkeypatch):
         ("[filter]\nsmooth = 1", "[filter] smooth = 1: expected true or false."),
         ("[filter]\ngate = true", "[filter] gate = true: expected a number above zero."),
         ("[filter]\ngate = 0", "[filter] gate = 0: expected a number above zero."),
+        ("[filter]\nset = 'window'", '[filter] set = "window": expected parameters of a method, such as '
+         '"window=6,m=0.01".'),
+        ("[filter]\nset = 3", "[filter] set = 3: expected a text in quotes."),
         ("[filter]\ngate = inf", "[filter] gate = inf: expected a number above zero."),
         ("[filter]\nmethod = 'ekff'", '[filter] method = "ekff": expected the name of a method, see --list-methods; '
          'did you mean "ekf".'),

@@ -18,8 +18,8 @@ import pytest
 
 import ftproc.core
 from ftproc.core import compiled, signatures
-from ftproc.core.comparators.channels import Walk, outlier_kalman
 from ftproc.core.comparators.particles import log_kernel_sum
+from ftproc.core.comparators.walks import Walk, outlier_kalman
 from ftproc.core.editing.outlier_chain import label_runs
 from ftproc.core.filtering.forward import Span, run_weighted
 from ftproc.core.filtering.records import Observations, empty_rows
@@ -145,7 +145,8 @@ def test_wrong_arguments(arguments, sentence):
 
 @only_compiled
 def test_wrong_records():
-    z, walk = np.zeros((4, 3)), Walk(np.zeros(3, np.int64), *np.zeros((4, 3)), 1.0)
+    none, one = np.zeros(3, np.int64), np.ones(3, np.int64)
+    z, walk = np.zeros((4, 3)), Walk(none, *np.zeros((4, 3)), none, one, 16, 1.0)
     with pytest.raises(TypeError, match="model must be a Walk, not tuple"):
         outlier_kalman(np.arange(4.0), z, tuple(walk), 3.0, 0.1, True)
     with pytest.raises(TypeError, match=r"model\.x0 must be a 1-dimensional array of float64, not a 2-dim"):

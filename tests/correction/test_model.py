@@ -70,6 +70,20 @@ def test_there_and_back(model: Model, tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["model.safetensors"]
 
 
+def test_a_model_without_its_hidden_layer_says_linear(model: Model) -> None:
+    weights = model.filter.weights
+    assert not model.filter.linear
+    for name in ("w1", "w2"):
+        discarded = changed(model, weights=weights._replace(**{name: np.zeros_like(getattr(weights, name))}))
+        assert discarded.filter.linear
+        assert ", linear, " in card(discarded).split("smoother:")[0]
+        line = correct(fake.run(np.random.default_rng(1)), discarded.filter)
+        assert line.values.any()
+    assert not changed(
+        model, weights=weights._replace(w1=np.ones_like(weights.w1), w2=np.ones_like(weights.w2))
+    ).filter.linear
+
+
 def test_the_hash_is_that_of_the_file(model: Model, tmp_path: Path) -> None:
     import hashlib
 
@@ -181,9 +195,15 @@ def test_weights_of_another_size(model: Model) -> None:
 
 def test_the_card_describes_the_model(model: Model) -> None:
     text = card(model)
-    for part in ("41-4-6", "'window'", "seed 3", model.filter.fingerprint, "bounded to 2 to ", "up: gain"):
+    for part in (
+        "feature set 'window', network 41-4-6",
+        "seed 3",
+        model.filter.fingerprint,
+        "bounded to 2 to ",
+        "up: gain",
+    ):
         assert part in text
-    assert "smoother: feature set 'instrument', network 7-4-3 and direct connections" in text
+    assert "smoother: feature set 'instrument', linear, 7 inputs to 3 outputs" in text
     assert "no verdict" in card(changed(model, verdict=None))
     alone = replace(model, stages={"filter": model.filter})
     assert "smoother: no network; --smooth is not corrected" in card(alone)

@@ -75,7 +75,15 @@ def table(command: str, slow: bool = True, note: str = "", without: str = "") ->
 SIMULATE = "ftproc simulate --scenario zuo2021-outliers --seed 3 -o flight.csv --truth flight.truth.csv"
 FILTER = "ftproc filter flight.csv --smooth"
 SCORE = "ftproc score flight.trajectory.csv --truth flight.truth.csv"
-FLY = "python -m tests.docs.circle"
+ERRORS = (
+    "azimuth_zero_mrad=0.3,elevation_zero_mrad=-0.2,mislevel_mrad=0.6,mislevel_azimuth_rad=0.7,"
+    "collimation_mrad=0.4,refraction=2.8e-4"
+)
+FLY, NEXT = (
+    f"ftproc simulate --scenario calibration --seed {seed} --duration {duration_s} \\\n"
+    f"    -o {name}.csv --truth {name}.gps.csv --instrument-errors \\\n    {ERRORS}"
+    for name, seed, duration_s in (("circle", 1, 600), ("next", 2, 200))
+)
 TRAIN = "ftproc train --log circle.csv --truth circle.gps.csv -o theodolite.safetensors"
 STUDY = "ftproc train --scenario manoeuvre-clean --jerk 0.1 --editing none --compare-starts"
 TIMES = "; times vary from machine to machine"
@@ -90,12 +98,12 @@ BLOCKS = {
         only=("flight", "method", "samples", "mean position", "position", "velocity RMSE", "share", "the sigmas",
               "range outliers", "recall", "F1"),
     ),
-    "train": session(TRAIN, before=(FLY,), only=("filter:", "smoother:", "Position error")),
+    "train": session(FLY, TRAIN, only=("filter:", "smoother:", "Position error")),
     "train-use": session(
         "ftproc filter next.csv --smooth --model none -o plain.csv --summary none",
         "ftproc filter next.csv --smooth --model theodolite.safetensors -o corrected.csv --summary none",
         "ftproc score plain.csv corrected.csv --truth next.gps.csv",
-        before=(FLY, TRAIN), only=("plain", "mean position", "position RMSE", "velocity RMSE", "95 %"),
+        before=(FLY, TRAIN, NEXT), only=("plain", "mean position", "position RMSE", "velocity RMSE", "95 %"),
     ),
     "list-methods": session("ftproc filter --list-methods"),
     "all-methods": session(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 import tempfile
 import time
@@ -45,13 +46,13 @@ def mutated(content: bytes, draw: random.Random) -> bytes:
     return bytes(data)
 
 
-def run(seconds: float, seed: int = 0) -> tuple[int, list[str]]:
+def run(seconds: float = math.inf, most: float = math.inf, seed: int = 0) -> tuple[int, list[str]]:
     """How many inputs were tried, and a line for each that came out as something else than a result or a sentence."""
     draw, tried, wrong = random.Random(seed), 0, []
     found = {name: (target, seeds(target)) for name, target in all_targets().items()}
     until = time.monotonic() + seconds
     with tempfile.TemporaryDirectory() as directory:
-        while time.monotonic() < until:
+        while tried < most and time.monotonic() < until:
             name = draw.choice(sorted(found))
             target, contents = found[name]
             content = mutated(draw.choice(contents), draw)

@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ftproc import pipeline
+from ftproc import pipeline, scoring
+from ftproc.core.model.frames import from_cartesian
 from ftproc.quality import statistics
 from ftproc.quality.statistics import RunStatistics
 from ftproc.settings import FilterSettings
@@ -31,7 +32,8 @@ def counted(log, estimate, edges, correction=None):
     found = RunStatistics(log, ())
     correction = np.zeros((len(log), 6)) if correction is None else correction
     for low, high in itertools.pairwise(edges):
-        found.add(log.time_s[low:high], estimate.rows(low, high), correction[low:high], 0.25)
+        rows = estimate.rows(low, high)
+        found.add(log.time_s[low:high], rows, from_cartesian(rows.run.state[:, :3]), correction[low:high], 0.25)
     return found.summary()
 
 
@@ -72,7 +74,7 @@ def test_a_part_that_did_not_converge_decides_for_the_log(made):
     found = RunStatistics(log, ())
     nothing = np.zeros((len(log), 6))
     for settled in (True, False, True):
-        found.add(log.time_s, estimate._replace(settled=settled), nothing, 0.0)
+        found.add(log.time_s, estimate._replace(settled=settled), log.measurement, nothing, 0.0)
     assert found.summary()["editing_converged"] is False
 
 
@@ -94,6 +96,23 @@ def test_largest_correction_of_all_parts(made):
     found = counted(log, estimate, [0, 300, len(log)], correction)
     assert found["correction_largest_m"] == pytest.approx(5.0)
     assert found["correction_outside_training"] == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize("method", ["ga-bpnn-ukf", "gate", "enkf"])
+@pytest.mark.parametrize("missing", [(), (0,)])
+def test_average_gradient_is_that_of_the_score(method, missing):
+    """Also of a circle that crosses the cut of the azimuth, with values that a method leaves empty."""
+    flight = simulate("calibration", seed=1, duration_s=120.0, dt_s=1.0, outliers="isolated=0.05:20-100")
+    measurement = flight.log.measurement.copy()
+    measurement[:, missing] = np.nan
+    trajectory = pipeline.filter_log(replace(flight.log, measurement=measurement), FilterSettings(method=method))
+    found = trajectory.metadata["summary"]["average_gradient"]
+    expected = scoring.score(trajectory).as_dict()["average_gradient"]
+    assert found.keys() == expected.keys()
+    for name, value in expected.items():
+        assert found[name] == (None if value is None else pytest.approx(value, rel=1e-12)), name
+    assert (found["range_m"] is None) == (missing == (0,))
+    assert found["elevation_rad"] > 0
 
 
 def test_metadata_are_those_of_the_joined_parts():

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -68,12 +70,13 @@ def subtract(a: FloatArray, b: FloatArray) -> FloatArray:
 
 class Settings(NamedTuple):
     """method: of `particles.UPDATES`. members: how many. longest_patch_s: without a reading that is used, after which
-    the track counts as lost."""
+    the track counts as lost. tuned: arguments of the method's update by name."""
 
     method: str
     members: int
     longest_patch_s: float
     rng: Generator
+    tuned: Mapping[str, float] = MappingProxyType({})
 
 
 class _Run:
@@ -83,7 +86,7 @@ class _Run:
         self.log, self.settings = log, settings
         self.sensor = ensemble.Sensor(measure, subtract, np.diag(model.noise_variance))
         self.motion = Motion.of(model)
-        self.update: Update = particles.UPDATES[settings.method]
+        self.update: Update = partial(particles.UPDATES[settings.method], **settings.tuned)
         self.rows = empty_rows(len(log.time_s))
         self.blocks = np.empty((len(log.time_s), 2, 3, 3))
         self.starts: list[Start] = []

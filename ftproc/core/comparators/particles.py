@@ -41,8 +41,8 @@ def silverman(members: int, states: int) -> float:
     return float((4 / ((states + 2) * members)) ** (1 / (states + 4)))
 
 
-def enpf(known: Forecast, rng: Generator) -> Analysis:
-    """Weigh the analysis members by likelihood times prior over proposal, resample and jitter.
+def enpf(known: Forecast, rng: Generator, jitter: float = JITTER) -> Analysis:
+    """Weigh the analysis members by likelihood times prior over proposal, resample and jitter (in Silverman's widths).
 
     When almost no member has any weight the proposal has missed the posterior, and members made of copies of that
     one would be far too sure of it: then the ensemble Kalman filter's are kept.
@@ -60,19 +60,19 @@ def enpf(known: Forecast, rng: Generator) -> Analysis:
     if 1 / (weight @ weight) < COLLAPSED * count:
         return Analysis(members, members.mean(0), 1.0)
     chosen = resampled(weight, rng)
-    jitter = JITTER * silverman(count, states) * rng.standard_normal(members.shape) @ factor.T
-    return Analysis(members[chosen] + jitter, weight @ members, 1.0)
+    moved = jitter * silverman(count, states) * rng.standard_normal(members.shape) @ factor.T
+    return Analysis(members[chosen] + moved, weight @ members, 1.0)
 
 
-def enpf_gated(known: Forecast, rng: Generator, gate: float = GATE) -> Analysis:
+def enpf_gated(known: Forecast, rng: Generator, gate: float = GATE, jitter: float = JITTER) -> Analysis:
     """`enpf`, but a reading whose rho is beyond the chi-square gate (a probability) is not used."""
     if known.rho > chi_square_quantile(gate, known.freedom):
         return Analysis(known.members, known.mean, 0.0)
-    return enpf(known, rng)
+    return enpf(known, rng, jitter)
 
 
-def renpf(known: Forecast, rng: Generator) -> Analysis:
-    """Fuzzy weights of the reading and of each member, then Markov chains to the posterior.
+def renpf(known: Forecast, rng: Generator, moves: int = MOVES) -> Analysis:
+    """Fuzzy weights of the reading and of each member, then Markov chains of so many moves to the posterior.
 
     The mean of n members is itself 1/n of their variance off, and the chains' own randomness moves it as much again at
     every reading. Both accumulate unseen until the filter is too sure of itself and its gate shuts, so the members are
@@ -85,12 +85,12 @@ def renpf(known: Forecast, rng: Generator) -> Analysis:
         off = misfit(np.vstack([members.mean(0), members]), known.reading, known.sensor, known.used)
         rho = _squares(off, known.inverse)
         trust = trust_in_members(rho[0], rho[1:], known.freedom)
-    moved = _walk(known, members, trust, rng)
+    moved = _walk(known, members, trust, rng, moves)
     mean = moved.mean(0)
     return Analysis(mean + math.sqrt(1 + WIDER / len(moved)) * (moved - mean), mean, gamma)
 
 
-def _walk(known: Forecast, members: FloatArray, trust: FloatArray, rng: Generator) -> FloatArray:
+def _walk(known: Forecast, members: FloatArray, trust: FloatArray, rng: Generator, moves: int) -> FloatArray:
     """Metropolis chains, one from each member, to the density prior(x) likelihood(x)^trust; their last states."""
     count, states = members.shape
     width = silverman(count, states)
@@ -104,8 +104,8 @@ def _walk(known: Forecast, members: FloatArray, trust: FloatArray, rng: Generato
         return log_kernel_sum((x - known.mean) @ whiten, centres) + trust * likelihood
 
     step = STEP / math.sqrt(states) * root(spread(members)).T
-    steps = rng.standard_normal((MOVES, count, states)) @ step
-    threshold = np.log1p(-rng.random((MOVES, count)))
+    steps = rng.standard_normal((moves, count, states)) @ step
+    threshold = np.log1p(-rng.random((moves, count)))
     density = log_density(members)
     for move, least in zip(steps, threshold, strict=True):
         proposal = members + move
@@ -161,7 +161,7 @@ def _lengths(deviation: FloatArray, factor: FloatArray) -> FloatArray:
     return lengths
 
 
-UPDATES: dict[str, Callable[[Forecast, Generator], Analysis]] = {
+UPDATES: dict[str, Callable[..., Analysis]] = {
     "enkf": enkf,
     "enpf": enpf,
     "enpf-chi2": enpf_gated,

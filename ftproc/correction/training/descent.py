@@ -12,8 +12,9 @@ from ftproc.correction.network import Shape, cost, cost_and_gradient
 from ftproc.correction.training import Steps, silent
 from ftproc.correction.training.samples import Samples
 from ftproc.records import FloatArray
+from ftproc.settings import EPOCHS
 
-OPTIMISERS = ("l-bfgs", "momentum")
+OPTIMISERS = tuple(EPOCHS)
 DECAY = 1e-3  # weight decay
 PATIENCE = 25  # epochs without a better validation cost
 LEARNING_RATE, MOMENTUM, BATCH = 0.01, 0.9, 128

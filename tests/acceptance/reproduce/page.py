@@ -35,7 +35,12 @@ def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def conclusions(found: Iterable[tuple[str, str, bool]]) -> str:
+    """A table of what a paper concludes, what came out here, and whether the one follows from the other."""
+    return table(("the paper says", "here", "it"), found)
+
+
 def _cell(value: object) -> str:
     if isinstance(value, bool):
-        return "yes" if value else "**no**"
+        return "holds" if value else "**does not hold**"
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core.comparators import channels
-from tests.acceptance.reproduce.page import Page, table
+from ftproc.core.comparators import channels, walks
+from tests.acceptance.reproduce.page import Page, conclusions
 
 ORDER = 2
 
@@ -51,15 +51,20 @@ def readings(bad=(), by=WRONG_START - TRUE_START, seed=6206):
     return z
 
 
+def held(threshold, order=0, window=1, longest=SCANS):
+    """The paper's rules: against the value before, or the line through the last four."""
+    return channels.Predictor(order, window, threshold, longest, 1.0, False)
+
+
 def gate(z, check_first=False):
     """Both coordinates must pass, as the paper has it: a scan is dropped whole."""
-    weight = np.stack([channels.gate(TIME, z[:, c].copy(), GATE, 1.0, False, check_first) for c in range(2)], 1)
+    weight = np.stack([channels.gate(TIME, z[:, c].copy(), held(GATE), check_first) for c in range(2)], 1)
     kept = weight.all(1)
     return Result(np.where(kept[:, None], z, np.nan), kept)
 
 
 def line(z):
-    found = [channels.four_point_line(TIME, z[:, c].copy(), LINE, 1.0, False) for c in range(2)]
+    found = [channels.least_squares(TIME, z[:, c].copy(), held(LINE, 1, 4, 3)) for c in range(2)]
     return Result(np.stack([f[0] for f in found], 1), np.stack([f[1] for f in found], 1).all(1))
 
 
@@ -69,8 +74,10 @@ def kalman(z, improved=False, start=WRONG_START):
     if improved:
         begin[:] = int(gate(z, check_first=True).kept.argmax())
         x0 = z[begin[0]]
-    model = channels.Walk(begin, np.array(x0, float), np.full(2, P0), np.full(2, R), np.full(2, Q), 1.0)
-    value, variance, _, _, weight = channels.outlier_kalman(TIME, z, model, SIGMAS, SMALL_GAIN, improved)
+    variances = (np.full(2, v) for v in (P0, R, Q))
+    plain = np.zeros(2, np.int64), np.ones(2, np.int64)
+    model = walks.Walk(begin, np.array(x0, float), *variances, *plain, SCANS, 1.0)
+    value, variance, _, _, weight = walks.outlier_kalman(TIME, z, model, SIGMAS, SMALL_GAIN, improved)
     return Result(value, weight.all(1), variance[:, 0])
 
 
@@ -125,7 +132,7 @@ def claims() -> list[tuple[str, str, bool]]:
 def section(page: Page) -> str:
     away = WRONG_START - TRUE_START
     parts = [_TEXT.format(noise=NOISE, away=away[0], up=away[1])]
-    parts.append(table(("the paper says", "here", "holds"), claims()))
+    parts.append(conclusions(claims()))
     jumps, three, six = readings(bad=JUMPS), readings(bad=(30, 31, 32)), readings(bad=range(30, 36), by=LARGE)
     shown = {
         "range_test_2_to_4": ("Figures 2 to 4: raw, improved gate, line through four points", jumps,

@@ -5,15 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core.comparators import channels
+from ftproc.core.comparators import channels, walks
 
 TIME = np.arange(60.0)
 RNG = np.random.default_rng(0)
 
 
-def gate(z, threshold=0.06, check_first=False, time=TIME, angular=False):
+def held(threshold, order=0, window=1, longest=10**6, angular=False):
+    return channels.Predictor(order, window, threshold, longest, 1.0, angular)
+
+
+def gate(z, threshold=0.06, check_first=False, time=TIME, **how):
     z = np.asarray(z, float)
-    return channels.gate(time[: len(z)], z, threshold, 1.0, angular, check_first)
+    return channels.gate(time[: len(z)], z, held(threshold, **how), check_first)
 
 
 # --- the simple gate ----------------------------------------------------------------------------------------------
@@ -50,9 +54,9 @@ def test_threshold_grows_with_the_gap_and_azimuth_is_taken_the_short_way():
 # --- the line through four points ---------------------------------------------------------------------------------
 
 
-def line(z, threshold=0.6, time=TIME, angular=False):
+def line(z, threshold=0.6, time=TIME, order=1, window=4, longest=3, angular=False):
     z = np.asarray(z, float)
-    return channels.four_point_line(time[: len(z)], z, threshold, 1.0, angular)
+    return channels.least_squares(time[: len(z)], z, held(threshold, order, window, longest, angular))
 
 
 def test_weights_of_the_last_four_are_minus_half_nought_half_one():
@@ -103,13 +107,14 @@ def test_line_follows_an_azimuth_across_the_cut():
 # --- the anti-outlier Kalman filter -------------------------------------------------------------------------------
 
 
-def kalman(z, x0, own_only=False, small_gain=0.002, gate=4.0):
+def kalman(z, x0, own_only=False, small_gain=0.002, gate=4.0, order=0, window=1, longest=10**6):
     """With the paper's Q = 0.006, R = 0.002, P0 = 0.01."""
     z = np.asarray(z, float)
     m = z.shape[1]
     p0, noise, gained = np.full(m, 0.01), np.full(m, 0.002), np.full(m, 0.006)
-    model = channels.Walk(np.zeros(m, np.int64), np.asarray(x0, float), p0, noise, gained, 1.0)
-    return channels.outlier_kalman(TIME[: len(z)], z, model, gate, small_gain, own_only)
+    nought, one = np.zeros(m, np.int64), np.ones(m, np.int64)
+    model = walks.Walk(nought, np.asarray(x0, float), p0, noise, gained, order * one, window * one, longest, 1.0)
+    return walks.outlier_kalman(TIME[: len(z)], z, model, gate, small_gain, own_only)
 
 
 def test_from_the_papers_wrong_start_the_gate_opens_at_the_eighth_recursion():
@@ -152,6 +157,16 @@ def test_improved_filter_survives_six_outliers_in_a_row(run):
     np.testing.assert_array_equal(np.flatnonzero(weight[:, 0] == 0), np.arange(15, 15 + run))
 
 
+@pytest.mark.parametrize("order", [0, 1])
+def test_the_second_of_three_components_is_an_azimuth(order):
+    """It crosses the cut; a component that did so without being an angle would jump by a full turn."""
+    turning = 3.0 + 0.02 * TIME
+    z = np.stack([100 + TIME, (turning + np.pi) % (2 * np.pi) - np.pi, 0.01 * TIME], 1)
+    value, *_, weight = kalman(z, z[0], own_only=True, gate=30.0, order=order, window=3)
+    assert weight[:, 1].all()
+    np.testing.assert_allclose(value[3:, 1], turning[3:], atol=0.05)
+
+
 def test_missing_reading_leaves_the_value_and_widens_it():
     z = np.array([[0.0, 0.0], [np.nan, 0.1], [0.0, np.nan]])
     value, variance, innovation, _, weight = kalman(z, (0, 0))
@@ -164,13 +179,14 @@ def test_missing_reading_leaves_the_value_and_widens_it():
 # --- repaired by a window -----------------------------------------------------------------------------------------
 
 
-def walk(z, kind=channels.WALK, threshold=5.0, noise=1.0, gained=1.0, time=TIME, angular=False):
+def walk(z, kind=walks.WALK, threshold=5.0, noise=1.0, gained=1.0, time=TIME, order=0, window=10, angular=False):
     z = np.asarray(z, float)
-    return channels.repaired_walk(time[: len(z)], z, channels.Repair(kind, threshold, noise, gained, 1.0, angular))
+    how = walks.Repair(kind, noise, gained, 0.9, 0.3)
+    return walks.repaired_walk(time[: len(z)], z, how, held(threshold, order, window, 16, angular))
 
 
 @pytest.mark.parametrize("run", [1, 5, 16])
-@pytest.mark.parametrize("kind", [channels.WALK, channels.RELIABLE, channels.RELIABLE_LITERAL])
+@pytest.mark.parametrize("kind", [walks.WALK, walks.RELIABLE, walks.RELIABLE_LITERAL])
 def test_repaired_value_of_a_line_is_exact_for_up_to_sixteen_in_a_row(run, kind):
     z = 300 + 0.5 * TIME
     truth = z.copy()
@@ -198,14 +214,14 @@ def test_weights_of_the_ten_point_extrapolation():
 
 def test_literal_reliable_filter_gives_back_its_input():
     z = 300 + np.cumsum(RNG.standard_normal(60))
-    value, *_ = walk(z, channels.RELIABLE_LITERAL, threshold=50)
+    value, *_ = walk(z, walks.RELIABLE_LITERAL, threshold=50)
     np.testing.assert_array_equal(value, z)
 
 
 def test_regularised_reliable_filter_smooths_but_less_than_it_follows():
     truth = 377.8 - 15 * np.cos(0.083 * TIME)
     z = truth + 3 * RNG.standard_normal(60)
-    value, *_ = walk(z, channels.RELIABLE, threshold=50, noise=9.0)
+    value, *_ = walk(z, walks.RELIABLE, threshold=50, noise=9.0)
     error, raw = (np.sqrt(np.mean((v - truth)[10:] ** 2)) for v in (value, z))
     assert error < 0.95 * raw
     assert np.sqrt(np.mean((value - z) ** 2)) < 1.5
@@ -241,3 +257,140 @@ def test_walk_follows_an_azimuth_across_the_cut():
     turning = 3.0 + 0.02 * TIME
     value, *_ = walk((turning + np.pi) % (2 * np.pi) - np.pi, threshold=0.5, noise=1e-6, gained=1e-3, angular=True)
     np.testing.assert_allclose(value, turning, atol=2e-3)
+
+
+# --- about a polynomial -------------------------------------------------------------------------------------------
+
+JITTERED = np.cumsum(RNG.uniform(0.5, 1.5, 40))
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("window", [1, 2, 3, 5, 9])
+def test_residuals_are_those_of_a_fitted_polynomial(order, window):
+    z = RNG.standard_normal(40)
+    z[[4, 20]] = np.nan
+    off, gained = channels.residuals(JITTERED, z, channels.Predictor(order, window, 1.0, 1, 1.0, False))
+    there = np.flatnonzero(np.isfinite(z))
+    for i, k in enumerate(there):
+        if i < window or JITTERED[k] - JITTERED[there[i - 1]] > 1.5:
+            assert np.isnan(off[k])
+            assert np.isnan(gained[k])
+            continue
+        rows = there[i - window : i]
+        fitted = np.polynomial.Polynomial.fit(JITTERED[rows], z[rows], min(order, window - 1))
+        expected, before = fitted(JITTERED[k]), fitted(JITTERED[rows[-1]])
+        assert off[k] == pytest.approx(z[k] - expected, abs=1e-9)
+        assert gained[k] == pytest.approx(z[k] - z[rows[-1]] - (expected - before), abs=1e-9)
+    assert np.isfinite(off).sum() >= 40 - 2 * window - 20
+
+
+def test_a_polynomial_through_few_instants_has_a_lower_degree():
+    """Three readings at one instant: their mean, whatever the degree."""
+    time, z = np.array([1.0, 1.0, 1.0, 2.0]), np.array([1.0, 2.0, 6.0, 0.0])
+    for order in (0, 1, 2):
+        off, _ = channels.residuals(time, z, channels.Predictor(order, 3, 1.0, 1, 1.0, False))
+        assert off[3] == pytest.approx(-3.0)
+
+
+def flying(order):
+    """A path that a polynomial of this degree follows."""
+    return 100 + 40 * TIME + (1.5 * TIME**2 if order == 2 else 0.0)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("check_first", [False, True])
+def test_a_flying_target_needs_a_polynomial(order, check_first):
+    """Outliers of 30 m, with 40 m and more between readings; degree 0 cannot see them."""
+    z = flying(order)
+    bad = [20, 21, 22, 40]
+    z[bad] += 30
+    seen = gate(z, 5.0, check_first, order=order, window=order + 2)
+    np.testing.assert_array_equal(np.flatnonzero(seen == 0), bad)
+    assert gate(z, 2.0 * np.abs(np.diff(z)).max(), check_first).all()
+
+
+def test_a_checked_beginning_drops_readings_until_they_agree():
+    z = flying(1)
+    z[[0, 2]] += 500
+    weight = gate(z, 5.0, True, order=1, window=3)
+    np.testing.assert_array_equal(np.flatnonzero(weight == 0), [0, 1, 2])
+    assert gate(z, 5.0, False, order=1, window=3)[3:6].sum() == 0
+
+
+def test_so_many_in_a_row_are_the_track():
+    z = flying(1)
+    z[20:] += 1e6
+    for longest in (3, 7):
+        kept = gate(z, 5.0, order=1, window=3, longest=longest)
+        np.testing.assert_array_equal(np.flatnonzero(kept == 0), np.arange(20, 20 + longest - 1))
+        *_, weight = kalman(np.stack([z, z], 1), z[[0, 0]], order=1, window=3, longest=longest)
+        np.testing.assert_array_equal(np.flatnonzero(weight[:, 0] == 0), np.arange(20, 20 + longest - 1))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_kalman_filter_about_a_polynomial_follows_a_flight(order):
+    """The plain walk rejects nearly all of it; about a polynomial a patch is bridged, and what follows is taken."""
+    z = np.stack([flying(order), flying(order)], 1)
+    truth = z.copy()
+    z[30:35, 0] += 15
+    value, variance, _, _, weight = kalman(z, z[0], own_only=True, order=order, window=5)
+    np.testing.assert_array_equal(np.argwhere(weight == 0), [[k, 0] for k in range(30, 35)])
+    np.testing.assert_allclose(value[5:], truth[5:], atol=0.2)
+    assert (np.diff(variance[29:36, 0]) > 0)[:5].all()
+    plain = kalman(z, z[0], own_only=True)
+    assert plain[4].mean() < 0.2
+
+
+def test_gate_of_the_kalman_filter_opens_with_the_power_of_the_degree():
+    """After j intervals without a good reading the variance of its prediction has grown by Q j^(2 order)."""
+    z = np.stack([flying(2), flying(2)], 1)
+    z[30:36] = np.nan
+    for order, power in ((0, 1), (1, 2), (2, 4)):
+        _, variance, _, _, _ = kalman(z, z[0], gate=1e6, order=order, window=4)
+        gained = variance[30:36, 0] - variance[29, 0]
+        np.testing.assert_allclose(gained, 0.006 * np.arange(1, 7.0) ** power, rtol=1e-9)
+
+
+@pytest.mark.parametrize("kind", [walks.WALK, walks.RELIABLE, walks.RELIABLE_LITERAL])
+@pytest.mark.parametrize("order", [1, 2])
+def test_repair_about_a_polynomial_is_exact_on_it(kind, order):
+    truth = flying(order)
+    z = truth.copy()
+    z[30:38] += 150
+    z[45] = np.nan
+    value, *_, weight, repaired = walk(z, kind, 10.0, order=order, window=6)
+    np.testing.assert_array_equal(np.flatnonzero(weight == 0), [*range(30, 38), 45])
+    np.testing.assert_allclose(repaired, truth, atol=1e-6)
+    np.testing.assert_allclose(value, truth, atol=1e-6)
+
+
+def test_good_readings_after_a_long_patch_do_not_bend_the_polynomial():
+    """The flight has turned in the meantime; the first good reading is taken, and those that follow."""
+    truth = np.where(TIME < 33, 40 * TIME, 40 * 33 + 43 * (TIME - 33))
+    z = truth + 0.3 * RNG.standard_normal(60)
+    z[30:37] += 400
+    *_, weight, _ = walk(z, threshold=12.0, order=1, window=6)
+    np.testing.assert_array_equal(np.flatnonzero(weight == 0), np.arange(30, 37))
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_the_unit_of_time_does_not_matter(order):
+    """Thresholds and variances are those of one interval, whatever it lasts."""
+    z = 3 * RNG.standard_normal(60) + 100
+    z[20:24] += 40
+    z[[30, 31]] = np.nan
+    time = np.cumsum(RNG.uniform(0.6, 1.4, 60))
+    found = []
+    for unit in (1.0, 0.05):
+        how = channels.Predictor(order, order + 3, 12.0, 16, unit, False)
+        whole = np.full(2, order), np.full(2, order + 3)
+        model = walks.Walk(np.zeros(2, np.int64), z[[0, 0]], *np.full((3, 2), 9.0), *whole, 16, unit)
+        both = np.stack([z, z], 1)
+        found.append([
+            *walks.repaired_walk(unit * time, z, walks.Repair(walks.WALK, 9.0, 9.0, 0.9, 0.3), how),
+            *walks.outlier_kalman(unit * time, both, model, 4.0, 0.002, True),
+            *channels.least_squares(unit * time, z, how),
+            channels.gate(unit * time, z, how, True),
+        ])  # fmt: skip
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-6)

@@ -12,6 +12,7 @@ from hypothesis.extra import numpy as hnp
 
 from ftproc.errors import FtprocError, UsageError
 from ftproc.files.reading import logs
+from ftproc.files.reading.meaning import readings
 from ftproc.files.writing import flights
 from ftproc.records import MeasurementLog
 from tests.files.conftest import Make, refused
@@ -19,7 +20,8 @@ from tests.files.conftest import Make, refused
 HEADER = "time_s,range_m,azimuth_rad,elevation_rad\n"
 NAN = math.nan
 
-finite = st.floats(allow_nan=False, allow_infinity=False)
+#: What can be a reading: some numbers stand for "no reading" and are found as such.
+finite = st.floats(allow_nan=False, allow_infinity=False).filter(lambda number: number not in readings.NUMBERS)
 small_angle = st.floats(-1.5, 1.5)
 
 

@@ -25,38 +25,13 @@ _AGREE = 0.8  # of the jumps fall on changes of the column that tells targets ap
 
 #: Words in the names of columns that number targets.
 WORDS = frozenset(
-    [
-        *("track", "trk", "target", "tgt", "trn", "trackno", "trackid", "targetid", "object", "objectid", "obj"),
-        *(
-            "beacon",
-            "icao",
-            "callsign",
-            "squawk",
-            "acaddr",
-            "address",
-            "mode3a",
-            "tid",
-            "aircraft",
-            "tail",
-            "tracknumber",
-        ),
-        *(
-            "tracknumber",
-            "icao24",
-            "acid",
-            "flight",
-            "id",
-            "tracknum",
-            "targetno",
-            "code",
-            "ssr",
-            "vehicle",
-            "ship",
-            "mmsi",
-            "reg",
-        ),
-    ]
-)
+    (
+        "track", "trk", "target", "tgt", "trn", "tid", "trackno", "trackid", "tracknum", "tracknumber",
+        "targetid", "targetno", "object", "objectid", "obj", "id", "code", "icao", "icao24", "callsign",
+        "squawk", "beacon", "ssr", "mode3a", "acid", "acaddr", "address", "aircraft", "tail", "reg", "flight",
+        "vehicle", "ship", "mmsi",
+    )
+)  # fmt: skip
 
 
 class Column(NamedTuple):

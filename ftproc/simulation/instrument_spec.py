@@ -1,0 +1,68 @@
+"""The text that names the errors of an instrument, such as `mislevel_mrad=0.6,refraction=2.8e-4`."""
+
+from __future__ import annotations
+
+import math
+
+from ftproc.errors import UsageError, nearest
+from ftproc.simulation.instrument import InstrumentErrors
+
+#: The fields of `InstrumentErrors`, and the largest size of each: m, rad, refractivity.
+LARGEST = {
+    "range_zero_m": 1e5,
+    "azimuth_zero_rad": 0.1,
+    "elevation_zero_rad": 0.1,
+    "mislevel_rad": 0.1,
+    "mislevel_azimuth_rad": 2 * math.pi,
+    "collimation_rad": 0.1,
+    "refraction": 0.01,
+}
+ANGLES = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180, "arcsec": math.pi / 648_000}
+
+INSTRUMENT_GRAMMAR = """\
+NAME=VALUE,... or none. They are constant over the flight; those left out are zero. An angle may be in mrad, urad, rad,
+deg or arcsec, by the end of its name.
+  range_zero_m, azimuth_zero_mrad, elevation_zero_mrad
+                        zero-set errors, added to the reading
+  mislevel_mrad         tilt of the vertical axis,
+  mislevel_azimuth_deg  towards this azimuth
+  collimation_mrad      angle between the line of sight and the normal of the trunnion axis
+  refraction            refractivity n - 1 at the station: 2.8e-4 for light, 3.2e-4 for radar
+"""
+
+
+def parse_instrument(text: str) -> InstrumentErrors:
+    """The errors in a text as INSTRUMENT_GRAMMAR describes it. Raises UsageError."""
+    found: dict[str, float] = {}
+    for item in [] if text.strip() == "none" else text.split(","):
+        written, _, value = (part.strip() for part in item.partition("="))
+        name, scale = _named(written)
+        if name in found:
+            raise UsageError(f"--instrument-errors: {name.removesuffix('_rad')} is given twice; leave one out.")
+        found[name] = _size(written, value, scale, LARGEST[name] / scale)
+    return InstrumentErrors(**found)
+
+
+def _named(written: str) -> tuple[str, float]:
+    """The field of `InstrumentErrors` and the size of the unit that a name ends in. Raises UsageError."""
+    known = {name: (name, 1.0) for name in LARGEST if not name.endswith("_rad")}
+    for name in LARGEST:
+        if name.endswith("_rad"):
+            known |= {f"{name.removesuffix('_rad')}_{unit}": (name, size) for unit, size in ANGLES.items()}
+    if written not in known:
+        short = ", ".join(name.replace("_rad", "_mrad") for name in LARGEST)
+        raise UsageError(
+            f'--instrument-errors: there is no error "{written}"{nearest(written, known) or "."} There are {short}.'
+        )
+    return known[written]
+
+
+def _size(written: str, value: str, scale: float, most: float) -> float:
+    """The value in m, rad or refractivity. Raises UsageError."""
+    try:
+        size = float(value)
+    except ValueError:
+        size = math.nan
+    if not abs(size) <= most:
+        raise UsageError(f'--instrument-errors: {written} = "{value}": expected a number from {-most:g} to {most:g}.')
+    return size * scale
