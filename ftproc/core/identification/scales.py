@@ -32,7 +32,7 @@ class Scales(NamedTuple):
     @property
     def exact(self) -> NDArray[np.bool_]:
         """(3,) which components show no noise, beside the noisiest."""
-        return np.less(self.noise_m, EXACT * self.noise_m.max())
+        return np.asarray(self.noise_m < EXACT * self.noise_m.max(), np.bool_)
 
     @property
     def typical_noise_m(self) -> float:
