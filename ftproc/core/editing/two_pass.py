@@ -133,9 +133,9 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
     decision = decide(record, Decision(record.screened, model, starts, rates), tune_first=True)
     record, decision = allow_for_late_stamps(record, decision)
     record, decision = allow_for_tails(record, decision)
+    record, decision = allow_for_drift(record, decision)
     if jerk_psd is None:
         decision = reassess(record, decision)
-    record, decision = allow_for_drift(record, decision)
     if segment_of is None:
         decision = allow_for_colour(record, decision)
     log = record.weighted(decision.weight)
