@@ -119,7 +119,7 @@ samples: $(installed) ## make sample_data/ anew (fixed seeds: the same bytes)
 	$(ftproc) simulate --scenario radar --seed 11 \
 	  --units range=km,azimuth=deg,elevation=deg --azimuth-from north \
 	  -o sample_data/radar.csv --truth sample_data/radar.truth.csv
-	$(ftproc) simulate --scenario calibration --seed 1 --duration 600 --dt 0.5 --instrument-errors \
+	$(ftproc) simulate --scenario calibration --seed 1 --duration 600 --dt 0.5 --instrument \
 	  azimuth_zero_mrad=0.3,elevation_zero_mrad=-0.2,mislevel_mrad=0.6,mislevel_azimuth_rad=0.7,collimation_mrad=0.4,refraction=2.8e-4 \
 	  -o sample_data/calibration/circle.parquet --truth sample_data/calibration/circle.truth.parquet
 	$(ftproc) simulate --scenario zuo2021-outliers --seed 5 --noise 0.02,0.00003,0.00003 --azimuth-from north \

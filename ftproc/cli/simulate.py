@@ -24,7 +24,7 @@ def _scenarios_and_grammar() -> str:
     scenarios = list_scenarios()
     width = max(map(len, scenarios))
     names = "".join(f"  {name.ljust(width)}  {text}\n" for name, text in scenarios.items())
-    instrument = f"Errors of the instrument (--instrument-errors):\n{INSTRUMENT_GRAMMAR}"
+    instrument = f"Errors of the instrument (--instrument):\n{INSTRUMENT_GRAMMAR}"
     return f"Scenarios:\n{names}\nOutliers (--outliers):\n{GRAMMAR}\n{instrument}"
 
 
@@ -50,10 +50,12 @@ def _scenarios_and_grammar() -> str:
     "--outliers", metavar="SPEC", help="Outliers and gaps of the log, or none; see below. [default: scenario's]"
 )
 @click.option(
+    "--instrument",
     "--instrument-errors",
+    "instrument_errors",
     metavar="SPEC",
-    help="Errors of the instrument that repeat, such as mislevel_mrad=0.6,refraction=2.8e-4, or none; see below. "
-    "[default: scenario's]",
+    help="Errors of the instrument beside white noise, such as mislevel_mrad=0.6,stamp_jitter_s=0.005, or none; see "
+    "below. [default: scenario's]",
 )
 @options.units("Units to write, such as range=km,azimuth=deg; they show in the column names. [default: m, rad, s]")
 @options.azimuth_from(

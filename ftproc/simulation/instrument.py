@@ -1,4 +1,4 @@
-"""The measurement by an instrument: constant errors, refraction, and random noise."""
+"""The measurement by an instrument: its zero-set, refraction, noise, late time stamps, rounding and held readings."""
 
 from __future__ import annotations
 
@@ -8,19 +8,23 @@ from itertools import accumulate
 import numpy as np
 
 from ftproc.core.model.frames import from_cartesian, to_cartesian, wrap
-from ftproc.records import FloatArray
+from ftproc.records import COMPONENTS, FloatArray
 
 REFRACTION_SCALE_HEIGHT_M = 8000.0
 
 
 @dataclass(frozen=True)
 class InstrumentErrors:
-    """Constant errors of a station; the default is a perfect one. Angles in rad.
+    """Errors of a station beside its white noise; the default is a perfect one. Angles in rad.
 
     range_zero_m, azimuth_zero_rad, elevation_zero_rad: added to the reading (zero-set errors).
     mislevel_rad: tilt of the vertical axis towards the azimuth mislevel_azimuth_rad.
     collimation_rad: angle between line of sight and normal of the trunnion axis; its azimuth error is this over cos E.
     refraction: refractivity n - 1 at the station, 2.8e-4 for light, about 3.2e-4 for radar, 0 for none.
+    *_wander_*: 1-sigma of a first-order Gauss-Markov offset of the component; wander_s: its correlation time.
+    stamp_jitter_s: 1-sigma by which the instant of a sample differs from its time stamp, the same for its components.
+    *_rounding_*: step to which the readings are rounded, 0 for none.
+    *_held: samples for which a reading of the component is repeated, 1 for none.
     """
 
     range_zero_m: float = 0.0
@@ -30,6 +34,23 @@ class InstrumentErrors:
     mislevel_azimuth_rad: float = 0.0
     collimation_rad: float = 0.0
     refraction: float = 0.0
+    range_wander_m: float = 0.0
+    azimuth_wander_rad: float = 0.0
+    elevation_wander_rad: float = 0.0
+    wander_s: float = 1.0
+    stamp_jitter_s: float = 0.0
+    range_rounding_m: float = 0.0
+    azimuth_rounding_rad: float = 0.0
+    elevation_rounding_rad: float = 0.0
+    range_held: float = 1.0
+    azimuth_held: float = 1.0
+    elevation_held: float = 1.0
+
+    def of_components(self, what: str) -> tuple[float, float, float]:
+        """The field that ends so (but for its unit) of range, azimuth and elevation: "wander", "rounding", "held"."""
+        units = ("", "", "") if what == "held" else ("_m", "_rad", "_rad")
+        found = (getattr(self, f"{c}_{what}{unit}") for c, unit in zip(COMPONENTS, units, strict=True))
+        return next(found), next(found), next(found)
 
 
 PERFECT = InstrumentErrors()
@@ -95,6 +116,24 @@ def unit_noise(
         steps = zip(memory.tolist(), (fresh * w[1:]).tolist(), strict=True)
         columns.append(list(accumulate(steps, lambda x, step: step[0] * x + step[1], initial=float(w[0]))))
     return np.array(columns).T
+
+
+def wandering(time_s: FloatArray, errors: InstrumentErrors, rng: np.random.Generator) -> FloatArray:
+    """(n, 3) offsets that wander: range m, azimuth rad, elevation rad."""
+    return np.asarray(errors.of_components("wander") * unit_noise(time_s, errors.wander_s, None, rng))
+
+
+def rounded(reading: FloatArray, errors: InstrumentErrors) -> FloatArray:
+    """(n, 3) readings on the instrument's grid."""
+    step = np.array(errors.of_components("rounding"))
+    return np.where(step > 0, np.round(reading / np.where(step > 0, step, 1.0)) * step, reading)
+
+
+def held(values: np.ndarray, errors: InstrumentErrors) -> np.ndarray:
+    """(n, 3) of each component the value that it had when it was last taken."""
+    sample = np.arange(len(values))
+    every = np.array(errors.of_components("held"), int)
+    return np.stack([values[sample - sample % every[c], c] for c in range(3)], axis=1)
 
 
 def readable(reading: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""The text that names the errors of an instrument, such as `mislevel_mrad=0.6,refraction=2.8e-4`."""
+"""The text that names the errors of an instrument, such as `mislevel_mrad=0.6,stamp_jitter_s=0.005`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 from ftproc.errors import UsageError, nearest
 from ftproc.simulation.instrument import InstrumentErrors
 
-#: The fields of `InstrumentErrors`, and the largest size of each: m, rad, refractivity.
+#: The fields of `InstrumentErrors`, and the largest size of each: m, rad, refractivity, s, samples.
 LARGEST = {
     "range_zero_m": 1e5,
     "azimuth_zero_rad": 0.1,
@@ -16,18 +16,37 @@ LARGEST = {
     "mislevel_azimuth_rad": 2 * math.pi,
     "collimation_rad": 0.1,
     "refraction": 0.01,
+    "range_wander_m": 1e5,
+    "azimuth_wander_rad": 0.1,
+    "elevation_wander_rad": 0.1,
+    "wander_s": 1e5,
+    "stamp_jitter_s": 10.0,
+    "range_rounding_m": 1e5,
+    "azimuth_rounding_rad": 0.1,
+    "elevation_rounding_rad": 0.1,
+    "range_held": 1000,
+    "azimuth_held": 1000,
+    "elevation_held": 1000,
 }
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180, "arcsec": math.pi / 648_000}
 
 INSTRUMENT_GRAMMAR = """\
-NAME=VALUE,... or none. They are constant over the flight; those left out are zero. An angle may be in mrad, urad, rad,
-deg or arcsec, by the end of its name.
+NAME=VALUE,... or none. Those left out are zero. An angle may be in mrad, urad, rad, deg or arcsec, by the end of its
+name.
   range_zero_m, azimuth_zero_mrad, elevation_zero_mrad
                         zero-set errors, added to the reading
   mislevel_mrad         tilt of the vertical axis,
   mislevel_azimuth_deg  towards this azimuth
   collimation_mrad      angle between the line of sight and the normal of the trunnion axis
   refraction            refractivity n - 1 at the station: 2.8e-4 for light, 3.2e-4 for radar
+  range_wander_m, azimuth_wander_mrad, elevation_wander_mrad
+                        1 sigma of an offset that wanders (first-order Gauss-Markov),
+  wander_s              with this correlation time (1 s)
+  stamp_jitter_s        1 sigma by which time stamps are off, the same for the components of a sample
+  range_rounding_m, azimuth_rounding_mrad, elevation_rounding_mrad
+                        step to which the readings are rounded
+  range_held, azimuth_held, elevation_held
+                        samples for which a reading is repeated
 """
 
 
@@ -38,8 +57,8 @@ def parse_instrument(text: str) -> InstrumentErrors:
         written, _, value = (part.strip() for part in item.partition("="))
         name, scale = _named(written)
         if name in found:
-            raise UsageError(f"--instrument-errors: {name.removesuffix('_rad')} is given twice; leave one out.")
-        found[name] = _size(written, value, scale, LARGEST[name] / scale)
+            raise UsageError(f"--instrument: {name.removesuffix('_rad')} is given twice; leave one out.")
+        found[name] = _size(written, value, scale, (_least(name) / scale, LARGEST[name] / scale))
     return InstrumentErrors(**found)
 
 
@@ -52,17 +71,27 @@ def _named(written: str) -> tuple[str, float]:
     if written not in known:
         short = ", ".join(name.replace("_rad", "_mrad") for name in LARGEST)
         raise UsageError(
-            f'--instrument-errors: there is no error "{written}"{nearest(written, known) or "."} There are {short}.'
+            f'--instrument: there is no error "{written}"{nearest(written, known) or "."} There are {short}.'
         )
     return known[written]
 
 
-def _size(written: str, value: str, scale: float, most: float) -> float:
-    """The value in m, rad or refractivity. Raises UsageError."""
+def _least(name: str) -> float:
+    """The smallest value of a field: what is no offset has no sign."""
+    if name.endswith("_held"):
+        return 1.0
+    return 0.0 if any(word in name for word in ("wander", "jitter", "rounding")) else -LARGEST[name]
+
+
+def _size(written: str, value: str, scale: float, bounds: tuple[float, float]) -> float:
+    """The value in m, rad, refractivity, s or samples. Raises UsageError."""
     try:
         size = float(value)
     except ValueError:
         size = math.nan
-    if not abs(size) <= most:
-        raise UsageError(f'--instrument-errors: {written} = "{value}": expected a number from {-most:g} to {most:g}.')
+    least, most = bounds
+    whole = written.endswith("_held")
+    if not least <= size <= most or (whole and size != int(size)):
+        what = "a whole number" if whole else "a number"
+        raise UsageError(f'--instrument: {written} = "{value}": expected {what} from {least:g} to {most:g}.')
     return size * scale

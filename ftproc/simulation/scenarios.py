@@ -19,7 +19,7 @@ class Scenario:
 
     flights: kinds in `flights.FLIGHTS`, one is drawn. duration_s: uniform. dt_s: one is drawn.
     range_noise_m, angle_noise_rad: 1-sigma, log-uniform; elevation has the angle noise times a draw of
-    `elevation_ratio`. outliers: specifications (see `outlier_spec.GRAMMAR`), one is drawn. instrument: constant
+    `elevation_ratio`. outliers: specifications (see `outlier_spec.GRAMMAR`), one is drawn. instrument: its
     errors. members: when given, one of these scenarios is drawn instead of all of the above.
     """
 

@@ -12,7 +12,7 @@ from ftproc.errors import UsageError
 from ftproc.records import FloatArray, IntArray, MeasurementLog, Truth
 from ftproc.simulation.contamination import contaminate
 from ftproc.simulation.flights import FLIGHTS
-from ftproc.simulation.instrument import InstrumentErrors, readable, systematic, unit_noise
+from ftproc.simulation.instrument import InstrumentErrors, held, readable, rounded, systematic, unit_noise, wandering
 from ftproc.simulation.outlier_spec import OutlierSpec, parse_outliers
 from ftproc.simulation.sampling import kept_rows, row_count, sample_times, with_duplicates
 from ftproc.simulation.scenarios import Plan, draw, find_scenario
@@ -21,7 +21,7 @@ MAX_DURATION_S = 1e5
 MAX_ROWS = 10_000_000
 
 # One child generator each, so that flight and noise do not depend on the outlier specification.
-_STREAMS = ("plan", "flight", "times", "noise", "outliers", "gaps", "duplicates")
+_STREAMS = ("plan", "flight", "times", "noise", "outliers", "gaps", "duplicates", "instrument")
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def simulate(
     scenario: a name in `list_scenarios()`. seed: of flight, noise and outliers; the same seed gives the same bytes.
     duration_s, dt_s: length of the record and sample interval; samples at 0 and at the end are both included. noise:
     1-sigma of range m, azimuth rad, elevation rad. outliers: a specification, see `GRAMMAR`; it replaces the
-    scenario's own. instrument: constant errors of the station. None: from the scenario.
+    scenario's own. instrument: errors of the station beside its white noise. None: from the scenario.
 
     A = atan2(y, x) in [-pi, pi), E = atan2(z, hypot(x, y)), range >= 0 (Zuo et al. 2021 eq. 3, read as
     arctangents). Sizes in sigmas are of this noise; where it is zero, of the scenario's.
@@ -105,9 +105,12 @@ def _measure(plan: Plan, sigma: FloatArray, name: str, streams: dict[str, np.ran
     flight = FLIGHTS[plan.flight](streams["flight"], plan.duration_s)
     time = sample_times(plan.duration_s, plan.dt_s, spec.jitter, streams["times"])
     position, velocity, acceleration = flight.at(time)
-    exact = systematic(position, plan.instrument)
+    late = plan.instrument.stamp_jitter_s * streams["instrument"].standard_normal(len(time))
+    seen = flight.at(np.clip(time + late, time[0], time[-1]))[0] if late.any() else position
+    exact = systematic(seen, plan.instrument) + wandering(time, plan.instrument, streams["instrument"])
     clean = exact + plan.noise * unit_noise(time, spec.correlation_s, spec.tails_dof, streams["noise"])
     reading, code = contaminate(clean, spec.faults, sigma, streams["outliers"])
+    reading, code = held(rounded(reading, plan.instrument), plan.instrument), held(code, plan.instrument)
     rows, fresh = _rows(time, spec, streams)
     second = exact[rows] + plan.noise * streams["duplicates"].standard_normal((len(rows), 3))
     clean = np.where(fresh[:, None], second, clean[rows])

@@ -1,5 +1,6 @@
 """`python -m tests.bench [NAME...]`: tables of the README and the guide, as Markdown on standard output and in
-out/bench.md. The names: samples, accuracy, methods, rivals, correction, speed, start, scale, pages, training."""
+out/bench.md. The names: samples, accuracy, methods, rivals, instruments, correction, speed, start, scale, pages,
+training."""
 
 from __future__ import annotations
 
@@ -8,13 +9,26 @@ from collections.abc import Iterable, Sequence
 from itertools import chain
 from pathlib import Path
 
-from tests.bench import accuracy, correction, methods, pages, rivals, samples, scale, speed, start, training
+from tests.bench import (
+    accuracy,
+    correction,
+    instruments,
+    methods,
+    pages,
+    rivals,
+    samples,
+    scale,
+    speed,
+    start,
+    training,
+)
 
 TABLES = {
     "samples": samples,
     "accuracy": accuracy,
     "methods": methods,
     "rivals": rivals,
+    "instruments": instruments,
     "correction": correction,
     "speed": speed,
     "start": start,

@@ -81,7 +81,7 @@ ERRORS = (
 )
 FLY, NEXT = (
     f"ftproc simulate --scenario calibration --seed {seed} --duration {duration_s} \\\n"
-    f"    -o {name}.csv --truth {name}.gps.csv --instrument-errors \\\n    {ERRORS}"
+    f"    -o {name}.csv --truth {name}.gps.csv --instrument \\\n    {ERRORS}"
     for name, seed, duration_s in (("circle", 1, 600), ("next", 2, 200))
 )
 TRAIN = "ftproc train --log circle.csv --truth circle.gps.csv -o theodolite.safetensors"

@@ -35,6 +35,42 @@ def test_units_are_those_of_the_name(text: str, name: str, value: float) -> None
     assert getattr(parse_instrument("azimuth_zero_mrad=1," + text), name) == pytest.approx(value, rel=1e-15)
 
 
+def test_what_has_no_sign_has_none() -> None:
+    for name in ("range_wander_m", "stamp_jitter_s", "azimuth_rounding_mrad"):
+        with pytest.raises(UsageError, match="expected a number from 0 to"):
+            parse_instrument(f"{name}=-1")
+    for value in ("0", "2.5", "1001"):
+        with pytest.raises(UsageError, match="expected a whole number from 1 to 1000"):
+            parse_instrument(f"range_held={value}")
+
+
+def test_each_effect_is_in_the_readings_and_the_truth_stays() -> None:
+    def measured(text: str, scenario: str = "manoeuvre-clean") -> tuple[np.ndarray, np.ndarray]:
+        flight = simulate(scenario, seed=3, duration_s=30, outliers="none", instrument=parse_instrument(text))
+        return flight.log.measurement, np.hstack([flight.truth.position_m, flight.truth.velocity_mps])
+
+    plain, truth = measured("none")
+    rounded, same = measured("range_rounding_m=8,elevation_rounding_mrad=2")
+    assert (truth == same).all()
+    np.testing.assert_allclose(rounded[:, 0] / 8, np.round(plain[:, 0] / 8), atol=1e-9)
+    np.testing.assert_allclose(rounded[:, 2] / 2e-3, np.round(plain[:, 2] / 2e-3), atol=1e-9)
+    assert (rounded[:, 1] == plain[:, 1]).all()
+    held, same = measured("azimuth_held=4")
+    assert (truth == same).all()
+    assert (held[:, 1] == plain[np.arange(len(plain)) // 4 * 4, 1]).all()
+    assert (held[:, [0, 2]] == plain[:, [0, 2]]).all()
+    wandering, same = measured("range_wander_m=20,wander_s=0.5")
+    assert (truth == same).all()
+    off = wandering[:, 0] - plain[:, 0]
+    assert np.std(off) == pytest.approx(20, rel=0.3)
+    assert np.corrcoef(off[1:], off[:-1])[0, 1] == pytest.approx(np.exp(-0.05 / 0.5), abs=0.05)
+    late, same = measured("stamp_jitter_s=0.05")
+    assert (truth == same).all()
+    speed = np.sum(truth[:, :3] * truth[:, 3:6], 1) / np.linalg.norm(truth[:, :3], axis=1)
+    stamp = (late[:, 0] - plain[:, 0]) / speed
+    assert np.std(stamp[np.abs(speed) > 50]) == pytest.approx(0.05, rel=0.15)
+
+
 def test_none_is_a_perfect_instrument() -> None:
     assert parse_instrument("none") == InstrumentErrors()
     flight = simulate("zuo2021", seed=1, noise=(0, 0, 0), instrument=parse_instrument("range_zero_m=7"))
@@ -62,5 +98,5 @@ def test_none_is_a_perfect_instrument() -> None:
 def test_what_is_not_understood_is_a_sentence(text: str, sentence: str) -> None:
     with pytest.raises(UsageError) as raised:
         parse_instrument(text)
-    assert str(raised.value).startswith("--instrument-errors: ")
+    assert str(raised.value).startswith("--instrument: ")
     assert sentence in str(raised.value)
