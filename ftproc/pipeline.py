@@ -63,11 +63,14 @@ class Filtering:
     @cached_property
     def metadata(self) -> dict[str, Any]:
         """Settings, noise, model and summary: everything needed to reproduce the trajectory, and to judge it."""
-        summary = self.statistics.summary()
         model = self.model if self.method.corrected else None
         stage = None if model is None else model.smoother if self.settings.smooth else model.filter
-        summary["correction_linear"] = None if stage is None else stage.linear
-        summary["correction_lost_by_smoothing"] = model is not None and stage is None and model.filter.helps
+        summary = self.statistics.summary(
+            {
+                "correction_linear": None if stage is None else stage.linear,
+                "correction_lost_by_smoothing": model is not None and stage is None and model.filter.helps,
+            }
+        )
         return provenance.describe(self.log, self.method, self.settings, self.statistics, self.model, summary)
 
     def _trajectory(self, part: Part) -> Trajectory:

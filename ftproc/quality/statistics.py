@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,7 +39,7 @@ class RunStatistics:
         self.sigmas: list[FloatArray] = []
         self.jerk: list[FloatArray] = []
         self.reacquired, self.unexamined, self.stamp_s, self.drifts = 0, 0, 0.0, False
-        self.slow_noise_s, self.slow_noise_likelier = 0.0, False
+        self.slow_noise_s, self.slow_noise_likelier, self.slow_noise_separable = 0.0, False, True
         self.converged: bool | None = None
         self.largest_m, self.largest_sigma = 0.0, 0.0
         self.outside, self.rows, self.parts = 0.0, 0, 0
@@ -73,8 +74,9 @@ class RunStatistics:
         self.stamp_s = max(self.stamp_s, estimate.stamp_s)
         self.drifts |= estimate.drifts
         if estimate.alternative is not None:
-            other, likelier = estimate.alternative.model, estimate.alternative.likelier
-            self.slow_noise_likelier |= likelier
+            other = estimate.alternative.model
+            self.slow_noise_likelier |= estimate.alternative.likelier
+            self.slow_noise_separable &= estimate.alternative.separable
             self.slow_noise_s = max(self.slow_noise_s, float(other.fade_s[other.wander_variance > 0].max()))
         self.unexamined += estimate.unexamined
         self.largest_m = max(self.largest_m, float(np.linalg.norm(correction[:, :3], axis=1).max(initial=0.0)))
@@ -111,8 +113,9 @@ class RunStatistics:
         self.times.append(time_s[chosen])
         self.sigmas.append(sigma_m[chosen])
 
-    def summary(self) -> dict[str, Any]:
-        """The figures with the verdict on them, JSON-serialisable; units are in the names."""
+    def summary(self, correction: Mapping[str, Any]) -> dict[str, Any]:
+        """The figures with the verdict on them, JSON-serialisable; units are in the names. correction: what is said of
+        the model beside its figures."""
         log, absent, model = self.log, self.absent, self.model
         components: dict[str, Any] = {}
         for c, name in enumerate(COMPONENTS):
@@ -150,6 +153,7 @@ class RunStatistics:
             "editing_converged": self.converged,
             "slow_noise_s": self.slow_noise_s,
             "slow_noise_likelier": self.slow_noise_likelier,
+            "slow_noise_separable": self.slow_noise_separable,
             "time_stamp_sigma_s": self.stamp_s,
             "noise_drifts": self.drifts,
             "editing_places_unexamined": self.unexamined,
@@ -157,6 +161,7 @@ class RunStatistics:
             "correction_largest_sigma": self.largest_sigma,
             "correction_outside_training": self.outside / max(self.rows, 1),
         }
+        figures |= correction
         return figures | {"trust": verdict.verdict(verdict.remarks(figures))}
 
 

@@ -106,7 +106,7 @@ def _sigmas(s: Mapping[str, Any]) -> Iterator[Remark]:
         better = "better than motion does, but cannot be separated from it" if likelier else "as well as motion does"
         text = f"noise that is correlated over {s['slow_noise_s']:.3g} s explains the log {better}: the sigmas allow " \
                "for both, the estimate follows the motion"  # fmt: skip
-        yield Remark(UNRELIABLE if likelier else SUSPECT, text)
+        yield Remark(UNRELIABLE if likelier else CONSISTENT if s["slow_noise_separable"] else SUSPECT, text)
 
 
 def _editing(s: Mapping[str, Any]) -> Iterator[Remark]:

@@ -11,8 +11,6 @@ from ftproc.pipeline import filter_log
 from ftproc.settings import FilterSettings
 from tests.simulated import simulate
 
-pytestmark = pytest.mark.compiled
-
 
 def in_units(log, length, duration):
     """The log of the same flight, so many times as large and as slow."""

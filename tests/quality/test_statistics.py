@@ -34,7 +34,7 @@ def counted(log, estimate, edges, correction=None):
     for low, high in itertools.pairwise(edges):
         rows = estimate.rows(low, high)
         found.add(log.time_s[low:high], rows, from_cartesian(rows.run.state[:, :3]), correction[low:high], 0.25)
-    return found.summary()
+    return found.summary({})
 
 
 @pytest.mark.parametrize("size", [1, 7, 100])
@@ -75,7 +75,7 @@ def test_a_part_that_did_not_converge_decides_for_the_log(made):
     nothing = np.zeros((len(log), 6))
     for settled in (True, False, True):
         found.add(log.time_s, estimate._replace(settled=settled), log.measurement, nothing, 0.0)
-    assert found.summary()["editing_converged"] is False
+    assert found.summary({})["editing_converged"] is False
 
 
 def test_the_largest_sigmas_of_a_long_log_are_kept(made, monkeypatch):

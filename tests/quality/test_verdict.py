@@ -49,7 +49,9 @@ OFF = {"innovation_ratio": 1.5, "innovation_bounds": [0.8, 1.2], "verdict": "ove
         ({}, {"good": 60, "patch": 40, "isolated": 40}, UNRELIABLE, "57 % of the range readings are rejected"),
         ({}, {"predicted_sigma_ratio": 9.0}, SUSPECT, "range is poorly observable: its predicted sigma is 9 times"),
         ({"slow_noise_s": 3.0, "slow_noise_likelier": True}, {}, UNRELIABLE, "over 3 s explains the log better than"),
-        ({"slow_noise_s": 3.0}, {}, SUSPECT, "noise that is correlated over 3 s explains the log as well as motion"),
+        ({"slow_noise_s": 3.0}, {}, CONSISTENT, None),
+        ({"slow_noise_s": 3.0, "slow_noise_separable": False}, {}, SUSPECT,
+         "noise that is correlated over 3 s explains the log as well as motion"),
         ({"slow_noise_s": 3.0, "not_observable": ["elevation"]}, {}, SUSPECT, "elevation missing throughout"),
         ({"poorly_observable": LARGE[:1]}, {}, SUSPECT, "the position is poorly observable from 3 to 5 s: 1 sigma up "
                                                         "to 80 m"),

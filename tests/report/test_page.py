@@ -122,7 +122,7 @@ def test_words_of_the_page(text):
     assert "<strong>consistent: residuals agree with the published sigmas" in text
     part = filtered().metadata["summary"]["components"]["azimuth"]
     assert f"<td>{part['good']}</td><td>{part['isolated']}</td><td>{part['patch']}</td>" in text
-    assert "<th>jerk_psd_m2ps5</th><td>10 values, from" in text
+    assert re.search(r"<th>jerk_psd_m2ps5</th><td>\d+ values, from", text)
     assert "<th>version</th><td>" in text
     assert "<th>station</th><td>azimuth_from x, azimuth_zero_rad 0, elevation_from horizon, bias 0, 0, 0," in text
     assert "No network correction: " in text

@@ -157,7 +157,7 @@ def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
     steps = np.diff(np.unique(values))
     steps = steps[steps > 1e-12 * np.abs(values).max()]
     step = float(steps.min()) if len(steps) else np.inf
-    chance = step / (2 * np.sqrt(np.pi) * sigma) if np.isfinite(sigma) else np.inf
+    chance = step / (2 * np.sqrt(np.pi) * sigma) if 0 < sigma < np.inf else np.inf
     chance = max(chance, float(np.mean(values[1:] == values[:-1])))
     if chance >= 1:
         return found

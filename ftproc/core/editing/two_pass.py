@@ -30,6 +30,7 @@ from ftproc.core.identification import uneven_noise
 from ftproc.core.identification.likelihood import Fixed, first_jerk, without_noise
 from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.model.frames import unwrap
+from ftproc.core.model.measurement import NO_RANGE_M
 from ftproc.core.model.motion import isotropic
 
 FloatArray = NDArray[np.float64]
@@ -120,7 +121,7 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
     jerk_psd = known.jerk_psd
     screened, sigma, exact = screen(time_s, measurement)
     possible = np.isfinite(measurement) & ~stuck_readings(measurement, sigma)
-    possible[:, 0] &= measurement[:, 0] > 0  # no target is at the station, or behind it
+    possible[:, 0] &= measurement[:, 0] > NO_RANGE_M  # no target is at the station, or behind it
     fixed = Fixed(np.isfinite(known.sigma) | exact | (segment_of is not None), jerk_psd is not None)
     rounding = rounding_sigma(measurement)
     coarse = np.where(rounding > COARSE * sigma, np.sqrt(12) * rounding, 0.0)

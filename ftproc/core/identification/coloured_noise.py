@@ -43,7 +43,7 @@ FIRST_STEPS, STEPS, PROFILE_STEPS = 5, 15, 4
 SHORTEST_FADE, LONGEST_FADE = 0.3, 0.5  # intervals, and spans of the log
 STEP = 0.02  # of ln(tau), for differences
 LARGEST = 1e4  # times the variance that white noise would have
-NEGLIGIBLE = 0.02  # share of a component's variance
+NEGLIGIBLE = 0.02  # share of a component's variance, and correlation of neighbours
 LEAST_GAIN = 8.0  # in log-likelihood, for each component whose noise is called correlated
 INDEPENDENT = 20.0  # correlation times that a log must last for noise and motion to be separated
 
@@ -92,7 +92,8 @@ def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fi
     tries = [search.run(search.first(fade, calm), FIRST_STEPS) for fade in FIRST_FADES for calm in FIRST_CALMS]
     theta = search.run(min(tries, key=lambda theta: search.cost(theta)[0]), STEPS)
     model = search.model(theta)
-    correlated = model.wander_variance > NEGLIGIBLE * model.reading_variance
+    neighbours = np.exp(-scales.interval_s / model.fade_s) * model.wander_variance / model.reading_variance
+    correlated = neighbours > NEGLIGIBLE
     model = model._replace(wander_variance=np.where(correlated, model.wander_variance, 0.0))
     level = fit_profile(part, starts, fit_level(part, starts, white, fixed), PROFILE_STEPS)
     model = fit_profile(part, starts, model, PROFILE_STEPS)

@@ -28,6 +28,7 @@ CHI2_MEDIAN, MEDIAN_SPREAD = (
     0.45494,
     2.66,
 )  # of chi-square with one degree: median, and sqrt(n) sigma of its estimate's log
+SMALLEST = 1e-6  # square of a residual, in sigmas: a component that is computed from others has none
 LEAST_DRIFT = 0.15  # 1-sigma of ln(variance) over the windows, beyond chance
 LARGEST_DRIFT = 3.0  # of ln(variance)
 GOES_BACK = 0.2  # share of the changes of a rounded reading that go back to the value before: more of them is noise
@@ -94,7 +95,7 @@ def drift(log: Observations, smoothed: SmootherRun) -> FloatArray | None:
             continue
         square = smoothed.residual[seen, c] ** 2 / smoothed.residual_variance[seen, c]
         windows = np.array_split(np.arange(len(seen)), count)
-        level = np.log([np.median(square[w]) / CHI2_MEDIAN for w in windows])
+        level = np.log([max(float(np.median(square[w])), SMALLEST) / CHI2_MEDIAN for w in windows])
         chance = MEDIAN_SPREAD**2 / WINDOW
         drifting = float(np.var(level)) - chance
         if drifting < max(LEAST_DRIFT**2, 3 * chance * math.sqrt(2 / count)):
