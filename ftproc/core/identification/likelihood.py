@@ -84,7 +84,7 @@ def without_noise(log: Observations, sigma: FloatArray) -> tuple[NDArray[np.bool
     given, and what is assumed for these."""
     scales = scales_of(log, sigma**2)
     unit = np.array([1.0, scales.range_m, scales.range_m])
-    return scales.exact, np.where(scales.exact, ASSUMED * scales.typical_noise_m / unit, sigma)
+    return scales.exact, np.where(scales.exact, ASSUMED * scales.typical_noise_m, scales.noise_m) / unit
 
 
 def fit_level(
