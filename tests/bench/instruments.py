@@ -1,6 +1,6 @@
 """What real instruments do to their readings beside white noise: flights of two scenarios without outliers, measured
-with each effect. Median position error of the raw readings and of the smoother, as a share of that with white noise
-alone; how much of the truth lies inside 3 sigma; how many good readings are called outliers; and the verdicts."""
+with each effect. Median position errors of the raw readings and of the smoother; how much of the truth lies inside 3
+sigma; how many good readings are called outliers; and the verdicts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ EFFECTS = {
     "late time stamps": ("stamp_jitter_s=0.05", "stamp_jitter_s=0.5"),
     "noise correlated over 10 samples": (
         "range_wander_m=4,azimuth_wander_mrad=0.3,elevation_wander_mrad=0.3,wander_s=0.5",
-        "range_wander_m=40,azimuth_wander_mrad=1.5,elevation_wander_mrad=1.5,wander_s=40",
+        "range_wander_m=40,azimuth_wander_mrad=1.5,elevation_wander_mrad=1.5,wander_s=10",
     ),
     "angles held for 4 samples": ("azimuth_held=4,elevation_held=4", "azimuth_held=4,elevation_held=4"),
 }
@@ -60,5 +60,5 @@ def _one(flight: Simulation) -> tuple[float, float, float, float, str]:
         float(np.median(np.linalg.norm(away, axis=1))),
         float(np.mean(np.abs(away) <= 3 * trajectory.sigma[:, :3])),
         float(np.isin(trajectory.outlier, (1, 2)).mean()),
-        trajectory.metadata["summary"]["verdict"],
+        trajectory.metadata["summary"]["trust"]["verdict"],
     )

@@ -113,6 +113,7 @@ BLOCKS = {
     ),
     "samples": table("python -m tests.bench samples", slow=False),
     "accuracy": table("python -m tests.bench accuracy"),
+    "instruments": table("python -m tests.bench instruments"),
     "zuo2021": table("python -m tests.acceptance.zuo2021"),
     "correction": table("python -m tests.bench correction", note=DIGITS),
     "starts": session(STUDY, slow=True),
