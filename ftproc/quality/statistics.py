@@ -15,6 +15,7 @@ from ftproc.scoring.figures import changes
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from ftproc.core.editing.steps import Step
     from ftproc.methods.estimate import Estimate
 
 UNITS = ("m", "rad", "rad")
@@ -39,6 +40,7 @@ class RunStatistics:
         self.jerk: list[FloatArray] = []
         self.reacquired, self.unexamined, self.stamp_s, self.drifts = 0, 0, 0.0, False
         self.slow_noise_s, self.slow_noise_likelier = 0.0, False
+        self.steps: list[dict[str, Any]] = []
         self.converged: bool | None = None
         self.largest_m, self.largest_sigma = 0.0, 0.0
         self.outside, self.rows, self.parts = 0.0, 0, 0
@@ -77,6 +79,7 @@ class RunStatistics:
             self.slow_noise_likelier |= likelier
             self.slow_noise_s = max(self.slow_noise_s, float(other.fade_s[other.wander_variance > 0].max()))
         self.unexamined += estimate.unexamined
+        self.steps += [_named(step, time_s) for step in estimate.steps]
         self.largest_m = max(self.largest_m, float(np.linalg.norm(correction[:, :3], axis=1).max(initial=0.0)))
         changed, sigma = np.abs(correction), best_sigma[:, : correction.shape[1]]
         ratio = np.divide(changed, sigma, out=np.zeros_like(changed), where=changed > 0)
@@ -153,11 +156,20 @@ class RunStatistics:
             "time_stamp_sigma_s": self.stamp_s,
             "noise_drifts": self.drifts,
             "editing_places_unexamined": self.unexamined,
+            "steps": sorted(self.steps, key=lambda step: step["time_s"]),
             "correction_largest_m": self.largest_m,
             "correction_largest_sigma": self.largest_sigma,
             "correction_outside_training": self.outside / max(self.rows, 1),
         }
         return figures | {"trust": verdict.verdict(verdict.remarks(figures))}
+
+
+def _named(step: Step, time_s: FloatArray) -> dict[str, Any]:
+    """A step for the summary; time_s (n,) of the part in which it is."""
+    name, unit = (("range", "m"), ("azimuth", "rad"), ("elevation", "rad"), ("clock", "s"))[step.component]
+    return {
+        "component": name, "time_s": float(time_s[step.sample]), f"size_{unit}": step.size, f"sigma_{unit}": step.sigma,
+    }  # fmt: skip
 
 
 class _Component:

@@ -12,6 +12,7 @@ LEVELS = (CONSISTENT, SUSPECT, UNRELIABLE)  # from good to bad
 FEWEST_GOOD = 20  # readings of a component, for a test of its sigmas
 UNRELIABLE_RATIO = 2.0  # innovation ratio over its upper bound, from which the sigmas mean nothing
 MANY_SIGMAS = 5.0  # of a network's correction, from which only an error of the instrument can be its reason
+MOST_STEPS = 5  # that are named
 MANY_REJECTED, TOO_MANY_REJECTED = 0.25, 0.5  # share of a component's readings. With a third of all readings outliers,
 # one flight in five diverges, and nearly all of these have more than a quarter rejected.
 
@@ -31,7 +32,7 @@ class Remark(NamedTuple):
 
 def remarks(s: Mapping[str, Any]) -> list[Remark]:
     """All remarks on a summary (see `RunStatistics.summary`)."""
-    found = [*_observability(s), *_sigmas(s), *_editing(s)]
+    found = [*_observability(s), *_faults(s), *_sigmas(s), *_editing(s)]
     correlation = max(part["noise_correlation"] for part in s["components"].values())
     if correlation > 0:
         text = f"the noise is correlated between samples (coefficient up to {correlation:.2f}); the sigmas allow for it"
@@ -85,6 +86,23 @@ def _observability(s: Mapping[str, Any]) -> Iterator[Remark]:
         else:
             text = f"the position is poorly observable in {len(intervals)} intervals: {size}, {when}"
             yield Remark(SUSPECT, text)
+
+
+def _faults(s: Mapping[str, Any]) -> Iterator[Remark]:
+    steps = s["steps"]
+    if steps:
+        named = "; ".join(step_sentence(step) for step in steps[:MOST_STEPS])
+        rest = f"; and {len(steps) - MOST_STEPS} more steps" if len(steps) > MOST_STEPS else ""
+        yield Remark(SUSPECT, f"{named}{rest}: the estimate is continued as before, though either side may be right")
+
+
+def step_sentence(step: Mapping[str, Any]) -> str:
+    """A step of a summary in words: "azimuth steps by -4.1 mrad at 60.1 s"."""
+    at = f"at {step['time_s']:.6g} s"
+    if "size_s" in step:
+        return f"the clock jumps by {step['size_s']:+.3g} s {at}"
+    size = f"{step['size_m']:+.3g} m" if "size_m" in step else f"{1e3 * step['size_rad']:+.3g} mrad"
+    return f"{step['component']} steps by {size} {at}"
 
 
 def _sigmas(s: Mapping[str, Any]) -> Iterator[Remark]:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.editing import jump_patches, outlier_chain, screening
+from ftproc.core.editing import jump_patches, outlier_chain, screening, steps
 from ftproc.core.editing.decisions import (
     Decision,
     Record,
@@ -23,6 +23,7 @@ from ftproc.core.editing.decisions import (
     decide,
 )
 from ftproc.core.editing.reassessment import reassess
+from ftproc.core.editing.steps import Step
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
@@ -39,6 +40,7 @@ WINDOWS = (31, 75)  # samples: the short one follows manoeuvres, the long one se
 COARSE = 0.5  # of a component's noise: rounding that makes so much of it decides how its readings repeat
 FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
 PROFILE_STEPS = 4  # of the search for the jerk profile, once the decisions are made
+STEP_ROUNDS = 4  # of looking for steps: where one is bridged, another may show
 START_INFLATION = 2.0  # on the covariance of a smoothed state that starts a filter over the same record
 
 
@@ -55,7 +57,8 @@ class Edited(NamedTuple):
     """The decisions and what they rest on.
 
     log: with weights (n, 3), 1 good, 0 rejected or missing. model: noise and jerk profile. starts: for the next pass.
-    smoothed: the smoother's run with these. decision: the last one, with the model that it was made with.
+    smoothed: the smoother's run with these. decision: the last one, with the model that it was made with. steps: that
+    stay, and that were taken out of the log's readings.
     """
 
     log: Observations
@@ -63,6 +66,7 @@ class Edited(NamedTuple):
     starts: list[Start]
     smoothed: SmootherRun
     decision: Decision
+    steps: tuple[Step, ...] = ()
 
     @property
     def weight(self) -> FloatArray:
@@ -117,6 +121,31 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
     segment_of: of a segment, the noise of the whole log, which is taken as it is, and its typical jerk, with which the
     search starts. Raises ValueError when a component has no reading that agrees with its neighbours.
     """
+    record, decision = _decided(time_s, measurement, known, segment_of)
+    found: list[Step] = []
+    for _ in range(STEP_ROUNDS):
+        new = [] if decision.model.coloured else steps.find(record, decision)
+        if not new:
+            break
+        found += new
+        log = record.weighted(decision.weight)
+        record, decision = _decided(time_s, steps.bridged(log, decision.model, new), known, segment_of)
+    record, decision = allow_for_drift(record, decision)
+    if segment_of is None:
+        decision = allow_for_colour(record, decision)
+    log = record.weighted(decision.weight)
+    if known.jerk_psd is None:
+        profile = fit_profile(log, decision.starts, decision.model, PROFILE_STEPS)
+        decision = decision._replace(model=with_allowance(log, profile))
+    d = decision
+    smoothed = smooth_log(log, d.model, d.starts)
+    return Edited(log, d.model, d.starts, smoothed, d, tuple(found))
+
+
+def _decided(
+    time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: Model | None
+) -> tuple[Record, Decision]:
+    """The decisions on a log as if it had no steps, with a jerk profile."""
     jerk_psd = known.jerk_psd
     screened, sigma, exact = screen(time_s, measurement)
     possible = np.isfinite(measurement) & ~stuck_readings(measurement, sigma)
@@ -135,16 +164,7 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
     record, decision = allow_for_tails(record, decision)
     if jerk_psd is None:
         decision = reassess(record, decision)
-    record, decision = allow_for_drift(record, decision)
-    if segment_of is None:
-        decision = allow_for_colour(record, decision)
-    log = record.weighted(decision.weight)
-    if jerk_psd is None:
-        found = fit_profile(log, decision.starts, decision.model, PROFILE_STEPS)
-        decision = decision._replace(model=with_allowance(log, found))
-    d = decision
-    smoothed = smooth_log(log, d.model, d.starts)
-    return Edited(log, d.model, d.starts, smoothed, d)
+    return record, decision
 
 
 def smoothed_starts(smoothed: SmootherRun) -> list[Start]:
