@@ -67,13 +67,13 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         run, smoothed = _worse_of(edited, run, edited.decision.alternative.model)
     if edited.steps:
         run, smoothed = (_widened(each, edited.steps) for each in (run, smoothed))
-    label = preparing.labels(edited.weight, readings.measurement)
+    label = preparing.labels(edited.weight, edited.log.measurement)
     again = preparing.re_initialized(starts)
     decision = edited.decision
     return Estimate(
         run, label, edited.model, smoothed if settings.smooth else None, again, decision.settled,
         unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts, alternative=decision.alternative,
-        steps=edited.steps,
+        steps=edited.steps, copied=edited.copied,
     )  # fmt: skip
 
 

@@ -80,7 +80,7 @@ class Estimate(NamedTuple):
     that explains the log as well, and that the sigmas allow for. cleaned: (n, 3) readings of a method that works on
     range, azimuth and elevation one by one; NaN there and in its run means not estimated. unexamined: places where
     two-pass editing looked for no alternative, its search having been cut short. steps: that stay, which were found and
-    taken out of the readings.
+    taken out of the readings. copied: (n, 3) readings that were not measured, see `core.editing.copies`.
     """
 
     run: FilterRun
@@ -95,6 +95,7 @@ class Estimate(NamedTuple):
     cleaned: FloatArray | None = None
     unexamined: int = 0
     steps: tuple[Step, ...] = ()
+    copied: FlagArray | None = None
 
     @property
     def smoothed_run(self) -> FilterRun:
@@ -112,6 +113,7 @@ class Estimate(NamedTuple):
             smoothed=None if self.smoothed is None else self.smoothed.rows(low, high),
             reacquired=tuple(k - low for k in self.reacquired if low <= k < high),
             cleaned=None if self.cleaned is None else self.cleaned[low:high],
+            copied=None if self.copied is None else self.copied[low:high],
             steps=tuple(s._replace(sample=s.sample - low) for s in self.steps if low <= s.sample < high),
         )
 

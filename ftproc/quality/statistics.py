@@ -58,6 +58,8 @@ class RunStatistics:
         for c, component in enumerate(self.components):
             tested = used[:, c] & (c not in self.absent)
             component.add_labels(time_s, estimate.label[:, c])
+            if estimate.copied is not None:
+                component.copies += np.bincount(estimate.copied[:, c], minlength=3)
             component.add_innovations(squares[:, c], run.innovation_sigma[:, c], tested)
         self._add_gaps(time_s)
         self._add_changes(cleaned)
@@ -178,6 +180,7 @@ class _Component:
     def __init__(self, every: int) -> None:
         self.every = every
         self.labels = np.zeros(4, int)
+        self.copies = np.zeros(3, int)
         self.longest_s, self.patch_from = 0.0, np.nan  # the longest patch, and the start of one that may continue
         self.squares, self.count = 0.0, 0
         self.innovation_sigma: list[FloatArray] = []
@@ -204,7 +207,8 @@ class _Component:
 
     def counts(self) -> dict[str, Any]:
         counts = {name: int(self.labels[label]) for name, label in _LABELS.items()}
-        return {**counts, "longest_patch_s": self.longest_s}
+        _, held, interpolated = (int(number) for number in self.copies)
+        return {**counts, "held": held, "interpolated": interpolated, "longest_patch_s": self.longest_s}
 
     def consistency(self, noise_sigma: float) -> dict[str, Any]:
         sigmas = np.concatenate(self.innovation_sigma)

@@ -96,6 +96,16 @@ def _faults(s: Mapping[str, Any]) -> Iterator[Remark]:
         yield Remark(SUSPECT, f"{named}{rest}: the estimate is continued as before, though either side may be right")
 
 
+    for name, part in s["components"].items():
+        measured = part["good"] + part["isolated"] + part["patch"]
+        rate = f"it is used at its real rate, {measured} readings in {s['duration_s']:.6g} s"
+        if part["held"]:
+            yield Remark(CONSISTENT, f"{name} repeats the reading before in {part['held']} rows: {rate}")
+        if part["interpolated"]:
+            text = f"{name} is interpolated between its readings in {part['interpolated']} rows: {rate}"
+            yield Remark(CONSISTENT, text)
+
+
 def step_sentence(step: Mapping[str, Any]) -> str:
     """A step of a summary in words: "azimuth steps by -4.1 mrad at 60.1 s"."""
     at = f"at {step['time_s']:.6g} s"

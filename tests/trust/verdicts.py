@@ -23,7 +23,8 @@ SEEDS = 20
 
 
 class Tally(NamedTuple):
-    """Of a class of fault: runs (filter and smoother), those not called consistent, those confident and wrong."""
+    """Of a class of fault: runs (filter and smoother), those of which the summary names the fault or which
+    are not called consistent, and those confident and wrong."""
 
     name: str
     runs: int
@@ -49,12 +50,15 @@ def tally(name: str, seeds: Iterable[int], told: bool = False) -> Tally:
     """The counts of a class; told: each run that is wrong is named on standard error."""
     count, detected, wrong = 0, 0, 0
     for seed, smooth, faulty, found in runs(name, seeds):
-        trust = found.metadata["summary"]["trust"]
+        summary = found.metadata["summary"]
+        trust = summary["trust"]
         consistent, far = trust["verdict"] == CONSISTENT, is_far(found, faulty.position_m)
-        count, detected, wrong = count + 1, detected + (not consistent), wrong + (consistent and far)
+        named = not consistent or any(part["held"] + part["interpolated"] for part in summary["components"].values())
+        count, detected, wrong = count + 1, detected + named, wrong + (consistent and far)
         if told:
             way, mark = "smooth" if smooth else "filter", "WRONG" if consistent and far else "far" if far else ""
             reasons = "; ".join(trust["reasons"])
+            reasons += str({k: (p["held"], p["interpolated"]) for k, p in summary["components"].items()})
             print(f"{name} {seed} {way}: {faulty.what} -> {trust['verdict']} {mark} {reasons}", file=sys.stderr)
     return Tally(name, count, detected, wrong)
 

@@ -159,10 +159,10 @@ def _alternatives(log: Neighbourhood, weight: FloatArray, island: Island) -> Ite
     yield from _filled(log, weight, component, slice(first, last))
 
 
-def decisions(log: Neighbourhood, weight: FloatArray) -> list[Step]:
-    """The decisions from `weight` on until they stand still."""
+def decisions(log: Neighbourhood, weight: FloatArray, rounds: int = ROUNDS) -> list[Step]:
+    """The decisions from `weight` on until they stand still, or for so many rounds."""
     steps = []
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         step, smoothed = _step(log, weight)
         steps.append(step)
         noise = log.model.noise_variance

@@ -11,6 +11,7 @@ patch. So rejected runs that lie on a track of their own are taken in again befo
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -18,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.editing.alternatives import Neighbourhood, decisions
+from ftproc.core.editing import alternatives
 from ftproc.core.editing.decisions import Decision, Record
 from ftproc.core.editing.runs import runs_of
 from ftproc.core.filtering.initialization import find_starts, first_state
@@ -26,6 +27,7 @@ from ftproc.core.filtering.records import Model, Observations
 from ftproc.core.filtering.smoother import shifts, smooth_log
 from ftproc.core.identification.likelihood import Fixed, fit_level
 from ftproc.core.identification.profile import fit_profile, median_level
+from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.frames import from_cartesian, wrap
 
 FloatArray = NDArray[np.float64]
@@ -33,10 +35,10 @@ FloatArray = NDArray[np.float64]
 CLOCK = 3  # in place of a component
 LEAST = 5.0  # sigmas of a step's estimate that make it worth weighing
 FEWEST, EVEN = 3, 3.0  # readings in a rejected run, and sigmas between its neighbours, that may be a track
-AROUND = 100  # samples on each side that decide between step and manoeuvre
-APART = 25  # samples between steps of one component
-MARGIN = 4.0  # by which the log-probability of a stretch with a step must be better, and ln of the places for it
+AROUND, MEMORIES = (100, 400), 6.0  # samples on each side that decide between step and manoeuvre, and memories
+MARGIN = 8.0  # by which the log-probability of a stretch with a step must be better, and ln of the places for it
 MOST = 8  # steps that are weighed at a time
+SIZES = 2  # times that the size of a step is found anew, as the decisions beside it change
 PROFILE_STEPS = 3  # of the search for the jerk profile of a stretch
 END = 5  # samples at either end in which no step is looked for
 
@@ -51,14 +53,59 @@ class Step(NamedTuple):
     sigma: float
 
 
+class Stretch(NamedTuple):
+    """Part of a log around a step: its record; the weights (n, 3) as decided without steps, and with the runs taken in that
+    lie on a track of their own; the model with the flight's process noise, and with that of a calm flight; the rates of
+    outliers; and the margin by which a step must be likelier."""
+
+    record: Record
+    decided: FloatArray
+    taken_in: FloatArray
+    model: Model
+    calm: Model
+    rates: FloatArray
+    margin: float
+
+
 def find(record: Record, decision: Decision) -> list[Step]:
     """The steps in a log whose outliers were decided as if it had none."""
     calm = median_level(decision.model)
     weight = _taken_in(record, decision, calm)
+    log = record.weighted(weight)
+    scales = scales_of(log, calm.noise_variance)
+    around = int(np.clip(MEMORIES * scales.memory_s(float(calm.jerk[0, 0])) / scales.interval_s, *AROUND))
+    margin = MARGIN + math.log(4 * len(record.time_s))
     found: list[Step] = []
-    for step in _standing_out(record.weighted(weight), calm):
-        if _is_likelier(record, decision, weight, found, step):
-            found.append(step)
+    tries = [weight] if (weight == decision.weight).all() else [weight, decision.weight]
+    candidates = itertools.chain.from_iterable(
+        _standing_out(record.weighted(each), calm, around // 2) for each in tries
+    )
+    for step in candidates:
+        near = slice(max(step.sample - around, 0), step.sample + around)
+        known, one = ([s._replace(sample=s.sample - near.start) for s in some] for some in (found, [step]))
+        known = [s for s in known if 0 < s.sample < near.stop - near.start]
+        model, part = _from(decision.model, record.time_s, near), record.part(near)
+        own = slice(None) if step.component == CLOCK else step.component
+        taken = decision.weight[near].copy()
+        taken[:, own] = weight[near, own]
+        stretch = Stretch(part, decision.weight[near], taken, model, calm, decision.rates, margin)
+        likelier = _likelier(_without(stretch, known), one[0])
+        if likelier is not None:
+            found.append(likelier._replace(sample=step.sample))
+    return found
+
+
+def refined(log: Observations, model: Model, steps: Sequence[Step]) -> list[Step]:
+    """The steps with the sizes that the rest of the record tells. log: with the steps bridged, as they are."""
+    starts = find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
+    score, information = shifts(log, model, starts)
+    found = []
+    for step in steps:
+        at = step.sample - 1, step.component
+        if information[at] > 0:
+            more = score[at] / information[at] * (-1 if step.component == CLOCK else 1)
+            step = step._replace(size=float(step.size + more), sigma=float(1 / math.sqrt(information[at])))
+        found.append(step)
     return found
 
 
@@ -124,8 +171,8 @@ def _taken_in(record: Record, decision: Decision, calm: Model) -> FloatArray:
     return weight
 
 
-def _standing_out(log: Observations, calm: Model) -> list[Step]:
-    """The steps of which a calm flight would show too little, the clearest first."""
+def _standing_out(log: Observations, calm: Model, apart: int) -> list[Step]:
+    """The steps that stand out of a calm flight, the clearest first, and so many samples apart."""
     try:
         starts = find_starts(log, calm.noise_variance, float(calm.jerk[0, 0]))
     except ValueError:
@@ -138,35 +185,63 @@ def _standing_out(log: Observations, calm: Model) -> list[Step]:
         k, c = (int(i) for i in np.unravel_index(int(size.argmax()), size.shape))
         estimate, sigma = score[k, c] / information[k, c], 1 / math.sqrt(information[k, c])
         found.append(Step(c, k + 1, float(-estimate if c == CLOCK else estimate), sigma))
-        size[max(k - APART, 0) : k + APART, c] = 0.0
+        near = slice(max(k - apart, 0), k + apart)
+        size[near, c] = 0.0
+        size[near, CLOCK] = 0.0  # which is no jump where one component stands out more
     return found
 
 
-def _is_likelier(record: Record, decision: Decision, weight: FloatArray, known: Sequence[Step], step: Step) -> bool:
-    """Whether a stretch of the log is likelier with a step than without, given the steps that are known."""
-    near = slice(max(step.sample - AROUND, 0), step.sample + AROUND)
-    part, calm = record.part(near), median_level(decision.model)
-    inside = [s._replace(sample=s.sample - near.start) for s in known if near.start < s.sample < near.stop]
-    one = step._replace(sample=step.sample - near.start)
+def _from(model: Model, time_s: FloatArray, near: slice) -> Model:
+    """The model of a stretch of the log: its jerk profile, to the nearest knot."""
+    if not math.isfinite(model.knot_s):
+        return model
+    first = round((float(time_s[near.start]) - float(time_s[0])) / model.knot_s)
+    return model._replace(jerk=model.jerk[min(first, len(model.jerk) - 1) :])
+
+
+def _without(stretch: Stretch, steps: Sequence[Step]) -> Stretch:
+    """The stretch with some steps bridged."""
+    log = stretch.record.weighted(stretch.taken_in)
+    return stretch._replace(record=stretch.record._replace(measurement=bridged(log, stretch.calm, steps)))
+
+
+def _likelier(stretch: Stretch, step: Step) -> Step | None:
+    """The step, with the size that the stretch tells, if the stretch is likelier with it than without."""
     try:
-        without = part._replace(measurement=bridged(part.weighted(weight[near]), calm, inside))
-        best = max(_likelihood(without, w[near], decision, calm) for w in (decision.weight, weight))
-        bridge = without._replace(measurement=bridged(without.weighted(weight[near]), calm, [one]))
-        gain = _likelihood(bridge, weight[near], decision, calm) - best
+        without, model = max(
+            ((_decided(stretch, stretch.decided, model), model) for model in (stretch.model, stretch.calm)),
+            key=lambda tried: tried[0].likelihood,
+        )
+        bridged, weight = stretch, stretch.taken_in
+        for _ in range(SIZES):
+            bridged = _without(stretch, [step])
+            with_it = _decided(bridged, weight, model)
+            weight = with_it.weight
+            step = refined(bridged.record.weighted(weight), model, [step])[0]
+        if not with_it.likelihood > without.likelihood + MARGIN:
+            return None
+        bridged = _without(stretch, [step])
+        least = max(_likelihood(stretch, weight) for weight in (stretch.decided, stretch.taken_in)) + stretch.margin
+        return step if _likelihood(bridged, weight) > least else None
     except ValueError:  # a component has too few readings there
-        return False
-    return gain > MARGIN + math.log(4 * len(record.time_s))
+        return None
 
 
-def _likelihood(part: Record, weight: FloatArray, decision: Decision, calm: Model) -> float:
-    """Log-probability of the readings of a stretch, with a process noise and outlier decisions of its own."""
-    log = part.weighted(weight)
-    starts = find_starts(log, calm.noise_variance, float(calm.jerk[0, 0]))
-    model = calm
-    if not part.fixed.jerk:
-        level = fit_level(log, starts, calm, Fixed(np.ones(3, bool), False))
+def _decided(stretch: Stretch, weight: FloatArray, model: Model) -> alternatives.Step:
+    """The decisions on a stretch, as they are or made once again, whichever are likelier."""
+    return max(alternatives.decisions(_ready(stretch, model), weight, 2), key=lambda step: step.likelihood)
+
+
+def _likelihood(stretch: Stretch, weight: FloatArray) -> float:
+    """Log-probability of the readings of a stretch with a process noise and outlier decisions of its own."""
+    log, model = stretch.record.weighted(weight), stretch.calm
+    starts = find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
+    if not stretch.record.fixed.jerk:
+        level = fit_level(log, starts, model, Fixed(np.ones(3, bool), False))
         model = fit_profile(log, starts, level, PROFILE_STEPS)
-    stretch = Neighbourhood(
-        part.time_s, part.measurement, part.possible, model, decision.rates, part.gate, part.uneven
-    )
-    return max(step.likelihood for step in decisions(stretch, weight))
+    return max(step.likelihood for step in alternatives.decisions(_ready(stretch, model), weight))
+
+
+def _ready(stretch: Stretch, model: Model) -> alternatives.Neighbourhood:
+    r = stretch.record
+    return alternatives.Neighbourhood(r.time_s, r.measurement, r.possible, model, stretch.rates, r.gate, r.uneven)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing import jump_patches, outlier_chain, screening, steps
+from ftproc.core.editing.copies import KindArray, without_copies
 from ftproc.core.editing.decisions import (
     Decision,
     Record,
@@ -57,8 +58,9 @@ class Edited(NamedTuple):
     """The decisions and what they rest on.
 
     log: with weights (n, 3), 1 good, 0 rejected or missing. model: noise and jerk profile. starts: for the next pass.
-    smoothed: the smoother's run with these. decision: the last one, with the model that it was made with. steps: that
-    stay, and that were taken out of the log's readings.
+    smoothed: the smoother's run with these. decision: the last one, with the model that it was made with.
+    copied: (n, 3) readings that were not measured, see `copies`; the log has none there. steps: that stay, and that were
+    taken out of the log's readings.
     """
 
     log: Observations
@@ -66,6 +68,7 @@ class Edited(NamedTuple):
     starts: list[Start]
     smoothed: SmootherRun
     decision: Decision
+    copied: KindArray
     steps: tuple[Step, ...] = ()
 
     @property
@@ -121,14 +124,14 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
     segment_of: of a segment, the noise of the whole log, which is taken as it is, and its typical jerk, with which the
     search starts. Raises ValueError when a component has no reading that agrees with its neighbours.
     """
+    measurement, copied = without_copies(time_s, measurement)
     record, decision = _decided(time_s, measurement, known, segment_of)
     found: list[Step] = []
     for _ in range(STEP_ROUNDS):
         new = [] if decision.model.coloured else steps.find(record, decision)
         if not new:
             break
-        found += new
-        log = record.weighted(decision.weight)
+        found, log = [*found, *new], record.weighted(decision.weight)
         record, decision = _decided(time_s, steps.bridged(log, decision.model, new), known, segment_of)
     record, decision = allow_for_drift(record, decision)
     if segment_of is None:
@@ -139,7 +142,7 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
         decision = decision._replace(model=with_allowance(log, profile))
     d = decision
     smoothed = smooth_log(log, d.model, d.starts)
-    return Edited(log, d.model, d.starts, smoothed, d, tuple(found))
+    return Edited(log, d.model, d.starts, smoothed, d, copied, tuple(found))
 
 
 def _decided(
