@@ -11,7 +11,7 @@ continues from one stretch to the next (`recursive`).
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import TypeVar
 
@@ -65,15 +65,16 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     run, smoothed = forward.filter_log(edited.log, edited.model, starts), edited.smoothed
     if edited.decision.alternative is not None:
         run, smoothed = _worse_of(edited, run, edited.decision.alternative.model)
-    if edited.steps:
-        run, smoothed = (_widened(each, edited.steps) for each in (run, smoothed))
+    shifts = edited.faults.shifts
+    if shifts:
+        run, smoothed = (_widened(each, shifts) for each in (run, smoothed))
     label = preparing.labels(edited.weight, edited.log.measurement)
     again = preparing.re_initialized(starts)
     decision = edited.decision
     return Estimate(
         run, label, edited.model, smoothed if settings.smooth else None, again, decision.settled,
         unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts, alternative=decision.alternative,
-        steps=edited.steps, copied=edited.copied,
+        faults=edited.faults,
     )  # fmt: skip
 
 
@@ -92,10 +93,10 @@ def _worse_of(edited: two_pass.Edited, run: FilterRun, other: Model) -> tuple[Fi
     )
 
 
-def _widened(run: Run, found: tuple[steps.Step, ...]) -> Run:
-    """A run with sigmas that allow for the uncertain sizes of the steps that were taken out of its readings."""
+def _widened(run: Run, shifts: Sequence[steps.Step]) -> Run:
+    """A run with sigmas that allow for the uncertain sizes of the shifts that were taken out of its readings."""
     sigma, los_sigma = run.sigma.copy(), run.los_sigma.copy()
-    along_axes, along_lines = steps.spread(run.state, found)
+    along_axes, along_lines = steps.spread(run.state, shifts)
     sigma[:, :3] = np.sqrt(sigma[:, :3] ** 2 + along_axes)
     los_sigma[:, :3] = np.sqrt(los_sigma[:, :3] ** 2 + along_lines)
     return run._replace(sigma=sigma, los_sigma=los_sigma)

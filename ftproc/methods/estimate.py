@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core.editing.steps import Step
+from ftproc.core.editing.two_pass import Faults
 from ftproc.core.filtering.records import FilterRun, Model, Observations
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification.coloured_noise import Coloured
@@ -79,8 +79,8 @@ class Estimate(NamedTuple):
     the time stamps. drifts: whether the noise's variance drifts. alternative: a model with correlated noise
     that explains the log as well, and that the sigmas allow for. cleaned: (n, 3) readings of a method that works on
     range, azimuth and elevation one by one; NaN there and in its run means not estimated. unexamined: places where
-    two-pass editing looked for no alternative, its search having been cut short. steps: that stay, which were found and
-    taken out of the readings. copied: (n, 3) readings that were not measured, see `core.editing.copies`.
+    two-pass editing looked for no alternative, its search having been cut short. faults: of the instrument, that two-pass
+    editing found and took out of the readings.
     """
 
     run: FilterRun
@@ -94,8 +94,7 @@ class Estimate(NamedTuple):
     alternative: Coloured | None = None
     cleaned: FloatArray | None = None
     unexamined: int = 0
-    steps: tuple[Step, ...] = ()
-    copied: FlagArray | None = None
+    faults: Faults | None = None
 
     @property
     def smoothed_run(self) -> FilterRun:
@@ -113,8 +112,7 @@ class Estimate(NamedTuple):
             smoothed=None if self.smoothed is None else self.smoothed.rows(low, high),
             reacquired=tuple(k - low for k in self.reacquired if low <= k < high),
             cleaned=None if self.cleaned is None else self.cleaned[low:high],
-            copied=None if self.copied is None else self.copied[low:high],
-            steps=tuple(s._replace(sample=s.sample - low) for s in self.steps if low <= s.sample < high),
+            faults=None if self.faults is None else self.faults.rows(low, high),
         )
 
 

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from ftproc.methods.estimate import typical_interval
 from ftproc.quality import consistency, verdict
+from ftproc.quality.faults import FaultStatistics
 from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, FlagArray, FloatArray, MeasurementLog
 from ftproc.scoring.figures import changes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ftproc.core.editing.steps import Step
     from ftproc.methods.estimate import Estimate
 
 UNITS = ("m", "rad", "rad")
@@ -40,7 +40,7 @@ class RunStatistics:
         self.jerk: list[FloatArray] = []
         self.reacquired, self.unexamined, self.stamp_s, self.drifts = 0, 0, 0.0, False
         self.slow_noise_s, self.slow_noise_likelier = 0.0, False
-        self.steps: list[dict[str, Any]] = []
+        self.faults = FaultStatistics()
         self.converged: bool | None = None
         self.largest_m, self.largest_sigma = 0.0, 0.0
         self.outside, self.rows, self.parts = 0.0, 0, 0
@@ -58,8 +58,6 @@ class RunStatistics:
         for c, component in enumerate(self.components):
             tested = used[:, c] & (c not in self.absent)
             component.add_labels(time_s, estimate.label[:, c])
-            if estimate.copied is not None:
-                component.copies += np.bincount(estimate.copied[:, c], minlength=3)
             component.add_innovations(squares[:, c], run.innovation_sigma[:, c], tested)
         self._add_gaps(time_s)
         self._add_changes(cleaned)
@@ -81,7 +79,8 @@ class RunStatistics:
             self.slow_noise_likelier |= likelier
             self.slow_noise_s = max(self.slow_noise_s, float(other.fade_s[other.wander_variance > 0].max()))
         self.unexamined += estimate.unexamined
-        self.steps += [_named(step, time_s) for step in estimate.steps]
+        if estimate.faults is not None:
+            self.faults.add(time_s, estimate.faults)
         self.largest_m = max(self.largest_m, float(np.linalg.norm(correction[:, :3], axis=1).max(initial=0.0)))
         changed, sigma = np.abs(correction), best_sigma[:, : correction.shape[1]]
         ratio = np.divide(changed, sigma, out=np.zeros_like(changed), where=changed > 0)
@@ -124,6 +123,7 @@ class RunStatistics:
             noise = float(np.sqrt(model.reading_variance[c]))
             components[name] = {
                 **self.components[c].counts(),
+                **self.faults.of_component(c),
                 f"noise_{UNITS[c]}": noise if c not in absent else None,
                 "noise_correlation": float(model.correlation(self.interval_s)[c]),
                 **self.components[c].consistency(noise),
@@ -158,20 +158,12 @@ class RunStatistics:
             "time_stamp_sigma_s": self.stamp_s,
             "noise_drifts": self.drifts,
             "editing_places_unexamined": self.unexamined,
-            "steps": sorted(self.steps, key=lambda step: step["time_s"]),
+            **self.faults.figures(),
             "correction_largest_m": self.largest_m,
             "correction_largest_sigma": self.largest_sigma,
             "correction_outside_training": self.outside / max(self.rows, 1),
         }
         return figures | {"trust": verdict.verdict(verdict.remarks(figures))}
-
-
-def _named(step: Step, time_s: FloatArray) -> dict[str, Any]:
-    """A step for the summary; time_s (n,) of the part in which it is."""
-    name, unit = (("range", "m"), ("azimuth", "rad"), ("elevation", "rad"), ("clock", "s"))[step.component]
-    return {
-        "component": name, "time_s": float(time_s[step.sample]), f"size_{unit}": step.size, f"sigma_{unit}": step.sigma,
-    }  # fmt: skip
 
 
 class _Component:
@@ -180,7 +172,6 @@ class _Component:
     def __init__(self, every: int) -> None:
         self.every = every
         self.labels = np.zeros(4, int)
-        self.copies = np.zeros(3, int)
         self.longest_s, self.patch_from = 0.0, np.nan  # the longest patch, and the start of one that may continue
         self.squares, self.count = 0.0, 0
         self.innovation_sigma: list[FloatArray] = []
@@ -207,8 +198,7 @@ class _Component:
 
     def counts(self) -> dict[str, Any]:
         counts = {name: int(self.labels[label]) for name, label in _LABELS.items()}
-        _, held, interpolated = (int(number) for number in self.copies)
-        return {**counts, "held": held, "interpolated": interpolated, "longest_patch_s": self.longest_s}
+        return {**counts, "longest_patch_s": self.longest_s}
 
     def consistency(self, noise_sigma: float) -> dict[str, Any]:
         sigmas = np.concatenate(self.innovation_sigma)

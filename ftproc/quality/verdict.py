@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ftproc.quality import consistency
+from ftproc.quality import consistency, faults
 
 CONSISTENT, SUSPECT, UNRELIABLE = "consistent", "suspect", "unreliable"
 LEVELS = (CONSISTENT, SUSPECT, UNRELIABLE)  # from good to bad
 FEWEST_GOOD = 20  # readings of a component, for a test of its sigmas
 UNRELIABLE_RATIO = 2.0  # innovation ratio over its upper bound, from which the sigmas mean nothing
 MANY_SIGMAS = 5.0  # of a network's correction, from which only an error of the instrument can be its reason
-MOST_STEPS = 5  # that are named
 MANY_REJECTED, TOO_MANY_REJECTED = 0.25, 0.5  # share of a component's readings. With a third of all readings outliers,
 # one flight in five diverges, and nearly all of these have more than a quarter rejected.
 
@@ -32,7 +31,9 @@ class Remark(NamedTuple):
 
 def remarks(s: Mapping[str, Any]) -> list[Remark]:
     """All remarks on a summary (see `RunStatistics.summary`)."""
-    found = [*_observability(s), *_faults(s), *_sigmas(s), *_editing(s)]
+    found = [*_observability(s), *_sigmas(s), *_editing(s)]
+    found += [Remark(SUSPECT, text) for text in faults.suspicious(s)]
+    found += [Remark(CONSISTENT, text) for text in faults.allowed_for(s)]
     correlation = max(part["noise_correlation"] for part in s["components"].values())
     if correlation > 0:
         text = f"the noise is correlated between samples (coefficient up to {correlation:.2f}); the sigmas allow for it"
@@ -86,33 +87,6 @@ def _observability(s: Mapping[str, Any]) -> Iterator[Remark]:
         else:
             text = f"the position is poorly observable in {len(intervals)} intervals: {size}, {when}"
             yield Remark(SUSPECT, text)
-
-
-def _faults(s: Mapping[str, Any]) -> Iterator[Remark]:
-    steps = s["steps"]
-    if steps:
-        named = "; ".join(step_sentence(step) for step in steps[:MOST_STEPS])
-        rest = f"; and {len(steps) - MOST_STEPS} more steps" if len(steps) > MOST_STEPS else ""
-        yield Remark(SUSPECT, f"{named}{rest}: the estimate is continued as before, though either side may be right")
-
-
-    for name, part in s["components"].items():
-        measured = part["good"] + part["isolated"] + part["patch"]
-        rate = f"it is used at its real rate, {measured} readings in {s['duration_s']:.6g} s"
-        if part["held"]:
-            yield Remark(CONSISTENT, f"{name} repeats the reading before in {part['held']} rows: {rate}")
-        if part["interpolated"]:
-            text = f"{name} is interpolated between its readings in {part['interpolated']} rows: {rate}"
-            yield Remark(CONSISTENT, text)
-
-
-def step_sentence(step: Mapping[str, Any]) -> str:
-    """A step of a summary in words: "azimuth steps by -4.1 mrad at 60.1 s"."""
-    at = f"at {step['time_s']:.6g} s"
-    if "size_s" in step:
-        return f"the clock jumps by {step['size_s']:+.3g} s {at}"
-    size = f"{step['size_m']:+.3g} m" if "size_m" in step else f"{1e3 * step['size_rad']:+.3g} mrad"
-    return f"{step['component']} steps by {size} {at}"
 
 
 def _sigmas(s: Mapping[str, Any]) -> Iterator[Remark]:

@@ -95,18 +95,20 @@ def find(record: Record, decision: Decision) -> list[Step]:
     return found
 
 
-def refined(log: Observations, model: Model, steps: Sequence[Step]) -> list[Step]:
-    """The steps with the sizes that the rest of the record tells. log: with the steps bridged, as they are."""
-    starts = find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
-    score, information = shifts(log, model, starts)
-    found = []
+def refined(log: Observations, model: Model, steps: Sequence[Step]) -> tuple[Observations, list[Step]]:
+    """The log and the steps with the sizes that the rest of the record tells. log: with the steps bridged, as they are."""
+    if not steps:
+        return log, []
+    score, information = shifts(log, model, find_starts(log, model.noise_variance, float(model.jerk[0, 0])))
+    rest, found = [], []
     for step in steps:
         at = step.sample - 1, step.component
         if information[at] > 0:
-            more = score[at] / information[at] * (-1 if step.component == CLOCK else 1)
-            step = step._replace(size=float(step.size + more), sigma=float(1 / math.sqrt(information[at])))
+            more = float(score[at] / information[at]) * (-1 if step.component == CLOCK else 1)
+            rest.append(step._replace(size=more))
+            step = step._replace(size=step.size + more, sigma=1 / math.sqrt(information[at]))
         found.append(step)
-    return found
+    return log._replace(measurement=bridged(log, model, rest)), found
 
 
 def bridged(log: Observations, model: Model, steps: Sequence[Step]) -> FloatArray:
@@ -212,17 +214,16 @@ def _likelier(stretch: Stretch, step: Step) -> Step | None:
             ((_decided(stretch, stretch.decided, model), model) for model in (stretch.model, stretch.calm)),
             key=lambda tried: tried[0].likelihood,
         )
-        bridged, weight = stretch, stretch.taken_in
+        bridge, weight = _without(stretch, [step]), stretch.taken_in
         for _ in range(SIZES):
-            bridged = _without(stretch, [step])
-            with_it = _decided(bridged, weight, model)
+            with_it = _decided(bridge, weight, model)
             weight = with_it.weight
-            step = refined(bridged.record.weighted(weight), model, [step])[0]
+            log, (step,) = refined(bridge.record.weighted(weight), model, [step])
+            bridge = bridge._replace(record=bridge.record._replace(measurement=log.measurement))
         if not with_it.likelihood > without.likelihood + MARGIN:
             return None
-        bridged = _without(stretch, [step])
         least = max(_likelihood(stretch, weight) for weight in (stretch.decided, stretch.taken_in)) + stretch.margin
-        return step if _likelihood(bridged, weight) > least else None
+        return step if _likelihood(bridge, weight) > least else None
     except ValueError:  # a component has too few readings there
         return None
 

@@ -28,8 +28,9 @@ from ftproc.core.editing.steps import Step
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
-from ftproc.core.identification import uneven_noise
+from ftproc.core.identification import one_sided, uneven_noise
 from ftproc.core.identification.likelihood import Fixed, first_jerk, without_noise
+from ftproc.core.identification.one_sided import OneSided
 from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.model.frames import unwrap
 from ftproc.core.model.motion import isotropic
@@ -54,13 +55,31 @@ class Known(NamedTuple):
     gate: float
 
 
+class Faults(NamedTuple):
+    """What is wrong with the readings beyond outliers, and was taken out of them. copied: (n, 3) kinds of those that were
+    not measured, see `copies`. steps: that stay. one_sided: components of which many errors have one sign."""
+
+    copied: KindArray
+    steps: tuple[Step, ...] = ()
+    one_sided: tuple[OneSided, ...] = ()
+
+    @property
+    def shifts(self) -> tuple[Step, ...]:
+        """What was taken out of the readings, in components or the clock, and is uncertain."""
+        return (*self.steps, *(Step(each.component, 0, each.shift, each.sigma) for each in self.one_sided))
+
+    def rows(self, low: int, high: int) -> Faults:
+        """Of the samples [low, high) alone."""
+        inside = tuple(s._replace(sample=s.sample - low) for s in self.steps if low <= s.sample < high)
+        return self._replace(copied=self.copied[low:high], steps=inside)
+
+
 class Edited(NamedTuple):
     """The decisions and what they rest on.
 
     log: with weights (n, 3), 1 good, 0 rejected or missing. model: noise and jerk profile. starts: for the next pass.
     smoothed: the smoother's run with these. decision: the last one, with the model that it was made with.
-    copied: (n, 3) readings that were not measured, see `copies`; the log has none there. steps: that stay, and that were
-    taken out of the log's readings.
+    faults: of the instrument, of which the log is free.
     """
 
     log: Observations
@@ -68,8 +87,7 @@ class Edited(NamedTuple):
     starts: list[Start]
     smoothed: SmootherRun
     decision: Decision
-    copied: KindArray
-    steps: tuple[Step, ...] = ()
+    faults: Faults
 
     @property
     def weight(self) -> FloatArray:
@@ -131,7 +149,7 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
         new = [] if decision.model.coloured else steps.find(record, decision)
         if not new:
             break
-        found, log = [*found, *new], record.weighted(decision.weight)
+        found, log = sorted([*found, *new], key=lambda s: s.sample), record.weighted(decision.weight)
         record, decision = _decided(time_s, steps.bridged(log, decision.model, new), known, segment_of)
     record, decision = allow_for_drift(record, decision)
     if segment_of is None:
@@ -140,9 +158,14 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
     if known.jerk_psd is None:
         profile = fit_profile(log, decision.starts, decision.model, PROFILE_STEPS)
         decision = decision._replace(model=with_allowance(log, profile))
-    d = decision
-    smoothed = smooth_log(log, d.model, d.starts)
-    return Edited(log, d.model, d.starts, smoothed, d, copied, tuple(found))
+    log, found = steps.refined(log, decision.model, found)
+    smoothed = smooth_log(log, decision.model, decision.starts)
+    leaning = one_sided.find(log, smoothed)
+    if leaning:
+        log = one_sided.without(log, leaning)
+        smoothed = smooth_log(log, decision.model, decision.starts)
+    faults = Faults(copied, tuple(found), tuple(leaning))
+    return Edited(log, decision.model, decision.starts, smoothed, decision, faults)
 
 
 def _decided(
