@@ -35,7 +35,7 @@ class FaultStatistics:
         for one in faults.one_sided:
             name, unit = NAMES[one.component], UNITS[one.component]
             found = {"component": name, "share": one.share, f"error_{unit}": one.error, f"shift_{unit}": one.shift}
-            if name not in self.one_sided or one.share > self.one_sided[name]["share"]:
+            if one.share >= self.one_sided.get(name, {"share": 0.0})["share"]:
                 self.one_sided[name] = found
 
     def figures(self) -> dict[str, Any]:
@@ -55,6 +55,9 @@ def suspicious(s: Mapping[str, Any]) -> Iterator[str]:
         rest = f"; and {len(steps) - MOST_STEPS} more" if len(steps) > MOST_STEPS else ""
         yield f"{named}{rest}: the estimate goes on as before, but the side before may be the wrong one"
     for one in s["one_sided_errors"]:
+        if not one["share"]:
+            yield f"{one['component']} errors have two peaks, or a flat one: part of the readings are off, all to one side"
+            continue
         error, shift = (_size(one, what) for what in ("error", "shift"))
         yield (
             f"{one['component']} errors lie on one side in about {100 * one['share']:.0f} % of the readings, by "

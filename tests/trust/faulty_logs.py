@@ -275,10 +275,11 @@ def one_sided(draw: Draw, seed: int) -> Faulty:
     flight = fly(draw)
     z, n = flight.seen(), len(flight.time_s)
     c, share = (0, 0, 1, 2)[seed % 4], draw.uniform(0.45, 0.65)
-    size, kind = draw.uniform(4, 14) * flight.sigma[c], seed % 3
-    error = (draw.exponential(size, n), np.abs(size * draw.standard_normal(n)), draw.uniform(0, 2 * size, n))[kind]
+    size, kind = draw.uniform(4, 14) * flight.sigma[c], seed // 2 % 4
+    errors = draw.exponential(size, n), np.abs(size * draw.standard_normal(n)), draw.uniform(0, 2 * size, n)
+    error = (*errors, np.full(n, size))[kind]
     z[:, c] += (draw.random(n) < share) * error * draw.choice([-1, 1])
-    shape = ("exponential", "half normal", "uniform")[kind]
+    shape = ("exponential", "half normal", "uniform", "constant")[kind]
     return _log(flight.time_s, z, flight, f"{'rae'[c]} {100 * share:.0f} % {shape} {size / flight.sigma[c]:.1f} sigma")
 
 

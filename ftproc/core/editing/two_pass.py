@@ -160,7 +160,7 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
         decision = decision._replace(model=with_allowance(log, profile))
     log, found = steps.refined(log, decision.model, found)
     smoothed = smooth_log(log, decision.model, decision.starts)
-    leaning = one_sided.find(log, smoothed)
+    leaning = one_sided.find(log, smoothed, record.rounding)
     if leaning:
         log = one_sided.without(log, leaning)
         smoothed = smooth_log(log, decision.model, decision.starts)

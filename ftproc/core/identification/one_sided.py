@@ -20,7 +20,8 @@ from ftproc.core.filtering.smoother import SmootherRun
 FloatArray = NDArray[np.float64]
 
 FEWEST = 100  # readings of a component, for the shape of their errors to show
-SKEW, IN_SIGMAS = 0.25, 4.0  # least skewness of the residuals, and its standard errors, that make the fit worth while
+SKEW, IN_SIGMAS = 0.1, 3.5  # least skewness of the residuals, and its standard errors, that make the fit worth while
+FLAT, FINE = 0.2, 0.4  # the same of what is missing to the kurtosis of 3, where rounding makes less of the 1-sigma
 LEAST_GAIN = 10.0  # in log-likelihood, over errors of either sign
 LEAST_SHARE = 0.15  # of the readings
 CAUTION = 2.0  # times the standard error that the peak would have, if the honest readings were known
@@ -28,7 +29,7 @@ CAUTION = 2.0  # times the standard error that the peak would have, if the hones
 
 class OneSided(NamedTuple):
     """A share of a component's readings have errors of one sign. error: their mean; shift: by how much the readings as
-    a whole are too large, and its 1-sigma; m, rad, rad."""
+    a whole are too large, and its 1-sigma; m, rad, rad. All are zero where the sign cannot be told."""
 
     component: int
     share: float
@@ -37,8 +38,8 @@ class OneSided(NamedTuple):
     sigma: float
 
 
-def find(log: Observations, smoothed: SmootherRun) -> list[OneSided]:
-    """The components with such errors, from the residuals of the readings used."""
+def find(log: Observations, smoothed: SmootherRun, rounding: FloatArray) -> list[OneSided]:
+    """The components with such errors, from the residuals of the readings used. rounding: (3,) 1-sigma of it."""
     found = []
     for c in range(3):
         used = (log.weight[:, c] > 0) & (smoothed.residual_variance[:, c] > 0)
@@ -47,16 +48,27 @@ def find(log: Observations, smoothed: SmootherRun) -> list[OneSided]:
         residual = smoothed.residual[used, c]
         scale = float(np.sqrt(np.median(smoothed.residual_variance[used, c])))
         scaled = residual / scale
-        skew = float(np.mean((scaled - scaled.mean()) ** 3) / scaled.std() ** 3)
-        if abs(skew) < SKEW + IN_SIGMAS * math.sqrt(6 / len(scaled)):
+        skew, flat = _shape(scaled)
+        flat = flat and float(rounding[c]) < FINE * scale
+        if not skew and not flat:
             continue
-        side = math.copysign(1.0, skew)
-        one, either = (_likeliest(side * scaled, both) for both in (False, True))
+        either = _likeliest(scaled, True).gain
+        fits = sorted(((side, _likeliest(side * scaled, False)) for side in (-1.0, 1.0)), key=lambda fit: fit[1].gain)
+        (side, one), other = fits[1], fits[0][1].gain
         place, sigma, share, error = one.theta
-        if one.gain > either.gain + LEAST_GAIN and share > LEAST_SHARE:
+        if one.gain > max(either, other) + LEAST_GAIN and share > LEAST_SHARE:
             error_of_peak = CAUTION * sigma / math.sqrt((1 - share) * len(scaled))
             found.append(OneSided(c, share, side * error * scale, -side * place * scale, error_of_peak * scale))
+        elif flat:
+            found.append(OneSided(c, 0.0, 0.0, 0.0, 0.0))
     return found
+
+
+def _shape(residual: FloatArray) -> tuple[bool, bool]:
+    """Whether residuals (n,) are skew, and whether they are flatter than normal ones."""
+    count, centred = len(residual), (residual - residual.mean()) / residual.std()
+    skew = abs(np.mean(centred**3)) > SKEW + IN_SIGMAS * math.sqrt(6 / count)
+    return bool(skew), bool(np.mean(centred**4) - 3 < -FLAT - IN_SIGMAS * math.sqrt(24 / count))
 
 
 def without(log: Observations, errors: Sequence[OneSided]) -> Observations:
