@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ftproc.records import COMPONENTS, FloatArray
+from ftproc.records import COMPONENTS, FloatArray, MeasurementLog
 
 if TYPE_CHECKING:
     from ftproc.core.editing.two_pass import Faults
 
 NAMES, UNITS = (*COMPONENTS, "clock"), ("m", "rad", "rad", "s")
 MOST_STEPS = 5  # that are named
+FEWEST_OVERLAPPING = 6  # changes between rows before and rows after, of those at the same times
 
 
 class FaultStatistics:
@@ -47,13 +48,32 @@ class FaultStatistics:
         return {"held": int(self.copies[c, 1]), "interpolated": int(self.copies[c, 2])}
 
 
+def clock_set_back(log: MeasurementLog) -> dict[str, float] | None:
+    """Where the time goes back, and by how much, with rows before and after it that overlap; None if nowhere. A few rows
+    that come late do not count."""
+    if not log.rows_out_of_order:
+        return None
+    order = np.argsort(log.row, kind="stable")
+    time_s = log.time_s[order]
+    change = np.diff(time_s)
+    at = int(change.argmin())
+    overlap = (log.time_s >= time_s[at + 1]) & (log.time_s <= time_s[at])
+    after = log.row[overlap] > log.row[order[at]]
+    if np.count_nonzero(after[1:] != after[:-1]) < FEWEST_OVERLAPPING:
+        return None
+    return {"row": int(log.row[order[at + 1]]), "by_s": float(change[at])}
+
+
 def suspicious(s: Mapping[str, Any]) -> Iterator[str]:
     """The faults of a summary of which a single log cannot tell what is right."""
     steps = s["steps"]
     if steps:
         named = "; ".join(step_in_words(step) for step in steps[:MOST_STEPS])
         rest = f"; and {len(steps) - MOST_STEPS} more" if len(steps) > MOST_STEPS else ""
-        yield f"{named}{rest}: the estimate goes on as before, but the side before may be the wrong one"
+        yield f"{named}{rest}: the estimate follows the longer side, which may be the wrong one"
+    if s["clock_set_back"]:
+        back = s["clock_set_back"]
+        yield f"the time goes back by {-back['by_s']:.3g} s at row {back['row']}, and rows before and after it overlap"
     for one in s["one_sided_errors"]:
         if not one["share"]:
             yield f"{one['component']} errors have two peaks, or a flat one: part of the readings are off, all to one side"

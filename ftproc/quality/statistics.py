@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ftproc.methods.estimate import typical_interval
 from ftproc.quality import consistency, verdict
-from ftproc.quality.faults import FaultStatistics
+from ftproc.quality.faults import FaultStatistics, clock_set_back
 from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, FlagArray, FloatArray, MeasurementLog
 from ftproc.scoring.figures import changes
 
@@ -159,6 +159,7 @@ class RunStatistics:
             "noise_drifts": self.drifts,
             "editing_places_unexamined": self.unexamined,
             **self.faults.figures(),
+            "clock_set_back": clock_set_back(log),
             "correction_largest_m": self.largest_m,
             "correction_largest_sigma": self.largest_sigma,
             "correction_outside_training": self.outside / max(self.rows, 1),

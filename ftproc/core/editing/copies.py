@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing.runs import runs_of
-from ftproc.core.editing.screening import rounding_step, stuck
+from ftproc.core.editing.screening import MOSTLY_ON_GRID, ON_GRID, rounding_step, stuck
 from ftproc.core.model.frames import wrap
 
 FloatArray = NDArray[np.float64]
@@ -26,6 +26,8 @@ NEAR = 4.0  # steps within which changes are counted, to know how many are none 
 LEAST, SHARE, TIMES_CHANCE = 8, 0.03, 3.0  # copies, of all readings, and of those that chance makes, to be believed
 LEAST_ON_LINES = 0.15  # share of a component's readings
 ROUNDING = 1e-12  # of a number
+PRECISION, COARSER, DIFFERENCES = 1e-11, 10.0, 24  # of the largest reading, from which two differ; times that, for a
+# step to be one; and differences between neighbouring values, the smallest, from which it is found
 
 
 def without_copies(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, KindArray]:
@@ -36,7 +38,8 @@ def without_copies(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatAr
     z, kind = measurement.copy(), np.zeros(measurement.shape, np.uint8)
     for c in range(3):
         channel = measurement[:, c]
-        step, there = rounding_step(channel), np.isfinite(channel)
+        there = np.isfinite(channel)
+        step = _step(channel[there])
         seen = np.flatnonzero(there & ~stuck(channel, _scatter(channel[there])))
         held = _held(channel[seen], step)
         kind[seen[held], c] = HELD
@@ -45,6 +48,24 @@ def without_copies(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatAr
         kind[seen[on_lines], c], z[seen, c] = INTERPOLATED, values
     z[kind > 0] = np.nan
     return z, kind
+
+
+def _step(values: FloatArray) -> float:
+    """The step to which readings (m,) are rounded; zero if to none that shows. In a short log no two of them need lie a
+    single step apart, so it is the greatest common divisor of small differences."""
+    step = rounding_step(values)
+    differences = np.diff(np.unique(values))
+    least = PRECISION * float(np.abs(values).max(initial=0.0))
+    differences = np.sort(differences[differences > least])[:DIFFERENCES]
+    if step > 0 or not len(differences):
+        return step
+    step = float(differences[0])
+    for other in differences[1:].tolist():
+        while other > least:
+            step, other = other, abs(step - round(step / other) * other)
+    multiple = (values - values[0]) / step
+    on_grid = np.mean(np.abs(multiple - np.round(multiple)) < ON_GRID) >= MOSTLY_ON_GRID
+    return step if on_grid and step > COARSER * least else 0.0
 
 
 def _scatter(values: FloatArray) -> float:

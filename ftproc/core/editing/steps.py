@@ -28,7 +28,7 @@ from ftproc.core.filtering.smoother import shifts, smooth_log
 from ftproc.core.identification.likelihood import Fixed, fit_level
 from ftproc.core.identification.profile import fit_profile, median_level
 from ftproc.core.identification.scales import scales_of
-from ftproc.core.model.frames import from_cartesian, wrap
+from ftproc.core.model.frames import from_cartesian, line_of_sight_axes, wrap
 
 FloatArray = NDArray[np.float64]
 
@@ -40,17 +40,23 @@ MARGIN = 8.0  # by which the log-probability of a stretch with a step must be be
 MOST = 8  # steps that are weighed at a time
 SIZES = 2  # times that the size of a step is found anew, as the decisions beside it change
 PROFILE_STEPS = 3  # of the search for the jerk profile of a stretch
-END = 5  # samples at either end in which no step is looked for
+END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step cannot be told from a patch
 
 
 class Step(NamedTuple):
     """From a sample on the readings of a component (range, azimuth, elevation) are larger by `size` m, rad, rad, or,
-    where it is CLOCK, their times by so many seconds. sigma: 1-sigma of the size."""
+    where it is CLOCK, their times by so many seconds. sigma: 1-sigma of the size. The longer side is taken to be right."""
 
     component: int
     sample: int
     size: float
     sigma: float
+
+    def moved(self, samples: int) -> tuple[slice, float]:
+        """Which of so many samples are moved to the other side, and the sign of what is taken out of them."""
+        if 0 < self.sample < samples / 2:
+            return slice(0, self.sample), -1.0
+        return slice(self.sample, samples), 1.0
 
 
 class Stretch(NamedTuple):
@@ -112,47 +118,44 @@ def refined(log: Observations, model: Model, steps: Sequence[Step]) -> tuple[Obs
 
 
 def bridged(log: Observations, model: Model, steps: Sequence[Step]) -> FloatArray:
-    """The readings (n, 3) as they would be without the steps: those after each are moved to the side before it."""
+    """The readings (n, 3) as they would be without the steps: those of the shorter side moved to the other."""
     z = log.measurement.copy()
     for step in steps:
-        later = slice(step.sample, len(z))
+        rows, sign = step.moved(len(z))
         if step.component == CLOCK:
-            z[later] -= _way(log._replace(measurement=z), model, step)
+            z[rows] -= _way(log.part(rows)._replace(measurement=z[rows]), model, sign * step.size)
         else:
-            z[later, step.component] -= step.size
+            z[rows, step.component] -= sign * step.size
     z[:, 1] = wrap(z[:, 1])
     return z
 
 
-def spread(state: FloatArray, steps: Sequence[Step]) -> tuple[FloatArray, FloatArray]:
-    """(n, 3) variances, m2, that the uncertain sizes of the steps add to the positions of states (n, 9) after them:
-    along x, y, z, and along the radial, cross and up axes."""
-    axes, lines = np.zeros((len(state), 3)), np.zeros((len(state), 3))
-    for step in steps:
-        after = state[step.sample :]
-        (x, y, z), ground = after[:, :3].T, np.hypot(after[:, 0], after[:, 1])
-        slant = np.hypot(ground, z)
-        out = after[:, :3] / slant[:, None]
-        cross = np.stack([-y, x, np.zeros_like(x)], 1) / np.maximum(ground, 1e-300)[:, None]
-        turned = np.stack([out, cross, np.cross(out, cross)], 1)
-        moves = (out, cross * ground[:, None], turned[:, 2] * slant[:, None], after[:, 3:6])[step.component]
-        axes[step.sample :] += (moves * step.sigma) ** 2
-        lines[step.sample :] += ((turned @ moves[:, :, None])[:, :, 0] * step.sigma) ** 2
-    return axes, lines
-
-
-def _way(log: Observations, model: Model, step: Step) -> FloatArray:
-    """(m, 3) by how much the readings from a clock's jump on are larger than those of the target so many seconds later
-    on its way, which the readings after the jump alone tell."""
-    later = slice(step.sample, len(log.time_s))
-    after = log.part(later)
-    start = first_state(after, model.noise_variance, 0, slice(0, len(after.time_s)))
-    state = smooth_log(after, median_level(model), [start]).state
+def _way(log: Observations, model: Model, late_s: float) -> FloatArray:
+    """(n, 3) by how much readings are larger than those of the target so many seconds later, which these readings alone
+    tell."""
+    start = first_state(log, model.noise_variance, 0, slice(0, len(log.time_s)))
+    state = smooth_log(log, median_level(model), [start]).state
     position, velocity, acceleration = state[:, :3], state[:, 3:6], state[:, 6:]
-    further = position + step.size * (velocity + 0.5 * step.size * acceleration)
+    further = position + late_s * (velocity + 0.5 * late_s * acceleration)
     way: FloatArray = from_cartesian(position) - from_cartesian(further)
     way[:, 1] = wrap(way[:, 1])
     return way
+
+
+def spread(state: FloatArray, steps: Sequence[Step]) -> tuple[FloatArray, FloatArray]:
+    """(n, 3) variances, m2, that the uncertain sizes of the steps add to the positions of the states (n, 9) that were
+    moved: along x, y, z, and along the radial, cross and up axes."""
+    axes, lines = np.zeros((len(state), 3)), np.zeros((len(state), 3))
+    for step in steps:
+        rows, _ = step.moved(len(state))
+        position, velocity = state[rows, :3], state[rows, 3:6]
+        sight = line_of_sight_axes(position)
+        slant = np.linalg.norm(position, axis=1)[:, None]
+        ground = np.hypot(position[:, 0], position[:, 1])[:, None]
+        moves = (sight[:, 0], sight[:, 1] * ground, sight[:, 2] * slant, velocity)[step.component]
+        axes[rows] += (moves * step.sigma) ** 2
+        lines[rows] += (np.einsum("kij,kj->ki", sight, moves) * step.sigma) ** 2
+    return axes, lines
 
 
 def _taken_in(record: Record, decision: Decision, calm: Model) -> FloatArray:
@@ -181,7 +184,8 @@ def _standing_out(log: Observations, calm: Model, apart: int) -> list[Step]:
         return []
     score, information = shifts(log, calm, starts)
     size = np.divide(np.abs(score), np.sqrt(np.maximum(information, 0)), out=np.zeros_like(score), where=information > 0)
-    size[:END] = size[-END:] = 0.0
+    end = 1 + min(END, int(SHARE * len(size)))
+    size[:end] = size[-end:] = 0.0
     found: list[Step] = []
     while len(found) < MOST and size.max() > LEAST:
         k, c = (int(i) for i in np.unravel_index(int(size.argmax()), size.shape))
