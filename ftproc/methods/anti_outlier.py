@@ -67,13 +67,14 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         run, smoothed = _worse_of(edited, run, edited.decision.alternative.model)
     shifts = edited.faults.shifts
     if shifts:
-        run, smoothed = (_widened(each, shifts) for each in (run, smoothed))
+        run, smoothed = _widened(run, shifts), _widened(smoothed, shifts)
     label = preparing.labels(edited.weight, edited.log.measurement)
     again = preparing.re_initialized(starts)
     decision = edited.decision
     return Estimate(
         run, label, edited.model, smoothed if settings.smooth else None, again, decision.settled,
-        unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts, alternative=decision.alternative,
+        unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts,
+        alternative=decision.alternative,
         faults=edited.faults,
     )  # fmt: skip
 

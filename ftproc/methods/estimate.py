@@ -79,8 +79,8 @@ class Estimate(NamedTuple):
     the time stamps. drifts: whether the noise's variance drifts. alternative: a model with correlated noise
     that explains the log as well, and that the sigmas allow for. cleaned: (n, 3) readings of a method that works on
     range, azimuth and elevation one by one; NaN there and in its run means not estimated. unexamined: places where
-    two-pass editing looked for no alternative, its search having been cut short. faults: of the instrument, that two-pass
-    editing found and took out of the readings.
+    two-pass editing looked for no alternative, its search having been cut short. faults: of the instrument, that
+    two-pass editing found and took out of the readings.
     """
 
     run: FilterRun

@@ -1,5 +1,5 @@
-"""Faults of the instrument in a run's summary, and in words: steps that stay, readings that were not measured, errors on
-one side."""
+"""Faults of the instrument in a run's summary, and in words: steps that stay, readings that were not measured, errors
+on one side, a clock that was set back."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ class FaultStatistics:
 
 
 def clock_set_back(log: MeasurementLog) -> dict[str, float] | None:
-    """Where the time goes back, and by how much, with rows before and after it that overlap; None if nowhere. A few rows
-    that come late do not count."""
+    """Where the time goes back, and by how much, with rows before and after it that overlap; None if nowhere. A few
+    rows that come late do not count."""
     if not log.rows_out_of_order:
         return None
     order = np.argsort(log.row, kind="stable")
@@ -76,7 +76,7 @@ def suspicious(s: Mapping[str, Any]) -> Iterator[str]:
         yield f"the time goes back by {-back['by_s']:.3g} s at row {back['row']}, and rows before and after it overlap"
     for one in s["one_sided_errors"]:
         if not one["share"]:
-            yield f"{one['component']} errors have two peaks, or a flat one: part of the readings are off, all to one side"
+            yield f"{one['component']} errors have two peaks, or a flat one: some readings are off, all to one side"
             continue
         error, shift = (_size(one, what) for what in ("error", "shift"))
         yield (

@@ -50,8 +50,9 @@ def errors_of_oracle(share):
 
 
 #: m, of the mean over the seeds, by the share of outliers
-BOUNDS = {0.0: 1.6, 0.05: 1.75, 0.1: 1.75, 0.2: 1.9}
-FORWARD = {0.0: 1.7, 0.05: 2.15, 0.1: 2.3, 0.2: 3.3}
+BOUNDS = {0.0: 0.7, 0.05: 0.75, 0.1: 0.75, 0.2: 0.95}
+SMOOTHED = {0.0: 0.62, 0.05: 0.72, 0.1: 0.7, 0.2: 0.9}
+FORWARD = {0.0: 1.7, 0.05: 2.0, 0.1: 2.0, 0.2: 2.3}
 
 
 @pytest.mark.parametrize(("share", "bound"), BOUNDS.items())
@@ -60,19 +61,17 @@ def test_two_pass_editing(share, bound):
     assert errors(share).max() <= 2 * bound
 
 
-@pytest.mark.parametrize("share", SHARES)
-def test_outliers_cost_hardly_more_than_their_deletion(share):
-    assert errors(share).mean() <= 1.1 * errors_of_oracle(share).mean()
+@pytest.mark.parametrize(("share", "cost"), [(0.05, 1.1), (0.1, 1.1), (0.2, 1.3)])
+def test_outliers_cost_hardly_more_than_their_deletion(share, cost):
+    assert errors(share).mean() <= cost * errors_of_oracle(share).mean()
 
 
-@pytest.mark.parametrize("share", [0.0, *SHARES])
-def test_smoother_is_well_below_the_filter(share):
-    """Half of it would be too much to ask: the filter begins at the smoothed first state, and has gained by it; and a
-    smoother that believes in so calm a flight as this one is overconfident of real ones."""
+@pytest.mark.parametrize(("share", "bound"), SMOOTHED.items())
+def test_smoother_is_below_the_filter(share, bound):
+    """Not by much: a flight without jerk is one parabola, and the filter begins at the smoothed first state."""
     smoothed = errors(share, smooth=True)
-    assert smoothed.mean() <= 0.65 * errors(share).mean()
-    assert smoothed.mean() <= 1.1
-    assert smoothed.max() <= 2.0
+    assert smoothed.mean() <= min(bound, errors(share).mean())
+    assert smoothed.max() <= 2 * bound
 
 
 @pytest.mark.parametrize("gain_form", [False, True])
@@ -91,7 +90,7 @@ def test_filters_without_editing(method):
     for share in (0.0, *SHARES):
         flights = [flight(seed, share) for seed in SEEDS]
         found = np.mean([error(f.log, f.truth.position_m, method=method) for f in flights])
-        assert found > 15 if share else found <= 1.3
+        assert found > 8 if share else found <= 0.72
 
 
 def test_no_run_is_lost_at_a_loose_jerk():

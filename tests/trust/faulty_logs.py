@@ -18,8 +18,8 @@ Draw = np.random.Generator
 
 
 class Flight(NamedTuple):
-    """A clean log: time_s (n,), position (m, 3) by a fine clock (m,) that goes beyond it on both sides, the noise (n, 3)
-    and its 1-sigma (3,) m, rad, rad."""
+    """A clean log: time_s (n,), position (m, 3) by a fine clock (m,) that goes beyond it on both sides, the noise
+    (n, 3) and its 1-sigma (3,) m, rad, rad."""
 
     time_s: FloatArray
     fine_s: FloatArray
@@ -188,7 +188,10 @@ def steps(draw: Draw, seed: int) -> Faulty:
 def ambiguity(draw: Draw, seed: int) -> Faulty:
     """The range jumps by the length of an ambiguity, one time in three among outliers."""
     flight = fly(draw)
-    k, by = _place_of(draw, flight, seed % 2), float(draw.choice([-1.0, 1.0]) * draw.choice([29.98, 149.9, 749.5, 1498.96]))
+    k, by = (
+        _place_of(draw, flight, seed % 2),
+        float(draw.choice([-1.0, 1.0]) * draw.choice([29.98, 149.9, 749.5, 1498.96])),
+    )
     z = flight.seen()
     by *= 1 if abs(by) > 8 * flight.sigma[0] else 10
     z[k:, 0] += by

@@ -93,7 +93,7 @@ def _held(values: FloatArray, step: float) -> NDArray[np.bool_]:
 def _are_many(count: int, off: FloatArray, step: float, readings: int) -> bool:
     """Whether so many agreements are no chance, by how many of those that do not agree (m,) are off by little."""
     chance = float(np.sum(off <= NEAR * step)) / (2 * NEAR)
-    return count > max(LEAST, SHARE * readings, TIMES_CHANCE * chance + LEAST * np.sqrt(chance))
+    return bool(count > max(LEAST, SHARE * readings, TIMES_CHANCE * chance + LEAST * np.sqrt(chance)))
 
 
 def _on_lines(
@@ -118,7 +118,7 @@ def _on_lines(
     values = values.copy()
     for begin, end in runs_of(~on):
         kept = begin
-        if end - begin == 2 and 0 < begin and end < len(values):  # the knot lies between the two, where the lines meet
+        if end - begin == 2 and begin > 0 and end < len(values):  # the knot lies between the two, where the lines meet
             bend = slope[end - 1] - slope[begin - 1]
             late = (slope[begin] - slope[begin - 1]) / bend if bend != 0 else 0.0
             late = interval[begin] * (1 - float(np.clip(late, 0.0, 1.0)))  # from the first of the two

@@ -45,7 +45,7 @@ END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which
 
 class Step(NamedTuple):
     """From a sample on the readings of a component (range, azimuth, elevation) are larger by `size` m, rad, rad, or,
-    where it is CLOCK, their times by so many seconds. sigma: 1-sigma of the size. The longer side is taken to be right."""
+    where it is CLOCK, their times by so many seconds. sigma: 1-sigma of the size. The longer side is kept."""
 
     component: int
     sample: int
@@ -60,9 +60,9 @@ class Step(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """Part of a log around a step: its record; the weights (n, 3) as decided without steps, and with the runs taken in that
-    lie on a track of their own; the model with the flight's process noise, and with that of a calm flight; the rates of
-    outliers; and the margin by which a step must be likelier."""
+    """Part of a log around a step: its record; the weights (n, 3) as decided without steps, and with the runs taken in
+    that lie on a track of their own; the model with the flight's process noise, and with that of a calm flight; the
+    rates of outliers; and the margin by which a step must be likelier."""
 
     record: Record
     decided: FloatArray
@@ -102,7 +102,7 @@ def find(record: Record, decision: Decision) -> list[Step]:
 
 
 def refined(log: Observations, model: Model, steps: Sequence[Step]) -> tuple[Observations, list[Step]]:
-    """The log and the steps with the sizes that the rest of the record tells. log: with the steps bridged, as they are."""
+    """The log and the steps with the sizes that all the record tells. log: with the steps bridged as they are."""
     if not steps:
         return log, []
     score, information = shifts(log, model, find_starts(log, model.noise_variance, float(model.jerk[0, 0])))
@@ -183,7 +183,9 @@ def _standing_out(log: Observations, calm: Model, apart: int) -> list[Step]:
     except ValueError:
         return []
     score, information = shifts(log, calm, starts)
-    size = np.divide(np.abs(score), np.sqrt(np.maximum(information, 0)), out=np.zeros_like(score), where=information > 0)
+    size = np.divide(
+        np.abs(score), np.sqrt(np.maximum(information, 0)), out=np.zeros_like(score), where=information > 0
+    )
     end = 1 + min(END, int(SHARE * len(size)))
     size[:end] = size[-end:] = 0.0
     found: list[Step] = []

@@ -56,8 +56,8 @@ class Known(NamedTuple):
 
 
 class Faults(NamedTuple):
-    """What is wrong with the readings beyond outliers, and was taken out of them. copied: (n, 3) kinds of those that were
-    not measured, see `copies`. steps: that stay. one_sided: components of which many errors have one sign."""
+    """What is wrong with the readings beyond outliers, and was taken out of them. copied: (n, 3) kinds of those that
+    were not measured, see `copies`. steps: that stay. one_sided: components of which many errors have one sign."""
 
     copied: KindArray
     steps: tuple[Step, ...] = ()
@@ -151,7 +151,6 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
             break
         found, log = sorted([*found, *new], key=lambda s: s.sample), record.weighted(decision.weight)
         record, decision = _decided(time_s, steps.bridged(log, decision.model, new), known, segment_of)
-    record, decision = allow_for_drift(record, decision)
     if segment_of is None:
         decision = allow_for_colour(record, decision)
     log = record.weighted(decision.weight)
@@ -188,6 +187,7 @@ def _decided(
     decision = decide(record, Decision(record.screened, model, starts, rates), tune_first=True)
     record, decision = allow_for_late_stamps(record, decision)
     record, decision = allow_for_tails(record, decision)
+    record, decision = allow_for_drift(record, decision)
     if jerk_psd is None:
         decision = reassess(record, decision)
     return record, decision

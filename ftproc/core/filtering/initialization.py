@@ -155,12 +155,13 @@ def _nearest(time: Vector, z: Matrix, weight: Matrix, sample: int, first: int, l
 @kernel
 def _fit(time: Vector, z: Matrix, chosen: Indices, sample: int, c: int, sigma: float, fit: Vector) -> float:
     """The parabola through the chosen readings at the time of `sample`: value, rate and its change there, and the
-    1-sigma of each, in fit (6,). Returns the seconds over which the readings extend; without any, rates are unknown (infinite
-    sigmas).
+    1-sigma of each, in fit (6,). Returns the seconds over which the readings extend; without any, rates are unknown
+    (infinite sigmas).
 
     Readings on both sides of a manoeuvre lie on no parabola: then the farthest are left out, one by one. The scatter
-    about it stands for what it misses of the motion, so it is not averaged down. Too few readings to show a curve
-    lie on a line, and leave it open that the target has turned.
+    about it stands for what it misses of the motion, so it is not averaged down: it may hide a cubic, which grows away
+    from the readings as Legendre's third polynomial does. Too few readings to show a curve lie on a line, and leave it
+    open that the target has turned.
     """
     m = len(chosen)
     t, v, away = np.empty(m), np.empty(m), np.empty(m)
@@ -184,14 +185,17 @@ def _fit(time: Vector, z: Matrix, chosen: Indices, sample: int, c: int, sigma: f
         else:
             high -= 1
     lead = min(abs(t[low]), abs(t[high - 1])) if t[low] * t[high - 1] > 0 else 0.0
-    fit[3], fit[4], fit[5] = scatter, math.inf, math.inf
-    if lead > 0:
-        fit[3] = math.inf
+    fit[3], fit[4], fit[5] = scatter if lead == 0 else math.inf, math.inf, math.inf
     if span > 0:
-        fit[4] = 6 * scatter / span
-        fit[5] = 12 * scatter / (span * span) + (0.0 if curved else (abs(fit[1]) + fit[4]) / span)
-        fit[4] += fit[5] * lead
-        fit[3] = scatter + lead * fit[4]
+        away_from = 1 + 2 * lead / span  # the readings, whose half span is 1
+        fit[3] = scatter * 0.5 * away_from * (5 * away_from * away_from - 3)
+        fit[4] = scatter / span * (7.5 * away_from * away_from - 1.5)
+        fit[5] = 12 * scatter / (span * span) * away_from
+        if not curved:
+            unseen = (abs(fit[1]) + fit[4]) / span
+            fit[5] += unseen
+            fit[4] += unseen * lead
+            fit[3] += unseen * lead * lead
     return float(span)
 
 

@@ -93,7 +93,9 @@ def _likeliest(residual: FloatArray, both: bool) -> _Fit:
 
     def exponential(x: FloatArray, sigma: float, error: float) -> FloatArray:
         """Log-density of normal noise plus an exponential error."""
-        density: FloatArray = 0.5 * (sigma / error) ** 2 - x / error - math.log(error) + log_ndtr(x / sigma - sigma / error)
+        density: FloatArray = (
+            0.5 * (sigma / error) ** 2 - x / error - math.log(error) + log_ndtr(x / sigma - sigma / error)
+        )
         return density
 
     def natural(theta: FloatArray) -> tuple[float, float, float, float]:
@@ -110,5 +112,7 @@ def _likeliest(residual: FloatArray, both: bool) -> _Fit:
         return -float(np.sum(np.logaddexp(math.log1p(-share) + plain, math.log(share) + wrong)))
 
     starts = [np.array([0.0 if both else -0.7, math.log(0.5), 0.0, math.log(size)]) for size in (0.7, 2.0)]
-    found = min((minimize(cost, s, method="Nelder-Mead", options={"maxiter": 400}) for s in starts), key=lambda f: f.fun)
+    found = min(
+        (minimize(cost, s, method="Nelder-Mead", options={"maxiter": 400}) for s in starts), key=lambda f: f.fun
+    )
     return _Fit(natural(np.clip(found.x, -6.0, 6.0)), -float(found.fun))

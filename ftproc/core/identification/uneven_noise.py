@@ -80,7 +80,8 @@ def stamp_variance(log: Observations, smoothed: SmootherRun, model: Model) -> tu
     plain, _ = likeliest(without, np.r_[first[:3] - 12.0, without[3]])
     tries = [likeliest(first - np.r_[0.0, 0.0, 0.0, less], first - 35.0) for less in (0.0, 4.0)]
     best, found = min(tries, key=lambda each: each[0])
-    return np.exp(found[:3]), math.exp(found[3]) if plain - best > max(LEAST_GAIN, SHARE * len(used)) else 0.0
+    late = plain - best > max(LEAST_GAIN, SHARE * len(used))
+    return np.exp(found[:3]), math.exp(found[3]) if late else 0.0
 
 
 def drift(log: Observations, smoothed: SmootherRun) -> FloatArray | None:
