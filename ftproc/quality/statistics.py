@@ -41,6 +41,7 @@ class RunStatistics:
         self.reacquired, self.unexamined, self.stamp_s, self.drifts = 0, 0, 0.0, False
         self.slow_noise_s, self.slow_noise_likelier = 0.0, False
         self.faults = FaultStatistics()
+        self.screened_out, self.overlooked = 0, 0
         self.converged: bool | None = None
         self.largest_m, self.largest_sigma = 0.0, 0.0
         self.outside, self.rows, self.parts = 0.0, 0, 0
@@ -79,6 +80,9 @@ class RunStatistics:
             self.slow_noise_likelier |= likelier
             self.slow_noise_s = max(self.slow_noise_s, float(other.fade_s[other.wander_variance > 0].max()))
         self.unexamined += estimate.unexamined
+        if estimate.screened_out is not None:
+            self.screened_out += int(estimate.screened_out.sum())
+            self.overlooked += int((estimate.screened_out & (estimate.label == GOOD)).sum())
         if estimate.faults is not None:
             self.faults.add(time_s, estimate.faults)
         self.largest_m = max(self.largest_m, float(np.linalg.norm(correction[:, :3], axis=1).max(initial=0.0)))
@@ -159,6 +163,8 @@ class RunStatistics:
             "noise_drifts": self.drifts,
             "editing_places_unexamined": self.unexamined,
             **self.faults.figures(),
+            "screened_out": self.screened_out,
+            "screened_out_but_used": self.overlooked,
             "clock_set_back": clock_set_back(log),
             "correction_largest_m": self.largest_m,
             "correction_largest_sigma": self.largest_sigma,

@@ -69,9 +69,10 @@ def _step(values: FloatArray) -> float:
 
 
 def _scatter(values: FloatArray) -> float:
-    """1-sigma of the noise of readings (m,), copies left out, by their second differences."""
+    """1-sigma of the noise of readings (m,), copies left out, by their second differences; NaN if there is none."""
     fresh = values[np.r_[True, np.diff(values) != 0]] if len(values) else values
-    return float(np.median(np.abs(np.diff(fresh, 2)))) / (0.6745 * np.sqrt(6)) if len(fresh) > 2 else np.nan
+    sigma = float(np.median(np.abs(np.diff(fresh, 2)))) / (0.6745 * np.sqrt(6)) if len(fresh) > 2 else 0.0
+    return sigma or np.nan
 
 
 def _held(values: FloatArray, step: float) -> NDArray[np.bool_]:

@@ -34,7 +34,7 @@ FloatArray = NDArray[np.float64]
 
 CLOCK = 3  # in place of a component
 LEAST = 5.0  # sigmas of a step's estimate that make it worth weighing
-FEWEST, EVEN = 3, 3.0  # readings in a rejected run, and sigmas between its neighbours, that may be a track
+FEWEST, EVEN = 3, 5.0  # readings in a rejected run, and second differences in sigmas, that may be a track
 AROUND, MEMORIES = (100, 400), 6.0  # samples on each side that decide between step and manoeuvre, and memories
 MARGIN = 8.0  # by which the log-probability of a stretch with a step must be better, and ln of the places for it
 MOST = 8  # steps that are weighed at a time
@@ -171,7 +171,7 @@ def _taken_in(record: Record, decision: Decision, calm: Model) -> FloatArray:
         seen = np.flatnonzero(record.possible[:, c])
         for begin, end in runs_of(weight[seen, c] <= 0):
             run = seen[begin:end]
-            if len(run) >= FEWEST and np.median(np.abs(np.diff(residual[run, c]))) < EVEN * sigma[c]:
+            if len(run) >= FEWEST and np.median(np.abs(np.diff(residual[run, c], 2))) < EVEN * sigma[c]:
                 weight[run, c] = 1.0
     return weight
 

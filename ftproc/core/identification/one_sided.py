@@ -22,6 +22,7 @@ FloatArray = NDArray[np.float64]
 FEWEST = 100  # readings of a component, for the shape of their errors to show
 SKEW, IN_SIGMAS = 0.1, 3.5  # least skewness of the residuals, and its standard errors, that make the fit worth while
 FLAT, FINE = 0.2, 0.4  # the same of what is missing to the kurtosis of 3, where rounding makes less of the 1-sigma
+LEANS = 0.15  # skewness from which it is clear on which side the errors are
 LEAST_GAIN = 10.0  # in log-likelihood, over errors of either sign
 LEAST_SHARE = 0.15  # of the readings
 CAUTION = 2.0  # times the standard error that the peak would have, if the honest readings were known
@@ -48,15 +49,16 @@ def find(log: Observations, smoothed: SmootherRun, rounding: FloatArray) -> list
         residual = smoothed.residual[used, c]
         scale = float(np.sqrt(np.median(smoothed.residual_variance[used, c])))
         scaled = residual / scale
-        skew, flat = _shape(scaled)
+        skew, odd, flat = _shape(scaled)
         flat = flat and float(rounding[c]) < FINE * scale
-        if not skew and not flat:
+        if not odd and not flat:
             continue
         either = _likeliest(scaled, True).gain
         fits = sorted(((side, _likeliest(side * scaled, False)) for side in (-1.0, 1.0)), key=lambda fit: fit[1].gain)
         (side, one), other = fits[1], fits[0][1].gain
         place, sigma, share, error = one.theta
-        if one.gain > max(either, other) + LEAST_GAIN and share > LEAST_SHARE:
+        leans = skew * side > LEANS
+        if leans and one.gain > max(either, other) + LEAST_GAIN and share > LEAST_SHARE:
             error_of_peak = CAUTION * sigma / math.sqrt((1 - share) * len(scaled))
             found.append(OneSided(c, share, side * error * scale, -side * place * scale, error_of_peak * scale))
         elif flat:
@@ -64,11 +66,11 @@ def find(log: Observations, smoothed: SmootherRun, rounding: FloatArray) -> list
     return found
 
 
-def _shape(residual: FloatArray) -> tuple[bool, bool]:
-    """Whether residuals (n,) are skew, and whether they are flatter than normal ones."""
+def _shape(residual: FloatArray) -> tuple[float, bool, bool]:
+    """The skewness of residuals (n,), whether that is no chance, and whether they are flatter than normal ones."""
     count, centred = len(residual), (residual - residual.mean()) / residual.std()
-    skew = abs(np.mean(centred**3)) > SKEW + IN_SIGMAS * math.sqrt(6 / count)
-    return bool(skew), bool(np.mean(centred**4) - 3 < -FLAT - IN_SIGMAS * math.sqrt(24 / count))
+    skew, missing = float(np.mean(centred**3)), 3 - float(np.mean(centred**4))
+    return skew, abs(skew) > SKEW + IN_SIGMAS * math.sqrt(6 / count), missing > FLAT + IN_SIGMAS * math.sqrt(24 / count)
 
 
 def without(log: Observations, errors: Sequence[OneSided]) -> Observations:
