@@ -98,7 +98,7 @@ def too_many(judged: Iterable[Tally]) -> list[str]:
     for each in judged:
         if each.wrong > BOUNDS.get(each.name, MOST_WRONG) * each.runs:
             found.append(f"{each.name}: {each.wrong} of {each.runs} runs are confident and wrong")
-        if each.name in faulty_logs.SOUND and each.reported > (1 - LEAST_CONSISTENT) * each.runs:
+        if each.name in faulty_logs.SOUND and each.runs - each.reported < LEAST_CONSISTENT * each.runs:
             found.append(f"{each.name}: {each.reported} of {each.runs} runs without a fault are not called consistent")
     return found
 

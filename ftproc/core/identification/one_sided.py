@@ -49,6 +49,8 @@ def find(log: Observations, smoothed: SmootherRun, rounding: FloatArray) -> list
         residual = smoothed.residual[used, c]
         scale = float(np.sqrt(np.median(smoothed.residual_variance[used, c])))
         scaled = residual / scale
+        if not scaled.std() > 0:  # a component that was not measured
+            continue
         skew, odd, flat = _shape(scaled)
         flat = flat and float(rounding[c]) < FINE * scale
         if not odd and not flat:
