@@ -25,6 +25,8 @@ MANY = 6.0  # steps of rounding by which a reading changes typically, or else it
 NEAR = 4.0  # steps within which changes are counted, to know how many are none by chance
 LEAST, SHARE, TIMES_CHANCE = 8, 0.03, 3.0  # copies, of all readings, and of those that chance makes, to be believed
 LEAST_ON_LINES = 0.15  # share of a component's readings
+NEARLY = 0.2  # of the median that the nearest twentieth of those off the lines are off: more shows rounding that is
+# coarse, whatever its step
 ROUNDING = 1e-12  # of a number
 PRECISION, COARSER, DIFFERENCES = 1e-11, 10.0, 24  # of the largest reading, from which two differ; times that, for a
 # step to be one; and differences between neighbouring values, the smallest, from which it is found
@@ -112,6 +114,8 @@ def _on_lines(
     flat = off <= limit
     others = off[~flat]
     if len(others) < FEWEST or np.median(others) < MANY * limit or flat.sum() < LEAST_ON_LINES * len(values):
+        return on, values
+    if np.quantile(others, 0.05) > NEARLY * np.median(others):
         return on, values
     if not _are_many(int(flat.sum()), others, limit, len(values)):
         return on, values

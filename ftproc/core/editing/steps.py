@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +38,9 @@ FEWEST, EVEN = 3, 5.0  # readings in a rejected run, and second differences in s
 AROUND, MEMORIES = (100, 400), 6.0  # samples on each side that decide between step and manoeuvre, and memories
 MARGIN = 8.0  # by which the log-probability of a stretch with a step must be better, and ln of the places for it
 MOST = 8  # steps that are weighed at a time
+SMALLEST = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
+PATCHES = 12, 24, 48  # readings in a patch, of which a step may be an end
+STAYS = 0.75  # share of the readings on either side of a step that must be good
 SIZES = 2  # times that the size of a step is found anew, as the decisions beside it change
 PROFILE_STEPS = 3  # of the search for the jerk profile of a stretch
 END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step cannot be told from a patch
@@ -95,7 +98,7 @@ def find(record: Record, decision: Decision) -> list[Step]:
         taken = decision.weight[near].copy()
         taken[:, own] = weight[near, own]
         stretch = Stretch(part, decision.weight[near], taken, model, calm, decision.rates, margin)
-        likelier = _likelier(_without(stretch, known), one[0])
+        likelier = _likelier(stretch, known, one[0])
         if likelier is not None:
             found.append(likelier._replace(sample=step.sample))
     return found
@@ -133,7 +136,10 @@ def bridged(log: Observations, model: Model, steps: Sequence[Step]) -> FloatArra
 def _way(log: Observations, model: Model, late_s: float) -> FloatArray:
     """(n, 3) by how much readings are larger than those of the target so many seconds later, which these readings alone
     tell."""
-    start = first_state(log, model.noise_variance, 0, slice(0, len(log.time_s)))
+    try:
+        start = first_state(log, model.noise_variance, 0, slice(0, len(log.time_s)))
+    except ValueError:  # a component has no reading there, so nobody knows the way
+        return np.zeros_like(log.measurement)
     state = smooth_log(log, median_level(model), [start]).state
     position, velocity, acceleration = state[:, :3], state[:, 3:6], state[:, 6:]
     further = position + late_s * (velocity + 0.5 * late_s * acceleration)
@@ -213,9 +219,11 @@ def _without(stretch: Stretch, steps: Sequence[Step]) -> Stretch:
     return stretch._replace(record=stretch.record._replace(measurement=bridged(log, stretch.calm, steps)))
 
 
-def _likelier(stretch: Stretch, step: Step) -> Step | None:
-    """The step, with the size that the stretch tells, if the stretch is likelier with it than without."""
+def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | None:
+    """The step, with the size that the stretch tells, if the stretch is likelier with it than without, given the steps
+    that are known."""
     try:
+        stretch = _without(stretch, known)
         without, model = max(
             ((_decided(stretch, stretch.decided, model), model) for model in (stretch.model, stretch.calm)),
             key=lambda tried: tried[0].likelihood,
@@ -226,12 +234,45 @@ def _likelier(stretch: Stretch, step: Step) -> Step | None:
             weight = with_it.weight
             log, (step,) = refined(bridge.record.weighted(weight), model, [step])
             bridge = bridge._replace(record=bridge.record._replace(measurement=log.measurement))
-        if not with_it.likelihood > without.likelihood + MARGIN:
+        if not with_it.likelihood > without.likelihood + MARGIN or not _stays(stretch.record, weight, step):
             return None
-        least = max(_likelihood(stretch, weight) for weight in (stretch.decided, stretch.taken_in)) + stretch.margin
-        return step if _likelihood(bridge, weight) > least else None
+        if _size(stretch, bridge, step) < SMALLEST:
+            return None
+        least = max(_likelihood(stretch, weight) for weight in (stretch.decided, stretch.taken_in))
+        most = _likelihood(bridge, weight) - stretch.margin
+        if most <= least or any(_likelihood(stretch, patch) >= most for patch in _patches(stretch, step)):
+            return None
+        return step
     except ValueError:  # a component has too few readings there
         return None
+
+
+def _patches(stretch: Stretch, step: Step) -> Iterator[FloatArray]:
+    """The decisions (n, 3) in which the readings just before a step, or just after, are a patch."""
+    own = slice(None) if step.component == CLOCK else step.component
+    for length in PATCHES:
+        for side in (slice(step.sample - length, step.sample), slice(step.sample, step.sample + length)):
+            weight = stretch.decided.copy()
+            weight[side, own] = 0.0
+            yield weight
+
+
+def _size(stretch: Stretch, bridge: Stretch, step: Step) -> float:
+    """How far a step moves the readings, in sigmas of the component that it moves most."""
+    rows, _ = step.moved(len(stretch.decided))
+    away = stretch.record.measurement[rows] - bridge.record.measurement[rows]
+    away[:, 1] = wrap(away[:, 1])
+    seen = np.where(np.isfinite(away), np.abs(away), 0.0) / np.sqrt(stretch.calm.noise_variance)
+    return float(np.median(seen, 0).max())
+
+
+def _stays(record: Record, weight: FloatArray, step: Step) -> bool:
+    """Whether most readings on both sides are good with the step; else it is the edge of a patch."""
+    own = slice(None) if step.component == CLOCK else step.component
+    return all(
+        weight[side, own].sum() >= STAYS * record.possible[side, own].sum()
+        for side in (slice(0, step.sample), slice(step.sample, None))
+    )
 
 
 def _decided(stretch: Stretch, weight: FloatArray, model: Model) -> alternatives.Step:
