@@ -11,13 +11,14 @@ continues from one stretch to the next (`recursive`).
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
 from ftproc.core import threads
-from ftproc.core.editing import two_pass
+from ftproc.core.editing import steps, two_pass
 from ftproc.core.filtering import forward
 from ftproc.core.filtering.records import FilterRun, Model
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
@@ -26,6 +27,8 @@ from ftproc.core.identification.profile import median_level
 from ftproc.methods import preparing, recursive
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
 from ftproc.settings import FilterSettings
+
+Run = TypeVar("Run", FilterRun, SmootherRun)
 
 LONGEST_WHOLE = 60_000  # samples of a log that is edited as a whole
 KEPT = 40_000  # samples of a segment, without its margins,
@@ -62,13 +65,17 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     run, smoothed = forward.filter_log(edited.log, edited.model, starts), edited.smoothed
     if edited.decision.alternative is not None:
         run, smoothed = _worse_of(edited, run, edited.decision.alternative.model)
-    label = preparing.labels(edited.weight, readings.measurement)
+    shifts = edited.faults.shifts
+    if shifts:
+        run, smoothed = _widened(run, shifts), _widened(smoothed, shifts)
+    label = preparing.labels(edited.weight, edited.log.measurement)
     again = preparing.re_initialized(starts)
     decision = edited.decision
     return Estimate(
         run, label, edited.model, smoothed if settings.smooth else None, again, decision.settled,
         unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts,
         alternative=decision.alternative,
+        faults=edited.faults,
     )  # fmt: skip
 
 
@@ -85,6 +92,15 @@ def _worse_of(edited: two_pass.Edited, run: FilterRun, other: Model) -> tuple[Fi
             los_sigma=np.maximum(edited.smoothed.los_sigma, smoothed.los_sigma),
         ),
     )
+
+
+def _widened(run: Run, shifts: Sequence[steps.Step]) -> Run:
+    """A run with sigmas that allow for the uncertain sizes of the shifts that were taken out of its readings."""
+    sigma, los_sigma = run.sigma.copy(), run.los_sigma.copy()
+    along_axes, along_lines = steps.spread(run.state, shifts)
+    sigma[:, :3] = np.sqrt(sigma[:, :3] ** 2 + along_axes)
+    los_sigma[:, :3] = np.sqrt(los_sigma[:, :3] ** 2 + along_lines)
+    return run._replace(sigma=sigma, los_sigma=los_sigma)
 
 
 def usual_of(record: Recording, settings: FilterSettings) -> Model | None:

@@ -156,4 +156,8 @@ def estimate(readings: Readings, log: Log, found: Cleaned) -> Estimate:
         found.weight, np.full(n, np.nan), los_sigma, np.arange(n), np.nan,
     )  # fmt: skip
     model = Model(log.sigma**2, np.full((1, 6), np.nan))
-    return Estimate(run, labels(found.weight, readings.measurement), model, cleaned=cleaned)
+    label = labels(found.weight, readings.measurement)
+    if found.sigma is not None:
+        return Estimate(run, label, model, cleaned=cleaned)
+    rejected = np.isfinite(readings.measurement) & ~np.isfinite(log.trusted[log.led :])
+    return Estimate(run, label, model, cleaned=cleaned, screened_out=rejected)

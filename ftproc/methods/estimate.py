@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ftproc.core.editing.two_pass import Faults
 from ftproc.core.filtering.records import FilterRun, Model, Observations
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification.coloured_noise import Coloured
@@ -78,7 +80,9 @@ class Estimate(NamedTuple):
     the time stamps. drifts: whether the noise's variance drifts. alternative: a model with correlated noise
     that explains the log as well, and that the sigmas allow for. cleaned: (n, 3) readings of a method that works on
     range, azimuth and elevation one by one; NaN there and in its run means not estimated. unexamined: places where
-    two-pass editing looked for no alternative, its search having been cut short.
+    two-pass editing looked for no alternative, its search having been cut short. faults: of the instrument, that
+    two-pass editing found and took out of the readings. screened_out: (n, 3) readings that screening rejects, of a
+    method without sigmas, whose labels nothing else tests.
     """
 
     run: FilterRun
@@ -92,6 +96,8 @@ class Estimate(NamedTuple):
     alternative: Coloured | None = None
     cleaned: FloatArray | None = None
     unexamined: int = 0
+    faults: Faults | None = None
+    screened_out: NDArray[np.bool_] | None = None
 
     @property
     def smoothed_run(self) -> FilterRun:
@@ -109,6 +115,8 @@ class Estimate(NamedTuple):
             smoothed=None if self.smoothed is None else self.smoothed.rows(low, high),
             reacquired=tuple(k - low for k in self.reacquired if low <= k < high),
             cleaned=None if self.cleaned is None else self.cleaned[low:high],
+            screened_out=None if self.screened_out is None else self.screened_out[low:high],
+            faults=None if self.faults is None else self.faults.rows(low, high),
         )
 
 

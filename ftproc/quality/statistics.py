@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ftproc.methods.estimate import typical_interval
 from ftproc.quality import consistency, verdict
+from ftproc.quality.faults import FaultStatistics, clock_set_back
 from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, FlagArray, FloatArray, MeasurementLog
 from ftproc.scoring.figures import changes
 
@@ -40,6 +41,8 @@ class RunStatistics:
         self.jerk: list[FloatArray] = []
         self.reacquired, self.unexamined, self.stamp_s, self.drifts = 0, 0, 0.0, False
         self.slow_noise_s, self.slow_noise_likelier, self.slow_noise_separable = 0.0, False, True
+        self.faults = FaultStatistics()
+        self.screened_out, self.overlooked = 0, 0
         self.converged: bool | None = None
         self.largest_m, self.largest_sigma = 0.0, 0.0
         self.outside, self.rows, self.parts = 0.0, 0, 0
@@ -79,6 +82,11 @@ class RunStatistics:
             self.slow_noise_separable &= estimate.alternative.separable
             self.slow_noise_s = max(self.slow_noise_s, float(other.fade_s[other.wander_variance > 0].max()))
         self.unexamined += estimate.unexamined
+        if estimate.screened_out is not None:
+            self.screened_out += int(estimate.screened_out.sum())
+            self.overlooked += int((estimate.screened_out & (estimate.label == GOOD)).sum())
+        if estimate.faults is not None:
+            self.faults.add(time_s, estimate.faults)
         self.largest_m = max(self.largest_m, float(np.linalg.norm(correction[:, :3], axis=1).max(initial=0.0)))
         changed, sigma = np.abs(correction), best_sigma[:, : correction.shape[1]]
         ratio = np.divide(changed, sigma, out=np.zeros_like(changed), where=changed > 0)
@@ -122,6 +130,7 @@ class RunStatistics:
             noise = float(np.sqrt(model.reading_variance[c]))
             components[name] = {
                 **self.components[c].counts(),
+                **self.faults.of_component(c),
                 f"noise_{UNITS[c]}": noise if c not in absent else None,
                 "noise_correlation": float(model.correlation(self.interval_s)[c]),
                 **self.components[c].consistency(noise),
@@ -157,6 +166,10 @@ class RunStatistics:
             "time_stamp_sigma_s": self.stamp_s,
             "noise_drifts": self.drifts,
             "editing_places_unexamined": self.unexamined,
+            **self.faults.figures(),
+            "screened_out": self.screened_out,
+            "screened_out_but_used": self.overlooked,
+            "clock_set_back": clock_set_back(log),
             "correction_largest_m": self.largest_m,
             "correction_largest_sigma": self.largest_sigma,
             "correction_outside_training": self.outside / max(self.rows, 1),

@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ftproc.quality import consistency
+from ftproc.quality import consistency, faults
 
 CONSISTENT, SUSPECT, UNRELIABLE = "consistent", "suspect", "unreliable"
 LEVELS = (CONSISTENT, SUSPECT, UNRELIABLE)  # from good to bad
 FEWEST_GOOD = 20  # readings of a component, for a test of its sigmas
 UNRELIABLE_RATIO = 2.0  # innovation ratio over its upper bound, from which the sigmas mean nothing
 MANY_SIGMAS = 5.0  # of a network's correction, from which only an error of the instrument can be its reason
+FEWEST_OVERLOOKED, OVERLOOKED = (
+    5,
+    0.5,
+)  # outliers of the screening, and share of them, that a method without sigmas uses
 MANY_REJECTED, TOO_MANY_REJECTED = 0.25, 0.5  # share of a component's readings. With a third of all readings outliers,
 # one flight in five diverges, and nearly all of these have more than a quarter rejected.
 
@@ -32,6 +36,8 @@ class Remark(NamedTuple):
 def remarks(s: Mapping[str, Any]) -> list[Remark]:
     """All remarks on a summary (see `RunStatistics.summary`)."""
     found = [*_observability(s), *_sigmas(s), *_editing(s)]
+    found += [Remark(SUSPECT, text) for text in faults.suspicious(s)]
+    found += [Remark(CONSISTENT, text) for text in faults.allowed_for(s)]
     correlation = max(part["noise_correlation"] for part in s["components"].values())
     if correlation > 0:
         text = f"the noise is correlated between samples (coefficient up to {correlation:.2f}); the sigmas allow for it"
@@ -90,6 +96,11 @@ def _observability(s: Mapping[str, Any]) -> Iterator[Remark]:
 def _sigmas(s: Mapping[str, Any]) -> Iterator[Remark]:
     if not s["sigmas_published"] and not s["not_observable"]:
         yield Remark(SUSPECT, "the method publishes no sigmas, so nothing tests its estimate")
+    used, all_of_them = s["screened_out_but_used"], s["screened_out"]
+    if used:
+        level = UNRELIABLE if used >= FEWEST_OVERLOOKED and used > OVERLOOKED * all_of_them else SUSPECT
+        text = f"screening calls {all_of_them} readings outliers, of which the method uses {used}"
+        yield Remark(level, text)
     for name, part in s["components"].items():
         ratio, predicted = part["innovation_ratio"], part["predicted_sigma_ratio"]
         if ratio is not None and part["verdict"] == "overconfident":

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tests.faults import batches
 from tests.fuzz import mutation
-from tests.trust import corpus, elsewhere, long_runs
+from tests.trust import corpus, elsewhere, long_runs, verdicts
 
 KILLS, FLIGHTS, SAMPLES, FUZZ_S = 50, 200, 10_000_000, 60.0
 
@@ -23,8 +23,9 @@ def main() -> int:
     plain = elsewhere.run(*elsewhere.PLAIN, FTPROC_KERNELS="python")
     diverged = long_runs.many(FLIGHTS)
     endless = long_runs.endless(SAMPLES)
+    judged = verdicts.table()
     tracebacks = counts["wrong"] + counts["known"] + len(wrong)
-    for line in filter(None, [*lines, *wrong, *lost, faults.failures, plain.failures]):
+    for line in filter(None, [*lines, *wrong, *lost, faults.failures, plain.failures, *verdicts.too_many(judged)]):
         print(line, file=sys.stderr)
     for row in (
         ("what", "count"),
@@ -42,11 +43,12 @@ def main() -> int:
         ("of these diverged (20 sigma for 2 s)", diverged.diverged),
         ("divergences called consistent", diverged.unreported),
         (f"{SAMPLES:,} samples, sigmas finite and positive, as after a late start", endless),
+        *verdicts.rows(judged),
         ("tests of the kernels with the compiler off", plain.passed + plain.failed),
         ("of these failed", plain.failed),
     ):
         print(f"| {row[0]} | {row[1]} |")
-    right = faults.all_passed and plain.all_passed and endless == "ok"
+    right = faults.all_passed and plain.all_passed and endless == "ok" and not verdicts.too_many(judged)
     return int(bool(counts["wrong"] or wrong or lost or diverged.unreported or not right))
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.simulation import simulate
-from tests.trust import elsewhere, long_runs
+from tests.trust import elsewhere, faulty_logs, long_runs, verdicts
 
 
 def test_no_divergence_is_called_consistent() -> None:
@@ -55,3 +55,28 @@ def test_failures_elsewhere_are_counted(tmp_path: Path) -> None:
     assert not elsewhere.run(str(tmp_path / "none")).all_passed
     path.write_text("import nothing_of_this_name\n")
     assert elsewhere.run(str(path)).failed == 1
+
+
+def test_no_fault_is_confident_and_wrong() -> None:
+    """A short version of the table; the bounds are those of `make trust`."""
+    for name in ("step of 20 sigma", "clock jump", "held", "one-sided errors"):
+        assert verdicts.tally(name, verdicts.runs(name, range(2))).wrong == 0
+
+
+def test_the_bounds_of_the_verdicts() -> None:
+    assert verdicts.too_many([verdicts.Tally("clean", 40, 4, 0), verdicts.Tally("clock jump", 40, 40, 2)]) == []
+    assert len(verdicts.too_many([verdicts.Tally("clean", 40, 5, 0), verdicts.Tally("clock jump", 40, 40, 3)])) == 2
+    assert len(verdicts.too_many([verdicts.Tally("step of 10 sigma", 40, 40, 1)])) == 1
+    assert list(verdicts.rows([verdicts.Tally("dirty", 40, 2, 0)])) == [
+        ("dirty logs: runs, called consistent", "40, 38")
+    ]
+
+
+def test_what_counts_as_far_off() -> None:
+    faulty = faulty_logs.make("clean", 4)
+    found = pipeline.filter_log(faulty.log)
+    assert not verdicts.is_far(found, faulty.position_m)
+    moved = faulty.position_m.copy()
+    moved[: len(moved) // 50] += 6 * found.sigma[: len(moved) // 50, :3]
+    assert verdicts.is_far(found, moved)
+    assert (faulty_logs.make("clean", 4).log.measurement == faulty.log.measurement).all()

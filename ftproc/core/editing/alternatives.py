@@ -112,7 +112,7 @@ def try_alternatives(log: Neighbourhood, weight: FloatArray, search: Search) -> 
         near = slice(low, island.last + AROUND)
         part = log.part(near)
         try:
-            steps = [*_decisions(part, result[near]), *_alternatives(part, result[near], island.shifted(low))]
+            steps = [*decisions(part, result[near]), *_alternatives(part, result[near], island.shifted(low))]
         except ValueError:  # a component has too few readings there
             continue
         search.work -= len(steps) * len(part.time_s)
@@ -155,14 +155,14 @@ def _alternatives(log: Neighbourhood, weight: FloatArray, island: Island) -> Ite
     opposite[begin:end, component] = 0.0
     steps = _without_the_worst(log, opposite * log.possible)
     yield from steps
-    yield from _decisions(log, max(steps, key=lambda step: step.likelihood).weight)
+    yield from decisions(log, max(steps, key=lambda step: step.likelihood).weight)
     yield from _filled(log, weight, component, slice(first, last))
 
 
-def _decisions(log: Neighbourhood, weight: FloatArray) -> list[Step]:
-    """The decisions from `weight` on until they stand still."""
+def decisions(log: Neighbourhood, weight: FloatArray, rounds: int = ROUNDS) -> list[Step]:
+    """The decisions from `weight` on until they stand still, or for so many rounds."""
     steps = []
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         step, smoothed = _step(log, weight)
         steps.append(step)
         noise = log.model.noise_variance

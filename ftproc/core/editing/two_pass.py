@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.editing import jump_patches, outlier_chain, screening
+from ftproc.core.editing import jump_patches, outlier_chain, screening, steps
+from ftproc.core.editing.copies import KindArray, without_copies
 from ftproc.core.editing.decisions import (
     Decision,
     Record,
@@ -23,11 +24,13 @@ from ftproc.core.editing.decisions import (
     decide,
 )
 from ftproc.core.editing.reassessment import reassess
+from ftproc.core.editing.steps import Step
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
-from ftproc.core.identification import uneven_noise
+from ftproc.core.identification import one_sided, uneven_noise
 from ftproc.core.identification.likelihood import Fixed, first_jerk, without_noise
+from ftproc.core.identification.one_sided import OneSided
 from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.model.frames import unwrap
 from ftproc.core.model.measurement import NO_RANGE_M
@@ -40,6 +43,7 @@ WINDOWS = (31, 75)  # samples: the short one follows manoeuvres, the long one se
 COARSE = 0.5  # of a component's noise: rounding that makes so much of it decides how its readings repeat
 FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
 PROFILE_STEPS = 4  # of the search for the jerk profile, once the decisions are made
+STEP_ROUNDS = 4  # of looking for steps: where one is bridged, another may show
 START_INFLATION = 2.0  # on the covariance of a smoothed state that starts a filter over the same record
 
 
@@ -52,11 +56,31 @@ class Known(NamedTuple):
     gate: float
 
 
+class Faults(NamedTuple):
+    """What is wrong with the readings beyond outliers, and was taken out of them. copied: (n, 3) kinds of those that
+    were not measured, see `copies`. steps: that stay. one_sided: components of which many errors have one sign."""
+
+    copied: KindArray
+    steps: tuple[Step, ...] = ()
+    one_sided: tuple[OneSided, ...] = ()
+
+    @property
+    def shifts(self) -> tuple[Step, ...]:
+        """What was taken out of the readings, in components or the clock, and is uncertain."""
+        return (*self.steps, *(Step(each.component, 0, each.shift, each.sigma) for each in self.one_sided))
+
+    def rows(self, low: int, high: int) -> Faults:
+        """Of the samples [low, high) alone."""
+        inside = tuple(s._replace(sample=s.sample - low) for s in self.steps if low <= s.sample < high)
+        return self._replace(copied=self.copied[low:high], steps=inside)
+
+
 class Edited(NamedTuple):
     """The decisions and what they rest on.
 
     log: with weights (n, 3), 1 good, 0 rejected or missing. model: noise and jerk profile. starts: for the next pass.
     smoothed: the smoother's run with these. decision: the last one, with the model that it was made with.
+    faults: of the instrument, of which the log is free.
     """
 
     log: Observations
@@ -64,6 +88,7 @@ class Edited(NamedTuple):
     starts: list[Start]
     smoothed: SmootherRun
     decision: Decision
+    faults: Faults
 
     @property
     def weight(self) -> FloatArray:
@@ -118,6 +143,35 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
     segment_of: of a segment, the noise of the whole log, which is taken as it is, and its typical jerk, with which the
     search starts. Raises ValueError when a component has no reading that agrees with its neighbours.
     """
+    measurement, copied = without_copies(time_s, measurement)
+    record, decision = _decided(time_s, measurement, known, segment_of)
+    found: list[Step] = []
+    for _ in range(STEP_ROUNDS):
+        new = [] if decision.model.coloured else steps.find(record, decision)
+        if not new:
+            break
+        found, log = sorted([*found, *new], key=lambda s: s.sample), record.weighted(decision.weight)
+        record, decision = _decided(time_s, steps.bridged(log, decision.model, new), known, segment_of)
+    if segment_of is None:
+        decision = allow_for_colour(record, decision)
+    log = record.weighted(decision.weight)
+    if known.jerk_psd is None:
+        profile = fit_profile(log, decision.starts, decision.model, PROFILE_STEPS)
+        decision = decision._replace(model=with_allowance(log, profile))
+    log, found = steps.refined(log, decision.model, found)
+    smoothed = smooth_log(log, decision.model, decision.starts)
+    leaning = one_sided.find(log, smoothed, record.rounding)
+    if leaning:
+        log = one_sided.without(log, leaning)
+        smoothed = smooth_log(log, decision.model, decision.starts)
+    faults = Faults(copied, tuple(found), tuple(leaning))
+    return Edited(log, decision.model, decision.starts, smoothed, decision, faults)
+
+
+def _decided(
+    time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: Model | None
+) -> tuple[Record, Decision]:
+    """The decisions on a log as if it had no steps, with a jerk profile."""
     jerk_psd = known.jerk_psd
     screened, sigma, exact = screen(time_s, measurement)
     possible = np.isfinite(measurement) & ~stuck_readings(measurement, sigma)
@@ -137,15 +191,7 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
     record, decision = allow_for_drift(record, decision)
     if jerk_psd is None:
         decision = reassess(record, decision)
-    if segment_of is None:
-        decision = allow_for_colour(record, decision)
-    log = record.weighted(decision.weight)
-    if jerk_psd is None:
-        found = fit_profile(log, decision.starts, decision.model, PROFILE_STEPS)
-        decision = decision._replace(model=with_allowance(log, found))
-    d = decision
-    smoothed = smooth_log(log, d.model, d.starts)
-    return Edited(log, d.model, d.starts, smoothed, d)
+    return record, decision
 
 
 def smoothed_starts(smoothed: SmootherRun) -> list[Start]:

@@ -55,7 +55,17 @@ class Coloured(Backward, Protocol):
     n_first: Annotated[FloatArray, 12, 12]
 
 
+class Shift(Protocol):
+    """What the readings after a sample say of a step between it and the next: of range, azimuth, elevation and the
+    clock, see `smoother.shifts`."""
+
+    score: Annotated[FloatArray, 4]
+    information: Annotated[FloatArray, 4]
+
+
 BACKWARD, COLOURED = record(Backward), record(Coloured)
+SHIFT = record(Shift)
+Shifts = Annotated[Any, Layout(SHIFT)]
 Backwards = Annotated[Any, Layout(BACKWARD)]
 ColouredBackwards = Annotated[Any, Layout(COLOURED)]
 
@@ -93,6 +103,21 @@ def store(back: Backward, f: Filter, row: Estimated) -> None:
         # Rounding may eat a variance that the record has all but determined; it cannot be below that rounding.
         row.sigma[i] = math.sqrt(max(back.cov[i, i], 1e-14 * abs(f.p[i, i])))
     line_of_sight_sigma(back.state, back.cov, row.los_sigma)
+
+
+@part
+def store_shift(back: Backward, f: Filter, row: Shift) -> None:
+    """Keep the score and the information of a step that begins after a sample: of the offsets, r and N themselves, of
+    the clock, those along the way that the state goes in a second."""
+    r, n, state = back.r, back.n, back.state
+    for i in range(3):
+        row.score[i] = r[OFFSETS + i]
+        row.information[i] = n[OFFSETS + i, OFFSETS + i]
+    row.score[3] = row.information[3] = 0.0
+    for i in range(6):
+        row.score[3] += r[i] * state[3 + i]
+        for j in range(6):
+            row.information[3] += state[3 + i] * n[i, j] * state[3 + j]
 
 
 @part

@@ -38,6 +38,7 @@ from ftproc.core.signatures import Matrix
 FloatArray = NDArray[np.float64]
 
 BLOCK = 1024
+FOREVER_S = 1e300  # correlation time of an offset that stays
 
 
 class SmootherRun(NamedTuple):
@@ -90,6 +91,16 @@ class ColouredMemory(NamedTuple):
     residuals: Residuals
 
 
+class ShiftMemory(NamedTuple):
+    """The same where steps take the place of estimates."""
+
+    block: ColouredFilters
+    before: ColouredFilters
+    back: backward.ColouredBackwards
+    estimates: backward.Shifts
+    residuals: Residuals
+
+
 def _memory(samples: int, first: Any, estimates: Any, residuals: Any) -> Any:
     """For a span of so many samples that begins with a filter (an array of one record)."""
     coloured = first.dtype == COLOURED
@@ -97,7 +108,8 @@ def _memory(samples: int, first: Any, estimates: Any, residuals: Any) -> Any:
     before[:1] = first
     block["wander"], block["fade_s"] = first["wander"][0], first["fade_s"][0]
     back = zeros(backward.COLOURED if coloured else backward.BACKWARD)
-    return (ColouredMemory if coloured else Memory)(block, before, back, estimates, residuals)
+    kind = ShiftMemory if estimates.dtype == backward.SHIFT else ColouredMemory if coloured else Memory
+    return kind(block, before, back, estimates, residuals)
 
 
 @part
@@ -117,6 +129,9 @@ def _copy_state(source: Filter, target: Filter) -> None:
         target.x[i] = source.x[i]
         for j in range(len(source.x)):
             target.p[i, j] = source.p[i, j]
+
+
+_store = backward.store  # of the sweep below; that for steps has another
 
 
 def _swept_through(
@@ -152,7 +167,7 @@ def _swept_through(
             if kept == STATES or (kept == RESIDUALS and k == span.first):
                 backward.estimate(back, f)
             if kept == STATES:
-                backward.store(back, f, estimates[k])
+                _store(back, f, estimates[k])
             if k == span.first:
                 back.n_first[:] = back.n
             backward.absorb(back, f)
@@ -173,6 +188,9 @@ def _swept_through(
 
 _sweep = kernel(variant(_swept_through, __name__, "_sweep"))
 _sweep_coloured = kernel(variant(_swept_through, __name__, "_sweep_coloured", memory=ColouredMemory))
+_sweep_shifts = kernel(
+    variant(_swept_through, __name__, "_sweep_shifts", memory=ShiftMemory, _store=backward.store_shift)
+)
 
 
 def smoothed_covariance(p: FloatArray, n: FloatArray) -> FloatArray:
@@ -246,3 +264,24 @@ def smooth_log(log: Observations, model: Model, starts: list[Start], residuals_o
     return SmootherRun(
         **fields, log_likelihood=scores.log_likelihood, noise_score=scores.noise, jerk_score=scores.jerk, heads=heads
     )
+
+
+def shifts(log: Observations, model: Model, starts: list[Start]) -> tuple[FloatArray, FloatArray]:
+    """What the record says of a step between each sample and the next: score and information (n, 4), of which
+    score / information is the estimate and 1 / information its variance (de Jong and Penzer 1998, section 3).
+
+    In the first three columns the readings of a component are larger from the next sample on, m, rad, rad: a shock of
+    an offset of that component, which the smoother carries along at no variance. In the last the target is seconds
+    further on its way, as when the clock jumps. Noise that is correlated is taken for white.
+    """
+    n = len(log.time_s)
+    samples, profile = log.samples(model.reading_variance), model.profile(log.time_s)
+    found = zeros(backward.SHIFT, n)
+    residuals = zeros(LEFT, n)
+    for start, stop in between(starts, n):
+        first = zeros(COLOURED)
+        first["x"][0, :9], first["p"][0, :9, :9], first["fade_s"] = start.state, start.covariance, FOREVER_S
+        memory = _memory(stop - start.sample, first, found, residuals)
+        span = Span(start.sample, stop, start.sample)
+        _sweep_shifts(span, samples, profile, memory, np.zeros_like(model.jerk), STATES)
+    return found["score"].copy(), found["information"].copy()

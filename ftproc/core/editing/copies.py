@@ -1,0 +1,136 @@
+"""Readings that were not measured: held from the sample before, or drawn on a line between two others.
+
+An instrument that is slower than its log, or that has nothing new to say, leaves the reading before in its place; a
+program that brings several instruments to one clock interpolates. Used as readings, such copies make the noise
+seem correlated, and what they say is counted several times. They are told from chance by exact agreement: the readings
+of a moving target change by many steps of their rounding, and hardly ever by none. A coarse instrument that sees a slow
+target repeats its readings too, but then goes on by single steps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing.runs import runs_of
+from ftproc.core.editing.screening import MOSTLY_ON_GRID, ON_GRID, rounding_step, stuck
+from ftproc.core.model.frames import wrap
+
+FloatArray = NDArray[np.float64]
+KindArray = NDArray[np.uint8]
+
+MEASURED, HELD, INTERPOLATED = 0, 1, 2
+FEWEST = 20  # readings that must be left
+MANY = 6.0  # steps of rounding by which a reading changes typically, or else it is coarse
+NEAR = 4.0  # steps within which changes are counted, to know how many are none by chance
+LEAST, SHARE, TIMES_CHANCE = 8, 0.03, 3.0  # copies, of all readings, and of those that chance makes, to be believed
+LEAST_ON_LINES = 0.15  # share of a component's readings
+NEARLY = 0.2  # of the median that the nearest twentieth of those off the lines are off: more shows rounding that is
+# coarse, whatever its step
+ROUNDING = 1e-12  # of a number
+PRECISION, COARSER, DIFFERENCES = 1e-11, 10.0, 24  # of the largest reading, from which two differ; times that, for a
+# step to be one; and differences between neighbouring values, the smallest, from which it is found
+
+
+def without_copies(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, KindArray]:
+    """The readings (n, 3), missing where they were not measured, and (n, 3) HELD or INTERPOLATED there, else MEASURED.
+
+    time_s (n,), measurement (n, 3). Repeats of a component that is stuck now and then are outliers, not copies.
+    """
+    z, kind = measurement.copy(), np.zeros(measurement.shape, np.uint8)
+    for c in range(3):
+        channel = measurement[:, c]
+        there = np.isfinite(channel)
+        step = _step(channel[there])
+        seen = np.flatnonzero(there & ~stuck(channel, _scatter(channel[there])))
+        held = _held(channel[seen], step)
+        kind[seen[held], c] = HELD
+        seen = seen[~held]
+        on_lines, values = _on_lines(time_s[seen], channel[seen], step, c == 1)
+        kind[seen[on_lines], c], z[seen, c] = INTERPOLATED, values
+    z[kind > 0] = np.nan
+    return z, kind
+
+
+def _step(values: FloatArray) -> float:
+    """The step to which readings (m,) are rounded; zero if to none that shows. In a short log no two of them need lie a
+    single step apart, so it is the greatest common divisor of small differences."""
+    step = rounding_step(values)
+    differences = np.diff(np.unique(values))
+    least = PRECISION * float(np.abs(values).max(initial=0.0))
+    differences = np.sort(differences[differences > least])[:DIFFERENCES]
+    if step > 0 or not len(differences):
+        return step
+    step = float(differences[0])
+    for other in differences[1:].tolist():
+        while other > least:
+            step, other = other, abs(step - round(step / other) * other)
+    multiple = (values - values[0]) / step
+    on_grid = np.mean(np.abs(multiple - np.round(multiple)) < ON_GRID) >= MOSTLY_ON_GRID
+    return step if on_grid and step > COARSER * least else 0.0
+
+
+def _scatter(values: FloatArray) -> float:
+    """1-sigma of the noise of readings (m,), copies left out, by their second differences; NaN if there is none."""
+    fresh = values[np.r_[True, np.diff(values) != 0]] if len(values) else values
+    sigma = float(np.median(np.abs(np.diff(fresh, 2)))) / (0.6745 * np.sqrt(6)) if len(fresh) > 2 else 0.0
+    return sigma or np.nan
+
+
+def _held(values: FloatArray, step: float) -> NDArray[np.bool_]:
+    """(m,) readings that repeat the one before, if they are so many that they were not measured."""
+    none = np.zeros(len(values), bool)
+    change = np.abs(np.diff(values))
+    moved = change[change > 0]
+    if len(moved) < FEWEST or np.median(moved) < MANY * step:
+        return none
+    begins = np.flatnonzero(np.r_[True, change > 0])
+    length = np.diff(np.r_[begins, len(values)])
+    onward = np.r_[change[begins[1:] - 1], np.inf]  # the change that ends each run
+    resting = (length > 2) & (onward <= 2 * step)  # a target that stands
+    found = np.repeat(~resting, length)
+    found[begins] = False
+    return found if _are_many(int(found.sum()), moved, step, len(values)) else none
+
+
+def _are_many(count: int, off: FloatArray, step: float, readings: int) -> bool:
+    """Whether so many agreements are no chance, by how many of those that do not agree (m,) are off by little."""
+    chance = float(np.sum(off <= NEAR * step)) / (2 * NEAR)
+    return bool(count > max(LEAST, SHARE * readings, TIMES_CHANCE * chance + LEAST * np.sqrt(chance)))
+
+
+def _on_lines(
+    time_s: FloatArray, values: FloatArray, step: float, angular: bool
+) -> tuple[NDArray[np.bool_], FloatArray]:
+    """(m,) readings on the lines between others, if they are so many that they were not measured; and (m,) the values,
+    of which those about a knot are what was measured there."""
+    on, interval = np.zeros(len(values), bool), np.diff(time_s)
+    if len(values) < FEWEST or not (interval > 0).all():
+        return on, values
+    rise = wrap(np.diff(values)) if angular else np.diff(values)
+    slope = rise / interval
+    off = np.abs(np.diff(slope)) * interval[:-1] * interval[1:] / (interval[:-1] + interval[1:])
+    limit = 1.01 * step + ROUNDING * float(np.abs(values).max())
+    flat = off <= limit
+    others = off[~flat]
+    if len(others) < FEWEST or np.median(others) < MANY * limit or flat.sum() < LEAST_ON_LINES * len(values):
+        return on, values
+    if np.quantile(others, 0.05) > NEARLY * np.median(others):
+        return on, values
+    if not _are_many(int(flat.sum()), others, limit, len(values)):
+        return on, values
+    on[1:-1] = flat
+    values = values.copy()
+    for begin, end in runs_of(~on):
+        kept = begin
+        if end - begin == 2 and begin > 0 and end < len(values):  # the knot lies between the two, where the lines meet
+            bend = slope[end - 1] - slope[begin - 1]
+            late = (slope[begin] - slope[begin - 1]) / bend if bend != 0 else 0.0
+            late = interval[begin] * (1 - float(np.clip(late, 0.0, 1.0)))  # from the first of the two
+            kept = begin + (late > 0.5 * interval[begin])
+            away = -late if kept == begin else interval[begin] - late
+            values[kept] -= 0.5 * bend * abs(away)  # from its line to the curve through the knots
+        on[begin:end] = True
+        on[kept:end:2] = False
+    on[[0, -1]] = False
+    return on, values

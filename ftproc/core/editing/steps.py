@@ -1,0 +1,295 @@
+"""Steps that stay: an encoder that slips, a range ambiguity, another lobe, a clock that jumps.
+
+From one backward pass come the estimate and the variance of a step between any two samples (de Jong and Penzer 1998;
+see `smoother.shifts`): of a component, and of the clock, which moves the target along its way. A manoeuvre may look
+like a step to a filter that expects a calm flight, so each step that stands out is weighed against the same stretch
+without it: both with a process noise that follows the flight, and with outlier decisions of their own.
+
+Two-pass editing without steps follows one as motion, and rejects what lies beside it, or all that comes after it, as a
+patch. So rejected runs that lie on a track of their own are taken in again before steps are looked for.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing import alternatives
+from ftproc.core.editing.decisions import Decision, Record
+from ftproc.core.editing.runs import runs_of
+from ftproc.core.filtering.initialization import find_starts, first_state
+from ftproc.core.filtering.records import Model, Observations
+from ftproc.core.filtering.smoother import shifts, smooth_log
+from ftproc.core.identification.likelihood import Fixed, fit_level
+from ftproc.core.identification.profile import fit_profile, median_level
+from ftproc.core.identification.scales import scales_of
+from ftproc.core.model.frames import from_cartesian, line_of_sight_axes, wrap
+
+FloatArray = NDArray[np.float64]
+
+CLOCK = 3  # in place of a component
+LEAST = 5.0  # sigmas of a step's estimate that make it worth weighing
+FEWEST, EVEN = 3, 5.0  # readings in a rejected run, and second differences in sigmas, that may be a track
+AROUND, MEMORIES = (100, 400), 6.0  # samples on each side that decide between step and manoeuvre, and memories
+MARGIN = 8.0  # by which the log-probability of a stretch with a step must be better, and ln of the places for it
+MOST = 8  # steps that are weighed at a time
+SMALLEST = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
+PATCHES = 12, 24, 48  # readings in a patch, of which a step may be an end
+STAYS = 0.75  # share of the readings on either side of a step that must be good
+SIZES = 2  # times that the size of a step is found anew, as the decisions beside it change
+PROFILE_STEPS = 3  # of the search for the jerk profile of a stretch
+END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step cannot be told from a patch
+
+
+class Step(NamedTuple):
+    """From a sample on the readings of a component (range, azimuth, elevation) are larger by `size` m, rad, rad, or,
+    where it is CLOCK, their times by so many seconds. sigma: 1-sigma of the size. The longer side is kept."""
+
+    component: int
+    sample: int
+    size: float
+    sigma: float
+
+    def moved(self, samples: int) -> tuple[slice, float]:
+        """Which of so many samples are moved to the other side, and the sign of what is taken out of them."""
+        if 0 < self.sample < samples / 2:
+            return slice(0, self.sample), -1.0
+        return slice(self.sample, samples), 1.0
+
+
+class Stretch(NamedTuple):
+    """Part of a log around a step: its record; the weights (n, 3) as decided without steps, and with the runs taken in
+    that lie on a track of their own; the model with the flight's process noise, and with that of a calm flight; the
+    rates of outliers; and the margin by which a step must be likelier."""
+
+    record: Record
+    decided: FloatArray
+    taken_in: FloatArray
+    model: Model
+    calm: Model
+    rates: FloatArray
+    margin: float
+
+
+def find(record: Record, decision: Decision) -> list[Step]:
+    """The steps in a log whose outliers were decided as if it had none."""
+    calm = median_level(decision.model)
+    weight = _taken_in(record, decision, calm)
+    log = record.weighted(weight)
+    scales = scales_of(log, calm.noise_variance)
+    around = int(np.clip(MEMORIES * scales.memory_s(float(calm.jerk[0, 0])) / scales.interval_s, *AROUND))
+    margin = MARGIN + math.log(4 * len(record.time_s))
+    found: list[Step] = []
+    tries = [weight] if (weight == decision.weight).all() else [weight, decision.weight]
+    candidates = itertools.chain.from_iterable(
+        _standing_out(record.weighted(each), calm, around // 2) for each in tries
+    )
+    for step in candidates:
+        near = slice(max(step.sample - around, 0), step.sample + around)
+        known, one = ([s._replace(sample=s.sample - near.start) for s in some] for some in (found, [step]))
+        known = [s for s in known if 0 < s.sample < near.stop - near.start]
+        model, part = _from(decision.model, record.time_s, near), record.part(near)
+        own = slice(None) if step.component == CLOCK else step.component
+        taken = decision.weight[near].copy()
+        taken[:, own] = weight[near, own]
+        stretch = Stretch(part, decision.weight[near], taken, model, calm, decision.rates, margin)
+        likelier = _likelier(stretch, known, one[0])
+        if likelier is not None:
+            found.append(likelier._replace(sample=step.sample))
+    return found
+
+
+def refined(log: Observations, model: Model, steps: Sequence[Step]) -> tuple[Observations, list[Step]]:
+    """The log and the steps with the sizes that all the record tells. log: with the steps bridged as they are."""
+    if not steps:
+        return log, []
+    score, information = shifts(log, model, find_starts(log, model.noise_variance, float(model.jerk[0, 0])))
+    rest, found = [], []
+    for step in steps:
+        at = step.sample - 1, step.component
+        if information[at] > 0:
+            more = float(score[at] / information[at]) * (-1 if step.component == CLOCK else 1)
+            rest.append(step._replace(size=more))
+            step = step._replace(size=step.size + more, sigma=1 / math.sqrt(information[at]))
+        found.append(step)
+    return log._replace(measurement=bridged(log, model, rest)), found
+
+
+def bridged(log: Observations, model: Model, steps: Sequence[Step]) -> FloatArray:
+    """The readings (n, 3) as they would be without the steps: those of the shorter side moved to the other."""
+    z = log.measurement.copy()
+    for step in steps:
+        rows, sign = step.moved(len(z))
+        if step.component == CLOCK:
+            z[rows] -= _way(log.part(rows)._replace(measurement=z[rows]), model, sign * step.size)
+        else:
+            z[rows, step.component] -= sign * step.size
+    z[:, 1] = wrap(z[:, 1])
+    return z
+
+
+def _way(log: Observations, model: Model, late_s: float) -> FloatArray:
+    """(n, 3) by how much readings are larger than those of the target so many seconds later, which these readings alone
+    tell."""
+    try:
+        start = first_state(log, model.noise_variance, 0, slice(0, len(log.time_s)))
+    except ValueError:  # a component has no reading there, so nobody knows the way
+        return np.zeros_like(log.measurement)
+    state = smooth_log(log, median_level(model), [start]).state
+    position, velocity, acceleration = state[:, :3], state[:, 3:6], state[:, 6:]
+    further = position + late_s * (velocity + 0.5 * late_s * acceleration)
+    way: FloatArray = from_cartesian(position) - from_cartesian(further)
+    way[:, 1] = wrap(way[:, 1])
+    return way
+
+
+def spread(state: FloatArray, steps: Sequence[Step]) -> tuple[FloatArray, FloatArray]:
+    """(n, 3) variances, m2, that the uncertain sizes of the steps add to the positions of the states (n, 9) that were
+    moved: along x, y, z, and along the radial, cross and up axes."""
+    axes, lines = np.zeros((len(state), 3)), np.zeros((len(state), 3))
+    for step in steps:
+        rows, _ = step.moved(len(state))
+        position, velocity = state[rows, :3], state[rows, 3:6]
+        sight = line_of_sight_axes(position)
+        slant = np.linalg.norm(position, axis=1)[:, None]
+        ground = np.hypot(position[:, 0], position[:, 1])[:, None]
+        moves = (sight[:, 0], sight[:, 1] * ground, sight[:, 2] * slant, velocity)[step.component]
+        axes[rows] += (moves * step.sigma) ** 2
+        lines[rows] += (np.einsum("kij,kj->ki", sight, moves) * step.sigma) ** 2
+    return axes, lines
+
+
+def _taken_in(record: Record, decision: Decision, calm: Model) -> FloatArray:
+    """The decisions' weights (n, 3), but with the rejected runs whose readings lie on a track of their own."""
+    weight = decision.weight.copy()
+    rejected = record.possible & (weight <= 0)
+    if not (rejected[:-1] & rejected[1:]).any():
+        return weight
+    log = record.weighted(decision.weight)
+    residual = smooth_log(log, calm, decision.starts, residuals_only=True).residual
+    sigma = np.sqrt(calm.noise_variance)
+    for c in range(3):
+        seen = np.flatnonzero(record.possible[:, c])
+        for begin, end in runs_of(weight[seen, c] <= 0):
+            run = seen[begin:end]
+            if len(run) >= FEWEST and np.median(np.abs(np.diff(residual[run, c], 2))) < EVEN * sigma[c]:
+                weight[run, c] = 1.0
+    return weight
+
+
+def _standing_out(log: Observations, calm: Model, apart: int) -> list[Step]:
+    """The steps that stand out of a calm flight, the clearest first, and so many samples apart."""
+    try:
+        starts = find_starts(log, calm.noise_variance, float(calm.jerk[0, 0]))
+    except ValueError:
+        return []
+    score, information = shifts(log, calm, starts)
+    size = np.divide(
+        np.abs(score), np.sqrt(np.maximum(information, 0)), out=np.zeros_like(score), where=information > 0
+    )
+    end = 1 + min(END, int(SHARE * len(size)))
+    size[:end] = size[-end:] = 0.0
+    found: list[Step] = []
+    while len(found) < MOST and size.max() > LEAST:
+        k, c = (int(i) for i in np.unravel_index(int(size.argmax()), size.shape))
+        estimate, sigma = score[k, c] / information[k, c], 1 / math.sqrt(information[k, c])
+        found.append(Step(c, k + 1, float(-estimate if c == CLOCK else estimate), sigma))
+        near = slice(max(k - apart, 0), k + apart)
+        size[near, c] = 0.0
+        size[near, CLOCK] = 0.0  # which is no jump where one component stands out more
+    return found
+
+
+def _from(model: Model, time_s: FloatArray, near: slice) -> Model:
+    """The model of a stretch of the log: its jerk profile, to the nearest knot."""
+    if not math.isfinite(model.knot_s):
+        return model
+    first = round((float(time_s[near.start]) - float(time_s[0])) / model.knot_s)
+    return model._replace(jerk=model.jerk[min(first, len(model.jerk) - 1) :])
+
+
+def _without(stretch: Stretch, steps: Sequence[Step]) -> Stretch:
+    """The stretch with some steps bridged."""
+    log = stretch.record.weighted(stretch.taken_in)
+    return stretch._replace(record=stretch.record._replace(measurement=bridged(log, stretch.calm, steps)))
+
+
+def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | None:
+    """The step, with the size that the stretch tells, if the stretch is likelier with it than without, given the steps
+    that are known."""
+    try:
+        stretch = _without(stretch, known)
+        without, model = max(
+            ((_decided(stretch, stretch.decided, model), model) for model in (stretch.model, stretch.calm)),
+            key=lambda tried: tried[0].likelihood,
+        )
+        bridge, weight = _without(stretch, [step]), stretch.taken_in
+        for _ in range(SIZES):
+            with_it = _decided(bridge, weight, model)
+            weight = with_it.weight
+            log, (step,) = refined(bridge.record.weighted(weight), model, [step])
+            bridge = bridge._replace(record=bridge.record._replace(measurement=log.measurement))
+        if not with_it.likelihood > without.likelihood + MARGIN or not _stays(stretch.record, weight, step):
+            return None
+        if _size(stretch, bridge, step) < SMALLEST:
+            return None
+        least = max(_likelihood(stretch, weight) for weight in (stretch.decided, stretch.taken_in))
+        most = _likelihood(bridge, weight) - stretch.margin
+        if most <= least or any(_likelihood(stretch, patch) >= most for patch in _patches(stretch, step)):
+            return None
+        return step
+    except ValueError:  # a component has too few readings there
+        return None
+
+
+def _patches(stretch: Stretch, step: Step) -> Iterator[FloatArray]:
+    """The decisions (n, 3) in which the readings just before a step, or just after, are a patch."""
+    own = slice(None) if step.component == CLOCK else step.component
+    for length in PATCHES:
+        for side in (slice(step.sample - length, step.sample), slice(step.sample, step.sample + length)):
+            weight = stretch.decided.copy()
+            weight[side, own] = 0.0
+            yield weight
+
+
+def _size(stretch: Stretch, bridge: Stretch, step: Step) -> float:
+    """How far a step moves the readings, in sigmas of the component that it moves most."""
+    rows, _ = step.moved(len(stretch.decided))
+    away = stretch.record.measurement[rows] - bridge.record.measurement[rows]
+    away[:, 1] = wrap(away[:, 1])
+    seen = np.where(np.isfinite(away), np.abs(away), 0.0) / np.sqrt(stretch.calm.noise_variance)
+    return float(np.median(seen, 0).max())
+
+
+def _stays(record: Record, weight: FloatArray, step: Step) -> bool:
+    """Whether most readings on both sides are good with the step; else it is the edge of a patch."""
+    own = slice(None) if step.component == CLOCK else step.component
+    return all(
+        weight[side, own].sum() >= STAYS * record.possible[side, own].sum()
+        for side in (slice(0, step.sample), slice(step.sample, None))
+    )
+
+
+def _decided(stretch: Stretch, weight: FloatArray, model: Model) -> alternatives.Step:
+    """The decisions on a stretch, as they are or made once again, whichever are likelier."""
+    return max(alternatives.decisions(_ready(stretch, model), weight, 2), key=lambda step: step.likelihood)
+
+
+def _likelihood(stretch: Stretch, weight: FloatArray) -> float:
+    """Log-probability of the readings of a stretch with a process noise and outlier decisions of its own."""
+    log, model = stretch.record.weighted(weight), stretch.calm
+    starts = find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
+    if not stretch.record.fixed.jerk:
+        level = fit_level(log, starts, model, Fixed(np.ones(3, bool), False))
+        model = fit_profile(log, starts, level, PROFILE_STEPS)
+    return max(step.likelihood for step in alternatives.decisions(_ready(stretch, model), weight))
+
+
+def _ready(stretch: Stretch, model: Model) -> alternatives.Neighbourhood:
+    r = stretch.record
+    return alternatives.Neighbourhood(r.time_s, r.measurement, r.possible, model, stretch.rates, r.gate, r.uneven)

@@ -1,0 +1,110 @@
+"""Faults of the instrument in a run's summary, and in words: steps that stay, readings that were not measured, errors
+on one side, a clock that was set back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ftproc.records import COMPONENTS, FloatArray, MeasurementLog
+
+if TYPE_CHECKING:
+    from ftproc.core.editing.two_pass import Faults
+
+NAMES, UNITS = (*COMPONENTS, "clock"), ("m", "rad", "rad", "s")
+MOST_STEPS = 5  # that are named
+FEWEST_OVERLAPPING = 6  # changes between rows before and rows after, of those at the same times
+
+
+class FaultStatistics:
+    """The faults of a log, to which those of its parts are added in their order."""
+
+    def __init__(self) -> None:
+        self.copies = np.zeros((len(COMPONENTS), 3), int)
+        self.steps: list[dict[str, Any]] = []
+        self.one_sided: dict[str, dict[str, Any]] = {}
+
+    def add(self, time_s: FloatArray, faults: Faults) -> None:
+        """Add those of a part: time_s (n,)."""
+        self.copies += [np.bincount(kind, minlength=3) for kind in faults.copied.T]
+        for step in faults.steps:
+            sizes = {"size": step.size, "sigma": step.sigma}
+            found = {"component": NAMES[step.component], "time_s": float(time_s[step.sample])}
+            self.steps.append(found | {f"{what}_{UNITS[step.component]}": size for what, size in sizes.items()})
+        for one in faults.one_sided:
+            name, unit = NAMES[one.component], UNITS[one.component]
+            found = {"component": name, "share": one.share, f"error_{unit}": one.error, f"shift_{unit}": one.shift}
+            if one.share >= self.one_sided.get(name, {"share": 0.0})["share"]:
+                self.one_sided[name] = found
+
+    def figures(self) -> dict[str, Any]:
+        """JSON-serialisable; units are in the names."""
+        return {"steps": self.steps, "one_sided_errors": list(self.one_sided.values())}
+
+    def of_component(self, c: int) -> dict[str, int]:
+        """How many readings of a component were not measured."""
+        return {"held": int(self.copies[c, 1]), "interpolated": int(self.copies[c, 2])}
+
+
+def clock_set_back(log: MeasurementLog) -> dict[str, float] | None:
+    """Where the time goes back, and by how much, with rows before and after it that overlap; None if nowhere. A few
+    rows that come late do not count."""
+    if not log.rows_out_of_order:
+        return None
+    order = np.argsort(log.row, kind="stable")
+    time_s = log.time_s[order]
+    change = np.diff(time_s)
+    at = int(change.argmin())
+    overlap = (log.time_s >= time_s[at + 1]) & (log.time_s <= time_s[at])
+    after = log.row[overlap] > log.row[order[at]]
+    if np.count_nonzero(after[1:] != after[:-1]) < FEWEST_OVERLAPPING:
+        return None
+    return {"row": int(log.row[order[at + 1]]), "by_s": float(change[at])}
+
+
+def suspicious(s: Mapping[str, Any]) -> Iterator[str]:
+    """The faults of a summary of which a single log cannot tell what is right."""
+    steps = s["steps"]
+    if steps:
+        named = "; ".join(step_in_words(step) for step in steps[:MOST_STEPS])
+        rest = f"; and {len(steps) - MOST_STEPS} more" if len(steps) > MOST_STEPS else ""
+        yield f"{named}{rest}: the estimate follows the longer side, which may be the wrong one"
+    if s["clock_set_back"]:
+        back = s["clock_set_back"]
+        yield f"the time goes back by {-back['by_s']:.3g} s at row {back['row']}, and rows before and after it overlap"
+    for one in s["one_sided_errors"]:
+        if not one["share"]:
+            yield f"{one['component']} errors have two peaks, or a flat one: some readings are off, all to one side"
+            continue
+        error, shift = (_size(one, what) for what in ("error", "shift"))
+        yield (
+            f"{one['component']} errors lie on one side in about {100 * one['share']:.0f} % of the readings, by "
+            f"{error} on average: the estimate leans to the other side by {shift.lstrip('+-')}"
+        )
+
+
+def allowed_for(s: Mapping[str, Any]) -> Iterator[str]:
+    """The faults of a summary that cost readings only."""
+    for name, part in s["components"].items():
+        measured = part["good"] + part["isolated"] + part["patch"]
+        rate = f"these count as missing, and {measured} readings are left"
+        if part["held"]:
+            yield f"{name} repeats the reading before in {part['held']} rows: {rate}"
+        if part["interpolated"]:
+            yield f"{name} is interpolated between other readings in {part['interpolated']} rows: {rate}"
+
+
+def step_in_words(step: Mapping[str, Any]) -> str:
+    """A step of a summary, such as: azimuth steps by -4.1 mrad at 60.1 s."""
+    what = "the clock jumps" if step["component"] == "clock" else f"{step['component']} steps"
+    return f"{what} by {_size(step, 'size')} at {step['time_s']:.6g} s"
+
+
+def _size(fault: Mapping[str, Any], what: str) -> str:
+    """A size with its sign and unit."""
+    for unit in ("m", "s"):
+        if f"{what}_{unit}" in fault:
+            return f"{fault[f'{what}_{unit}']:+.3g} {unit}"
+    return f"{1e3 * fault[f'{what}_rad']:+.3g} mrad"

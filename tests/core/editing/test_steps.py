@@ -1,0 +1,108 @@
+"""Steps that stay, in flights that obey the filter's model: found with place and size, and bridged; none elsewhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.core.editing import steps, two_pass
+from ftproc.core.editing.steps import CLOCK, Step
+from ftproc.core.model.frames import from_cartesian, line_of_sight_axes, to_cartesian, wrap
+from tests.core.tracks import SIGMA, matched
+
+pytestmark = pytest.mark.compiled
+
+UNKNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
+N = 500
+
+
+def flight(seed):
+    return matched(seed, N, dt=0.2, q=0.5, distance=7000.0)
+
+
+def edit(a, z):
+    return two_pass.edit(a.time, z, UNKNOWN)
+
+
+@pytest.mark.parametrize("size", [10.0, 40.0, 300.0])
+@pytest.mark.parametrize(("c", "k"), [(0, 120), (1, 380), (2, 240)])
+def test_a_step_is_found_with_its_place_and_size_and_the_longer_side_is_kept(c, k, size):
+    a = flight(c)
+    z = a.z.copy()
+    z[k:, c] -= size * SIGMA[c]
+    found = edit(a, z)
+    (step,) = found.faults.steps
+    assert (step.component, step.sample) == (c, pytest.approx(k, abs=1))
+    assert step.size == pytest.approx(-size * SIGMA[c], abs=5 * step.sigma)
+    assert 0.1 * SIGMA[c] < step.sigma < 3 * SIGMA[c]
+    truth = a.truth[:, :3] if k > N / 2 else to_cartesian(from_cartesian(a.truth[:, :3]) - _at(c, size * SIGMA[c]))
+    off = np.abs(found.smoothed.state[:, :3] - truth)
+    extra, _ = steps.spread(found.smoothed.state, found.faults.steps)
+    assert (off < 5 * np.sqrt(found.smoothed.sigma[:, :3] ** 2 + extra)).all(1).mean() > 0.98
+    assert found.weight.mean() > 0.98
+
+
+def _at(c, value):
+    return value * np.eye(3)[c]
+
+
+def test_both_angles_at_once_among_outliers_and_after_a_loss_of_track():
+    a, draw = flight(7), np.random.default_rng(1)
+    z = a.z.copy()
+    z[200:, 1:] += np.array([30, -25]) * SIGMA[1:]
+    spike = draw.random(z.shape) < 0.02
+    z += spike * draw.choice([-1, 1], z.shape) * draw.uniform(10, 100, z.shape) * SIGMA
+    z[195:200] = np.nan
+    found = edit(a, z).faults.steps
+    assert sorted(s.component for s in found) == [1, 2]
+    assert all(195 <= s.sample <= 200 for s in found)
+
+
+@pytest.mark.parametrize("late", [0.4, -0.8])
+def test_a_clock_that_jumps(late):
+    a = matched(11, N, dt=0.2, q=0.05, distance=7000.0)
+    k = 300
+    time = a.time + late * (np.arange(N) >= k) * (late > 0)
+    z = a.z.copy()
+    if late < 0:  # under an even clock, readings of a target that is further on its way
+        place = a.truth[:, :3] - late * a.truth[:, 3:6] + 0.5 * late**2 * a.truth[:, 6:]
+        z[k:] += (from_cartesian(place) - from_cartesian(a.truth[:, :3]))[k:]
+        z[:, 1] = wrap(z[:, 1])
+    found = edit(a._replace(time=time), z).faults.steps
+    assert (found[0].component, found[0].sample) == (CLOCK, pytest.approx(k, abs=1))
+    assert found[0].size == pytest.approx(late, abs=5 * found[0].sigma + 0.05)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_none_in_clean_flights_with_spikes_and_patches_and_bad_starts(seed):
+    a, draw = flight(seed), np.random.default_rng(seed)
+    z = a.z.copy()
+    if seed % 2:
+        z[draw.random(z.shape) < 0.03] += 1e-2
+        z[300:315, 1] += 60 * SIGMA[1]
+        z[:8] += 50 * SIGMA
+    assert edit(a, z).faults.steps == ()
+
+
+def test_what_is_bridged_is_what_was_added():
+    a = flight(3)
+    added = [Step(0, 100, 70.0, 1.0), Step(1, 400, -3e-3, 1e-4), Step(2, 260, 2e-3, 1e-4)]
+    z = a.z.copy()
+    for step in added:
+        rows, sign = step.moved(N)
+        z[rows, step.component] += sign * step.size
+    back = steps.bridged(a._replace(z=z).log, a.model, added)
+    np.testing.assert_allclose(back[:, [0, 2]], a.z[:, [0, 2]], atol=1e-9)
+    np.testing.assert_allclose(wrap(back[:, 1] - a.z[:, 1]), 0, atol=1e-12)
+
+
+def test_spread_is_the_move_of_the_position():
+    a = flight(4)
+    for c in range(3):
+        step = Step(c, 300, 1.0, 1e-3 * (1000 if c == 0 else 1))
+        axes, lines = steps.spread(a.truth, [step])
+        moved = to_cartesian(from_cartesian(a.truth[:, :3]) + _at(c, 1e-3 * step.sigma)) - a.truth[:, :3]
+        np.testing.assert_allclose(np.sqrt(axes[300:]), 1e3 * np.abs(moved[300:]), rtol=1e-2, atol=1e-3)
+        along = np.einsum("kij,kj->ki", line_of_sight_axes(a.truth[:, :3]), 1e3 * moved)
+        np.testing.assert_allclose(np.sqrt(lines[300:]), np.abs(along[300:]), rtol=1e-2, atol=2e-2)
+        assert not axes[:300].any()

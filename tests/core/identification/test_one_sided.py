@@ -1,0 +1,68 @@
+"""Errors on one side: found in noise of every scale, its place too; and nothing in noise of any symmetric shape."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.core.filtering.records import Observations
+from ftproc.core.filtering.smoother import SmootherRun
+from ftproc.core.identification import one_sided
+
+FINE = np.zeros(3)
+
+
+def residuals(noise):
+    """A log and a smoother's run that leaves these residuals (n,) in each component."""
+    n = len(noise)
+    scale = np.array([5.0, 1e-3, 2e-4])
+    residual = noise[:, None] * scale
+    nothing = np.zeros((n, 9))
+    run = SmootherRun(nothing, nothing, nothing[:, :6], residual, np.tile(scale**2 * noise.var(), (n, 1)),
+                      np.zeros(n), 0.0, np.zeros(3), np.zeros((1, 6)), ())  # fmt: skip
+    return Observations(np.arange(float(n)), residual, np.ones((n, 3))), run, scale
+
+
+@pytest.mark.parametrize("share", [0.35, 0.55])
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("shape", ["exponential", "half normal"])
+def test_the_share_and_the_place_are_found(shape, side, share):
+    draw = np.random.default_rng(1)
+    n, size = 3000, 6.0
+    error = draw.exponential(size, n) if shape == "exponential" else np.abs(size * draw.standard_normal(n))
+    noise = draw.standard_normal(n) + side * (draw.random(n) < share) * error
+    middle = noise.mean()
+    log, run, scale = residuals(noise - middle)
+    found = one_sided.find(log, run, FINE)
+    assert [one.component for one in found] == [0, 1, 2]
+    for one in found:
+        assert one.share == pytest.approx(share, abs=0.15)
+        assert one.error * side > 0
+        assert one.shift / scale[one.component] == pytest.approx(middle, abs=0.35)
+        assert 0 < one.sigma < 0.3 * abs(one.shift)
+    moved = log.measurement - one_sided.without(log, found).measurement
+    np.testing.assert_allclose(moved, np.tile([one.shift for one in found], (len(noise), 1)), atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", ["normal", "student", "spikes"])
+def test_symmetric_errors_are_left_alone(shape):
+    draw = np.random.default_rng(2)
+    noise = draw.standard_t(4, 4000) if shape == "student" else draw.standard_normal(4000)
+    noise += (draw.random(4000) < 0.1) * 8 * draw.standard_normal(4000) if shape == "spikes" else 0.0
+    log, run, _ = residuals(noise)
+    assert one_sided.find(log, run, FINE) == []
+
+
+def test_two_equal_peaks_are_said_but_not_leant_on():
+    draw = np.random.default_rng(3)
+    log, run, _ = residuals(draw.standard_normal(2000) + 4.0 * draw.choice([-1, 1], 2000))
+    found = one_sided.find(log, run, FINE)
+    assert [one.shift for one in found] == [0.0, 0.0, 0.0]
+
+
+def test_flat_errors_of_coarse_rounding_are_no_fault():
+    draw = np.random.default_rng(4)
+    noise = draw.uniform(-1, 1, 4000)
+    log, run, scale = residuals(noise)
+    assert one_sided.find(log, run, FINE) != []
+    assert one_sided.find(log, run, scale / np.sqrt(3)) == []
