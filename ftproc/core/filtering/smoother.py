@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import empty, kernel, part, variant, zeros
-from ftproc.core.filtering import backward, ukf
+from ftproc.core.filtering import backward, sites, ukf
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Estimates, Residuals, Span, advance, extrapolated
 from ftproc.core.filtering.records import Model, Observations, Sample, Samples, Start, between
 from ftproc.core.model import motion
@@ -103,7 +103,7 @@ def _memory(samples: int, first: Any, estimates: Any, residuals: Any) -> Any:
 def _take_in(f: ukf.Filter, sample: Sample) -> tuple[float, float]:
     """Update by a sample; NIS, NaN where nothing is used, and the log-likelihood. All that the way back needs stays in
     the record."""
-    ukf.expect(f)
+    sites.expect_at(sample, f)
     ukf.innovate(sample, f)
     any_used = ukf.use(sample.weight, f)
     nis, gained = ukf.update(f)
@@ -116,6 +116,26 @@ def _copy_state(source: ukf.Filter, target: ukf.Filter) -> None:
         target.x[i] = source.x[i]
         for j in range(len(source.x)):
             target.p[i, j] = source.p[i, j]
+
+
+@part
+def _keep(memory: Any, b: int) -> None:
+    """What a variant of the sweep does where a block begins, see `biases`: it keeps its own state for the block,"""
+
+
+@part
+def _recall(memory: Any, b: int) -> None:
+    """takes it again,"""
+
+
+@part
+def _carry(memory: Any, f: ukf.Filter, k: int, interval: float, place: int) -> None:
+    """takes it over an interval and an update, at a place of the block (-1: of none)"""
+
+
+@part
+def _carry_back(memory: Any, f: ukf.Filter, k: int, interval: float, place: int, kept: int) -> None:
+    """and back."""
 
 
 def _swept_through(
@@ -132,17 +152,21 @@ def _swept_through(
             if k > span.first:
                 advance(f, samples, k, profile)
             _take_in(f, samples[k])
+            _carry(memory, f, k, samples[k].time_s - samples[max(k - 1, span.first)].time_s, -1)
         _copy_state(f, before[b])
+        _keep(memory, b)
     likelihood = 0.0
     for b in range(len(before) - 1, -1, -1):
         low = span.first + b * BLOCK
         high = min(low + BLOCK, span.last)
+        _recall(memory, b)
         for k in range(low, high):
             f = block[k - low]
             _copy_state(before[b] if k == low else block[k - low - 1], f)
             if k > span.first:
                 advance(f, samples, k, profile)
             nis, gained = _take_in(f, samples[k])
+            _carry(memory, f, k, samples[k].time_s - samples[max(k - 1, span.first)].time_s, k - low)
             likelihood += gained
             if kept >= RESIDUALS:
                 residuals[k].nis = nis
@@ -159,6 +183,7 @@ def _swept_through(
                 for i in range(3):
                     residuals[k].residual[i] = back.residual[i]
                     residuals[k].residual_variance[i] = back.variance[i]
+            _carry_back(memory, f, k, samples[k].time_s - samples[max(k - 1, span.first)].time_s, k - low, kept)
             if k > span.first:
                 interval = samples[k].time_s - samples[k - 1].time_s
                 backward.score_jerk(back, interval, jerk_score[motion.knot_index(samples[k].time_s, profile)])
@@ -169,6 +194,8 @@ def _swept_through(
                 backward.score_wander(back, f, math.inf)
     return likelihood
 
+
+swept_through = _swept_through  # for variants with other memories
 
 _sweep = kernel(variant(_swept_through, __name__, "_sweep"))
 _sweep_coloured = kernel(variant(_swept_through, __name__, "_sweep_coloured", memory=ColouredMemory))
