@@ -21,17 +21,17 @@ from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import optimizer
 from ftproc.core.identification.likelihood import VERTICAL_PRECISION, jerk_bounds, shaped
-from ftproc.core.identification.profile import fit_profile, with_allowance
+from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model import stations as geometry
 from ftproc.core.model.motion import isotropic
 from ftproc.fusion import constants as posterior
-from ftproc.fusion import first_track
+from ftproc.fusion import alternatives, first_track
 from ftproc.fusion.constants import Constants
 from ftproc.fusion.events import Events, Seen, merge
 from ftproc.records import FloatArray
 
-FIRST_ROUNDS, MOST_ROUNDS = 4, 14
+FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 16, 5
 LEVEL_STEPS, PROFILE_STEPS = 4, 3
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after the first rounds
 STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that may still change
@@ -106,12 +106,16 @@ def fuse(
     prior = np.stack([station.prior for station in stations])
     current = _begin(stations, screened, trusted, track, sigma, Constants.unknown(prior), jerk_psd)
     say = progress or (lambda text: None)
+    looks, search = 0, set[alternatives.Place]()
     for number in range(MOST_ROUNDS):
         say(f"round {number + 1}")
         level = number if number < FIRST_ROUNDS else None
         current = _round(current, trusted, gate, jerk_psd, level)
-        if current.settled and number > FIRST_ROUNDS:
-            break
+        if number >= FIRST_ROUNDS - 1 and looks < LOOKS and (current.settled or number % 2):
+            looks += 1
+            current, changed = _reassessed(current, trusted, gate, search)
+            if not changed and current.settled:
+                break
     return _last(current)
 
 
@@ -173,6 +177,42 @@ def _round(current: Fused, trusted: list[FloatArray], gate: float, jerk_psd: flo
     now = _decided(current, trusted, gate, first)
     now = _tuned(now, jerk_psd, first)
     return _smoothed(now)
+
+
+def _reassessed(
+    current: Fused, trusted: list[FloatArray], gate: float, search: set[alternatives.Place]
+) -> tuple[Fused, bool]:
+    """The decisions replaced by likelier ones where another hypothesis explains a place better; whether any was."""
+    events, log = current.events, current.log
+    possible, believed, weight = events.gathered(current.possible), events.gathered(trusted), log.weight.copy()
+    state = current.found.run.state
+    margin = alternatives.margin_s(events.time_s)
+    changed = False
+    for place in alternatives.places(log, possible):
+        if place in search:
+            continue
+        search.add(place)
+        ends = np.searchsorted(events.time_s, [place.first_s - margin, place.last_s + margin])
+        here = slice(max(int(ends[0]), current.start.sample), int(ends[1]))
+        inside = (events.time_s[here] >= place.first_s - alternatives.EDGE_S) & (
+            events.time_s[here] <= place.last_s + alternatives.EDGE_S
+        )
+        if not inside.any():
+            continue
+        start = Start(0, state[here.start], np.diag(np.repeat(alternatives.FREE, 3) ** 2))
+        near = alternatives.Neighbourhood(
+            log.part(here)._replace(weight=weight[here]), possible[here], believed[here], current.sigma, inside, start,
+            alternatives.calm_levels(current.model, here, events.time_s), gate,
+        )  # fmt: skip
+        found = alternatives.likeliest(near)
+        if found is not None:
+            weight[here][inside] = found[inside]
+            changed = True
+    if not changed:
+        return current, False
+    by_station = [events.of(s, weight) for s in range(len(current.stations))]
+    calm = median_level(current.model) if math.isfinite(current.model.knot_s) else current.model
+    return _smoothed(current._replace(weight=by_station, model=calm, settled=False)), True
 
 
 def _decided(current: Fused, trusted: list[FloatArray], gate: float, first: int | None) -> Fused:

@@ -1,0 +1,209 @@
+"""Alternative hypotheses: is it another reading, or another station, that is wrong?
+
+One patch that is believed makes the good readings of the other stations look bad, and the decisions stand still there,
+because each supports the others. Where readings are rejected for a while, the decisions are made again over the
+neighbourhood alone: as they are, from the screening, with each component and each station wrong in turn, and from few
+components only; the likeliest outcome is kept. The biases stay.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing import outlier_chain, patch_likelihood
+from ftproc.core.filtering.records import Model, Observations, Start
+from ftproc.core.filtering.smoother import smooth_log
+from ftproc.records import FloatArray, IntArray
+
+SHORTEST, SHORTEST_S = 3, 1.0  # readings, or seconds, that a run must last to be looked at
+BRIDGED = 2  # readings between two rejected ones of a run
+TOGETHER_S, LONGEST_S = 1.0, 45.0  # seconds between runs of one place, and of a place
+MARGIN_S, MARGIN_INTERVALS = 8.0, 60.0  # on each side, of which the likelihood is compared
+EDGE_S = 0.3  # by which a hypothesis reaches beyond the place
+ROUNDS, FINALISTS = 3, 4  # of decisions, and hypotheses that get them
+BETTER = 6.0  # in log-probability, that another decision must be
+RATES = np.array([0.03, 0.001, 0.93])  # isolated outlier; patch begins; goes on
+LOST = 0.35  # share of a component that is rejected in a place, to be called lost
+FEWEST = 12  # readings that a hypothesis leaves at least
+FREE = (50.0, 20.0, 20.0)  # m, m/s, m/s2: 1-sigma of the state where a neighbourhood begins
+CALMER = 4.0  # times the calm level: the jerk may be so much more in a place
+
+Channel = tuple[int, int]  # station, component
+
+
+class Neighbourhood(NamedTuple):
+    """A stretch of the events and what decides in it. log: with the weights of now. station (n,). possible, trusted
+    (n, 3). sigma (stations, 3). inside (n,): the place itself. start: a state at the first event. levels: models to try.
+    gate, in sigmas."""
+
+    log: Observations
+    possible: FloatArray
+    trusted: FloatArray
+    sigma: FloatArray
+    inside: NDArray[np.bool_]
+    start: Start
+    levels: tuple[Model, ...]
+    gate: float
+
+    @property
+    def station(self) -> IntArray:
+        assert self.log.sites is not None
+        return self.log.sites.index
+
+
+class Place(NamedTuple):
+    """Where readings are rejected: from, to (s), and the channels."""
+
+    first_s: float
+    last_s: float
+    channels: frozenset[Channel]
+
+
+class Outcome(NamedTuple):
+    """Weights (n, 3) and their log-probability."""
+
+    weight: FloatArray
+    likelihood: float
+
+
+def places(log: Observations, possible: FloatArray) -> list[Place]:
+    """Where to look, in the order of time."""
+    assert log.sites is not None
+    found: list[Place] = []
+    for s, c in itertools.product(range(len(log.sites.range_m)), range(3)):
+        rows = np.flatnonzero((log.sites.index == s) & (possible[:, c] > 0))
+        if len(rows) == 0:
+            continue
+        rejected = np.flatnonzero(log.weight[rows, c] <= 0)
+        for run in np.split(rejected, np.flatnonzero(np.diff(rejected) > BRIDGED + 1) + 1):
+            if len(run) == 0:
+                continue
+            first, last = log.time_s[rows[run[0]]], log.time_s[rows[run[-1]]]
+            if len(run) >= SHORTEST or last - first > SHORTEST_S:
+                found.append(Place(float(first), float(last), frozenset([(s, c)])))
+    merged: list[Place] = []
+    for place in sorted(found):
+        last = merged[-1] if merged else None
+        if last and place.first_s <= last.last_s + TOGETHER_S and place.last_s - last.first_s < LONGEST_S:
+            merged[-1] = Place(last.first_s, max(last.last_s, place.last_s), last.channels | place.channels)
+        else:
+            merged.append(place)
+    return merged
+
+
+def margin_s(time_s: FloatArray) -> float:
+    """Seconds on each side of a place that the comparison looks at."""
+    return max(MARGIN_S, MARGIN_INTERVALS * float(np.median(np.diff(time_s))))
+
+
+def calm_levels(model: Model, here: slice, time_s: FloatArray) -> tuple[Model, ...]:
+    """The model with the flight's calm jerk, and with that of the neighbourhood where it is much higher."""
+    jerk = model.jerk
+    calm = np.median(jerk, 0)
+    found = [calm]
+    if len(jerk) > 1 and math.isfinite(model.knot_s):
+        knots = np.clip(((time_s[here] - time_s[0]) / model.knot_s).astype(int), 0, len(jerk) - 1)
+        around = np.quantile(jerk[np.unique(knots)], 0.35, axis=0)
+        if around[0] > CALMER * calm[0]:
+            found.append(around)
+    else:
+        found.append(calm / 10)
+    return tuple(model._replace(jerk=level[None, :].copy(), knot_s=math.inf) for level in found)
+
+
+def likeliest(near: Neighbourhood) -> FloatArray | None:
+    """Weights (n, 3) of the likeliest hypothesis; None if that is the one of now."""
+    now = max((_settled(near, near.log.weight, model) for model in near.levels), key=lambda each: each.likelihood)
+    tries = []
+    for weight in _hypotheses(near):
+        for model in near.levels:
+            if (weight.sum() >= FEWEST) and math.isfinite(found := _step(near, weight, model)[0].likelihood):
+                tries.append((found, weight, model))
+    tries.sort(key=lambda each: -each[0])
+    ends = [_settled(near, weight, model) for _, weight, model in tries[:FINALISTS]]
+    best = max(ends, key=lambda each: each.likelihood, default=now)
+    return best.weight if best.likelihood > now.likelihood + BETTER else None
+
+
+def _hypotheses(near: Neighbourhood) -> Iterator[FloatArray]:
+    """First decisions (n, 3) to begin with."""
+    weight, inside, station = near.log.weight, near.inside, near.station
+    base = np.where(inside[:, None], near.trusted, weight) * near.possible
+    yield base
+    live = [
+        (s, c)
+        for s, c in itertools.product(range(len(near.sigma)), range(3))
+        if (near.possible[inside & (station == s), c] > 0).any()
+    ]
+    wrong: list[tuple[Channel, ...]] = [(each,) for each in live]
+    for s in range(len(near.sigma)):
+        own = tuple(each for each in live if each[0] == s)
+        if len(own) > 1:
+            wrong.append(own)
+    lost = [each for each in live if _share_lost(near, each) > LOST]
+    if len(lost) > 1:
+        wrong += [pair for pair in itertools.combinations(live, 2) if pair[0][0] != pair[1][0]]
+    for channels in wrong:
+        yield _without(near, base, channels)
+    if len(lost) > 1 and len(live) > 3:
+        nothing = np.where(inside[:, None], 0.0, weight)
+        for channels in itertools.combinations(live, 3):
+            some = nothing.copy()
+            for s, c in channels:
+                rows = inside & (station == s)
+                some[rows, c] = base[rows, c]
+            yield some
+
+
+def _without(near: Neighbourhood, weight: FloatArray, channels: tuple[Channel, ...]) -> FloatArray:
+    found = weight.copy()
+    for s, c in channels:
+        found[near.inside & (near.station == s), c] = 0.0
+    return found
+
+
+def _share_lost(near: Neighbourhood, channel: Channel) -> float:
+    s, c = channel
+    rows = near.inside & (near.station == s) & (near.possible[:, c] > 0)
+    return float((near.log.weight[rows, c] <= 0).mean())
+
+
+def _settled(near: Neighbourhood, weight: FloatArray, model: Model) -> Outcome:
+    """The likeliest decisions on the way from the first ones until they stand still."""
+    best, following = _step(near, weight, model)
+    for _ in range(ROUNDS):
+        if (following == weight).all() or following.sum() < FEWEST:
+            break
+        weight = following
+        found, following = _step(near, weight, model)
+        if found.likelihood > best.likelihood:
+            best = found
+    return best
+
+
+def _step(near: Neighbourhood, weight: FloatArray, model: Model) -> tuple[Outcome, FloatArray]:
+    """How likely decisions are, and those that follow from them."""
+    log = near.log._replace(weight=weight)
+    run = smooth_log(log, model, [near.start], residuals_only=True)
+    likelihood, following = run.log_likelihood, np.zeros_like(weight)
+    for s in range(len(near.sigma)):
+        rows = np.flatnonzero(near.station == s)
+        if len(rows) == 0:
+            continue
+        residual, variance = run.residual[rows], run.residual_variance[rows]
+        good = outlier_chain.classify(residual, variance, near.sigma[s] ** 2, np.tile(RATES, (3, 1)), near.gate)
+        following[rows] = (good > 0.5) * near.possible[rows]
+        for c in range(3):
+            seen = rows[near.possible[rows, c] > 0]
+            if len(seen):
+                likelihood += patch_likelihood.log_probability(
+                    log.time_s[seen], run.residual[seen, c], run.residual_variance[seen, c],
+                    np.ascontiguousarray(weight[seen, c]), float(near.sigma[s, c]), RATES,
+                )  # fmt: skip
+    return Outcome(weight, likelihood), following
