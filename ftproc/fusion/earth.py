@@ -1,0 +1,35 @@
+"""Places on the earth (WGS-84) in the east, north, up of an origin, each with its own vertical."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ftproc.records import FloatArray
+
+RADIUS_M, ECCENTRICITY2 = 6378137.0, 6.69437999014131705734e-3  # of the ellipsoid: equatorial, and e^2
+
+Geodetic = tuple[float, float, float]  # latitude deg, longitude deg, height m
+
+
+def earth_centred(place: Geodetic) -> FloatArray:
+    """(3,) x, y, z in m, earth-centred and earth-fixed."""
+    latitude, longitude = np.radians(place[:2])
+    normal = RADIUS_M / np.sqrt(1 - ECCENTRICITY2 * np.sin(latitude) ** 2)
+    across = (normal + place[2]) * np.cos(latitude)
+    up = (normal * (1 - ECCENTRICITY2) + place[2]) * np.sin(latitude)
+    return np.array([across * np.cos(longitude), across * np.sin(longitude), up])
+
+
+def verticals(place: Geodetic) -> FloatArray:
+    """(3, 3) whose rows are east, north and up there, earth-centred."""
+    latitude, longitude = np.radians(place[:2])
+    sp, cp, sl, cl = np.sin(latitude), np.cos(latitude), np.sin(longitude), np.cos(longitude)
+    return np.array([[-sl, cl, 0.0], [-sp * cl, -sp * sl, cp], [cp * cl, cp * sl, sp]])
+
+
+def seen_from(origin: Geodetic, place: Geodetic) -> tuple[FloatArray, FloatArray]:
+    """(3,) east, north, up in m of a place at the origin, and (3, 3) rows: the place's own east, north, up there."""
+    if tuple(origin) == tuple(place):
+        return np.zeros(3), np.eye(3)
+    at_origin = verticals(origin)
+    return at_origin @ (earth_centred(place) - earth_centred(origin)), verticals(place) @ at_origin.T
