@@ -24,7 +24,9 @@ from ftproc.records import FloatArray, IntArray
 SHORTEST, SHORTEST_S = 3, 1.0  # readings, or seconds, that a run must last to be looked at
 BRIDGED = 2  # readings between two rejected ones of a run
 TOGETHER_S, LONGEST_S = 1.0, 45.0  # seconds between runs of one place, and of a place
-MARGIN_S, MARGIN_INTERVALS = 8.0, 60.0  # on each side, of which the likelihood is compared
+ISLAND, ISLAND_S = 48, 6.0  # readings and seconds between two runs of a component that may belong to one patch
+MARGIN_MEMORIES, MARGIN_S, MARGIN_INTERVALS = 8.0, (2.0, 20.0), 60.0  # on each side, of which the likelihood is compared
+TENSION, TENSION_S = 3.5, 2.0  # standard deviations of the sum of squares of a stretch so long that the decisions explain
 EDGE_S = 0.3  # by which a hypothesis reaches beyond the place
 ROUNDS, FINALISTS = 3, 4  # of decisions, and hypotheses that get them
 BETTER = 6.0  # in log-probability, that another decision must be
@@ -81,12 +83,14 @@ def places(log: Observations, possible: FloatArray) -> list[Place]:
         if len(rows) == 0:
             continue
         rejected = np.flatnonzero(log.weight[rows, c] <= 0)
+        runs = []
         for run in np.split(rejected, np.flatnonzero(np.diff(rejected) > BRIDGED + 1) + 1):
             if len(run) == 0:
                 continue
-            first, last = log.time_s[rows[run[0]]], log.time_s[rows[run[-1]]]
+            first, last = float(log.time_s[rows[run[0]]]), float(log.time_s[rows[run[-1]]])
             if len(run) >= SHORTEST or last - first > SHORTEST_S:
-                found.append(Place(float(first), float(last), frozenset([(s, c)])))
+                runs.append((int(run[0]), int(run[-1]), first, last))
+        found += _bridged(runs, frozenset([(s, c)]))
     merged: list[Place] = []
     for place in sorted(found):
         last = merged[-1] if merged else None
@@ -97,9 +101,24 @@ def places(log: Observations, possible: FloatArray) -> list[Place]:
     return merged
 
 
-def margin_s(time_s: FloatArray) -> float:
-    """Seconds on each side of a place that the comparison looks at."""
-    return max(MARGIN_S, MARGIN_INTERVALS * float(np.median(np.diff(time_s))))
+def _bridged(runs: list[tuple[int, int, float, float]], channel: frozenset[Channel]) -> list[Place]:
+    """The runs of a component, joined where few readings between two of them are believed."""
+    found: list[Place] = []
+    before = None
+    for begin, end, first, last in runs:
+        near = before is not None and begin - before <= ISLAND and first - found[-1].last_s <= ISLAND_S
+        if near and last - found[-1].first_s < LONGEST_S:
+            found[-1] = found[-1]._replace(last_s=last)
+        else:
+            found.append(Place(first, last, channel))
+        before = end
+    return found
+
+
+def margin_s(time_s: FloatArray, memory_s: float) -> float:
+    """Seconds on each side of a place that the comparison looks at. memory_s: of the filter."""
+    wanted = float(np.clip(MARGIN_MEMORIES * memory_s, *MARGIN_S))
+    return max(wanted, MARGIN_INTERVALS * float(np.median(np.diff(time_s))))
 
 
 def calm_levels(model: Model, here: slice, time_s: FloatArray) -> tuple[Model, ...]:
@@ -119,16 +138,33 @@ def calm_levels(model: Model, here: slice, time_s: FloatArray) -> tuple[Model, .
 
 def likeliest(near: Neighbourhood) -> FloatArray | None:
     """Weights (n, 3) of the likeliest hypothesis; None if that is the one of now."""
+    calm = near.levels[0]
+    if not _tense(near, calm):
+        return None
     now = max((_settled(near, near.log.weight, model) for model in near.levels), key=lambda each: each.likelihood)
     tries = []
     for weight in _hypotheses(near):
-        for model in near.levels:
-            if (weight.sum() >= FEWEST) and math.isfinite(found := _step(near, weight, model)[0].likelihood):
-                tries.append((found, weight, model))
+        if (weight.sum() >= FEWEST) and math.isfinite(found := _step(near, weight, calm)[0].likelihood):
+            tries.append((found, weight))
     tries.sort(key=lambda each: -each[0])
-    ends = [_settled(near, weight, model) for _, weight, model in tries[:FINALISTS]]
+    ends = [_settled(near, weight, model) for _, weight in tries[:FINALISTS] for model in near.levels]
     best = max(ends, key=lambda each: each.likelihood, default=now)
     return best.weight if best.likelihood > now.likelihood + BETTER else None
+
+
+def _tense(near: Neighbourhood, calm: Model) -> bool:
+    """Whether the readings that are used now do not fit a calm flight somewhere about the place."""
+    run = smooth_log(near.log, calm, [near.start], residuals_only=True)
+    squares = np.where(near.log.weight > 0, run.residual**2 / run.residual_variance, 0.0).sum(1)
+    count = ((near.log.weight > 0) & np.isfinite(run.residual)).sum(1)
+    time_s = near.log.time_s
+    around = (time_s >= time_s[near.inside][0] - TENSION_S) & (time_s <= time_s[near.inside][-1] + TENSION_S)
+    for half in (0.0, 0.5):
+        piece = ((time_s[around] - time_s[around][0]) / TENSION_S + half).astype(int)
+        total, number = np.bincount(piece, squares[around]), np.bincount(piece, count[around])
+        if (total - number > TENSION * np.sqrt(2 * np.maximum(number, 1))).any():
+            return True
+    return False
 
 
 def _hypotheses(near: Neighbourhood) -> Iterator[FloatArray]:

@@ -186,7 +186,8 @@ def _reassessed(
     events, log = current.events, current.log
     possible, believed, weight = events.gathered(current.possible), events.gathered(trusted), log.weight.copy()
     state = current.found.run.state
-    margin = alternatives.margin_s(events.time_s)
+    memory_s = scales_of(log, current.model.noise_variance).memory_s(float(np.median(current.model.jerk[:, 0])))
+    margin = alternatives.margin_s(events.time_s, memory_s)
     changed = False
     for place in alternatives.places(log, possible):
         if place in search:
