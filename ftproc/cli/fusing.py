@@ -24,7 +24,19 @@ from ftproc.quality.summary import line
 from ftproc.settings import PACKAGED, FilterSettings
 
 #: Options of `filter` that mean something for several stations; of a single log, the others are its station's.
-MEANT = ("fuse", "logs", "output", "smooth", "summary", "report", "jerk", "gate", "ecef", "write_calibration", "write_config")
+MEANT = (
+    "fuse",
+    "logs",
+    "output",
+    "smooth",
+    "summary",
+    "report",
+    "jerk",
+    "gate",
+    "ecef",
+    "write_calibration",
+    "write_config",
+)
 
 
 def range_file(ctx: click.Context) -> str:

@@ -25,8 +25,15 @@ SHORTEST, SHORTEST_S = 3, 1.0  # readings, or seconds, that a run must last to b
 BRIDGED = 2  # readings between two rejected ones of a run
 TOGETHER_S, LONGEST_S = 1.0, 45.0  # seconds between runs of one place, and of a place
 ISLAND, ISLAND_S = 48, 6.0  # readings and seconds between two runs of a component that may belong to one patch
-MARGIN_MEMORIES, MARGIN_S, MARGIN_INTERVALS = 8.0, (2.0, 20.0), 60.0  # on each side, of which the likelihood is compared
-TENSION, TENSION_S = 3.5, 2.0  # standard deviations of the sum of squares of a stretch so long that the decisions explain
+MARGIN_MEMORIES, MARGIN_S, MARGIN_INTERVALS = (
+    8.0,
+    (2.0, 20.0),
+    60.0,
+)  # on each side, of which the likelihood is compared
+TENSION, TENSION_S = (
+    3.5,
+    2.0,
+)  # standard deviations of the sum of squares of a stretch so long that the decisions explain
 EDGE_S = 0.3  # by which a hypothesis reaches beyond the place
 ROUNDS, FINALISTS = 3, 4  # of decisions, and hypotheses that get them
 BETTER = 6.0  # in log-probability, that another decision must be
@@ -56,7 +63,7 @@ class Neighbourhood(NamedTuple):
     @property
     def station(self) -> IntArray:
         assert self.log.sites is not None
-        return self.log.sites.index
+        return self.log.sites.station
 
 
 class Place(NamedTuple):
@@ -79,7 +86,7 @@ def places(log: Observations, possible: FloatArray) -> list[Place]:
     assert log.sites is not None
     found: list[Place] = []
     for s, c in itertools.product(range(len(log.sites.range_m)), range(3)):
-        rows = np.flatnonzero((log.sites.index == s) & (possible[:, c] > 0))
+        rows = np.flatnonzero((log.sites.station == s) & (possible[:, c] > 0))
         if len(rows) == 0:
             continue
         rejected = np.flatnonzero(log.weight[rows, c] <= 0)
@@ -93,9 +100,9 @@ def places(log: Observations, possible: FloatArray) -> list[Place]:
         found += _bridged(runs, frozenset([(s, c)]))
     merged: list[Place] = []
     for place in sorted(found):
-        last = merged[-1] if merged else None
-        if last and place.first_s <= last.last_s + TOGETHER_S and place.last_s - last.first_s < LONGEST_S:
-            merged[-1] = Place(last.first_s, max(last.last_s, place.last_s), last.channels | place.channels)
+        one = merged[-1] if merged else None
+        if one and place.first_s <= one.last_s + TOGETHER_S and place.last_s - one.first_s < LONGEST_S:
+            merged[-1] = Place(one.first_s, max(one.last_s, place.last_s), one.channels | place.channels)
         else:
             merged.append(place)
     return merged

@@ -33,9 +33,7 @@ def text(instrument: Instrument, constants: Constants, s: int) -> str:
     zenith = -1.0 if station.elevation_from == "zenith" else 1.0
     before = options.get("bias") or (0.0, 0.0, 0.0)
     signs = (1.0, sense, zenith)  # in the sense of the readings as they are written
-    options["bias"] = tuple(
-        before[c] + signs[c] * float(estimate[c]) if told[c] else before[c] for c in range(3)
-    )
+    options["bias"] = tuple(before[c] + signs[c] * float(estimate[c]) if told[c] else before[c] for c in range(3))
     if told[CLOCK]:
         options["time_offset_s"] = options.get("time_offset_s", 0.0) - float(estimate[CLOCK])
     if instrument.site is not None:

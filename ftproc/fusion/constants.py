@@ -11,10 +11,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.core.filtering.biases import PARAMETERS, Biased, Directions
 from ftproc.fusion.events import CLOCK
-from ftproc.records import FloatArray
+from ftproc.records import FloatArray, IntArray
 
 NAMES = ("range_m", "azimuth_rad", "elevation_rad", "tilt_east_rad", "tilt_north_rad", "clock_s")
 WORDS = ("range bias", "azimuth zero", "elevation zero", "tilt about east", "tilt about north", "clock offset")
@@ -45,9 +46,10 @@ class Constants(NamedTuple):
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).reshape(self.prior.shape)
 
     @property
-    def observable(self) -> FloatArray:
+    def observable(self) -> NDArray[np.bool_]:
         """(m, PARAMETERS) whether the flight has told more of it than was known."""
-        return self.sigma < TOLD * self.prior
+        told: NDArray[np.bool_] = self.sigma < TOLD * self.prior
+        return told
 
     def columns(self) -> FloatArray:
         """Directions for `core.filtering.biases`: a root of the covariance."""
@@ -87,7 +89,7 @@ def update(constants: Constants, found: Biased, directions: Directions) -> Const
 
 
 def _without_common_clock(
-    prior: FloatArray, free: FloatArray, information: FloatArray, score: FloatArray
+    prior: FloatArray, free: IntArray, information: FloatArray, score: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
     """Information and score without what they say of a common shift of all clocks, and that direction (unit length)."""
     if not (prior[:, CLOCK] > 0).all():
@@ -106,7 +108,11 @@ def cannot_be_told(constants: Constants, names: list[str]) -> list[str]:
     found = ["common clock"] if len(constants.untold) else []
     sigma, prior = constants.sigma, constants.prior
     for parameter, word in enumerate(WORDS):
-        vague = [n for n, s, p in zip(names, sigma[:, parameter], prior[:, parameter], strict=True) if p > 0 and s >= TOLD * p]
+        vague = [
+            n
+            for n, s, p in zip(names, sigma[:, parameter], prior[:, parameter], strict=True)
+            if p > 0 and s >= TOLD * p
+        ]
         if not vague or (parameter == CLOCK and len(constants.untold)):
             continue
         if len(vague) > 1 and len(vague) == int((prior[:, parameter] > 0).sum()):

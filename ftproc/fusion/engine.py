@@ -86,7 +86,9 @@ def screen(station: Seen) -> Screened:
     weight, sigma, least = np.isfinite(z).astype(float), np.ones(3), two_pass.rounding_sigma(z)
     for c in station.components:
         channel = np.ascontiguousarray(z[:, c])
-        weight[:, c], sigma[c] = two_pass.screen_channel(station.time_s, channel, c == 1, math.sqrt(2) * float(least[c]))
+        weight[:, c], sigma[c] = two_pass.screen_channel(
+            station.time_s, channel, c == 1, math.sqrt(2) * float(least[c])
+        )
     sigma = np.where(np.isfinite(station.known), station.known, np.maximum(sigma, LEAST_NOISE))
     possible = np.isfinite(z) & ~two_pass.stuck_readings(z, sigma)
     possible[:, 0] &= z[:, 0] > 0
@@ -155,7 +157,9 @@ def _begin(
     covariance = np.diag(np.repeat([spread, 100.0, 50.0], 3) ** 2)
     start = Start(first, state[first], covariance)
     log = events.weighted(weight)
-    model = Model(sigma**2, isotropic(jerk_psd or scales_of(log, sigma**2).jerk_psd(FIRST_MEMORY * _interval(stations))))
+    model = Model(
+        sigma**2, isotropic(jerk_psd or scales_of(log, sigma**2).jerk_psd(FIRST_MEMORY * _interval(stations)))
+    )
     found = smooth_biased(log, model, start, _directions(events, state, constants))
     rates = np.tile(np.array(outlier_chain.START_RATES), (len(stations), 3, 1))
     possible = [each.possible for each in screened]
@@ -168,7 +172,7 @@ def _interval(stations: list[Seen]) -> float:
 
 def _directions(events: Events, state: FloatArray, constants: Constants) -> Directions:
     sites = events.sites
-    design = geometry.design(state, sites.place[sites.index], sites.axes[sites.index])
+    design = geometry.design(state, sites.place[sites.station], sites.axes[sites.station])
     return Directions(design, constants.columns())
 
 
@@ -287,9 +291,7 @@ def _smoothed(current: Fused) -> Fused:
     floor = np.repeat(START_SIGMA, 3) ** 2
     covariance = START_INFLATION * head.covariance + np.diag(floor)
     start = Start(first, state[first], covariance)
-    found = smooth_biased(
-        events.weighted(current.weight), current.model, start, _directions(events, state, constants)
-    )
+    found = smooth_biased(events.weighted(current.weight), current.model, start, _directions(events, state, constants))
     return current._replace(events=events, constants=constants, start=start, found=found)
 
 

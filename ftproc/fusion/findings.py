@@ -117,9 +117,13 @@ def remarks(fused: Fused, sigma_m: FloatArray, zero_s: float) -> list[Remark]:
 def _clocks(fused: Fused) -> Iterator[Remark]:
     prior = fused.constants.prior[:, CLOCK]
     if len(prior) > 1 and not prior.any():
-        yield Remark(CONSISTENT, "all clocks are taken as exact (clock_offset_sigma_s = 0 everywhere): none is estimated")
+        yield Remark(
+            CONSISTENT, "all clocks are taken as exact (clock_offset_sigma_s = 0 everywhere): none is estimated"
+        )
     elif (prior > 0).all():
-        text = "no clock is the reference (clock_offset_sigma_s = 0): the time of all is known as well as the best of them"
+        text = (
+            "no clock is the reference (clock_offset_sigma_s = 0): the time of all is known as well as the best of them"
+        )
         yield Remark(CONSISTENT, text)
 
 
@@ -165,12 +169,16 @@ def _stretches(fused: Fused, zero_s: float) -> Iterator[Remark]:
         if each.kind != "another target":
             yield Remark(CONSISTENT, f"{each.station} {each.kind}: no reading {when}")
             continue
-        others = [s for s, station in enumerate(fused.stations) if station.name != each.station and _carries(fused, s, each)]
+        others = [
+            s for s, station in enumerate(fused.stations) if station.name != each.station and _carries(fused, s, each)
+        ]
         if len(others) > 1:
             yield Remark(CONSISTENT, f"{each.station} follows another target {when}: all of its readings are rejected")
         else:
             other = fused.stations[others[0]].name if others else "no other station"
-            text = f"{each.station} and {other} contradict each other {when}, and nobody else saw the target: it is open "
+            text = (
+                f"{each.station} and {other} contradict each other {when}, and nobody else saw the target: it is open "
+            )
             yield Remark(SUSPECT, text + f"which is right; {each.station} is left out")
 
 

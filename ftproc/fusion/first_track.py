@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ftproc.core.model import stations as model
-from ftproc.core.model.frames import to_cartesian, unwrap, wrap
+from ftproc.core.model.frames import from_cartesian, to_cartesian, unwrap, wrap
 from ftproc.fusion.events import Seen
 from ftproc.records import FloatArray
 
@@ -36,7 +36,10 @@ class Track(NamedTuple):
 
         inside = np.clip(time_s, self.time_s[0], self.time_s[-1])
         if len(self.time_s) == 1:
-            position, velocity = np.repeat(self.state[:, :3], len(inside), 0), np.repeat(self.state[:, 3:], len(inside), 0)
+            position, velocity = (
+                np.repeat(self.state[:, :3], len(inside), 0),
+                np.repeat(self.state[:, 3:], len(inside), 0),
+            )
         else:
             curve = CubicHermiteSpline(self.time_s, self.state[:, :3], self.state[:, 3:6])
             position, velocity = curve(inside), curve(inside, 1)
@@ -143,7 +146,7 @@ def _fitted(
         for k, station in enumerate(stations):
             seen = model.local(point, station.place, station.axes)
             jacobian = model.jacobian(seen) @ station.axes
-            off = (readings[:, k] - model.from_cartesian(seen)) / allowed[k]
+            off = (readings[:, k] - from_cartesian(seen)) / allowed[k]
             off[:, 1] = wrap(off[:, 1] * allowed[k, 1]) / allowed[k, 1]
             there = np.isfinite(off)
             off = np.where(there, off, 0.0)
@@ -177,5 +180,3 @@ def _drawn(time_s: FloatArray, point: FloatArray, spread: FloatArray) -> Track:
     powers = np.stack([np.ones_like(t), t / span, (t / span) ** 2], 2) / spread[near][:, :, None]
     fit = np.linalg.pinv(powers) @ (point[near] / spread[near][:, :, None])
     return Track(time_s, np.hstack([fit[:, 0], fit[:, 1] / span]), spread)
-
-

@@ -207,7 +207,8 @@ def _metadata(range_: Range, settings: FilterSettings, summary: dict[str, Any], 
         "convention": CONVENTION["local"],
         "origin": range_.origin,
         "stations": {
-            each.name: {"log": each.log, "place_m": each.place.tolist(), "site": each.site} for each in range_.instruments
+            each.name: {"log": each.log, "place_m": each.place.tolist(), "site": each.site}
+            for each in range_.instruments
         },
         "settings": {
             "editing": "two-pass",

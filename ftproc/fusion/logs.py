@@ -65,7 +65,9 @@ def check_overlap(range_: Range, seen: Sequence[Seen]) -> None:
             continue
         first, last = station.time_s[0], station.time_s[-1]
         spans = ", ".join(f"{other.name} {other.time_s[0]:.6g} to {other.time_s[-1]:.6g} s" for other in others)
-        hour = next((h for h in sorted(ZONES, key=abs) if any(_overlap(station, o, h * HOUR_S) > 0 for o in others)), None)
+        hour = next(
+            (h for h in sorted(ZONES, key=abs) if any(_overlap(station, o, h * HOUR_S) > 0 for o in others)), None
+        )
         cure = "name the log of the same flight, or leave the station out"
         if hour is not None:
             cure = (

@@ -75,11 +75,15 @@ def load(path: str) -> Range:
     for section in content:
         if section not in ("origin", "station"):
             hint = nearest(section, ("origin", "station")) or "."
-            raise UsageError(f'{path}: there is no section "{section}"{hint} A range file has [origin] and [station.NAME].')
+            raise UsageError(
+                f'{path}: there is no section "{section}"{hint} A range file has [origin] and [station.NAME].'
+            )
     origin = _origin(path, content.get("origin", {}))
     stations = content.get("station", {})
     if not isinstance(stations, Mapping) or not stations:
-        raise UsageError(f"{path}: there is no station; write a section [station.NAME] for each, with its log and place.")
+        raise UsageError(
+            f"{path}: there is no station; write a section [station.NAME] for each, with its log and place."
+        )
     found = tuple(_instrument(path, origin, name, keys) for name, keys in stations.items())
     for one, other in pairwise(sorted(found, key=lambda each: str(Path(each.log).resolve()))):
         if Path(one.log).resolve() == Path(other.log).resolve():
@@ -173,7 +177,9 @@ def _stand(
     """Where a station stands: place, axes, and its site on the earth."""
     earth, metres = [name for name in _DEGREES if name in values], [name for name in _METRES if name in values]
     if earth and metres:
-        raise UsageError(f"{place} has {earth[0]} and {metres[0]}: a place is either on the earth or in metres of the range.")
+        raise UsageError(
+            f"{place} has {earth[0]} and {metres[0]}: a place is either on the earth or in metres of the range."
+        )
     if metres:
         missing = [name for name in _METRES if name not in values]
         if missing:
@@ -185,7 +191,9 @@ def _stand(
         kind = "lat_deg, lon_deg and height_m" if origin else "east_m, north_m and up_m"
         raise UsageError(f"{place} has no place; write {kind}.")
     if origin is None:
-        raise UsageError(f"{place} stands on the earth, but [origin] has no lat_deg, lon_deg and height_m; write them there.")
+        raise UsageError(
+            f"{place} stands on the earth, but [origin] has no lat_deg, lon_deg and height_m; write them there."
+        )
     at, axes = seen_from(origin, site)
     if np.linalg.norm(at) > FARTHEST_M:
         raise UsageError(
@@ -210,14 +218,20 @@ def _other_sign(origin: Geodetic, site: Geodetic) -> str:
 def template(logs: Sequence[str], azimuth_from: str | None) -> str:
     """The text of a range file for these logs, with places to fill in."""
     if not logs:
-        raise UsageError("--fuse --write-config needs the logs of the stations: ftproc filter --fuse --write-config LOG...")
+        raise UsageError(
+            "--fuse --write-config needs the logs of the stations: ftproc filter --fuse --write-config LOG..."
+        )
     parts = [_HEAD, _ORIGIN]
     taken: list[str] = []
     for log in logs:
         name = "".join(c if c.isalnum() or c in "-_" else "_" for c in Path(log).name.partition(".")[0]) or "station"
         name = next(each for k in count(1) if (each := name if k == 1 else f"{name}{k}") not in taken)
         taken.append(name)
-        parts.append(_STATION.format(name=name, log=json.dumps(log), azimuth=azimuth_from or "x", clock=0 if len(taken) == 1 else 0.1))
+        parts.append(
+            _STATION.format(
+                name=name, log=json.dumps(log), azimuth=azimuth_from or "x", clock=0 if len(taken) == 1 else 0.1
+            )
+        )
     return "".join(parts)
 
 

@@ -120,7 +120,14 @@ def biases(constants: Constants, names: list[str]) -> pa.Table:
     import pyarrow as pa
 
     rows = [
-        (name, parameter, constants.estimate[s, j], constants.sigma[s, j], constants.prior[s, j], constants.observable[s, j])
+        (
+            name,
+            parameter,
+            constants.estimate[s, j],
+            constants.sigma[s, j],
+            constants.prior[s, j],
+            constants.observable[s, j],
+        )
         for s, name in enumerate(names)
         for j, parameter in enumerate(posterior.NAMES)
         if constants.prior[s, j] > 0

@@ -67,6 +67,8 @@ def _table(rows: list[tuple[str, ...]]) -> list[str]:
     left = 2
     return [
         "  "
-        + "  ".join(v.ljust(w) if i < left else v.rjust(w) for i, (v, w) in enumerate(zip(row, widths, strict=True))).rstrip()
+        + "  ".join(
+            v.ljust(w) if i < left else v.rjust(w) for i, (v, w) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
         for row in rows
     ]

@@ -197,7 +197,7 @@ def smooth_biased(log: Observations, model: Model, start: Start, directions: Dir
     estimates, residuals = zeros(ESTIMATED, n), zeros(LEFT, n)
     memory = Memory(
         block, before, zeros(backward.BACKWARD), estimates, residuals,
-        np.ascontiguousarray(log.sites.index), np.ascontiguousarray(directions.design),
+        np.ascontiguousarray(log.sites.station), np.ascontiguousarray(directions.design),
         np.ascontiguousarray(directions.columns),
         np.zeros((9, m)), np.zeros((9, m)), np.zeros((blocks, 9, m)), np.zeros((rows, 9, m)),
         np.zeros((rows, 3, m)), np.zeros(m), np.zeros((m, m)), np.zeros((n, 9)),

@@ -72,17 +72,17 @@ class Uneven(NamedTuple):
 
 
 class Sites(NamedTuple):
-    """Where the samples of several stations were taken: index (n,) of the station of each; place (m, 3) and axes
+    """Where the samples of several stations were taken: station (n,) of each; place (m, 3) and axes
     (m, 3, 3) of the stations in the frame of the state, see `Sample`; range_m (m,) typical, of the target from each."""
 
-    index: IntArray
+    station: IntArray
     place: FloatArray
     axes: FloatArray
     range_m: FloatArray
 
     def part(self, rows: slice | IntArray) -> Sites:
         """Of some of the samples."""
-        return self._replace(index=self.index[rows])
+        return self._replace(station=self.station[rows])
 
 
 class Observations(NamedTuple):
@@ -103,13 +103,13 @@ class Observations(NamedTuple):
         return Observations(self.time_s[rows], self.measurement[rows], self.weight[rows], uneven, sites)
 
     def samples(self, noise_variance: FloatArray) -> Any:
-        """The same as an array (n,) of `Sample` records, with noise (3,) m^2, rad^2, rad^2, or (m, 3) of each station."""
+        """The same as an array (n,) of `Sample` records, with noise (3,) m^2, rad^2, rad^2, or (m, 3) by station."""
         samples = zeros(SAMPLE, len(self.time_s))
         samples["time_s"], samples["measurement"], samples["weight"] = self.time_s, self.measurement, self.weight
         if self.sites is not None:
-            index, place, axes, _ = self.sites
-            samples["placed"], samples["place"], samples["axes"] = 1.0, place[index], axes[index]
-            noise_variance = noise_variance[index]
+            station, place, axes, _ = self.sites
+            samples["placed"], samples["place"], samples["axes"] = 1.0, place[station], axes[station]
+            noise_variance = noise_variance[station]
         samples["noise"] = noise_variance
         if self.uneven is not None:
             samples["noise"], samples["late"] = noise_variance * self.uneven.times, self.uneven.late
@@ -132,9 +132,9 @@ def between(starts: list[Start], samples: int) -> Iterator[tuple[Start, int]]:
 class Model(NamedTuple):
     """The noise of the measurements, and of the motion.
 
-    noise_variance: (3,) of white noise, m^2, rad^2, rad^2, or (stations, 3). jerk: (m, 6) tensor of the jerk density, m^2/s^5, each row
-    holding for `knot_s` seconds from the first sample on. wander_variance, fade_s: (3,) of the noise that is correlated
-    in time (first-order Gauss-Markov), which adds to the white; zero for none.
+    noise_variance: (3,) of white noise, m^2, rad^2, rad^2, or (stations, 3). jerk: (m, 6) tensor of the jerk density,
+    m^2/s^5, each row holding for `knot_s` seconds from the first sample on. wander_variance, fade_s: (3,) of the noise
+    that is correlated in time (first-order Gauss-Markov), which adds to the white; zero for none.
     """
 
     noise_variance: FloatArray

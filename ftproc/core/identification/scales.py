@@ -54,8 +54,8 @@ def scales_of(log: Observations, noise_variance: FloatArray) -> Scales:
 def _of_sites(log: Observations, noise_variance: FloatArray) -> tuple[float, FloatArray]:
     """Typical range, and the noise in m of each component of a station that is used, of several stations."""
     assert log.sites is not None
-    index, range_m = log.sites.index, log.sites.range_m
-    used = np.stack([np.bincount(index, log.weight[:, c] > 0, len(range_m)) for c in range(3)], 1) > 0
+    station, range_m = log.sites.station, log.sites.range_m
+    used = np.stack([np.bincount(station, log.weight[:, c] > 0, len(range_m)) for c in range(3)], 1) > 0
     typical = float(np.median(range_m))
     noise = np.sqrt(noise_variance) * np.stack([np.ones_like(range_m), range_m, range_m], 1)
     return typical, np.maximum(noise[used], FINEST * typical)
