@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -52,9 +51,11 @@ def fuse_logs(ctx: click.Context, debug: bool) -> int:
     _refuse_idle(ctx, given)
     range_ = load(given["fuse"])
     settings = FilterSettings(
-        smooth=given.get("smooth", False), jerk_psd_m2ps5=given.get("jerk"), gate=given.get("gate", FilterSettings.gate),
+        smooth=given.get("smooth", False),
+        jerk_psd_m2ps5=given.get("jerk"),
+        gate=given.get("gate", FilterSettings.gate),
         ecef=given.get("ecef", False),
-    )  # fmt: skip
+    )
     output = given.get("output") or f"{Path(given['fuse']).stem}.trajectory.parquet"
     if Path(output).is_dir() or output.endswith("/"):
         output = str(Path(output) / f"{Path(given['fuse']).stem}.trajectory.parquet")

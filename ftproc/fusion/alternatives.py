@@ -47,9 +47,9 @@ Channel = tuple[int, int]  # station, component
 
 
 class Neighbourhood(NamedTuple):
-    """A stretch of the events and what decides in it. log: with the weights of now. station (n,). possible, trusted
-    (n, 3). sigma (stations, 3). inside (n,): the place itself. start: a state at the first event. levels: models to try.
-    gate, in sigmas."""
+    """A stretch of the events and what decides in it. log: with the weights of now. possible, trusted (n, 3). sigma
+    (stations, 3). inside (n,): the place itself. start: a state at the first event. levels: models to try. gate, in
+    sigmas."""
 
     log: Observations
     possible: FloatArray

@@ -38,7 +38,7 @@ def text(instrument: Instrument, constants: Constants, s: int) -> str:
         options["time_offset_s"] = options.get("time_offset_s", 0.0) - float(estimate[CLOCK])
     if instrument.site is not None:
         options.setdefault("site", instrument.site)
-    head = "# Biases, reading minus truth, and the time to add, as a fused flight has shown them; what it could not tell stays.\n"
+    head = "# Biases, reading minus truth, and the time to add, as a fused flight has shown them.\n"
     if told[3:CLOCK].any():
         tilts = " and ".join(
             f"{1e3 * estimate[3 + j]:.4g} mrad about {axis}" for j, axis in enumerate(("east", "north")) if told[3 + j]

@@ -25,8 +25,8 @@ from ftproc.core.identification.profile import fit_profile, median_level, with_a
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model import stations as geometry
 from ftproc.core.model.motion import isotropic
-from ftproc.fusion import constants as posterior
 from ftproc.fusion import alternatives, first_track
+from ftproc.fusion import constants as posterior
 from ftproc.fusion.constants import Constants
 from ftproc.fusion.events import Events, Seen, merge
 from ftproc.records import FloatArray
@@ -253,11 +253,14 @@ def _tuned(current: Fused, jerk_psd: float | None, first: int | None) -> Fused:
     starts = [current.start]
     if jerk_psd is None:
         log = current.log
-        if first is not None:
-            model = _level(log, starts, model)
-        else:
-            model = fit_profile(log, starts, model, PROFILE_STEPS)
+        fit = _level if first is not None else _profile
+        model = fit(log, starts, model)
     return current._replace(sigma=sigma, model=model)
+
+
+def _profile(log: Observations, starts: list[Start], model: Model) -> Model:
+    """The likeliest profile, from the model's."""
+    return fit_profile(log, starts, model, PROFILE_STEPS)
 
 
 def _level(log: Observations, starts: list[Start], model: Model) -> Model:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -26,8 +27,8 @@ ALONE_S = 3.0  # of a stretch that only one station carries while others are rej
 
 #: Is said with every consistent fused flight.
 NOT_SHOWN = (
-    "Stations together cannot show what is wrong with all of them alike: a clock offset or a tilt that they share, places "
-    "in a wrong frame, or a false target that all follow."
+    "Stations together cannot show what is wrong with all of them alike: a clock offset or a tilt that they share, "
+    "places in a wrong frame, or a false target that all follow."
 )
 
 
@@ -64,8 +65,7 @@ def _elsewhere(fused: Fused, s: int, time_s: FloatArray) -> Iterator[tuple[float
     """From and to where all readings of a station are rejected."""
     possible, used = fused.possible[s] > 0, fused.weight[s] > 0
     rows = np.flatnonzero(possible.any(1))
-    bad = ~(used[rows].any(1))
-    bad = _closed(bad, BRIDGED)
+    bad = _closed(~np.asarray(used[rows].any(1)), BRIDGED)
     for first, last in runs_of(bad):
         if last - first >= WRONG_ROWS and time_s[rows[last - 1]] - time_s[rows[first]] >= WRONG_S:
             yield float(time_s[rows[first]]), float(time_s[rows[last - 1]])
@@ -75,7 +75,7 @@ def _closed(flag: NDArray[np.bool_], most: int) -> NDArray[np.bool_]:
     """Gaps of at most so many between runs of true filled, where the runs are longer."""
     found = flag.copy()
     runs = runs_of(flag)
-    for (a, b), (c, d) in zip(runs[:-1], runs[1:], strict=True):
+    for (a, b), (c, d) in itertools.pairwise(runs):
         if c - b <= most and min(b - a, d - c) > c - b:
             found[b:c] = True
     return found
@@ -141,8 +141,8 @@ def _improbable(fused: Fused) -> Iterator[Remark]:
                 times = abs(c.estimate[s, j]) / c.prior[s, j]
                 yield Remark(
                     SUSPECT,
-                    f"the {word} of {station.name} is {times:.0f} times what is said of it beforehand: check its place, "
-                    "its clock and its conventions, or its 1-sigma in the range file",
+                    f"the {word} of {station.name} is {times:.0f} times its 1-sigma of the range file: check its "
+                    "place, its clock and its conventions, or that 1-sigma",
                 )
 
 
@@ -154,8 +154,8 @@ def _rejections(fused: Fused) -> Iterator[Remark]:
             if possible.sum() >= FEWEST:
                 shares[COMPONENTS[c]] = float(1 - (fused.weight[s][possible, c] > 0).mean())
         if shares and min(shares.values()) > TOO_MANY_REJECTED:
-            text = f"{station.name} contradicts the others: most of its readings are rejected; check its place, its clock, "
-            yield Remark(SUSPECT, text + "its conventions, and that it follows the same target")
+            text = f"{station.name} contradicts the others: most of its readings are rejected; check its place, its "
+            yield Remark(SUSPECT, text + "clock, its conventions, and that it follows the same target")
             continue
         for name, share in shares.items():
             if share > MANY_REJECTED:

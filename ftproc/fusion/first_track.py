@@ -116,7 +116,7 @@ def _candidates(stations: list[Seen], readings: FloatArray) -> list[FloatArray]:
 
 
 def _nearest_point(at: FloatArray, along: FloatArray, other: FloatArray, sight: FloatArray) -> FloatArray:
-    """(g, 3) halfway between two lines where they are nearest to each other; NaN where they are parallel or meet behind."""
+    """(g, 3) halfway between two lines where they are nearest; NaN where they are parallel or meet behind."""
     between, cosine = other - at, (along * sight).sum(1)
     sine2 = np.where(1 - cosine**2 > 1e-6, 1 - cosine**2, np.nan)
     p, q = along @ between, sight @ between

@@ -48,7 +48,7 @@ def fuse(
 ) -> Flight:
     """The flight that the stations of a range have seen. model: the correction of a single station's filter.
 
-    Raises InputError for logs that cannot be read or have nothing in common, UsageError for settings that make no sense.
+    Raises InputError for logs that cannot be read or have nothing in common, UsageError for settings without sense.
     """
     read = logs.read(range_.instruments)
     if len(read) == 1:
@@ -60,8 +60,8 @@ def fuse(
     except engine.Alone as cause:
         names = ", ".join(station.name for station in seen)
         raise InputError(
-            f"{range_.path}: the readings of {names} meet nowhere, so there is no first track: at no time is the target "
-            "seen by a range and two angles, two lines of sight, or three ranges. Check the places, the clocks and the "
+            f"{range_.path}: the readings of {names} meet nowhere, so there is no first track: at no time do a range "
+            "and two angles, two lines of sight, or three ranges meet in a point. Check the places, the clocks and the "
             "conventions of the stations, or add one."
         ) from cause
     return _flight(range_, read, fused, zero_s, settings)
@@ -99,7 +99,7 @@ def _located(trajectory: Trajectory, range_: Range, settings: FilterSettings) ->
         return trajectory
     try:
         geodesy.require_pymap3d()
-    except Exception:  # noqa: BLE001 - without the library there are no such columns
+    except Exception:
         return trajectory
     return geodesy.located(trajectory, replace(settings, site=range_.origin))
 
@@ -113,9 +113,8 @@ def _alone(range_: Range, log: MeasurementLog, settings: FilterSettings, model: 
     )
     found = pipeline.filter_log(log, settings, model)
     turned = _from_origin(found, instrument, log.frame)
-    prior = np.where(np.isfinite(log.measurement).any(0)[[0, 1, 2, 1, 1, 0]], instrument.prior, 0.0)
-    prior[5] = instrument.prior[5]
-    constants = Constants.unknown(prior[None])
+    (seen,), _ = logs.as_seen(range_.instruments, [log])
+    constants = Constants.unknown(seen.prior[None])
     used = (found.outlier == 0).any(1).astype(np.int64)
     last = results.distinct(found.time_s)
     summary = {
@@ -126,9 +125,9 @@ def _alone(range_: Range, log: MeasurementLog, settings: FilterSettings, model: 
     metadata = {**found.metadata, "method": METHOD, "log": range_.path, "frame": "local", "summary": summary}
     trajectory = replace(
         turned, name=range_.path, row=np.arange(len(last)), time_s=found.time_s[last], state=turned.state[last],
-        sigma=turned.sigma[last], measurement=np.full((len(last), 3), np.nan), outlier=np.zeros((len(last), 3), np.uint8),
-        nis=found.nis[last], correction=np.zeros((len(last), 6)), metadata=metadata,
-        extra=arrow.table({"stations": used[last]}), diagnostics=None,
+        sigma=turned.sigma[last], measurement=np.full((len(last), 3), np.nan),
+        outlier=np.zeros((len(last), 3), np.uint8), nis=found.nis[last], correction=np.zeros((len(last), 6)),
+        metadata=metadata, extra=arrow.table({"stations": used[last]}), diagnostics=None,
     )  # fmt: skip
     edited = {instrument.name: results.edited_alone(found, log)}
     table = results.biases(constants, [instrument.name])

@@ -39,8 +39,9 @@ def as_seen(instruments: Sequence[Instrument], found: Sequence[MeasurementLog]) 
         if log.frame == "north-east-up":
             z[:, 1] = math.pi / 2 - z[:, 1]
         z[:, 1] = wrap(z[:, 1])
-        present = np.isfinite(z).any(0)
-        prior = np.where([*present, present[1] or present[2], present[1] or present[2], True], instrument.prior, 0.0)
+        of_range, azimuth, elevation = (bool(np.isfinite(z[:, c]).any()) for c in range(3))
+        tilts = azimuth or elevation
+        prior = np.where([of_range, azimuth, elevation, tilts, tilts, True], instrument.prior, 0.0)
         stated = instrument.options.get("noise") or (None, None, None)
         time_s = np.array(log.time_s) + shift - zero
         place = instrument.place, instrument.axes

@@ -15,8 +15,8 @@ from ftproc.config import reading
 from ftproc.config.keys import KEYS, Key
 from ftproc.config.kinds import number, text
 from ftproc.config.recipe import Recipe
+from ftproc.core.model.earth import Geodetic, seen_from
 from ftproc.errors import UsageError, nearest
-from ftproc.fusion.earth import Geodetic, seen_from
 from ftproc.records import FloatArray
 
 MAKER = "--fuse --write-config LOG..."
@@ -237,11 +237,12 @@ def template(logs: Sequence[str], azimuth_from: str | None) -> str:
 
 _HEAD = """\
 # A range file of ftproc: ftproc filter --fuse THIS --smooth -o best.parquet. Logs are relative to this file.
-# Keys of a station file may stand here too, such as azimuth_from = "north" or time_offset_s; or in a file: config = "radar.toml".
+# Keys of a station file may stand here too, such as azimuth_from = "north" or time_offset_s = 0.5; or in a file of
+# its own: config = "radar.toml".
 
 """
 _ORIGIN = """\
-[origin]                        # x east, y north, z up of the fused trajectory; leave its keys out for stations in metres
+[origin]                        # of x east, y north, z up; leave its keys out for stations in metres
 lat_deg = 48.0812               # WGS-84
 lon_deg = 11.2803
 height_m = 612.0                # above the ellipsoid

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.core.model import stations as geometry
 from ftproc.core.model.frames import wrap
@@ -72,7 +73,7 @@ def edited(fused: Fused, s: int, log: MeasurementLog, state: FloatArray) -> pa.T
     cleaned[:, absent] = np.nan
     rows = max(log.rows_in_file, int(log.row.max()) + 1)
 
-    def full(values: FloatArray, fill: float = np.nan) -> FloatArray:
+    def full(values: NDArray[Any], fill: float = np.nan) -> NDArray[Any]:
         found = np.full((rows, *values.shape[1:]), fill, values.dtype)
         found[log.row] = values
         return found
@@ -99,7 +100,7 @@ def edited_alone(found: Trajectory, log: MeasurementLog) -> pa.Table:
     diagnostics = found.diagnostics
     assert diagnostics is not None
 
-    def full(values: FloatArray, fill: float = np.nan) -> FloatArray:
+    def full(values: NDArray[Any], fill: float = np.nan) -> NDArray[Any]:
         made = np.full(rows, fill, values.dtype)
         made[found.row] = values
         return made
@@ -132,7 +133,7 @@ def biases(constants: Constants, names: list[str]) -> pa.Table:
         for j, parameter in enumerate(posterior.NAMES)
         if constants.prior[s, j] > 0
     ]
-    columns = list(zip(*rows, strict=True)) if rows else [[]] * 6
+    columns: list[Any] = list(zip(*rows, strict=True)) if rows else [()] * 6
     kinds = (pa.string(), pa.string(), pa.float64(), pa.float64(), pa.float64(), pa.bool_())
     titles = ("station", "parameter", "estimate", "sigma", "prior_sigma", "observable")
     return pa.table([pa.array(c, k) for c, k in zip(columns, kinds, strict=True)], names=titles)

@@ -15,10 +15,8 @@ _UNIT = {"m": (1.0, "m"), "rad": (1e3, "mrad"), "s": (1e3, "ms")}
 def text(metadata: Mapping[str, Any]) -> str:
     """The summary in the metadata of a fused trajectory, at most a screen of a terminal for a few stations."""
     s, way = metadata["summary"], "smoothed" if metadata["settings"]["smooth"] else "filtered"
-    lines = [
-        f"{metadata['log']}: {counted(len(s['stations']), 'station')}, {s['readings']} readings, {s['duration_s']:.6g} s, "
-        f"fused and {way}"
-    ]
+    size = f"{counted(len(s['stations']), 'station')}, {s['readings']} readings, {s['duration_s']:.6g} s"
+    lines = [f"{metadata['log']}: {size}, fused and {way}"]
     lines += _table([("station", "component", "good", "rejected", "missing", "noise (1 sigma)"), *_components(s)])
     lines += _table([("station", "bias", "estimate", "1 sigma", "before", ""), *_biases(s)])
     jerk = s["jerk_psd_m2ps5"]

@@ -46,8 +46,9 @@ def to_table(trajectory: Trajectory, without: Sequence[str] = ()) -> pa.Table:
 def write(trajectory: Trajectory, target: Target, without: Sequence[str] = ()) -> None:
     """Write a file of a kind that `layout` names, or CSV on standard output for `-`, complete or not at all.
 
-    without: columns to leave out. The metadata of a CSV file or a map go into its `sidecar`. The same trajectory gives the same bytes.
-    Raises OutputError; BrokenPipeError if standard output is closed; UsageError as `to_table` and `maps.check`.
+    without: columns to leave out. The metadata of a CSV file or a map go into its `sidecar`. The same trajectory gives
+    the same bytes. Raises OutputError; BrokenPipeError if standard output is closed; UsageError as `to_table` and
+    `maps.check`.
     """
     beside = sidecar(target)
     if beside is None:
