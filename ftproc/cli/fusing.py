@@ -134,9 +134,9 @@ def _write(found: flight.Flight, output: str, given: Mapping[str, Any], range_: 
         calibration.write(range_, found.constants, folder)
         places.append(f"{folder}/")
     if given.get("report") is not None:
-        from ftproc.report import fused
+        from ftproc.report.fused import write
 
-        fused.write(found, given["report"])
+        write(found, given["report"])
         places.append(given["report"])
     return places
 

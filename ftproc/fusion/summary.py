@@ -9,6 +9,8 @@ from ftproc.fusion.constants import NAMES, WORDS
 from ftproc.quality import verdict
 from ftproc.quality.summary import counted, line
 
+COMPONENT_HEADER = ("station", "component", "good", "rejected", "missing", "noise (1 sigma)")
+BIAS_HEADER = ("station", "bias", "estimate", "1 sigma", "before", "")
 _UNIT = {"m": (1.0, "m"), "rad": (1e3, "mrad"), "s": (1e3, "ms")}
 
 
@@ -17,8 +19,8 @@ def text(metadata: Mapping[str, Any]) -> str:
     s, way = metadata["summary"], "smoothed" if metadata["settings"]["smooth"] else "filtered"
     size = f"{counted(len(s['stations']), 'station')}, {s['readings']} readings, {s['duration_s']:.6g} s"
     lines = [f"{metadata['log']}: {size}, fused and {way}"]
-    lines += _table([("station", "component", "good", "rejected", "missing", "noise (1 sigma)"), *_components(s)])
-    lines += _table([("station", "bias", "estimate", "1 sigma", "before", ""), *_biases(s)])
+    lines += _table([COMPONENT_HEADER, *component_rows(s)])
+    lines += _table([BIAS_HEADER, *bias_rows(s)])
     jerk = s["jerk_psd_m2ps5"]
     named = [("jerk", f"PSD {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.3g} to {jerk['highest']:.3g})")]
     named += [("note", note) for note in s["notes"]]
@@ -31,7 +33,8 @@ def text(metadata: Mapping[str, Any]) -> str:
     return "\n".join([*lines, *(line(name, what) for name, what in named)])
 
 
-def _components(s: Mapping[str, Any]) -> list[tuple[str, ...]]:
+def component_rows(s: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """A row for each component of each station, under COMPONENT_HEADER."""
     found = []
     for station, part in s["stations"].items():
         for k, (component, figures) in enumerate(part["components"].items()):
@@ -41,7 +44,8 @@ def _components(s: Mapping[str, Any]) -> list[tuple[str, ...]]:
     return found
 
 
-def _biases(s: Mapping[str, Any]) -> list[tuple[str, ...]]:
+def bias_rows(s: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """A row for each parameter that was not known beforehand, under BIAS_HEADER."""
     found = []
     for station, part in s["stations"].items():
         for k, (name, each) in enumerate(part["biases"].items()):
