@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core.editing import outlier_chain, two_pass
+from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.biases import Biased, Directions, smooth_biased
 from ftproc.core.filtering.forward import filter_log
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
@@ -25,7 +25,7 @@ from ftproc.core.identification.profile import fit_profile, median_level, with_a
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model import stations as geometry
 from ftproc.core.model.motion import isotropic
-from ftproc.fusion import alternatives, first_track
+from ftproc.fusion import alternatives, first_track, screening
 from ftproc.fusion import constants as posterior
 from ftproc.fusion.constants import Constants
 from ftproc.fusion.events import Events, Seen, merge
@@ -35,14 +35,11 @@ FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 16, 5
 LEVEL_STEPS, PROFILE_STEPS = 4, 3
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after the first rounds
 STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that may still change
-LEAST_NOISE = (1e-4, 1e-8, 1e-8)  # m, rad, rad
 NOISE_STEP = 4.0  # times its variance that the noise of a component moves in a round
-FEWEST = 20  # readings, for its noise to be found
 START_SIGMA = (30.0, 10.0, 20.0)  # m, m/s, m/s2: at least, of the state at the start
 START_INFLATION = 25.0  # on its variance
 FIRST_MEMORY = 8.0  # intervals of the densest station, of the filter with which the search begins
 FEWEST_KEPT = 0.5  # of what screening trusts, in each component of a station
-OFF, OFF_SIGMAS, OFF_CLOCKS = 8.0, 3.0, 2.0  # of the first track: median deviations, sigmas, clock priors
 
 
 class Fused(NamedTuple):
@@ -68,43 +65,20 @@ class Fused(NamedTuple):
         return self.events.weighted(self.weight)
 
 
-class Screened(NamedTuple):
-    """possible, trusted: (rows, 3) readings of a station that may be good, and that screening trusts; sigma (3,)."""
-
-    possible: FloatArray
-    trusted: FloatArray
-    sigma: FloatArray
-
-
 class Alone(Exception):
     """The readings of the stations determine no first track."""
-
-
-def screen(station: Seen) -> Screened:
-    """A station by itself."""
-    z = station.measurement
-    weight, sigma, least = np.isfinite(z).astype(float), np.ones(3), two_pass.rounding_sigma(z)
-    for c in station.components:
-        channel = np.ascontiguousarray(z[:, c])
-        weight[:, c], sigma[c] = two_pass.screen_channel(
-            station.time_s, channel, c == 1, math.sqrt(2) * float(least[c])
-        )
-    sigma = np.where(np.isfinite(station.known), station.known, np.maximum(sigma, LEAST_NOISE))
-    possible = np.isfinite(z) & ~two_pass.stuck_readings(z, sigma)
-    possible[:, 0] &= z[:, 0] > 0
-    return Screened(possible.astype(float), weight * possible, sigma)
 
 
 def fuse(
     stations: list[Seen], gate: float, jerk_psd: float | None, progress: Callable[[str], None] | None = None
 ) -> Fused:
     """The fused flight of two or more stations. Raises Alone."""
-    screened = [screen(station) for station in stations]
+    screened = [screening.screen(station) for station in stations]
     sigma = np.stack([each.sigma for each in screened])
     track = first_track.find(stations, [each.trusted for each in screened], sigma)
     if track is None:
         raise Alone
-    trusted = [_agreeing(s, each, track) for s, each in zip(stations, screened, strict=True)]
+    trusted = [screening.agreeing(s, each, track) for s, each in zip(stations, screened, strict=True)]
     prior = np.stack([station.prior for station in stations])
     current = _begin(stations, screened, trusted, track, sigma, Constants.unknown(prior), jerk_psd)
     say = progress or (lambda text: None)
@@ -121,30 +95,8 @@ def fuse(
     return _last(current)
 
 
-def _agreeing(station: Seen, screened: Screened, track: first_track.Track) -> FloatArray:
-    """(rows, 3) readings that the screening trusts and the first track does not contradict, about their own median."""
-    weight = screened.trusted.copy()
-    state = track.at(station.time_s)
-    expected = geometry.measured(state[:, :3], station.place, station.axes)
-    n = len(state)
-    rate = np.abs(geometry.design(state, np.tile(station.place, (n, 1)), np.tile(station.axes, (n, 1, 1)))[:, :, 2])
-    off = geometry.innovation(station.measurement, expected)
-    inside = (station.time_s >= track.time_s[0]) & (station.time_s <= track.time_s[-1])
-    for c in station.components:
-        known = (weight[:, c] > 0) & inside
-        if known.sum() < FEWEST:
-            continue
-        middle = np.median(off[known, c])
-        scatter = 1.4826 * np.median(np.abs(off[known, c] - middle))
-        limit = OFF * scatter + OFF_SIGMAS * screened.sigma[c] + OFF_CLOCKS * station.prior[5] * rate[:, c]
-        wrong = inside & (np.abs(off[:, c] - middle) > limit)
-        if wrong[known].mean() < FEWEST_KEPT:
-            weight[wrong, c] = 0.0
-    return weight
-
-
 def _begin(
-    stations: list[Seen], screened: list[Screened], weight: list[FloatArray], track: first_track.Track,
+    stations: list[Seen], screened: list[screening.Screened], weight: list[FloatArray], track: first_track.Track,
     sigma: FloatArray, constants: Constants, jerk_psd: float | None,
 ) -> Fused:  # fmt: skip
     """The first smoother run, along the first track."""
@@ -244,11 +196,11 @@ def _tuned(current: Fused, jerk_psd: float | None, first: int | None) -> Fused:
         here = current.events.station == s
         for c in station.components:
             rows = here & used[:, c]
-            if rows.sum() < FEWEST or np.isfinite(station.known[c]):
+            if rows.sum() < screening.FEWEST or np.isfinite(station.known[c]):
                 continue
             r, v = run.residual[rows, c], run.residual_variance[rows, c]
             growth = np.clip(((r / v) ** 2).sum() / (1 / v).sum(), 1 / NOISE_STEP, NOISE_STEP)
-            sigma[s, c] = max(sigma[s, c] * math.sqrt(growth), LEAST_NOISE[c])
+            sigma[s, c] = max(sigma[s, c] * math.sqrt(growth), screening.LEAST_NOISE[c])
     model = current.model._replace(noise_variance=sigma**2)
     starts = [current.start]
     if jerk_psd is None:

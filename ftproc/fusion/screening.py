@@ -1,0 +1,65 @@
+"""What is believed of a station's readings before there is a fused track: what each component says by itself, and then
+what a first track does not contradict."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ftproc.core.editing import two_pass
+from ftproc.core.model import stations as geometry
+from ftproc.fusion.events import CLOCK, Seen
+from ftproc.fusion.first_track import Track
+from ftproc.records import FloatArray
+
+LEAST_NOISE = (1e-4, 1e-8, 1e-8)  # m, rad, rad
+FEWEST = 20  # readings, for the noise or the median of a component
+FEWEST_KEPT = 0.5  # of a component: a track that contradicts more is wrong itself
+OFF, OFF_SIGMAS, OFF_CLOCKS = 8.0, 3.0, 2.0  # of the first track: median deviations, sigmas, clock priors
+
+
+class Screened(NamedTuple):
+    """possible, trusted: (rows, 3) readings of a station that may be good, and that screening trusts; sigma (3,)."""
+
+    possible: FloatArray
+    trusted: FloatArray
+    sigma: FloatArray
+
+
+def screen(station: Seen) -> Screened:
+    """A station by itself."""
+    z = station.measurement
+    weight, sigma, least = np.isfinite(z).astype(float), np.ones(3), two_pass.rounding_sigma(z)
+    for c in station.components:
+        channel = np.ascontiguousarray(z[:, c])
+        weight[:, c], sigma[c] = two_pass.screen_channel(
+            station.time_s, channel, c == 1, math.sqrt(2) * float(least[c])
+        )
+    sigma = np.where(np.isfinite(station.known), station.known, np.maximum(sigma, LEAST_NOISE))
+    possible = np.isfinite(z) & ~two_pass.stuck_readings(z, sigma)
+    possible[:, 0] &= z[:, 0] > 0
+    return Screened(possible.astype(float), weight * possible, sigma)
+
+
+def agreeing(station: Seen, screened: Screened, track: Track) -> FloatArray:
+    """(rows, 3) readings that the screening trusts and the first track does not contradict, about their own median."""
+    weight = screened.trusted.copy()
+    state = track.at(station.time_s)
+    expected = geometry.measured(state[:, :3], station.place, station.axes)
+    n = len(state)
+    rate = np.abs(geometry.design(state, np.tile(station.place, (n, 1)), np.tile(station.axes, (n, 1, 1)))[:, :, 2])
+    off = geometry.innovation(station.measurement, expected)
+    inside = (station.time_s >= track.time_s[0]) & (station.time_s <= track.time_s[-1])
+    for c in station.components:
+        known = (weight[:, c] > 0) & inside
+        if known.sum() < FEWEST:
+            continue
+        middle = np.median(off[known, c])
+        scatter = 1.4826 * np.median(np.abs(off[known, c] - middle))
+        limit = OFF * scatter + OFF_SIGMAS * screened.sigma[c] + OFF_CLOCKS * station.prior[CLOCK] * rate[:, c]
+        wrong = inside & (np.abs(off[:, c] - middle) > limit)
+        if wrong[known].mean() < FEWEST_KEPT:
+            weight[wrong, c] = 0.0
+    return weight
