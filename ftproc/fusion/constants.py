@@ -21,7 +21,7 @@ NAMES = ("range_m", "azimuth_rad", "elevation_rad", "tilt_east_rad", "tilt_north
 WORDS = ("range bias", "azimuth zero", "elevation zero", "tilt about east", "tilt about north", "clock offset")
 LEAST_TOLD = 0.05  # of the prior's information: less in a direction says nothing
 TOLD = 0.9  # of the prior's 1-sigma: a parameter that stays above it is not observable
-SHARE = 0.35  # of a direction of unit length: smaller parts of it are not named
+FARTHEST = 6.0  # prior sigmas that a bias may be off: more of it is a wrong place, clock or target
 
 
 class Constants(NamedTuple):
@@ -79,7 +79,7 @@ def update(constants: Constants, found: Biased, directions: Directions) -> Const
     covariance = np.zeros((len(prior), len(prior)))
     covariance[np.ix_(free, free)] = np.outer(prior[free], prior[free]) * ((turn / (1 + size)) @ turn.T)
     estimate = constants.estimate.copy().ravel()
-    estimate[free] += prior[free] * step
+    estimate[free] = np.clip(estimate[free] + prior[free] * step, -FARTHEST * prior[free], FARTHEST * prior[free])
     vague = np.zeros((0, len(prior)))
     moved = float(np.max(np.abs(step) * prior[free] / np.sqrt(np.diag(covariance)[free])))
     if untold is not None:

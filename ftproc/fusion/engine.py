@@ -18,7 +18,7 @@ from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.biases import Biased, Directions, smooth_biased
 from ftproc.core.filtering.forward import filter_log
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
-from ftproc.core.filtering.smoother import score_log
+from ftproc.core.filtering.smoother import score_log, smooth_log
 from ftproc.core.identification import optimizer
 from ftproc.core.identification.likelihood import VERTICAL_PRECISION, jerk_bounds, shaped
 from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
@@ -28,7 +28,7 @@ from ftproc.core.model.motion import isotropic
 from ftproc.fusion import alternatives, first_track, screening
 from ftproc.fusion import constants as posterior
 from ftproc.fusion.constants import Constants
-from ftproc.fusion.events import Events, Seen, merge
+from ftproc.fusion.events import CLOCK, Events, Seen, merge
 from ftproc.records import FloatArray
 
 FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 16, 5
@@ -38,7 +38,9 @@ STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that 
 NOISE_STEP = 4.0  # times its variance that the noise of a component moves in a round
 START_SIGMA = (30.0, 10.0, 20.0)  # m, m/s, m/s2: at least, of the state at the start
 START_INFLATION = 25.0  # on its variance
-FIRST_MEMORY = 8.0  # intervals of the densest station, of the filter with which the search begins
+FIRST_MEMORIES = (3.0, 8.0, 20.0, 50.0, 120.0)  # intervals of the densest station: of the filter that begins the search
+NEAR, NEAR_SHARE = 8.0, 0.9  # 1-sigmas of the first track, within which such a share of the smoothed one lies
+SHARES = (1.0, 0.25, 0.06, 0.0)  # of what is unknown of the readings, which is taken for noise at first: ever less
 FEWEST_KEPT = 0.5  # of what screening trusts, in each component of a station
 
 
@@ -109,13 +111,50 @@ def _begin(
     covariance = np.diag(np.repeat([spread, 100.0, 50.0], 3) ** 2)
     start = Start(first, state[first], covariance)
     log = events.weighted(weight)
-    model = Model(
-        sigma**2, isotropic(jerk_psd or scales_of(log, sigma**2).jerk_psd(FIRST_MEMORY * _interval(stations)))
-    )
+    wide = _with_biases(events, stations, state, sigma)
+    near = Near(state[:, :3], float(np.median(track.sigma)), _interval(stations))
+    model = Model(wide**2, isotropic(jerk_psd or _first_jerk(log, wide**2, start, near)))
     found = smooth_biased(log, model, start, _directions(events, state, constants))
     rates = np.tile(np.array(outlier_chain.START_RATES), (len(stations), 3, 1))
     possible = [each.possible for each in screened]
-    return Fused(stations, events, weight, possible, sigma, constants, model, start, found, rates)
+    begun = Fused(stations, events, weight, possible, sigma, constants, model, start, found, rates)
+    for share in SHARES:
+        noise = np.maximum(sigma, share * wide) ** 2
+        begun = _smoothed(begun._replace(model=model._replace(noise_variance=noise)))
+    return begun
+
+
+def _with_biases(events: Events, stations: list[Seen], state: FloatArray, sigma: FloatArray) -> FloatArray:
+    """(m, 3) how far readings may be off, with the biases and clocks that are yet unknown."""
+    rate = np.abs(_design(events, state)[:, :, 2])
+    wide = sigma.copy()
+    for s, station in enumerate(stations):
+        clock = station.prior[CLOCK] * np.median(rate[events.station == s], 0)
+        wide[s] = np.sqrt(sigma[s] ** 2 + station.prior[:3] ** 2 + clock**2)
+    return wide
+
+
+def _first_jerk(log: Observations, noise_variance: FloatArray, start: Start, near: Near) -> float:
+    """The likeliest of a few jerk densities, m^2/s^5, among those with which the smoother stays near the first track: a
+    filter that has lost it finds all readings vague, and so likely."""
+    scales = scales_of(log, noise_variance)
+    found: list[tuple[float, float]] = []
+    for memory in FIRST_MEMORIES:
+        jerk_psd = scales.jerk_psd(memory * near.interval_s)
+        run = smooth_log(log, Model(noise_variance, isotropic(jerk_psd)), [start])
+        away = np.linalg.norm(run.state[start.sample :, :3] - near.position[start.sample :], axis=1)
+        if found and not np.quantile(away, NEAR_SHARE) < NEAR * near.sigma_m:
+            break
+        found.append((run.log_likelihood, jerk_psd))
+    return max(found)[1]
+
+
+class Near(NamedTuple):
+    """The first track at the events (n, 3), m, its typical 1-sigma, and the interval of the densest station."""
+
+    position: FloatArray
+    sigma_m: float
+    interval_s: float
 
 
 def _interval(stations: list[Seen]) -> float:
@@ -123,9 +162,12 @@ def _interval(stations: list[Seen]) -> float:
 
 
 def _directions(events: Events, state: FloatArray, constants: Constants) -> Directions:
+    return Directions(_design(events, state), constants.columns())
+
+
+def _design(events: Events, state: FloatArray) -> FloatArray:
     sites = events.sites
-    design = geometry.design(state, sites.place[sites.station], sites.axes[sites.station])
-    return Directions(design, constants.columns())
+    return geometry.design(state, sites.place[sites.station], sites.axes[sites.station])
 
 
 def _round(current: Fused, trusted: list[FloatArray], gate: float, jerk_psd: float | None, first: int | None) -> Fused:
@@ -211,7 +253,10 @@ def _tuned(current: Fused, jerk_psd: float | None, first: int | None) -> Fused:
 
 
 def _profile(log: Observations, starts: list[Start], model: Model) -> Model:
-    """The likeliest profile, from the model's."""
+    """The likeliest profile, from the model's, whose length follows the span of the events: the clocks move it."""
+    if math.isfinite(model.knot_s):
+        knots = max(math.ceil(scales_of(log, model.noise_variance).span_s / model.knot_s), 1)
+        model = model._replace(jerk=model.jerk[np.minimum(np.arange(knots), len(model.jerk) - 1)])
     return fit_profile(log, starts, model, PROFILE_STEPS)
 
 

@@ -17,6 +17,7 @@ from ftproc.records import FloatArray
 LEAST_NOISE = (1e-4, 1e-8, 1e-8)  # m, rad, rad
 FEWEST = 20  # readings, for the noise or the median of a component
 FEWEST_KEPT = 0.5  # of a component: a track that contradicts more is wrong itself
+GROSS, GROSS_TRACK = 20.0, 8.0  # times what is not known of a component, and of the track, that a median may be off
 OFF, OFF_SIGMAS, OFF_CLOCKS = 8.0, 3.0, 2.0  # of the first track: median deviations, sigmas, clock priors
 
 
@@ -57,6 +58,11 @@ def agreeing(station: Seen, screened: Screened, track: Track) -> FloatArray:
         if known.sum() < FEWEST:
             continue
         middle = np.median(off[known, c])
+        vague = np.median(track.sigma) / (1.0 if c == 0 else max(float(np.median(expected[known, 0])), 1.0))
+        unknown = station.prior[c] + station.prior[CLOCK] * float(np.median(rate[known, c])) + screened.sigma[c]
+        if abs(middle) > GROSS * unknown + GROSS_TRACK * vague:
+            weight[:, c] = 0.0  # a wrong place, convention or clock: no bias explains it
+            continue
         scatter = 1.4826 * np.median(np.abs(off[known, c] - middle))
         limit = OFF * scatter + OFF_SIGMAS * screened.sigma[c] + OFF_CLOCKS * station.prior[CLOCK] * rate[:, c]
         wrong = inside & (np.abs(off[:, c] - middle) > limit)

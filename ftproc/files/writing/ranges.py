@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from pathlib import Path
 
 from ftproc.errors import OutputError
 from ftproc.files.writing import atomic, flights, tables
+from ftproc.records import MeasurementLog, Truth
 from ftproc.simulation.ranges import SimulatedRange, SimulatedStation
 
 _PARAMETERS = ("range_m", "azimuth_rad", "elevation_rad", "tilt_east_rad", "tilt_north_rad", "clock_s")
@@ -30,11 +33,27 @@ def write(simulated: SimulatedRange, directory: str, truth: str | None) -> None:
         flights.write_truth(simulated.truth, truth)
         _write_biases(simulated, truth)
     for station in simulated.stations:
-        flights.write_log(station.log, str(folder / f"{station.name}.csv"), azimuth_from=station.azimuth_from)
+        log, seen = _as_counted(station)
+        flights.write_log(log, str(folder / f"{station.name}.csv"), azimuth_from=station.azimuth_from)
         if truth is not None:
-            flights.write_truth(station.truth, str(folder / f"{station.name}.truth.csv"))
+            flights.write_truth(seen, str(folder / f"{station.name}.truth.csv"))
     with atomic.replacing(folder / "range.toml") as stream:
         stream.write(range_file(simulated).encode())
+
+
+def _as_counted(station: SimulatedStation) -> tuple[MeasurementLog, Truth]:
+    """The log and its truth as the station counts: with the azimuth from north, x is north and y east."""
+    log, truth = station.log, station.truth
+    if station.azimuth_from != "north":
+        return log, truth
+    turned = log.measurement.copy()
+    turned[:, 1] = math.pi / 2 - turned[:, 1]
+    assert truth.velocity_mps is not None
+    assert truth.acceleration_mps2 is not None
+    states = (truth.position_m, truth.velocity_mps, truth.acceleration_mps2)
+    position, velocity, acceleration = (each[:, [1, 0, 2]] for each in states)
+    seen = replace(truth, position_m=position, velocity_mps=velocity, acceleration_mps2=acceleration)
+    return replace(log, measurement=turned), seen
 
 
 def range_file(simulated: SimulatedRange) -> str:
