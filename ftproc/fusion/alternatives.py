@@ -41,6 +41,7 @@ RATES = np.array([0.03, 0.001, 0.93])  # isolated outlier; patch begins; goes on
 LOST = 0.35  # share of a component that is rejected in a place, to be called lost
 FEWEST = 12  # readings that a hypothesis leaves at least
 FREE = (50.0, 20.0, 20.0)  # m, m/s, m/s2: 1-sigma of the state where a neighbourhood begins
+OTHER_LEVEL = 2.0  # times the jerk level at which a place was examined, before it is examined again
 CALMER = 4.0  # times the calm level: the jerk may be so much more in a place
 
 Channel = tuple[int, int]  # station, component
@@ -72,6 +73,26 @@ class Place(NamedTuple):
     first_s: float
     last_s: float
     channels: frozenset[Channel]
+
+
+class Search:
+    """The places that were examined; they are examined again once the calm level of the jerk is another."""
+
+    def __init__(self) -> None:
+        self.tried: set[Place] = set()
+        self.level = math.inf
+
+    def begin(self, level: float) -> None:
+        """Look again, at this jerk level, m^2/s^5."""
+        if not self.level / OTHER_LEVEL < level < self.level * OTHER_LEVEL:
+            self.level = level
+            self.tried.clear()
+
+    def take(self, place: Place) -> bool:
+        """Whether a place is yet to be examined."""
+        new = place not in self.tried
+        self.tried.add(place)
+        return new
 
 
 class Outcome(NamedTuple):

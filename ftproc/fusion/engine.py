@@ -32,7 +32,7 @@ from ftproc.fusion.events import CLOCK, Events, Seen, merge
 from ftproc.records import FloatArray
 
 FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 16, 5
-LEVEL_STEPS, PROFILE_STEPS = 4, 3
+LEVEL_STEPS, PROFILE_STEPS, LAST_STEPS = 4, 3, 8
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after the first rounds
 STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that may still change
 NOISE_STEP = 4.0  # times its variance that the noise of a component moves in a round
@@ -84,7 +84,7 @@ def fuse(
     prior = np.stack([station.prior for station in stations])
     current = _begin(stations, screened, trusted, track, sigma, Constants.unknown(prior), jerk_psd)
     say = progress or (lambda text: None)
-    looks, search = 0, set[alternatives.Place]()
+    looks, search = 0, alternatives.Search()
     for number in range(MOST_ROUNDS):
         say(f"round {number + 1}")
         level = number if number < FIRST_ROUNDS else None
@@ -178,7 +178,7 @@ def _round(current: Fused, trusted: list[FloatArray], gate: float, jerk_psd: flo
 
 
 def _reassessed(
-    current: Fused, trusted: list[FloatArray], gate: float, search: set[alternatives.Place]
+    current: Fused, trusted: list[FloatArray], gate: float, search: alternatives.Search
 ) -> tuple[Fused, bool]:
     """The decisions replaced by likelier ones where another hypothesis explains a place better; whether any was."""
     events, log = current.events, current.log
@@ -187,10 +187,10 @@ def _reassessed(
     memory_s = scales_of(log, current.model.noise_variance).memory_s(float(np.median(current.model.jerk[:, 0])))
     margin = alternatives.margin_s(events.time_s, memory_s)
     changed = False
+    search.begin(float(np.median(current.model.jerk[:, 0])))
     for place in alternatives.places(log, possible):
-        if place in search:
+        if not search.take(place):
             continue
-        search.add(place)
         ends = np.searchsorted(events.time_s, [place.first_s - margin, place.last_s + margin])
         here = slice(max(int(ends[0]), current.start.sample), int(ends[1]))
         inside = (events.time_s[here] >= place.first_s - alternatives.EDGE_S) & (
@@ -254,10 +254,15 @@ def _tuned(current: Fused, jerk_psd: float | None, first: int | None) -> Fused:
 
 def _profile(log: Observations, starts: list[Start], model: Model) -> Model:
     """The likeliest profile, from the model's, whose length follows the span of the events: the clocks move it."""
-    if math.isfinite(model.knot_s):
-        knots = max(math.ceil(scales_of(log, model.noise_variance).span_s / model.knot_s), 1)
-        model = model._replace(jerk=model.jerk[np.minimum(np.arange(knots), len(model.jerk) - 1)])
-    return fit_profile(log, starts, model, PROFILE_STEPS)
+    return fit_profile(log, starts, _of_length(log, model), PROFILE_STEPS)
+
+
+def _of_length(log: Observations, model: Model) -> Model:
+    """The model with as many pieces as its profile needs over the events."""
+    if not math.isfinite(model.knot_s):
+        return model
+    knots = max(math.ceil(scales_of(log, model.noise_variance).span_s / model.knot_s), 1)
+    return model._replace(jerk=model.jerk[np.minimum(np.arange(knots), len(model.jerk) - 1)])
 
 
 def _level(log: Observations, starts: list[Start], model: Model) -> Model:
@@ -306,7 +311,9 @@ def _interpolated(time_s: FloatArray, state: FloatArray, wanted: FloatArray) -> 
 def _last(current: Fused) -> Fused:
     """The run to publish: with a little more process noise than is likeliest."""
     if math.isfinite(current.model.knot_s):
-        current = current._replace(model=with_allowance(current.log, current.model))
+        log = current.log
+        polished = fit_profile(log, [current.start], _of_length(log, current.model), LAST_STEPS)
+        current = current._replace(model=with_allowance(log, polished))
     return _smoothed(_smoothed(current))
 
 
