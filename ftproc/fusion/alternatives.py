@@ -38,6 +38,7 @@ EDGE_S = 0.3  # by which a hypothesis reaches beyond the place
 ROUNDS, FINALISTS = 3, 4  # of decisions, and hypotheses that get them
 BETTER = 6.0  # in log-probability, that another decision must be
 RATES = np.array([0.03, 0.001, 0.93])  # isolated outlier; patch begins; goes on
+SOLID = 0.9  # share of a component that is rejected in a place, to be one patch
 LOST = 0.35  # share of a component that is rejected in a place, to be called lost
 FEWEST = 12  # readings that a hypothesis leaves at least
 FREE = (50.0, 20.0, 20.0)  # m, m/s, m/s2: 1-sigma of the state where a neighbourhood begins
@@ -87,6 +88,11 @@ class Search:
         if not self.level / OTHER_LEVEL < level < self.level * OTHER_LEVEL:
             self.level = level
             self.tried.clear()
+
+    def again(self) -> bool:
+        """Examine all places once more."""
+        self.tried.clear()
+        return True
 
     def take(self, place: Place) -> bool:
         """Whether a place is yet to be examined."""
@@ -167,7 +173,7 @@ def calm_levels(model: Model, here: slice, time_s: FloatArray) -> tuple[Model, .
 def likeliest(near: Neighbourhood) -> FloatArray | None:
     """Weights (n, 3) of the likeliest hypothesis; None if that is the one of now."""
     calm = near.levels[0]
-    if not _tense(near, calm):
+    if _is_plain(near) and not _tense(near, calm):
         return None
     now = max((_settled(near, near.log.weight, model) for model in near.levels), key=lambda each: each.likelihood)
     tries = []
@@ -178,6 +184,15 @@ def likeliest(near: Neighbourhood) -> FloatArray | None:
     ends = [_settled(near, weight, model) for _, weight in tries[:FINALISTS] for model in near.levels]
     best = max(ends, key=lambda each: each.likelihood, default=now)
     return best.weight if best.likelihood > now.likelihood + BETTER else None
+
+
+def _is_plain(near: Neighbourhood) -> bool:
+    """Whether the place is one solid patch of a single component."""
+    rejected = (near.log.weight <= 0) & (near.possible > 0) & near.inside[:, None]
+    runs = [
+        (s, c) for s in range(len(near.sigma)) for c in range(3) if rejected[near.station == s, c].sum() >= SHORTEST
+    ]
+    return len(runs) <= 1 and all(_share_lost(near, each) > SOLID for each in runs)
 
 
 def _tense(near: Neighbourhood, calm: Model) -> bool:

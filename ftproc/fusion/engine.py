@@ -31,7 +31,7 @@ from ftproc.fusion.constants import Constants
 from ftproc.fusion.events import CLOCK, Events, Seen, merge
 from ftproc.records import FloatArray
 
-FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 16, 5
+FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 18, 8
 LEVEL_STEPS, PROFILE_STEPS, LAST_STEPS = 4, 3, 8
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after the first rounds
 STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that may still change
@@ -84,7 +84,7 @@ def fuse(
     prior = np.stack([station.prior for station in stations])
     current = _begin(stations, screened, trusted, track, sigma, Constants.unknown(prior), jerk_psd)
     say = progress or (lambda text: None)
-    looks, search = 0, alternatives.Search()
+    looks, search, again = 0, alternatives.Search(), False
     for number in range(MOST_ROUNDS):
         say(f"round {number + 1}")
         level = number if number < FIRST_ROUNDS else None
@@ -93,7 +93,9 @@ def fuse(
             looks += 1
             current, changed = _reassessed(current, trusted, gate, search)
             if not changed and current.settled:
-                break
+                if again:
+                    break
+                again = search.again()  # all places once more, with all that is known at the end
     return _last(current)
 
 
