@@ -18,17 +18,16 @@ from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.biases import Biased, Directions, smooth_biased
 from ftproc.core.filtering.forward import filter_log
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
-from ftproc.core.filtering.smoother import score_log, smooth_log
+from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import optimizer
 from ftproc.core.identification.likelihood import VERTICAL_PRECISION, jerk_bounds, shaped
 from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
 from ftproc.core.identification.scales import scales_of
-from ftproc.core.model import stations as geometry
 from ftproc.core.model.motion import isotropic
 from ftproc.fusion import alternatives, first_track, screening
 from ftproc.fusion import constants as posterior
 from ftproc.fusion.constants import Constants
-from ftproc.fusion.events import CLOCK, Events, Seen, merge
+from ftproc.fusion.events import Events, Seen, merge
 from ftproc.records import FloatArray
 
 FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 18, 8
@@ -38,8 +37,6 @@ STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that 
 NOISE_STEP = 4.0  # times its variance that the noise of a component moves in a round
 START_SIGMA = (30.0, 10.0, 20.0)  # m, m/s, m/s2: at least, of the state at the start
 START_INFLATION = 25.0  # on its variance
-FIRST_MEMORIES = (3.0, 8.0, 20.0, 50.0, 120.0)  # intervals of the densest station: of the filter that begins the search
-NEAR, NEAR_SHARE = 8.0, 0.9  # 1-sigmas of the first track, within which such a share of the smoothed one lies
 SHARES = (1.0, 0.25, 0.06, 0.0)  # of what is unknown of the readings, which is taken for noise at first: ever less
 FEWEST_KEPT = 0.5  # of what screening trusts, in each component of a station
 
@@ -113,9 +110,9 @@ def _begin(
     covariance = np.diag(np.repeat([spread, 100.0, 50.0], 3) ** 2)
     start = Start(first, state[first], covariance)
     log = events.weighted(weight)
-    wide = _with_biases(events, stations, state, sigma)
-    near = Near(state[:, :3], float(np.median(track.sigma)), _interval(stations))
-    model = Model(wide**2, isotropic(jerk_psd or _first_jerk(log, wide**2, start, near)))
+    wide = screening.with_biases(events, stations, state, sigma)
+    near = screening.Near(state[:, :3], float(np.median(track.sigma)), screening.interval(stations))
+    model = Model(wide**2, isotropic(jerk_psd or screening.first_jerk(log, wide**2, start, near)))
     found = smooth_biased(log, model, start, _directions(events, state, constants))
     rates = np.tile(np.array(outlier_chain.START_RATES), (len(stations), 3, 1))
     possible = [each.possible for each in screened]
@@ -126,50 +123,8 @@ def _begin(
     return begun
 
 
-def _with_biases(events: Events, stations: list[Seen], state: FloatArray, sigma: FloatArray) -> FloatArray:
-    """(m, 3) how far readings may be off, with the biases and clocks that are yet unknown."""
-    rate = np.abs(_design(events, state)[:, :, 2])
-    wide = sigma.copy()
-    for s, station in enumerate(stations):
-        clock = station.prior[CLOCK] * np.median(rate[events.station == s], 0)
-        wide[s] = np.sqrt(sigma[s] ** 2 + station.prior[:3] ** 2 + clock**2)
-    return wide
-
-
-def _first_jerk(log: Observations, noise_variance: FloatArray, start: Start, near: Near) -> float:
-    """The likeliest of a few jerk densities, m^2/s^5, among those with which the smoother stays near the first track: a
-    filter that has lost it finds all readings vague, and so likely."""
-    scales = scales_of(log, noise_variance)
-    found: list[tuple[float, float]] = []
-    for memory in FIRST_MEMORIES:
-        jerk_psd = scales.jerk_psd(memory * near.interval_s)
-        run = smooth_log(log, Model(noise_variance, isotropic(jerk_psd)), [start])
-        away = np.linalg.norm(run.state[start.sample :, :3] - near.position[start.sample :], axis=1)
-        if found and not np.quantile(away, NEAR_SHARE) < NEAR * near.sigma_m:
-            break
-        found.append((run.log_likelihood, jerk_psd))
-    return max(found)[1]
-
-
-class Near(NamedTuple):
-    """The first track at the events (n, 3), m, its typical 1-sigma, and the interval of the densest station."""
-
-    position: FloatArray
-    sigma_m: float
-    interval_s: float
-
-
-def _interval(stations: list[Seen]) -> float:
-    return min(float(np.median(np.diff(s.time_s))) for s in stations if len(s.time_s) > 1)
-
-
 def _directions(events: Events, state: FloatArray, constants: Constants) -> Directions:
-    return Directions(_design(events, state), constants.columns())
-
-
-def _design(events: Events, state: FloatArray) -> FloatArray:
-    sites = events.sites
-    return geometry.design(state, sites.place[sites.station], sites.axes[sites.station])
+    return Directions(screening.design(events, state), constants.columns())
 
 
 def _round(current: Fused, trusted: list[FloatArray], gate: float, jerk_psd: float | None, first: int | None) -> Fused:

@@ -76,7 +76,7 @@ def test_no_range_file(run, folder):
 
 
 def shifted(folder, name, seconds):
-    log = pd.read_csv(folder / f"{name}.csv", float_precision="round_trip")
+    log = pd.read_csv(folder / f"{name}.csv")
     log["time_s"] += seconds
     log.to_csv(folder / f"{name}.csv", index=False)
 
@@ -119,5 +119,5 @@ def test_options_that_mean_nothing(run, folder):
         assert f"{option[0]} does nothing with --fuse" in result.err
     assert "no place on the command line" in run("filter", "--fuse", "range.toml", "radar.csv").err
     assert "does nothing without --fuse" in run("filter", "radar.csv", "--write-calibration", "x").err
-    assert run("filter", "--fuse", "range.toml", "-o", "radar.csv").code == 2
+    assert "never overwritten" in run("filter", "--fuse", "range.toml", "-o", "radar.csv").err
     assert (folder / "radar.csv").read_text().startswith("time_s")
