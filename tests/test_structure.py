@@ -31,6 +31,8 @@ FLOORS = (
     ("correction.training",),
     ("pipeline",),
     ("config", "report"),
+    ("fusion",),
+    ("report.fused",),
     ("batch",),
     ("api",),
     ("cli",),
