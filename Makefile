@@ -9,6 +9,7 @@ MODEL_FLAGS = --scenario family --flights 60 --seed 2021
 FUZZ = csv gzip parquet feather truth trajectory station model header kernel
 FUZZ_SECONDS = 600
 OLDEST = tests/files tests/config tests/correction tests/test_pipeline.py tests/docs/test_readme.py
+KERNELS ?= tests/core
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -105,9 +106,9 @@ test: $(developer) ## lint, types and the whole test suite
 	$(bin)/mypy
 	FTPROC_KERNELS=compiled $(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal
 
-kernels: $(developer) ## the tests of the kernels as numba compiles them now, and as plain Python
-	FTPROC_KERNELS=jit $(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal tests/core
-	FTPROC_KERNELS=python $(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal tests/core
+kernels: $(developer) ## the tests KERNELS of the kernels as numba compiles them now, and as plain Python
+	FTPROC_KERNELS=jit $(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal $(KERNELS)
+	FTPROC_KERNELS=python $(bin)/python -m pytest -q -n logical --maxprocesses 8 --dist worksteal $(KERNELS)
 
 samples: $(installed) ## make sample_data/ anew (fixed seeds: the same bytes)
 	@mkdir -p sample_data/calibration

@@ -158,6 +158,8 @@ def test_every_filter_option_can_be_kept_in_a_file():
         "explain",
         "where",
         "target",
+        "fuse",
+        "write_calibration",
     }
     options = {p.name for p in command.params if isinstance(p, click.Option)} - about_the_run
     assert options <= {key.option for _, _, key in every()}

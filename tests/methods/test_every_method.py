@@ -104,7 +104,7 @@ def test_cut_costs_nothing(name, path):
     away = turned(position, np.pi / 2)
     here, there = (run(measured(where, times), name) for where in (position, away))
     by_chance = registry.METHODS[name].random
-    assert rms(here, position) == pytest.approx(rms(there, away), rel=0.4 if by_chance else 1e-2)
+    assert rms(here, position) == pytest.approx(rms(there, away), rel=0.6 if by_chance else 1e-2)
     azimuth = here.measurement[:, 1]
     assert (np.abs(azimuth[np.isfinite(azimuth)]) <= np.pi).all()
     if not by_chance:

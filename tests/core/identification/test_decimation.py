@@ -19,7 +19,7 @@ def plain_means(time, z, count):
 
 def test_complete_groups_are_plain_means():
     a = matched(1, 120)
-    (time, z, number, _), starts = decimation.merge(a.log, a.starts, 4)
+    (time, z, number, *_), starts = decimation.merge(a.log, a.starts, 4)
     unwrapped = np.column_stack([a.z[:, 0], np.unwrap(a.z[:, 1]), a.z[:, 2]])
     expected_time, expected = plain_means(a.time, unwrapped, 4)
     np.testing.assert_allclose(time, expected_time, rtol=1e-12)
@@ -37,7 +37,7 @@ def test_mean_of_some_is_moved_to_the_time_of_all():
     weight = np.ones_like(z)
     weight[3, 0] = weight[11, 1] = weight[22, 2] = 0
     start = matched(1, 40).starts[0]
-    (t, merged, number, _), _ = decimation.merge(Observations(time, z, weight), [start], 4)
+    (t, merged, number, *_), _ = decimation.merge(Observations(time, z, weight), [start], 4)
     np.testing.assert_allclose(merged[:, 0], 1000 + 50 * t, atol=0.9)
     np.testing.assert_allclose(merged[1:-1, 0], 1000 + 50 * t[1:-1], atol=1e-9)
     np.testing.assert_allclose(np.sin(merged[:, 1] - 3.1 - 0.02 * t), 0, atol=4e-4)
@@ -49,7 +49,7 @@ def test_missing_group_stays_missing_and_a_gap_ends_one():
     weight, time = a.weight.copy(), a.time.copy()
     weight[8:12, 1] = 0
     time[30:] += 100.0
-    (t, z, number, _), _ = decimation.merge(Observations(time, a.z, weight), a.starts, 4)
+    (t, z, number, *_), _ = decimation.merge(Observations(time, a.z, weight), a.starts, 4)
     assert np.isnan(z[2, 1])
     assert number[2, 1] == 0
     assert not ((t > time[29] + 1) & (t < time[30])).any()
