@@ -147,7 +147,7 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
     record, decision = _decided(time_s, measurement, known, segment_of)
     found: list[Step] = []
     for _ in range(STEP_ROUNDS):
-        new = [] if decision.model.coloured else steps.find(record, decision)
+        new = steps.find(record, decision) if _told_from_noise(decision) else []
         if not new:
             break
         found, log = sorted([*found, *new], key=lambda s: s.sample), record.weighted(decision.weight)
@@ -166,6 +166,12 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
         smoothed = smooth_log(log, decision.model, decision.starts)
     faults = Faults(copied, tuple(found), tuple(leaning))
     return Edited(log, decision.model, decision.starts, smoothed, decision, faults)
+
+
+def _told_from_noise(decision: Decision) -> bool:
+    """Whether steps stand out of the noise: not where it is correlated, or time stamps that are late, or a variance that
+    drifts, look like many."""
+    return not (decision.model.coloured or decision.stamp_s > 0 or decision.drifts)
 
 
 def _decided(
