@@ -169,8 +169,8 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
 
 
 def _told_from_noise(decision: Decision) -> bool:
-    """Whether steps stand out of the noise: not where it is correlated, or time stamps that are late, or a variance that
-    drifts, look like many."""
+    """Whether steps stand out of the noise: not where it is correlated, or where late time stamps or a variance that
+    drifts look like many."""
     return not (decision.model.coloured or decision.stamp_s > 0 or decision.drifts)
 
 
