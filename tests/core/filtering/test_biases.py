@@ -17,6 +17,8 @@ from ftproc.core.model import stations
 from ftproc.core.model.frames import from_cartesian
 from ftproc.core.model.motion import isotropic
 
+pytestmark = pytest.mark.compiled
+
 PLACES = np.array([[0.0, 0.0, 0.0], [9000.0, 2000.0, 100.0], [3000.0, -8000.0, 50.0]])
 NOISE = np.array([3.0, 1e-4, 1e-4])
 SCALE = np.array([2.0, 1e-4, 1e-4, 1e-4, 1e-4, 2e-3])  # of a small bias of each kind

@@ -11,6 +11,8 @@ from ftproc.core.filtering.smoother import score_log
 from ftproc.core.model.frames import from_cartesian
 from tests.core.tracks import SIGMA, matched
 
+pytestmark = pytest.mark.compiled
+
 
 @pytest.mark.parametrize(("c", "k"), [(0, 30), (1, 12), (2, 55)])
 def test_score_and_information_are_slope_and_bend_of_the_likelihood(c, k):
