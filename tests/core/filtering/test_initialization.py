@@ -246,11 +246,16 @@ def test_filter_is_re_initialized_after_one_component_was_blind_too_long(compone
 
 
 @pytest.mark.compiled
-def test_flight_with_blind_turns_does_not_run_away():
-    """5 g turns seen once a second, with patches of half a minute, which are too long to coast through."""
-    flight = simulate("manoeuvre", seed=15, dt_s=1.0, duration_s=600.0, outliers="patch=3:10-30:10-50")
-    known = two_pass.Known(np.full(3, np.nan), None, 4.0)
-    edited = two_pass.edit(flight.log.time_s, flight.log.measurement, known)
-    error = np.linalg.norm(edited.smoothed.state[:, :3] - flight.truth.position_m, axis=1)
-    assert np.median(error) < 5
-    assert np.quantile(error, 0.9) < 500
+def test_flights_with_blind_turns_do_not_run_away():
+    """5 g turns seen once a second, with patches of half a minute, which are too long to coast through. What becomes of
+    one such flight may hang on the last digit of a reading; what becomes of most does not."""
+    middle, far = [], []
+    for seed in range(14, 21):
+        flight = simulate("manoeuvre", seed=seed, dt_s=1.0, duration_s=600.0, outliers="patch=3:10-30:10-50")
+        known = two_pass.Known(np.full(3, np.nan), None, 4.0)
+        edited = two_pass.edit(flight.log.time_s, flight.log.measurement, known)
+        error = np.linalg.norm(edited.smoothed.state[:, :3] - flight.truth.position_m, axis=1)
+        middle.append(np.median(error))
+        far.append(np.quantile(error, 0.9))
+    assert np.median(middle) < 5
+    assert np.median(far) < 500
