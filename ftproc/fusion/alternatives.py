@@ -43,6 +43,7 @@ LOST = 0.35  # share of a component that is rejected in a place, to be called lo
 FEWEST = 12  # readings that a hypothesis leaves at least
 FREE = (50.0, 20.0, 20.0)  # m, m/s, m/s2: 1-sigma of the state where a neighbourhood begins
 OTHER_LEVEL = 2.0  # times the jerk level at which a place was examined, before it is examined again
+WORK, WORK_PER_SAMPLE = 250_000, 250  # samples that one search may smooth, and for each of the events
 CALMER = 4.0  # times the calm level: the jerk may be so much more in a place
 
 Channel = tuple[int, int]  # station, component
@@ -77,10 +78,14 @@ class Place(NamedTuple):
 
 
 class Search:
-    """The places that were examined; they are examined again once the calm level of the jerk is another."""
+    """The places that were examined; they are examined again once the calm level of the jerk is another. unexamined:
+    those that no work was left for; work is counted in samples that are smoothed, so that a result does not depend on
+    the machine."""
 
-    def __init__(self) -> None:
+    def __init__(self, samples: int) -> None:
         self.tried: set[Place] = set()
+        self.unexamined: set[Place] = set()
+        self.work = WORK + WORK_PER_SAMPLE * samples
         self.level = math.inf
 
     def begin(self, level: float) -> None:
@@ -89,16 +94,15 @@ class Search:
             self.level = level
             self.tried.clear()
 
-    def again(self) -> bool:
-        """Examine all places once more."""
-        self.tried.clear()
-        return True
-
     def take(self, place: Place) -> bool:
-        """Whether a place is yet to be examined."""
-        new = place not in self.tried
+        """Whether a place is yet to be examined, and work is left for it."""
+        if place in self.tried:
+            return False
+        if self.work <= 0:
+            self.unexamined.add(place)
+            return False
         self.tried.add(place)
-        return new
+        return True
 
 
 class Outcome(NamedTuple):
@@ -170,10 +174,11 @@ def calm_levels(model: Model, here: slice, time_s: FloatArray) -> tuple[Model, .
     return tuple(model._replace(jerk=level[None, :].copy(), knot_s=math.inf) for level in found)
 
 
-def likeliest(near: Neighbourhood) -> FloatArray | None:
-    """Weights (n, 3) of the likeliest hypothesis; None if that is the one of now."""
+def likeliest(near: Neighbourhood, search: Search) -> FloatArray | None:
+    """Weights (n, 3) of the likeliest hypothesis; None if that is the one of now. Takes its work from the search."""
     calm = near.levels[0]
     tense = _tense(near, calm)
+    search.work -= len(near.inside)
     if not tense and _is_plain(near):
         return None
     now = max((_settled(near, near.log.weight, model) for model in near.levels), key=lambda each: each.likelihood)
@@ -181,6 +186,8 @@ def likeliest(near: Neighbourhood) -> FloatArray | None:
     for weight in _hypotheses(near) if tense else itertools.islice(_hypotheses(near), 1):
         if (weight.sum() >= FEWEST) and math.isfinite(found := _step(near, weight, calm)[0].likelihood):
             tries.append((found, weight))
+    most = len(tries) + (1 + min(len(tries), FINALISTS)) * len(near.levels) * (1 + ROUNDS)
+    search.work -= most * len(near.inside)
     tries.sort(key=lambda each: -each[0])
     ends = [_settled(near, weight, model) for _, weight in tries[:FINALISTS] for model in near.levels]
     best = max(ends, key=lambda each: each.likelihood, default=now)
