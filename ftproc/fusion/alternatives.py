@@ -38,7 +38,6 @@ EDGE_S = 0.3  # by which a hypothesis reaches beyond the place
 ROUNDS, FINALISTS = 3, 4  # of decisions, and hypotheses that get them
 BETTER = 6.0  # in log-probability, that another decision must be
 RATES = np.array([0.03, 0.001, 0.93])  # isolated outlier; patch begins; goes on
-SOLID = 0.9  # share of a component that is rejected in a place, to be one patch
 LOST = 0.35  # share of a component that is rejected in a place, to be called lost
 FEWEST = 12  # readings that a hypothesis leaves at least
 FREE = (50.0, 20.0, 20.0)  # m, m/s, m/s2: 1-sigma of the state where a neighbourhood begins
@@ -177,13 +176,12 @@ def calm_levels(model: Model, here: slice, time_s: FloatArray) -> tuple[Model, .
 def likeliest(near: Neighbourhood, search: Search) -> FloatArray | None:
     """Weights (n, 3) of the likeliest hypothesis; None if that is the one of now. Takes its work from the search."""
     calm = near.levels[0]
-    tense = _tense(near, calm)
     search.work -= len(near.inside)
-    if not tense and _is_plain(near):
+    if not _tense(near, calm):
         return None
     now = max((_settled(near, near.log.weight, model) for model in near.levels), key=lambda each: each.likelihood)
     tries = []
-    for weight in _hypotheses(near) if tense else itertools.islice(_hypotheses(near), 1):
+    for weight in _hypotheses(near):
         if (weight.sum() >= FEWEST) and math.isfinite(found := _step(near, weight, calm)[0].likelihood):
             tries.append((found, weight))
     most = len(tries) + (1 + min(len(tries), FINALISTS)) * len(near.levels) * (1 + ROUNDS)
@@ -192,15 +190,6 @@ def likeliest(near: Neighbourhood, search: Search) -> FloatArray | None:
     ends = [_settled(near, weight, model) for _, weight in tries[:FINALISTS] for model in near.levels]
     best = max(ends, key=lambda each: each.likelihood, default=now)
     return best.weight if best.likelihood > now.likelihood + BETTER else None
-
-
-def _is_plain(near: Neighbourhood) -> bool:
-    """Whether the place is one solid patch of a single component."""
-    rejected = (near.log.weight <= 0) & (near.possible > 0) & near.inside[:, None]
-    runs = [
-        (s, c) for s in range(len(near.sigma)) for c in range(3) if rejected[near.station == s, c].sum() >= SHORTEST
-    ]
-    return len(runs) <= 1 and all(_share_lost(near, each) > SOLID for each in runs)
 
 
 def _tense(near: Neighbourhood, calm: Model) -> bool:
