@@ -38,11 +38,11 @@ EDGE_S = 0.3  # by which a hypothesis reaches beyond the place
 ROUNDS, FINALISTS = 3, 4  # of decisions, and hypotheses that get them
 BETTER = 6.0  # in log-probability, that another decision must be
 RATES = np.array([0.03, 0.001, 0.93])  # isolated outlier; patch begins; goes on
-SOLID = 0.9  # share of a component that is rejected in a place, to be one patch
 LOST = 0.35  # share of a component that is rejected in a place, to be called lost
 FEWEST = 12  # readings that a hypothesis leaves at least
 FREE = (50.0, 20.0, 20.0)  # m, m/s, m/s2: 1-sigma of the state where a neighbourhood begins
 OTHER_LEVEL = 2.0  # times the jerk level at which a place was examined, before it is examined again
+WORK, WORK_PER_SAMPLE = 250_000, 250  # samples that one search may smooth, and for each of the events
 CALMER = 4.0  # times the calm level: the jerk may be so much more in a place
 
 Channel = tuple[int, int]  # station, component
@@ -77,10 +77,14 @@ class Place(NamedTuple):
 
 
 class Search:
-    """The places that were examined; they are examined again once the calm level of the jerk is another."""
+    """The places that were examined; they are examined again once the calm level of the jerk is another. unexamined:
+    those that no work was left for; work is counted in samples that are smoothed, so that a result does not depend on
+    the machine."""
 
-    def __init__(self) -> None:
+    def __init__(self, samples: int) -> None:
         self.tried: set[Place] = set()
+        self.unexamined: set[Place] = set()
+        self.work = WORK + WORK_PER_SAMPLE * samples
         self.level = math.inf
 
     def begin(self, level: float) -> None:
@@ -89,16 +93,15 @@ class Search:
             self.level = level
             self.tried.clear()
 
-    def again(self) -> bool:
-        """Examine all places once more."""
-        self.tried.clear()
-        return True
-
     def take(self, place: Place) -> bool:
-        """Whether a place is yet to be examined."""
-        new = place not in self.tried
+        """Whether a place is yet to be examined, and work is left for it."""
+        if place in self.tried:
+            return False
+        if self.work <= 0:
+            self.unexamined.add(place)
+            return False
         self.tried.add(place)
-        return new
+        return True
 
 
 class Outcome(NamedTuple):
@@ -170,30 +173,23 @@ def calm_levels(model: Model, here: slice, time_s: FloatArray) -> tuple[Model, .
     return tuple(model._replace(jerk=level[None, :].copy(), knot_s=math.inf) for level in found)
 
 
-def likeliest(near: Neighbourhood) -> FloatArray | None:
-    """Weights (n, 3) of the likeliest hypothesis; None if that is the one of now."""
+def likeliest(near: Neighbourhood, search: Search) -> FloatArray | None:
+    """Weights (n, 3) of the likeliest hypothesis; None if that is the one of now. Takes its work from the search."""
     calm = near.levels[0]
-    tense = _tense(near, calm)
-    if not tense and _is_plain(near):
+    search.work -= len(near.inside)
+    if not _tense(near, calm):
         return None
     now = max((_settled(near, near.log.weight, model) for model in near.levels), key=lambda each: each.likelihood)
     tries = []
-    for weight in _hypotheses(near) if tense else itertools.islice(_hypotheses(near), 1):
+    for weight in _hypotheses(near):
         if (weight.sum() >= FEWEST) and math.isfinite(found := _step(near, weight, calm)[0].likelihood):
             tries.append((found, weight))
+    most = len(tries) + (1 + min(len(tries), FINALISTS)) * len(near.levels) * (1 + ROUNDS)
+    search.work -= most * len(near.inside)
     tries.sort(key=lambda each: -each[0])
     ends = [_settled(near, weight, model) for _, weight in tries[:FINALISTS] for model in near.levels]
     best = max(ends, key=lambda each: each.likelihood, default=now)
     return best.weight if best.likelihood > now.likelihood + BETTER else None
-
-
-def _is_plain(near: Neighbourhood) -> bool:
-    """Whether the place is one solid patch of a single component."""
-    rejected = (near.log.weight <= 0) & (near.possible > 0) & near.inside[:, None]
-    runs = [
-        (s, c) for s in range(len(near.sigma)) for c in range(3) if rejected[near.station == s, c].sum() >= SHORTEST
-    ]
-    return len(runs) <= 1 and all(_share_lost(near, each) > SOLID for each in runs)
 
 
 def _tense(near: Neighbourhood, calm: Model) -> bool:

@@ -43,7 +43,8 @@ FEWEST_KEPT = 0.5  # of what screening trusts, in each component of a station
 
 class Fused(NamedTuple):
     """events, weight (rows, 3) of each station; sigma (m, 3) noise; constants; model; start; found: the smoother's run
-    that the rest belongs to; rounds, settled: of the decisions."""
+    that the rest belongs to; rounds, settled: of the decisions; unexamined: places where
+    no work was left to look for other hypotheses."""
 
     stations: list[Seen]
     events: Events
@@ -57,6 +58,7 @@ class Fused(NamedTuple):
     rates: FloatArray
     rounds: int = 0
     settled: bool = False
+    unexamined: int = 0
 
     @property
     def log(self) -> Observations:
@@ -81,7 +83,7 @@ def fuse(
     prior = np.stack([station.prior for station in stations])
     current = _begin(stations, screened, trusted, track, sigma, Constants.unknown(prior), jerk_psd)
     say = progress or (lambda text: None)
-    looks, search, again = 0, alternatives.Search(), False
+    looks, search = 0, alternatives.Search(sum(len(s.time_s) for s in stations))
     for number in range(MOST_ROUNDS):
         say(f"round {number + 1}")
         level = number if number < FIRST_ROUNDS else None
@@ -90,10 +92,8 @@ def fuse(
             looks += 1
             current, changed = _reassessed(current, trusted, gate, search)
             if not changed and current.settled:
-                if again:
-                    break
-                again = search.again()  # all places once more, with all that is known at the end
-    return _last(current)
+                break
+    return _last(current)._replace(unexamined=len(search.unexamined - search.tried))
 
 
 def _begin(
@@ -160,7 +160,7 @@ def _reassessed(
             log.part(here)._replace(weight=weight[here]), possible[here], believed[here], current.sigma, inside, start,
             alternatives.calm_levels(current.model, here, events.time_s), gate,
         )  # fmt: skip
-        found = alternatives.likeliest(near)
+        found = alternatives.likeliest(near, search)
         if found is not None:
             weight[here][inside] = found[inside]
             changed = True

@@ -196,5 +196,8 @@ def _poorly(fused: Fused, sigma_m: FloatArray, zero_s: float) -> Iterator[Remark
 
 
 def _unsettled(fused: Fused) -> Iterator[Remark]:
+    if fused.unexamined:
+        text = f"the search for likelier decisions was cut short: places not examined: {fused.unexamined}"
+        yield Remark(SUSPECT, text)
     if not fused.settled:
         yield Remark(SUSPECT, "the decisions on outliers and the biases did not settle: inspect the flagged readings")

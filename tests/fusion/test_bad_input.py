@@ -60,13 +60,13 @@ def test_range_files(run, folder, case):
     assert not (folder / "best.parquet").exists()
 
 
-def test_the_wrong_hemisphere(run, folder):
+@pytest.mark.parametrize(("key", "word"), [("lat_deg", "latitude"), ("lon_deg", "longitude")])
+def test_the_wrong_hemisphere(run, folder, key, word):
     text = (folder / "range.toml").read_text()
-    place = text.index("lat_deg", text.index("[station.radar]"))
-    line = text[place : text.index("\n", place)]
-    value = float(line.partition("=")[2])
-    (folder / "range.toml").write_text(text[:place] + f"lat_deg = {-value}" + text[place + len(line) :])
-    refused(run, 2, "[station.radar]", "km from the origin", "other sign of its latitude")
+    text = re.sub("lat_deg = .*", "lat_deg = 40.0", re.sub("lon_deg = .*", "lon_deg = 20.0", text))
+    place = text.index(key, text.index("[station.radar]"))
+    (folder / "range.toml").write_text(text[:place] + re.sub("= ", "= -", text[place:], count=1))
+    refused(run, 2, "[station.radar]", "km from the origin", f"other sign of its {word}")
 
 
 def test_no_range_file(run, folder):
