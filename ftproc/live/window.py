@@ -1,0 +1,202 @@
+"""The sliding window of the live editor, and what it carries along: decisions, noise, jerk profile and an anchor.
+
+The buffer holds the readings that a new look at the whole situation needs (two-pass editing of all of it, now and
+then). Its newest part, from `near` on, is where decisions are still open: a refresh smooths that part alone, from the
+anchor (the filter's prediction at its first sample, which stands for everything before), decides again, lets the jerk
+profile follow and brings the filter to the newest sample.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing import outlier_chain, two_pass
+from ftproc.core.editing.predictive_chain import OPEN, chains_of, run_predictive, run_predictive_coloured
+from ftproc.core.filtering.forward import Span
+from ftproc.core.filtering.records import Model, Observations, Start, Uneven, between, empty_rows
+from ftproc.core.filtering.smoother import SmootherRun, smooth_log
+from ftproc.core.identification.profile import fit_profile, with_allowance
+from ftproc.core.model.motion import Profile
+
+FloatArray = NDArray[np.float64]
+
+ROUNDS = 3  # of smoothing and deciding in a refresh
+JERK_STEPS = 2  # of the search for the jerk profile in a refresh
+
+
+class Sizes(NamedTuple):
+    """Samples of the buffer, and of its newest part, where decisions are open."""
+
+    buffer: int
+    near: int
+
+
+class Window:
+    """A track and the readings it rests on."""
+
+    def __init__(self, time_s: FloatArray, measurement: FloatArray, known: two_pass.Known, sizes: Sizes) -> None:
+        self.known, self.sizes = known, sizes
+        self.time_s, self.measurement = time_s, measurement
+        self.rows = empty_rows(len(time_s))
+        self.near = 0
+        self.noise: FloatArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    # -- a new look at all of the buffer ------------------------------------------------------------------------------
+
+    def edit(self) -> None:
+        """Decide on all of the buffer anew. Raises ValueError when a component has no reading that agrees."""
+        edited = two_pass.edit(self.time_s, self.measurement, self.known)
+        self.adopt(edited)
+
+    def adopt(self, edited: two_pass.Edited) -> None:
+        """Go on from decisions, noise and jerk of two-pass editing."""
+        self.weight, self.rates = edited.weight.copy(), edited.decision.rates
+        self.noise = edited.model.noise_variance
+        self.uneven = edited.log.uneven or Uneven.none(len(self))
+        self.possible = np.isfinite(self.measurement) & ~two_pass.stuck_readings(self.measurement, np.sqrt(self.noise))
+        self.possible[:, 0] &= self.measurement[:, 0] > 0
+        self.near = max(len(self) - self.sizes.near, 0)
+        starts = edited.starts
+        model = edited.model
+        self.anchor = self._ahead(starts, model, self.near)
+        self.near = max(self.near, starts[0].sample)
+        first = self._knot(self.time_s[self.near], self.time_s[0], model.knot_s)
+        self.model = self.allowed = model._replace(jerk=model.jerk[min(first, len(model.jerk) - 1) :])
+        self.refresh()
+
+    def _knot(self, time_s: float, first_s: float, knot_s: float) -> int:
+        return int((time_s - first_s) / knot_s) if math.isfinite(knot_s) else 0
+
+    def _ahead(self, starts: list[Start], model: Model, sample: int) -> Start:
+        """The prediction at a sample, from starts before it."""
+        before = [start for start in starts if start.sample <= sample]
+        if not before:
+            return starts[0]._replace(sample=0)
+        (start, _) = list(between(before, sample))[-1]
+        span = slice(0, sample + 1)
+        log = self.observed(span)
+        log.weight[sample] = 0.0
+        filters = model.filter(start)
+        self._filter(log, Span(start.sample, sample + 1, start.sample), model, filters)
+        return Start(0, filters["x"][0, :9].copy(), filters["p"][0, :9, :9].copy())
+
+    def _filter(self, log: Observations, span: Span, model: Model, filters: Any, chains: Any = None, first_s: float | None = None) -> Any:
+        """Rows of a span of a log, filtered from a state, which is changed."""
+        rows = empty_rows(len(log.time_s))
+        chains = chains_of(self.rates, model.reading_variance, self.known.gate) if chains is None else chains
+        profile = model.profile(log.time_s) if first_s is None else Profile(model.jerk, model.knot_s, first_s)
+        run = run_predictive_coloured if model.coloured else run_predictive
+        run(span, log.samples(model.noise_variance), profile, filters, chains, rows)
+        return rows
+
+    def observed(self, span: slice) -> Observations:
+        """Some samples with their decisions (copies)."""
+        return Observations(self.time_s[span], self.measurement[span], self.weight[span].copy(), self.uneven.part(span))
+
+    def used_lately(self, count: int) -> FloatArray:
+        """(3,) share of each component's last `count` readings that is used."""
+        found = np.ones(3)
+        for c in range(3):
+            seen = np.flatnonzero(np.isfinite(self.measurement[:, c]))[-count:]
+            found[c] = (self.weight[seen, c] > 0).mean() if len(seen) else 0.0
+        return found
+
+    # -- sample by sample -----------------------------------------------------------------------------------------------
+
+    def append(self, time_s: FloatArray, measurement: FloatArray) -> None:
+        """Filter the next readings, each decided on when it comes."""
+        n, m = len(self), len(time_s)
+        self.time_s = np.concatenate([self.time_s, time_s])
+        self.measurement = np.concatenate([self.measurement, measurement])
+        possible = np.isfinite(measurement)
+        possible[:, 0] &= measurement[:, 0] > 0
+        self.possible = np.concatenate([self.possible, possible])
+        self.weight = np.concatenate([self.weight, np.where(possible, OPEN, 0.0)])
+        late, times = self.uneven.late, self.uneven.times
+        self.uneven = Uneven(np.concatenate([times, np.repeat(np.median(times[-50:], 0)[None], m, 0)]), np.concatenate([late, np.repeat(late[-1:], m, 0)]))
+        log = self.observed(slice(n - 1, n + m))
+        rows = self._filter(log, Span(1, m + 1, 0), self.allowed, self.filters, self.chains, float(self.time_s[self.near]))
+        self.weight[n:] = rows["weight"][1:]
+        self.rows = np.concatenate([self.rows, rows[1:]])
+
+    # -- refresh --------------------------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Decide again on the newest part, let the jerk profile follow, and filter that part anew."""
+        self._slide()
+        near = slice(self.near, len(self))
+        self._extend_profile()
+        starts = [self.anchor]
+        for _ in range(ROUNDS):
+            log = self.observed(near)
+            smoothed = smooth_log(log, self._allowed(log), starts, residuals_only=True)
+            good = outlier_chain.classify(
+                smoothed.residual, smoothed.residual_variance, self.model.reading_variance, self.rates.copy(), self.known.gate
+            )
+            decided = ((good > 0.5) & self.possible[near]).astype(float)
+            same = (decided == log.weight).all()
+            self.weight[near] = decided
+            if same:
+                break
+        log = self.observed(near)
+        if self.known.jerk_psd is None:
+            self.model = fit_profile(log, starts, self.model, JERK_STEPS)
+        self.allowed = self._allowed(log)
+        self.filters = self.allowed.filter(self.anchor)
+        self.chains = chains_of(self.rates, self.model.reading_variance, self.known.gate)
+        self.rows[near] = self._filter(log, Span(0, len(log.time_s), 0), self.allowed, self.filters, self.chains)
+
+    def _allowed(self, log: Observations) -> Model:
+        return self.model if self.known.jerk_psd is not None else with_allowance(log, self.model)
+
+    def smoothed(self) -> SmootherRun:
+        """The newest part, smoothed with the decisions as they are."""
+        return smooth_log(self.observed(slice(self.near, len(self))), self.allowed, [self.anchor])
+
+    def _extend_profile(self) -> None:
+        """As many pieces as the newest part has; the last one goes on."""
+        span_s = float(self.time_s[-1] - self.time_s[self.near])
+        pieces = max(math.ceil(span_s / self.model.knot_s), 1)
+        held = np.minimum(np.arange(pieces), len(self.model.jerk) - 1)
+        self.model = self.model._replace(jerk=self.model.jerk[held])
+
+    def _slide(self) -> None:
+        """Move the newest part on by whole pieces of the profile, and forget what the buffer has too much of."""
+        beyond = len(self) - self.near - self.sizes.near
+        if beyond < self.sizes.near // 4:
+            return
+        knot_s, first_s = self.model.knot_s, float(self.time_s[self.near])
+        target = self.near + beyond
+        if math.isfinite(knot_s):
+            knot = self._knot(float(self.time_s[target]), first_s, knot_s)
+            target = int(np.searchsorted(self.time_s, first_s + knot * knot_s))
+            target = min(max(target, self.near + 1), self.near + beyond)
+            knot = self._knot(float(self.time_s[target]) + 1e-9, first_s, knot_s)
+        else:
+            knot = 0
+        log = self.observed(slice(self.near, target + 1))
+        log.weight[-1] = 0.0
+        filters = self.allowed.filter(self.anchor)
+        self._filter(log, Span(0, len(log.time_s), 0), self.allowed, filters)
+        self.anchor = Start(0, filters["x"][0, :9].copy(), filters["p"][0, :9, :9].copy())
+        self.near = target
+        jerk = self.model.jerk
+        self.model = self.model._replace(jerk=jerk[min(knot, len(jerk) - 1):])
+        drop = len(self) - self.sizes.buffer
+        if drop > self.sizes.buffer // 4:
+            self.forget(min(drop, self.near))
+
+    def forget(self, drop: int) -> None:
+        self.time_s, self.measurement, self.possible, self.weight, self.rows = (
+            each[drop:].copy() for each in (self.time_s, self.measurement, self.possible, self.weight, self.rows)
+        )
+        self.uneven = self.uneven.part(slice(drop, None))
+        self.near -= drop
+        self.dropped = getattr(self, "dropped", 0) + drop
