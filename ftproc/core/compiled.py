@@ -24,6 +24,7 @@ import hashlib
 import importlib
 import importlib.util
 import os
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FunctionType
@@ -38,6 +39,7 @@ from ftproc.errors import InstallationError
 F = TypeVar("F", bound=Callable[..., Any])
 
 HOW: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+_IMPORTED = re.compile(rb"^from ftproc\.core\.([\w.]+) import (.*)", re.MULTILINE)
 WAYS = ("compiled", "jit", "python")
 ROOM = Path(__file__).parent
 CURE = (
@@ -46,14 +48,19 @@ CURE = (
 
 
 def digest(room: Path = ROOM) -> str:
-    """Of all sources in which kernels are written."""
-    found = hashlib.blake2b(digest_size=8)
-    for folder, folders, names in os.walk(room):
-        folders.sort()
-        for name in sorted(names):
-            if name.endswith(".py"):
-                found.update(Path(folder, name).read_bytes())
-    return found.hexdigest()
+    """Of all sources in which kernels are written, and of those in the room that they import."""
+    found = (Path(folder, name) for folder, _, names in os.walk(room) for name in names if name.endswith(".py"))
+    sources = {path.relative_to(room).as_posix(): path.read_bytes() for path in found}
+    to_read = [name for name, content in sources.items() if b"core.compiled import" in content]
+    wanted: set[str] = set()
+    while to_read:
+        name = to_read.pop()
+        if name in sources and name not in wanted:
+            wanted.add(name)
+            for module, names in _IMPORTED.findall(sources[name]):
+                folder = module.decode().replace(".", "/")
+                to_read += [f"{folder}.py", *(f"{folder}/{each.strip()}.py" for each in names.decode().split(","))]
+    return hashlib.blake2b(b"".join(sources[name] for name in sorted(wanted)), digest_size=8).hexdigest()
 
 
 DIGEST = digest()

@@ -67,7 +67,8 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     decision = edited.decision
     return Estimate(
         run, label, edited.model, smoothed if settings.smooth else None, again, decision.settled,
-        unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts, alternative=decision.alternative,
+        unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts,
+        alternative=decision.alternative,
     )  # fmt: skip
 
 

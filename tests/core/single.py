@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ftproc.core.compiled import WAY, zeros
-from ftproc.core.filtering import ukf
+from ftproc.core.filtering import ukf, unscented
+from ftproc.core.filtering.filters import FILTER
 from ftproc.core.filtering.records import SAMPLE
 from tests import naive
 from tests.core.tracks import covariance
@@ -19,7 +20,7 @@ def one(layout):
 
 def filter_at(x, p):
     """The record of a filter in this state."""
-    f = one(ukf.FILTER)
+    f = one(FILTER)
     f["x"], f["p"] = x, p
     return f
 
@@ -34,7 +35,7 @@ def sample_of(z, noise, weight=1.0, late=0.0):
 def transform(x, p):
     """z^, C, P_xz and H of the kernel."""
     f = filter_at(x, p)
-    ukf.linearise(f)
+    unscented.linearise(f)
     ukf.cross_covariance(f["p"], f["h"], f["pxz"])
     return f["z_hat"], f["c"], f["pxz"], f["h"]
 
@@ -42,7 +43,7 @@ def transform(x, p):
 def update(x, p, z, noise, weight, late=0.0):
     """x+, P+, NIS and log-likelihood of the kernel; the last two of an update that uses nothing mean nothing."""
     f = filter_at(x, p)
-    ukf.linearise(f)
+    unscented.linearise(f)
     ukf.cross_covariance(f["p"], f["h"], f["pxz"])
     ukf.innovate(sample_of(z, noise, late=late), f)
     ukf.use(weight, f)

@@ -9,9 +9,9 @@ from ftproc.core import compiled
 from ftproc.core.compiled import record, zeros
 from ftproc.core.editing.gate import GATE
 from ftproc.core.filtering.backward import BACKWARD
+from ftproc.core.filtering.filters import FILTER
 from ftproc.core.filtering.forward import recursion, run_weighted
 from ftproc.core.filtering.records import ROW, SAMPLE, Row
-from ftproc.core.filtering.ukf import FILTER
 
 
 def test_a_record_lies_in_one_piece_of_memory_without_gaps():

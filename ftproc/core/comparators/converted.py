@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part, record, zeros
 from ftproc.core.filtering import ukf
+from ftproc.core.filtering.filters import Filter
 from ftproc.core.filtering.forward import recursion
 from ftproc.core.filtering.records import Row, Sample
 from ftproc.core.model.measurement import measure
@@ -89,7 +90,7 @@ def conversion_of(noise_variance: FloatArray) -> Any:
 
 
 @part
-def _converted(f: ukf.Filter, sample: Sample, conversions: Conversions, row: Row) -> tuple[float, bool]:
+def _converted(f: Filter, sample: Sample, conversions: Conversions, row: Row) -> tuple[float, bool]:
     """The update of a sample by its converted position; every reading is used. The log-likelihood is that of positions
     along the line-of-sight axes."""
     v = conversions[0]

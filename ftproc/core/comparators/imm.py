@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part, record, zeros
-from ftproc.core.filtering import ukf
+from ftproc.core.filtering import ukf, unscented
+from ftproc.core.filtering.filters import FILTER, Filters
 from ftproc.core.filtering.forward import Span, lead_in, store
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Row, Rows, Samples, Start, between, empty_rows
 from ftproc.core.model import motion
@@ -72,7 +73,7 @@ def _mix(stay: float, filters: Any, modes: Any, share: FloatArray) -> None:
 
 @kernel
 def _run(
-    span: Span, samples: Samples, filters: ukf.Filters, modes: Modes, sojourn_s: float, rows: Rows, probability: Matrix
+    span: Span, samples: Samples, filters: Filters, modes: Modes, sojourn_s: float, rows: Rows, probability: Matrix
 ) -> float:
     """Filter a span by all models; the last of the filters is what they say together. Fills the rows and the
     probability (n, m) of each model; returns the log-likelihood."""
@@ -94,7 +95,7 @@ def _run(
         row.nis = math.nan
         for m in range(models):
             f = filters[m]
-            ukf.linearise(f)
+            unscented.linearise(f)
             ukf.innovate(samples[k], f)
             any_used = ukf.use(samples[k].weight, f)
             modes[m].gained = 0.0
@@ -160,7 +161,7 @@ def filter_log(log: Observations, model: Model, starts: list[Start], jumps: Jump
     models, likelihood = len(jumps.jerk), 0.0
     probability = np.full((len(log.time_s), models), np.nan)
     for start, stop in between(starts, len(log.time_s)):
-        filters, modes = zeros(ukf.FILTER, models + 1), zeros(MODE, models)
+        filters, modes = zeros(FILTER, models + 1), zeros(MODE, models)
         filters[:] = model.filter(start)
         modes["jerk"], modes["probability"], modes["expected"] = jumps.jerk, 1 / models, 1 / models
         span = Span(start.sample, stop, start.sample)

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part, record, zeros
-from ftproc.core.filtering import ukf
+from ftproc.core.filtering import ukf, unscented
+from ftproc.core.filtering.filters import Filter
 from ftproc.core.filtering.forward import recursion, store_innovation
 from ftproc.core.filtering.records import Row, Sample
 from ftproc.core.signatures import Layout
@@ -63,7 +64,7 @@ def weighting_of(kind: int, parameter: float) -> Any:
 
 
 @part
-def _weigh(f: ukf.Filter, how: Weighting) -> bool:
+def _weigh(f: Filter, how: Weighting) -> bool:
     """Weights from the residuals; whether any reading is used."""
     any_used = False
     for i in range(3):
@@ -78,12 +79,12 @@ def _weigh(f: ukf.Filter, how: Weighting) -> bool:
 
 
 @part
-def _reweighted(f: ukf.Filter, sample: Sample, weightings: Weightings, row: Row) -> tuple[float, bool]:
+def _reweighted(f: Filter, sample: Sample, weightings: Weightings, row: Row) -> tuple[float, bool]:
     """The update of a sample, repeated until its weights fit the residuals that it leaves."""
     how = weightings[0]
     how.x[:] = f.x
     how.p[:] = f.p
-    ukf.linearise(f)
+    unscented.linearise(f)
     ukf.innovate(sample, f)
     store_innovation(f, row)
     for i in range(3):

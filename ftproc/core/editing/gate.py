@@ -22,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part, record, zeros
-from ftproc.core.filtering import ukf
+from ftproc.core.filtering import ukf, unscented
+from ftproc.core.filtering.filters import Filter
 from ftproc.core.filtering.forward import recursion
 from ftproc.core.filtering.records import Row, Sample
 from ftproc.core.model.measurement import moves, wrap_angle, wrapped
@@ -97,7 +98,7 @@ def gate_of(settings: GateSettings) -> Any:
 
 
 @part
-def _decide(f: ukf.Filter, sample: Sample, gate: Gate, sigma: FloatArray) -> bool:
+def _decide(f: Filter, sample: Sample, gate: Gate, sigma: FloatArray) -> bool:
     """Weights of a sample from its innovation, of this 1-sigma (3,); False while any component is in a patch."""
     e, used = f.e, f.used
     all_inside = True
@@ -131,7 +132,7 @@ def _decide(f: ukf.Filter, sample: Sample, gate: Gate, sigma: FloatArray) -> boo
 
 
 @part
-def _update_by_gain(f: ukf.Filter) -> tuple[float, float]:
+def _update_by_gain(f: Filter) -> tuple[float, float]:
     """The paper's letter, K <- K m, with the covariance that any gain has: P - K Pxz' - Pxz K' + K S K'."""
     x, p, e, used, s, pxz, gain = f.x, f.p, f.e, f.used, f.s, f.pxz, np.empty((9, 3))
     for i in range(3):
@@ -166,7 +167,7 @@ def _overdue(gate: Gate, now_s: float) -> bool:
 
 
 @part
-def _diverged(f: ukf.Filter, range_m: float, longest_patch_s: float) -> bool:
+def _diverged(f: Filter, range_m: float, longest_patch_s: float) -> bool:
     """Whether speed or acceleration are those of nothing that is where it was measured to be (range_m, or NaN)."""
     speed2 = f.x[3] * f.x[3] + f.x[4] * f.x[4] + f.x[5] * f.x[5]
     acceleration2 = f.x[6] * f.x[6] + f.x[7] * f.x[7] + f.x[8] * f.x[8]
@@ -175,10 +176,10 @@ def _diverged(f: ukf.Filter, range_m: float, longest_patch_s: float) -> bool:
 
 
 @part
-def _gated(f: ukf.Filter, sample: Sample, gates: Gates, row: Row) -> tuple[float, bool]:
+def _gated(f: Filter, sample: Sample, gates: Gates, row: Row) -> tuple[float, bool]:
     """The update of a sample through the gate; a component whose weight is zero in the log is barred."""
     gate = gates[0]
-    ukf.linearise(f)
+    unscented.linearise(f)
     ukf.innovate(sample, f)
     for i in range(3):
         row.innovation_sigma[i] = math.sqrt(f.c[i, i] + f.noise[i] + f.late[i] * f.late[i])

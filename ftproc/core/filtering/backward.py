@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import part, record
+from ftproc.core.filtering.filters import OFFSETS, Filter
 from ftproc.core.filtering.forward import Estimated
-from ftproc.core.filtering.ukf import OFFSETS, Filter
 from ftproc.core.model import motion
 from ftproc.core.model.measurement import line_of_sight_sigma
 from ftproc.core.signatures import Layout

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part, record, variant, zeros
 from ftproc.core.filtering import ukf
+from ftproc.core.filtering.filters import ColouredFilters, Filter, Filters
 from ftproc.core.filtering.records import (
     FilterRun,
     Model,
@@ -39,14 +40,14 @@ class Span(NamedTuple):
 
 
 #: The update by which filters differ: (filter, sample, extra, row) -> log-likelihood gained, whether the track is lost.
-Update = Callable[[ukf.Filter, Sample, Any, Row], tuple[float, bool]]
+Update = Callable[[Filter, Sample, Any, Row], tuple[float, bool]]
 
 #: (span, samples, profile, filters, extra, rows) -> see `recursion`.
 Recursion = Callable[[Span, Any, motion.Profile, Any, Any, Any], tuple[int, float]]
 
 
 @part
-def advance(f: ukf.Filter, samples: Any, k: int, profile: motion.Profile) -> None:
+def advance(f: Filter, samples: Any, k: int, profile: motion.Profile) -> None:
     """Predict from sample k - 1 to sample k."""
     time_s = samples[k].time_s
     interval = time_s - samples[k - 1].time_s
@@ -55,7 +56,7 @@ def advance(f: ukf.Filter, samples: Any, k: int, profile: motion.Profile) -> Non
 
 
 @part
-def store(f: ukf.Filter, row: Row) -> None:
+def store(f: Filter, row: Row) -> None:
     """Keep the updated state."""
     for i in range(9):
         row.state[i] = f.x[i]
@@ -64,7 +65,7 @@ def store(f: ukf.Filter, row: Row) -> None:
 
 
 @part
-def store_innovation(f: ukf.Filter, row: Row) -> None:
+def store_innovation(f: Filter, row: Row) -> None:
     """Keep the innovation, its sigma and the weights."""
     for i in range(3):
         row.innovation[i] = f.e[i]
@@ -73,7 +74,7 @@ def store_innovation(f: ukf.Filter, row: Row) -> None:
 
 
 @part
-def _weighted(f: ukf.Filter, sample: Sample, extended: bool, row: Row) -> tuple[float, bool]:
+def _weighted(f: Filter, sample: Sample, extended: bool, row: Row) -> tuple[float, bool]:
     """The update of a sample whose weights are decided; extended: linearised by the Jacobian."""
     if extended:
         jacobian.linearise(f)
@@ -92,7 +93,7 @@ _update: Update = _weighted  # of the loop below; each recursion has its own
 
 
 def _loop(
-    span: Span, samples: Samples, profile: motion.Profile, filters: ukf.Filters, extra: Any, rows: Rows
+    span: Span, samples: Samples, profile: motion.Profile, filters: Filters, extra: Any, rows: Rows
 ) -> tuple[int, float]:
     """Predict, update, keep what came of it; see `recursion`."""
     f = filters[0]
@@ -113,22 +114,22 @@ def _loop(
     return span.last, likelihood
 
 
-def recursion(update: Update, kind: Any, filters: Any = ukf.Filters) -> Recursion:
+def recursion(update: Update, kind: Any, filters: Any = Filters) -> Recursion:
     """A recursive filter: the kernel that runs the loop with this update of one sample compiled into it.
 
-    The kernel takes a span of the samples, from the state of the filter (an array of one `ukf.Filter`), which it
+    The kernel takes a span of the samples, from the state of the filter (an array of one `filters.Filter`), which it
     changes, and fills the rows. extra: what else the update needs, annotated as `kind`. filters: annotation of the
     filter's record. It returns the sample at which
     the track was lost, or the span's end, and the log-likelihood of what was used.
 
     The code of the loop is shared; each kernel has an `_update` of its own among its globals.
     """
-    name = update.__name__ + ("_coloured" if filters is ukf.ColouredFilters else "")
+    name = update.__name__ + ("_coloured" if filters is ColouredFilters else "")
     return kernel(variant(_loop, update.__module__, name, extra=kind, filters=filters, _update=update))
 
 
 run_weighted = recursion(_weighted, bool)
-_run_coloured = recursion(_weighted, bool, ukf.ColouredFilters)
+_run_coloured = recursion(_weighted, bool, ColouredFilters)
 
 
 class Estimated(Protocol):
@@ -153,7 +154,7 @@ Residuals = Annotated[Any, Layout(LEFT)]
 
 
 def _extrapolated(
-    samples: Samples, profile: motion.Profile, filters: ukf.Filters, estimates: Estimates, residuals: Residuals
+    samples: Samples, profile: motion.Profile, filters: Filters, estimates: Estimates, residuals: Residuals
 ) -> None:
     """Fill the estimates and residuals of the samples before the first that has none, from the state there, which is
     changed; no reading is used."""
@@ -178,7 +179,7 @@ def _extrapolated(
 
 
 _extrapolate = kernel(variant(_extrapolated, __name__, "_extrapolate"))
-_extrapolate_coloured = kernel(variant(_extrapolated, __name__, "_extrapolate_coloured", filters=ukf.ColouredFilters))
+_extrapolate_coloured = kernel(variant(_extrapolated, __name__, "_extrapolate_coloured", filters=ColouredFilters))
 
 
 def extrapolated(log: Observations, model: Model, start: Start) -> tuple[Any, Any]:

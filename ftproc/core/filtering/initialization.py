@@ -155,8 +155,8 @@ def _nearest(time: Vector, z: Matrix, weight: Matrix, sample: int, first: int, l
 @kernel
 def _fit(time: Vector, z: Matrix, chosen: Indices, sample: int, c: int, sigma: float, fit: Vector) -> float:
     """The parabola through the chosen readings at the time of `sample`: value, rate and its change there, and the
-    1-sigma of each, in fit (6,). Returns the seconds over which the readings extend; without any, rates are unknown (infinite
-    sigmas).
+    1-sigma of each, in fit (6,). Returns the seconds over which the readings extend; without any, rates are unknown
+    (infinite sigmas).
 
     Readings on both sides of a manoeuvre lie on no parabola: then the farthest are left out, one by one. The scatter
     about it stands for what it misses of the motion, so it is not averaged down. Too few readings to show a curve

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import record, zeros
-from ftproc.core.filtering.ukf import COLOURED, FILTER
+from ftproc.core.filtering.filters import COLOURED, FILTER
 from ftproc.core.model.motion import Profile
 from ftproc.core.signatures import Layout
 
@@ -140,7 +140,7 @@ class Model(NamedTuple):
         return Profile(self.jerk, self.knot_s, float(time_s[0]))
 
     def filter(self, start: Start) -> Any:
-        """An array of one `ukf.Filter` record at a start; of one `ukf.Coloured` if some noise is correlated."""
+        """An array of one `filters.Filter` record at a start; of one `filters.Coloured` if some noise is correlated."""
         filters = zeros(COLOURED if self.coloured else FILTER)
         filters["x"][0, :9], filters["p"][0, :9, :9] = start.state, start.covariance
         filters["wander"][0], filters["fade_s"][0] = self.wander_variance, self.fade_s

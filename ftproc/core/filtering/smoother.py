@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import empty, kernel, part, variant, zeros
 from ftproc.core.filtering import backward, ukf
+from ftproc.core.filtering.filters import COLOURED, ColouredFilters, Filter, Filters
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Estimates, Residuals, Span, advance, extrapolated
 from ftproc.core.filtering.records import Model, Observations, Sample, Samples, Start, between
 from ftproc.core.model import motion
@@ -69,11 +70,11 @@ SCORES, RESIDUALS, STATES = 0, 1, 2  # what is kept of each sample: nothing, res
 
 
 class Memory(NamedTuple):
-    """What a sweep works on: `ukf.Filter` records, one for each sample of a block and one for the state before each
+    """What a sweep works on: `filters.Filter` records, one for each sample of a block and one for the state before each
     block, and one `backward.Backward`; and what it fills, sample by sample of the log."""
 
-    block: ukf.Filters
-    before: ukf.Filters
+    block: Filters
+    before: Filters
     back: backward.Backwards
     estimates: Estimates
     residuals: Residuals
@@ -82,8 +83,8 @@ class Memory(NamedTuple):
 class ColouredMemory(NamedTuple):
     """The same of a state that ends with the offsets of the measurements."""
 
-    block: ukf.ColouredFilters
-    before: ukf.ColouredFilters
+    block: ColouredFilters
+    before: ColouredFilters
     back: backward.ColouredBackwards
     estimates: Estimates
     residuals: Residuals
@@ -91,7 +92,7 @@ class ColouredMemory(NamedTuple):
 
 def _memory(samples: int, first: Any, estimates: Any, residuals: Any) -> Any:
     """For a span of so many samples that begins with a filter (an array of one record)."""
-    coloured = first.dtype == ukf.COLOURED
+    coloured = first.dtype == COLOURED
     before, block = empty(first.dtype, -(-samples // BLOCK)), empty(first.dtype, min(samples, BLOCK))
     before[:1] = first
     block["wander"], block["fade_s"] = first["wander"][0], first["fade_s"][0]
@@ -100,7 +101,7 @@ def _memory(samples: int, first: Any, estimates: Any, residuals: Any) -> Any:
 
 
 @part
-def _take_in(f: ukf.Filter, sample: Sample) -> tuple[float, float]:
+def _take_in(f: Filter, sample: Sample) -> tuple[float, float]:
     """Update by a sample; NIS, NaN where nothing is used, and the log-likelihood. All that the way back needs stays in
     the record."""
     ukf.expect(f)
@@ -111,7 +112,7 @@ def _take_in(f: ukf.Filter, sample: Sample) -> tuple[float, float]:
 
 
 @part
-def _copy_state(source: ukf.Filter, target: ukf.Filter) -> None:
+def _copy_state(source: Filter, target: Filter) -> None:
     for i in range(len(source.x)):
         target.x[i] = source.x[i]
         for j in range(len(source.x)):

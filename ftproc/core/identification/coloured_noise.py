@@ -1,7 +1,7 @@
 """Noise that is correlated from sample to sample, which a white-noise likelihood takes for motion.
 
 Each component's noise is white noise of variance r plus a first-order Gauss-Markov offset of variance w and correlation
-time tau, which is part of the state (`ukf.Coloured`). r, w, tau and the jerk density are found together by maximum
+time tau, which is part of the state (`filters.Coloured`). r, w, tau and the jerk density are found together by maximum
 likelihood: motion is smooth and common to the three components, such an offset is neither. The scores by r, w and the
 jerk are exact; those by tau are differences.
 """

@@ -16,15 +16,14 @@ from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import optimizer
-from ftproc.core.identification.scales import Scales, scales_of
+from ftproc.core.identification.scales import EXACT, Scales, scales_of
 from ftproc.core.model.motion import isotropic
 
 FloatArray = NDArray[np.float64]
 
 LEVEL_STEPS = 12  # of the search for one level
 SPANS, SPAN = 6, 400  # of samples: what stands for a long log when one noise and one jerk level are looked for
-NOISE_FLOOR = 1e-4  # of the components' median noise, in metres: one that shows less was not measured,
-EXACT = 0.3  # and is taken to be this much better than the others: nothing moves exactly
+ASSUMED = 0.03  # of the others' noise, in metres, that is assumed of a component that shows none: nothing moves exactly
 NOISE_GROWTH = 3.0  # times the noise that the search begins with: more of it is a diverged track, not noise
 NOISE_SHRINKS = 4.0  # less of it comes of readings left out until the rest fits
 NOISE_ALLOWED = 1e-4  # 1-sigma, in ranges or rad, that is never too much: a component computed from another shows no
@@ -84,9 +83,8 @@ def without_noise(log: Observations, sigma: FloatArray) -> tuple[NDArray[np.bool
     """(3,) which components show no noise at all, because they were not measured, and (3,) 1-sigma m, rad, rad: those
     given, and what is assumed for these."""
     scales = scales_of(log, sigma**2)
-    unit, typical = np.array([1.0, scales.range_m, scales.range_m]), float(np.median(scales.noise_m))
-    exact = sigma * unit < NOISE_FLOOR * typical
-    return exact, np.where(exact, EXACT * typical / unit, sigma)
+    unit = np.array([1.0, scales.range_m, scales.range_m])
+    return scales.exact, np.where(scales.exact, ASSUMED * scales.typical_noise_m / unit, sigma)
 
 
 def fit_level(
@@ -108,7 +106,7 @@ def fit_level(
     scales = scales_of(log, guess.noise_variance)
     log_noise = np.log(guess.noise_variance)
     expected = np.sqrt(guess.noise_variance) if expected_sigma is None else expected_sigma
-    smallest = NOISE_FLOOR * float(np.median(scales.noise_m)) / np.array([1.0, scales.range_m, scales.range_m])
+    smallest = EXACT * scales.typical_noise_m / np.array([1.0, scales.range_m, scales.range_m])
     smallest = np.maximum(smallest, least_sigma)
     floor = 2 * np.log(np.maximum(smallest, expected / NOISE_SHRINKS if expected_sigma is not None else 0.0))
     allowed = NOISE_ALLOWED * np.array([scales.range_m, 1.0, 1.0])

@@ -17,6 +17,7 @@ from ftproc.core.filtering.records import Observations
 FloatArray = NDArray[np.float64]
 
 FINEST = 1e-9  # of the range: no noise is smaller
+EXACT = 1e-4  # of the noisiest component's noise, in metres: one that shows less was not measured
 
 
 class Scales(NamedTuple):
@@ -28,13 +29,23 @@ class Scales(NamedTuple):
     range_m: float
     noise_m: FloatArray
 
+    @property
+    def exact(self) -> NDArray[np.bool_]:
+        """(3,) which components show no noise, beside the noisiest."""
+        return np.less(self.noise_m, EXACT * self.noise_m.max())
+
+    @property
+    def typical_noise_m(self) -> float:
+        """The median of the noise of the components that show some."""
+        return float(np.median(self.noise_m[~self.exact]))
+
     def memory_s(self, jerk_psd: float) -> float:
         """The memory of a filter for this jerk density, m^2/s^5."""
-        return float((np.median(self.noise_m) ** 2 * self.interval_s / jerk_psd) ** (1 / 6))
+        return float((self.typical_noise_m**2 * self.interval_s / jerk_psd) ** (1 / 6))
 
     def jerk_psd(self, memory_s: float) -> float:
         """The jerk density, m^2/s^5, that gives a filter this memory."""
-        return float(np.median(self.noise_m) ** 2 * self.interval_s / memory_s**6)
+        return float(self.typical_noise_m**2 * self.interval_s / memory_s**6)
 
 
 def scales_of(log: Observations, noise_variance: FloatArray) -> Scales:

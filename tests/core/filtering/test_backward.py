@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from ftproc.core.filtering import backward
+from ftproc.core.filtering.filters import FILTER
 from ftproc.core.filtering.forward import ESTIMATED
 from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.smoother import score_log, smooth_log
-from ftproc.core.filtering.ukf import FILTER
 from ftproc.core.model import motion
 from tests import naive
 from tests.core.single import one

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
-from ftproc.core.filtering import forward, ukf
+from ftproc.core.filtering import forward, unscented
 from ftproc.core.model import jacobian
 from ftproc.core.model.measurement import measure
 from tests import naive
@@ -23,7 +23,7 @@ def test_weights_of_the_19_points_are_0_and_1_in_18():
     points = MerweScaledSigmaPoints(9, alpha=1.0, beta=0.0, kappa=0.0)
     np.testing.assert_allclose(points.Wm, np.r_[0.0, np.full(18, 1 / 18)], atol=1e-15)
     np.testing.assert_allclose(points.Wc, points.Wm, atol=1e-15)
-    assert ukf.SPREAD == 3.0
+    assert unscented.SPREAD == 3.0
 
 
 def test_transform_of_7_points_is_that_of_19():
@@ -144,7 +144,7 @@ def test_wide_covariance_draws_the_points_together(missing):
     for _ in range(50):
         x, p, z, noise = random_problem(rng, spread=rng.choice([0.5, 5.0, 50.0]))
         slant, widest = np.linalg.norm(x[:3]), np.sqrt(np.trace(p[:3, :3]))
-        spread = min(ukf.SPREAD, ukf.MAX_SPREAD_IN_RANGES * slant / widest)
+        spread = min(unscented.SPREAD, unscented.MAX_SPREAD_IN_RANGES * slant / widest)
         expected = naive.unscented(x, p, spread)
         z_hat, c, _, h = transform(x, p)
         scale = np.sqrt(np.diag(expected[1]))
