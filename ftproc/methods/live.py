@@ -9,7 +9,7 @@ import numpy as np
 
 from ftproc.core.editing.two_pass import Known
 from ftproc.core.filtering.records import FilterRun
-from ftproc.live.editor import LiveEditor, Published
+from ftproc.core.live.editor import LiveEditor, Published
 from ftproc.methods.estimate import Estimate, Part, Recording
 from ftproc.records import chunks
 from ftproc.settings import FilterSettings

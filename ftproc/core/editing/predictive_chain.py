@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ftproc.core.compiled import part, record, zeros
 from ftproc.core.editing.outlier_chain import NATURAL_GATE, WIDE
 from ftproc.core.filtering import ukf
+from ftproc.core.filtering.filters import ColouredFilters, Filter
 from ftproc.core.filtering.forward import recursion, store_innovation
 from ftproc.core.filtering.records import Row, Sample
 from ftproc.core.signatures import Layout
@@ -87,7 +88,7 @@ def _weigh(chains: Chains, i: int, innovation: float, variance: float) -> float:
 
 
 @part
-def _predictive(f: ukf.Filter, sample: Sample, records: ChainRecords, row: Row) -> tuple[float, bool]:
+def _predictive(f: Filter, sample: Sample, records: ChainRecords, row: Row) -> tuple[float, bool]:
     """The update of a sample with the readings that are good, as far as can be told by then."""
     chains = records[0]
     ukf.expect(f)
@@ -110,4 +111,4 @@ def _predictive(f: ukf.Filter, sample: Sample, records: ChainRecords, row: Row) 
 
 
 run_predictive = recursion(_predictive, ChainRecords)
-run_predictive_coloured = recursion(_predictive, ChainRecords, ukf.ColouredFilters)
+run_predictive_coloured = recursion(_predictive, ChainRecords, ColouredFilters)

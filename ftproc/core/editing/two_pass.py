@@ -111,11 +111,14 @@ def stuck_readings(measurement: FloatArray, sigma: FloatArray) -> NDArray[np.boo
     return np.stack([screening.stuck(measurement[:, c], float(sigma[c])) for c in range(3)], 1)
 
 
-def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: Model | None = None) -> Edited:
+def edit(
+    time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: Model | None = None, short: bool = False
+) -> Edited:
     """Edit a whole log, or a segment of a long one. time_s (n,), measurement (n, 3).
 
     segment_of: of a segment, the noise of the whole log, which is taken as it is, and its typical jerk, with which the
-    search starts. Raises ValueError when a component has no reading that agrees with its neighbours.
+    search starts. short: the log is too short to tell whether the noise is uneven or correlated, so it is taken for white.
+    Raises ValueError when a component has no reading that agrees with its neighbours.
     """
     jerk_psd = known.jerk_psd
     screened, sigma, exact = screen(time_s, measurement)
@@ -131,12 +134,14 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
     rates = np.tile(np.array(outlier_chain.START_RATES), (3, 1))
     starts = find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
     decision = decide(record, Decision(record.screened, model, starts, rates), tune_first=True)
-    record, decision = allow_for_late_stamps(record, decision)
-    record, decision = allow_for_tails(record, decision)
+    if not short:
+        record, decision = allow_for_late_stamps(record, decision)
+        record, decision = allow_for_tails(record, decision)
     if jerk_psd is None:
         decision = reassess(record, decision)
-    record, decision = allow_for_drift(record, decision)
-    if segment_of is None:
+    if not short:
+        record, decision = allow_for_drift(record, decision)
+    if segment_of is None and not short:
         decision = allow_for_colour(record, decision)
     log = record.weighted(decision.weight)
     if jerk_psd is None:

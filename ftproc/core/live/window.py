@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.editing import outlier_chain, two_pass
+from ftproc.core.editing import outlier_chain, patch_likelihood, two_pass
 from ftproc.core.editing.predictive_chain import OPEN, chains_of, run_predictive, run_predictive_coloured
 from ftproc.core.filtering.forward import Span
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven, between, empty_rows
@@ -25,6 +25,8 @@ from ftproc.core.model.motion import Profile
 FloatArray = NDArray[np.float64]
 
 ROUNDS = 3  # of smoothing and deciding in a refresh
+SHORT = 160  # samples: with fewer, nothing is said of how the noise of single readings differs
+MARGIN = 5.0  # by which the log-probability of other decisions must be better
 JERK_STEPS = 2  # of the search for the jerk profile in a refresh
 
 
@@ -52,7 +54,7 @@ class Window:
 
     def edit(self) -> None:
         """Decide on all of the buffer anew. Raises ValueError when a component has no reading that agrees."""
-        edited = two_pass.edit(self.time_s, self.measurement, self.known)
+        edited = two_pass.edit(self.time_s, self.measurement, self.known, short=len(self) < SHORT)
         self.adopt(edited)
 
     def adopt(self, edited: two_pass.Edited) -> None:
@@ -133,25 +135,70 @@ class Window:
         self._slide()
         near = slice(self.near, len(self))
         self._extend_profile()
-        starts = [self.anchor]
-        for _ in range(ROUNDS):
-            log = self.observed(near)
-            smoothed = smooth_log(log, self._allowed(log), starts, residuals_only=True)
-            good = outlier_chain.classify(
-                smoothed.residual, smoothed.residual_variance, self.model.reading_variance, self.rates.copy(), self.known.gate
-            )
-            decided = ((good > 0.5) & self.possible[near]).astype(float)
-            same = (decided == log.weight).all()
-            self.weight[near] = decided
-            if same:
-                break
+        self._decide(near)
+        if self._readmit(near):
+            self._decide(near)
         log = self.observed(near)
         if self.known.jerk_psd is None:
-            self.model = fit_profile(log, starts, self.model, JERK_STEPS)
+            self.model = fit_profile(log, [self.anchor], self.model, JERK_STEPS)
         self.allowed = self._allowed(log)
         self.filters = self.allowed.filter(self.anchor)
         self.chains = chains_of(self.rates, self.model.reading_variance, self.known.gate)
         self.rows[near] = self._filter(log, Span(0, len(log.time_s), 0), self.allowed, self.filters, self.chains)
+
+    def _decide(self, near: slice) -> None:
+        """Smooth and decide in turn until the decisions stand still."""
+        for _ in range(ROUNDS):
+            log = self.observed(near)
+            smoothed = smooth_log(log, self._allowed(log), [self.anchor], residuals_only=True)
+            good = outlier_chain.classify(
+                smoothed.residual, smoothed.residual_variance, self.model.reading_variance, self.rates.copy(), self.known.gate
+            )
+            decided = ((good > 0.5) & self.possible[near]).astype(float)
+            self.weight[near] = decided
+            if (decided == log.weight).all():
+                break
+
+    def _readmit(self, near: slice) -> bool:
+        """Where the newest readings are rejected: whether the last of them are likelier good, and the track wrong."""
+        runs = {c: run for c in range(3) if len(run := self._rejected(near, c)) >= patch_likelihood.SHORTEST_RUN}
+        if not runs:
+            return False
+        weight = self.weight[near]
+        longest = max(map(len, runs.values()))
+        together = [list(runs), *([c] for c in runs)] if len(runs) > 1 else [list(runs)]
+        tried = [weight]
+        for components in together:
+            for last in sorted({patch_likelihood.SHORTEST_RUN, longest // 2, longest}):
+                other = weight.copy()
+                for c in components:
+                    other[runs[c][-last:], c] = 1.0
+                tried.append(other)
+        found = [self._likelihood(near, each) for each in tried]
+        best = int(np.argmax(found))
+        if found[best] <= found[0] + MARGIN:
+            return False
+        self.weight[near] = tried[best]
+        return True
+
+    def _rejected(self, near: slice, c: int) -> NDArray[np.int64]:
+        """The samples of the newest part whose readings of a component are rejected, up to the last one that is good."""
+        seen = np.flatnonzero(self.possible[near, c])
+        good = np.flatnonzero(self.weight[near][seen, c] > 0)
+        return seen[good[-1] + 1 if len(good) else 0 :]
+
+    def _likelihood(self, near: slice, weight: FloatArray) -> float:
+        """Log-probability of all readings of the newest part with these decisions."""
+        log = self.observed(near)._replace(weight=weight)
+        smoothed = smooth_log(log, self._allowed(log), [self.anchor], residuals_only=True)
+        total, sigma = smoothed.log_likelihood, np.sqrt(self.model.reading_variance)
+        for c in range(3):
+            seen = np.flatnonzero(self.possible[near, c])
+            total += patch_likelihood.log_probability(
+                log.time_s[seen], smoothed.residual[seen, c], smoothed.residual_variance[seen, c], weight[seen, c],
+                float(sigma[c]), self.rates[c],
+            )  # fmt: skip
+        return total
 
     def _allowed(self, log: Observations) -> Model:
         return self.model if self.known.jerk_psd is not None else with_allowance(log, self.model)

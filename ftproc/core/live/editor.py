@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ftproc.core.editing import outlier_chain, two_pass
 from ftproc.core.filtering.records import ROW, empty_rows
 from ftproc.core.filtering.initialization import FEWEST_READINGS
-from ftproc.live.window import Sizes, Window
+from ftproc.core.live.window import Sizes, Window
 
 FloatArray = NDArray[np.float64]
 
@@ -23,6 +23,7 @@ GROWTH = 1.25  # from one attempt to the next
 ROUND = 128  # samples from one new look at the buffer to the next, once the track is old
 LATELY, AGREE = 8, 0.6  # readings of a component, and share of them that must be good for a track to be confirmed
 DOUBTED, DOUBT = 12, 0.4  # readings, and share of them: with fewer good ones the track itself is in doubt
+PATIENCE_S = 1.5
 TICK_S = 0.1  # between refreshes, or one sample
 LONGEST_ISOLATED = 2
 
@@ -46,7 +47,7 @@ class LiveEditor:
         self.published = 0
         self.next_tick, self.next_edit = 0, FEWEST
         self.edits = 0
-        self.patience, self.next_doubt = DOUBTED // 2, 0
+        self.next_doubt, self.next_doubt_s, self.doubted_from_s = 0, 0.0, 0.0
 
     def push(self, time_s: FloatArray, measurement: FloatArray) -> list[Published]:
         found: list[Published] = []
@@ -142,8 +143,10 @@ class LiveEditor:
 
     def _later(self) -> None:
         self.next_edit = self.count + min(ROUND, max(4, int(0.25 * self.count)))
-        self.patience = min(2 * self.patience, ROUND) if self._doubtful() else DOUBTED // 2
-        self.next_doubt = self.count + self.patience
+        now_s = float(self.window.time_s[-1])
+        if not self._doubtful():
+            self.doubted_from_s = now_s
+        self.next_doubt, self.next_doubt_s = self.count + 3, now_s + max(PATIENCE_S, 0.2 * (now_s - self.doubted_from_s))
         self.next_tick = self.count + self.tick
 
     def _doubtful(self) -> bool:
@@ -152,7 +155,10 @@ class LiveEditor:
     def _look(self) -> None:
         window = self.window
         if self.count >= self.next_edit or (
-            self.count >= self.next_tick and self.count >= self.next_doubt and self._doubtful()
+            self.count >= self.next_tick
+            and self.count >= self.next_doubt
+            and self.window.time_s[-1] >= self.next_doubt_s
+            and self._doubtful()
         ):
             window.sizes = self._sizes(window.time_s)
             if len(window) > window.sizes.buffer:
