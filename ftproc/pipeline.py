@@ -72,7 +72,7 @@ class Filtering:
 
     def _trajectory(self, part: Part) -> Trajectory:
         """The rows of a part that count, corrected, and added to the statistics."""
-        absent = list(self.record.absent)
+        absent = list(part.estimate.absent if part.estimate.known is not None else self.record.absent)
         correction, outside = np.zeros((len(part.estimate.label), 6)), 0.0
         if self.model is not None and self.method.corrected and not absent:
             correction, outside = _corrected(part.estimate, self.model)
@@ -81,12 +81,13 @@ class Filtering:
         best = estimate.run if estimate.smoothed is None else estimate.smoothed
         state, sigma = best.state.copy(), best.sigma[:, :6].copy()
         state[:, :6] += correction
+        known = slice(None) if estimate.known is None else estimate.known
         cleaned = from_cartesian(state[:, :3]) if estimate.cleaned is None else estimate.cleaned
         if absent:  # the filter ran on a stand-in; what depends on it is not published
             state[:], sigma[:] = np.nan, np.nan
             cleaned[:, absent] = np.nan
             estimate.label[:, absent] = MISSING
-        elif np.isinf(state).any() or (estimate.cleaned is None and np.isnan(state).any()):
+        elif np.isinf(state).any() or (estimate.cleaned is None and np.isnan(state[known]).any()):
             name = self.method.name
             raise InputError(f"{self.log.name}: {name} diverged; give --noise and --jerk, or check the log's units")
         log = self.log.stretch(rows)

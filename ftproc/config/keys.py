@@ -110,8 +110,9 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
         "model": Key("model", file_name, "packaged", _MODEL, default="packaged"),
         "smooth": Key("smooth", flag, False, "add the fixed-interval smoother", default=False),
         "editing": Key(
-            "editing", words("two-pass", "forward", "none"), "two-pass", "how outliers are found", default="two-pass"
+            "editing", words("two-pass", "live", "forward", "none"), "two-pass", "how outliers are found", default="two-pass"
         ),
+        "lag_s": Key("lag", number(0, 3600), 2.0, "of live editing", default=0.0),
         "jerk_psd_m2ps5": Key("jerk", positive(), 10.0, "process noise (jerk PSD); left out: estimated"),
         "gate": Key("gate", positive(), FilterSettings.gate, "in sigmas of the residual", default=FilterSettings.gate),
         "max_patch_s": Key("max_patch", positive(), 5.0, _PATCH),

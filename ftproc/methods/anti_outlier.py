@@ -23,7 +23,7 @@ from ftproc.core.filtering.records import FilterRun, Model
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 from ftproc.core.identification.likelihood import HORIZONTAL, VERTICAL
 from ftproc.core.identification.profile import median_level
-from ftproc.methods import preparing, recursive
+from ftproc.methods import live, preparing, recursive
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
 from ftproc.settings import FilterSettings
 
@@ -47,6 +47,8 @@ def parts(record: Recording, settings: FilterSettings) -> Iterator[Part]:
     if settings.editing == "forward" and not settings.smooth:
         stretches = recursive.parts(record, settings)
         yield from stretches if len(record) <= recursive.BLOCK else threads.ahead(stretches)
+    elif settings.editing == "live":
+        yield from live.parts(record, settings)
     elif settings.editing == "two-pass" and len(record) > LONGEST_WHOLE:
         work = partial(_segment, record, settings, usual_of(record, settings))
         yield from threads.in_order(work, segments(record))

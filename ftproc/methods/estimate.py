@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import FilterRun, Model, Observations
 from ftproc.core.filtering.smoother import SmootherRun
@@ -78,7 +79,8 @@ class Estimate(NamedTuple):
     the time stamps. drifts: whether the noise's variance drifts. alternative: a model with correlated noise
     that explains the log as well, and that the sigmas allow for. cleaned: (n, 3) readings of a method that works on
     range, azimuth and elevation one by one; NaN there and in its run means not estimated. unexamined: places where
-    two-pass editing looked for no alternative, its search having been cut short.
+    two-pass editing looked for no alternative, its search having been cut short. known: (n,) which samples have an
+    estimate, where live editing has none of some; absent: the components that it has not seen.
     """
 
     run: FilterRun
@@ -92,6 +94,8 @@ class Estimate(NamedTuple):
     alternative: Coloured | None = None
     cleaned: FloatArray | None = None
     unexamined: int = 0
+    known: NDArray[np.bool_] | None = None
+    absent: tuple[int, ...] = ()
 
     @property
     def smoothed_run(self) -> FilterRun:
@@ -108,6 +112,7 @@ class Estimate(NamedTuple):
             label=self.label[low:high],
             smoothed=None if self.smoothed is None else self.smoothed.rows(low, high),
             reacquired=tuple(k - low for k in self.reacquired if low <= k < high),
+            known=None if self.known is None else self.known[low:high],
             cleaned=None if self.cleaned is None else self.cleaned[low:high],
         )
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing import outlier_chain, two_pass
-from ftproc.core.filtering.records import ROW, empty_rows
-from ftproc.core.filtering.initialization import FEWEST_READINGS
+from ftproc.core.filtering.initialization import FEWEST_READINGS, shortest_gap
+from ftproc.core.filtering.records import ROW, Model, empty_rows
 from ftproc.core.live.window import Sizes, Window
 
 FloatArray = NDArray[np.float64]
@@ -26,16 +26,20 @@ DOUBTED, DOUBT = 12, 0.4  # readings, and share of them: with fewer good ones th
 PATIENCE_S = 1.5
 TICK_S = 0.1  # between refreshes, or one sample
 LONGEST_ISOLATED = 2
+PATIENCE = 64  # samples that a component with few readings may take before its noise is assumed
+ASSUMED_READING, ASSUMED_SIGMA = (10_000.0, 0.0, 0.0), (10.0, 1e-3, 1e-3)  # m, rad, rad
 
 
 class Published(NamedTuple):
     """Rows that leave. first: number of the first, counted from zero. rows: `Row` records (n,). label: (n, 3) as
-    `outlier_chain.label_runs`. known: (n,) whether there is an estimate."""
+    `outlier_chain.label_runs`. known: (n,) whether there is an estimate. reacquired: (n,) whether a lost track was found
+    again there."""
 
     first: int
     rows: Any
     label: FloatArray
     known: NDArray[np.bool_]
+    reacquired: NDArray[np.bool_]
 
 
 class LiveEditor:
@@ -43,10 +47,13 @@ class LiveEditor:
         self.known, self.lag_s = known, lag_s
         self.window: Window | None = None
         self.time_s, self.measurement = np.empty(0), np.empty((0, 3))  # before the track is confirmed
+        self.absent: tuple[int, ...] = ()  # components that were never seen
+        self.again: list[int] = []  # rows at which a lost track was found again, until they leave
         self.count = 0  # rows taken
         self.published = 0
         self.next_tick, self.next_edit = 0, FEWEST
         self.edits = 0
+        self.was_confirmed = False
         self.next_doubt, self.next_doubt_s, self.doubted_from_s = 0, 0.0, 0.0
 
     def push(self, time_s: FloatArray, measurement: FloatArray) -> list[Published]:
@@ -58,10 +65,16 @@ class LiveEditor:
                 found += self._due(time_s[low])
                 self._take_unconfirmed(time_s[low:high], measurement[low:high])
             else:
-                high, forced = self._slice_end(time_s, low)
+                if np.isfinite(measurement[low, list(self.absent)]).any():
+                    self._begin_again()
+                    continue
+                high = self._slice_end(time_s, low)
+                seen = np.flatnonzero(np.isfinite(measurement[low:high, list(self.absent)]).any(1))
+                high = low + int(seen[0]) if len(seen) else high
                 if self.lag_s > 0:
                     found += self._due(time_s[high - 1])
-                self.window.append(time_s[low:high], measurement[low:high])
+                self._note_gap(float(time_s[low]))
+                self.window.append(time_s[low:high], self._with_stand_ins(measurement[low:high]))
                 self.count += high - low
                 self._look()
             if self.lag_s == 0:
@@ -77,9 +90,12 @@ class LiveEditor:
 
     # ------------------------------------------------------------------------------------------------------------------
 
-    def _slice_end(self, time_s: FloatArray, low: int) -> tuple[int, bool]:
+    def _slice_end(self, time_s: FloatArray, low: int) -> int:
         """How many of the rows to come can be taken at once."""
         high = min(len(time_s), low + max(min(self.next_tick, self.next_edit) - self.count, 1))
+        gaps = np.flatnonzero(np.diff(time_s[low:high]) > self.longest_s)
+        if len(gaps):
+            high = low + int(gaps[0]) + 1
         if self.lag_s > 0:
             # the first row that is not covered by the last refresh must not be due before the next
             uncovered = self.refreshed - self.first
@@ -91,7 +107,25 @@ class LiveEditor:
                         self._refresh()
                         return self._slice_end(time_s, low)
                     high = low + int(overdue[0])
-        return high, False
+        return high
+
+    def _note_gap(self, time_s: float) -> None:
+        """After a gap that may be too long to bridge all of the buffer is looked at as soon as a track can begin."""
+        if time_s - self.window.time_s[-1] > self.longest_s:
+            self.next_edit = min(self.next_edit, self.count + FEWEST_READINGS + 1)
+
+    def _begin_again(self) -> None:
+        """A component is seen for the first time: what is known without it does not tell where the target is."""
+        window = self.window
+        low = max(min(len(window) - window.sizes.near, self.published - self.first), 0)
+        self.time_s, self.measurement = window.time_s[low:].copy(), window.measurement[low:].copy()
+        self.measurement[:, list(self.absent)] = np.nan
+        self.window, self.absent, self.next_edit = None, (), self.count + FEWEST_READINGS
+
+    @property
+    def model(self) -> Model:
+        """Noise and process noise of the track; of none before it is confirmed."""
+        return Model(np.full(3, np.nan), np.empty((0, 6))) if self.window is None else self.window.allowed
 
     @property
     def first(self) -> int:
@@ -108,18 +142,21 @@ class LiveEditor:
         if window is None:
             self.next_edit = int(self.count * GROWTH) + 1
             return
-        self.window = window
+        self.window, self.was_confirmed = window, True
         self.time_s, self.measurement = np.empty(0), np.empty((0, 3))
         self._later()
         self.refreshed = self.count
         self._smooth()
 
     def _confirmed(self) -> Window | None:
-        good = np.isfinite(self.measurement).sum(0)
-        if (good < FEWEST_READINGS).any():
+        count = np.isfinite(self.measurement).sum(0)
+        few = count < FEWEST_READINGS
+        if count.sum() < 2 * FEWEST_READINGS or (few & (count > 0)).any() and len(self.time_s) < PATIENCE:
             return None
-        sizes = self._sizes(self.time_s)
-        window = Window(self.time_s, self.measurement, self.known, sizes)
+        self.absent = tuple(np.flatnonzero(count == 0).tolist())
+        sigma = np.where(few & np.isnan(self.known.sigma), ASSUMED_SIGMA, self.known.sigma)
+        readings = self._with_stand_ins(self.measurement)
+        window = Window(self.time_s, readings, self.known._replace(sigma=sigma), self._sizes(self.time_s))
         try:
             window.edit()
         except ValueError:
@@ -132,9 +169,18 @@ class LiveEditor:
             return None
         return window
 
+    def _with_stand_ins(self, measurement: FloatArray) -> FloatArray:
+        """The readings with constants for components that were never seen; they keep the filter upright, and nothing
+        that rests on them is published."""
+        readings = measurement.copy()
+        for c in self.absent:
+            readings[:, c] = ASSUMED_READING[c]
+        return readings
+
     def _sizes(self, time_s: FloatArray) -> Sizes:
         times = np.diff(time_s)
         interval = float(np.median(times[times > 0])) if (times > 0).any() else 1.0
+        self.longest_s = shortest_gap(interval)
         self.tick = max(1, int(np.ceil(TICK_S / interval - 1e-6)))
         lag = int(self.lag_s / interval)
         buffer = int(np.clip(30.0 / interval, 300, 1500))
@@ -165,10 +211,13 @@ class LiveEditor:
                 drop = len(window) - window.sizes.buffer
                 window.forget(drop)
             self.edits += 1
+            lost = self._doubtful()
             try:
                 window.edit()
             except ValueError:
                 window.refresh()
+            if lost and not self._doubtful():
+                self.again.append(self.count - 1)
             self._later()
         elif self.count >= self.next_tick:
             window.refresh()
@@ -221,7 +270,10 @@ class LiveEditor:
             for name in ("state", "sigma", "los_sigma"):
                 rows[name] = getattr(self.smoothed, name)[s : s + n]
         known = np.ones(n, bool)
-        return [Published(first, rows, label, known)]
+        again = np.isin(np.arange(first, stop), self.again)
+        self.again = [row for row in self.again if row >= stop]
+        label[:, list(self.absent)] = 3.0
+        return [Published(first, rows, label, known, again)]
 
     def _unknown(self, first: int, missing) -> Published:
         n = len(missing)
@@ -230,4 +282,4 @@ class LiveEditor:
             rows[name] = np.nan
         rows["weight"] = 0.0
         rows["since_start"] = 0.0
-        return Published(first, rows, np.where(missing, 3.0, 0.0), np.zeros(n, bool))
+        return Published(first, rows, np.where(missing, 3.0, 0.0), np.zeros(n, bool), np.zeros(n, bool))

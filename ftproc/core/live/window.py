@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.editing import outlier_chain, patch_likelihood, two_pass
 from ftproc.core.editing.predictive_chain import OPEN, chains_of, run_predictive, run_predictive_coloured
+from ftproc.core.editing.screening import SHORTEST_STUCK, STUCK_ODDS
 from ftproc.core.filtering.forward import Span
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven, between, empty_rows
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
@@ -37,6 +38,39 @@ class Sizes(NamedTuple):
     near: int
 
 
+class Repeats:
+    """How often readings repeat the one before, component by component; see `screening.stuck`."""
+
+    def __init__(self) -> None:
+        self.last, self.run = np.full(3, np.nan), np.zeros(3, int)
+        self.seen, self.ended = np.zeros(3, int), np.zeros(3, int)  # readings, and repeats in runs that are over
+
+    def stuck(self, measurement: FloatArray) -> list[tuple[int, int, int]]:
+        """Row, component and length so far of the runs of repeats among the next rows that chance does not explain."""
+        found = []
+        for c in range(3):
+            seen = np.flatnonzero(np.isfinite(measurement[:, c]))
+            values = np.r_[self.last[c], measurement[seen, c]]
+            same = values[1:] == values[:-1]
+            if not len(seen) or not (same.any() or self.run[c]):
+                self.seen[c] += len(seen)
+                self.last[c] = values[-1]
+                continue
+            for k, repeated in zip(seen.tolist(), same.tolist(), strict=True):
+                self.seen[c] += 1
+                if not repeated:
+                    self.ended[c] += self.run[c]
+                    self.run[c] = 0
+                    continue
+                self.run[c] += 1
+                chance = self.ended[c] / self.seen[c]
+                needed = math.log(STUCK_ODDS / self.seen[c]) / math.log(max(chance, 1e-300)) if chance < 1 else math.inf
+                if self.run[c] >= max(needed, SHORTEST_STUCK - 1):
+                    found.append((k, c, int(self.run[c])))
+            self.last[c] = values[-1]
+        return found
+
+
 class Window:
     """A track and the readings it rests on."""
 
@@ -44,7 +78,9 @@ class Window:
         self.known, self.sizes = known, sizes
         self.time_s, self.measurement = time_s, measurement
         self.rows = empty_rows(len(time_s))
-        self.near = 0
+        self.near, self.repeats = 0, Repeats()
+        self.possible = np.isfinite(measurement) & (measurement[:, :1] > 0) | np.isfinite(measurement) & np.array([False, True, True])
+        self._refuse_stuck(0)
         self.noise: FloatArray | None = None
 
     def __len__(self) -> int:
@@ -54,7 +90,8 @@ class Window:
 
     def edit(self) -> None:
         """Decide on all of the buffer anew. Raises ValueError when a component has no reading that agrees."""
-        edited = two_pass.edit(self.time_s, self.measurement, self.known, short=len(self) < SHORT)
+        readings = np.where(self.possible, self.measurement, np.nan)
+        edited = two_pass.edit(self.time_s, readings, self.known, short=len(self) < SHORT)
         self.adopt(edited)
 
     def adopt(self, edited: two_pass.Edited) -> None:
@@ -62,8 +99,6 @@ class Window:
         self.weight, self.rates = edited.weight.copy(), edited.decision.rates
         self.noise = edited.model.noise_variance
         self.uneven = edited.log.uneven or Uneven.none(len(self))
-        self.possible = np.isfinite(self.measurement) & ~two_pass.stuck_readings(self.measurement, np.sqrt(self.noise))
-        self.possible[:, 0] &= self.measurement[:, 0] > 0
         self.near = max(len(self) - self.sizes.near, 0)
         starts = edited.starts
         model = edited.model
@@ -102,6 +137,14 @@ class Window:
         """Some samples with their decisions (copies)."""
         return Observations(self.time_s[span], self.measurement[span], self.weight[span].copy(), self.uneven.part(span))
 
+    def _refuse_stuck(self, first: int) -> None:
+        """No reading from `first` on that merely repeats the one before for too long is possible, nor those before it."""
+        for k, c, run in self.repeats.stuck(self.measurement[first:]):
+            seen = np.flatnonzero(np.isfinite(self.measurement[: first + k + 1, c]))[-run:]
+            self.possible[seen, c] = False
+            if first:
+                self.weight[seen, c] = 0.0
+
     def used_lately(self, count: int) -> FloatArray:
         """(3,) share of each component's last `count` readings that is used."""
         found = np.ones(3)
@@ -120,7 +163,9 @@ class Window:
         possible = np.isfinite(measurement)
         possible[:, 0] &= measurement[:, 0] > 0
         self.possible = np.concatenate([self.possible, possible])
-        self.weight = np.concatenate([self.weight, np.where(possible, OPEN, 0.0)])
+        self.weight = np.concatenate([self.weight, np.zeros((m, 3))])
+        self._refuse_stuck(n)
+        self.weight[n:][self.possible[n:]] = OPEN
         late, times = self.uneven.late, self.uneven.times
         self.uneven = Uneven(np.concatenate([times, np.repeat(np.median(times[-50:], 0)[None], m, 0)]), np.concatenate([late, np.repeat(late[-1:], m, 0)]))
         log = self.observed(slice(n - 1, n + m))
