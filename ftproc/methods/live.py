@@ -32,7 +32,7 @@ def parts(record: Recording, settings: FilterSettings) -> Iterator[Part]:
         found = live.push(readings.time_s, readings.measurement)
         if rows.stop == len(record):
             found += live.finish()
-            if live.window is None and not live.was_confirmed:
+            if not live.confirmed_once:
                 raise ValueError("no track can be confirmed from so few readings, or from readings that agree so little")
         if found:
             n = sum(len(each.rows) for each in found)

@@ -1,39 +1,47 @@
 """The live editor: readings in, rows out, each as soon as its lag has passed.
 
-What a row rests on depends on the readings before it and up to its lag after it alone, not on how they arrive: when to
-look again at the newest part, and when at all of the buffer, follows from counts and times of rows.
+What a row rests on depends on the readings before it, and up to its lag after it, alone, not on how they arrive: when
+the newest part of the window is looked at again, and when all of it, follows from the counts and times of rows.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.editing import outlier_chain, two_pass
+from ftproc.core.editing import outlier_chain
+from ftproc.core.editing.two_pass import Known
 from ftproc.core.filtering.initialization import FEWEST_READINGS, shortest_gap
 from ftproc.core.filtering.records import ROW, Model, empty_rows
+from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.live.window import Sizes, Window
 
 FloatArray = NDArray[np.float64]
 
-FEWEST = 16  # samples before a track may be confirmed
-GROWTH = 1.25  # from one attempt to the next
-ROUND = 128  # samples from one new look at the buffer to the next, once the track is old
+FEWEST = 16  # samples before a track may be confirmed,
+GROWTH = 1.25  # and times as many at the next attempt
 LATELY, AGREE = 8, 0.6  # readings of a component, and share of them that must be good for a track to be confirmed
-DOUBTED, DOUBT = 12, 0.4  # readings, and share of them: with fewer good ones the track itself is in doubt
-PATIENCE_S = 1.5
-TICK_S = 0.1  # between refreshes, or one sample
-LONGEST_ISOLATED = 2
-PATIENCE = 64  # samples that a component with few readings may take before its noise is assumed
-ASSUMED_READING, ASSUMED_SIGMA = (10_000.0, 0.0, 0.0), (10.0, 1e-3, 1e-3)  # m, rad, rad
+VAGUE = 0.1  # of the range, as 1-sigma of the position: then there is no track
+PATIENCE = 64  # samples after which the noise of a component with few readings is assumed
+ASSUMED_READING, ASSUMED_SIGMA = (10_000.0, 0.0, 0.0), (10.0, 1e-3, 1e-3)  # m, rad, rad: of what was never, or hardly seen
+YOUNG, SOONEST, ROUND = 0.25, 4, 128  # all of the window is looked at when it has grown by this share, but not
+# sooner and not later than after so many samples,
+DOUBT_S, DOUBT_GROWTH, DOUBT_SAMPLES = 1.5, 0.2, 3  # or while the track is in doubt, after so long, or after this share
+# of the time since it is, and so many samples
+REFRESH_S = 0.1  # between refreshes of the newest part, or one sample
+WINDOW_S, WINDOW_SAMPLES = 30.0, (300, 1500)  # of the window: the longer of the two, up to so many samples
+NEAR_S, NEAR_SAMPLES = 8.0, (120, 400)  # of its newest part, beside the lag
+LONGEST_ISOLATED = 2  # readings rejected in a row; more make a patch
 
 
 class Published(NamedTuple):
-    """Rows that leave. first: number of the first, counted from zero. rows: `Row` records (n,). label: (n, 3) as
-    `outlier_chain.label_runs`. known: (n,) whether there is an estimate. reacquired: (n,) whether a lost track was found
-    again there."""
+    """Rows that leave. first: number of the first, from zero. rows: `Row` records (n,), NaN where there is no estimate.
+    label: (n, 3) as of `outlier_chain.label_runs`. known: (n,) whether there is an estimate. reacquired: (n,) whether a
+    lost track was found again there."""
 
     first: int
     rows: Any
@@ -43,131 +51,95 @@ class Published(NamedTuple):
 
 
 class LiveEditor:
-    def __init__(self, known: two_pass.Known, lag_s: float = 0.0) -> None:
-        self.known, self.lag_s = known, lag_s
+    """Edits and filters readings as they come. absent: components that were never seen."""
+
+    def __init__(self, known: Known, lag_s: float = 0.0, window: Callable[..., Window] = Window) -> None:
+        """lag_s: seconds that a row waits for later readings. window: the kind of window that edits."""
+        self.known, self.lag_s, self.kind = known, lag_s, window
         self.window: Window | None = None
-        self.time_s, self.measurement = np.empty(0), np.empty((0, 3))  # before the track is confirmed
-        self.absent: tuple[int, ...] = ()  # components that were never seen
-        self.again: list[int] = []  # rows at which a lost track was found again, until they leave
-        self.count = 0  # rows taken
-        self.published = 0
-        self.next_tick, self.next_edit = 0, FEWEST
-        self.edits = 0
-        self.was_confirmed = False
-        self.next_doubt, self.next_doubt_s, self.doubted_from_s = 0, 0.0, 0.0
-
-    def push(self, time_s: FloatArray, measurement: FloatArray) -> list[Published]:
-        found: list[Published] = []
-        low = 0
-        while low < len(time_s):
-            if self.window is None:
-                high = low + 1
-                found += self._due(time_s[low])
-                self._take_unconfirmed(time_s[low:high], measurement[low:high])
-            else:
-                if np.isfinite(measurement[low, list(self.absent)]).any():
-                    self._begin_again()
-                    continue
-                high = self._slice_end(time_s, low)
-                seen = np.flatnonzero(np.isfinite(measurement[low:high, list(self.absent)]).any(1))
-                high = low + int(seen[0]) if len(seen) else high
-                if self.lag_s > 0:
-                    found += self._due(time_s[high - 1])
-                self._note_gap(float(time_s[low]))
-                self.window.append(time_s[low:high], self._with_stand_ins(measurement[low:high]))
-                self.count += high - low
-                self._look()
-            if self.lag_s == 0:
-                found += self._out(self.count)
-            low = high
-        return found
-
-    def finish(self) -> list[Published]:
-        """The rows that wait, when no more come."""
-        if self.window is not None and self.lag_s > 0:
-            self._refresh()
-        return self._out(self.count)
-
-    # ------------------------------------------------------------------------------------------------------------------
-
-    def _slice_end(self, time_s: FloatArray, low: int) -> int:
-        """How many of the rows to come can be taken at once."""
-        high = min(len(time_s), low + max(min(self.next_tick, self.next_edit) - self.count, 1))
-        gaps = np.flatnonzero(np.diff(time_s[low:high]) > self.longest_s)
-        if len(gaps):
-            high = low + int(gaps[0]) + 1
-        if self.lag_s > 0:
-            # the first row that is not covered by the last refresh must not be due before the next
-            uncovered = self.refreshed - self.first
-            waiting = np.concatenate([self.window.time_s[uncovered:], time_s[low:high]])
-            if len(waiting):
-                overdue = np.flatnonzero(time_s[low:high] > waiting[0] + self.lag_s)
-                if len(overdue):
-                    if overdue[0] == 0:
-                        self._refresh()
-                        return self._slice_end(time_s, low)
-                    high = low + int(overdue[0])
-        return high
-
-    def _note_gap(self, time_s: float) -> None:
-        """After a gap that may be too long to bridge all of the buffer is looked at as soon as a track can begin."""
-        if time_s - self.window.time_s[-1] > self.longest_s:
-            self.next_edit = min(self.next_edit, self.count + FEWEST_READINGS + 1)
-
-    def _begin_again(self) -> None:
-        """A component is seen for the first time: what is known without it does not tell where the target is."""
-        window = self.window
-        low = max(min(len(window) - window.sizes.near, self.published - self.first), 0)
-        self.time_s, self.measurement = window.time_s[low:].copy(), window.measurement[low:].copy()
-        self.measurement[:, list(self.absent)] = np.nan
-        self.window, self.absent, self.next_edit = None, (), self.count + FEWEST_READINGS
+        self.confirmed_once = False
+        self.waiting = _Waiting(np.empty(0), np.empty((0, 3)))
+        self.absent: tuple[int, ...] = ()
+        self.count = self.published = 0  # rows taken, and rows that have left
+        self.next_edit, self.next_refresh = FEWEST, 0
+        self.doubt = _Doubt()
+        self.refreshed = 0  # rows that the last refresh has seen
+        self.smoothed: tuple[int, SmootherRun] | None = None  # the newest part, from this row on, where there is a lag
 
     @property
     def model(self) -> Model:
         """Noise and process noise of the track; of none before it is confirmed."""
         return Model(np.full(3, np.nan), np.empty((0, 6))) if self.window is None else self.window.allowed
 
-    @property
-    def first(self) -> int:
-        """Number of the window's first row."""
-        return self.count - len(self.window)
+    def push(self, time_s: FloatArray, measurement: FloatArray) -> list[Published]:
+        """Take the next rows, time_s (n,) never decreasing, measurement (n, 3); the rows that leave."""
+        found: list[Published] = []
+        low = 0
+        while low < len(time_s):
+            if self.window is None:
+                high = low + 1
+                found += self._due(float(time_s[low]))
+                self.waiting = self.waiting.with_row(time_s[low:high], measurement[low:high])
+                self.count += 1
+                if self.count >= self.next_edit:
+                    self._confirm()
+            else:
+                if np.isfinite(measurement[low, list(self.absent)]).any():
+                    self._begin_again()
+                    continue
+                high = self._slice_end(time_s, measurement, low)
+                if self.lag_s > 0:
+                    found += self._due(float(time_s[high - 1]))
+                self._note_gap(self.window, float(time_s[low]))
+                self.window.append(time_s[low:high], self._with_stand_ins(measurement[low:high]))
+                self.count += high - low
+                self._look(self.window)
+            if self.lag_s == 0:
+                found += self._leave(self.count)
+            low = high
+        return found
 
-    def _take_unconfirmed(self, time_s, measurement) -> None:
-        self.time_s = np.concatenate([self.time_s, time_s])
-        self.measurement = np.concatenate([self.measurement, measurement])
-        self.count += len(time_s)
-        if self.count < self.next_edit:
-            return
-        window = self._confirmed()
-        if window is None:
-            self.next_edit = int(self.count * GROWTH) + 1
-            return
-        self.window, self.was_confirmed = window, True
-        self.time_s, self.measurement = np.empty(0), np.empty((0, 3))
-        self._later()
-        self.refreshed = self.count
-        self._smooth()
+    def finish(self) -> list[Published]:
+        """The rows that wait, when no more come."""
+        if self.window is not None and self.lag_s > 0:
+            self._refresh(self.window)
+        return self._leave(self.count)
 
-    def _confirmed(self) -> Window | None:
-        count = np.isfinite(self.measurement).sum(0)
-        few = count < FEWEST_READINGS
-        if count.sum() < 2 * FEWEST_READINGS or (few & (count > 0)).any() and len(self.time_s) < PATIENCE:
-            return None
-        self.absent = tuple(np.flatnonzero(count == 0).tolist())
+    # -- the track's beginning ------------------------------------------------------------------------------------------
+
+    def _confirm(self) -> None:
+        """Begin a track, if the readings so far agree on one."""
+        self.next_edit = int(self.count * GROWTH) + 1
+        seen = np.isfinite(self.waiting.measurement).sum(0)
+        few = seen < FEWEST_READINGS
+        if seen.sum() < 2 * FEWEST_READINGS or ((few & (seen > 0)).any() and len(self.waiting.time_s) < PATIENCE):
+            return
+        self.absent = tuple(np.flatnonzero(seen == 0).tolist())
         sigma = np.where(few & np.isnan(self.known.sigma), ASSUMED_SIGMA, self.known.sigma)
-        readings = self._with_stand_ins(self.measurement)
-        window = Window(self.time_s, readings, self.known._replace(sigma=sigma), self._sizes(self.time_s))
+        readings = self._with_stand_ins(self.waiting.measurement)
+        sizes = self._sizes(self.waiting.time_s)
+        window = self.kind(self.waiting.time_s, readings, self.known._replace(sigma=sigma), sizes)
         try:
             window.edit()
-        except ValueError:
-            return None
-        self.edits += 1
-        last = window.rows[-1]
-        if (window.used_lately(LATELY) < AGREE).any():
-            return None
-        if not np.sqrt((last["sigma"][:3]**2).sum()) < 0.1 * np.linalg.norm(last["state"][:3]):
-            return None
-        return window
+        except ValueError:  # a component has too few readings that agree
+            return
+        newest = window.rows[-1]
+        vague = np.linalg.norm(newest["sigma"][:3]) / np.linalg.norm(newest["state"][:3])
+        if (window.used_lately(LATELY) < AGREE).any() or not vague < VAGUE:
+            return
+        self.window, self.confirmed_once = window, True
+        self.waiting = _Waiting(np.empty(0), np.empty((0, 3)))
+        self._edited(window)
+
+    def _begin_again(self) -> None:
+        """A component is seen for the first time: what is known without it does not tell where the target is."""
+        assert self.window is not None
+        window = self.window
+        low = max(min(len(window) - window.sizes.near, self.published - self._first), 0)
+        measurement = window.measurement[low:].copy()
+        measurement[:, list(self.absent)] = np.nan
+        self.waiting = _Waiting(window.time_s[low:].copy(), measurement)
+        self.window, self.absent, self.next_edit = None, (), self.count + FEWEST_READINGS
 
     def _with_stand_ins(self, measurement: FloatArray) -> FloatArray:
         """The readings with constants for components that were never seen; they keep the filter upright, and nothing
@@ -177,109 +149,136 @@ class LiveEditor:
             readings[:, c] = ASSUMED_READING[c]
         return readings
 
+    # -- when to look ---------------------------------------------------------------------------------------------------
+
+    @property
+    def _first(self) -> int:
+        """Number of the first row that is kept."""
+        return self.count - len(self.waiting.time_s if self.window is None else self.window)
+
     def _sizes(self, time_s: FloatArray) -> Sizes:
+        """How much the window keeps, by the interval of its readings."""
         times = np.diff(time_s)
-        interval = float(np.median(times[times > 0])) if (times > 0).any() else 1.0
-        self.longest_s = shortest_gap(interval)
-        self.tick = max(1, int(np.ceil(TICK_S / interval - 1e-6)))
-        lag = int(self.lag_s / interval)
-        buffer = int(np.clip(30.0 / interval, 300, 1500))
-        near = int(np.clip(8.0 / interval, 120, 400)) + lag
-        return Sizes(max(buffer, 2 * near), near)
+        interval_s = float(np.median(times[times > 0])) if (times > 0).any() else 1.0
+        self.longest_s = shortest_gap(interval_s)
+        self.samples_a_refresh = max(1, math.ceil(REFRESH_S / interval_s - 1e-6))
+        near = int(np.clip(NEAR_S / interval_s, *NEAR_SAMPLES)) + int(self.lag_s / interval_s)
+        return Sizes(max(int(np.clip(WINDOW_S / interval_s, *WINDOW_SAMPLES)), 2 * near), near)
 
-    def _later(self) -> None:
-        self.next_edit = self.count + min(ROUND, max(4, int(0.25 * self.count)))
-        now_s = float(self.window.time_s[-1])
-        if not self._doubtful():
-            self.doubted_from_s = now_s
-        self.next_doubt, self.next_doubt_s = self.count + 3, now_s + max(PATIENCE_S, 0.2 * (now_s - self.doubted_from_s))
-        self.next_tick = self.count + self.tick
+    def _slice_end(self, time_s: FloatArray, measurement: FloatArray, low: int) -> int:
+        """How far the rows can be taken at once: to the next look, the next gap, the first reading of a component that
+        was absent, or where a row must leave that no refresh has seen."""
+        assert self.window is not None
+        high = min(len(time_s), low + max(min(self.next_refresh, self.next_edit) - self.count, 1))
+        if self.lag_s > 0:
+            unseen = np.concatenate([self.window.time_s[self.refreshed - self._first :], time_s[low:high]])
+            if time_s[low] > unseen[0] + self.lag_s:
+                self._refresh(self.window)
+                return self._slice_end(time_s, measurement, low)
+            high = low + int(np.searchsorted(time_s[low:high], unseen[0] + self.lag_s, side="right"))
+        gaps = np.flatnonzero(np.diff(time_s[low:high]) > self.longest_s)
+        high = low + int(gaps[0]) + 1 if len(gaps) else high
+        seen = np.flatnonzero(np.isfinite(measurement[low:high, list(self.absent)]).any(1))
+        return low + int(seen[0]) if len(seen) else high
 
-    def _doubtful(self) -> bool:
-        return bool((self.window.used_lately(DOUBTED) < DOUBT).any())
+    def _note_gap(self, window: Window, time_s: float) -> None:
+        """After a gap that may be too long to bridge, all of the window is looked at as soon as a track can begin."""
+        if time_s - window.time_s[-1] > self.longest_s:
+            self.next_edit = min(self.next_edit, self.count + FEWEST_READINGS + 1)
 
-    def _look(self) -> None:
-        window = self.window
-        if self.count >= self.next_edit or (
-            self.count >= self.next_tick
-            and self.count >= self.next_doubt
-            and self.window.time_s[-1] >= self.next_doubt_s
-            and self._doubtful()
-        ):
+    def _look(self, window: Window) -> None:
+        doubted = self.count >= self.next_refresh and self.doubt.is_due(window, self.count)
+        if self.count >= self.next_edit or doubted:
             window.sizes = self._sizes(window.time_s)
-            if len(window) > window.sizes.buffer:
-                drop = len(window) - window.sizes.buffer
-                window.forget(drop)
-            self.edits += 1
-            lost = self._doubtful()
+            window.trim()
+            lost = window.in_doubt()
             try:
                 window.edit()
-            except ValueError:
+            except ValueError:  # a component has too few readings that agree
                 window.refresh()
-            if lost and not self._doubtful():
-                self.again.append(self.count - 1)
-            self._later()
-        elif self.count >= self.next_tick:
-            window.refresh()
-            self.next_tick = self.count + self.tick
-        else:
-            return
-        self.refreshed = self.count
-        self._smooth()
+            if lost and not window.in_doubt():
+                window.reacquired.append(len(window) - 1)
+            self._edited(window)
+        elif self.count >= self.next_refresh:
+            self._refresh(window)
 
-    def _refresh(self) -> None:
+    def _edited(self, window: Window) -> None:
+        self.next_edit = self.count + int(np.clip(YOUNG * self.count, SOONEST, ROUND))
+        self.doubt = self.doubt.after_edit(window, self.count)
+        self._seen(window)
+
+    def _refresh(self, window: Window) -> None:
         if self.refreshed < self.count:
-            self.window.refresh()
-            self.refreshed = self.count
-            self.next_tick = self.count + self.tick
-            self._smooth()
+            window.refresh()
+            self._seen(window)
 
-    def _smooth(self) -> None:
+    def _seen(self, window: Window) -> None:
+        self.refreshed, self.next_refresh = self.count, self.count + self.samples_a_refresh
         if self.lag_s > 0:
-            self.smoothed = self.window.smoothed()
-            self.smoothed_first = self.first + self.window.near
+            self.smoothed = self._first + window.near, window.smoothed()
+
+    # -- what leaves ----------------------------------------------------------------------------------------------------
 
     def _due(self, now_s: float) -> list[Published]:
         """The rows whose lag has passed at a time."""
-        if self.window is None:
-            k = self.published - (self.count - len(self.time_s))
-            due = int(np.searchsorted(self.time_s[k:] + self.lag_s, now_s, side="left"))
-            return self._out(self.published + due)
-        k = self.published - self.first
-        due = int(np.searchsorted(self.window.time_s[k:] + self.lag_s, now_s, side="left"))
-        return self._out(min(self.published + due, self.refreshed))
+        kept = self.waiting.time_s if self.window is None else self.window.time_s
+        due = int(np.searchsorted(kept[self.published - self._first :] + self.lag_s, now_s, side="left"))
+        most = self.count if self.window is None else self.refreshed
+        return self._leave(min(self.published + due, most))
 
-    def _out(self, stop: int) -> list[Published]:
+    def _leave(self, stop: int) -> list[Published]:
         first, n = self.published, stop - self.published
         if n <= 0:
             return []
         self.published = stop
+        low = first - self._first
         if self.window is None:
-            start = first - (self.count - len(self.time_s))
-            missing = ~np.isfinite(self.measurement[start : start + n])
-            return [self._unknown(first, missing)]
-        w = self.window
-        low = first - self.first
-        if low < 0:
-            raise AssertionError("forgot rows before they left")
-        rows = w.rows[low : low + n].copy()
-        a = w.near
-        label = outlier_chain.label_runs(np.maximum(w.weight[a:], 0), w.measurement[a:], LONGEST_ISOLATED)[low - a : low - a + n]
-        if self.lag_s > 0:
-            s = first - self.smoothed_first
+            missing = ~np.isfinite(self.waiting.measurement[low : low + n])
+            nothing = np.zeros(n, bool)
+            return [Published(first, _unknown_rows(n), np.where(missing, 3.0, 0.0), nothing, nothing)]
+        window = self.window
+        rows = window.rows[low : low + n].copy()
+        if self.smoothed is not None:
+            begin, smoothed = self.smoothed
             for name in ("state", "sigma", "los_sigma"):
-                rows[name] = getattr(self.smoothed, name)[s : s + n]
-        known = np.ones(n, bool)
-        again = np.isin(np.arange(first, stop), self.again)
-        self.again = [row for row in self.again if row >= stop]
+                rows[name] = getattr(smoothed, name)[first - begin : stop - begin]
+        run = min(window.near, low)
+        label = outlier_chain.label_runs(np.maximum(window.weight[run:], 0), window.measurement[run:], LONGEST_ISOLATED)
+        label = label[low - run : low - run + n]
         label[:, list(self.absent)] = 3.0
-        return [Published(first, rows, label, known, again)]
+        again = np.isin(np.arange(low, low + n), window.reacquired)
+        return [Published(first, rows, label, np.ones(n, bool), again)]
 
-    def _unknown(self, first: int, missing) -> Published:
-        n = len(missing)
-        rows = empty_rows(n)
-        for name in ROW.names:
-            rows[name] = np.nan
-        rows["weight"] = 0.0
-        rows["since_start"] = 0.0
-        return Published(first, rows, np.where(missing, 3.0, 0.0), np.zeros(n, bool), np.zeros(n, bool))
+
+class _Waiting(NamedTuple):
+    """Rows before there is a track."""
+
+    time_s: FloatArray
+    measurement: FloatArray
+
+    def with_row(self, time_s: FloatArray, measurement: FloatArray) -> _Waiting:
+        return _Waiting(np.concatenate([self.time_s, time_s]), np.concatenate([self.measurement, measurement]))
+
+
+class _Doubt(NamedTuple):
+    """When a track in doubt is looked at: not before this row and this time. since_s: since when it is in doubt."""
+
+    row: int = 0
+    time_s: float = -math.inf
+    since_s: float = 0.0
+
+    def is_due(self, window: Window, row: int) -> bool:
+        return row >= self.row and float(window.time_s[-1]) >= self.time_s and window.in_doubt()
+
+    def after_edit(self, window: Window, row: int) -> _Doubt:
+        now_s = float(window.time_s[-1])
+        since_s = self.since_s if window.in_doubt() else now_s
+        return _Doubt(row + DOUBT_SAMPLES, now_s + max(DOUBT_S, DOUBT_GROWTH * (now_s - since_s)), since_s)
+
+
+def _unknown_rows(n: int) -> Any:
+    """`Row` records without an estimate."""
+    rows = empty_rows(n)
+    for name in ROW.names or ():
+        rows[name] = 0.0 if name in ("weight", "since_start") else np.nan
+    return rows

@@ -27,6 +27,7 @@ FloatArray = NDArray[np.float64]
 
 ROUNDS = 3  # of smoothing and deciding in a refresh
 SHORT = 160  # samples: with fewer, nothing is said of how the noise of single readings differs
+DOUBTED, DOUBT = 12, 0.4  # readings, and share of them: with fewer good ones the track is in doubt
 MARGIN = 5.0  # by which the log-probability of other decisions must be better
 JERK_STEPS = 2  # of the search for the jerk profile in a refresh
 
@@ -79,6 +80,7 @@ class Window:
         self.time_s, self.measurement = time_s, measurement
         self.rows = empty_rows(len(time_s))
         self.near, self.repeats = 0, Repeats()
+        self.reacquired: list[int] = []  # samples at which a lost track was found again
         self.possible = np.isfinite(measurement) & (measurement[:, :1] > 0) | np.isfinite(measurement) & np.array([False, True, True])
         self._refuse_stuck(0)
         self.noise: FloatArray | None = None
@@ -144,6 +146,10 @@ class Window:
             self.possible[seen, c] = False
             if first:
                 self.weight[seen, c] = 0.0
+
+    def in_doubt(self) -> bool:
+        """Whether so few of a component's newest readings are used that it may be the track that is wrong."""
+        return bool((self.used_lately(DOUBTED) < DOUBT).any())
 
     def used_lately(self, count: int) -> FloatArray:
         """(3,) share of each component's last `count` readings that is used."""
@@ -281,14 +287,15 @@ class Window:
         self.near = target
         jerk = self.model.jerk
         self.model = self.model._replace(jerk=jerk[min(knot, len(jerk) - 1):])
-        drop = len(self) - self.sizes.buffer
-        if drop > self.sizes.buffer // 4:
-            self.forget(min(drop, self.near))
+        if len(self) > 5 * self.sizes.buffer // 4:
+            self.trim()
 
-    def forget(self, drop: int) -> None:
+    def trim(self) -> None:
+        """Forget what the buffer has too much of."""
+        drop = min(max(len(self) - self.sizes.buffer, 0), self.near)
         self.time_s, self.measurement, self.possible, self.weight, self.rows = (
             each[drop:].copy() for each in (self.time_s, self.measurement, self.possible, self.weight, self.rows)
         )
         self.uneven = self.uneven.part(slice(drop, None))
         self.near -= drop
-        self.dropped = getattr(self, "dropped", 0) + drop
+        self.reacquired = [row - drop for row in self.reacquired if row >= drop]
