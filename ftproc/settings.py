@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+EDITING = ("two-pass", "live", "forward", "none")
 PACKAGED, NO_MODEL = "packaged", "none"  # values of `model` that are not files
 EPOCHS = {"l-bfgs": 400, "momentum": 1000}  # most that an optimiser of `train` is given, where the user says nothing
 

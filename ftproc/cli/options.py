@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from ftproc.settings import FilterSettings, Noise
+from ftproc.settings import EDITING, FilterSettings, Noise
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -187,7 +187,7 @@ def _with(options: tuple[Callable[[Any], Any], ...], function: F) -> F:
 
 _TUNED: tuple[Callable[[Any], Any], ...] = (
     click.option(
-        "--editing", type=click.Choice(["two-pass", "live", "forward", "none"]), default=FilterSettings.editing,
+        "--editing", type=click.Choice(EDITING), default=FilterSettings.editing,
         help="How outliers are found: from the whole log (two-pass), from a window of the readings so far, as a live "
         "system can (live), recursively (forward), or not at all.",
     ),

@@ -10,6 +10,7 @@ import numpy as np
 from ftproc.core.editing.two_pass import Known
 from ftproc.core.filtering.records import FilterRun
 from ftproc.core.live.editor import LiveEditor, Published
+from ftproc.core.live.recursive import Gating
 from ftproc.methods.estimate import Estimate, Part, Recording
 from ftproc.records import chunks
 from ftproc.settings import FilterSettings
@@ -20,7 +21,10 @@ BLOCK = 4096  # samples of a part
 def editor(settings: FilterSettings) -> LiveEditor:
     """The live editor with these settings."""
     sigma = np.array(settings.noise or (None, None, None), float)  # None becomes NaN
-    return LiveEditor(Known(sigma, settings.jerk_psd_m2ps5, settings.gate), settings.lag_s)
+    known = Known(sigma, settings.jerk_psd_m2ps5, settings.gate)
+    if settings.editing == "forward":
+        return LiveEditor(known, 0.0, Gating(settings.gate, settings.max_patch_s, settings.gain_form).window)
+    return LiveEditor(known, settings.lag_s)
 
 
 def parts(record: Recording, settings: FilterSettings) -> Iterator[Part]:
@@ -33,7 +37,7 @@ def parts(record: Recording, settings: FilterSettings) -> Iterator[Part]:
         if rows.stop == len(record):
             found += live.finish()
             if not live.confirmed_once:
-                raise ValueError("no track can be confirmed from so few readings, or from readings that agree so little")
+                raise ValueError("the readings are too few, or agree too little, for a track to be confirmed")
         if found:
             n = sum(len(each.rows) for each in found)
             first = found[0].first
@@ -46,7 +50,5 @@ def estimate(live: LiveEditor, found: Sequence[Published], time_s: np.ndarray) -
     label = np.concatenate([each.label for each in found]).astype(np.uint8)
     known = np.concatenate([each.known for each in found])
     again = np.concatenate([each.reacquired for each in found])
-    return Estimate(
-        FilterRun.of(time_s, rows, 0.0), label, live.model, reacquired=tuple(np.flatnonzero(again).tolist()), known=known,
-        absent=live.absent,
-    )  # fmt: skip
+    run, lost = FilterRun.of(time_s, rows, 0.0), tuple(np.flatnonzero(again).tolist())
+    return Estimate(run, label, live.model, reacquired=lost, known=known, absent=live.absent)

@@ -8,13 +8,12 @@ import numpy as np
 from ftproc.errors import InputError, UsageError, row_named
 from ftproc.methods.estimate import Recording
 from ftproc.records import COMPONENTS, FloatArray, IntArray, MeasurementLog, chunks, forget, thinned
-from ftproc.settings import FilterSettings
+from ftproc.settings import EDITING, FilterSettings
 
 FARTHEST_M = 1e12  # with half of all ranges beyond, the column or its unit is wrong
 SHORTEST_S = 1e-6  # the shortest duration of a log of several times; less is a wrong unit
 MOST_RANGES = 250_000  # that are checked; a longer log is thinned
 LATEST_S = 1e11  # 3000 years; beyond, the unit is not seconds, and differences lose their fractions
-EDITING = ("two-pass", "live", "forward", "none")
 LONGEST_LAG_S = 3600.0
 SMALLEST = 1e-30  # of noise, jerk PSD and gate: the square and its inverse must be finite
 FEWEST_PARTICLES = 20

@@ -31,9 +31,9 @@ OPEN = -1.0  # the weight of a reading that is not decided
 class Chains(Protocol):
     """The record of the chains of range, azimuth and elevation.
 
-    stretch: (gate / natural gate)^2. rates: (3, 3) isolated outlier, patch begins, patch goes on, by component. wide: (3,) variance that a bad reading
-    has beyond the good ones'. ahead: (3, 3) probabilities of the next reading's state by component, negative before
-    the first reading. good: (3,) probability that the last reading was good.
+    stretch: (gate / natural gate)^2. rates: (3, 3) isolated outlier, patch begins, patch goes on, by component. wide:
+    (3,) variance that a bad reading has beyond the good ones'. ahead: (3, 3) probabilities of the next reading's state
+    by component, negative before the first reading. good: (3,) probability that the last reading was good.
     """
 
     stretch: float
@@ -84,7 +84,7 @@ def _weigh(chains: Chains, i: int, innovation: float, variance: float) -> float:
             + p1 * _transition(isolated, begins, stays, 1, j)
             + p2 * _transition(isolated, begins, stays, 2, j)
         )
-    return p0
+    return float(p0)
 
 
 @part

@@ -117,7 +117,7 @@ def edit(
     """Edit a whole log, or a segment of a long one. time_s (n,), measurement (n, 3).
 
     segment_of: of a segment, the noise of the whole log, which is taken as it is, and its typical jerk, with which the
-    search starts. short: the log is too short to tell whether the noise is uneven or correlated, so it is taken for white.
+    search starts. short: the log is too short to tell whether the noise is uneven or correlated: it is taken for white.
     Raises ValueError when a component has no reading that agrees with its neighbours.
     """
     jerk_psd = known.jerk_psd

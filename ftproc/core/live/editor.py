@@ -25,9 +25,9 @@ FloatArray = NDArray[np.float64]
 FEWEST = 16  # samples before a track may be confirmed,
 GROWTH = 1.25  # and times as many at the next attempt
 LATELY, AGREE = 8, 0.6  # readings of a component, and share of them that must be good for a track to be confirmed
-VAGUE = 0.1  # of the range, as 1-sigma of the position: then there is no track
+VAGUE = 1.0  # times the noise of a single reading, as 1-sigma of the position: then there is no track
 PATIENCE = 64  # samples after which the noise of a component with few readings is assumed
-ASSUMED_READING, ASSUMED_SIGMA = (10_000.0, 0.0, 0.0), (10.0, 1e-3, 1e-3)  # m, rad, rad: of what was never, or hardly seen
+ASSUMED_READING, ASSUMED_SIGMA = (10_000.0, 0.0, 0.0), (10.0, 1e-3, 1e-3)  # m, rad, rad: of what was hardly seen
 YOUNG, SOONEST, ROUND = 0.25, 4, 128  # all of the window is looked at when it has grown by this share, but not
 # sooner and not later than after so many samples,
 DOUBT_S, DOUBT_GROWTH, DOUBT_SAMPLES = 1.5, 0.2, 3  # or while the track is in doubt, after so long, or after this share
@@ -35,6 +35,7 @@ DOUBT_S, DOUBT_GROWTH, DOUBT_SAMPLES = 1.5, 0.2, 3  # or while the track is in d
 REFRESH_S = 0.1  # between refreshes of the newest part, or one sample
 WINDOW_S, WINDOW_SAMPLES = 30.0, (300, 1500)  # of the window: the longer of the two, up to so many samples
 NEAR_S, NEAR_SAMPLES = 8.0, (120, 400)  # of its newest part, beside the lag
+BLOCK = 4096  # samples between looks at a window that has nothing to learn
 LONGEST_ISOLATED = 2  # readings rejected in a row; more make a patch
 
 
@@ -105,7 +106,7 @@ class LiveEditor:
             self._refresh(self.window)
         return self._leave(self.count)
 
-    # -- the track's beginning ------------------------------------------------------------------------------------------
+    # -- the track's beginning --------------------------------------------------------------------------------------
 
     def _confirm(self) -> None:
         """Begin a track, if the readings so far agree on one."""
@@ -123,13 +124,18 @@ class LiveEditor:
             window.edit()
         except ValueError:  # a component has too few readings that agree
             return
-        newest = window.rows[-1]
-        vague = np.linalg.norm(newest["sigma"][:3]) / np.linalg.norm(newest["state"][:3])
-        if (window.used_lately(LATELY) < AGREE).any() or not vague < VAGUE:
+        if (window.used_lately(LATELY) < AGREE).any() or not self._vagueness(window) < VAGUE:
             return
         self.window, self.confirmed_once = window, True
         self.waiting = _Waiting(np.empty(0), np.empty((0, 3)))
         self._edited(window)
+
+    def _vagueness(self, window: Window) -> float:
+        """1-sigma of the newest position, in units of that of a single reading."""
+        (newest,) = window.shown(len(window) - 1, len(window))
+        range_m = np.linalg.norm(newest["state"][:3])
+        noise_m = np.sqrt(window.model.reading_variance) * np.array([1.0, range_m, range_m])
+        return float(np.linalg.norm(newest["sigma"][:3]) / np.linalg.norm(noise_m))
 
     def _begin_again(self) -> None:
         """A component is seen for the first time: what is known without it does not tell where the target is."""
@@ -149,7 +155,7 @@ class LiveEditor:
             readings[:, c] = ASSUMED_READING[c]
         return readings
 
-    # -- when to look ---------------------------------------------------------------------------------------------------
+    # -- when to look -----------------------------------------------------------------------------------------------
 
     @property
     def _first(self) -> int:
@@ -163,7 +169,7 @@ class LiveEditor:
         self.longest_s = shortest_gap(interval_s)
         self.samples_a_refresh = max(1, math.ceil(REFRESH_S / interval_s - 1e-6))
         near = int(np.clip(NEAR_S / interval_s, *NEAR_SAMPLES)) + int(self.lag_s / interval_s)
-        return Sizes(max(int(np.clip(WINDOW_S / interval_s, *WINDOW_SAMPLES)), 2 * near), near)
+        return Sizes(max(int(np.clip(WINDOW_S / interval_s, *WINDOW_SAMPLES)), 2 * near), near, self.lag_s)
 
     def _slice_end(self, time_s: FloatArray, measurement: FloatArray, low: int) -> int:
         """How far the rows can be taken at once: to the next look, the next gap, the first reading of a component that
@@ -203,7 +209,7 @@ class LiveEditor:
             self._refresh(window)
 
     def _edited(self, window: Window) -> None:
-        self.next_edit = self.count + int(np.clip(YOUNG * self.count, SOONEST, ROUND))
+        self.next_edit = self.count + (int(np.clip(YOUNG * self.count, SOONEST, ROUND)) if window.learns else BLOCK)
         self.doubt = self.doubt.after_edit(window, self.count)
         self._seen(window)
 
@@ -213,11 +219,12 @@ class LiveEditor:
             self._seen(window)
 
     def _seen(self, window: Window) -> None:
-        self.refreshed, self.next_refresh = self.count, self.count + self.samples_a_refresh
+        every = window.refresh_every * self.samples_a_refresh if window.learns else BLOCK
+        self.refreshed, self.next_refresh = self.count, self.count + every
         if self.lag_s > 0:
             self.smoothed = self._first + window.near, window.smoothed()
 
-    # -- what leaves ----------------------------------------------------------------------------------------------------
+    # -- what leaves ------------------------------------------------------------------------------------------------
 
     def _due(self, now_s: float) -> list[Published]:
         """The rows whose lag has passed at a time."""
@@ -237,13 +244,14 @@ class LiveEditor:
             nothing = np.zeros(n, bool)
             return [Published(first, _unknown_rows(n), np.where(missing, 3.0, 0.0), nothing, nothing)]
         window = self.window
-        rows = window.rows[low : low + n].copy()
+        rows = window.shown(low, low + n)
         if self.smoothed is not None:
             begin, smoothed = self.smoothed
             for name in ("state", "sigma", "los_sigma"):
                 rows[name] = getattr(smoothed, name)[first - begin : stop - begin]
         run = min(window.near, low)
-        label = outlier_chain.label_runs(np.maximum(window.weight[run:], 0), window.measurement[run:], LONGEST_ISOLATED)
+        decided = np.maximum(window.decided[run:], 0.0)
+        label = outlier_chain.label_runs(decided, window.measurement[run:].copy(), LONGEST_ISOLATED)
         label = label[low - run : low - run + n]
         label[:, list(self.absent)] = 3.0
         again = np.isin(np.arange(low, low + n), window.reacquired)
