@@ -66,9 +66,21 @@ class Filtering:
         summary = self.statistics.summary()
         model = self.model if self.method.corrected else None
         stage = None if model is None else model.smoother if self.settings.smooth else model.filter
+        summary["network"] = self._network() if self.method.corrected else None
         summary["correction_linear"] = None if stage is None else stage.linear
         summary["correction_lost_by_smoothing"] = model is not None and stage is None and model.filter.helps
         return provenance.describe(self.log, self.method, self.settings, self.statistics, self.model, summary)
+
+    def _network(self) -> str:
+        """What the learned correction did, in words."""
+        if self.model is None:
+            return "none: no correction applied"
+        stage = self.model.smoother if self.settings.smooth else self.model.filter
+        if stage is None or not stage.helps:
+            return "gain 0: no correction applied"
+        if self.statistics.largest_m == 0:
+            return f"gain {stage.gain.max():.2g}, but no sample is like those it was trained on: no correction applied"
+        return f"gain {stage.gain.max():.2g}: corrections of up to {self.statistics.largest_m:.3g} m"
 
     def _trajectory(self, part: Part) -> Trajectory:
         """The rows of a part that count, corrected, and added to the statistics."""

@@ -31,6 +31,7 @@ FLOORS = (
     ("correction.training",),
     ("pipeline",),
     ("config", "report"),
+    ("live",),
     ("batch",),
     ("api",),
     ("cli",),

@@ -22,6 +22,7 @@ from ftproc.records import GOOD, FloatArray, chunks
 from ftproc.settings import FilterSettings
 
 BLOCK = 4096  # samples that are taken at once
+HISTORY = 256  # samples before a stretch that go with it: the network looks back
 
 
 def editor(settings: FilterSettings) -> LiveEditor:
@@ -37,7 +38,7 @@ def parts(record: Recording, settings: FilterSettings, block: int = BLOCK) -> It
     """The estimate of a log by stretches; whatever their length, it is the same. Samples before the track is confirmed
     have none. Raises ValueError when it never is."""
     record = replace(record, absent=())  # whether a component is missing throughout shows only at the end
-    live = editor(settings)
+    live, history = editor(settings), list[Published]()
     for rows in chunks(len(record), block):
         readings = record.part(rows)
         found = live.push(readings.time_s, readings.measurement)
@@ -47,7 +48,11 @@ def parts(record: Recording, settings: FilterSettings, block: int = BLOCK) -> It
                 raise ValueError("the readings are too few, or agree too little, for a track to be confirmed")
         if found:
             first, count = found[0].first, sum(len(each.rows) for each in found)
-            yield Part(estimate(live, found, record.part(slice(first, first + count)).time_s), first, 0, count)
+            low = sum(len(each.rows) for each in history)
+            both = [*history, *found]
+            times = record.part(slice(first - low, first + count)).time_s
+            yield Part(estimate(live, both, times), first - low, low, low + count)
+            history = [_last(both, HISTORY)]
 
 
 def estimate(live: LiveEditor, found: Sequence[Published], time_s: FloatArray) -> Estimate:
@@ -58,6 +63,12 @@ def estimate(live: LiveEditor, found: Sequence[Published], time_s: FloatArray) -
     again = np.concatenate([each.reacquired for each in found])
     run, lost = FilterRun.of(time_s, rows, 0.0), tuple(np.flatnonzero(again).tolist())
     return Estimate(run, label, live.model, reacquired=lost, known=known, absent=live.absent)
+
+
+def _last(found: Sequence[Published], count: int) -> Published:
+    """The last rows of several."""
+    rows, label, known, again = (np.concatenate(each)[-count:] for each in list(zip(*found, strict=True))[1:])
+    return Published(0, rows, label, known, again)
 
 
 def smoothed(readings: Readings, settings: FilterSettings) -> Estimate:

@@ -100,6 +100,25 @@ class LiveEditor:
             low = high
         return found
 
+    def insert(self, time_s: float, measurement: FloatArray) -> bool:
+        """Take a row that comes late, measurement (1, 3); whether that is possible: no row as late must have left."""
+        row = np.array([time_s]), self._with_stand_ins(measurement)
+        kept = self.waiting.time_s if self.window is None else self.window.time_s
+        place = int(np.searchsorted(kept, time_s, side="right"))
+        if place < self.published - self._first or (place == 0 and self.published > 0):
+            return False
+        if self.window is None:
+            parts = (np.insert(old, place, new, 0) for old, new in zip(self.waiting, row, strict=True))
+            self.waiting = _Waiting(*parts)
+            self.count += 1
+            return True
+        if self.lag_s == 0 or place <= self.window.near:
+            return False
+        self.window.insert(place, *row)
+        self.count += 1
+        self._refresh(self.window)
+        return True
+
     def finish(self) -> list[Published]:
         """The rows that wait, when no more come."""
         if self.window is not None and self.lag_s > 0:

@@ -41,6 +41,13 @@ class Columns:
             array[self._count : count] = more
         self._count = count
 
+    def insert(self, place: int) -> None:
+        """Move the last row of each to a place."""
+        for array in self._arrays.values():
+            last = array[self._count - 1].copy()
+            array[place + 1 : self._count] = array[place : self._count - 1].copy()
+            array[place] = last
+
     def forget(self, rows: int) -> None:
         """Remove the first rows of each."""
         for array in self._arrays.values():

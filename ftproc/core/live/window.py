@@ -154,6 +154,12 @@ class Window:
         )  # fmt: skip
         self.kept["weight"][n:], self.kept["rows"][n:] = rows["weight"][1:], rows[1:]
 
+    def insert(self, place: int, time_s: FloatArray, measurement: FloatArray) -> None:
+        """Take a sample, time_s (1,), measurement (1, 3), that belongs before that at a place in the newest part."""
+        self._take(time_s, measurement)
+        self.kept.insert(place)
+        self.reacquired = [sample + (sample >= place) for sample in self.reacquired]
+
     def _take(self, time_s: FloatArray, measurement: FloatArray) -> None:
         """Keep the next readings, undecided where they may be good at all: no target is at the station, or behind it,
         and none stands still to the last digit."""
