@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import io
+import signal
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 
@@ -20,55 +23,85 @@ from ftproc.files.units import QUANTITIES
 from ftproc.live.live import Live
 from ftproc.records import FloatArray, MeasurementLog, Trajectory
 
+MOST = 1 << 18  # bytes that are read at once
 LINES = 4096  # that are taken at once, of those that are there
 NAP_S = 0.05  # between looks at a file that has not grown
 
 
-def follow(source: str, recipe: Recipe, track: Live) -> Iterator[Trajectory]:
-    """The rows that are published while a log grows: a file, or `-` for standard input. Ends at the end of the input,
-    or when the user interrupts; a file has no end. Raises InputError for a header that is not understood, and for a
+class Stop:
+    """Within its context, an interruption (Ctrl-C, SIGTERM) ends the reading, and not what is being computed or
+    written."""
+
+    def __init__(self) -> None:
+        self.asked = self._reading = False
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> Stop:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._before[number] = signal.signal(number, self._ask)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _ask(self, number: int, frame: object) -> None:
+        self.asked = True
+        if self._reading:
+            raise KeyboardInterrupt
+
+    def read(self, stream: IO[bytes], endless: bool) -> bytes:
+        """What there is to read, when there is something; empty at the end, or when a stop is asked for."""
+        self._reading = True
+        try:
+            while not self.asked:
+                found: bytes = stream.read1(MOST) if isinstance(stream, io.BufferedReader) else stream.read(MOST)
+                if found or not endless:
+                    return found
+                time.sleep(NAP_S)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            self._reading = False
+        return b""
+
+
+def follow(source: str, recipe: Recipe, track: Live, stop: Stop) -> Iterator[Trajectory]:
+    """The rows that are published while a log grows: a file, which has no end, or `-` for standard input. Ends at the
+    end of the input, or when a stop is asked for. Raises InputError for a header that is not understood, and for a
     line that is not made of numbers."""
     if recipe.station.refraction is not None:
         raise UsageError("--follow corrects no refraction, which needs the ranges around each reading; leave it out.")
-    lines = _lines(source)
-    header = next(lines, None)
-    if not header:
-        raise InputError(f"{source}: there is no header; the first line names the columns.")
-    columns = _Columns.of(source, header[0], recipe)
-    batch, number = header[1:], 1
-    try:
-        while batch is not None:
-            readings = columns.read(batch, number)
-            number += len(batch)
-            if len(readings):
-                found = track.push(*_converted(readings, recipe).T)
-                if len(found):
-                    yield found
-            batch = next(lines, None)
-    except KeyboardInterrupt:
-        pass
-    found = track.finish()
-    if len(found):
+    columns: _Columns | None = None
+    number = 0
+    for lines in _lines(source, stop):
+        if columns is None:
+            columns, lines, number = _Columns.of(source, lines[0], recipe), lines[1:], 1
+        readings = columns.read(lines, number)
+        number += len(lines)
+        if len(readings) and len(found := track.push(*_converted(readings, recipe).T)):
+            yield found
+    if columns is None:
+        raise InputError(f"{source}: there is no line; the first one names the columns.")
+    if len(found := track.finish()):
         yield found
 
 
-def _lines(source: str) -> Iterator[list[str]]:
+def _lines(source: str, stop: Stop) -> Iterator[list[str]]:
     """Complete lines, as many as there are, up to LINES at a time."""
-    stream: IO[bytes] = sys.stdin.buffer if source == "-" else Path(source).open("rb")
     rest = b""
-    with stream:
-        while True:
-            more = stream.read1(1 << 18) if hasattr(stream, "read1") else stream.read(1 << 18)
-            if not more and source == "-":
-                break
-            if not more:
-                time.sleep(NAP_S)
-                continue
+    with contextlib.ExitStack() as open_:
+        stream: IO[bytes] = sys.stdin.buffer if source == "-" else open_.enter_context(Path(source).open("rb"))
+        while more := stop.read(stream, endless=source != "-"):
             *whole, rest = (rest + more).split(b"\n")
             for low in range(0, len(whole), LINES):
-                yield [line.decode("utf-8", "replace").strip("\r\ufeff") for line in whole[low : low + LINES]]
-    if rest.strip():
-        yield [rest.decode("utf-8", "replace").strip("\r\ufeff")]
+                yield [_text(line) for line in whole[low : low + LINES]]
+    if rest.strip() and source == "-":
+        yield [_text(rest)]
+
+
+def _text(line: bytes) -> str:
+    return line.decode("utf-8", "replace").strip("\r\ufeff")
 
 
 class _Columns(NamedTuple):
@@ -114,8 +147,8 @@ class _Columns(NamedTuple):
                     row.append(float(text) * factor if text else np.nan)
                 except ValueError:
                     raise InputError(
-                        f'{self.source}: line {first + k + 1}: the {quantity} is "{text[:40]}", not a number; correct it, '
-                        "or leave the cell empty."
+                        f'{self.source}: line {first + k + 1}: the {quantity} is "{text[:40]}", which is no number; '
+                        "correct it, or leave the cell empty."
                     ) from None
             if np.isfinite(row[0]):
                 rows.append(row)

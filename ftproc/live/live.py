@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import bisect
+import itertools
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ftproc.core.live.editor import Published
 from ftproc.core.model.frames import from_cartesian
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import live, registry
@@ -57,9 +59,8 @@ class Live:
         may come out of time order by less than the lag. Returns the rows published now, of which there may be none.
         Raises InputError for a time that is not a number or not that of a flight.
         """
-        readings = np.broadcast_arrays(
-            *(np.atleast_1d(np.asarray(v, float)) for v in (range_m, azimuth_rad, elevation_rad))
-        )
+        components = (range_m, azimuth_rad, elevation_rad)
+        readings = np.broadcast_arrays(*(np.atleast_1d(np.asarray(each, float)) for each in components))
         times = np.atleast_1d(np.asarray(time_s, float))
         measurement = np.clip(np.stack(readings, 1), -FARTHEST, FARTHEST)
         if times.shape != measurement.shape[:1]:
@@ -81,13 +82,13 @@ class Live:
         newest = self._newest_s
         back = np.flatnonzero(times < np.maximum.accumulate(np.r_[newest, times[:-1]]))
         edges = sorted({0, len(times), *back.tolist(), *(back + 1).tolist()})
-        return [(low, high) for low, high in zip(edges[:-1], edges[1:], strict=True)]
+        return list(itertools.pairwise(edges))
 
     @property
     def _newest_s(self) -> float:
         return self._time_s[-1] if self._time_s else self._left_s
 
-    def _push(self, times: FloatArray, measurement: FloatArray) -> list[live.Published]:
+    def _push(self, times: FloatArray, measurement: FloatArray) -> list[Published]:
         rows = range(self._taken, self._taken + len(times))
         self._taken += len(times)
         if self._begins_s is None:
@@ -104,7 +105,7 @@ class Live:
         self._row += rows
         return self._editor.push(times - self._begins_s, measurement)
 
-    def _published(self, found: list[live.Published]) -> Trajectory:
+    def _published(self, found: list[Published]) -> Trajectory:
         count = sum(len(each.rows) for each in found)
         time_s, row = np.array(self._time_s[:count]), np.array(self._row[:count], np.int64)
         del self._time_s[:count], self._row[:count]
