@@ -43,8 +43,8 @@ class Request(NamedTuple):
 
 
 def recipe(ctx: click.Context, live: bool = False) -> Recipe:
-    """How every log is filtered; live: with live editing, unless that is recursive. Raises UsageError for what is wrong whatever the log, and for options on the command
-    line that have no effect."""
+    """How every log is filtered; live: with live editing, unless that is recursive. Raises UsageError for what is wrong
+    whatever the log, and for options on the command line that have no effect."""
     found = Recipe.of(_options(ctx))
     if live and found.settings.editing == "two-pass":
         found = replace(found, settings=replace(found.settings, editing="live"))
