@@ -30,7 +30,7 @@ PATIENCE = 64  # samples after which the noise of a component with few readings 
 ASSUMED_READING, ASSUMED_SIGMA = (10_000.0, 0.0, 0.0), (10.0, 1e-3, 1e-3)  # m, rad, rad: of what was hardly seen
 YOUNG, SOONEST, ROUND = 0.25, 4, 128  # all of the window is looked at when it has grown by this share, but not
 # sooner and not later than after so many samples,
-DOUBT_S, DOUBT_GROWTH, DOUBT_SAMPLES = 1.5, 0.2, 3  # or while the track is in doubt, after so long, or after this share
+DOUBT_S, DOUBT_GROWTH, DOUBT_SAMPLES = 0.5, 0.2, 3  # or while the track is in doubt, after so long, or after this share
 # of the time since it is, and so many samples
 REFRESH_S = 0.1  # between refreshes of the newest part, or one sample
 WINDOW_S, WINDOW_SAMPLES = 30.0, (300, 1500)  # of the window: the longer of the two, up to so many samples
