@@ -22,7 +22,7 @@ FLOORS = (
     ("core.filtering",),
     ("core.identification",),
     ("core.editing",),
-    ("core.comparators",),
+    ("core.comparators", "core.live"),
     ("files", "simulation"),
     ("files.reading", "files.writing"),
     ("scoring",),

@@ -133,9 +133,10 @@ def command(list_methods: str | None, write_config: bool, explain: bool, follow:
         ctx.exit(explaining.explain(options["logs"], filtering.recipe(ctx), options["summary"], ctx.meta[DEBUG]))
     elif follow is not None:
         from ftproc.cli import filtering
-        from ftproc.cli.follow import follow_log
+        from ftproc.live.publishing import follow_log
 
-        ctx.exit(follow_log(options["logs"], options["output"], filtering.recipe(ctx, live=True), follow))
+        said = follow_log(options["logs"], options["output"], filtering.recipe(ctx, live=True), follow)
+        click.echo(f"ftproc: {said}", err=True)
     else:
         start_quickly()
         from ftproc.cli import filtering

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.editing import outlier_chain
 from ftproc.core.editing.two_pass import Known
 from ftproc.core.filtering.initialization import FEWEST_READINGS, shortest_gap
 from ftproc.core.filtering.records import ROW, Model, empty_rows
 from ftproc.core.filtering.smoother import SmootherRun
+from ftproc.core.live.doubt import Doubt
 from ftproc.core.live.window import Sizes, Window
 
 FloatArray = NDArray[np.float64]
@@ -29,14 +29,11 @@ VAGUE = 1.0  # times the noise of a single reading, as 1-sigma of the position: 
 PATIENCE = 64  # samples after which the noise of a component with few readings is assumed
 ASSUMED_READING, ASSUMED_SIGMA = (10_000.0, 0.0, 0.0), (10.0, 1e-3, 1e-3)  # m, rad, rad: of what was hardly seen
 YOUNG, SOONEST, ROUND = 0.25, 4, 128  # all of the window is looked at when it has grown by this share, but not
-# sooner and not later than after so many samples,
-DOUBT_S, DOUBT_GROWTH, DOUBT_SAMPLES = 0.5, 0.2, 3  # or while the track is in doubt, after so long, or after this share
-# of the time since it is, and so many samples
+# sooner and not later than after so many samples, or while the track is in doubt
 REFRESH_S = 0.1  # between refreshes of the newest part, or one sample
 WINDOW_S, WINDOW_SAMPLES = 30.0, (300, 1500)  # of the window: the longer of the two, up to so many samples
 NEAR_S, NEAR_SAMPLES = 8.0, (120, 400)  # of its newest part, beside the lag
 BLOCK = 4096  # samples between looks at a window that has nothing to learn
-LONGEST_ISOLATED = 2  # readings rejected in a row; more make a patch
 
 
 class Published(NamedTuple):
@@ -63,9 +60,12 @@ class LiveEditor:
         self.absent: tuple[int, ...] = ()
         self.count = self.published = 0  # rows taken, and rows that have left
         self.next_edit, self.next_refresh = FEWEST, 0
-        self.doubt = _Doubt()
+        self.doubt = Doubt()
         self.refreshed = 0  # rows that the last refresh has seen
-        self.smoothed: tuple[int, SmootherRun] | None = None  # the newest part, from this row on, where there is a lag
+        self.smoothed: tuple[int, SmootherRun, FloatArray] | None = (
+            None  # the newest part, from this row on, if there is
+        )
+        # a lag, with its labels
 
     @property
     def model(self) -> Model:
@@ -94,6 +94,8 @@ class LiveEditor:
                 self._note_gap(self.window, float(time_s[low]))
                 self.window.append(time_s[low:high], self._with_stand_ins(measurement[low:high]))
                 self.count += high - low
+                if self.lag_s == 0:  # what a look finds out is known from the newest row on
+                    found += self._leave(self.count - 1)
                 self._look(self.window)
             if self.lag_s == 0:
                 found += self._leave(self.count)
@@ -151,7 +153,7 @@ class LiveEditor:
 
     def _vagueness(self, window: Window) -> float:
         """1-sigma of the newest position, in units of that of a single reading."""
-        (newest,) = window.shown(len(window) - 1, len(window))
+        ((newest,), _) = window.shown(len(window) - 1, len(window))
         range_m = np.linalg.norm(newest["state"][:3])
         noise_m = np.sqrt(window.model.reading_variance) * np.array([1.0, range_m, range_m])
         return float(np.linalg.norm(newest["sigma"][:3]) / np.linalg.norm(noise_m))
@@ -241,7 +243,8 @@ class LiveEditor:
         every = window.refresh_every * self.samples_a_refresh if window.learns else BLOCK
         self.refreshed, self.next_refresh = self.count, self.count + every
         if self.lag_s > 0:
-            self.smoothed = self._first + window.near, window.smoothed()
+            _, labels = window.shown(window.near, len(window))
+            self.smoothed = self._first + window.near, window.smoothed(), labels
 
     # -- what leaves ------------------------------------------------------------------------------------------------
 
@@ -263,15 +266,12 @@ class LiveEditor:
             nothing = np.zeros(n, bool)
             return [Published(first, _unknown_rows(n), np.where(missing, 3.0, 0.0), nothing, nothing)]
         window = self.window
-        rows = window.shown(low, low + n)
+        rows, label = window.shown(low, low + n)
         if self.smoothed is not None:
-            begin, smoothed = self.smoothed
+            begin, smoothed, labels = self.smoothed
+            label = labels[first - begin : stop - begin].copy()
             for name in ("state", "sigma", "los_sigma"):
                 rows[name] = getattr(smoothed, name)[first - begin : stop - begin]
-        run = min(window.near, low)
-        decided = np.maximum(window.decided[run:], 0.0)
-        label = outlier_chain.label_runs(decided, window.measurement[run:].copy(), LONGEST_ISOLATED)
-        label = label[low - run : low - run + n]
         label[:, list(self.absent)] = 3.0
         again = np.isin(np.arange(low, low + n), window.reacquired)
         return [Published(first, rows, label, np.ones(n, bool), again)]
@@ -285,22 +285,6 @@ class _Waiting(NamedTuple):
 
     def with_row(self, time_s: FloatArray, measurement: FloatArray) -> _Waiting:
         return _Waiting(np.concatenate([self.time_s, time_s]), np.concatenate([self.measurement, measurement]))
-
-
-class _Doubt(NamedTuple):
-    """When a track in doubt is looked at: not before this row and this time. since_s: since when it is in doubt."""
-
-    row: int = 0
-    time_s: float = -math.inf
-    since_s: float = 0.0
-
-    def is_due(self, window: Window, row: int) -> bool:
-        return row >= self.row and float(window.time_s[-1]) >= self.time_s and window.in_doubt()
-
-    def after_edit(self, window: Window, row: int) -> _Doubt:
-        now_s = float(window.time_s[-1])
-        since_s = self.since_s if window.in_doubt() else now_s
-        return _Doubt(row + DOUBT_SAMPLES, now_s + max(DOUBT_S, DOUBT_GROWTH * (now_s - since_s)), since_s)
 
 
 def _unknown_rows(n: int) -> Any:

@@ -13,6 +13,7 @@ from ftproc.core.editing.screening import SHORTEST_STUCK, STUCK_ODDS
 
 FloatArray = NDArray[np.float64]
 
+LONGEST_ISOLATED = 2  # readings rejected in a row; more make a patch
 ROOM = 2  # times what is kept: so rarely is it copied
 
 
@@ -53,6 +54,28 @@ class Columns:
         for array in self._arrays.values():
             array[: self._count - rows] = array[rows : self._count].copy()
         self._count -= rows
+
+
+class Labels:
+    """Good, isolated, patch or missing (0 to 3) for each reading as it comes, from the decisions so far."""
+
+    def __init__(self) -> None:
+        self.run = np.zeros(3, int)  # of rejected readings, up to the newest
+
+    def add(self, used: FloatArray, measurement: FloatArray) -> FloatArray:
+        """(n, 3) of the next readings; used (n, 3) above zero for those that are good."""
+        label = np.zeros(used.shape)
+        for row, good, there in zip(label, used > 0, np.isfinite(measurement), strict=True):
+            self.run = np.where(there, np.where(good, 0, self.run + 1), self.run)
+            row[:] = np.where(there, np.where(good, 0.0, np.where(self.run > LONGEST_ISOLATED, 2.0, 1.0)), 3.0)
+        return label
+
+    def reset(self, used: FloatArray, measurement: FloatArray) -> None:
+        """Count again from the decisions (n, 3) on the readings so far."""
+        for c in range(3):
+            good = used[np.isfinite(measurement[:, c]), c] > 0
+            last = np.flatnonzero(good)
+            self.run[c] = len(good) - 1 - last[-1] if len(last) else len(good)
 
 
 class Repeats:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ftproc.core.editing import gate, two_pass
 from ftproc.core.editing.track import REACQUIRE_SAMPLES, GatedRecursion, Track
 from ftproc.core.filtering.records import Model, Observations, empty_rows
-from ftproc.core.live.readings import Columns
+from ftproc.core.live.readings import Columns, Labels
 from ftproc.core.live.window import Sizes, Window
 
 FloatArray = NDArray[np.float64]
@@ -56,7 +56,9 @@ class GatedWindow(Window):
             return
         super().edit()
         if self.track is None:
-            self.gated = Columns(rows=super().shown(0, len(self)), used=super().decided)
+            rows, label = super().shown(0, len(self))
+            self.gated, self.gated_labels = Columns(rows=rows, label=label, used=super().decided), Labels()
+            self.gated_labels.reset(super().decided, self.measurement)
             self.track = Track(0, self.filters.copy(), gate.gate_of(self.how))
 
     def refresh(self) -> None:
@@ -70,10 +72,10 @@ class GatedWindow(Window):
         if self.learns:
             super().append(time_s, measurement)
         else:
-            self._take(time_s, measurement)
+            self._bar(self._take(time_s, measurement))
         low = max(n - REACQUIRE_SAMPLES, 0)
         readings = self.kept["time_s"][low:].copy(), self.measurement[low:].copy()
-        log = Observations(*readings, self.kept["possible"][low:].astype(float))
+        log = Observations(*readings, self._gateable(low))
         model = Model(self.model.noise_variance, self.allowed.jerk[-1:])
         rows = empty_rows(len(log.time_s))
         recursion = GatedRecursion(log, model, self.how, rows)
@@ -81,8 +83,14 @@ class GatedWindow(Window):
         self.track = recursion.run(self.track.shifted(low), n - low, []).shifted(-low)
         new = rows[n - low :]
         kept = np.where(new["weight"] > gate.rejection_weight(self.how.gate), 1.0, 0.0)
-        self.gated.append(rows=new, used=kept)
+        self.gated.append(rows=new, used=kept, label=self.gated_labels.add(kept, measurement))
         self.reacquired += [low + start.sample for start in recursion.starts]
+
+    def _gateable(self, low: int) -> FloatArray:
+        """(m, 3) one for the readings from a sample on that the gate may take."""
+        found = np.isfinite(self.measurement[low:])
+        found[:, 0] &= self.measurement[low:, 0] > 0
+        return found.astype(float)
 
     def in_doubt(self) -> bool:
         return self.learns and super().in_doubt()
@@ -94,8 +102,8 @@ class GatedWindow(Window):
             self.track = self.track.shifted(drop)
         return drop
 
-    def shown(self, low: int, high: int) -> Any:
-        return self.gated["rows"][low:high].copy()
+    def shown(self, low: int, high: int) -> tuple[Any, FloatArray]:
+        return self.gated["rows"][low:high].copy(), self.gated["label"][low:high].copy()
 
     @property
     def decided(self) -> FloatArray:

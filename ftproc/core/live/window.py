@@ -20,11 +20,12 @@ from ftproc.core.filtering.forward import Span
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven, between, empty_rows
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 from ftproc.core.identification.profile import fit_profile, with_allowance
-from ftproc.core.live.readings import Columns, Repeats
+from ftproc.core.live.readings import LONGEST_ISOLATED, Columns, Labels, Repeats
 from ftproc.core.live.readmission import Open, readmitted
 from ftproc.core.model.motion import Profile
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 ROUNDS = 3  # of smoothing and deciding in a refresh
 SHORT = 160  # samples: with fewer, nothing is said of how the noise of single readings differs
@@ -52,14 +53,16 @@ class Window:
     white, refresh_every = False, 1
 
     def __init__(self, time_s: FloatArray, measurement: FloatArray, known: two_pass.Known, sizes: Sizes) -> None:
-        self.known, self.sizes, self.near, self.repeats = known, sizes, 0, Repeats()
+        self.known, self.sizes, self.near = known, sizes, 0
+        self.repeats, self.labels = Repeats(), Labels()
+        self.next_times, self.next_late = np.ones(3), np.zeros(3)  # how the noise of the next readings differs
         self.reacquired: list[int] = []  # samples at which a lost track was found again
         nothing, ones = np.zeros((0, 3)), np.ones((0, 3))
         self.kept = Columns(
-            time_s=np.empty(0), measurement=nothing, possible=nothing > 0, weight=nothing, times=ones, late=nothing,
-            rows=empty_rows(0),
+            time_s=np.empty(0), measurement=nothing, possible=nothing > 0, weight=nothing, label=nothing, times=ones,
+            late=nothing, rows=empty_rows(0),
         )  # fmt: skip
-        self._take(time_s, measurement)
+        self._bar(self._take(time_s, measurement))
 
     def __len__(self) -> int:
         return len(self.kept)
@@ -84,9 +87,9 @@ class Window:
         """Whether noise or process noise are yet to be found, or decisions to be made again."""
         return True
 
-    def shown(self, low: int, high: int) -> Any:
-        """A copy of the `Row` records of some samples."""
-        return self.kept["rows"][low:high].copy()
+    def shown(self, low: int, high: int) -> tuple[Any, FloatArray]:
+        """Copies of the `Row` records and of the labels (m, 3) of some samples."""
+        return self.kept["rows"][low:high].copy(), self.kept["label"][low:high].copy()
 
     def smoothed(self) -> SmootherRun:
         """The newest part, smoothed with the decisions as they are."""
@@ -146,37 +149,45 @@ class Window:
     def append(self, time_s: FloatArray, measurement: FloatArray) -> None:
         """Filter the next readings, each decided on when it comes."""
         n = len(self)
-        self._take(time_s, measurement)
+        stuck = self._take(time_s, measurement)
         first_s = float(self.time_s[self.near])
         rows = self._filtered(
             self._observed(slice(n - 1, len(self))), Span(1, 1 + len(time_s), 0), self.allowed, self.filters,
             self.chains, first_s,
         )  # fmt: skip
         self.kept["weight"][n:], self.kept["rows"][n:] = rows["weight"][1:], rows[1:]
+        self.kept["label"][n:] = self.labels.add(rows["weight"][1:], measurement)
+        self._bar(stuck)
 
     def insert(self, place: int, time_s: FloatArray, measurement: FloatArray) -> None:
         """Take a sample, time_s (1,), measurement (1, 3), that belongs before that at a place in the newest part."""
-        self._take(time_s, measurement)
+        self._bar(self._take(time_s, measurement))
         self.kept.insert(place)
         self.reacquired = [sample + (sample >= place) for sample in self.reacquired]
 
-    def _take(self, time_s: FloatArray, measurement: FloatArray) -> None:
+    def _take(self, time_s: FloatArray, measurement: FloatArray) -> list[tuple[IntArray, int]]:
         """Keep the next readings, undecided where they may be good at all: no target is at the station, or behind it,
-        and none stands still to the last digit."""
+        and none stands still to the last digit. Samples and component of the readings that were repeated so."""
         n, m = len(self), len(time_s)
         possible = np.isfinite(measurement)
         possible[:, 0] &= measurement[:, 0] > 0
-        times = np.median(self.kept["times"][-RECENT:], 0) if n else np.ones(3)
-        late = self.kept["late"][-1] if n else np.zeros(3)
         self.kept.append(
             time_s=time_s, measurement=measurement, possible=possible, weight=np.zeros((m, 3)),
-            times=np.tile(times, (m, 1)), late=np.tile(late, (m, 1)), rows=empty_rows(m),
+            label=np.zeros((m, 3)), times=np.tile(self.next_times, (m, 1)), late=np.tile(self.next_late, (m, 1)),
+            rows=empty_rows(m),
         )  # fmt: skip
+        repeated = []
         for k, c, run in self.repeats.stuck(measurement):
-            stuck = np.flatnonzero(np.isfinite(self.measurement[: n + k + 1, c]))[-run:]
-            self.kept["possible"][stuck, c] = False
-            self.kept["weight"][stuck, c] = 0.0
+            repeated.append((np.flatnonzero(np.isfinite(self.measurement[: n + k + 1, c]))[-run:], c))
+            self.kept["possible"][n + k, c] = False
         self.kept["weight"][n:][self.kept["possible"][n:]] = OPEN
+        return repeated
+
+    def _bar(self, repeated: list[tuple[IntArray, int]]) -> None:
+        """Readings that turn out to be repeated are not possible either, from the next refresh on."""
+        for samples, c in repeated:
+            self.kept["possible"][samples, c] = False
+            self.kept["weight"][samples, c] = 0.0
 
     def _observed(self, span: slice) -> Observations:
         """Some samples with the decisions on them (copies)."""
@@ -218,6 +229,9 @@ class Window:
         self.filters, self.chains = self.allowed.filter(self.anchor), self._chains(self.allowed)
         span = Span(0, len(log.time_s), 0)
         self.kept["rows"][near] = self._filtered(log, span, self.allowed, self.filters, self.chains)
+        self.kept["label"][near] = outlier_chain.label_runs(log.weight, log.measurement, LONGEST_ISOLATED)
+        self.labels.reset(log.weight, log.measurement)
+        self.next_times, self.next_late = np.median(self.kept["times"][-RECENT:], 0), self.kept["late"][-1].copy()
 
     def _decide(self, near: slice) -> None:
         """Smooth and decide in turn until the decisions stand still."""

@@ -1,12 +1,10 @@
-"""`ftproc filter --follow`: a log that still grows in, rows out as soon as their lag has passed."""
+"""Rows of a log that is followed, written as soon as their lag has passed."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
-
-import click
 
 from ftproc import __version__
 from ftproc.config.recipe import Recipe
@@ -21,8 +19,9 @@ from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, Trajector
 _LABELS = {"good": GOOD, "isolated": ISOLATED, "patch": PATCH, "missing": MISSING}
 
 
-def follow_log(logs: Sequence[str], output: str | None, recipe: Recipe, form: str) -> int:
-    """Follow one log to its end, or until it is interrupted; the exit code. Raises FtprocError."""
+def follow_log(logs: Sequence[str], output: str | None, recipe: Recipe, form: str) -> str:
+    """Follow one log to its end, or until it is interrupted; what was published, in words. output: a file, or `-` or
+    None for standard output in this form, csv or jsonl. Raises FtprocError."""
     if len(logs) != 1:
         raise UsageError("--follow reads one log; name a file that grows, or - for standard input.")
     track, counts = Live(recipe.settings), _Counts()
@@ -34,8 +33,7 @@ def follow_log(logs: Sequence[str], output: str | None, recipe: Recipe, form: st
             atomic.refuse_overwriting(output, logs)
             atomic.check_target(output)
             trajectories.write_parts(rows, lambda: _metadata(logs[0], recipe, track, counts), output)
-    click.echo(f"ftproc: {logs[0]}: {counts.said(track)}", err=True)
-    return 0
+    return f"{logs[0]}: {counts.said(track)}"
 
 
 def _print(rows: Iterable[Trajectory], form: str) -> None:
