@@ -287,7 +287,7 @@ def test_a_blank_of_a_channel_method_is_no_divergence_but_infinity_is(monkeypatc
     ("settings", "message"),
     [
         ({"method": "ufk"}, "there is no method 'ufk'; did you mean 'ukf'"),
-        ({"editing": "twopass"}, "editing is one of two-pass, forward, none, not 'twopass'"),
+        ({"editing": "twopass"}, "editing is one of two-pass, live, forward, none, not 'twopass'"),
         ({"noise": (1.0, 0.0, 1.0)}, "noise must be a positive number, from 1e-30 to 1e+30, not 0.0"),
         ({"noise": (1.0, 1.0, float("nan"))}, "noise must be a positive number, from 1e-30 to 1e+30, not nan"),
         ({"jerk_psd_m2ps5": -1.0}, "jerk must be a positive number, from 1e-30 to 1e+30, not -1.0"),

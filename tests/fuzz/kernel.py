@@ -17,7 +17,7 @@ import numpy as np
 
 from ftproc import pipeline
 from ftproc.correction import model_file
-from ftproc.methods import recursive
+from ftproc.methods import live
 from ftproc.quality import sanity
 from ftproc.records import MeasurementLog
 from ftproc.settings import FilterSettings
@@ -41,7 +41,7 @@ def check(path: Path) -> None:
         cases.judge_trajectory(found)
         assert set(np.unique(found.outlier)) <= {0, 1, 2, 3}, "labels that are none"
         assert ((found.outlier == 3) == np.isnan(log.measurement)).all(), "missing is not what is missing"
-        with mock.patch.object(recursive.parts, "__defaults__", (_STRETCH,)):
+        with mock.patch.object(live.parts, "__defaults__", (_STRETCH,)):
             again = pipeline.filter_log(log, settings, model)
     for name in ("state", "sigma", "nis", "outlier", "correction"):
         one, other = getattr(found, name), getattr(again, name)
