@@ -32,6 +32,8 @@ FLOORS = (
     ("pipeline",),
     ("config", "report"),
     ("live",),
+    ("fusion",),
+    ("report.fused",),
     ("batch",),
     ("api",),
     ("cli",),

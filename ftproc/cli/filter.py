@@ -24,6 +24,21 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     "[default: STEM.trajectory.parquet or .csv, like the log, in the current directory]",
     "OUT",
 )
+@click.option(
+    "--fuse",
+    is_flag=False,
+    flag_value="",
+    type=options.RANGE,
+    metavar="RANGE.toml",
+    help="Several stations, one trajectory: fuse the logs of a range file, with the stations' biases and clocks found "
+    "from the flight; --fuse --write-config LOG... prints such a file.",
+)
+@click.option(
+    "--write-calibration",
+    type=options.FILE,
+    metavar="DIR",
+    help="With --fuse: write a station file for each station, with the biases found.",
+)
 @options.tracker
 @click.option(
     "--site",
@@ -118,6 +133,16 @@ def command(list_methods: str | None, write_config: bool, explain: bool, follow:
         from ftproc.methods import registry
 
         click.echo(registry.list_methods() if list_methods == "all" else registry.describe(list_methods))
+    elif options.pop("fuse") is not None:
+        start_quickly()
+        from ftproc.cli import fusing
+
+        if write_config:
+            click.echo(fusing.range_file(ctx), nl=False)
+        else:
+            ctx.exit(fusing.fuse_logs(ctx, ctx.meta[DEBUG]))
+    elif options.pop("write_calibration") is not None:
+        raise click.UsageError("--write-calibration does nothing without --fuse. Leave it out.", ctx)
     elif write_config:
         from ftproc.cli import filtering
 

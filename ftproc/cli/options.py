@@ -98,6 +98,8 @@ class _File(click.Path):
 
 #: The name of a file, which shells complete.
 FILE = _File()
+#: The same, or nothing.
+RANGE = click.Path()
 
 
 def _starting(names: Iterable[str], incomplete: str) -> list[str]:

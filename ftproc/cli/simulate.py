@@ -8,21 +8,25 @@ from typing import Any
 import click
 
 from ftproc.cli import options
-from ftproc.cli.command import Command
+from ftproc.cli.command import Command, refuse_with
 from ftproc.errors import UsageError
 
 _EXAMPLES = """
 ftproc simulate --scenario zuo2021-outliers --seed 3 -o flight.csv --truth flight.truth.csv
 ftproc simulate --scenario manoeuvre --duration 30 --outliers isolated=0.05:8-100,range.offset=1:20:60m -o hard.parquet
 ftproc simulate --scenario radar --units range=km,azimuth=deg,elevation=deg --azimuth-from north -o radar.csv
+ftproc simulate --scenario range --seed 3 -o flight/ --truth flight/truth.parquet
 """
+#: Options that a flight for several stations does not take.
+_OF_ONE_LOG = ("dt_s", "noise", "outliers", "instrument_errors", "units", "azimuth_from")
 
 
 def _scenarios_and_grammar() -> str:
-    from ftproc.simulation import GRAMMAR, INSTRUMENT_GRAMMAR, list_scenarios
+    from ftproc.simulation import GRAMMAR, INSTRUMENT_GRAMMAR, RANGE_SCENARIOS, list_scenarios
 
     scenarios = list_scenarios()
     width = max(map(len, scenarios))
+    scenarios = {**scenarios, **RANGE_SCENARIOS}
     names = "".join(f"  {name.ljust(width)}  {text}\n" for name, text in scenarios.items())
     instrument = f"Errors of the instrument (--instrument):\n{INSTRUMENT_GRAMMAR}"
     return f"Scenarios:\n{names}\nOutliers (--outliers):\n{GRAMMAR}\n{instrument}"
@@ -62,7 +66,12 @@ def _scenarios_and_grammar() -> str:
     "north: azimuth in the survey convention, clockwise from north, from 0 to a full turn. The truth's x is then "
     "north, y east and z up."
 )
-@options.output("The log to write: .csv, .csv.gz, .parquet, .feather, or - for CSV on stdout.", "LOG", required=True)
+@options.output(
+    "The log to write: .csv, .csv.gz, .parquet, .feather, or - for CSV on stdout; of several stations (range...) the "
+    "directory for the range file and the logs.",
+    "LOG",
+    required=True,
+)
 @click.option("--truth", type=options.FILE, metavar="TRUTH", help="The truth to write: states and outlier flags.")
 def command(
     scenario: str, output: str, truth: str | None, units: str | None, azimuth_from: str,
@@ -70,9 +79,13 @@ def command(
 ) -> None:  # fmt: skip
     """Make a log as dirty as a real one, with its truth."""
     from ftproc.files.options import parse_units
-    from ftproc.files.writing import flights
-    from ftproc.simulation import parse_instrument, simulate
+    from ftproc.files.writing import flights, ranges
+    from ftproc.simulation import RANGE_SCENARIOS, parse_instrument, simulate, simulate_range
 
+    if scenario in RANGE_SCENARIOS:
+        refuse_with(click.get_current_context(), f"--scenario {scenario}", _OF_ONE_LOG)
+        ranges.write(simulate_range(scenario, changes["seed"], changes["duration_s"]), output, truth)
+        return
     _check(output, truth)
     parse_units(units)  # errors are reported before any work
     instrument = None if instrument_errors is None else parse_instrument(instrument_errors)

@@ -22,54 +22,75 @@ _MAX_LINE = 5000  # bytes; parsing takes time by the square of the number of dot
 def load(path: str | Path) -> dict[str, Any]:
     """The options that a station file sets, such as {"site": (48.1, 11.3, 612.0), "smooth": True}; lengths in m, angles
     in rad. Raises UsageError, naming file and key, for what cannot be read or is not understood."""
-    try:
-        text = _bytes(Path(path)).decode("utf-8-sig")
-    except FileNotFoundError as error:
-        raise UsageError(f"{path}: there is no such file. ftproc filter --write-config > {path} makes one.") from error
-    except UnicodeDecodeError as error:
-        raise UsageError(f"{path}: this is not UTF-8 text; save it as UTF-8.") from error
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise UsageError(f"{path}: cannot be read ({reason}); name a station file.") from error
-    options = parse(text, str(path))
+    options = parse(read_text(path, "station file", "--write-config"), str(path))
     if options.get("model", NO_MODEL) not in (PACKAGED, NO_MODEL):
         options["model"] = str(Path(path).parent / options["model"])
     return options
 
 
-def _bytes(path: Path) -> bytes:
+def read_text(path: str | Path, kind: str, maker: str) -> str:
+    """The text of a small TOML file. kind: what it is called; maker: the options with which `ftproc filter` prints one.
+    Raises UsageError."""
+    try:
+        return _bytes(Path(path), kind, maker).decode("utf-8-sig")
+    except FileNotFoundError as error:
+        raise UsageError(f"{path}: there is no such file. ftproc filter {maker} > {path} makes one.") from error
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path}: this is not UTF-8 text; save it as UTF-8.") from error
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise UsageError(f"{path}: cannot be read ({reason}); name a {kind}.") from error
+
+
+def _bytes(path: Path, kind: str, maker: str) -> bytes:
     if not is_ordinary(path):
-        raise UsageError(f"{path}: not an ordinary file (a pipe or a device); name a station file.")
+        raise UsageError(f"{path}: not an ordinary file (a pipe or a device); name a {kind}.")
     with path.open("rb") as stream:
         content = stream.read(_MAX_SIZE + 1)
     if len(content) > _MAX_SIZE:
-        raise UsageError(f"{path}: far too large for a station file; ftproc filter --write-config prints one.")
+        raise UsageError(f"{path}: far too large for a {kind}; ftproc filter {maker} prints one.")
     for number, line in enumerate(content.splitlines(), 1):
         if len(line) > _MAX_LINE:
-            raise UsageError(f"{path}: line {number} is far too long for a station file; delete or split it.")
+            raise UsageError(f"{path}: line {number} is far too long for a {kind}; delete or split it.")
     return content
 
 
 def parse(text: str, name: str) -> dict[str, Any]:
     """As `load`, from the text of a file called `name`."""
+    return options_of(toml(text, name), name)
+
+
+def toml(text: str, name: str) -> dict[str, Any]:
+    """The tables of a TOML text. Raises UsageError."""
     import tomllib
 
     try:
-        found = tomllib.loads(text)
+        return tomllib.loads(text)
     except ValueError as error:  # also of numbers with thousands of digits
         raise UsageError(f"{name}: this is not TOML: {error}. Correct it there.") from error
     except RecursionError as error:
         raise UsageError(f"{name}: this TOML nests too deeply. Delete the nested part.") from error
+
+
+def options_of(sections: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """As `load`, from the sections of a station file called `name`."""
     values: dict[tuple[str, str], Any] = {}
-    for section, keys in found.items():
+    for section, keys in sections.items():
         _check_section(name, section, keys)
-        place = f"{name}: [{section}]"
-        for written, value in keys.items():
-            key_name, to_si = _key_of(place, KEYS[section], written)
-            if (section, key_name) in values:
-                raise UsageError(f"{place} has {key_name} in two units; leave one out.")
-            values[section, key_name] = _checked(f"{place} {written}", KEYS[section][key_name], value, to_si)
+        for key_name, value in values_of(f"{name}: [{section}]", KEYS[section], keys).items():
+            values[section, key_name] = value
     return _options(name, values)
+
+
+def values_of(place: str, known: Mapping[str, Key], written: Mapping[str, Any]) -> dict[str, Any]:
+    """The values in SI units of what is written, by the names of the keys. place: of the file, for messages."""
+    values: dict[str, Any] = {}
+    for spelt, value in written.items():
+        key_name, to_si = _key_of(place, known, spelt)
+        if key_name in values:
+            raise UsageError(f"{place} has {key_name} in two units; leave one out.")
+        values[key_name] = _checked(f"{place} {spelt}", known[key_name], value, to_si)
+    return values
 
 
 def _check_section(name: str, section: str, keys: object) -> None:

@@ -67,10 +67,10 @@ def page(trajectory: Trajectory, truth: Truth | None = None) -> str:
     shown = view(trajectory, truth)
     parts = [tables.heading(shown), tables.banner(shown), tables.summary(shown)]
     if truth is not None:
-        parts.append(_section("Against the truth", [("errors", errors(shown))], tables.score(shown)))
+        parts.append(section("Against the truth", [("errors", errors(shown))], tables.score(shown)))
     parts.append(tables.patches(shown))
     for title, names in _SECTIONS:
-        parts.append(_section(title, [(name, FIGURES[name](shown)) for name in names]))
+        parts.append(section(title, [(name, FIGURES[name](shown)) for name in names]))
     parts.append(tables.provenance(shown))
     return document(tables.name(trajectory), "\n".join(parts), drawn=True)
 
@@ -97,7 +97,7 @@ def document(title: str, body: str, drawn: bool = False) -> str:
     )
 
 
-def _section(title: str, figures: list[tuple[str, Drawn]], before: str = "") -> str:
+def section(title: str, figures: list[tuple[str, Drawn]], before: str = "") -> str:
     shown = [_figure(name, drawn.figure) for name, drawn in figures if drawn.figure is not None]
     notes = dict.fromkeys(drawn.note for _, drawn in figures if drawn.note)  # without repetitions
     text = f'<p class="note">{html.escape(" ".join(notes))}</p>' if notes else ""

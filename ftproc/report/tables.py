@@ -59,7 +59,7 @@ def _banner(colour: str, sentence: str, reasons: Sequence[str]) -> str:
 def summary(view: View) -> str:
     """Counts, rates and noise per component; gaps, process noise, NIS; notes."""
     s = view.summary
-    if not s:
+    if "components" not in s:  # nor has a fused flight, whose stations have them
         return ""
     rows = [figures.component_cells(component, s["components"][component]) for component in COMPONENTS]
     notes = figures.notes(s)

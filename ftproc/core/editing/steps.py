@@ -1,7 +1,7 @@
 """Steps that stay: an encoder that slips, a range ambiguity, another lobe, a clock that jumps.
 
 From one backward pass come the estimate and the variance of a step between any two samples (de Jong and Penzer 1998;
-see `smoother.shifts`): of a component, and of the clock, which moves the target along its way. A manoeuvre may look
+see `filtering.shifts`): of a component, and of the clock, which moves the target along its way. A manoeuvre may look
 like a step to a filter that expects a calm flight, so each step that stands out is weighed against the same stretch
 without it: both with a process noise that follows the flight, and with outlier decisions of their own.
 
@@ -24,7 +24,8 @@ from ftproc.core.editing.decisions import Decision, Record
 from ftproc.core.editing.runs import runs_of
 from ftproc.core.filtering.initialization import find_starts, first_state
 from ftproc.core.filtering.records import Model, Observations
-from ftproc.core.filtering.smoother import shifts, smooth_log
+from ftproc.core.filtering.shifts import shifts
+from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification.likelihood import Fixed, fit_level
 from ftproc.core.identification.profile import fit_profile, median_level
 from ftproc.core.identification.scales import scales_of

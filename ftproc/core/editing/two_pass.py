@@ -101,7 +101,7 @@ def screen(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, Flo
     weight, sigma, least = np.isfinite(measurement).astype(float), np.zeros(3), rounding_sigma(measurement)
     for c in range(3):
         channel = np.ascontiguousarray(measurement[:, c])
-        weight[:, c], sigma[c] = _screen_channel(time_s, channel, c == 1, math.sqrt(2) * float(least[c]))
+        weight[:, c], sigma[c] = screen_channel(time_s, channel, c == 1, math.sqrt(2) * float(least[c]))
     exact, sigma = without_noise(Observations(time_s, measurement, weight), sigma)
     return weight, sigma, exact
 
@@ -112,7 +112,7 @@ def rounding_sigma(measurement: FloatArray) -> FloatArray:
     return np.array(steps) / math.sqrt(12)
 
 
-def _screen_channel(
+def screen_channel(
     time_s: FloatArray, channel: FloatArray, angular: bool, least_sigma: float
 ) -> tuple[FloatArray, float]:
     """(n,) weights and the noise 1-sigma of one component."""

@@ -57,7 +57,7 @@ class Coloured(Backward, Protocol):
 
 class Shift(Protocol):
     """What the readings after a sample say of a step between it and the next: of range, azimuth, elevation and the
-    clock, see `smoother.shifts`."""
+    clock, see `shifts`."""
 
     score: Annotated[FloatArray, 4]
     information: Annotated[FloatArray, 4]

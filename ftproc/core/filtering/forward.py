@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part, record, variant, zeros
-from ftproc.core.filtering import ukf
+from ftproc.core.filtering import sites, ukf
 from ftproc.core.filtering.filters import ColouredFilters, Filter, Filters
 from ftproc.core.filtering.records import (
     FilterRun,
@@ -79,7 +79,7 @@ def _weighted(f: Filter, sample: Sample, extended: bool, row: Row) -> tuple[floa
     if extended:
         jacobian.linearise(f)
     else:
-        ukf.expect(f)
+        sites.expect_at(sample, f)
     ukf.innovate(sample, f)
     any_used = ukf.use(sample.weight, f)
     store_innovation(f, row)
@@ -164,7 +164,7 @@ def _extrapolated(
         interval = time_s - samples[k + 1].time_s
         motion.predict(f, interval, profile.jerk[motion.knot_index(time_s, profile)])
         motion.wander(f, interval)
-        ukf.expect(f)
+        sites.expect_at(samples[k], f)
         ukf.innovate(samples[k], f)
         for i in range(3):
             left.residual[i] = f.e[i]

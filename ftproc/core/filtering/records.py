@@ -21,13 +21,17 @@ IntArray = NDArray[np.int64]
 class Sample(Protocol):
     """One row of a log: measurement m, rad, rad, NaN where missing; the weight of each component in [0, 1], zero for
     one that is not used; the variance of its noise at full weight, and the 1-sigma that a late time stamp adds to all
-    three at once."""
+    three at once. placed: not zero where the station is not at the origin of the frame, or not level with it: it stands
+    at place, m, and the rows of axes are its own x, y and z."""
 
     time_s: float
     measurement: Annotated[FloatArray, 3]
     weight: Annotated[FloatArray, 3]
     noise: Annotated[FloatArray, 3]
     late: Annotated[FloatArray, 3]
+    placed: float
+    place: Annotated[FloatArray, 3]
+    axes: Annotated[FloatArray, 3, 3]
 
 
 class Row(Protocol):
@@ -67,25 +71,45 @@ class Uneven(NamedTuple):
         return Uneven(self.times[rows], self.late[rows])
 
 
+class Sites(NamedTuple):
+    """Where the samples of several stations were taken: station (n,) of each; place (m, 3) and axes
+    (m, 3, 3) of the stations in the frame of the state, see `Sample`; range_m (m,) typical, of the target from each."""
+
+    station: IntArray
+    place: FloatArray
+    axes: FloatArray
+    range_m: FloatArray
+
+    def part(self, rows: slice | IntArray) -> Sites:
+        """Of some of the samples."""
+        return self._replace(station=self.station[rows])
+
+
 class Observations(NamedTuple):
     """A log as the filters see it: time_s (n,), measurement (n, 3) slant range m, azimuth and elevation rad, NaN where
-    missing, the weight (n, 3) in [0, 1] of each reading, zero for one that is not used, and how the noise of single
-    readings differs, if it does."""
+    missing, the weight (n, 3) in [0, 1] of each reading, zero for one that is not used, how the noise of single
+    readings differs, if it does, and who took them, if not the one station at the origin."""
 
     time_s: FloatArray
     measurement: FloatArray
     weight: FloatArray
     uneven: Uneven | None = None
+    sites: Sites | None = None
 
     def part(self, rows: slice | IntArray) -> Observations:
         """Some of the samples."""
         uneven = None if self.uneven is None else self.uneven.part(rows)
-        return Observations(self.time_s[rows], self.measurement[rows], self.weight[rows], uneven)
+        sites = None if self.sites is None else self.sites.part(rows)
+        return Observations(self.time_s[rows], self.measurement[rows], self.weight[rows], uneven, sites)
 
     def samples(self, noise_variance: FloatArray) -> Any:
-        """The same as an array (n,) of `Sample` records, with noise (3,) m^2, rad^2, rad^2."""
+        """The same as an array (n,) of `Sample` records, with noise (3,) m^2, rad^2, rad^2, or (m, 3) by station."""
         samples = zeros(SAMPLE, len(self.time_s))
         samples["time_s"], samples["measurement"], samples["weight"] = self.time_s, self.measurement, self.weight
+        if self.sites is not None:
+            station, place, axes, _ = self.sites
+            samples["placed"], samples["place"], samples["axes"] = 1.0, place[station], axes[station]
+            noise_variance = noise_variance[station]
         samples["noise"] = noise_variance
         if self.uneven is not None:
             samples["noise"], samples["late"] = noise_variance * self.uneven.times, self.uneven.late
@@ -108,9 +132,9 @@ def between(starts: list[Start], samples: int) -> Iterator[tuple[Start, int]]:
 class Model(NamedTuple):
     """The noise of the measurements, and of the motion.
 
-    noise_variance: (3,) of white noise, m^2, rad^2, rad^2. jerk: (m, 6) tensor of the jerk density, m^2/s^5, each row
-    holding for `knot_s` seconds from the first sample on. wander_variance, fade_s: (3,) of the noise that is correlated
-    in time (first-order Gauss-Markov), which adds to the white; zero for none.
+    noise_variance: (3,) of white noise, m^2, rad^2, rad^2, or (stations, 3). jerk: (m, 6) tensor of the jerk density,
+    m^2/s^5, each row holding for `knot_s` seconds from the first sample on. wander_variance, fade_s: (3,) of the noise
+    that is correlated in time (first-order Gauss-Markov), which adds to the white; zero for none.
     """
 
     noise_variance: FloatArray

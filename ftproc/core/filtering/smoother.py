@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import empty, kernel, part, variant, zeros
-from ftproc.core.filtering import backward, ukf
+from ftproc.core.filtering import backward, sites, ukf
 from ftproc.core.filtering.filters import COLOURED, ColouredFilters, Filter, Filters
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Estimates, Residuals, Span, advance, extrapolated
 from ftproc.core.filtering.records import Model, Observations, Sample, Samples, Start, between
@@ -38,7 +38,6 @@ from ftproc.core.signatures import Matrix
 FloatArray = NDArray[np.float64]
 
 BLOCK = 1024
-FOREVER_S = 1e300  # correlation time of an offset that stays
 
 
 class SmootherRun(NamedTuple):
@@ -91,32 +90,21 @@ class ColouredMemory(NamedTuple):
     residuals: Residuals
 
 
-class ShiftMemory(NamedTuple):
-    """The same where steps take the place of estimates."""
-
-    block: ColouredFilters
-    before: ColouredFilters
-    back: backward.ColouredBackwards
-    estimates: backward.Shifts
-    residuals: Residuals
-
-
-def _memory(samples: int, first: Any, estimates: Any, residuals: Any) -> Any:
+def memory_of(samples: int, first: Any, estimates: Any, residuals: Any) -> Any:
     """For a span of so many samples that begins with a filter (an array of one record)."""
     coloured = first.dtype == COLOURED
     before, block = empty(first.dtype, -(-samples // BLOCK)), empty(first.dtype, min(samples, BLOCK))
     before[:1] = first
     block["wander"], block["fade_s"] = first["wander"][0], first["fade_s"][0]
     back = zeros(backward.COLOURED if coloured else backward.BACKWARD)
-    kind = ShiftMemory if estimates.dtype == backward.SHIFT else ColouredMemory if coloured else Memory
-    return kind(block, before, back, estimates, residuals)
+    return (ColouredMemory if coloured else Memory)(block, before, back, estimates, residuals)
 
 
 @part
 def _take_in(f: Filter, sample: Sample) -> tuple[float, float]:
     """Update by a sample; NIS, NaN where nothing is used, and the log-likelihood. All that the way back needs stays in
     the record."""
-    ukf.expect(f)
+    sites.expect_at(sample, f)
     ukf.innovate(sample, f)
     any_used = ukf.use(sample.weight, f)
     nis, gained = ukf.update(f)
@@ -134,6 +122,26 @@ def _copy_state(source: Filter, target: Filter) -> None:
 _store = backward.store  # of the sweep below; that for steps has another
 
 
+@part
+def _keep(memory: Any, b: int) -> None:
+    """What a variant of the sweep does where a block begins, see `biases`: it keeps its own state for the block,"""
+
+
+@part
+def _recall(memory: Any, b: int) -> None:
+    """takes it again,"""
+
+
+@part
+def _carry(memory: Any, f: Filter, k: int, interval: float, place: int) -> None:
+    """takes it over an interval and an update, at a place of the block (-1: of none)"""
+
+
+@part
+def _carry_back(memory: Any, f: Filter, k: int, interval: float, place: int, kept: int) -> None:
+    """and back."""
+
+
 def _swept_through(
     span: Span, samples: Samples, profile: motion.Profile, memory: Memory, jerk_score: Matrix, kept: int
 ) -> float:
@@ -148,17 +156,21 @@ def _swept_through(
             if k > span.first:
                 advance(f, samples, k, profile)
             _take_in(f, samples[k])
+            _carry(memory, f, k, samples[k].time_s - samples[max(k - 1, span.first)].time_s, -1)
         _copy_state(f, before[b])
+        _keep(memory, b)
     likelihood = 0.0
     for b in range(len(before) - 1, -1, -1):
         low = span.first + b * BLOCK
         high = min(low + BLOCK, span.last)
+        _recall(memory, b)
         for k in range(low, high):
             f = block[k - low]
             _copy_state(before[b] if k == low else block[k - low - 1], f)
             if k > span.first:
                 advance(f, samples, k, profile)
             nis, gained = _take_in(f, samples[k])
+            _carry(memory, f, k, samples[k].time_s - samples[max(k - 1, span.first)].time_s, k - low)
             likelihood += gained
             if kept >= RESIDUALS:
                 residuals[k].nis = nis
@@ -175,6 +187,7 @@ def _swept_through(
                 for i in range(3):
                     residuals[k].residual[i] = back.residual[i]
                     residuals[k].residual_variance[i] = back.variance[i]
+            _carry_back(memory, f, k, samples[k].time_s - samples[max(k - 1, span.first)].time_s, k - low, kept)
             if k > span.first:
                 interval = samples[k].time_s - samples[k - 1].time_s
                 backward.score_jerk(back, interval, jerk_score[motion.knot_index(samples[k].time_s, profile)])
@@ -186,11 +199,10 @@ def _swept_through(
     return likelihood
 
 
+swept_through = _swept_through  # for variants with other memories
+
 _sweep = kernel(variant(_swept_through, __name__, "_sweep"))
 _sweep_coloured = kernel(variant(_swept_through, __name__, "_sweep_coloured", memory=ColouredMemory))
-_sweep_shifts = kernel(
-    variant(_swept_through, __name__, "_sweep_shifts", memory=ShiftMemory, _store=backward.store_shift)
-)
 
 
 def smoothed_covariance(p: FloatArray, n: FloatArray) -> FloatArray:
@@ -233,7 +245,7 @@ def _swept(log: Observations, model: Model, starts: list[Start], kept: int) -> _
     estimates, residuals = zeros(ESTIMATED, n if kept == STATES else 0), zeros(LEFT, n if kept != SCORES else 0)
     noise, wander, jerk, likelihood, heads = np.zeros(3), np.zeros(3), np.zeros_like(model.jerk), 0.0, []
     for start, stop in between(starts, n):
-        memory = _memory(stop - start.sample, model.filter(start), estimates, residuals)
+        memory = memory_of(stop - start.sample, model.filter(start), estimates, residuals)
         likelihood += sweep(Span(start.sample, stop, start.sample), samples, profile, memory, jerk, kept)
         noise += memory.back["noise_score"][0]
         wander += memory.back["wander_score"][0]
@@ -264,24 +276,3 @@ def smooth_log(log: Observations, model: Model, starts: list[Start], residuals_o
     return SmootherRun(
         **fields, log_likelihood=scores.log_likelihood, noise_score=scores.noise, jerk_score=scores.jerk, heads=heads
     )
-
-
-def shifts(log: Observations, model: Model, starts: list[Start]) -> tuple[FloatArray, FloatArray]:
-    """What the record says of a step between each sample and the next: score and information (n, 4), of which
-    score / information is the estimate and 1 / information its variance (de Jong and Penzer 1998, section 3).
-
-    In the first three columns the readings of a component are larger from the next sample on, m, rad, rad: a shock of
-    an offset of that component, which the smoother carries along at no variance. In the last the target is seconds
-    further on its way, as when the clock jumps. Noise that is correlated is taken for white.
-    """
-    n = len(log.time_s)
-    samples, profile = log.samples(model.reading_variance), model.profile(log.time_s)
-    found = zeros(backward.SHIFT, n)
-    residuals = zeros(LEFT, n)
-    for start, stop in between(starts, n):
-        first = zeros(COLOURED)
-        first["x"][0, :9], first["p"][0, :9, :9], first["fade_s"] = start.state, start.covariance, FOREVER_S
-        memory = _memory(stop - start.sample, first, found, residuals)
-        span = Span(start.sample, stop, start.sample)
-        _sweep_shifts(span, samples, profile, memory, np.zeros_like(model.jerk), STATES)
-    return found["score"].copy(), found["information"].copy()

@@ -46,7 +46,7 @@ def fit_profile(log: Observations, starts: list[Start], level: Model, steps: int
         knot_s = max(KNOT_MEMORIES * memory_s, KNOT_SAMPLES * scales.interval_s, scales.span_s / MAX_KNOTS)
     knots = max(math.ceil(scales.span_s / knot_s), 1)
 
-    merged = decimation.how_many(scales, level, knot_s)
+    merged = 1 if log.sites is not None else decimation.how_many(scales, level, knot_s)
     if merged > 1:
         log, starts = decimation.merge(log, starts, merged)
 

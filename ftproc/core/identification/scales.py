@@ -54,7 +54,19 @@ def scales_of(log: Observations, noise_variance: FloatArray) -> Scales:
     range_m = float(np.nanmedian(ranges)) if np.isfinite(ranges).any() else 1.0
     times = np.diff(log.time_s)
     interval = float(np.median(times[times > 0])) if (times > 0).any() else 1.0
+    if log.sites is not None:
+        return Scales(interval, max(float(log.time_s[-1] - log.time_s[0]), interval), *_of_sites(log, noise_variance))
     if log.uneven is not None:
         noise_variance = np.median(noise_variance * log.uneven.times + log.uneven.late**2, 0)
     noise = np.maximum(np.sqrt(noise_variance) * np.array([1.0, range_m, range_m]), FINEST * range_m)
     return Scales(interval, max(float(log.time_s[-1] - log.time_s[0]), interval), range_m, noise)
+
+
+def _of_sites(log: Observations, noise_variance: FloatArray) -> tuple[float, FloatArray]:
+    """Typical range, and the noise in m of each component of a station that is used, of several stations."""
+    assert log.sites is not None
+    station, range_m = log.sites.station, log.sites.range_m
+    used = np.stack([np.bincount(station, log.weight[:, c] > 0, len(range_m)) for c in range(3)], 1) > 0
+    typical = float(np.median(range_m))
+    noise = np.sqrt(noise_variance) * np.stack([np.ones_like(range_m), range_m, range_m], 1)
+    return typical, np.maximum(noise[used], FINEST * typical)

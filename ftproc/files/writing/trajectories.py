@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
-def to_table(trajectory: Trajectory) -> pa.Table:
+def to_table(trajectory: Trajectory, without: Sequence[str] = ()) -> pa.Table:
     """One Arrow row per time: `row` int64, `outlier_*` uint8, the rest float64 (NaN where not estimated).
 
     The columns of `trajectory.extra` follow, with their own types; the metadata are JSON under the key `ftproc`.
-    Raises UsageError if an extra column has the name of one of `layout.TRAJECTORY`.
+    without: columns to leave out. Raises UsageError if an extra column has the name of one of `layout.TRAJECTORY`.
     """
     groups: tuple[tuple[Sequence[str], Any], ...] = (
         (layout.MEASUREMENT, trajectory.measurement),
@@ -38,19 +38,21 @@ def to_table(trajectory: Trajectory) -> pa.Table:
     arrays: dict[str, Any] = {"row": np.asarray(trajectory.row, np.int64), "time_s": trajectory.time_s}
     for names, group in groups:
         arrays.update(zip(names, np.ascontiguousarray(group.T), strict=True))
+    arrays = {name: array for name, array in arrays.items() if name not in without}
     table = tables.with_extra(arrow.table(arrays), trajectory.extra)
     return table.replace_schema_metadata({METADATA_KEY: _to_json(trajectory.metadata, indent=None)})
 
 
-def write(trajectory: Trajectory, target: Target) -> None:
+def write(trajectory: Trajectory, target: Target, without: Sequence[str] = ()) -> None:
     """Write a file of a kind that `layout` names, or CSV on standard output for `-`, complete or not at all.
 
-    The metadata of a CSV file or a map go into its `sidecar`. The same trajectory gives the same bytes.
-    Raises OutputError; BrokenPipeError if standard output is closed; UsageError as `to_table` and `maps.check`.
+    without: columns to leave out. The metadata of a CSV file or a map go into its `sidecar`. The same trajectory gives
+    the same bytes. Raises OutputError; BrokenPipeError if standard output is closed; UsageError as `to_table` and
+    `maps.check`.
     """
     beside = sidecar(target)
     if beside is None:
-        tables.write_table(to_table(trajectory), target)
+        tables.write_table(to_table(trajectory, without), target)
         return
     map_kind = layout.map_kind(target)
     drawn = maps.as_bytes(trajectory, map_kind) if map_kind else b""
@@ -58,7 +60,7 @@ def write(trajectory: Trajectory, target: Target) -> None:
         if map_kind:
             stream.write(drawn)
         else:
-            tables.write_stream(to_table(trajectory), stream, tables.kind_of(target))
+            tables.write_stream(to_table(trajectory, without), stream, tables.kind_of(target))
         _write_sidecar(beside, stream, trajectory.metadata)
 
 

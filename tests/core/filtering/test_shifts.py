@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from ftproc.core.filtering.records import Observations
-from ftproc.core.filtering.smoother import score_log, shifts
+from ftproc.core.filtering.shifts import shifts
+from ftproc.core.filtering.smoother import score_log
 from ftproc.core.model.frames import from_cartesian
 from tests.core.tracks import SIGMA, matched
 

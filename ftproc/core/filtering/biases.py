@@ -1,0 +1,219 @@
+"""Unknown constants of the measurements beside the smoother: Friedland's separate-bias form.
+
+The biases b of the stations (range, azimuth, elevation, tilts, clock) are few and constant. The filter runs without
+them; what it would do otherwise is linear in them (Friedland 1969), so that only columns are carried along: with
+design D = d(reading)/db and the whitened quantities of `smoother`,
+
+    S <- Phi S       C = L^-1 (D + H S)     S <- S - U' C          forward: S = dx/db, C = -dy/db
+    info += C' C     score += C' y                                 of the likelihood with the trajectory integrated out
+    V = C - U l      l <- l + G' V          l <- Phi' l            backward
+    S^s = S+ - P+ l+                                               of the smoothed state
+
+Columns are directions of the space of biases, scaled so that the biases' covariance in them is the unit matrix. So S^s
+S^s' is what they add to the covariance of the state; a leave-one-out residual u / M becomes u / (M - c c') where c is
+its row of L^-T V.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.compiled import empty, kernel, part, variant, zeros
+from ftproc.core.filtering import backward, smoother
+from ftproc.core.filtering.filters import FILTER, Filter, Filters
+from ftproc.core.filtering.forward import ESTIMATED, LEFT, Estimates, Residuals, Span, extrapolated
+from ftproc.core.filtering.records import Model, Observations, Start
+from ftproc.core.filtering.smoother import BLOCK, SCORES, STATES, SmootherRun, smoothed_covariance
+from ftproc.core.signatures import Indices, Layout, Matrix, Vector
+
+FloatArray = NDArray[np.float64]
+Cube = Annotated[NDArray[np.float64], Layout(np.dtype(np.float64), 3)]
+
+PARAMETERS = 6  # of a station: range, azimuth, elevation, tilt about its x and about its y, clock
+LEAST_LEFT = 1e-6  # of a reading's information: what biases leave of it at least
+
+
+class Directions(NamedTuple):
+    """How the readings depend on the biases. design: (n, 3, 3) derivative of each component by the two tilts and the
+    clock offset of its station, m or rad per rad and s; by its own bias it is one. columns: (PARAMETERS * stations, m)
+    directions, each a set of biases."""
+
+    design: FloatArray
+    columns: FloatArray
+
+
+class Memory(NamedTuple):
+    """`smoother.Memory`, and for m columns: station (n,) of each sample; design (n, 3, 3), columns of `Directions`;
+    state (9, m) S; adjoint (9, m) l; at_block (blocks, 9, m) S before each block; in_block (BLOCK, 9, m) S after each
+    sample and white (BLOCK, 3, m) C; score (m,), info (m, m); spread (n, 9) the variance that biases add to the
+    filter's state."""
+
+    block: Filters
+    before: Filters
+    back: backward.Backwards
+    estimates: Estimates
+    residuals: Residuals
+    station: Indices
+    design: Cube
+    columns: Matrix
+    state: Matrix
+    adjoint: Matrix
+    at_block: Cube
+    in_block: Cube
+    white: Cube
+    score: Vector
+    info: Matrix
+    spread: Matrix
+
+
+class Biased(NamedTuple):
+    """A smoother run that allows for biases. run: of `smoother`; its sigmas and residuals include them. spread: (n, 9)
+    the variance that they add to the filter's state, m2 and so on. score (m,), info (m, m): of the log-likelihood by
+    the biases in the directions given."""
+
+    run: SmootherRun
+    spread: FloatArray
+    score: FloatArray
+    info: FloatArray
+
+
+@part
+def _keep(memory: Any, b: int) -> None:
+    memory.at_block[b] = memory.state
+
+
+@part
+def _recall(memory: Any, b: int) -> None:
+    memory.state[:] = memory.at_block[b]
+
+
+@part
+def _derivative(memory: Any, k: int, i: int, c: int) -> float:
+    """D of component i of a sample in direction c."""
+    at, columns, design = PARAMETERS * memory.station[k], memory.columns, memory.design
+    turning = design[k, i, 0] * columns[at + 3, c] + design[k, i, 1] * columns[at + 4, c]
+    return float(columns[at + i, c] + turning + design[k, i, 2] * columns[at + 5, c])
+
+
+@part
+def _carry(memory: Any, f: Filter, k: int, interval: float, place: int) -> None:
+    s, g, u, root, y, h = memory.state, f.g, f.u, f.root, f.y, 0.5 * interval * interval
+    m = s.shape[1]
+    for c in range(m):
+        for i in range(3):
+            s[i, c] += interval * s[i + 3, c] + h * s[i + 6, c]
+            s[i + 3, c] += interval * s[i + 6, c]
+        d0, d1, d2 = _derivative(memory, k, 0, c), _derivative(memory, k, 1, c), _derivative(memory, k, 2, c)
+        w0 = root[0, 0] * d0 + g[0, 0] * s[0, c] + g[0, 1] * s[1, c] + g[0, 2] * s[2, c]
+        w1 = root[1, 0] * d0 + root[1, 1] * d1 + g[1, 0] * s[0, c] + g[1, 1] * s[1, c] + g[1, 2] * s[2, c]
+        w2 = root[2, 0] * d0 + root[2, 1] * d1 + root[2, 2] * d2
+        w2 += g[2, 0] * s[0, c] + g[2, 1] * s[1, c] + g[2, 2] * s[2, c]
+        for i in range(9):
+            s[i, c] -= u[0, i] * w0 + u[1, i] * w1 + u[2, i] * w2
+        if place >= 0:
+            white = memory.white[place]
+            white[0, c], white[1, c], white[2, c] = w0, w1, w2
+            memory.score[c] += w0 * y[0] + w1 * y[1] + w2 * y[2]
+            for e in range(c + 1):
+                memory.info[c, e] += w0 * white[0, e] + w1 * white[1, e] + w2 * white[2, e]
+            for i in range(9):
+                memory.in_block[place, i, c] = s[i, c]
+                memory.spread[k, i] += s[i, c] * s[i, c]
+
+
+@part
+def _carry_back(memory: Any, f: Filter, k: int, interval: float, place: int, kept: int) -> None:
+    if kept == SCORES:
+        return
+    a, white, s = memory.adjoint, memory.white[place], memory.in_block[place]
+    g, u, p, root, m, h = f.g, f.u, f.p, f.root, len(memory.score), 0.5 * interval * interval
+    row, left = memory.estimates[k], memory.residuals[k]
+    added, lost, smoothed = np.zeros(9), np.zeros(3), np.zeros(9)
+    for c in range(m):
+        for i in range(9):
+            v = s[i, c]
+            for j in range(9):
+                v -= p[i, j] * a[j, c]
+            added[i] += v * v
+            smoothed[i] = v
+        v0, v1, v2 = white[0, c], white[1, c], white[2, c]
+        for i in range(9):
+            v0 -= u[0, i] * a[i, c]
+            v1 -= u[1, i] * a[i, c]
+            v2 -= u[2, i] * a[i, c]
+        for i in range(3):
+            if f.used[i] > 0:
+                share = root[0, i] * v0 + root[1, i] * v1 + root[2, i] * v2
+            else:
+                share = _derivative(memory, k, i, c)
+                share += f.h[i, 0] * smoothed[0] + f.h[i, 1] * smoothed[1] + f.h[i, 2] * smoothed[2]
+            lost[i] += share * share
+        for i in range(3):
+            a[i, c] += g[0, i] * v0 + g[1, i] * v1 + g[2, i] * v2
+        for i in range(3):
+            a[i + 6, c] += interval * a[i + 3, c] + h * a[i, c]
+            a[i + 3, c] += interval * a[i, c]
+        for i in range(9):
+            memory.state[i, c] = smoothed[i]
+    if kept == STATES:
+        for i in range(9):
+            row.sigma[i] = math.sqrt(row.sigma[i] * row.sigma[i] + added[i])
+    for i in range(3):
+        if not f.used[i] > 0:
+            left.residual_variance[i] += lost[i]
+        else:
+            told = 1 / (left.residual_variance[i] - f.noise[i] * (1 - 1 / f.used[i]))
+            rest = max(told - lost[i], LEAST_LEFT * told)
+            left.residual[i] *= told / rest
+            left.residual_variance[i] = 1 / rest + f.noise[i] * (1 - 1 / f.used[i])
+
+
+_sweep_biased = kernel(
+    variant(
+        smoother.swept_through,
+        __name__,
+        "_sweep_biased",
+        memory=Memory,
+        _keep=_keep,
+        _recall=_recall,
+        _carry=_carry,
+        _carry_back=_carry_back,
+    )
+)
+
+
+def smooth_biased(log: Observations, model: Model, start: Start, directions: Directions) -> Biased:
+    """Smooth a log of several stations from a start, allowing for biases. Samples before it are extrapolated."""
+    assert log.sites is not None
+    n, m, first = len(log.time_s), directions.columns.shape[1], start.sample
+    blocks, rows = -(-(n - first) // BLOCK), min(n - first, BLOCK)
+    before, block = empty(FILTER, blocks), empty(FILTER, rows)
+    before[:1] = model.filter(start)
+    for name in ("wander", "fade_s"):
+        block[name] = before[name][0]
+    estimates, residuals = zeros(ESTIMATED, n), zeros(LEFT, n)
+    memory = Memory(
+        block, before, zeros(backward.BACKWARD), estimates, residuals,
+        np.ascontiguousarray(log.sites.station), np.ascontiguousarray(directions.design),
+        np.ascontiguousarray(directions.columns),
+        np.zeros((9, m)), np.zeros((9, m)), np.zeros((blocks, 9, m)), np.zeros((rows, 9, m)),
+        np.zeros((rows, 3, m)), np.zeros(m), np.zeros((m, m)), np.zeros((n, 9)),
+    )  # fmt: skip
+    jerk = np.zeros_like(model.jerk)
+    samples, profile = log.samples(model.noise_variance), model.profile(log.time_s)
+    likelihood = _sweep_biased(Span(first, n, first), samples, profile, memory, jerk, STATES)
+    covariance = smoothed_covariance(block["p"][0], memory.back["n_first"][0])[:9, :9]
+    covariance += memory.state @ memory.state.T
+    head = Start(first, memory.back["state"][0, :9].copy(), covariance)
+    estimates[:first], residuals[:first] = extrapolated(log, model, head)
+    fields = {name: estimates[name] for name in ESTIMATED.names or ()}
+    fields |= {name: np.ascontiguousarray(residuals[name]) for name in LEFT.names or ()}
+    run = SmootherRun(
+        **fields, log_likelihood=likelihood, noise_score=memory.back["noise_score"][0], jerk_score=jerk, heads=(head,)
+    )
+    info = memory.info + np.tril(memory.info, -1).T
+    return Biased(run, memory.spread, memory.score, info)

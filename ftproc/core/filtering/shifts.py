@@ -1,0 +1,52 @@
+"""What a record says of a step between any two samples: the smoother's backward pass with the auxiliary residuals."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.compiled import kernel, variant, zeros
+from ftproc.core.filtering import backward, smoother
+from ftproc.core.filtering.filters import COLOURED, ColouredFilters
+from ftproc.core.filtering.forward import LEFT, Residuals, Span
+from ftproc.core.filtering.records import Model, Observations, Start, between
+
+FloatArray = NDArray[np.float64]
+
+FOREVER_S = 1e300  # correlation time of an offset that stays
+
+
+class ShiftMemory(NamedTuple):
+    """`smoother.ColouredMemory` where steps take the place of estimates."""
+
+    block: ColouredFilters
+    before: ColouredFilters
+    back: backward.ColouredBackwards
+    estimates: backward.Shifts
+    residuals: Residuals
+
+
+_sweep = kernel(variant(smoother.swept_through, __name__, "_sweep", memory=ShiftMemory, _store=backward.store_shift))
+
+
+def shifts(log: Observations, model: Model, starts: list[Start]) -> tuple[FloatArray, FloatArray]:
+    """What the record says of a step between each sample and the next: score and information (n, 4), of which
+    score / information is the estimate and 1 / information its variance (de Jong and Penzer 1998, section 3).
+
+    In the first three columns the readings of a component are larger from the next sample on, m, rad, rad: a shock of
+    an offset of that component, which the smoother carries along at no variance. In the last the target is seconds
+    further on its way, as when the clock jumps. Noise that is correlated is taken for white.
+    """
+    n = len(log.time_s)
+    samples, profile = log.samples(model.reading_variance), model.profile(log.time_s)
+    found = zeros(backward.SHIFT, n)
+    residuals = zeros(LEFT, n)
+    for start, stop in between(starts, n):
+        first = zeros(COLOURED)
+        first["x"][0, :9], first["p"][0, :9, :9], first["fade_s"] = start.state, start.covariance, FOREVER_S
+        memory = ShiftMemory(*smoother.memory_of(stop - start.sample, first, found, residuals))
+        span = Span(start.sample, stop, start.sample)
+        _sweep(span, samples, profile, memory, np.zeros_like(model.jerk), smoother.STATES)
+    return found["score"].copy(), found["information"].copy()

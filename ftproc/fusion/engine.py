@@ -1,0 +1,281 @@
+"""The fused flight: smoother, biases, noise, process noise and decisions in turn, until they stand still.
+
+Each round smooths the events of all stations with the readings that are believed (`core.filtering.biases`), moves the
+biases to their posterior, the noise of each station to what its leave-one-out residuals show, the process noise to its
+likelihood's maximum, and decides anew, station by station and component by component, which readings are outliers: by
+the same hidden Markov chain as for a single log, on residuals in which all other stations take part.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ftproc.core.editing import outlier_chain
+from ftproc.core.filtering.biases import Biased, Directions, smooth_biased
+from ftproc.core.filtering.forward import filter_log
+from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
+from ftproc.core.filtering.smoother import score_log
+from ftproc.core.identification import optimizer
+from ftproc.core.identification.likelihood import VERTICAL_PRECISION, jerk_bounds, shaped
+from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
+from ftproc.core.identification.scales import scales_of
+from ftproc.core.model.motion import isotropic
+from ftproc.fusion import alternatives, first_track, screening
+from ftproc.fusion import constants as posterior
+from ftproc.fusion.constants import Constants
+from ftproc.fusion.events import Events, Seen, merge
+from ftproc.records import FloatArray
+
+FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 18, 8
+LEVEL_STEPS, PROFILE_STEPS, LAST_STEPS = 4, 3, 8
+READMITTED = 0.8  # probability of being good from which a rejected reading is used again after the first rounds
+STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that may still change
+NOISE_STEP = 4.0  # times its variance that the noise of a component moves in a round
+START_SIGMA = (30.0, 10.0, 20.0)  # m, m/s, m/s2: at least, of the state at the start
+START_INFLATION = 25.0  # on its variance
+SHARES = (1.0, 0.25, 0.06, 0.0)  # of what is unknown of the readings, which is taken for noise at first: ever less
+FEWEST_KEPT = 0.5  # of what screening trusts, in each component of a station
+
+
+class Fused(NamedTuple):
+    """events, weight (rows, 3) of each station; sigma (m, 3) noise; constants; model; start; found: the smoother's run
+    that the rest belongs to; rounds, settled: of the decisions."""
+
+    stations: list[Seen]
+    events: Events
+    weight: list[FloatArray]
+    possible: list[FloatArray]
+    sigma: FloatArray
+    constants: Constants
+    model: Model
+    start: Start
+    found: Biased
+    rates: FloatArray
+    rounds: int = 0
+    settled: bool = False
+
+    @property
+    def log(self) -> Observations:
+        """The events with the weights of the readings."""
+        return self.events.weighted(self.weight)
+
+
+class Alone(Exception):
+    """The readings of the stations determine no first track."""
+
+
+def fuse(
+    stations: list[Seen], gate: float, jerk_psd: float | None, progress: Callable[[str], None] | None = None
+) -> Fused:
+    """The fused flight of two or more stations. Raises Alone."""
+    screened = [screening.screen(station) for station in stations]
+    sigma = np.stack([each.sigma for each in screened])
+    track = first_track.find(stations, [each.trusted for each in screened], sigma)
+    if track is None:
+        raise Alone
+    trusted = [screening.agreeing(s, each, track) for s, each in zip(stations, screened, strict=True)]
+    prior = np.stack([station.prior for station in stations])
+    current = _begin(stations, screened, trusted, track, sigma, Constants.unknown(prior), jerk_psd)
+    say = progress or (lambda text: None)
+    looks, search, again = 0, alternatives.Search(), False
+    for number in range(MOST_ROUNDS):
+        say(f"round {number + 1}")
+        level = number if number < FIRST_ROUNDS else None
+        current = _round(current, trusted, gate, jerk_psd, level)
+        if number >= FIRST_ROUNDS - 1 and looks < LOOKS and (current.settled or number % 2):
+            looks += 1
+            current, changed = _reassessed(current, trusted, gate, search)
+            if not changed and current.settled:
+                if again:
+                    break
+                again = search.again()  # all places once more, with all that is known at the end
+    return _last(current)
+
+
+def _begin(
+    stations: list[Seen], screened: list[screening.Screened], weight: list[FloatArray], track: first_track.Track,
+    sigma: FloatArray, constants: Constants, jerk_psd: float | None,
+) -> Fused:  # fmt: skip
+    """The first smoother run, along the first track."""
+    range_m = np.array([np.median(np.linalg.norm(track.state[:, :3] - s.place, axis=1)) for s in stations])
+    events = merge(stations, constants.estimate, range_m)
+    state = track.at(events.time_s)
+    first = int(np.searchsorted(events.time_s, track.time_s[0]))
+    first = min(first, len(events.time_s) - 1)
+    spread = max(float(track.sigma[0]), START_SIGMA[0])
+    covariance = np.diag(np.repeat([spread, 100.0, 50.0], 3) ** 2)
+    start = Start(first, state[first], covariance)
+    log = events.weighted(weight)
+    wide = screening.with_biases(events, stations, state, sigma)
+    near = screening.Near(state[:, :3], float(np.median(track.sigma)), screening.interval(stations))
+    model = Model(wide**2, isotropic(jerk_psd or screening.first_jerk(log, wide**2, start, near)))
+    found = smooth_biased(log, model, start, _directions(events, state, constants))
+    rates = np.tile(np.array(outlier_chain.START_RATES), (len(stations), 3, 1))
+    possible = [each.possible for each in screened]
+    begun = Fused(stations, events, weight, possible, sigma, constants, model, start, found, rates)
+    for share in SHARES:
+        noise = np.maximum(sigma, share * wide) ** 2
+        begun = _smoothed(begun._replace(model=model._replace(noise_variance=noise)))
+    return begun
+
+
+def _directions(events: Events, state: FloatArray, constants: Constants) -> Directions:
+    return Directions(screening.design(events, state), constants.columns())
+
+
+def _round(current: Fused, trusted: list[FloatArray], gate: float, jerk_psd: float | None, first: int | None) -> Fused:
+    """Decide, tune, move the biases, and smooth again."""
+    now = _decided(current, trusted, gate, first)
+    now = _tuned(now, jerk_psd, first)
+    return _smoothed(now)
+
+
+def _reassessed(
+    current: Fused, trusted: list[FloatArray], gate: float, search: alternatives.Search
+) -> tuple[Fused, bool]:
+    """The decisions replaced by likelier ones where another hypothesis explains a place better; whether any was."""
+    events, log = current.events, current.log
+    possible, believed, weight = events.gathered(current.possible), events.gathered(trusted), log.weight.copy()
+    state = current.found.run.state
+    memory_s = scales_of(log, current.model.noise_variance).memory_s(float(np.median(current.model.jerk[:, 0])))
+    margin = alternatives.margin_s(events.time_s, memory_s)
+    changed = False
+    search.begin(float(np.median(current.model.jerk[:, 0])))
+    for place in alternatives.places(log, possible):
+        if not search.take(place):
+            continue
+        ends = np.searchsorted(events.time_s, [place.first_s - margin, place.last_s + margin])
+        here = slice(max(int(ends[0]), current.start.sample), int(ends[1]))
+        inside = (events.time_s[here] >= place.first_s - alternatives.EDGE_S) & (
+            events.time_s[here] <= place.last_s + alternatives.EDGE_S
+        )
+        if not inside.any():
+            continue
+        start = Start(0, state[here.start], np.diag(np.repeat(alternatives.FREE, 3) ** 2))
+        near = alternatives.Neighbourhood(
+            log.part(here)._replace(weight=weight[here]), possible[here], believed[here], current.sigma, inside, start,
+            alternatives.calm_levels(current.model, here, events.time_s), gate,
+        )  # fmt: skip
+        found = alternatives.likeliest(near)
+        if found is not None:
+            weight[here][inside] = found[inside]
+            changed = True
+    if not changed:
+        return current, False
+    by_station = [events.of(s, weight) for s in range(len(current.stations))]
+    calm = median_level(current.model) if math.isfinite(current.model.knot_s) else current.model
+    return _smoothed(current._replace(weight=by_station, model=calm, settled=False)), True
+
+
+def _decided(current: Fused, trusted: list[FloatArray], gate: float, first: int | None) -> Fused:
+    run, weight, changed, total = current.found.run, [], 0, 0
+    for s, before in enumerate(current.weight):
+        residual = np.ascontiguousarray(current.events.of(s, run.residual))
+        variance = np.ascontiguousarray(current.events.of(s, run.residual_variance))
+        good = outlier_chain.classify(residual, variance, current.sigma[s] ** 2, current.rates[s], gate)
+        sure = np.where((before > 0) | (first is not None), 0.5, READMITTED)
+        decided = ((good > sure) & (current.possible[s] > 0)).astype(float)
+        lost = decided.sum(0) < FEWEST_KEPT * trusted[s].sum(0)
+        decided = np.where(lost, trusted[s], decided)
+        changed, total = changed + int((decided != before).sum()), total + int((current.possible[s] > 0).sum())
+        weight.append(decided)
+    settled = changed <= STILL * total and current.constants.moved < UNMOVED
+    return current._replace(weight=weight, rounds=current.rounds + 1, settled=settled)
+
+
+def _tuned(current: Fused, jerk_psd: float | None, first: int | None) -> Fused:
+    """Noise by one step, the process noise by a few."""
+    run, sigma = current.found.run, current.sigma.copy()
+    used = current.events.gathered(current.weight) > 0
+    for s, station in enumerate(current.stations):
+        here = current.events.station == s
+        for c in station.components:
+            rows = here & used[:, c]
+            if rows.sum() < screening.FEWEST or np.isfinite(station.known[c]):
+                continue
+            r, v = run.residual[rows, c], run.residual_variance[rows, c]
+            growth = np.clip(((r / v) ** 2).sum() / (1 / v).sum(), 1 / NOISE_STEP, NOISE_STEP)
+            sigma[s, c] = max(sigma[s, c] * math.sqrt(growth), screening.LEAST_NOISE[c])
+    model = current.model._replace(noise_variance=sigma**2)
+    starts = [current.start]
+    if jerk_psd is None:
+        log = current.log
+        fit = _level if first is not None else _profile
+        model = fit(log, starts, model)
+    return current._replace(sigma=sigma, model=model)
+
+
+def _profile(log: Observations, starts: list[Start], model: Model) -> Model:
+    """The likeliest profile, from the model's, whose length follows the span of the events: the clocks move it."""
+    return fit_profile(log, starts, _of_length(log, model), PROFILE_STEPS)
+
+
+def _of_length(log: Observations, model: Model) -> Model:
+    """The model with as many pieces as its profile needs over the events."""
+    if not math.isfinite(model.knot_s):
+        return model
+    knots = max(math.ceil(scales_of(log, model.noise_variance).span_s / model.knot_s), 1)
+    return model._replace(jerk=model.jerk[np.minimum(np.arange(knots), len(model.jerk) - 1)])
+
+
+def _level(log: Observations, starts: list[Start], model: Model) -> Model:
+    """The likeliest single jerk level, from the model's."""
+    scales = scales_of(log, model.noise_variance)
+    lower, upper = jerk_bounds(scales)
+
+    def cost(theta: FloatArray) -> tuple[float, FloatArray]:
+        tried = model._replace(jerk=shaped(theta[:1], theta[1]))
+        found = score_log(log, tried, starts)
+        by_axis = found.jerk[0] * tried.jerk[0]
+        pull = VERTICAL_PRECISION * theta[1]
+        return -found.log_likelihood + 0.5 * pull * theta[1], -np.r_[by_axis.sum(), by_axis[5] - pull]
+
+    jerk = np.median(model.jerk, 0)
+    theta = np.clip(np.array([math.log(jerk[0]), math.log(jerk[5] / jerk[0])]), lower, upper)
+    curvature = np.array([len(log.time_s) / 20, len(log.time_s) / 60])
+    theta = optimizer.minimise(cost, theta, curvature, lower, upper, LEVEL_STEPS, tolerance=0.1)
+    return model._replace(jerk=shaped(theta[:1], theta[1]), knot_s=math.inf)
+
+
+def _smoothed(current: Fused) -> Fused:
+    """Smooth at the biases' posterior of the run before, with the weights and the model of now."""
+    old = current.events
+    directions = _directions(old, current.found.run.state, current.constants)
+    constants = posterior.update(current.constants, current.found, directions)
+    events = merge(current.stations, constants.estimate, old.sites.range_m)
+    state = _interpolated(old.time_s, current.found.run.state, events.time_s)
+    head = current.found.run.heads[0]
+    first = min(head.sample, len(events.time_s) - 1)
+    floor = np.repeat(START_SIGMA, 3) ** 2
+    covariance = START_INFLATION * head.covariance + np.diag(floor)
+    start = Start(first, state[first], covariance)
+    found = smooth_biased(events.weighted(current.weight), current.model, start, _directions(events, state, constants))
+    return current._replace(events=events, constants=constants, start=start, found=found)
+
+
+def _interpolated(time_s: FloatArray, state: FloatArray, wanted: FloatArray) -> FloatArray:
+    """(k, 9) states at other times, by the motion from the nearest one before."""
+    at = np.clip(np.searchsorted(time_s, wanted, side="right") - 1, 0, len(time_s) - 1)
+    late = (wanted - time_s[at])[:, None]
+    p, v, a = state[at, :3], state[at, 3:6], state[at, 6:]
+    return np.hstack([p + late * v + 0.5 * late**2 * a, v + late * a, a])
+
+
+def _last(current: Fused) -> Fused:
+    """The run to publish: with a little more process noise than is likeliest."""
+    if math.isfinite(current.model.knot_s):
+        log = current.log
+        polished = fit_profile(log, [current.start], _of_length(log, current.model), LAST_STEPS)
+        current = current._replace(model=with_allowance(log, polished))
+    return _smoothed(_smoothed(current))
+
+
+def filtered(fused: Fused) -> FilterRun:
+    """The causal filter with the decisions and the biases of the whole flight; its sigmas include theirs."""
+    run = filter_log(fused.log, fused.model, [fused.start])
+    sigma = np.sqrt(run.sigma**2 + fused.found.spread)
+    return run._replace(sigma=sigma)

@@ -1,0 +1,200 @@
+"""What a fused flight shows of its stations: stretches on another target, silences, contradictions; and the verdict."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing.runs import runs_of
+from ftproc.fusion import constants as posterior
+from ftproc.fusion.engine import Fused
+from ftproc.fusion.events import CLOCK
+from ftproc.quality import consistency
+from ftproc.quality.verdict import CONSISTENT, MANY_REJECTED, SUSPECT, TOO_MANY_REJECTED, UNRELIABLE, Remark
+from ftproc.records import COMPONENTS, FloatArray
+
+WRONG_S, WRONG_ROWS = 3.0, 6  # seconds and rows that all of a station's readings are rejected: another target
+BRIDGED = 4  # rows within that are good by chance
+SILENT_S, SILENT_INTERVALS = 10.0, 25.0  # without a reading
+LATE = 0.03  # of the flight
+IMPROBABLE = 4.0  # prior sigmas of a bias
+FEWEST = 10  # readings of a component, for its share of rejections to mean anything
+ALONE_S = 3.0  # of a stretch that only one station carries while others are rejected
+
+#: Is said with every consistent fused flight.
+NOT_SHOWN = (
+    "Stations together cannot show what is wrong with all of them alike: a clock offset or a tilt that they share, "
+    "places in a wrong frame, or a false target that all follow."
+)
+
+
+class Stretch(NamedTuple):
+    """A station from first_s to last_s, true time in s. kind: another target, silent, joins late, leaves early."""
+
+    station: str
+    first_s: float
+    last_s: float
+    kind: str
+
+
+def stretches(fused: Fused) -> list[Stretch]:
+    """What happened to each station, in the order of time; times from the first reading."""
+    found = []
+    begin, end = (float(fused.events.time_s[k]) for k in (0, -1))
+    for s, station in enumerate(fused.stations):
+        time_s = station.time_s - fused.constants.estimate[s, CLOCK]
+        found += [Stretch(station.name, *ends, "another target") for ends in _elsewhere(fused, s, time_s)]
+        seen = time_s[fused.possible[s].any(1)]
+        if len(seen) < 2:
+            continue
+        least = max(SILENT_S, SILENT_INTERVALS * float(np.median(np.diff(seen))), LATE * (end - begin))
+        if seen[0] - begin > least:
+            found.append(Stretch(station.name, begin, float(seen[0]), "joins late"))
+        if end - seen[-1] > least:
+            found.append(Stretch(station.name, float(seen[-1]), end, "leaves early"))
+        silent = np.flatnonzero(np.diff(seen) > least)
+        found += [Stretch(station.name, float(seen[k]), float(seen[k + 1]), "silent") for k in silent]
+    return sorted(found, key=lambda each: each.first_s)
+
+
+def _elsewhere(fused: Fused, s: int, time_s: FloatArray) -> Iterator[tuple[float, float]]:
+    """From and to where all readings of a station are rejected."""
+    possible, used = fused.possible[s] > 0, fused.weight[s] > 0
+    rows = np.flatnonzero(possible.any(1))
+    bad = _closed(~np.asarray(used[rows].any(1)), BRIDGED)
+    for first, last in runs_of(bad):
+        if last - first >= WRONG_ROWS and time_s[rows[last - 1]] - time_s[rows[first]] >= WRONG_S:
+            yield float(time_s[rows[first]]), float(time_s[rows[last - 1]])
+
+
+def _closed(flag: NDArray[np.bool_], most: int) -> NDArray[np.bool_]:
+    """Gaps of at most so many between runs of true filled, where the runs are longer."""
+    found = flag.copy()
+    runs = runs_of(flag)
+    for (a, b), (c, d) in itertools.pairwise(runs):
+        if c - b <= most and min(b - a, d - c) > c - b:
+            found[b:c] = True
+    return found
+
+
+def component_figures(fused: Fused, s: int) -> dict[str, Any]:
+    """Counts, noise and the test of the residuals of a station, by component."""
+    station, found = fused.stations[s], {}
+    residual = fused.events.of(s, fused.found.run.residual)
+    variance = fused.events.of(s, fused.found.run.residual_variance)
+    for c in station.components:
+        seen, used = np.isfinite(station.measurement[:, c]), fused.weight[s][:, c] > 0
+        squares = residual[used, c] ** 2 / variance[used, c]
+        unit = ("m", "rad", "rad")[c]
+        found[COMPONENTS[c]] = {
+            "good": int(used.sum()),
+            "rejected": int((seen & ~used).sum()),
+            "missing": int((~seen).sum()),
+            f"noise_{unit}": float(fused.sigma[s, c]),
+            "residual_ratio": float(np.sqrt(squares.mean())) if len(squares) else None,
+        }
+    return found
+
+
+def remarks(fused: Fused, sigma_m: FloatArray, zero_s: float) -> list[Remark]:
+    """All remarks on a fused flight. sigma_m: (n, 3) of the published position. zero_s: the logs' time of the first
+    reading."""
+    return [
+        *_clocks(fused),
+        *_told(fused),
+        *_improbable(fused),
+        *_rejections(fused),
+        *_stretches(fused, zero_s),
+        *_poorly(fused, sigma_m, zero_s),
+        *_unsettled(fused),
+    ]
+
+
+def _clocks(fused: Fused) -> Iterator[Remark]:
+    prior = fused.constants.prior[:, CLOCK]
+    if len(prior) > 1 and not prior.any():
+        yield Remark(
+            CONSISTENT, "all clocks are taken as exact (clock_offset_sigma_s = 0 everywhere): none is estimated"
+        )
+    elif (prior > 0).all():
+        text = (
+            "no clock is the reference (clock_offset_sigma_s = 0): the time of all is known as well as the best of them"
+        )
+        yield Remark(CONSISTENT, text)
+
+
+def _told(fused: Fused) -> Iterator[Remark]:
+    untold = posterior.cannot_be_told(fused.constants, [station.name for station in fused.stations])
+    if untold:
+        yield Remark(CONSISTENT, f"cannot be told: {'; '.join(untold)} (1-sigma stays at the prior's)")
+
+
+def _improbable(fused: Fused) -> Iterator[Remark]:
+    c = fused.constants
+    for s, station in enumerate(fused.stations):
+        for j, word in enumerate(posterior.WORDS):
+            if c.prior[s, j] > 0 and abs(c.estimate[s, j]) > IMPROBABLE * c.prior[s, j]:
+                times = abs(c.estimate[s, j]) / c.prior[s, j]
+                yield Remark(
+                    SUSPECT,
+                    f"the {word} of {station.name} is {times:.0f} times its 1-sigma of the range file: check its "
+                    "place, its clock and its conventions, or that 1-sigma",
+                )
+
+
+def _rejections(fused: Fused) -> Iterator[Remark]:
+    for s, station in enumerate(fused.stations):
+        shares = {}
+        for c in station.components:
+            possible = np.isfinite(station.measurement[:, c])
+            if possible.sum() >= FEWEST:
+                shares[COMPONENTS[c]] = float(1 - (fused.weight[s][possible, c] > 0).mean())
+        if shares and min(shares.values()) > TOO_MANY_REJECTED:
+            text = f"{station.name} contradicts the others: most of its readings are rejected; check its place, its "
+            yield Remark(SUSPECT, text + "clock, its conventions, and that it follows the same target")
+            continue
+        for name, share in shares.items():
+            if share > MANY_REJECTED:
+                level = UNRELIABLE if share > TOO_MANY_REJECTED else SUSPECT
+                yield Remark(level, f"{100 * share:.0f} % of the {name} readings of {station.name} are rejected")
+
+
+def _stretches(fused: Fused, zero_s: float) -> Iterator[Remark]:
+    for each in stretches(fused):
+        when = f"from {each.first_s + zero_s:.6g} to {each.last_s + zero_s:.6g} s"
+        if each.kind != "another target":
+            yield Remark(CONSISTENT, f"{each.station} {each.kind}: no reading {when}")
+            continue
+        others = [
+            s for s, station in enumerate(fused.stations) if station.name != each.station and _carries(fused, s, each)
+        ]
+        if len(others) > 1:
+            yield Remark(CONSISTENT, f"{each.station} follows another target {when}: all of its readings are rejected")
+        else:
+            other = fused.stations[others[0]].name if others else "no other station"
+            text = (
+                f"{each.station} and {other} contradict each other {when}, and nobody else saw the target: it is open "
+            )
+            yield Remark(SUSPECT, text + f"which is right; {each.station} is left out")
+
+
+def _carries(fused: Fused, s: int, during: Stretch) -> bool:
+    """Whether a station has readings that are used then."""
+    time_s = fused.stations[s].time_s - fused.constants.estimate[s, CLOCK]
+    here = (time_s >= during.first_s) & (time_s <= during.last_s)
+    return bool((fused.weight[s][here] > 0).any())
+
+
+def _poorly(fused: Fused, sigma_m: FloatArray, zero_s: float) -> Iterator[Remark]:
+    for part in consistency.poorly_observable(fused.events.time_s, sigma_m)[:3]:
+        when = f"from {part['from_s'] + zero_s:.6g} to {part['to_s'] + zero_s:.6g} s"
+        yield Remark(SUSPECT, f"the position is poorly observable {when}: 1 sigma up to {part['sigma_m']:.3g} m")
+
+
+def _unsettled(fused: Fused) -> Iterator[Remark]:
+    if not fused.settled:
+        yield Remark(SUSPECT, "the decisions on outliers and the biases did not settle: inspect the flagged readings")

@@ -1,0 +1,225 @@
+"""From a range file to a fused flight: its trajectory, the stations' edited logs, the table of biases, the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ftproc import __version__, pipeline
+from ftproc.errors import InputError
+from ftproc.files import arrow
+from ftproc.files.conventions import CONVENTION
+from ftproc.files.writing import geodesy
+from ftproc.fusion import constants as posterior
+from ftproc.fusion import engine, findings, logs, results
+from ftproc.fusion.constants import Constants
+from ftproc.fusion.engine import Fused
+from ftproc.fusion.range_file import Instrument, Range
+from ftproc.quality import verdict
+from ftproc.records import FloatArray, MeasurementLog, Trajectory
+from ftproc.settings import FilterSettings
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from ftproc.correction.model import Model
+
+METHOD = "fusion"
+
+
+@dataclass(frozen=True)
+class Flight:
+    """trajectory: x east, y north, z up at the origin, with the summary in its metadata. edited: a table for each
+    station. biases: the table. constants: the same as numbers. fused: what the report draws; None of one station."""
+
+    trajectory: Trajectory
+    edited: dict[str, pa.Table]
+    biases: pa.Table
+    constants: Constants
+    fused: Fused | None = None
+    zero_s: float = 0.0
+
+
+def fuse(
+    range_: Range, settings: FilterSettings, model: Model | None = None, say: Callable[[str], None] | None = None
+) -> Flight:
+    """The flight that the stations of a range have seen. model: the correction of a single station's filter.
+
+    Raises InputError for logs that cannot be read or have nothing in common, UsageError for settings without sense.
+    """
+    read = logs.read(range_.instruments)
+    if len(read) == 1:
+        return _alone(range_, read[0], settings, model)
+    seen, zero_s = logs.as_seen(range_.instruments, read)
+    logs.check_overlap(range_, seen)
+    try:
+        fused = engine.fuse(seen, settings.gate, settings.jerk_psd_m2ps5, say)
+    except engine.Alone as cause:
+        names = ", ".join(station.name for station in seen)
+        raise InputError(
+            f"{range_.path}: the readings of {names} meet nowhere, so there is no first track: at no time do a range "
+            "and two angles, two lines of sight, or three ranges meet in a point. Check the places, the clocks and the "
+            "conventions of the stations, or add one."
+        ) from cause
+    return _flight(range_, read, fused, zero_s, settings)
+
+
+def _flight(
+    range_: Range, read: Sequence[MeasurementLog], fused: Fused, zero_s: float, settings: FilterSettings
+) -> Flight:
+    events, run = fused.events, fused.found.run
+    state, sigma, nis = run.state, run.sigma, run.nis
+    if not settings.smooth:
+        causal = engine.filtered(fused)
+        state, sigma, nis = causal.state, causal.sigma, causal.nis
+    if not np.isfinite(state).all():
+        raise InputError(f"{range_.path}: the fused filter diverged; check the places, the clocks and the conventions.")
+    last = results.distinct(events.time_s)
+    names = [station.name for station in fused.stations]
+    summary = summarize(fused, sigma, zero_s)
+    metadata = _metadata(range_, settings, summary, fused)
+    n = len(last)
+    nothing = np.full((n, 3), np.nan)
+    trajectory = Trajectory(
+        range_.path, np.arange(n), events.time_s[last] + zero_s, nothing, state[last], sigma[last, :6],
+        np.zeros((n, 3), np.uint8), results.nis(events, nis), np.zeros((n, 6)), metadata,
+        arrow.table({"stations": results.stations_used(fused).astype(np.int64)}),
+    )  # fmt: skip
+    located = _located(trajectory, range_, settings)
+    edited = {name: results.edited(fused, s, read[s], state) for s, name in enumerate(names)}
+    return Flight(located, edited, results.biases(fused.constants, names), fused.constants, fused, zero_s)
+
+
+def _located(trajectory: Trajectory, range_: Range, settings: FilterSettings) -> Trajectory:
+    """With positions on the earth, if the origin is there and the library too."""
+    if range_.origin is None:
+        return trajectory
+    try:
+        geodesy.require_pymap3d()
+    except Exception:
+        return trajectory
+    return geodesy.located(trajectory, replace(settings, site=range_.origin))
+
+
+def _alone(range_: Range, log: MeasurementLog, settings: FilterSettings, model: Model | None) -> Flight:
+    """A single station: filtered as any log, and seen from the origin."""
+    instrument = range_.instruments[0]
+    own = instrument.recipe.settings
+    settings = replace(
+        settings, noise=settings.noise or own.noise, jerk_psd_m2ps5=settings.jerk_psd_m2ps5 or own.jerk_psd_m2ps5
+    )
+    found = pipeline.filter_log(log, settings, model)
+    turned = _from_origin(found, instrument, log.frame)
+    (seen,), _ = logs.as_seen(range_.instruments, [log])
+    constants = Constants.unknown(seen.prior[None])
+    used = (found.outlier == 0).any(1).astype(np.int64)
+    last = results.distinct(found.time_s)
+    summary = {
+        **found.metadata["summary"],
+        "log": range_.path,
+        "stations": {instrument.name: {"log": log.name}},
+    }
+    metadata = {**found.metadata, "method": METHOD, "log": range_.path, "frame": "local", "summary": summary}
+    trajectory = replace(
+        turned, name=range_.path, row=np.arange(len(last)), time_s=found.time_s[last], state=turned.state[last],
+        sigma=turned.sigma[last], measurement=np.full((len(last), 3), np.nan),
+        outlier=np.zeros((len(last), 3), np.uint8), nis=found.nis[last], correction=np.zeros((len(last), 6)),
+        metadata=metadata, extra=arrow.table({"stations": used[last]}), diagnostics=None,
+    )  # fmt: skip
+    edited = {instrument.name: results.edited_alone(found, log)}
+    table = results.biases(constants, [instrument.name])
+    return Flight(_located(trajectory, range_, settings), edited, table, constants)
+
+
+def _from_origin(found: Trajectory, instrument: Instrument, frame: str) -> Trajectory:
+    """A station's own trajectory in east, north and up of the origin."""
+    order = [1, 0, 2] if frame == "north-east-up" else [0, 1, 2]
+    back = instrument.axes.T
+    level = bool((back == np.eye(3)).all())
+    state, sigma = found.state.copy(), found.sigma.copy()
+    for at in (0, 3, 6):
+        own = found.state[:, at : at + 3][:, order]
+        state[:, at : at + 3] = own if level else own @ back.T
+    state[:, :3] += instrument.place
+    for at in (0, 3):
+        own = found.sigma[:, at : at + 3][:, order]
+        sigma[:, at : at + 3] = own if level else np.sqrt(own**2 @ (back.T) ** 2)
+    return replace(found, state=state, sigma=sigma)
+
+
+def summarize(fused: Fused, sigma: FloatArray, zero_s: float) -> dict[str, Any]:
+    """The figures of a fused flight, JSON-serialisable; times as in the logs."""
+    events, jerk = fused.events, fused.model.jerk[:, [0, 3, 5]].mean(1)
+    said = findings.remarks(fused, sigma[:, :3], zero_s)
+    trust = verdict.verdict(said)
+    if trust["verdict"] == verdict.CONSISTENT:
+        trust["not_shown"] = findings.NOT_SHOWN
+    return {
+        "rows": len(results.distinct(events.time_s)),
+        "readings": int(sum((possible > 0).sum() for possible in fused.possible)),
+        "duration_s": float(events.time_s[-1] - events.time_s[0]),
+        "stations": {
+            station.name: {
+                "rows": len(station.time_s),
+                "components": findings.component_figures(fused, s),
+                "biases": _bias_figures(fused.constants, s),
+            }
+            for s, station in enumerate(fused.stations)
+        },
+        "stretches": [
+            {"station": e.station, "from_s": e.first_s + zero_s, "to_s": e.last_s + zero_s, "what": e.kind}
+            for e in findings.stretches(fused)
+        ],
+        "cannot_be_told": posterior.cannot_be_told(fused.constants, [station.name for station in fused.stations]),
+        "jerk_psd_m2ps5": {"lowest": jerk.min(), "median": float(np.median(jerk)), "highest": jerk.max()},
+        "rounds": fused.rounds,
+        "editing_converged": fused.settled,
+        "notes": [remark.text for remark in said if remark.text not in trust["reasons"]],
+        "trust": trust,
+    }
+
+
+def _bias_figures(constants: Constants, s: int) -> dict[str, Any]:
+    return {
+        name: {
+            "estimate": float(constants.estimate[s, j]),
+            "sigma": float(constants.sigma[s, j]),
+            "prior_sigma": float(constants.prior[s, j]),
+            "observable": bool(constants.observable[s, j]),
+        }
+        for j, name in enumerate(posterior.NAMES)
+        if constants.prior[s, j] > 0
+    }
+
+
+def _metadata(range_: Range, settings: FilterSettings, summary: dict[str, Any], fused: Fused) -> dict[str, Any]:
+    return {
+        "program": "ftproc",
+        "version": __version__,
+        "method": METHOD,
+        "log": range_.path,
+        "frame": "local",
+        "axes": "x east, y north, z up at the origin of the range; time is true time: clock offsets are taken out",
+        "convention": CONVENTION["local"],
+        "origin": range_.origin,
+        "stations": {
+            each.name: {"log": each.log, "place_m": each.place.tolist(), "site": each.site}
+            for each in range_.instruments
+        },
+        "settings": {
+            "editing": "two-pass",
+            "smooth": settings.smooth,
+            "gate": settings.gate,
+            "site": range_.origin,
+            "jerk_specified": settings.jerk_psd_m2ps5 is not None,
+            "jerk_psd_m2ps5": [float(q) for q in fused.model.jerk[:, 0]],
+            "jerk_vertical_ratio": float(fused.model.jerk[0, 5] / fused.model.jerk[0, 0]),
+            "jerk_knot_s": float(fused.model.knot_s) if len(fused.model.jerk) > 1 else None,
+        },
+        "sees": "the whole record",
+        "model_sha256": None,
+        "summary": summary,
+    }

@@ -1,0 +1,85 @@
+"""The logs of a range read, and brought to one clock, one frame and one sense of the azimuth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from datetime import datetime
+
+import numpy as np
+
+from ftproc.core.model.frames import wrap
+from ftproc.errors import InputError
+from ftproc.files.reading import logs
+from ftproc.fusion.events import Seen
+from ftproc.fusion.range_file import Instrument, Range
+from ftproc.quality import sanity
+from ftproc.records import FloatArray, MeasurementLog
+
+HOUR_S = 3600.0
+ZONES = range(-14, 15)  # hours by which a clock of another time zone is off
+
+
+def read(instruments: Sequence[Instrument]) -> list[MeasurementLog]:
+    """The log of each. Raises InputError, UsageError."""
+    found = [logs.read(each.log, **each.recipe.reading()) for each in instruments]
+    for log in found:
+        sanity.check(log)
+    return found
+
+
+def as_seen(instruments: Sequence[Instrument], found: Sequence[MeasurementLog]) -> tuple[list[Seen], float]:
+    """What the stations have seen, with the time of the first reading taken as zero, and that time. Raises InputError
+    if their dates contradict each other."""
+    shifts = _shifts(instruments, found)
+    zero = min(float(log.time_s[0]) + shift for log, shift in zip(found, shifts, strict=True))
+    seen = []
+    for instrument, log, shift in zip(instruments, found, shifts, strict=True):
+        z = np.array(log.measurement)
+        if log.frame == "north-east-up":
+            z[:, 1] = math.pi / 2 - z[:, 1]
+        z[:, 1] = wrap(z[:, 1])
+        of_range, azimuth, elevation = (bool(np.isfinite(z[:, c]).any()) for c in range(3))
+        tilts = azimuth or elevation
+        prior = np.where([of_range, azimuth, elevation, tilts, tilts, True], instrument.prior, 0.0)
+        stated = instrument.options.get("noise") or (None, None, None)
+        time_s = np.array(log.time_s) + shift - zero
+        place = instrument.place, instrument.axes
+        seen.append(Seen(instrument.name, time_s, z, *place, prior, np.array(stated, float)))
+    return seen, zero
+
+
+def _shifts(instruments: Sequence[Instrument], found: Sequence[MeasurementLog]) -> FloatArray:
+    """(m,) s that bring logs of different dates to the first of these dates."""
+    dates = [None if not log.epoch else datetime.fromisoformat(log.epoch.replace("Z", "+00:00")) for log in found]
+    known = [date for date in dates if date is not None]
+    if not known:
+        return np.zeros(len(found))
+    return np.array([0.0 if date is None else (date - min(known)).total_seconds() for date in dates])
+
+
+def check_overlap(range_: Range, seen: Sequence[Seen]) -> None:
+    """Raise InputError for a station whose times have nothing in common with those of the others."""
+    for k, station in enumerate(seen):
+        others = [other for j, other in enumerate(seen) if j != k]
+        if not others or any(_overlap(station, other, 0.0) > 0 for other in others):
+            continue
+        first, last = station.time_s[0], station.time_s[-1]
+        spans = ", ".join(f"{other.name} {other.time_s[0]:.6g} to {other.time_s[-1]:.6g} s" for other in others)
+        hour = next(
+            (h for h in sorted(ZONES, key=abs) if any(_overlap(station, o, h * HOUR_S) > 0 for o in others)), None
+        )
+        cure = "name the log of the same flight, or leave the station out"
+        if hour is not None:
+            cure = (
+                f"it would with {hour * HOUR_S:+g} s added to its times (a time zone?): write "
+                f"time_offset_s = {hour * HOUR_S:g} in [station.{station.name}]"
+            )
+        raise InputError(
+            f"{range_.path}: {station.name} ({first:.6g} to {last:.6g} s after the first reading) overlaps with no "
+            f"other station ({spans}); {cure}."
+        )
+
+
+def _overlap(one: Seen, other: Seen, added: float) -> float:
+    return float(min(one.time_s[-1] + added, other.time_s[-1]) - max(one.time_s[0] + added, other.time_s[0]))

@@ -1,0 +1,139 @@
+"""A fused flight as tables: the trajectory, each station's edited log, the biases."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.model import stations as geometry
+from ftproc.core.model.frames import wrap
+from ftproc.files import arrow, layout
+from ftproc.fusion import constants as posterior
+from ftproc.fusion.constants import Constants
+from ftproc.fusion.engine import Fused
+from ftproc.fusion.events import CLOCK, Events
+from ftproc.methods.preparing import labels
+from ftproc.records import COMPONENTS, MISSING, FloatArray, MeasurementLog, Trajectory
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+UNSEEN_S, UNSEEN_INTERVALS = 1.0, 2.5  # since its last used reading, until a station no longer counts as used
+WITHOUT = ("row", *layout.MEASUREMENT, *layout.OUTLIER, *layout.CORRECTION)  # of a trajectory of one station
+
+
+def distinct(time_s: FloatArray) -> Any:
+    """The last of the events of each time, (m,) places."""
+    return np.flatnonzero(np.r_[time_s[1:] > time_s[:-1], True])
+
+
+def nis(events: Events, each: FloatArray) -> FloatArray:
+    """(m,) NIS of all events of one time together; NaN where none was used."""
+    last = distinct(events.time_s)
+    first = np.r_[0, last[:-1] + 1]
+    total = np.add.reduceat(np.nan_to_num(each), first)
+    known = np.add.reduceat(np.isfinite(each).astype(float), first)
+    found: FloatArray = np.where(known > 0, total, np.nan)
+    return found
+
+
+def stations_used(fused: Fused) -> FloatArray:
+    """(m,) how many stations have a used reading within a few of their intervals of each distinct time."""
+    times = fused.events.time_s[distinct(fused.events.time_s)]
+    count = np.zeros(len(times))
+    for s, station in enumerate(fused.stations):
+        used = (station.time_s - fused.constants.estimate[s, CLOCK])[(fused.weight[s] > 0).any(1)]
+        if len(used) < 2:
+            continue
+        near = max(UNSEEN_S, UNSEEN_INTERVALS * float(np.median(np.diff(used))))
+        after = np.clip(np.searchsorted(used, times), 1, len(used) - 1)
+        away = np.minimum(np.abs(times - used[after - 1]), np.abs(used[after] - times))
+        count += away <= near
+    return count
+
+
+def edited(fused: Fused, s: int, log: MeasurementLog, state: FloatArray) -> pa.Table:
+    """A row for each row of a station's log, in its order and in its sense of the azimuth. state: (events, 9). Rows
+    without a time are missing. The cleaned reading is what the station would have read: its biases are in it."""
+    events, station, biases = fused.events, fused.stations[s], fused.constants.estimate[s]
+    here = events.of(s, state)
+    cleaned = geometry.measured(here[:, :3], station.place, events.sites.axes[s]) + biases[:3]
+    near = np.where(np.isfinite(station.measurement[:, 1]), station.measurement[:, 1], 0.0)
+    cleaned[:, 1] = near + wrap(cleaned[:, 1] - near)
+    residual, variance = (events.of(s, each) for each in (fused.found.run.residual, fused.found.run.residual_variance))
+    label = labels(fused.weight[s], station.measurement)
+    if log.frame == "north-east-up":
+        cleaned[:, 1], residual[:, 1] = math.pi / 2 - cleaned[:, 1], -residual[:, 1]
+        reading = np.where(np.isfinite(log.measurement[:, 1]), log.measurement[:, 1], math.pi)
+        cleaned[:, 1] = reading + wrap(cleaned[:, 1] - reading)
+    absent = [c for c in range(3) if c not in station.components]
+    cleaned[:, absent] = np.nan
+    rows = max(log.rows_in_file, int(log.row.max()) + 1)
+
+    def full(values: NDArray[Any], fill: float = np.nan) -> NDArray[Any]:
+        found = np.full((rows, *values.shape[1:]), fill, values.dtype)
+        found[log.row] = values
+        return found
+
+    columns: dict[str, Any] = {
+        "row": np.arange(rows),
+        "time_s": full(log.time_s),
+        "true_time_s": full(log.time_s - biases[CLOCK]),
+    }
+    units = ("m", "rad", "rad")
+    for c, name in enumerate(layout.MEASUREMENT):
+        columns[name] = full(cleaned[:, c])
+    for c, (component, unit) in enumerate(zip(COMPONENTS, units, strict=True)):
+        columns[f"residual_{component}_{unit}"] = full(residual[:, c])
+        columns[f"residual_sigma_{component}_{unit}"] = full(np.sqrt(variance[:, c]))
+    for c, name in enumerate(layout.OUTLIER):
+        columns[name] = full(label[:, c], MISSING)
+    return arrow.table(columns)
+
+
+def edited_alone(found: Trajectory, log: MeasurementLog) -> pa.Table:
+    """The same of a single station."""
+    rows = max(log.rows_in_file, int(log.row.max()) + 1)
+    diagnostics = found.diagnostics
+    assert diagnostics is not None
+
+    def full(values: NDArray[Any], fill: float = np.nan) -> NDArray[Any]:
+        made = np.full(rows, fill, values.dtype)
+        made[found.row] = values
+        return made
+
+    columns: dict[str, Any] = {"row": np.arange(rows), "time_s": full(found.time_s), "true_time_s": full(found.time_s)}
+    for c, name in enumerate(layout.MEASUREMENT):
+        columns[name] = full(found.measurement[:, c])
+    for c, (component, unit) in enumerate(zip(COMPONENTS, ("m", "rad", "rad"), strict=True)):
+        columns[f"residual_{component}_{unit}"] = full(diagnostics.residual[:, c])
+        columns[f"residual_sigma_{component}_{unit}"] = full(diagnostics.residual_sigma[:, c])
+    for c, name in enumerate(layout.OUTLIER):
+        columns[name] = full(found.outlier[:, c], MISSING)
+    return arrow.table(columns)
+
+
+def biases(constants: Constants, names: list[str]) -> pa.Table:
+    """A row for each parameter that was not known beforehand."""
+    import pyarrow as pa
+
+    rows = [
+        (
+            name,
+            parameter,
+            constants.estimate[s, j],
+            constants.sigma[s, j],
+            constants.prior[s, j],
+            constants.observable[s, j],
+        )
+        for s, name in enumerate(names)
+        for j, parameter in enumerate(posterior.NAMES)
+        if constants.prior[s, j] > 0
+    ]
+    columns: list[Any] = list(zip(*rows, strict=True)) if rows else [()] * 6
+    kinds = (pa.string(), pa.string(), pa.float64(), pa.float64(), pa.float64(), pa.bool_())
+    titles = ("station", "parameter", "estimate", "sigma", "prior_sigma", "observable")
+    return pa.table([pa.array(c, k) for c, k in zip(columns, kinds, strict=True)], names=titles)

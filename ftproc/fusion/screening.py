@@ -1,0 +1,121 @@
+"""What is believed of a station's readings before there is a fused track: what each component says by itself, and then
+what a first track does not contradict."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ftproc.core.editing import two_pass
+from ftproc.core.filtering.records import Model, Observations, Start
+from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.identification.scales import scales_of
+from ftproc.core.model import stations as geometry
+from ftproc.core.model.motion import isotropic
+from ftproc.fusion.events import CLOCK, Events, Seen
+from ftproc.fusion.first_track import Track
+from ftproc.records import FloatArray
+
+FIRST_MEMORIES = (3.0, 8.0, 20.0, 50.0, 120.0)  # intervals of the densest station: of the filter that begins the search
+NEAR, NEAR_SHARE = 8.0, 0.9  # 1-sigmas of the first track, within which such a share of the smoothed one lies
+LEAST_NOISE = (1e-4, 1e-8, 1e-8)  # m, rad, rad
+FEWEST = 20  # readings, for the noise or the median of a component
+FEWEST_KEPT = 0.5  # of a component: a track that contradicts more is wrong itself
+GROSS, GROSS_TRACK = 20.0, 8.0  # times what is not known of a component, and of the track, that a median may be off
+OFF, OFF_SIGMAS, OFF_CLOCKS = 8.0, 3.0, 2.0  # of the first track: median deviations, sigmas, clock priors
+
+
+class Screened(NamedTuple):
+    """possible, trusted: (rows, 3) readings of a station that may be good, and that screening trusts; sigma (3,)."""
+
+    possible: FloatArray
+    trusted: FloatArray
+    sigma: FloatArray
+
+
+def screen(station: Seen) -> Screened:
+    """A station by itself."""
+    z = station.measurement
+    weight, sigma, least = np.isfinite(z).astype(float), np.ones(3), two_pass.rounding_sigma(z)
+    for c in station.components:
+        channel = np.ascontiguousarray(z[:, c])
+        weight[:, c], sigma[c] = two_pass.screen_channel(
+            station.time_s, channel, c == 1, math.sqrt(2) * float(least[c])
+        )
+    sigma = np.where(np.isfinite(station.known), station.known, np.maximum(sigma, LEAST_NOISE))
+    possible = np.isfinite(z) & ~two_pass.stuck_readings(z, sigma)
+    possible[:, 0] &= z[:, 0] > 0
+    return Screened(possible.astype(float), weight * possible, sigma)
+
+
+def agreeing(station: Seen, screened: Screened, track: Track) -> FloatArray:
+    """(rows, 3) readings that the screening trusts and the first track does not contradict, about their own median."""
+    weight = screened.trusted.copy()
+    state = track.at(station.time_s)
+    expected = geometry.measured(state[:, :3], station.place, station.axes)
+    n = len(state)
+    rate = np.abs(geometry.design(state, np.tile(station.place, (n, 1)), np.tile(station.axes, (n, 1, 1)))[:, :, 2])
+    off = geometry.innovation(station.measurement, expected)
+    inside = (station.time_s >= track.time_s[0]) & (station.time_s <= track.time_s[-1])
+    for c in station.components:
+        known = (weight[:, c] > 0) & inside
+        if known.sum() < FEWEST:
+            continue
+        middle = np.median(off[known, c])
+        vague = np.median(track.sigma) / (1.0 if c == 0 else max(float(np.median(expected[known, 0])), 1.0))
+        unknown = station.prior[c] + station.prior[CLOCK] * float(np.median(rate[known, c])) + screened.sigma[c]
+        if abs(middle) > GROSS * unknown + GROSS_TRACK * vague:
+            weight[:, c] = 0.0  # a wrong place, convention or clock: no bias explains it
+            continue
+        scatter = 1.4826 * np.median(np.abs(off[known, c] - middle))
+        limit = OFF * scatter + OFF_SIGMAS * screened.sigma[c] + OFF_CLOCKS * station.prior[CLOCK] * rate[:, c]
+        wrong = inside & (np.abs(off[:, c] - middle) > limit)
+        if wrong[known].mean() < FEWEST_KEPT:
+            weight[wrong, c] = 0.0
+    return weight
+
+
+class Near(NamedTuple):
+    """The first track at the events (n, 3), m, its typical 1-sigma, and the interval of the densest station."""
+
+    position: FloatArray
+    sigma_m: float
+    interval_s: float
+
+
+def with_biases(events: Events, stations: list[Seen], state: FloatArray, sigma: FloatArray) -> FloatArray:
+    """(m, 3) how far readings may be off, with the biases and clocks that are yet unknown."""
+    rate = np.abs(design(events, state)[:, :, 2])
+    wide = sigma.copy()
+    for s, station in enumerate(stations):
+        clock = station.prior[CLOCK] * np.median(rate[events.station == s], 0)
+        wide[s] = np.sqrt(sigma[s] ** 2 + station.prior[:3] ** 2 + clock**2)
+    return wide
+
+
+def first_jerk(log: Observations, noise_variance: FloatArray, start: Start, near: Near) -> float:
+    """The likeliest of a few jerk densities, m^2/s^5, among those with which the smoother stays near the first track: a
+    filter that has lost it finds all readings vague, and so likely."""
+    scales = scales_of(log, noise_variance)
+    found: list[tuple[float, float]] = []
+    for memory in FIRST_MEMORIES:
+        jerk_psd = scales.jerk_psd(memory * near.interval_s)
+        run = smooth_log(log, Model(noise_variance, isotropic(jerk_psd)), [start])
+        away = np.linalg.norm(run.state[start.sample :, :3] - near.position[start.sample :], axis=1)
+        if found and not np.quantile(away, NEAR_SHARE) < NEAR * near.sigma_m:
+            break
+        found.append((run.log_likelihood, jerk_psd))
+    return max(found)[1]
+
+
+def interval(stations: list[Seen]) -> float:
+    """Of the densest station, s."""
+    return min(float(np.median(np.diff(s.time_s))) for s in stations if len(s.time_s) > 1)
+
+
+def design(events: Events, state: FloatArray) -> FloatArray:
+    """(n, 3, 3) of the events, see `core.model.stations`."""
+    sites = events.sites
+    return geometry.design(state, sites.place[sites.station], sites.axes[sites.station])

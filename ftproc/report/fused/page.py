@@ -1,0 +1,40 @@
+"""The page of a fused flight."""
+
+from __future__ import annotations
+
+import html
+
+from ftproc.fusion import summary
+from ftproc.fusion.flight import Flight
+from ftproc.report import tables
+from ftproc.report.fused.figures import biases, carried, disagreements, residuals, station_map
+from ftproc.report.page import document, section
+from ftproc.report.timeplots import motion, sigmas
+from ftproc.report.track import track
+from ftproc.report.view import view
+
+
+def page(flight: Flight) -> str:
+    """The whole page as HTML text."""
+    fused, shown = flight.fused, view(flight.trajectory)
+    assert fused is not None
+    s = flight.trajectory.metadata["summary"]
+    stretches = disagreements(flight, fused)
+    listed = tables.table(("station", "from, s", "to, s", "what"), stretches, "numbers") if stretches else ""
+    nothing = "" if stretches else '<p class="note">No station joins late, is silent or follows another target.</p>'
+    readings = tables.table(summary.COMPONENT_HEADER, summary.component_rows(s), "numbers")
+    known = tables.table(summary.BIAS_HEADER, summary.bias_rows(s), "numbers")
+    notes = "".join(f"<li>{html.escape(note)}</li>" for note in s["notes"])
+    parts = [
+        tables.heading(shown),
+        tables.banner(shown),
+        f"<section><h2>Stations</h2>{readings}<ul>{notes}</ul></section>",
+        section("Map", [("map", station_map(flight, fused)), ("track", track(shown))]),
+        section("Who carried which stretch", [("carried", carried(flight, fused))], listed + nothing),
+        section("Biases and clocks", [("biases", biases(flight, fused))], known),
+        section("Residuals", [("residuals", residuals(flight, fused))]),
+        section("Uncertainty", [("sigmas", sigmas(shown))]),
+        section("Motion", [("motion", motion(shown))]),
+        tables.provenance(shown),
+    ]
+    return document(tables.name(flight.trajectory), "\n".join(parts), drawn=True)
