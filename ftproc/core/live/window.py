@@ -20,6 +20,7 @@ from ftproc.core.filtering.forward import Span
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven, between, empty_rows
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 from ftproc.core.identification.profile import fit_profile, with_allowance
+from ftproc.core.identification.scales import scales_of
 from ftproc.core.live.readings import LONGEST_ISOLATED, Columns, Labels, Repeats
 from ftproc.core.live.readmission import Open, readmitted
 from ftproc.core.model.motion import Profile
@@ -29,6 +30,7 @@ IntArray = NDArray[np.int64]
 
 ROUNDS = 3  # of smoothing and deciding in a refresh
 SHORT = 160  # samples: with fewer, nothing is said of how the noise of single readings differs
+YOUNG, JUMPY = 40, 1.5  # samples with which a track is young, and intervals that its filter must remember
 RECENT = 50  # samples whose noise the next ones are taken to have
 DOUBTED, DOUBT = 12, 0.4  # readings, and share of them: with fewer good ones the track is in doubt
 JERK_STEPS = 2  # of the search for the jerk profile in a refresh
@@ -110,11 +112,15 @@ class Window:
     # -- all of the window ------------------------------------------------------------------------------------------
 
     def edit(self) -> None:
-        """Decide on all of the window anew. Raises ValueError when a component has no reading that agrees."""
+        """Decide on all of the window anew. Raises ValueError when a component has no reading that agrees, or the few
+        readings that there are lie on a track that only a filter without memory could follow."""
         readings = np.where(self.kept["possible"], self.measurement, np.nan)
         found = two_pass.edit(
             self.time_s.copy(), readings, self.known, live=True, short=self.white or len(self) < SHORT
         )
+        scales = scales_of(found.log, found.model.noise_variance)
+        if len(self) < YOUNG and scales.memory_s(float(found.model.jerk[:, 0].max())) < JUMPY * scales.interval_s:
+            raise ValueError("the readings jump too much for the track of anything that flies")
         self.kept["weight"][:], self.rates = found.weight, found.decision.rates
         uneven = found.log.uneven or Uneven.none(len(self))
         self.kept["times"][:], self.kept["late"][:] = uneven

@@ -60,7 +60,7 @@ def test_lag_makes_it_better_and_outliers_are_found(flight):
         bad = flight.truth.outlier[:count][there] > 0
         said = np.isin(found["label"][there], (1, 2))
         assert said[bad].mean() > 0.8
-        assert said[~bad & np.isfinite(flight.log.measurement[:count][there])].mean() < 0.02
+        assert said[~bad & np.isfinite(flight.log.measurement[:count][there])].mean() < 0.04
     assert error["lag"] < 0.8 * error["live"]
 
 
