@@ -21,7 +21,7 @@ def readings(flight):
 
 
 def error(run, flight):
-    return np.sqrt(np.mean(np.sum((run.state[:, :3] - flight.truth.position_m) ** 2, 1)))
+    return np.sqrt(np.nanmean(np.sum((run.state[:, :3] - flight.truth.position_m) ** 2, 1)))
 
 
 @pytest.fixture(scope="module")
