@@ -40,6 +40,7 @@ AROUND, MEMORIES = (100, 400), 6.0  # samples on each side that decide between s
 MARGIN = 8.0  # by which the log-probability of a stretch with a step must be better, and ln of the places for it
 MOST = 8  # steps that are weighed at a time
 SMALLEST = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
+SMALL = 0.7  # times that, before its size is found with the outliers beside it
 PATCHES = 12, 24, 48  # readings in a patch, of which a step may be an end
 STAYS = 0.75  # share of the readings on either side of a step that must be good
 SIZES = 2  # times that the size of a step is found anew, as the decisions beside it change
@@ -190,6 +191,8 @@ def _standing_out(log: Observations, calm: Model, apart: int) -> list[Step]:
     except ValueError:
         return []
     score, information = shifts(log, calm, starts)
+    small = SMALL * SMALLEST * np.sqrt(calm.noise_variance) * information[:, :3]
+    score[:, :3] = np.where(np.abs(score[:, :3]) > small, score[:, :3], 0.0)
     size = np.divide(
         np.abs(score), np.sqrt(np.maximum(information, 0)), out=np.zeros_like(score), where=information > 0
     )
