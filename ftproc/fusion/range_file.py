@@ -20,7 +20,7 @@ from ftproc.errors import UsageError, nearest
 from ftproc.records import FloatArray
 
 MAKER = "--fuse --write-config LOG..."
-FARTHEST_M = 1_500_000.0  # of a station from the origin
+FARTHEST_M = 500_000.0  # of a station from the origin
 SMALLEST = number(0.0)
 _SIGMA = "1-sigma of what is not known beforehand, 0: known"
 

@@ -3,13 +3,14 @@ recursive editing of Zuo et al. 2021 section 2.3, which decides on every reading
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ftproc.core.editing.two_pass import Known
-from ftproc.core.filtering.initialization import find_starts
+from ftproc.core.filtering.initialization import find_starts, first_state
 from ftproc.core.filtering.records import FilterRun, Model
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification.likelihood import Fixed, first_jerk, fit_level
@@ -45,7 +46,9 @@ def parts(record: Recording, settings: FilterSettings, block: int = BLOCK) -> It
         if rows.stop == len(record):
             found += live.finish()
             if not live.confirmed_once:
-                raise ValueError("the readings are too few, or agree too little, for a track to be confirmed")
+                raise ValueError(
+                    "the readings are too few, or agree too little, for a track to be confirmed; use --editing two-pass"
+                )
         if found:
             first, count = found[0].first, sum(len(each.rows) for each in found)
             low = sum(len(each.rows) for each in history)
@@ -83,6 +86,10 @@ def smoothed(readings: Readings, settings: FilterSettings) -> Estimate:
     log, noise = readings.weighted(kept), screened.sigma**2
     jerk_psd = known.jerk_psd or first_jerk(log, noise)
     starts = find_starts(log, noise, jerk_psd)
+    for sample in found.reacquired:
+        with contextlib.suppress(ValueError):  # a component has no good reading from there on
+            starts.append(first_state(log, noise, sample, slice(sample, len(kept))))
+    starts.sort(key=lambda start: start.sample)
     fixed = Fixed(np.isfinite(known.sigma), known.jerk_psd is not None)
     model = fit_level(log, starts, Model(noise, isotropic(jerk_psd)), fixed)
     label = preparing.labels(kept, readings.measurement)
