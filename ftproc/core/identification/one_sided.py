@@ -19,7 +19,6 @@ from ftproc.core.filtering.smoother import SmootherRun
 
 FloatArray = NDArray[np.float64]
 
-MOST = 1000  # residuals that the errors are fitted to
 FEWEST = 100  # readings of a component, for the shape of their errors to show
 SKEW, IN_SIGMAS = 0.1, 3.5  # least skewness of the residuals, and its standard errors, that make the fit worth while
 FLAT, FINE = 0.2, 0.4  # the same of what is missing to the kurtosis of 3, where rounding makes less of the 1-sigma
@@ -56,9 +55,8 @@ def find(log: Observations, smoothed: SmootherRun, rounding: FloatArray) -> list
         flat = flat and float(rounding[c]) < FINE * scale
         if not odd and not flat:
             continue
-        some = scaled[:: 1 + len(scaled) // MOST]
-        either = _likeliest(some, True).gain
-        fits = sorted(((side, _likeliest(side * some, False)) for side in (-1.0, 1.0)), key=lambda fit: fit[1].gain)
+        either = _likeliest(scaled, True).gain
+        fits = sorted(((side, _likeliest(side * scaled, False)) for side in (-1.0, 1.0)), key=lambda fit: fit[1].gain)
         (side, one), other = fits[1], fits[0][1].gain
         place, sigma, share, error = one.theta
         leans = skew * side > LEANS
