@@ -193,10 +193,6 @@ _TUNED: tuple[Callable[[Any], Any], ...] = (
         help="How outliers are found: from the whole log (two-pass), from a window of the readings so far, as a live "
         "system can (live), recursively (forward), or not at all.",
     ),
-    click.option(
-        "--lag", type=seconds, metavar="S", default=FilterSettings.lag_s,
-        help="In live editing: the estimate at t rests on readings up to t + S seconds, and no later one.",
-    ),
     noise(noise_or_auto, AUTO, "; auto, for all or for one: estimated from the log."),
     click.option(
         "--jerk", type=number_or_auto, default=AUTO, metavar="S",
@@ -216,6 +212,10 @@ _TRACKER: tuple[Callable[[Any], Any], ...] = (
     ),
     click.option("--smooth/--no-smooth", help="Add the fixed-interval smoother: the best estimate of trajectory."),
     *_TUNED,
+    click.option(
+        "--lag", type=seconds, metavar="S", default=FilterSettings.lag_s,
+        help="In live editing: the estimate at t rests on readings up to t + S seconds, and no later one.",
+    ),
     click.option(
         "--gate", type=number, default=FilterSettings.gate, metavar="C",
         help="The gate in sigmas: a reading whose innovation is larger is suspected of being an outlier.",
