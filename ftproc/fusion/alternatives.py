@@ -173,11 +173,12 @@ def calm_levels(model: Model, here: slice, time_s: FloatArray) -> tuple[Model, .
 def likeliest(near: Neighbourhood) -> FloatArray | None:
     """Weights (n, 3) of the likeliest hypothesis; None if that is the one of now."""
     calm = near.levels[0]
-    if _is_plain(near) and not _tense(near, calm):
+    tense = _tense(near, calm)
+    if not tense and _is_plain(near):
         return None
     now = max((_settled(near, near.log.weight, model) for model in near.levels), key=lambda each: each.likelihood)
     tries = []
-    for weight in _hypotheses(near):
+    for weight in _hypotheses(near) if tense else itertools.islice(_hypotheses(near), 1):
         if (weight.sum() >= FEWEST) and math.isfinite(found := _step(near, weight, calm)[0].likelihood):
             tries.append((found, weight))
     tries.sort(key=lambda each: -each[0])
