@@ -66,11 +66,14 @@ def decoded(content: bytes, name: str) -> MeasurementLog | None:
     return MeasurementLog(name, np.cumsum(delay), measurement, np.arange(n))
 
 
+_EDITING = [way for way in sanity.EDITING if way != "live"]  # which is never smoothed
+
+
 def _settings(content: bytes) -> FilterSettings:
     flags, scale = content[0], content[5]
     return FilterSettings(
         smooth=bool(flags & 1),
-        editing=sanity.EDITING[flags // 16 % 3],
+        editing=_EDITING[flags // 16 % 3],
         noise=(10.0 ** (scale % 8 - 4), 10.0 ** -(scale % 6), 10.0 ** -(scale % 5)) if flags & 2 else None,
         jerk_psd_m2ps5=10.0 ** (scale // 16 - 6) if flags & 4 else None,
     )
