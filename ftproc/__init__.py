@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from ftproc.api import filter_log, plot, read_log, score, simulate, to_pandas, to_table, train, write_report
+    from ftproc.api import Live, filter_log, plot, read_log, score, simulate, to_pandas, to_table, train, write_report
 
 __all__ = [
-    "__version__", "filter_log", "plot", "read_log", "score", "simulate", "to_pandas", "to_table", "train",
+    "Live", "__version__", "filter_log", "plot", "read_log", "score", "simulate", "to_pandas", "to_table", "train",
     "write_report",
 ]  # fmt: skip
 

@@ -12,8 +12,11 @@ from ftproc.config.reading import load
 from ftproc.config.recipe import Recipe
 from ftproc.correction import model_file
 from ftproc.files.writing import clock, geodesy
+from ftproc.live.live import Live
 from ftproc.records import MeasurementLog, Trajectory, Truth
 from ftproc.settings import PACKAGED, FilterSettings, TrainSettings
+
+__all__ = ["Live"]
 
 if TYPE_CHECKING:
     import pandas as pd

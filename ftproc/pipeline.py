@@ -67,15 +67,27 @@ class Filtering:
         stage = None if model is None else model.smoother if self.settings.smooth else model.filter
         summary = self.statistics.summary(
             {
+                "network": self._network() if self.method.corrected else None,
                 "correction_linear": None if stage is None else stage.linear,
                 "correction_lost_by_smoothing": model is not None and stage is None and model.filter.helps,
             }
         )
         return provenance.describe(self.log, self.method, self.settings, self.statistics, self.model, summary)
 
+    def _network(self) -> str:
+        """What the learned correction did, in words."""
+        if self.model is None:
+            return "none: no correction applied"
+        stage = self.model.smoother if self.settings.smooth else self.model.filter
+        if stage is None or not stage.helps:
+            return "gain 0: no correction applied"
+        if self.statistics.largest_m == 0:
+            return f"gain {stage.gain.max():.2g}, but no sample is like those it was trained on: no correction applied"
+        return f"gain {stage.gain.max():.2g}: corrections of up to {self.statistics.largest_m:.3g} m"
+
     def _trajectory(self, part: Part) -> Trajectory:
         """The rows of a part that count, corrected, and added to the statistics."""
-        absent = list(self.record.absent)
+        absent = list(part.estimate.absent if part.estimate.known is not None else self.record.absent)
         correction, outside = np.zeros((len(part.estimate.label), 6)), 0.0
         if self.model is not None and self.method.corrected and not absent:
             correction, outside = _corrected(part.estimate, self.model)
@@ -84,12 +96,13 @@ class Filtering:
         best = estimate.run if estimate.smoothed is None else estimate.smoothed
         state, sigma = best.state.copy(), best.sigma[:, :6].copy()
         state[:, :6] += correction
+        known = slice(None) if estimate.known is None else estimate.known
         cleaned = from_cartesian(state[:, :3]) if estimate.cleaned is None else estimate.cleaned
         if absent:  # the filter ran on a stand-in; what depends on it is not published
             state[:], sigma[:] = np.nan, np.nan
             cleaned[:, absent] = np.nan
             estimate.label[:, absent] = MISSING
-        elif np.isinf(state).any() or (estimate.cleaned is None and np.isnan(state).any()):
+        elif np.isinf(state).any() or (estimate.cleaned is None and np.isnan(state[known]).any()):
             name = self.method.name
             raise InputError(f"{self.log.name}: {name} diverged; give --noise and --jerk, or check the log's units")
         log = self.log.stretch(rows)

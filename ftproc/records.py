@@ -28,7 +28,8 @@ COMPONENTS = ("range", "azimuth", "elevation")
 GOOD, ISOLATED, PATCH, MISSING = 0, 1, 2, 3
 
 #: The readings that an estimate depends on, the fewest first.
-PAST, EDITED, WHOLE = "past readings", "past readings, edited with the whole record", "the whole record"
+PAST, LAGGED = "past readings", "past readings and those of the next {:g} s"
+EDITED, WHOLE = "past readings, edited with the whole record", "the whole record"
 
 
 @dataclass(frozen=True)

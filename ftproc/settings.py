@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+EDITING = ("two-pass", "live", "forward", "none")
 PACKAGED, NO_MODEL = "packaged", "none"  # values of `model` that are not files
 EPOCHS = {"l-bfgs": 400, "momentum": 1000}  # most that an optimiser of `train` is given, where the user says nothing
 
@@ -37,7 +38,8 @@ class FilterSettings:
     """Settings of `filter`; None means: estimated from the log."""
 
     method: str = "ga-bpnn-ukf"
-    editing: str = "two-pass"  # two-pass | forward | none
+    editing: str = "two-pass"  # two-pass | live | forward | none
+    lag_s: float = 0.0  # of live editing: the estimate at t rests on readings up to t + lag_s
     smooth: bool = False
     noise: Noise | None = None  # 1-sigma of range m, azimuth rad, elevation rad; each may be None
     jerk_psd_m2ps5: float | None = None  # spectral density of white jerk

@@ -38,15 +38,18 @@ def tiny(n):
 def test_trajectory_has_a_row_for_every_row_of_the_log(flight, settings):
     log = replace(flight.log, row=flight.log.row[::-1].copy())
     trajectory = pipeline.filter_log(log, FilterSettings(**settings))
-    n = len(log)
+    n, without = len(log), trajectory.metadata["summary"]["rows_without_estimate"]
+    assert without == 0 or settings.get("editing") == "forward"
+    assert without <= 0.1 * n
     assert len(trajectory) == n
     assert trajectory.name == log.name
     np.testing.assert_array_equal(trajectory.row, log.row)
     np.testing.assert_array_equal(trajectory.time_s, log.time_s)
     for array, width in ((trajectory.state, 9), (trajectory.sigma, 6), (trajectory.correction, 6)):
         assert array.shape == (n, width)
-        assert np.isfinite(array).all()
-    assert (trajectory.sigma > 0).all()
+        assert np.isfinite(array[without:]).all()
+    assert (trajectory.sigma[without:] > 0).all()
+    assert np.isnan(trajectory.state[:without]).all()
     np.testing.assert_allclose(trajectory.measurement, from_cartesian(trajectory.state[:, :3]))
     np.testing.assert_array_equal(trajectory.outlier == MISSING, np.isnan(log.measurement))
     assert trajectory.nis.shape == (n,)
@@ -196,7 +199,13 @@ def test_component_missing_throughout(flight, component, smooth):
     assert np.sqrt((clean**2).mean(0) / np.array(flight.sigma)[others] ** 2).max() < 1
 
 
-@pytest.mark.parametrize("settings", [{}, {"smooth": True}, {"editing": "forward"}, {"editing": "none"}], ids=str)
+@pytest.mark.parametrize("editing", ["live", "forward"])
+def test_no_track_is_confirmed_in_a_tiny_log(editing):
+    with pytest.raises(InputError, match="the readings are too few, or agree too little, for a track to be confirmed"):
+        pipeline.filter_log(tiny(8)[0], FilterSettings(editing=editing))
+
+
+@pytest.mark.parametrize("settings", [{}, {"smooth": True}, {"editing": "none"}], ids=str)
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
 def test_tiny_logs(n, settings):
     log, position = tiny(n)
@@ -287,7 +296,7 @@ def test_a_blank_of_a_channel_method_is_no_divergence_but_infinity_is(monkeypatc
     ("settings", "message"),
     [
         ({"method": "ufk"}, "there is no method 'ufk'; did you mean 'ukf'"),
-        ({"editing": "twopass"}, "editing is one of two-pass, forward, none, not 'twopass'"),
+        ({"editing": "twopass"}, "editing is one of two-pass, live, forward, none, not 'twopass'"),
         ({"noise": (1.0, 0.0, 1.0)}, "noise must be a positive number, from 1e-30 to 1e+30, not 0.0"),
         ({"noise": (1.0, 1.0, float("nan"))}, "noise must be a positive number, from 1e-30 to 1e+30, not nan"),
         ({"jerk_psd_m2ps5": -1.0}, "jerk must be a positive number, from 1e-30 to 1e+30, not -1.0"),

@@ -100,6 +100,15 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     default="text",
     help="Form of the printed summary of each trajectory; on stderr when the trajectory goes to stdout.",
 )
+@click.option(
+    "--follow",
+    is_flag=False,
+    flag_value="csv",
+    type=click.Choice(["csv", "jsonl"]),
+    metavar="[csv|jsonl]",
+    help="Read a log that still grows (a file, or - for standard input) with live editing, and write each row as soon "
+    "as its lag has passed: on standard output as CSV or JSON lines, or to -o. Ctrl-C ends it, with a whole file.",
+)
 @options.report("a trajectory, its readings and residuals, and the verdict")
 @click.option(
     "--explain", is_flag=True, help="Print how each log is understood, with its first rows, and filter nothing."
@@ -111,7 +120,7 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     metavar="[NAME]",
     help="List the methods, or the parameters of one, and filter nothing.",
 )
-def command(list_methods: str | None, write_config: bool, explain: bool, **options: Any) -> None:
+def command(list_methods: str | None, write_config: bool, explain: bool, follow: str | None, **options: Any) -> None:
     """Find the outliers of LOGs, and estimate the target's trajectory with its uncertainty.
 
     A LOG is a text file (.csv, .txt, .tsv, .dat), .parquet, .feather, .arrow, .xlsx, .jsonl, .h5 or .mat, even packed
@@ -147,6 +156,12 @@ def command(list_methods: str | None, write_config: bool, explain: bool, **optio
         from ftproc.cli import explaining, filtering
 
         ctx.exit(explaining.explain(options["logs"], filtering.recipe(ctx), options["summary"], ctx.meta[DEBUG]))
+    elif follow is not None:
+        from ftproc.cli import filtering
+        from ftproc.live.publishing import follow_log
+
+        said = follow_log(options["logs"], options["output"], filtering.recipe(ctx, live=True), follow)
+        click.echo(f"ftproc: {said}", err=True)
     else:
         start_quickly()
         from ftproc.cli import filtering

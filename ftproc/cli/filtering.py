@@ -42,10 +42,12 @@ class Request(NamedTuple):
     report: str | None
 
 
-def recipe(ctx: click.Context) -> Recipe:
-    """How every log is filtered. Raises UsageError for what is wrong whatever the log, and for options on the command
-    line that have no effect."""
+def recipe(ctx: click.Context, live: bool = False) -> Recipe:
+    """How every log is filtered; live: with live editing, unless that is recursive. Raises UsageError for what is wrong
+    whatever the log, and for options on the command line that have no effect."""
     found = Recipe.of(_options(ctx))
+    if live and found.settings.editing == "two-pass":
+        found = replace(found, settings=replace(found.settings, editing="live"))
     method = found.settings.method
     chosen = list(registry.METHODS.values()) if method == EVERY else [registry.named(method)]
     asked = [name for name, value in stated(ctx).items() if (name, value) not in _ASK_FOR_NOTHING]

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from ftproc.settings import FilterSettings, Noise
+from ftproc.settings import EDITING, FilterSettings, Noise
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -22,6 +22,14 @@ def number(text: Any) -> float:
     value = _finite(text)
     if value is None or value <= 0:
         raise click.BadParameter(f'"{text}" is not a number above zero.')
+    return value
+
+
+def seconds(text: Any) -> float:
+    """A number of seconds, zero or more."""
+    value = _finite(text)
+    if value is None or value < 0:
+        raise click.BadParameter(f'"{text}" is not a number of seconds, zero or more.')
     return value
 
 
@@ -181,8 +189,9 @@ def _with(options: tuple[Callable[[Any], Any], ...], function: F) -> F:
 
 _TUNED: tuple[Callable[[Any], Any], ...] = (
     click.option(
-        "--editing", type=click.Choice(["two-pass", "forward", "none"]), default=FilterSettings.editing,
-        help="How outliers are found: from the whole log, recursively as in a live system, or not at all.",
+        "--editing", type=click.Choice(EDITING), default=FilterSettings.editing,
+        help="How outliers are found: from the whole log (two-pass), from a window of the readings so far, as a live "
+        "system can (live), recursively (forward), or not at all.",
     ),
     noise(noise_or_auto, AUTO, "; auto, for all or for one: estimated from the log."),
     click.option(
@@ -203,6 +212,10 @@ _TRACKER: tuple[Callable[[Any], Any], ...] = (
     ),
     click.option("--smooth/--no-smooth", help="Add the fixed-interval smoother: the best estimate of trajectory."),
     *_TUNED,
+    click.option(
+        "--lag", type=seconds, metavar="S", default=FilterSettings.lag_s,
+        help="In live editing: the estimate at t rests on readings up to t + S seconds, and no later one.",
+    ),
     click.option(
         "--gate", type=number, default=FilterSettings.gate, metavar="C",
         help="The gate in sigmas: a reading whose innovation is larger is suspected of being an outlier.",

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from ftproc.config.kinds import Kind, file_name, flag, method, number, parameters, positive, text, whole, widths, words
 from ftproc.files.units import UNITS
 from ftproc.records import COMPONENTS
-from ftproc.settings import Air, FilterSettings
+from ftproc.settings import EDITING, Air, FilterSettings
 
 
 class Key(NamedTuple):
@@ -109,9 +109,8 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
         "method": Key("method", method, FilterSettings.method, "see --list-methods", default=FilterSettings.method),
         "model": Key("model", file_name, "packaged", _MODEL, default="packaged"),
         "smooth": Key("smooth", flag, False, "add the fixed-interval smoother", default=False),
-        "editing": Key(
-            "editing", words("two-pass", "forward", "none"), "two-pass", "how outliers are found", default="two-pass"
-        ),
+        "editing": Key("editing", words(*EDITING), "two-pass", "how outliers are found", default="two-pass"),
+        "lag_s": Key("lag", number(0, 3600), 2.0, "of live editing", default=0.0),
         "jerk_psd_m2ps5": Key("jerk", positive(), 10.0, "process noise (jerk PSD); left out: estimated"),
         "gate": Key("gate", positive(), FilterSettings.gate, "in sigmas of the residual", default=FilterSettings.gate),
         "max_patch_s": Key("max_patch", positive(), 5.0, _PATCH),

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 #: Option -> setting, where the names differ.
-_SETTINGS = {"jerk": "jerk_psd_m2ps5", "max_patch": "max_patch_s"}
+_SETTINGS = {"jerk": "jerk_psd_m2ps5", "max_patch": "max_patch_s", "lag": "lag_s"}
 
 
 @dataclass(frozen=True)

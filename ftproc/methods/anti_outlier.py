@@ -4,8 +4,8 @@ added by the pipeline.
 
 Two-pass editing uses the record on both sides of a sample, but what lies far away says nothing of it: a long log is cut
 into short ones that overlap, of which the middles are kept, and which are processed in parallel. Noise belongs to the
-instrument and is found once, from spans that are spread over the log. Recursive editing sees only the past, and
-continues from one stretch to the next (`recursive`).
+instrument and is found once, from spans that are spread over the log. Live and recursive editing see only what has come
+so far (`live`).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ftproc.core.filtering.records import FilterRun, Model
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 from ftproc.core.identification.likelihood import HORIZONTAL, VERTICAL
 from ftproc.core.identification.profile import median_level
-from ftproc.methods import preparing, recursive
+from ftproc.methods import live, preparing
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
 from ftproc.settings import FilterSettings
 
@@ -41,15 +41,14 @@ def estimate(readings: Readings, settings: FilterSettings) -> Estimate:
     if settings.editing == "two-pass":
         return edited_twice(readings, settings)
     if settings.editing == "forward":
-        return recursive.estimate(readings, settings)
+        return live.smoothed(readings, settings)
     return preparing.unedited(readings, settings)
 
 
 def parts(record: Recording, settings: FilterSettings) -> Iterator[Part]:
     """The estimate of a log, a stretch at a time. Raises ValueError where there is no first state."""
-    if settings.editing == "forward" and not settings.smooth:
-        stretches = recursive.parts(record, settings)
-        yield from stretches if len(record) <= recursive.BLOCK else threads.ahead(stretches)
+    if settings.editing in ("live", "forward") and not settings.smooth:
+        yield from live.parts(record, settings)
     elif settings.editing == "two-pass" and len(record) > LONGEST_WHOLE:
         work = partial(_segment, record, settings, usual_of(record, settings))
         yield from threads.in_order(work, segments(record))

@@ -82,7 +82,8 @@ class Estimate(NamedTuple):
     range, azimuth and elevation one by one; NaN there and in its run means not estimated. unexamined: places where
     two-pass editing looked for no alternative, its search having been cut short. faults: of the instrument, that
     two-pass editing found and took out of the readings. screened_out: (n, 3) readings that screening rejects, of a
-    method without sigmas, whose labels nothing else tests.
+    method without sigmas, whose labels nothing else tests. known: (n,) which samples have an estimate, where live
+    editing has none of some; absent: the components that it has not seen.
     """
 
     run: FilterRun
@@ -98,6 +99,8 @@ class Estimate(NamedTuple):
     unexamined: int = 0
     faults: Faults | None = None
     screened_out: NDArray[np.bool_] | None = None
+    known: NDArray[np.bool_] | None = None
+    absent: tuple[int, ...] = ()
 
     @property
     def smoothed_run(self) -> FilterRun:
@@ -114,6 +117,7 @@ class Estimate(NamedTuple):
             label=self.label[low:high],
             smoothed=None if self.smoothed is None else self.smoothed.rows(low, high),
             reacquired=tuple(k - low for k in self.reacquired if low <= k < high),
+            known=None if self.known is None else self.known[low:high],
             cleaned=None if self.cleaned is None else self.cleaned[low:high],
             screened_out=None if self.screened_out is None else self.screened_out[low:high],
             faults=None if self.faults is None else self.faults.rows(low, high),

@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ftproc.errors import UsageError
-from ftproc.records import EDITED, PAST, WHOLE
+from ftproc.records import EDITED, LAGGED, PAST, WHOLE
 from ftproc.settings import FilterSettings
 
 if TYPE_CHECKING:
@@ -76,6 +76,8 @@ class Method:
         """What an estimate rests on."""
         if settings.smooth or not self.causal:
             return WHOLE
+        if self.editing(settings) == "live" and settings.lag_s > 0:
+            return LAGGED.format(settings.lag_s)
         return EDITED if self.editing(settings) == "two-pass" else PAST
 
 
@@ -179,11 +181,16 @@ def _recursive(method: Method, settings: FilterSettings) -> bool:
     return method.name == MAIN and settings.editing == "forward"
 
 
+def _live(method: Method, settings: FilterSettings) -> bool:
+    return method.name == MAIN and settings.editing == "live"
+
+
 _ENSEMBLES = "it is for the methods enkf, enpf, enpf-chi2 and renpf"
 
 #: The options that only some ways of filtering use, by their names on the command line.
 USES = {
     "--editing": Use(lambda m, s: m.name == MAIN, f"it is for {MAIN}; the others have editing of their own, or none"),
+    "--lag": Use(_live, f"it is for {MAIN} with --editing live"),
     "--max-patch": Use(
         lambda m, s: _recursive(m, s) or (m.random and m.handles_outliers),
         f"it is for {MAIN} with --editing forward, for enpf-chi2 and for renpf",

@@ -51,6 +51,7 @@ def describe(
         "settings": {
             "editing": method.editing(settings),
             "smooth": settings.smooth,
+            **({"lag_s": settings.lag_s} if method.editing(settings) == "live" else {}),
             "gate": settings.gate,
             "max_patch_s": settings.max_patch_s,
             "gain_form": settings.gain_form,

@@ -8,13 +8,13 @@ import numpy as np
 from ftproc.errors import InputError, UsageError, row_named
 from ftproc.methods.estimate import Recording
 from ftproc.records import COMPONENTS, FloatArray, IntArray, MeasurementLog, chunks, forget, thinned
-from ftproc.settings import FilterSettings
+from ftproc.settings import EDITING, FilterSettings
 
 FARTHEST_M = 1e12  # with half of all ranges beyond, the column or its unit is wrong
 SHORTEST_S = 1e-6  # the shortest duration of a log of several times; less is a wrong unit
 MOST_RANGES = 250_000  # that are checked; a longer log is thinned
 LATEST_S = 1e11  # 3000 years; beyond, the unit is not seconds, and differences lose their fractions
-EDITING = ("two-pass", "forward", "none")
+LONGEST_LAG_S = 3600.0
 SMALLEST = 1e-30  # of noise, jerk PSD and gate: the square and its inverse must be finite
 FEWEST_PARTICLES = 20
 FEWEST_READINGS = 8  # of a component, to estimate its noise
@@ -34,6 +34,12 @@ def check_settings(settings: FilterSettings) -> None:
         raise UsageError(f"editing is one of {', '.join(EDITING)}, not {settings.editing!r}")
     if settings.particles < FEWEST_PARTICLES:
         raise UsageError(f"particles must be {FEWEST_PARTICLES} or more, not {settings.particles}")
+    if not 0 <= settings.lag_s <= LONGEST_LAG_S:
+        raise UsageError(f"lag must be from 0 to {LONGEST_LAG_S:g} seconds, not {settings.lag_s:g}")
+    if settings.editing == "live" and settings.smooth:
+        raise UsageError(
+            "--smooth takes the whole record, and --editing live what is known by its lag; give a longer --lag instead"
+        )
     numbers: list[tuple[str, float | None]] = [("noise", v) for v in settings.noise or ()]
     numbers += [("jerk", settings.jerk_psd_m2ps5), ("gate", settings.gate), ("max-patch", settings.max_patch_s)]
     for name, value in numbers:

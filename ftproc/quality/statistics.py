@@ -45,7 +45,7 @@ class RunStatistics:
         self.screened_out, self.overlooked = 0, 0
         self.converged: bool | None = None
         self.largest_m, self.largest_sigma = 0.0, 0.0
-        self.outside, self.rows, self.parts = 0.0, 0, 0
+        self.outside, self.rows, self.parts, self.unknown = 0.0, 0, 0, 0
 
     def add(
         self, time_s: FloatArray, estimate: Estimate, cleaned: FloatArray, correction: FloatArray, outside: float
@@ -94,6 +94,7 @@ class RunStatistics:
         self.outside += outside * len(time_s)
         self.rows += len(time_s)
         self.parts += 1
+        self.unknown += 0 if estimate.known is None else int((~estimate.known).sum())
 
     def _add_gaps(self, time_s: FloatArray) -> None:
         interval = np.diff(time_s, prepend=self.last_time) if self.rows else np.diff(time_s)
@@ -145,6 +146,7 @@ class RunStatistics:
             "first_row_without_time": log.rows_without_time[0] if log.rows_without_time else None,
             "rows_out_of_order": log.rows_out_of_order,
             "duplicate_times": log.duplicate_times,
+            "rows_without_estimate": self.unknown,
             "remarks": list(log.remarks),
             "duration_s": float(log.time_s[-1] - log.time_s[0]),
             "interval_s": self.interval_s,

@@ -19,10 +19,11 @@ def text(metadata: Mapping[str, Any]) -> str:
     """The summary in a trajectory's metadata as plain text, at most a screen of a terminal."""
     s, settings = metadata["summary"], metadata["settings"]
     way = "smoothed" if settings["smooth"] else "filtered"
+    lag = f", {settings['lag_s']:g} s of lag" if settings["editing"] == "live" else ""
     lines = [f"{metadata['log']}: {counted(s['rows'], 'row')}, {s['duration_s']:.6g} s, {way} by "
-             f"{metadata['method']} ({settings['editing']} editing)"]  # fmt: skip
+             f"{metadata['method']} ({settings['editing']} editing{lag})"]  # fmt: skip
     lines += _table(s["components"])
-    named = [*facts(s), *(("note", text) for text in notes(s))]
+    named = [*facts(s), *network(s), *(("note", text) for text in notes(s))]
     level, reasons = s["trust"]["verdict"], s["trust"]["reasons"]
     if len(reasons) < 2:
         named.append(("verdict", verdict.sentence(s["trust"])))
@@ -77,6 +78,12 @@ def facts(s: Mapping[str, Any]) -> list[tuple[str, str]]:
     return found
 
 
+def network(s: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """The line about the learned correction, of a method that may have one."""
+    said = s.get("network")
+    return [("network", said)] if said else []
+
+
 def notes(s: Mapping[str, Any]) -> list[str]:
     """The remarks on a run that are not the reasons of its verdict."""
     return [remark.text for remark in verdict.remarks(s) if remark.text not in s["trust"]["reasons"]]
@@ -91,6 +98,8 @@ def _rows(s: Mapping[str, Any]) -> list[str]:
         found.append(f"{lost} {have} no time (first: row {s['first_row_without_time']})")
     if s["rows_out_of_order"]:
         found.append(f"{counted(s['rows_out_of_order'], 'row')} out of time order, sorted")
+    if s.get("rows_without_estimate"):
+        found.append(f"{counted(s['rows_without_estimate'], 'row')} without an estimate: no track was confirmed yet")
     if s["duplicate_times"]:
         share = "shares" if s["duplicate_times"] == 1 else "share"
         found.append(f"{counted(s['duplicate_times'], 'row')} {share} the time of the row before")

@@ -17,7 +17,7 @@ import numpy as np
 
 from ftproc import pipeline
 from ftproc.correction import model_file
-from ftproc.methods import recursive
+from ftproc.methods import live
 from ftproc.quality import sanity
 from ftproc.records import MeasurementLog
 from ftproc.settings import FilterSettings
@@ -41,7 +41,7 @@ def check(path: Path) -> None:
         cases.judge_trajectory(found)
         assert set(np.unique(found.outlier)) <= {0, 1, 2, 3}, "labels that are none"
         assert ((found.outlier == 3) == np.isnan(log.measurement)).all(), "missing is not what is missing"
-        with mock.patch.object(recursive.parts, "__defaults__", (_STRETCH,)):
+        with mock.patch.object(live.parts, "__defaults__", (_STRETCH,)):
             again = pipeline.filter_log(log, settings, model)
     for name in ("state", "sigma", "nis", "outlier", "correction"):
         one, other = getattr(found, name), getattr(again, name)
@@ -66,11 +66,14 @@ def decoded(content: bytes, name: str) -> MeasurementLog | None:
     return MeasurementLog(name, np.cumsum(delay), measurement, np.arange(n))
 
 
+_EDITING = [way for way in sanity.EDITING if way != "live"]  # which is never smoothed
+
+
 def _settings(content: bytes) -> FilterSettings:
     flags, scale = content[0], content[5]
     return FilterSettings(
         smooth=bool(flags & 1),
-        editing=sanity.EDITING[flags // 16 % 3],
+        editing=_EDITING[flags // 16 % 3],
         noise=(10.0 ** (scale % 8 - 4), 10.0 ** -(scale % 6), 10.0 ** -(scale % 5)) if flags & 2 else None,
         jerk_psd_m2ps5=10.0 ** (scale // 16 - 6) if flags & 4 else None,
     )

@@ -111,6 +111,7 @@ def test_only_options_that_change_something_are_accepted():
     log = simulation.simulate("manoeuvre", seed=1, duration_s=40.0).log
     changes = {
         "--editing": ({"editing": "forward"}, {"editing": "none"}, {"editing": "two-pass"}),
+        "--lag": ({"lag_s": 1.0},),
         "--particles": ({"particles": 95},),
         "--seed": ({"seed": 5},),
         "--weight-form": ({"gain_form": True},),
@@ -120,7 +121,7 @@ def test_only_options_that_change_something_are_accepted():
         found = pipeline.filter_log(log, settings)
         return found.state.tobytes() + found.sigma.tobytes() + found.outlier.tobytes()
 
-    modes = [(registry.MAIN, way) for way in ("two-pass", "forward", "none")]
+    modes = [(registry.MAIN, way) for way in ("two-pass", "live", "forward", "none")]
     modes += [
         (name, "two-pass")
         for name, method in registry.METHODS.items()

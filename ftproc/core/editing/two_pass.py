@@ -137,22 +137,31 @@ def stuck_readings(measurement: FloatArray, sigma: FloatArray) -> NDArray[np.boo
     return np.stack([screening.stuck(measurement[:, c], float(sigma[c])) for c in range(3)], 1)
 
 
-def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: Model | None = None) -> Edited:
+def edit(
+    time_s: FloatArray,
+    measurement: FloatArray,
+    known: Known,
+    segment_of: Model | None = None,
+    live: bool = False,
+    short: bool = False,
+) -> Edited:
     """Edit a whole log, or a segment of a long one. time_s (n,), measurement (n, 3).
 
     segment_of: of a segment, the noise of the whole log, which is taken as it is, and its typical jerk, with which the
-    search starts. Raises ValueError when a component has no reading that agrees with its neighbours.
+    search starts. live: of a window that moves on, in which faults that stay are not looked for. short: too short to
+    tell whether the noise is uneven or correlated: it is taken for white. Raises ValueError when a component has no
+    reading that agrees with its neighbours.
     """
     measurement, copied = without_copies(time_s, measurement)
-    record, decision = _decided(time_s, measurement, known, segment_of)
+    record, decision = _decided(time_s, measurement, known, segment_of, short)
     found: list[Step] = []
-    for _ in range(STEP_ROUNDS):
+    for _ in range(0 if live else STEP_ROUNDS):
         new = steps.find(record, decision) if _told_from_noise(decision) else []
         if not new:
             break
         found, log = sorted([*found, *new], key=lambda s: s.sample), record.weighted(decision.weight)
-        record, decision = _decided(time_s, steps.bridged(log, decision.model, new), known, segment_of)
-    if segment_of is None:
+        record, decision = _decided(time_s, steps.bridged(log, decision.model, new), known, segment_of, short)
+    if segment_of is None and not short:
         decision = allow_for_colour(record, decision)
     log = record.weighted(decision.weight)
     if known.jerk_psd is None:
@@ -160,7 +169,7 @@ def edit(time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: 
         decision = decision._replace(model=with_allowance(log, profile))
     log, found = steps.refined(log, decision.model, found)
     smoothed = smooth_log(log, decision.model, decision.starts)
-    leaning = one_sided.find(log, smoothed, record.rounding)
+    leaning = [] if live else one_sided.find(log, smoothed, record.rounding)
     if leaning:
         log = one_sided.without(log, leaning)
         smoothed = smooth_log(log, decision.model, decision.starts)
@@ -175,7 +184,7 @@ def _told_from_noise(decision: Decision) -> bool:
 
 
 def _decided(
-    time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: Model | None
+    time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: Model | None, short: bool
 ) -> tuple[Record, Decision]:
     """The decisions on a log as if it had no steps, with a jerk profile."""
     jerk_psd = known.jerk_psd
@@ -192,9 +201,10 @@ def _decided(
     rates = np.tile(np.array(outlier_chain.START_RATES), (3, 1))
     starts = find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
     decision = decide(record, Decision(record.screened, model, starts, rates), tune_first=True)
-    record, decision = allow_for_late_stamps(record, decision)
-    record, decision = allow_for_tails(record, decision)
-    record, decision = allow_for_drift(record, decision)
+    if not short:
+        record, decision = allow_for_late_stamps(record, decision)
+        record, decision = allow_for_tails(record, decision)
+        record, decision = allow_for_drift(record, decision)
     if jerk_psd is None:
         decision = reassess(record, decision)
     return record, decision

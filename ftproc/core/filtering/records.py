@@ -125,8 +125,10 @@ class Start(NamedTuple):
 
 
 def between(starts: list[Start], samples: int) -> Iterator[tuple[Start, int]]:
-    """Each start with the sample at which the next one follows, or the log of so many samples ends."""
-    yield from zip(starts, [start.sample for start in starts[1:]] + [samples], strict=True)
+    """Each start with the sample at which the next one follows, or the log of so many samples ends. Of several at one
+    sample the last one counts."""
+    stops = [start.sample for start in starts[1:]] + [samples]
+    yield from ((start, stop) for start, stop in zip(starts, stops, strict=True) if start.sample < stop)
 
 
 class Model(NamedTuple):

@@ -1,0 +1,295 @@
+"""The live editor: readings in, rows out, each as soon as its lag has passed.
+
+What a row rests on depends on the readings before it, and up to its lag after it, alone, not on how they arrive: when
+the newest part of the window is looked at again, and when all of it, follows from the counts and times of rows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing.two_pass import Known
+from ftproc.core.filtering.initialization import FEWEST_READINGS, shortest_gap
+from ftproc.core.filtering.records import ROW, Model, empty_rows
+from ftproc.core.filtering.smoother import SmootherRun
+from ftproc.core.live.doubt import Doubt
+from ftproc.core.live.window import Sizes, Window
+
+FloatArray = NDArray[np.float64]
+
+FEWEST = 16  # samples before a track may be confirmed,
+GROWTH = 1.25  # and times as many at the next attempt
+LATELY, AGREE = 8, 0.6  # readings of a component, and share of them that must be good for a track to be confirmed
+VAGUE = 1.0  # times the noise of a single reading, as 1-sigma of the position: then there is no track
+PATIENCE = 64  # samples after which the noise of a component with few readings is assumed
+ASSUMED_READING, ASSUMED_SIGMA = (10_000.0, 0.0, 0.0), (10.0, 1e-3, 1e-3)  # m, rad, rad: of what was hardly seen
+YOUNG, SOONEST, ROUND = 0.25, 4, 128  # all of the window is looked at when it has grown by this share, but not
+# sooner and not later than after so many samples, or while the track is in doubt
+REFRESH_S = 0.1  # between refreshes of the newest part, or one sample
+WINDOW_S, WINDOW_SAMPLES = 30.0, (300, 1500)  # of the window: the longer of the two, up to so many samples
+NEAR_S, NEAR_SAMPLES = 8.0, (120, 400)  # of its newest part, beside the lag
+BLOCK = 4096  # samples between looks at a window that has nothing to learn
+
+
+class Published(NamedTuple):
+    """Rows that leave. first: number of the first, from zero. rows: `Row` records (n,), NaN where there is no estimate.
+    label: (n, 3) as of `outlier_chain.label_runs`. known: (n,) whether there is an estimate. reacquired: (n,) whether a
+    lost track was found again there."""
+
+    first: int
+    rows: Any
+    label: FloatArray
+    known: NDArray[np.bool_]
+    reacquired: NDArray[np.bool_]
+
+
+class LiveEditor:
+    """Edits and filters readings as they come. absent: components that were never seen."""
+
+    def __init__(self, known: Known, lag_s: float = 0.0, window: Callable[..., Window] = Window) -> None:
+        """lag_s: seconds that a row waits for later readings. window: the kind of window that edits."""
+        self.known, self.lag_s, self.kind = known, lag_s, window
+        self.window: Window | None = None
+        self.confirmed_once = False
+        self.waiting = _Waiting(np.empty(0), np.empty((0, 3)))
+        self.absent: tuple[int, ...] = ()
+        self.count = self.published = 0  # rows taken, and rows that have left
+        self.next_edit, self.next_refresh = FEWEST, 0
+        self.doubt = Doubt()
+        self.refreshed = 0  # rows that the last refresh has seen
+        self.smoothed: tuple[int, SmootherRun, FloatArray] | None = (
+            None  # the newest part, from this row on, if there is
+        )
+        # a lag, with its labels
+
+    @property
+    def model(self) -> Model:
+        """Noise and process noise of the track; of none before it is confirmed."""
+        return Model(np.full(3, np.nan), np.empty((0, 6))) if self.window is None else self.window.allowed
+
+    def push(self, time_s: FloatArray, measurement: FloatArray) -> list[Published]:
+        """Take the next rows, time_s (n,) never decreasing, measurement (n, 3); the rows that leave."""
+        found: list[Published] = []
+        low = 0
+        while low < len(time_s):
+            if self.window is None:
+                high = low + 1
+                found += self._due(float(time_s[low]))
+                self.waiting = self.waiting.with_row(time_s[low:high], measurement[low:high])
+                self.count += 1
+                if self.count >= self.next_edit:
+                    self._confirm()
+            else:
+                if np.isfinite(measurement[low, list(self.absent)]).any():
+                    self._begin_again()
+                    continue
+                high = self._slice_end(time_s, measurement, low)
+                if self.lag_s > 0:
+                    found += self._due(float(time_s[high - 1]))
+                self._note_gap(self.window, float(time_s[low]))
+                self.window.append(time_s[low:high], self._with_stand_ins(measurement[low:high]))
+                self.count += high - low
+                if self.lag_s == 0:  # what a look finds out is known from the newest row on
+                    found += self._leave(self.count - 1)
+                self._look(self.window)
+            if self.lag_s == 0:
+                found += self._leave(self.count)
+            low = high
+        return found
+
+    def insert(self, time_s: float, measurement: FloatArray) -> bool:
+        """Take a row that comes late, measurement (1, 3); whether that is possible: no row as late must have left."""
+        row = np.array([time_s]), self._with_stand_ins(measurement)
+        kept = self.waiting.time_s if self.window is None else self.window.time_s
+        place = int(np.searchsorted(kept, time_s, side="right"))
+        if place < self.published - self._first or (place == 0 and self.published > 0):
+            return False
+        if self.window is None:
+            parts = (np.insert(old, place, new, 0) for old, new in zip(self.waiting, row, strict=True))
+            self.waiting = _Waiting(*parts)
+            self.count += 1
+            return True
+        if self.lag_s == 0 or place <= self.window.near:
+            return False
+        self.window.insert(place, *row)
+        self.count += 1
+        self._refresh(self.window)
+        return True
+
+    def finish(self) -> list[Published]:
+        """The rows that wait, when no more come."""
+        if self.window is not None and self.lag_s > 0:
+            self._refresh(self.window)
+        return self._leave(self.count)
+
+    # -- the track's beginning --------------------------------------------------------------------------------------
+
+    def _confirm(self) -> None:
+        """Begin a track, if the readings so far agree on one."""
+        self.next_edit = int(self.count * GROWTH) + 1
+        seen = np.isfinite(self.waiting.measurement).sum(0)
+        few = seen < FEWEST_READINGS
+        if seen.sum() < 2 * FEWEST_READINGS or ((few & (seen > 0)).any() and len(self.waiting.time_s) < PATIENCE):
+            return
+        self.absent = tuple(np.flatnonzero(seen == 0).tolist())
+        sigma = np.where(few & np.isnan(self.known.sigma), ASSUMED_SIGMA, self.known.sigma)
+        readings = self._with_stand_ins(self.waiting.measurement)
+        sizes = self._sizes(self.waiting.time_s)
+        window = self.kind(self.waiting.time_s, readings, self.known._replace(sigma=sigma), sizes)
+        try:
+            window.edit()
+        except ValueError:  # a component has too few readings that agree
+            return
+        if (window.used_lately(LATELY) < AGREE).any() or not self._vagueness(window) < VAGUE:
+            return
+        self.window, self.confirmed_once = window, True
+        self.waiting = _Waiting(np.empty(0), np.empty((0, 3)))
+        self._edited(window)
+
+    def _vagueness(self, window: Window) -> float:
+        """1-sigma of the newest position, in units of that of a single reading."""
+        ((newest,), _) = window.shown(len(window) - 1, len(window))
+        range_m = np.linalg.norm(newest["state"][:3])
+        noise_m = np.sqrt(window.model.reading_variance) * np.array([1.0, range_m, range_m])
+        return float(np.linalg.norm(newest["sigma"][:3]) / np.linalg.norm(noise_m))
+
+    def _begin_again(self) -> None:
+        """A component is seen for the first time: what is known without it does not tell where the target is."""
+        assert self.window is not None
+        window = self.window
+        low = max(min(len(window) - window.sizes.near, self.published - self._first), 0)
+        measurement = window.measurement[low:].copy()
+        measurement[:, list(self.absent)] = np.nan
+        self.waiting = _Waiting(window.time_s[low:].copy(), measurement)
+        self.window, self.absent, self.next_edit = None, (), self.count + FEWEST_READINGS
+
+    def _with_stand_ins(self, measurement: FloatArray) -> FloatArray:
+        """The readings with constants for components that were never seen; they keep the filter upright, and nothing
+        that rests on them is published."""
+        readings = measurement.copy()
+        for c in self.absent:
+            readings[:, c] = ASSUMED_READING[c]
+        return readings
+
+    # -- when to look -----------------------------------------------------------------------------------------------
+
+    @property
+    def _first(self) -> int:
+        """Number of the first row that is kept."""
+        return self.count - len(self.waiting.time_s if self.window is None else self.window)
+
+    def _sizes(self, time_s: FloatArray) -> Sizes:
+        """How much the window keeps, by the interval of its readings."""
+        times = np.diff(time_s)
+        interval_s = float(np.median(times[times > 0])) if (times > 0).any() else 1.0
+        self.longest_s = shortest_gap(interval_s)
+        self.samples_a_refresh = max(1, math.ceil(REFRESH_S / interval_s - 1e-6))
+        near = int(np.clip(NEAR_S / interval_s, *NEAR_SAMPLES)) + int(self.lag_s / interval_s)
+        return Sizes(max(int(np.clip(WINDOW_S / interval_s, *WINDOW_SAMPLES)), 2 * near), near, self.lag_s)
+
+    def _slice_end(self, time_s: FloatArray, measurement: FloatArray, low: int) -> int:
+        """How far the rows can be taken at once: to the next look, the next gap, the first reading of a component that
+        was absent, or where a row must leave that no refresh has seen."""
+        assert self.window is not None
+        high = min(len(time_s), low + max(min(self.next_refresh, self.next_edit) - self.count, 1))
+        if self.lag_s > 0:
+            unseen = np.concatenate([self.window.time_s[self.refreshed - self._first :], time_s[low:high]])
+            if time_s[low] > unseen[0] + self.lag_s:
+                self._refresh(self.window)
+                return self._slice_end(time_s, measurement, low)
+            high = low + int(np.searchsorted(time_s[low:high], unseen[0] + self.lag_s, side="right"))
+        gaps = np.flatnonzero(np.diff(time_s[low:high]) > self.longest_s)
+        high = low + int(gaps[0]) + 1 if len(gaps) else high
+        seen = np.flatnonzero(np.isfinite(measurement[low:high, list(self.absent)]).any(1))
+        return low + int(seen[0]) if len(seen) else high
+
+    def _note_gap(self, window: Window, time_s: float) -> None:
+        """After a gap that may be too long to bridge, all of the window is looked at as soon as a track can begin."""
+        if time_s - window.time_s[-1] > self.longest_s:
+            self.next_edit = min(self.next_edit, self.count + FEWEST_READINGS + 1)
+
+    def _look(self, window: Window) -> None:
+        doubted = self.count >= self.next_refresh and self.doubt.is_due(window, self.count)
+        if self.count >= self.next_edit or doubted:
+            window.sizes = self._sizes(window.time_s)
+            window.trim()
+            lost = window.in_doubt()
+            try:
+                window.edit()
+            except ValueError:  # a component has too few readings that agree
+                window.refresh()
+            if lost and not window.in_doubt():
+                window.reacquired.append(len(window) - 1)
+            self._edited(window)
+        elif self.count >= self.next_refresh:
+            self._refresh(window)
+
+    def _edited(self, window: Window) -> None:
+        self.next_edit = self.count + (int(np.clip(YOUNG * self.count, SOONEST, ROUND)) if window.learns else BLOCK)
+        self.doubt = self.doubt.after_edit(window, self.count)
+        self._seen(window)
+
+    def _refresh(self, window: Window) -> None:
+        if self.refreshed < self.count:
+            window.refresh()
+            self._seen(window)
+
+    def _seen(self, window: Window) -> None:
+        every = window.refresh_every * self.samples_a_refresh if window.learns else BLOCK
+        self.refreshed, self.next_refresh = self.count, self.count + every
+        if self.lag_s > 0:
+            _, labels = window.shown(window.near, len(window))
+            self.smoothed = self._first + window.near, window.smoothed(), labels
+
+    # -- what leaves ------------------------------------------------------------------------------------------------
+
+    def _due(self, now_s: float) -> list[Published]:
+        """The rows whose lag has passed at a time."""
+        kept = self.waiting.time_s if self.window is None else self.window.time_s
+        due = int(np.searchsorted(kept[self.published - self._first :] + self.lag_s, now_s, side="left"))
+        most = self.count if self.window is None else self.refreshed
+        return self._leave(min(self.published + due, most))
+
+    def _leave(self, stop: int) -> list[Published]:
+        first, n = self.published, stop - self.published
+        if n <= 0:
+            return []
+        self.published = stop
+        low = first - self._first
+        if self.window is None:
+            missing = ~np.isfinite(self.waiting.measurement[low : low + n])
+            nothing = np.zeros(n, bool)
+            return [Published(first, _unknown_rows(n), np.where(missing, 3.0, 0.0), nothing, nothing)]
+        window = self.window
+        rows, label = window.shown(low, low + n)
+        if self.smoothed is not None:
+            begin, smoothed, labels = self.smoothed
+            label = labels[first - begin : stop - begin].copy()
+            for name in ("state", "sigma", "los_sigma"):
+                rows[name] = getattr(smoothed, name)[first - begin : stop - begin]
+        label[:, list(self.absent)] = 3.0
+        again = np.isin(np.arange(low, low + n), window.reacquired)
+        return [Published(first, rows, label, np.ones(n, bool), again)]
+
+
+class _Waiting(NamedTuple):
+    """Rows before there is a track."""
+
+    time_s: FloatArray
+    measurement: FloatArray
+
+    def with_row(self, time_s: FloatArray, measurement: FloatArray) -> _Waiting:
+        return _Waiting(np.concatenate([self.time_s, time_s]), np.concatenate([self.measurement, measurement]))
+
+
+def _unknown_rows(n: int) -> Any:
+    """`Row` records without an estimate."""
+    rows = empty_rows(n)
+    for name in ROW.names or ():
+        rows[name] = 0.0 if name in ("weight", "since_start") else np.nan
+    return rows

@@ -1,0 +1,118 @@
+"""Readings as they are kept in a window: columns that grow at the end and are cut at the beginning, and which of the
+readings merely repeat the one before."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing.screening import SHORTEST_STUCK, STUCK_ODDS
+
+FloatArray = NDArray[np.float64]
+
+LONGEST_ISOLATED = 2  # readings rejected in a row; more make a patch
+ROOM = 2  # times what is kept: so rarely is it copied
+
+
+class Columns:
+    """Arrays (n, ...) of the same length, by name."""
+
+    def __init__(self, **arrays: Any) -> None:
+        self._arrays = {name: array.copy() for name, array in arrays.items()}
+        self._count = len(next(iter(arrays.values())))
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, name: str) -> Any:
+        return self._arrays[name][: self._count]
+
+    def append(self, **new: Any) -> None:
+        """Add rows to each."""
+        count = self._count + len(next(iter(new.values())))
+        for name, more in new.items():
+            array = self._arrays[name]
+            if count > len(array):
+                grown = np.zeros((ROOM * count, *array.shape[1:]), array.dtype)
+                grown[: self._count] = array[: self._count]
+                self._arrays[name] = array = grown
+            array[self._count : count] = more
+        self._count = count
+
+    def insert(self, place: int) -> None:
+        """Move the last row of each to a place."""
+        for array in self._arrays.values():
+            last = array[self._count - 1].copy()
+            array[place + 1 : self._count] = array[place : self._count - 1].copy()
+            array[place] = last
+
+    def forget(self, rows: int) -> None:
+        """Remove the first rows of each."""
+        for array in self._arrays.values():
+            array[: self._count - rows] = array[rows : self._count].copy()
+        self._count -= rows
+
+
+class Labels:
+    """Good, isolated, patch or missing (0 to 3) for each reading as it comes, from the decisions so far."""
+
+    def __init__(self) -> None:
+        self.run = np.zeros(3, int)  # of rejected readings, up to the newest
+
+    def add(self, used: FloatArray, measurement: FloatArray) -> FloatArray:
+        """(n, 3) of the next readings; used (n, 3) above zero for those that are good."""
+        label = np.zeros(used.shape)
+        for row, good, there in zip(label, used > 0, np.isfinite(measurement), strict=True):
+            self.run = np.where(there, np.where(good, 0, self.run + 1), self.run)
+            row[:] = np.where(there, np.where(good, 0.0, np.where(self.run > LONGEST_ISOLATED, 2.0, 1.0)), 3.0)
+        return label
+
+    def reset(self, used: FloatArray, measurement: FloatArray) -> None:
+        """Count again from the decisions (n, 3) on the readings so far."""
+        for c in range(3):
+            good = used[np.isfinite(measurement[:, c]), c] > 0
+            last = np.flatnonzero(good)
+            self.run[c] = len(good) - 1 - last[-1] if len(last) else len(good)
+
+
+class Repeats:
+    """How often readings repeat the one before, component by component, as in `screening.stuck`, but as they come."""
+
+    def __init__(self) -> None:
+        self.last, self.run = np.full(3, np.nan), np.zeros(3, int)
+        self.seen, self.ended = np.zeros(3, int), np.zeros(3, int)  # readings, and repeats in runs that are over
+
+    def stuck(self, measurement: FloatArray) -> list[tuple[int, int, int]]:
+        """Row, component and length so far of the runs of repeats among the next rows (n, 3) that chance does not
+        explain."""
+        found = []
+        for c in range(3):
+            rows = np.flatnonzero(np.isfinite(measurement[:, c]))
+            if not len(rows):
+                continue
+            values = np.r_[self.last[c], measurement[rows, c]]
+            same = values[1:] == values[:-1]
+            self.last[c] = values[-1]
+            if not same.any() and not self.run[c]:
+                self.seen[c] += len(rows)
+                continue
+            for k, repeated in zip(rows.tolist(), same.tolist(), strict=True):
+                self.seen[c] += 1
+                if not repeated:
+                    self.ended[c] += self.run[c]
+                    self.run[c] = 0
+                    continue
+                self.run[c] += 1
+                if self.run[c] >= self._unlikely(c):
+                    found.append((k, c, int(self.run[c])))
+        return found
+
+    def _unlikely(self, c: int) -> float:
+        """Repeats in a row that chance does not make, where so many of the earlier readings were repeats."""
+        chance = self.ended[c] / self.seen[c]
+        if chance >= 1:
+            return math.inf
+        return max(math.log(STUCK_ODDS / self.seen[c]) / math.log(max(chance, 1e-300)), SHORTEST_STUCK - 1)

@@ -1,0 +1,77 @@
+"""Where the newest readings are rejected: is it a patch, or the track that is wrong?
+
+Each rejected reading alone lies off a prediction that has become vague since, and all of them lie off it together. But
+if the last of them are good, each makes the next one likely. So the log-probability of all readings of the newest part
+is compared between the decisions as they are and those in which the last few of the run, or half of it, or all are
+good.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing import patch_likelihood
+from ftproc.core.filtering.records import Model, Observations, Start
+from ftproc.core.filtering.smoother import smooth_log
+
+FloatArray = NDArray[np.float64]
+
+MARGIN = 5.0  # by which the log-probability of other decisions must be better
+
+
+class Open(NamedTuple):
+    """What is open: the log with the decisions (n, 3) so far, which of its readings are possible (n, 3), the model, the
+    start, and the rates (3, 3) of outliers."""
+
+    log: Observations
+    possible: NDArray[np.bool_]
+    model: Model
+    start: Start
+    rates: FloatArray
+
+
+def readmitted(case: Open) -> FloatArray | None:
+    """Other decisions (n, 3), if they are likelier."""
+    runs = {c: run for c in range(3) if len(run := _rejected(case, c)) >= patch_likelihood.SHORTEST_RUN}
+    if not runs:
+        return None
+    tried = [case.log.weight, *_others(case.log.weight, runs)]
+    found = [_log_probability(case, weight) for weight in tried]
+    best = int(np.argmax(found))
+    return tried[best] if found[best] > found[0] + MARGIN else None
+
+
+def _others(weight: FloatArray, runs: dict[int, NDArray[np.int64]]) -> Iterator[FloatArray]:
+    """The decisions with the last readings of one run good, or of all runs."""
+    longest = max(map(len, runs.values()))
+    for components in {tuple(runs), *((c,) for c in runs)}:
+        for last in sorted({patch_likelihood.SHORTEST_RUN, longest // 2, longest} - {0, 1, 2}):
+            other = weight.copy()
+            for c in components:
+                other[runs[c][-last:], c] = 1.0
+            yield other
+
+
+def _rejected(case: Open, c: int) -> NDArray[np.int64]:
+    """The samples whose readings of a component are rejected, after the last one that is good."""
+    seen = np.flatnonzero(case.possible[:, c])
+    good = np.flatnonzero(case.log.weight[seen, c] > 0)
+    return seen[good[-1] + 1 if len(good) else 0 :]
+
+
+def _log_probability(case: Open, weight: FloatArray) -> float:
+    """Log-probability of all readings with these decisions."""
+    log = case.log._replace(weight=weight)
+    smoothed = smooth_log(log, case.model, [case.start], residuals_only=True)
+    total, sigma = smoothed.log_likelihood, np.sqrt(case.model.reading_variance)
+    for c in range(3):
+        seen = np.flatnonzero(case.possible[:, c])
+        total += patch_likelihood.log_probability(
+            log.time_s[seen], smoothed.residual[seen, c], smoothed.residual_variance[seen, c], weight[seen, c],
+            float(sigma[c]), case.rates[c],
+        )  # fmt: skip
+    return total

@@ -1,0 +1,110 @@
+"""The window of the paper's recursive editing: every reading is decided on once, when it comes, by the gate of
+`core.editing.gate`, and the filter is never run again. Noise and process noise are those that the live editor finds
+from the readings so far, unless the user has specified them."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing import gate, two_pass
+from ftproc.core.editing.track import REACQUIRE_SAMPLES, GatedRecursion, Track
+from ftproc.core.filtering.records import Model, Observations, empty_rows
+from ftproc.core.live.readings import Columns, Labels
+from ftproc.core.live.window import Sizes, Window
+
+FloatArray = NDArray[np.float64]
+
+PATCH_S, PATCH_SAMPLES = 1.5, 12  # the longest patch expected is the longer of the two
+
+
+class Gating(NamedTuple):
+    """The gate, where the user has specified it. longest_patch_s: None for that of PATCH_S and PATCH_SAMPLES."""
+
+    gate: float
+    longest_patch_s: float | None = None
+    gain_form: bool = False
+
+    def window(self, time_s: FloatArray, measurement: FloatArray, known: two_pass.Known, sizes: Sizes) -> GatedWindow:
+        """A window that edits with it."""
+        times = np.diff(time_s)
+        interval_s = float(np.median(times[times > 0])) if (times > 0).any() else 1.0
+        longest_s = self.longest_patch_s or max(PATCH_S, PATCH_SAMPLES * interval_s)
+        window = GatedWindow(time_s, measurement, known, sizes)
+        window.how = gate.GateSettings(self.gate, longest_s, self.gain_form)
+        return window
+
+
+class GatedWindow(Window):
+    """A track that is edited recursively."""
+
+    refresh_every = 5  # fewer than where decisions depend on them
+    how: gate.GateSettings
+    track: Track | None = None
+    white = True
+
+    @property
+    def learns(self) -> bool:
+        """Whether noise or process noise are yet to be found."""
+        return self.track is None or not (np.isfinite(self.known.sigma).all() and self.known.jerk_psd is not None)
+
+    def edit(self) -> None:
+        if not self.learns:
+            self.refresh()
+            return
+        super().edit()
+        if self.track is None:
+            rows, label = super().shown(0, len(self))
+            self.gated, self.gated_labels = Columns(rows=rows, label=label, used=super().decided), Labels()
+            self.gated_labels.reset(super().decided, self.measurement)
+            self.track = Track(0, self.filters.copy(), gate.gate_of(self.how))
+
+    def refresh(self) -> None:
+        if self.learns:
+            super().refresh()
+        else:
+            self.near = max(len(self) - self.sizes.near, 0)
+
+    def append(self, time_s: FloatArray, measurement: FloatArray) -> None:
+        n = len(self)
+        if self.learns:
+            super().append(time_s, measurement)
+        else:
+            self._bar(self._take(time_s, measurement))
+        low = max(n - REACQUIRE_SAMPLES, 0)
+        readings = self.kept["time_s"][low:].copy(), self.measurement[low:].copy()
+        log = Observations(*readings, self._gateable(low))
+        model = Model(self.model.noise_variance, self.allowed.jerk[-1:])
+        rows = empty_rows(len(log.time_s))
+        recursion = GatedRecursion(log, model, self.how, rows)
+        assert self.track is not None
+        self.track = recursion.run(self.track.shifted(low), n - low, []).shifted(-low)
+        new = rows[n - low :]
+        kept = np.where(new["weight"] > gate.rejection_weight(self.how.gate), 1.0, 0.0)
+        self.gated.append(rows=new, used=kept, label=self.gated_labels.add(kept, measurement))
+        self.reacquired += [low + start.sample for start in recursion.starts]
+
+    def _gateable(self, low: int) -> FloatArray:
+        """(m, 3) one for the readings from a sample on that the gate may take."""
+        found = np.isfinite(self.measurement[low:])
+        found[:, 0] &= self.measurement[low:, 0] > 0
+        return found.astype(float)
+
+    def in_doubt(self) -> bool:
+        return self.learns and super().in_doubt()
+
+    def trim(self) -> int:
+        drop = super().trim()
+        if self.track is not None:
+            self.gated.forget(drop)
+            self.track = self.track.shifted(drop)
+        return drop
+
+    def shown(self, low: int, high: int) -> tuple[Any, FloatArray]:
+        return self.gated["rows"][low:high].copy(), self.gated["label"][low:high].copy()
+
+    @property
+    def decided(self) -> FloatArray:
+        return self.gated["used"]  # type: ignore[no-any-return]

@@ -1,0 +1,299 @@
+"""The sliding window of the live editor, and what it carries along: decisions, noise, jerk profile and an anchor.
+
+The window holds the readings that a new look at the whole situation needs: two-pass editing of all of it, now and
+then. Its newest part, from `near` on, is where decisions are still open. A refresh smooths that part alone from the
+anchor, the filter's prediction at its first sample, which stands for everything before; decides again; lets the jerk
+profile follow; and brings the filter to the newest sample.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing import outlier_chain, two_pass
+from ftproc.core.editing.predictive_chain import OPEN, chains_of, run_predictive, run_predictive_coloured
+from ftproc.core.filtering.forward import Span
+from ftproc.core.filtering.records import Model, Observations, Start, Uneven, empty_rows
+from ftproc.core.filtering.smoother import SmootherRun, smooth_log
+from ftproc.core.identification.profile import fit_profile, with_allowance
+from ftproc.core.identification.scales import scales_of
+from ftproc.core.live.readings import LONGEST_ISOLATED, Columns, Labels, Repeats
+from ftproc.core.live.readmission import Open, readmitted
+from ftproc.core.model.motion import Profile
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+ROUNDS = 3  # of smoothing and deciding in a refresh
+SHORT = 160  # samples: with fewer, nothing is said of how the noise of single readings differs
+YOUNG, JUMPY = 40, 1.5  # samples with which a track is young, and intervals that its filter must remember
+RECENT = 50  # samples whose noise the next ones are taken to have
+DOUBTED, DOUBT = 12, 0.4  # readings, and share of them: with fewer good ones the track is in doubt
+JERK_STEPS = 2  # of the search for the jerk profile in a refresh
+SLIDES = 0.25  # of the newest part that it is longer before it is cut
+
+
+class Sizes(NamedTuple):
+    """Samples of the window, and of its newest part, where decisions are open; lag_s: for which samples wait in it."""
+
+    window: int
+    near: int
+    lag_s: float = 0.0
+
+
+class Window:
+    """A track and the readings it rests on.
+
+    white: whether its noise is taken for white and even, whatever it is. refresh_every: so many times less often than
+    usual.
+    """
+
+    white, refresh_every = False, 1
+
+    def __init__(self, time_s: FloatArray, measurement: FloatArray, known: two_pass.Known, sizes: Sizes) -> None:
+        self.known, self.sizes, self.near = known, sizes, 0
+        self.repeats, self.labels = Repeats(), Labels()
+        self.next_times, self.next_late = np.ones(3), np.zeros(3)  # how the noise of the next readings differs
+        self.reacquired: list[int] = []  # samples at which a lost track was found again
+        nothing, ones = np.zeros((0, 3)), np.ones((0, 3))
+        self.kept = Columns(
+            time_s=np.empty(0), measurement=nothing, possible=nothing > 0, weight=nothing, label=nothing, times=ones,
+            late=nothing, rows=empty_rows(0),
+        )  # fmt: skip
+        self._bar(self._take(time_s, measurement))
+
+    def __len__(self) -> int:
+        return len(self.kept)
+
+    @property
+    def time_s(self) -> FloatArray:
+        """(n,) of the samples kept."""
+        return self.kept["time_s"]  # type: ignore[no-any-return]
+
+    @property
+    def measurement(self) -> FloatArray:
+        """(n, 3) their readings."""
+        return self.kept["measurement"]  # type: ignore[no-any-return]
+
+    @property
+    def decided(self) -> FloatArray:
+        """(n, 3) one for the readings that are used, else zero."""
+        return self.kept["weight"]  # type: ignore[no-any-return]
+
+    @property
+    def learns(self) -> bool:
+        """Whether noise or process noise are yet to be found, or decisions to be made again."""
+        return True
+
+    def shown(self, low: int, high: int) -> tuple[Any, FloatArray]:
+        """Copies of the `Row` records and of the labels (m, 3) of some samples."""
+        return self.kept["rows"][low:high].copy(), self.kept["label"][low:high].copy()
+
+    def smoothed(self) -> SmootherRun:
+        """The newest part, smoothed with the decisions as they are."""
+        return smooth_log(self._observed(slice(self.near, len(self))), self.allowed, [self.anchor])
+
+    def used_lately(self, count: int) -> FloatArray:
+        """(3,) share of each component's last `count` readings that is used."""
+        found = np.zeros(3)
+        for c in range(3):
+            seen = np.flatnonzero(np.isfinite(self.measurement[:, c]))[-count:]
+            found[c] = (self.kept["weight"][seen, c] > 0).mean() if len(seen) else 0.0
+        return found
+
+    def in_doubt(self) -> bool:
+        """Whether so few of a component's newest readings are used that it may be the track that is wrong."""
+        return bool((self.used_lately(DOUBTED) < DOUBT).any())
+
+    # -- all of the window ------------------------------------------------------------------------------------------
+
+    def edit(self) -> None:
+        """Decide on all of the window anew. Raises ValueError when a component has no reading that agrees, or the few
+        readings that there are lie on a track that only a filter without memory could follow."""
+        readings = np.where(self.kept["possible"], self.measurement, np.nan)
+        found = two_pass.edit(
+            self.time_s.copy(), readings, self.known, live=True, short=self.white or len(self) < SHORT
+        )
+        scales = scales_of(found.log, found.model.noise_variance)
+        if len(self) < YOUNG and scales.memory_s(float(found.model.jerk[:, 0].max())) < JUMPY * scales.interval_s:
+            raise ValueError("the readings jump too much for the track of anything that flies")
+        self.kept["weight"][:], self.rates = found.weight, found.decision.rates
+        uneven = found.log.uneven or Uneven.none(len(self))
+        self.kept["times"][:], self.kept["late"][:] = uneven
+        self.near = max(min(len(self) - self.sizes.near, self._waiting()), found.starts[0].sample, 0)
+        model = found.model
+        self.anchor = self._ahead(found.starts, model, self.near)
+        passed = _piece(float(self.time_s[self.near] - self.time_s[0]), model)
+        self.model = self.allowed = model._replace(jerk=model.jerk[min(passed, len(model.jerk) - 1) :])
+        self.refresh()
+
+    def _ahead(self, starts: list[Start], model: Model, sample: int) -> Start:
+        """The prediction at a sample, from the last start that is not after it."""
+        start = [s for s in starts if s.sample <= sample][-1]
+        log = self._observed(slice(0, sample + 1))
+        log.weight[sample] = 0.0
+        filters = model.filter(start)
+        self._filtered(log, Span(start.sample, sample + 1, start.sample), model, filters)
+        return _predicted(filters)
+
+    def trim(self) -> int:
+        """Forget what is more than the window's size, but nothing that waits for its lag; how many samples."""
+        drop = max(min(len(self) - self.sizes.window, self.near, self._waiting()), 0)
+        self.kept.forget(drop)
+        self.near -= drop
+        self.reacquired = [sample - drop for sample in self.reacquired if sample >= drop]
+        return drop
+
+    def _waiting(self) -> int:
+        """The first sample that may wait for its lag to pass."""
+        return int(np.searchsorted(self.time_s, self.time_s[-1] - self.sizes.lag_s))
+
+    # -- sample by sample -------------------------------------------------------------------------------------------
+
+    def append(self, time_s: FloatArray, measurement: FloatArray) -> None:
+        """Filter the next readings, each decided on when it comes."""
+        n = len(self)
+        stuck = self._take(time_s, measurement)
+        first_s = float(self.time_s[self.near])
+        rows = self._filtered(
+            self._observed(slice(n - 1, len(self))), Span(1, 1 + len(time_s), 0), self.allowed, self.filters,
+            self.chains, first_s,
+        )  # fmt: skip
+        self.kept["weight"][n:], self.kept["rows"][n:] = rows["weight"][1:], rows[1:]
+        self.kept["label"][n:] = self.labels.add(rows["weight"][1:], measurement)
+        self._bar(stuck)
+
+    def insert(self, place: int, time_s: FloatArray, measurement: FloatArray) -> None:
+        """Take a sample, time_s (1,), measurement (1, 3), that belongs before that at a place in the newest part."""
+        self._bar(self._take(time_s, measurement))
+        self.kept.insert(place)
+        self.reacquired = [sample + (sample >= place) for sample in self.reacquired]
+
+    def _take(self, time_s: FloatArray, measurement: FloatArray) -> list[tuple[IntArray, int]]:
+        """Keep the next readings, undecided where they may be good at all: no target is at the station, or behind it,
+        and none stands still to the last digit. Samples and component of the readings that were repeated so."""
+        n, m = len(self), len(time_s)
+        possible = np.isfinite(measurement)
+        possible[:, 0] &= measurement[:, 0] > 0
+        self.kept.append(
+            time_s=time_s, measurement=measurement, possible=possible, weight=np.zeros((m, 3)),
+            label=np.zeros((m, 3)), times=np.tile(self.next_times, (m, 1)), late=np.tile(self.next_late, (m, 1)),
+            rows=empty_rows(m),
+        )  # fmt: skip
+        repeated = []
+        for k, c, run in self.repeats.stuck(measurement):
+            repeated.append((np.flatnonzero(np.isfinite(self.measurement[: n + k + 1, c]))[-run:], c))
+            self.kept["possible"][n + k, c] = False
+        self.kept["weight"][n:][self.kept["possible"][n:]] = OPEN
+        return repeated
+
+    def _bar(self, repeated: list[tuple[IntArray, int]]) -> None:
+        """Readings that turn out to be repeated are not possible either, from the next refresh on."""
+        for samples, c in repeated:
+            self.kept["possible"][samples, c] = False
+            self.kept["weight"][samples, c] = 0.0
+
+    def _observed(self, span: slice) -> Observations:
+        """Some samples with the decisions on them (copies)."""
+        time_s, measurement, weight, times, late = (
+            self.kept[name][span].copy() for name in ("time_s", "measurement", "weight", "times", "late")
+        )
+        return Observations(time_s, measurement, weight, Uneven(times, late))
+
+    def _filtered(
+        self, log: Observations, span: Span, model: Model, filters: Any, chains: Any = None, first_s: float = math.nan
+    ) -> Any:
+        """`Row` records of a span of a log, filtered from a state, which is changed. first_s: where the jerk profile
+        begins, if not with the log."""
+        rows = empty_rows(len(log.time_s))
+        chains = self._chains(model) if chains is None else chains
+        profile = model.profile(log.time_s) if math.isnan(first_s) else Profile(model.jerk, model.knot_s, first_s)
+        run = run_predictive_coloured if model.coloured else run_predictive
+        run(span, log.samples(model.noise_variance), profile, filters, chains, rows)
+        return rows
+
+    # -- the newest part --------------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Decide again on the newest part, let the jerk profile follow, and filter that part anew."""
+        self._slide()
+        near = slice(self.near, len(self))
+        self.model = _stretched(self.model, float(self.time_s[-1] - self.time_s[self.near]))
+        self._decide(near)
+        log = self._observed(near)
+        open_ = Open(log, self.kept["possible"][near], self._with_allowance(log), self.anchor, self.rates)
+        other = readmitted(open_)
+        if other is not None:
+            self.kept["weight"][near] = other
+            self._decide(near)
+            log = self._observed(near)
+        if self.known.jerk_psd is None:
+            self.model = fit_profile(log, [self.anchor], self.model, JERK_STEPS)
+        self.allowed = self._with_allowance(log)
+        self.filters, self.chains = self.allowed.filter(self.anchor), self._chains(self.allowed)
+        span = Span(0, len(log.time_s), 0)
+        self.kept["rows"][near] = self._filtered(log, span, self.allowed, self.filters, self.chains)
+        self.kept["label"][near] = outlier_chain.label_runs(log.weight, log.measurement, LONGEST_ISOLATED)
+        self.labels.reset(log.weight, log.measurement)
+        self.next_times, self.next_late = np.median(self.kept["times"][-RECENT:], 0), self.kept["late"][-1].copy()
+
+    def _decide(self, near: slice) -> None:
+        """Smooth and decide in turn until the decisions stand still."""
+        weight, possible = self.kept["weight"][near], self.kept["possible"][near]
+        for _ in range(ROUNDS):
+            log = self._observed(near)
+            smoothed = smooth_log(log, self._with_allowance(log), [self.anchor], residuals_only=True)
+            good = outlier_chain.classify(
+                smoothed.residual, smoothed.residual_variance, self.model.reading_variance, self.rates.copy(),
+                self.known.gate,
+            )  # fmt: skip
+            weight[:] = (good > 0.5) & possible
+            if (weight == log.weight).all():
+                break
+
+    def _chains(self, model: Model) -> Any:
+        return chains_of(self.rates, model.reading_variance, self.known.gate)
+
+    def _with_allowance(self, log: Observations) -> Model:
+        return self.model if self.known.jerk_psd is not None else with_allowance(log, self.model)
+
+    def _slide(self) -> None:
+        """Move the newest part on, by whole pieces of its jerk profile if there are such."""
+        beyond = len(self) - self.near - self.sizes.near
+        if beyond < SLIDES * self.sizes.near:
+            return
+        times, first_s = self.time_s, float(self.time_s[self.near])
+        ahead = min(self.near + beyond, self._waiting())
+        if math.isfinite(self.model.knot_s):
+            pieces = _piece(float(times[ahead]) - first_s, self.model)
+            ahead = min(ahead, int(np.searchsorted(times, first_s + pieces * self.model.knot_s)))
+        if ahead <= self.near:
+            return
+        log = self._observed(slice(self.near, ahead + 1))
+        log.weight[-1] = 0.0
+        filters = self.allowed.filter(self.anchor)
+        self._filtered(log, Span(0, len(log.time_s), 0), self.allowed, filters)
+        self.anchor, self.near = _predicted(filters), ahead
+        passed = _piece(float(times[ahead]) - first_s, self.model)
+        jerk = self.model.jerk
+        self.model = self.model._replace(jerk=jerk[min(passed, len(jerk) - 1) :])
+
+
+def _predicted(filters: Any) -> Start:
+    """A filter's state as the start of what follows."""
+    return Start(0, filters["x"][0, :9].copy(), filters["p"][0, :9, :9].copy())
+
+
+def _piece(after_s: float, model: Model) -> int:
+    """The piece of a jerk profile that holds so long after its beginning."""
+    return int((after_s + 1e-9) / model.knot_s) if math.isfinite(model.knot_s) else 0
+
+
+def _stretched(model: Model, span_s: float) -> Model:
+    """The model with as many pieces of its jerk profile as the span needs; the last one goes on."""
+    pieces = max(math.ceil(span_s / model.knot_s), 1)
+    return model._replace(jerk=model.jerk[np.minimum(np.arange(pieces), len(model.jerk) - 1)])

@@ -1,0 +1,96 @@
+"""The main method as a live system can run it: live editing, which publishes each row when its lag has passed, and the
+recursive editing of Zuo et al. 2021 section 2.3, which decides on every reading once, when it comes."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ftproc.core.editing.two_pass import Known
+from ftproc.core.filtering.initialization import find_starts, first_state
+from ftproc.core.filtering.records import FilterRun, Model
+from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.identification.likelihood import Fixed, first_jerk, fit_level
+from ftproc.core.live.editor import LiveEditor, Published
+from ftproc.core.live.recursive import Gating
+from ftproc.core.model.motion import isotropic
+from ftproc.methods import preparing
+from ftproc.methods.estimate import Estimate, Part, Readings, Recording
+from ftproc.records import GOOD, FloatArray, chunks
+from ftproc.settings import FilterSettings
+
+BLOCK = 4096  # samples that are taken at once
+HISTORY = 256  # samples before a stretch that go with it: the network looks back
+
+
+def editor(settings: FilterSettings) -> LiveEditor:
+    """An editor that has seen nothing, with these settings."""
+    sigma = np.array(settings.noise or (None, None, None), float)  # None becomes NaN
+    known = Known(sigma, settings.jerk_psd_m2ps5, settings.gate)
+    if settings.editing == "forward":
+        return LiveEditor(known, window=Gating(settings.gate, settings.max_patch_s, settings.gain_form).window)
+    return LiveEditor(known, settings.lag_s)
+
+
+def parts(record: Recording, settings: FilterSettings, block: int = BLOCK) -> Iterator[Part]:
+    """The estimate of a log by stretches; whatever their length, it is the same. Samples before the track is confirmed
+    have none. Raises ValueError when it never is."""
+    record = replace(record, absent=())  # whether a component is missing throughout shows only at the end
+    live, history = editor(settings), list[Published]()
+    for rows in chunks(len(record), block):
+        readings = record.part(rows)
+        found = live.push(readings.time_s, readings.measurement)
+        if rows.stop == len(record):
+            found += live.finish()
+            if not live.confirmed_once:
+                raise ValueError(
+                    "the readings are too few, or agree too little, for a track to be confirmed; use --editing two-pass"
+                )
+        if found:
+            first, count = found[0].first, sum(len(each.rows) for each in found)
+            low = sum(len(each.rows) for each in history)
+            both = [*history, *found]
+            times = record.part(slice(first - low, first + count)).time_s
+            yield Part(estimate(live, both, times), first - low, low, low + count)
+            history = [_last(both, HISTORY)]
+
+
+def estimate(live: LiveEditor, found: Sequence[Published], time_s: FloatArray) -> Estimate:
+    """The rows that have left the editor, one after the other, with their times (n,)."""
+    rows = np.concatenate([each.rows for each in found])
+    label = np.concatenate([each.label for each in found]).astype(np.uint8)
+    known = np.concatenate([each.known for each in found])
+    again = np.concatenate([each.reacquired for each in found])
+    run, lost = FilterRun.of(time_s, rows, 0.0), tuple(np.flatnonzero(again).tolist())
+    return Estimate(run, label, live.model, reacquired=lost, known=known, absent=live.absent)
+
+
+def _last(found: Sequence[Published], count: int) -> Published:
+    """The last rows of several."""
+    rows, label, known, again = (np.concatenate(each)[-count:] for each in list(zip(*found, strict=True))[1:])
+    return Published(0, rows, label, known, again)
+
+
+def smoothed(readings: Readings, settings: FilterSettings) -> Estimate:
+    """A whole log with the decisions of recursive editing, smoothed. Samples before the track was confirmed are
+    screened. Errors as in `parts`."""
+    record = Recording(*readings)
+    (part,) = parts(record, settings, len(record))
+    found, screened = part.estimate, preparing.trusted(readings, settings)
+    assert found.known is not None
+    kept = np.where(found.known[:, None], found.label == GOOD, screened.weight > 0).astype(float)
+    known = preparing.what_is_known(readings, settings)
+    log, noise = readings.weighted(kept), screened.sigma**2
+    jerk_psd = known.jerk_psd or first_jerk(log, noise)
+    starts = find_starts(log, noise, jerk_psd)
+    for sample in found.reacquired:
+        with contextlib.suppress(ValueError):  # a component has no good reading from there on
+            starts.append(first_state(log, noise, sample, slice(sample, len(kept))))
+    starts.sort(key=lambda start: start.sample)
+    fixed = Fixed(np.isfinite(known.sigma), known.jerk_psd is not None)
+    model = fit_level(log, starts, Model(noise, isotropic(jerk_psd)), fixed)
+    label = preparing.labels(kept, readings.measurement)
+    return found._replace(label=label, model=model, smoothed=smooth_log(log, model, starts), known=None)

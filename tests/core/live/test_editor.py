@@ -1,0 +1,98 @@
+"""The live editor: what a row rests on, and how good it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.methods import live
+from ftproc.settings import FilterSettings
+from tests.simulated import simulate
+
+SPEC = "isolated=0.05:6-300,offset=2:8-30:20-200,stuck=1:8-20,nan=0.02"
+WAYS = {
+    "live": {"editing": "live"},
+    "lag": {"editing": "live", "lag_s": 0.5},
+    "forward": {"editing": "forward"},
+    "specified": {"editing": "forward", "noise": (5.0, 1e-4, 1e-4), "jerk_psd_m2ps5": 10.0},
+}
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return simulate("manoeuvre", seed=3, duration_s=12.0, dt_s=0.04, outliers=SPEC)
+
+
+def rows(log, stop, way, step):
+    """The rows that have left an editor after `stop` readings that came `step` at a time."""
+    editor = live.editor(FilterSettings(**WAYS[way]))
+    found = []
+    for low in range(0, stop, step):
+        high = min(low + step, stop)
+        found += editor.push(log.time_s[low:high], log.measurement[low:high])
+    names = ("state", "sigma", "nis", "weight", "innovation")
+    parts = {name: np.concatenate([each.rows[name] for each in found]) for name in names}
+    return {**parts, "label": np.concatenate([each.label for each in found])}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_no_row_knows_the_future_and_none_depends_on_how_readings_come(flight, way):
+    whole = rows(flight.log, len(flight.log), way, 1000)
+    for stop, step in ((len(flight.log), 1), (len(flight.log) - 60, 7)):
+        part = rows(flight.log, stop, way, step)
+        count = len(part["state"])
+        lag_s = WAYS[way].get("lag_s", 0.0)
+        assert flight.log.time_s[count] + lag_s >= flight.log.time_s[stop - 1] if count < stop else lag_s == 0
+        for name, values in part.items():
+            np.testing.assert_array_equal(values, whole[name][:count], err_msg=f"{name} {stop}")
+
+
+def test_lag_makes_it_better_and_outliers_are_found(flight):
+    truth = flight.truth.position_m
+    error = {}
+    for way in ("live", "lag"):
+        found = rows(flight.log, len(flight.log), way, 64)
+        there = np.isfinite(found["state"][:, 0])
+        assert there[20:].all()
+        count = len(there)
+        off = np.linalg.norm(found["state"][there, :3] - truth[:count][there], axis=1)
+        error[way] = np.sqrt(np.mean(off**2))
+        bad = flight.truth.outlier[:count][there] > 0
+        said = np.isin(found["label"][there], (1, 2))
+        assert said[bad].mean() > 0.8
+        assert said[~bad & np.isfinite(flight.log.measurement[:count][there])].mean() < 0.04
+    assert error["lag"] < 0.8 * error["live"]
+
+
+def test_a_component_that_comes_later_and_one_that_never_comes(flight):
+    log = flight.log
+    measurement = log.measurement.copy()
+    measurement[:150, 0] = np.nan
+    editor = live.editor(FilterSettings(editing="live"))
+    editor.push(log.time_s[:100], measurement[:100])
+    assert editor.absent == (0,)
+    editor.push(log.time_s[100:200], measurement[100:200])
+    assert editor.absent == ()
+    assert editor.window is not None
+
+
+def test_a_wrong_first_stretch_is_no_track(flight):
+    """Twelve readings beside the track: no track is confirmed on them."""
+    measurement = flight.log.measurement.copy()
+    measurement[:12, :2] += [900.0, 0.03]
+    editor = live.editor(FilterSettings(editing="live"))
+    found = editor.push(flight.log.time_s[:60], measurement[:60])
+    state = np.concatenate([each.rows["state"] for each in found])
+    there = np.isfinite(state[:, 0])
+    off = np.linalg.norm(state[there, :3] - flight.truth.position_m[:60][there], axis=1)
+    assert there.any()
+    assert off.max() < 100
+
+
+def test_memory_is_constant(flight):
+    editor = live.editor(FilterSettings(**WAYS["specified"]))
+    sizes = []
+    for k in range(60):
+        editor.push(flight.log.time_s + 12.1 * k, flight.log.measurement)
+        sizes.append(len(editor.window))
+    assert max(sizes) <= 2 * 4096 + 2 * editor.window.sizes.window
