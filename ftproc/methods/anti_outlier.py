@@ -40,8 +40,8 @@ def estimate(readings: Readings, settings: FilterSettings) -> Estimate:
     """Filter, edit and (if asked) smooth a log as a whole, by the way of editing that the settings name."""
     if settings.editing == "two-pass":
         return edited_twice(readings, settings)
-    if settings.editing == "forward":
-        return live.smoothed(readings, settings)
+    if settings.editing in ("live", "forward"):
+        return live.smoothed(readings, settings) if settings.smooth else live.whole(readings, settings)
     return preparing.unedited(readings, settings)
 
 

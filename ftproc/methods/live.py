@@ -74,12 +74,17 @@ def _last(found: Sequence[Published], count: int) -> Published:
     return Published(0, rows, label, known, again)
 
 
+def whole(readings: Readings, settings: FilterSettings) -> Estimate:
+    """The estimate of a whole log. Errors as in `parts`."""
+    record = Recording(*readings)
+    (part,) = parts(record, settings, len(record))
+    return part.estimate
+
+
 def smoothed(readings: Readings, settings: FilterSettings) -> Estimate:
     """A whole log with the decisions of recursive editing, smoothed. Samples before the track was confirmed are
     screened. Errors as in `parts`."""
-    record = Recording(*readings)
-    (part,) = parts(record, settings, len(record))
-    found, screened = part.estimate, preparing.trusted(readings, settings)
+    found, screened = whole(readings, settings), preparing.trusted(readings, settings)
     assert found.known is not None
     kept = np.where(found.known[:, None], found.label == GOOD, screened.weight > 0).astype(float)
     known = preparing.what_is_known(readings, settings)

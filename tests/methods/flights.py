@@ -11,6 +11,7 @@ from ftproc.settings import FilterSettings
 
 SIGMA = np.array([3.0, 2e-4, 2e-4])
 TIME = 0.1 * np.arange(600)
+UNCONFIRMED = 30  # samples at most before a live track is confirmed; for two readings each instant, twice as many
 
 PATHS = {
     "radial": lambda t: np.stack([-9000 + 100 * t, 0 * t, 500 + 0 * t], 1),
@@ -36,7 +37,11 @@ def turned(position, angle):
 
 
 def rms(trajectory, position, rows=slice(None)):
-    return np.sqrt(np.mean(np.sum((trajectory.state[rows, :3] - position[rows]) ** 2, 1)))
+    """Of the samples with an estimate; a track that is edited as it comes has none before it is confirmed."""
+    error = np.sum((trajectory.state[rows, :3] - position[rows]) ** 2, 1)
+    known = np.isfinite(error)
+    assert known[UNCONFIRMED:].all()
+    return np.sqrt(np.mean(error[known]))
 
 
 def held(trajectory, position):

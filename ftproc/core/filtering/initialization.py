@@ -57,7 +57,7 @@ def find_starts(log: Observations, noise_variance: FloatArray, jerk_psd: float) 
     time_s, measurement, weight = log[:3]
     starts = [first_start(log, noise_variance)]
     good = (weight > 0) & np.isfinite(measurement)
-    interval_s = _median(time_s[1:] - time_s[:-1]) if len(time_s) > 1 else 0.0
+    interval_s = median(time_s[1:] - time_s[:-1]) if len(time_s) > 1 else 0.0
     gaps = gaps_of(time_s, good, shortest_gap(interval_s))
     edges = [*sorted(gaps), len(time_s)]
     for low, high in itertools.pairwise(edges):
@@ -68,8 +68,8 @@ def find_starts(log: Observations, noise_variance: FloatArray, jerk_psd: float) 
     return starts
 
 
-def _median(values: FloatArray) -> float:
-    """numpy's, in a tenth of the time where there are few values."""
+def median(values: FloatArray) -> float:
+    """Of values without NaN; numpy's, in a tenth of the time where there are few."""
     middle = [(len(values) - 1) // 2, len(values) // 2]
     return float(np.partition(values, middle)[middle].mean())
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core.filtering.initialization import median
 from ftproc.core.filtering.records import Observations
 
 FloatArray = NDArray[np.float64]
@@ -37,7 +38,7 @@ class Scales(NamedTuple):
     @property
     def typical_noise_m(self) -> float:
         """The median of the noise of the components that show some."""
-        return float(np.median(self.noise_m[~self.exact]))
+        return median(self.noise_m[~self.exact])
 
     def memory_s(self, jerk_psd: float) -> float:
         """The memory of a filter for this jerk density, m^2/s^5."""
@@ -51,9 +52,11 @@ class Scales(NamedTuple):
 def scales_of(log: Observations, noise_variance: FloatArray) -> Scales:
     """The scales of a log with this noise (3,) m^2, rad^2, rad^2."""
     ranges = log.measurement[:, 0][log.weight[:, 0] > 0]
-    range_m = float(np.nanmedian(ranges)) if np.isfinite(ranges).any() else 1.0
-    times = np.diff(log.time_s)
-    interval = float(np.median(times[times > 0])) if (times > 0).any() else 1.0
+    ranges = ranges[np.isfinite(ranges)]
+    range_m = median(ranges) if len(ranges) else 1.0
+    times = log.time_s[1:] - log.time_s[:-1]
+    times = times[times > 0]
+    interval = median(times) if len(times) else 1.0
     if log.sites is not None:
         return Scales(interval, max(float(log.time_s[-1] - log.time_s[0]), interval), *_of_sites(log, noise_variance))
     if log.uneven is not None:

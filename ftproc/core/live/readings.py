@@ -93,7 +93,7 @@ class Repeats:
             rows = np.flatnonzero(np.isfinite(measurement[:, c]))
             if not len(rows):
                 continue
-            values = np.r_[self.last[c], measurement[rows, c]]
+            values = np.concatenate([self.last[c : c + 1], measurement[rows, c]])
             same = values[1:] == values[:-1]
             self.last[c] = values[-1]
             if not same.any() and not self.run[c]:

@@ -38,6 +38,7 @@ def train_flights(
     model = train_model(filtered_flights(pairs, filtering, progress), settings, progress, jobs)
     made_for = {
         "editing": filtering.editing,
+        **({"lag_s": filtering.lag_s} if filtering.editing == "live" else {}),
         "noise": filtering.noise or "auto",
         "jerk": filtering.jerk_psd_m2ps5 or "auto",
     }
@@ -50,7 +51,8 @@ def filtered_flights(
     progress: Progress = silent,
 ) -> dict[str, list[Flight]]:
     """Runs with truth by their stage, `filter` or `smoother`. Raises InputError and UsageError as `train_flights`."""
-    filtering = replace(filtering or FilterSettings(), smooth=True)
+    filtering = filtering or FilterSettings()
+    filtering = replace(filtering, smooth=filtering.editing != "live")
     sanity.check_settings(filtering)
     method = registry.named(filtering.method)
     if not method.corrected:
