@@ -41,7 +41,7 @@ def screen(station: Seen) -> Screened:
     weight, sigma, least = np.isfinite(z).astype(float), np.ones(3), two_pass.rounding_sigma(z)
     for c in station.components:
         channel = np.ascontiguousarray(z[:, c])
-        weight[:, c], sigma[c] = two_pass.screen_channel(
+        weight[:, c], _, sigma[c] = two_pass.screen_channel(
             station.time_s, channel, c == 1, math.sqrt(2) * float(least[c])
         )
     sigma = np.where(np.isfinite(station.known), station.known, np.maximum(sigma, LEAST_NOISE))

@@ -222,10 +222,10 @@ def _step(log: Neighbourhood, weight: FloatArray) -> tuple[Step, SmootherRun]:
     weighted = log.weighted(weight)
     starts = find_starts(weighted, noise, float(log.model.jerk[0, 0]))
     smoothed = smooth_log(weighted, log.model, starts, residuals_only=True)
-    return Step(weight, smoothed.log_likelihood + _rejections(log, weight, smoothed)), smoothed
+    return Step(weight, smoothed.log_likelihood + rejections(log, weight, smoothed)), smoothed
 
 
-def _rejections(log: Neighbourhood, weight: FloatArray, smoothed: SmootherRun) -> float:
+def rejections(log: Neighbourhood, weight: FloatArray, smoothed: SmootherRun) -> float:
     """Log-probability of the rejected readings, and of there being such."""
     total = 0.0
     for c in range(3):

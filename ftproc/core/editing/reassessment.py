@@ -19,15 +19,16 @@ from ftproc.core.editing.runs import runs_of
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Start
 from ftproc.core.filtering.smoother import smooth_log
-from ftproc.core.identification.profile import fit_profile, median_level
+from ftproc.core.identification.profile import fit_profile, median_level, roughness
 from ftproc.core.identification.scales import scales_of
 
 FloatArray = NDArray[np.float64]
 
 ROUNDS = 6
 LEAST_KEPT = 0.8  # of the readings of a component that were good before the first round
+MARGIN = 5.0  # in log-probability, by which the decisions made again may be less likely than those before
 OTHER_LEVEL = 2.5  # times the jerk level at which an alternative was tried, before it is tried again
-PROFILE_STEPS = 3  # of the search for the jerk profile
+PROFILE_STEPS, COMPARED_STEPS = 3, 12  # of the search for the jerk profile; where two are compared
 STANDS_OUT = 8.0  # times the median of the jerk profile
 AROUND = 200  # samples on each side of what stands out that are decided with it
 LONGEST_SPAN = 3000  # samples that are decided together
@@ -60,9 +61,9 @@ def reassess(record: Record, decision: Decision) -> Decision:
     return decision._replace(weight=weight, starts=_starts(record, weight, calm), model=profile, unexamined=unexamined)
 
 
-def _profile(record: Record, decision: Decision) -> Model:
+def _profile(record: Record, decision: Decision, steps: int = PROFILE_STEPS) -> Model:
     """The decision's model with a jerk profile."""
-    return fit_profile(record.weighted(decision.weight), decision.starts, decision.model, PROFILE_STEPS)
+    return fit_profile(record.weighted(decision.weight), decision.starts, decision.model, steps)
 
 
 def _starts(record: Record, weight: FloatArray, calm: Model) -> list[Start]:
@@ -73,9 +74,11 @@ def _until_settled(record: Record, decision: Decision, profile: Model | None) ->
     """Decide again from the calm level until nothing changes, or ROUNDS times.
 
     A round that rejects much of what was good is not believed: where the smallest noise that explains the readings
-    left is taken for theirs, ever fewer are left.
+    left is taken for theirs, ever fewer are left. Nor is the outcome, if it makes all readings together less likely than
+    the decisions before did, each with a jerk profile of its own: then turns are taken for patches.
     """
-    first = decision.weight
+    first = decision._replace(model=profile or _profile(record, decision))
+    profile = first.model
     search, tried_at = alternatives.Search(len(record.time_s)), np.inf
     for _ in range(ROUNDS):
         profile = profile or _profile(record, decision)
@@ -92,11 +95,40 @@ def _until_settled(record: Record, decision: Decision, profile: Model | None) ->
         if not _stands_out(record.time_s, profile).any() and (weight == decision.weight).all():
             break
         again = decide(record, decision._replace(weight=weight, model=calm), tune_first=False)
-        if (again.weight == decision.weight).all() or (again.weight.sum(0) < LEAST_KEPT * first.sum(0)).any():
+        if (again.weight == decision.weight).all() or (again.weight.sum(0) < LEAST_KEPT * first.weight.sum(0)).any():
             break
         decision, profile = again, None
-    unexamined = len(search.unexamined - search.tried)
-    return decision._replace(model=profile or _profile(record, decision), unexamined=unexamined)
+    found = decision._replace(
+        model=profile or _profile(record, decision), unexamined=len(search.unexamined - search.tried)
+    )
+    if (found.weight != first.weight).any() and _likelihood(record, found) < _likelihood(record, first) - MARGIN:
+        return first._replace(rounds=found.rounds, unexamined=found.unexamined)
+    return found
+
+
+def likelier(
+    one: tuple[Record, Decision], other: tuple[Record, Decision], behind: float = 0.0
+) -> tuple[Record, Decision]:
+    """Of two ways to understand a log, that which makes all of its readings together likelier, each with a jerk profile
+    of its own; the other one too if its log-probability is behind by less than so much."""
+    if other[1] is one[1]:
+        return one
+    first, second = (
+        _likelihood(record, each._replace(model=_profile(record, each, COMPARED_STEPS)))
+        for record, each in (one, other)
+    )
+    return other if second > first - behind else one
+
+
+def _likelihood(record: Record, decision: Decision) -> float:
+    """Log-probability of all readings, of the decisions on them and of the jerk profile."""
+    model, calm = decision.model, median_level(decision.model)
+    log = record.weighted(decision.weight)
+    smoothed = smooth_log(log, model, _starts(record, decision.weight, calm), residuals_only=True)
+    whole = alternatives.Neighbourhood(
+        record.time_s, record.measurement, record.possible, model, decision.rates, record.gate, record.uneven
+    )
+    return smoothed.log_likelihood + alternatives.rejections(whole, decision.weight, smoothed) - roughness(model)
 
 
 def _stands_out(time_s: FloatArray, profile: Model) -> NDArray[np.bool_]:

@@ -7,6 +7,7 @@ leave-one-out residuals -> again, until the decisions stand still; then a jerk p
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,8 @@ from ftproc.core.editing.decisions import (
     allow_for_tails,
     decide,
 )
-from ftproc.core.editing.reassessment import reassess
+from ftproc.core.editing.reassessment import likelier, reassess
+from ftproc.core.editing.runs import runs_of
 from ftproc.core.editing.steps import Step
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
@@ -41,7 +43,12 @@ FloatArray = NDArray[np.float64]
 SHORT_WINDOW = 11  # samples: sees jumps, and little else
 WINDOWS = (31, 75)  # samples: the short one follows manoeuvres, the long one sees through patches
 COARSE = 0.5  # of a component's noise: rounding that makes so much of it decides how its readings repeat
+OUTVOTED = 0.5  # share of a window's parabolas that a reading is off
 FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
+TURN, EDGE = 6, 3  # readings in a row that a turn may have, and on each side of its ends that do not jump
+DRIFT_ROUNDS = 3  # of following the noise: where it grows, each finds readings that the next can follow
+HOPELESS = 200.0  # in log-probability, by which another hypothesis is behind if it is not followed up
+FEW_MORE = 0.01  # of the readings: those that such a hypothesis may reject beyond the others, to be believed
 PROFILE_STEPS = 4  # of the search for the jerk profile, once the decisions are made
 STEP_ROUNDS = 4  # of looking for steps: where one is bridged, another may show
 START_INFLATION = 2.0  # on the covariance of a smoothed state that starts a filter over the same record
@@ -96,14 +103,25 @@ class Edited(NamedTuple):
         return self.log.weight
 
 
-def screen(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """(n, 3) weights after screening each component alone, (3,) noise 1-sigma, and which components show none (3,)."""
+class Screened(NamedTuple):
+    """What screening each component alone finds: weights (n, 3), those of the short window alone, which sees jumps but
+    through which turns pass (n, 3), the noise 1-sigma (3,), and which components show none (3,)."""
+
+    weight: FloatArray
+    jumps_only: FloatArray
+    sigma: FloatArray
+    exact: NDArray[np.bool_]
+
+
+def screen(time_s: FloatArray, measurement: FloatArray) -> Screened:
+    """Screen each component alone."""
     weight, sigma, least = np.isfinite(measurement).astype(float), np.zeros(3), rounding_sigma(measurement)
+    jumps_only = weight.copy()
     for c in range(3):
-        channel = np.ascontiguousarray(measurement[:, c])
-        weight[:, c], sigma[c] = screen_channel(time_s, channel, c == 1, math.sqrt(2) * float(least[c]))
+        channel, floor = np.ascontiguousarray(measurement[:, c]), math.sqrt(2) * float(least[c])
+        weight[:, c], jumps_only[:, c], sigma[c] = screen_channel(time_s, channel, c == 1, floor)
     exact, sigma = without_noise(Observations(time_s, measurement, weight), sigma)
-    return weight, sigma, exact
+    return Screened(weight, jumps_only, sigma, exact)
 
 
 def rounding_sigma(measurement: FloatArray) -> FloatArray:
@@ -114,10 +132,11 @@ def rounding_sigma(measurement: FloatArray) -> FloatArray:
 
 def screen_channel(
     time_s: FloatArray, channel: FloatArray, angular: bool, least_sigma: float
-) -> tuple[FloatArray, float]:
-    """(n,) weights and the noise 1-sigma of one component."""
+) -> tuple[FloatArray, FloatArray, float]:
+    """(n,) weights, (n,) those of the short window, and the noise 1-sigma of one component."""
     seen = np.isfinite(channel).astype(float)
     near, scales = screening.screen_component(time_s, channel, SHORT_WINDOW, angular, least_sigma)
+    jumps_only = np.where(near > OUTVOTED, 0.0, seen)
     weight, sigma = seen.copy(), least_sigma
     for window in WINDOWS:
         votes, scales = screening.screen_component(time_s, channel, window, angular, least_sigma)
@@ -126,10 +145,10 @@ def screen_channel(
             sigma = max(float(np.median(scales)), least_sigma)
     weight[jump_patches.find(time_s, unwrap(channel) if angular else channel, weight, sigma) > 0] = 0.0
     # A component that swings too fast for parabolas loses half of itself: then only the short window is believed.
-    for alternative in (np.where(near > 0.5, 0.0, seen), seen):
+    for alternative in (jumps_only, seen):
         if weight.sum() < FEWEST_TRUSTED * seen.sum():
             weight = alternative
-    return weight, sigma
+    return weight, jumps_only, sigma
 
 
 def stuck_readings(measurement: FloatArray, sigma: FloatArray) -> NDArray[np.bool_]:
@@ -188,7 +207,7 @@ def _decided(
 ) -> tuple[Record, Decision]:
     """The decisions on a log as if it had no steps, with a jerk profile."""
     jerk_psd = known.jerk_psd
-    screened, sigma, exact = screen(time_s, measurement)
+    screened, jumps_only, sigma, exact = screen(time_s, measurement)
     possible = np.isfinite(measurement) & ~stuck_readings(measurement, sigma)
     possible[:, 0] &= measurement[:, 0] > NO_RANGE_M  # no target is at the station, or behind it
     fixed = Fixed(np.isfinite(known.sigma) | exact | (segment_of is not None), jerk_psd is not None)
@@ -196,18 +215,54 @@ def _decided(
     coarse = np.where(rounding > COARSE * sigma, np.sqrt(12) * rounding, 0.0)
     uneven = uneven_noise.repeated(measurement, coarse)
     record = Record(time_s, measurement, possible, screened * possible, sigma, fixed, known.gate, rounding, uneven)
-    log, noise = record.weighted(record.screened), np.where(np.isfinite(known.sigma), known.sigma, sigma) ** 2
+    noise = np.where(np.isfinite(known.sigma), known.sigma, sigma) ** 2
+    begin = partial(_first, record, segment_of=segment_of, noise=noise, jerk_psd=jerk_psd)
+    found = _examined(*begin(record.screened), known)
+    turns = jumps_only * possible
+    if jerk_psd is None and found[1].stamp_s == 0 and _may_turn(found[1], turns):
+        other = begin(turns)
+        if likelier(found, other, HOPELESS) is other:
+            other = _examined(*other, known)
+            if other[1].weight.sum() > found[1].weight.sum() - FEW_MORE * possible.sum():
+                found = likelier(found, other)
+    return found
+
+
+def _first(
+    record: Record, weight: FloatArray, segment_of: Model | None, noise: FloatArray, jerk_psd: float | None
+) -> tuple[Record, Decision]:
+    """The decisions that are made from these weights (n, 3) on. noise (3,): variances to begin with."""
+    log = record.weighted(weight)
     model = segment_of or Model(noise, isotropic(first_jerk(log, noise) if jerk_psd is None else jerk_psd))
     rates = np.tile(np.array(outlier_chain.START_RATES), (3, 1))
     starts = find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
-    decision = decide(record, Decision(record.screened, model, starts, rates), tune_first=True)
-    if not short:
-        record, decision = allow_for_late_stamps(record, decision)
-        record, decision = allow_for_tails(record, decision)
-        record, decision = allow_for_drift(record, decision)
-    if jerk_psd is None:
-        decision = reassess(record, decision)
-    return record, decision
+    return record, decide(record, Decision(weight, model, starts, rates), tune_first=True)
+
+
+def _examined(record: Record, decision: Decision, known: Known) -> tuple[Record, Decision]:
+    """The decisions made again where the noise is not even, and where they do not explain the log."""
+    found = record, decision
+    found = likelier(found, allow_for_late_stamps(*found))
+    found = allow_for_tails(*found)
+    for _ in range(DRIFT_ROUNDS):
+        before, found = found, likelier(found, allow_for_drift(*found))
+        if found is before or found[1].weight.sum() <= before[1].weight.sum():
+            break
+    return found if known.jerk_psd is not None else (found[0], reassess(*found))
+
+
+def _may_turn(decision: Decision, jumps_only: FloatArray) -> bool:
+    """Whether the target may have turned where readings are rejected: where they do not stand still, or reject long
+    runs at whose ends nothing jumps."""
+    if not decision.settled:
+        return True
+    for c in range(3):
+        jumps = np.cumsum(np.pad(jumps_only[:, c] == 0, (1, 0)))
+        for begin, end in runs_of(decision.weight[:, c] == 0):
+            edges = [(max(edge - EDGE, 0), min(edge + EDGE, len(jumps) - 1)) for edge in (begin, end)]
+            if end - begin >= TURN and all(jumps[high] == jumps[low] for low, high in edges):
+                return True
+    return False
 
 
 def smoothed_starts(smoothed: SmootherRun) -> list[Start]:

@@ -57,17 +57,26 @@ def fit_profile(log: Observations, starts: list[Start], level: Model, steps: int
         model = unpack(theta)
         found = score_log(log, model, starts)
         by_axis = found.jerk * model.jerk
-        walk, ratio = np.diff(theta[:knots]), theta[knots]
-        pull = np.r_[WALK_PRECISION * (np.r_[0.0, walk] - np.r_[walk, 0.0]), VERTICAL_PRECISION * ratio]
+        walk, ratio = theta[1:knots] - theta[: knots - 1], theta[knots]
+        bend = np.zeros(knots)
+        bend[1:] += walk
+        bend[:-1] -= walk
+        pull = np.append(WALK_PRECISION * bend, VERTICAL_PRECISION * ratio)
         penalty = WALK_PRECISION * float(walk @ walk) + VERTICAL_PRECISION * ratio**2
-        score = np.r_[by_axis.sum(1), by_axis[:, 5].sum()]
+        score = np.append(by_axis.sum(1), by_axis[:, 5].sum())
         return -found.log_likelihood + 0.5 * penalty, pull - score
 
     ratio = math.log(level.jerk[0, 5] / level.jerk[0, 0])
-    theta = np.r_[np.broadcast_to(np.log(level.jerk[:, 0]), knots), ratio]
-    low, high = (np.r_[np.full(knots, bound), side] for bound, side in jerk_bounds(scales))
-    curvature = np.r_[np.full(knots, 2.0), 0.7 * knots]
+    theta = np.append(np.broadcast_to(np.log(level.jerk[:, 0]), knots), ratio)
+    low, high = (np.append(np.full(knots, bound), side) for bound, side in jerk_bounds(scales))
+    curvature = np.append(np.full(knots, 2.0), 0.7 * knots)
     return unpack(optimizer.minimise(cost, theta, curvature, low, high, steps, tolerance=0.1 * knots**0.5))
+
+
+def roughness(model: Model) -> float:
+    """What a jerk profile takes from the log-likelihood: it is a random walk from knot to knot."""
+    walk = np.diff(np.log(model.jerk[:, 0]))
+    return 0.5 * WALK_PRECISION * float(walk @ walk)
 
 
 def median_level(model: Model) -> Model:

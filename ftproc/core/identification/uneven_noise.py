@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 TAILS = 4.0  # degrees of freedom of the distribution that outliers hardly move
 LEAST_GAIN, SHARE = 15.0, 0.1  # in log-likelihood, and for each sample, for late stamps to be believed
 STEPS = 30
-WINDOW = 60  # readings from which a variance is taken
+WINDOW, SHORTEST_WINDOW = 60, 24  # readings from which a variance is taken, of a long log and of a short one
 FEWEST_WINDOWS = 6
 CHI2_MEDIAN, MEDIAN_SPREAD = (
     0.45494,
@@ -30,7 +30,7 @@ CHI2_MEDIAN, MEDIAN_SPREAD = (
 )  # of chi-square with one degree: median, and sqrt(n) sigma of its estimate's log
 SMALLEST = 1e-6  # square of a residual, in sigmas: a component that is computed from others has none
 LEAST_DRIFT = 0.15  # 1-sigma of ln(variance) over the windows, beyond chance
-LARGEST_DRIFT = 3.0  # of ln(variance)
+LARGEST_DRIFT = 6.0  # of ln(variance)
 GOES_BACK = 0.2  # share of the changes of a rounded reading that go back to the value before: more of them is noise
 SURELY_CHANCE, MOST_REPEATS = 0.05, 0.98  # expected number of longer runs that noise makes; share of repeats
 
@@ -82,6 +82,7 @@ def stamp_variance(log: Observations, smoothed: SmootherRun, model: Model) -> tu
     tries = [likeliest(first - np.r_[0.0, 0.0, 0.0, less], first - 35.0) for less in (0.0, 4.0)]
     best, found = min(tries, key=lambda each: each[0])
     late = plain - best > max(LEAST_GAIN, SHARE * len(used))
+    late &= math.exp(found[3]) < float(np.median(np.diff(log.time_s))) ** 2  # else they would not be in order
     return np.exp(found[:3]), math.exp(found[3]) if late else 0.0
 
 
@@ -90,19 +91,22 @@ def drift(log: Observations, smoothed: SmootherRun) -> FloatArray | None:
     found = np.ones_like(log.weight)
     for c in range(3):
         seen = np.flatnonzero((log.weight[:, c] > 0) & np.isfinite(smoothed.residual_variance[:, c]))
-        count = len(seen) // WINDOW
-        if count < FEWEST_WINDOWS:
+        size = min(WINDOW, len(seen) // FEWEST_WINDOWS)
+        if size < SHORTEST_WINDOW:
             continue
+        count = len(seen) // size
         square = smoothed.residual[seen, c] ** 2 / smoothed.residual_variance[seen, c]
         windows = np.array_split(np.arange(len(seen)), count)
         level = np.log([max(float(np.median(square[w])), SMALLEST) / CHI2_MEDIAN for w in windows])
-        chance = MEDIAN_SPREAD**2 / WINDOW
+        chance = MEDIAN_SPREAD**2 / size
         drifting = float(np.var(level)) - chance
         if drifting < max(LEAST_DRIFT**2, 3 * chance * math.sqrt(2 / count)):
             continue
         even = np.convolve(np.pad(level, 1, mode="edge"), [0.25, 0.5, 0.25], "valid")
         even = np.clip(even - np.median(even), -LARGEST_DRIFT, LARGEST_DRIFT) * drifting / (drifting + 0.375 * chance)
         middle = np.array([log.time_s[seen[w]].mean() for w in windows])
+        # It goes on as far again beyond the ends, where readings may be missing because the noise has grown.
+        middle, even = (np.pad(each, 1, mode="reflect", reflect_type="odd") for each in (middle, even))
         found[:, c] = np.exp(np.interp(log.time_s, middle, even))
     return found if (found != 1).any() else None
 

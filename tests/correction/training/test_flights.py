@@ -1,4 +1,4 @@
-"""Which logs and methods a correction is not trained from."""
+"""What a correction is trained from."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from ftproc.correction.training.flights import train_flights
 from ftproc.errors import InputError, UsageError
 from ftproc.records import Truth
-from ftproc.settings import TrainSettings
+from ftproc.settings import FilterSettings, TrainSettings
 from tests.simulated import simulate
 
 
@@ -25,3 +25,12 @@ def test_refuses_what_it_cannot_learn_from():
     late = Truth("late.csv", flight.truth.time_s + 1e4, flight.truth.position_m)
     with pytest.raises(InputError, match=r"^late\.csv: its times do not overlap those of "):
         train_flights([(flight.log, late)], settings)
+
+
+def test_of_live_editing_the_filter_alone_is_corrected():
+    flight = simulate("manoeuvre", seed=1, dt_s=0.5, duration_s=150.0)
+    settings = TrainSettings(population=2, generations=0, epochs=5)
+    model = train_flights([(flight.log, flight.truth)], settings, FilterSettings(editing="live", lag_s=1.0))
+    assert model.smoother is None
+    assert model.settings["editing"] == "live"
+    assert model.settings["lag_s"] == 1.0
