@@ -179,17 +179,17 @@ def likeliest(near: Neighbourhood, search: Search) -> FloatArray | None:
     search.work -= len(near.inside)
     if not _tense(near, calm):
         return None
-    now = max((_settled(near, near.log.weight, model) for model in near.levels), key=lambda each: each.likelihood)
-    tries = []
+    now = max(_step(near, near.log.weight, model)[0].likelihood for model in near.levels)
+    tries = [(math.inf, near.log.weight)]
     for weight in _hypotheses(near):
         if (weight.sum() >= FEWEST) and math.isfinite(found := _step(near, weight, calm)[0].likelihood):
             tries.append((found, weight))
-    most = len(tries) + (1 + min(len(tries), FINALISTS)) * len(near.levels) * (1 + ROUNDS)
-    search.work -= most * len(near.inside)
-    tries.sort(key=lambda each: -each[0])
-    ends = [_settled(near, weight, model) for _, weight in tries[:FINALISTS] for model in near.levels]
-    best = max(ends, key=lambda each: each.likelihood, default=now)
-    return best.weight if best.likelihood > now.likelihood + BETTER else None
+    count = len(tries)
+    tries = sorted(tries, key=lambda each: -each[0])[: 1 + FINALISTS]
+    search.work -= (count + (1 + len(tries) * (1 + ROUNDS)) * len(near.levels)) * len(near.inside)
+    ends = [_settled(near, weight, model) for _, weight in tries for model in near.levels]
+    best = max(ends, key=lambda each: each.likelihood)
+    return best.weight if best.likelihood > now + BETTER else None
 
 
 def _tense(near: Neighbourhood, calm: Model) -> bool:
