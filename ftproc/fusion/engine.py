@@ -21,7 +21,7 @@ from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import optimizer
 from ftproc.core.identification.likelihood import VERTICAL_PRECISION, jerk_bounds, shaped
-from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
+from ftproc.core.identification.profile import fit_profile, knot_length, median_level, with_allowance
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import isotropic
 from ftproc.fusion import alternatives, first_track, screening
@@ -31,6 +31,7 @@ from ftproc.fusion.events import Events, Seen, merge
 from ftproc.records import FloatArray
 
 FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 18, 8
+OTHER_KNOTS = 1.5  # times the distance of the knots of the jerk profile, before they are laid out anew
 LEVEL_STEPS, PROFILE_STEPS, LAST_STEPS = 4, 3, 8
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after the first rounds
 STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that may still change
@@ -210,16 +211,22 @@ def _tuned(current: Fused, jerk_psd: float | None, first: int | None) -> Fused:
 
 
 def _profile(log: Observations, starts: list[Start], model: Model) -> Model:
-    """The likeliest profile, from the model's, whose length follows the span of the events: the clocks move it."""
-    return fit_profile(log, starts, _of_length(log, model), PROFILE_STEPS)
+    """The likeliest profile, from the model's."""
+    return fit_profile(log, starts, _on_knots(log, model), PROFILE_STEPS)
 
 
-def _of_length(log: Observations, model: Model) -> Model:
-    """The model with as many pieces as its profile needs over the events."""
+def _on_knots(log: Observations, model: Model) -> Model:
+    """The model with as many knots as its profile needs over the events, whose span the clocks move; farther apart or
+    closer together where the jerk has become another than the one that they were laid out for."""
     if not math.isfinite(model.knot_s):
         return model
-    knots = max(math.ceil(scales_of(log, model.noise_variance).span_s / model.knot_s), 1)
-    return model._replace(jerk=model.jerk[np.minimum(np.arange(knots), len(model.jerk) - 1)])
+    scales = scales_of(log, model.noise_variance)
+    knot_s = knot_length(scales, float(np.median(model.jerk[:, 0])))
+    if model.knot_s / OTHER_KNOTS < knot_s < model.knot_s * OTHER_KNOTS:
+        knot_s = model.knot_s
+    middle_s = (np.arange(max(math.ceil(scales.span_s / knot_s), 1)) + 0.5) * knot_s
+    before = np.minimum((middle_s / model.knot_s).astype(int), len(model.jerk) - 1)
+    return model._replace(jerk=model.jerk[before], knot_s=knot_s)
 
 
 def _level(log: Observations, starts: list[Start], model: Model) -> Model:
@@ -269,7 +276,7 @@ def _last(current: Fused) -> Fused:
     """The run to publish: with a little more process noise than is likeliest."""
     if math.isfinite(current.model.knot_s):
         log = current.log
-        polished = fit_profile(log, [current.start], _of_length(log, current.model), LAST_STEPS)
+        polished = fit_profile(log, [current.start], _on_knots(log, current.model), LAST_STEPS)
         current = current._replace(model=with_allowance(log, polished))
     return _smoothed(_smoothed(current))
 

@@ -20,7 +20,7 @@ from ftproc.core.identification.likelihood import (
     jerk_bounds,
     shaped,
 )
-from ftproc.core.identification.scales import scales_of
+from ftproc.core.identification.scales import Scales, scales_of
 
 FloatArray = NDArray[np.float64]
 
@@ -42,8 +42,7 @@ def fit_profile(log: Observations, starts: list[Start], level: Model, steps: int
     scales = scales_of(log, level.noise_variance)
     knot_s = level.knot_s
     if not math.isfinite(knot_s):
-        memory_s = scales.memory_s(float(level.jerk[0, 0]))
-        knot_s = max(KNOT_MEMORIES * memory_s, KNOT_SAMPLES * scales.interval_s, scales.span_s / MAX_KNOTS)
+        knot_s = knot_length(scales, float(level.jerk[0, 0]))
     knots = max(math.ceil(scales.span_s / knot_s), 1)
 
     merged = 1 if log.sites is not None else decimation.how_many(scales, level, knot_s)
@@ -68,6 +67,12 @@ def fit_profile(log: Observations, starts: list[Start], level: Model, steps: int
     low, high = (np.r_[np.full(knots, bound), side] for bound, side in jerk_bounds(scales))
     curvature = np.r_[np.full(knots, 2.0), 0.7 * knots]
     return unpack(optimizer.minimise(cost, theta, curvature, low, high, steps, tolerance=0.1 * knots**0.5))
+
+
+def knot_length(scales: Scales, jerk_psd: float) -> float:
+    """Seconds from knot to knot of the profile of a flight with such a typical jerk density."""
+    memories, samples = KNOT_MEMORIES * scales.memory_s(jerk_psd), KNOT_SAMPLES * scales.interval_s
+    return max(memories, samples, scales.span_s / MAX_KNOTS)
 
 
 def median_level(model: Model) -> Model:
