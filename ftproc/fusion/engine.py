@@ -158,8 +158,8 @@ def _reassessed(
             continue
         start = Start(0, state[here.start], np.diag(np.repeat(alternatives.FREE, 3) ** 2))
         near = alternatives.Neighbourhood(
-            log.part(here)._replace(weight=weight[here]), possible[here], believed[here], current.sigma, inside, start,
-            alternatives.calm_levels(current.model, here, events.time_s), gate,
+            log.part(here)._replace(weight=weight[here]), possible[here], believed[here], current.sigma, inside,
+            place.together, start, alternatives.calm_levels(current.model, here, events.time_s), gate,
         )  # fmt: skip
         found = alternatives.likeliest(near, search)
         if found is not None:
