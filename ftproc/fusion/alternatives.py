@@ -221,6 +221,14 @@ def likeliest(near: Neighbourhood, search: Search) -> FloatArray | None:
     return best.weight if best.likelihood > standing + BETTER else None
 
 
+def first_decisions(whole: Neighbourhood) -> tuple[Model, FloatArray]:
+    """The likeliest model and decisions (n, 3) of a whole flight, from the weights of its log."""
+    search = Search(0)
+    ends = [(Steps(whole, model, search).settled(whole.log.weight), model) for model in whole.levels]
+    best, model = max(ends, key=lambda each: each[0].likelihood)
+    return model, best.weight
+
+
 def _tense(near: Neighbourhood, calm: Model) -> bool:
     """Whether the readings that are used now do not fit a calm flight somewhere about the place."""
     run = smooth_log(near.log, calm, [near.start], residuals_only=True)

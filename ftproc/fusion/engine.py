@@ -38,6 +38,7 @@ STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that 
 NOISE_STEP = 4.0  # times its variance that the noise of a component moves in a round
 START_SIGMA = (30.0, 10.0, 20.0)  # m, m/s, m/s2: at least, of the state at the start
 START_INFLATION = 25.0  # on its variance
+FIRST_MEMORIES = (5.0, 20.0, 80.0)  # intervals of the densest station: of the filters that begin the search
 SHARES = (1.0, 0.25, 0.06, 0.0)  # of what is unknown of the readings, which is taken for noise at first: ever less
 FEWEST_KEPT = 0.5  # of what screening trusts, in each component of a station
 
@@ -82,7 +83,7 @@ def fuse(
         raise Alone
     trusted = [screening.agreeing(s, each, track) for s, each in zip(stations, screened, strict=True)]
     prior = np.stack([station.prior for station in stations])
-    current = _begin(stations, screened, trusted, track, sigma, Constants.unknown(prior), jerk_psd)
+    current = _begin(stations, screened, trusted, track, Constants.unknown(prior), gate, jerk_psd)
     say = progress or (lambda text: None)
     looks, search = 0, alternatives.Search(sum(len(s.time_s) for s in stations))
     for number in range(MOST_ROUNDS):
@@ -99,9 +100,10 @@ def fuse(
 
 def _begin(
     stations: list[Seen], screened: list[screening.Screened], weight: list[FloatArray], track: first_track.Track,
-    sigma: FloatArray, constants: Constants, jerk_psd: float | None,
+    constants: Constants, gate: float, jerk_psd: float | None,
 ) -> Fused:  # fmt: skip
     """The first smoother run, along the first track."""
+    sigma = np.stack([each.sigma for each in screened])
     range_m = np.array([np.median(np.linalg.norm(track.state[:, :3] - s.place, axis=1)) for s in stations])
     events = merge(stations, constants.estimate, range_m)
     state = track.at(events.time_s)
@@ -112,11 +114,17 @@ def _begin(
     start = Start(first, state[first], covariance)
     log = events.weighted(weight)
     wide = screening.with_biases(events, stations, state, sigma)
-    near = screening.Near(state[:, :3], float(np.median(track.sigma)), screening.interval(stations))
-    model = Model(wide**2, isotropic(jerk_psd or screening.first_jerk(log, wide**2, start, near)))
-    found = smooth_biased(log, model, start, _directions(events, state, constants))
-    rates = np.tile(np.array(outlier_chain.START_RATES), (len(stations), 3, 1))
     possible = [each.possible for each in screened]
+    scales, interval_s = scales_of(log, wide**2), screening.interval(stations)
+    levels = [jerk_psd] if jerk_psd else [scales.jerk_psd(memory * interval_s) for memory in FIRST_MEMORIES]
+    whole = alternatives.Neighbourhood(
+        log, events.gathered(possible), log.weight, wide, np.ones(len(state), bool), True, start,
+        tuple(Model(wide**2, isotropic(level)) for level in levels), gate,
+    )  # fmt: skip
+    model, decided = alternatives.first_decisions(whole)
+    weight = [events.of(s, decided) for s in range(len(stations))]
+    found = smooth_biased(log._replace(weight=decided), model, start, _directions(events, state, constants))
+    rates = np.tile(np.array(outlier_chain.START_RATES), (len(stations), 3, 1))
     begun = Fused(stations, events, weight, possible, sigma, constants, model, start, found, rates)
     for share in SHARES:
         noise = np.maximum(sigma, share * wide) ** 2
