@@ -27,11 +27,9 @@ ISLAND, ISLAND_S = 48, 6.0  # readings and seconds between two runs of a compone
 MARGIN_MEMORIES, MARGIN_S, MARGIN_INTERVALS = 8.0, (2.0, 20.0), 60.0  # on each side, whose likelihood is compared
 TENSION, TENSION_S = 3.5, 2.0  # standard deviations of the sum of squares of so long a stretch, that are explained
 EDGE_S = 0.3  # by which a hypothesis reaches beyond the place
-ROUNDS, FINALISTS = 3, 4  # of decisions, and hypotheses that get them
-BETTER = 6.0  # in log-probability, that another decision must be
+ROUNDS, FINALISTS, BETTER = 3, 3, 6.0  # of decisions; hypotheses that get them; in log-probability, to be taken
 RATES = np.array([0.03, 0.001, 0.93])  # isolated outlier; patch begins; goes on
-LOST = 0.35  # share of a component that is rejected in a place, to be called lost
-FEWEST = 12  # readings that a hypothesis leaves at least
+LOST, FEWEST = 0.35, 12  # share rejected of a component, to be called lost; readings that a hypothesis leaves
 FREE = (50.0, 20.0, 20.0)  # m, m/s, m/s2: 1-sigma of the state where a neighbourhood begins
 OTHER_LEVEL = 2.0  # times the jerk level at which a place was examined, before it is examined again
 WORK, WORK_PER_SAMPLE = 250_000, 250  # samples that one search may smooth, and for each of the events
@@ -214,19 +212,12 @@ def likeliest(near: Neighbourhood, search: Search) -> FloatArray | None:
     tried.sort(key=lambda each: -each[0].likelihood)
     leading = {following.tobytes(): first.weight for first, following in reversed(tried)}
     finalists = [now, *list(reversed(leading.values()))[:FINALISTS]]
-    best = max((way.settled(each) for way in ways for each in finalists), key=lambda each: each.likelihood)
+    best = max((ways[0].settled(each) for each in finalists), key=lambda each: each.likelihood)
+    best = max((way.settled(best.weight) for way in ways), key=lambda each: each.likelihood)
     calm = ways[0].model
     ways += [Steps(near, calm._replace(jerk=times * calm.jerk), search) for times in MANOEUVRES]
     standing = max(way.of(now)[0].likelihood for way in ways)
     return best.weight if best.likelihood > standing + BETTER else None
-
-
-def first_decisions(whole: Neighbourhood) -> tuple[Model, FloatArray]:
-    """The likeliest model and decisions (n, 3) of a whole flight, from the weights of its log."""
-    search = Search(0)
-    ends = [(Steps(whole, model, search).settled(whole.log.weight), model) for model in whole.levels]
-    best, model = max(ends, key=lambda each: each[0].likelihood)
-    return model, best.weight
 
 
 def _tense(near: Neighbourhood, calm: Model) -> bool:

@@ -45,8 +45,8 @@ FEWEST_KEPT = 0.5  # of what screening trusts, in each component of a station
 
 class Fused(NamedTuple):
     """events, weight (rows, 3) of each station; sigma (m, 3) noise; constants; model; start; found: the smoother's run
-    that the rest belongs to; rounds, settled: of the decisions; unexamined: places where
-    no work was left to look for other hypotheses."""
+    that the rest belongs to; own (m, 3): the noise that each component shows by itself; rounds, settled: of the
+    decisions; unexamined: places where no work was left to look for other hypotheses."""
 
     stations: list[Seen]
     events: Events
@@ -58,6 +58,7 @@ class Fused(NamedTuple):
     start: Start
     found: Biased
     rates: FloatArray
+    own: FloatArray
     rounds: int = 0
     settled: bool = False
     unexamined: int = 0
@@ -121,11 +122,11 @@ def _begin(
         log, events.gathered(possible), log.weight, wide, np.ones(len(state), bool), True, start,
         tuple(Model(wide**2, isotropic(level)) for level in levels), gate,
     )  # fmt: skip
-    model, decided = alternatives.first_decisions(whole)
+    model, decided = screening.first_decisions(whole)
     weight = [events.of(s, decided) for s in range(len(stations))]
     found = smooth_biased(log._replace(weight=decided), model, start, _directions(events, state, constants))
     rates = np.tile(np.array(outlier_chain.START_RATES), (len(stations), 3, 1))
-    begun = Fused(stations, events, weight, possible, sigma, constants, model, start, found, rates)
+    begun = Fused(stations, events, weight, possible, sigma, constants, model, start, found, rates, sigma)
     for share in SHARES:
         noise = np.maximum(sigma, share * wide) ** 2
         begun = _smoothed(begun._replace(model=model._replace(noise_variance=noise)))

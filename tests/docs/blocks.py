@@ -99,7 +99,9 @@ BLOCKS = {
         SCORE, before=(SIMULATE, FILTER),
         only=("flight", "method", "samples", "mean position", "position", "velocity RMSE", "share", "the sigmas"),
     ),
-    "fuse": session(FUSE, before=(RANGE,), only=("range/range.toml", "radar        range bias", "azimuth zero", "verdict")),
+    "fuse": session(
+        FUSE, before=(RANGE,), only=("range/range.toml", "radar        range bias", "azimuth zero", "verdict")
+    ),
     "fuse-score": session(RANGE, FUSE, "ftproc score best.parquet --truth range/truth.parquet"),
     "train": session(FLY, TRAIN, only=("filter:", "smoother:", "Position error")),
     "train-use": session(
