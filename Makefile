@@ -3,6 +3,7 @@
 PYTHON ?= python3
 VENV ?= .venv
 LOGS = sample_data/*.csv sample_data/*.csv.gz sample_data/*.parquet
+RANGES = $(if $(filter file,$(origin LOGS)),sample_data/range/range.toml)
 OUT = out
 FLAGS =
 MODEL_FLAGS = --scenario family --flights 60 --seed 2021
@@ -37,6 +38,13 @@ $(foreach log,$(logs),$(eval log-of-$(call stem,$(log)) += $(log)))
 
 outputs := $(foreach log,$(logs),$(call output,$(log)))
 scored := $(foreach log,$(logs),$(if $(call truth,$(log)),$(log)))
+# Flights that several stations have seen: DIR/range.toml becomes DIR.fused.parquet, DIR/truth.* is its truth.
+fused = $(OUT)/$(notdir $(patsubst %/,%,$(dir $(1)))).fused.parquet
+seen = $(firstword $(wildcard $(dir $(1))truth.parquet $(dir $(1))truth.csv))
+ranges := $(wildcard $(RANGES))
+$(foreach range,$(ranges),$(eval range-of-$(patsubst $(OUT)/%.fused.parquet,%,$(call fused,$(range))) := $(range)))
+told := $(foreach range,$(ranges),$(if $(call seen,$(range)),$(range)))
+
 program := $(shell find ftproc -name '*.py' -o -name '*.safetensors')
 
 ifneq ($(filter run,$(MAKECMDGOALS)),)
@@ -56,12 +64,13 @@ help: ## this list
 	@echo
 	@echo 'make run LOGS="flights/*.csv" OUT=clean FLAGS="--smooth" filters your own logs; -j2 runs two at a time.'
 	@echo 'Only logs that changed are run again. A truth beside a log (STEM.truth.csv or .parquet) is used for the score,'
-	@echo 'a station file beside it (STEM.toml) for reading it.'
+	@echo 'a station file beside it (STEM.toml) for reading it. RANGES="flight7/range.toml" fuses the logs of a range file.'
 
-run: $(outputs) ## filter the LOGS to OUT with FLAGS, then print the score table
-ifneq ($(scored),)
+run: $(outputs) $(foreach range,$(ranges),$(call fused,$(range))) ## filter the LOGS to OUT with FLAGS, then print the score table
+ifneq ($(scored)$(told),)
 	@echo
-	@$(ftproc) score $(foreach log,$(scored),$(call output,$(log)) --truth $(call truth,$(log)))
+	@$(ftproc) score $(foreach log,$(scored),$(call output,$(log)) --truth $(call truth,$(log))) \
+	  $(foreach range,$(told),$(call fused,$(range)) --truth $(call seen,$(range)))
 else
 	@echo 'No log has a truth beside it, so there is nothing to score.'
 endif
@@ -69,6 +78,9 @@ endif
 # The log is the first prerequisite. A change of the program, its model or FLAGS makes all results old.
 $(OUT)/%.trajectory.parquet: $$(log-of-$$*) $$(call station,$$(log-of-$$*)) $(OUT)/.flags $(program) | $(installed)
 	@$(ftproc) filter $< -o $@ $(addprefix --config ,$(call station,$<)) $(FLAGS)
+
+$(OUT)/%.fused.parquet: $$(range-of-$$*) $$(wildcard $$(dir $$(range-of-$$*))*) $(OUT)/.flags $(program) | $(installed)
+	@$(ftproc) filter --fuse $< -o $@ $(FLAGS)
 
 export FLAGS
 $(OUT)/.flags: FORCE
@@ -123,6 +135,9 @@ samples: $(installed) ## make sample_data/ anew (fixed seeds: the same bytes)
 	$(ftproc) simulate --scenario calibration --seed 1 --duration 600 --dt 0.5 --instrument \
 	  azimuth_zero_mrad=0.3,elevation_zero_mrad=-0.2,mislevel_mrad=0.6,mislevel_azimuth_rad=0.7,collimation_mrad=0.4,refraction=2.8e-4 \
 	  -o sample_data/calibration/circle.parquet --truth sample_data/calibration/circle.truth.parquet
+	$(ftproc) simulate --scenario range-radar --seed 7 --duration 60 \
+	  -o sample_data/range --truth sample_data/range/truth.parquet
+	rm -f sample_data/range/*.truth.csv sample_data/range/truth.biases.csv
 	$(ftproc) simulate --scenario zuo2021-outliers --seed 5 --noise 0.02,0.00003,0.00003 --azimuth-from north \
 	  --units azimuth=gon,elevation=gon -o - --truth sample_data/total_station.truth.csv | awk -F, 'BEGIN { OFS = "," } \
 	  NR == 1 { print "t", "SD", "Hz", "V"; next } \

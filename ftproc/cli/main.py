@@ -106,7 +106,8 @@ def cli() -> None:
 
     A log holds the times, slant range R, azimuth A and elevation E of one target, measured by one station. `filter`
     finds the outliers, estimates position and velocity with the anti-outlier GA-BPNN-UKF (Zuo et al. 2021), and judges
-    the result: consistent, suspect or unreliable.
+    the result: consistent, suspect or unreliable. Logs of several stations on one flight become one trajectory
+    (`filter --fuse`).
     """
 
 

@@ -2,8 +2,8 @@
 
 One patch that is believed makes the good readings of the other stations look bad, and the decisions stand still there,
 because each supports the others. Where readings are rejected for a while, the decisions are made again over the
-neighbourhood alone: as they are, from the screening, with each component and each station wrong in turn, and from few
-components only; the likeliest outcome is kept. The biases stay.
+neighbourhood alone: from those of now, from the screening, with each component and each station wrong in turn, and from
+few components only; the likeliest outcome is kept. The biases stay.
 """
 
 from __future__ import annotations
@@ -21,28 +21,19 @@ from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.records import FloatArray, IntArray
 
-SHORTEST, SHORTEST_S = 3, 1.0  # readings, or seconds, that a run must last to be looked at
-BRIDGED = 2  # readings between two rejected ones of a run
+SHORTEST, SHORTEST_S, BRIDGED = 3, 1.0, 2  # readings, or s, of a run; readings between two rejected ones of it
 TOGETHER_S, LONGEST_S = 1.0, 45.0  # seconds between runs of one place, and of a place
 ISLAND, ISLAND_S = 48, 6.0  # readings and seconds between two runs of a component that may belong to one patch
-MARGIN_MEMORIES, MARGIN_S, MARGIN_INTERVALS = (
-    8.0,
-    (2.0, 20.0),
-    60.0,
-)  # on each side, of which the likelihood is compared
-TENSION, TENSION_S = (
-    3.5,
-    2.0,
-)  # standard deviations of the sum of squares of a stretch so long that the decisions explain
+MARGIN_MEMORIES, MARGIN_S, MARGIN_INTERVALS = 8.0, (2.0, 20.0), 60.0  # on each side, whose likelihood is compared
+TENSION, TENSION_S = 3.5, 2.0  # standard deviations of the sum of squares of so long a stretch, that are explained
 EDGE_S = 0.3  # by which a hypothesis reaches beyond the place
-ROUNDS, FINALISTS = 3, 4  # of decisions, and hypotheses that get them
-BETTER = 6.0  # in log-probability, that another decision must be
+ROUNDS, FINALISTS, BETTER = 3, 3, 6.0  # of decisions; hypotheses that get them; in log-probability, to be taken
 RATES = np.array([0.03, 0.001, 0.93])  # isolated outlier; patch begins; goes on
-LOST = 0.35  # share of a component that is rejected in a place, to be called lost
-FEWEST = 12  # readings that a hypothesis leaves at least
+LOST, FEWEST = 0.35, 12  # share rejected of a component, to be called lost; readings that a hypothesis leaves
 FREE = (50.0, 20.0, 20.0)  # m, m/s, m/s2: 1-sigma of the state where a neighbourhood begins
 OTHER_LEVEL = 2.0  # times the jerk level at which a place was examined, before it is examined again
 WORK, WORK_PER_SAMPLE = 250_000, 250  # samples that one search may smooth, and for each of the events
+MANOEUVRES = (16.0, 256.0)  # times the calm level: of manoeuvres that explain the decisions of now
 CALMER = 4.0  # times the calm level: the jerk may be so much more in a place
 
 Channel = tuple[int, int]  # station, component
@@ -50,14 +41,15 @@ Channel = tuple[int, int]  # station, component
 
 class Neighbourhood(NamedTuple):
     """A stretch of the events and what decides in it. log: with the weights of now. possible, trusted (n, 3). sigma
-    (stations, 3). inside (n,): the place itself. start: a state at the first event. levels: models to try. gate, in
-    sigmas."""
+    (stations, 3). inside (n,): the place itself; together: as of `Place`. start: a state at the first event. levels:
+    models to try. gate, in sigmas."""
 
     log: Observations
     possible: FloatArray
     trusted: FloatArray
     sigma: FloatArray
     inside: NDArray[np.bool_]
+    together: bool
     start: Start
     levels: tuple[Model, ...]
     gate: float
@@ -69,11 +61,17 @@ class Neighbourhood(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Where readings are rejected: from, to (s), and the channels."""
+    """Where readings are rejected: from, to (s), and the channels. together: more than one of them at a time."""
 
     first_s: float
     last_s: float
     channels: frozenset[Channel]
+    together: bool = False
+
+    def is_like(self, other: Place) -> bool:
+        """Whether it is the same place; the clocks move it a little."""
+        moved = max(abs(self.first_s - other.first_s), abs(self.last_s - other.last_s))
+        return moved < EDGE_S and self.channels == other.channels
 
 
 class Search:
@@ -95,7 +93,7 @@ class Search:
 
     def take(self, place: Place) -> bool:
         """Whether a place is yet to be examined, and work is left for it."""
-        if place in self.tried:
+        if any(place.is_like(other) for other in self.tried):
             return False
         if self.work <= 0:
             self.unexamined.add(place)
@@ -132,7 +130,8 @@ def places(log: Observations, possible: FloatArray) -> list[Place]:
     for place in sorted(found):
         one = merged[-1] if merged else None
         if one and place.first_s <= one.last_s + TOGETHER_S and place.last_s - one.first_s < LONGEST_S:
-            merged[-1] = Place(one.first_s, max(one.last_s, place.last_s), one.channels | place.channels)
+            together = one.together or place.first_s <= one.last_s
+            merged[-1] = Place(one.first_s, max(one.last_s, place.last_s), one.channels | place.channels, together)
         else:
             merged.append(place)
     return merged
@@ -173,23 +172,52 @@ def calm_levels(model: Model, here: slice, time_s: FloatArray) -> tuple[Model, .
     return tuple(model._replace(jerk=level[None, :].copy(), knot_s=math.inf) for level in found)
 
 
+class Steps:
+    """Decisions in a neighbourhood with one model: how likely they are, and those that follow from them. Each is worked
+    out once, and taken from the work of the search."""
+
+    def __init__(self, near: Neighbourhood, model: Model, search: Search) -> None:
+        self.near, self.model, self.search = near, model, search
+        self.known: dict[bytes, tuple[Outcome, FloatArray]] = {}
+
+    def of(self, weight: FloatArray) -> tuple[Outcome, FloatArray]:
+        """The outcome of decisions (n, 3), and those that follow."""
+        key = weight.tobytes()
+        if key not in self.known:
+            self.search.work -= len(weight)
+            self.known[key] = _step(self.near, weight, self.model)
+        return self.known[key]
+
+    def settled(self, weight: FloatArray) -> Outcome:
+        """The likeliest decisions on the way from the first ones until they stand still."""
+        best, following = self.of(weight)
+        for _ in range(ROUNDS):
+            if (following == weight).all() or following.sum() < FEWEST:
+                break
+            weight = following
+            found, following = self.of(weight)
+            if found.likelihood > best.likelihood:
+                best = found
+        return best
+
+
 def likeliest(near: Neighbourhood, search: Search) -> FloatArray | None:
-    """Weights (n, 3) of the likeliest hypothesis; None if that is the one of now. Takes its work from the search."""
-    calm = near.levels[0]
-    search.work -= len(near.inside)
-    if not _tense(near, calm):
+    """Weights (n, 3) of the likeliest hypothesis; None if that is the one of now, be it with a manoeuvre. Takes its
+    work from the search."""
+    now = near.log.weight
+    ways = [Steps(near, model, search) for model in near.levels]
+    if not near.together and not _tense(near, ways[0].model):
         return None
-    now = max((_settled(near, near.log.weight, model) for model in near.levels), key=lambda each: each.likelihood)
-    tries = []
-    for weight in _hypotheses(near):
-        if (weight.sum() >= FEWEST) and math.isfinite(found := _step(near, weight, calm)[0].likelihood):
-            tries.append((found, weight))
-    most = len(tries) + (1 + min(len(tries), FINALISTS)) * len(near.levels) * (1 + ROUNDS)
-    search.work -= most * len(near.inside)
-    tries.sort(key=lambda each: -each[0])
-    ends = [_settled(near, weight, model) for _, weight in tries[:FINALISTS] for model in near.levels]
-    best = max(ends, key=lambda each: each.likelihood, default=now)
-    return best.weight if best.likelihood > now.likelihood + BETTER else None
+    tried = [way for way in (ways[0].of(each) for each in _hypotheses(near)) if math.isfinite(way[0].likelihood)]
+    tried.sort(key=lambda each: -each[0].likelihood)
+    leading = {following.tobytes(): first.weight for first, following in reversed(tried)}
+    finalists = [now, *list(reversed(leading.values()))[:FINALISTS]]
+    best = max((ways[0].settled(each) for each in finalists), key=lambda each: each.likelihood)
+    best = max((way.settled(best.weight) for way in ways), key=lambda each: each.likelihood)
+    calm = ways[0].model
+    ways += [Steps(near, calm._replace(jerk=times * calm.jerk), search) for times in MANOEUVRES]
+    standing = max(way.of(now)[0].likelihood for way in ways)
+    return best.weight if best.likelihood > standing + BETTER else None
 
 
 def _tense(near: Neighbourhood, calm: Model) -> bool:
@@ -248,19 +276,6 @@ def _share_lost(near: Neighbourhood, channel: Channel) -> float:
     s, c = channel
     rows = near.inside & (near.station == s) & (near.possible[:, c] > 0)
     return float((near.log.weight[rows, c] <= 0).mean())
-
-
-def _settled(near: Neighbourhood, weight: FloatArray, model: Model) -> Outcome:
-    """The likeliest decisions on the way from the first ones until they stand still."""
-    best, following = _step(near, weight, model)
-    for _ in range(ROUNDS):
-        if (following == weight).all() or following.sum() < FEWEST:
-            break
-        weight = following
-        found, following = _step(near, weight, model)
-        if found.likelihood > best.likelihood:
-            best = found
-    return best
 
 
 def _step(near: Neighbourhood, weight: FloatArray, model: Model) -> tuple[Outcome, FloatArray]:

@@ -19,6 +19,7 @@ from ftproc.records import FloatArray, IntArray
 
 NAMES = ("range_m", "azimuth_rad", "elevation_rad", "tilt_east_rad", "tilt_north_rad", "clock_s")
 WORDS = ("range bias", "azimuth zero", "elevation zero", "tilt about east", "tilt about north", "clock offset")
+ALLOWANCE = 1.7  # on the variance that the readings leave: manoeuvres are not white jerk, noise is not quite white
 LEAST_TOLD = 0.05  # of the prior's information: less in a direction says nothing
 TOLD = 0.9  # of the prior's 1-sigma: a parameter that stays above it is not observable
 FARTHEST = 6.0  # prior sigmas that a bias may be off: more of it is a wrong place, clock or target
@@ -70,6 +71,7 @@ def update(constants: Constants, found: Biased, directions: Directions) -> Const
         return constants._replace(moved=0.0)
     into = np.linalg.inv(directions.columns[free] / prior[free, None])
     information, score = into.T @ found.info @ into, into.T @ found.score  # in units of the prior
+    information, score = information / ALLOWANCE, score / ALLOWANCE
     information, score, untold = _without_common_clock(constants.prior, free, information, score)
     size, turn = np.linalg.eigh(0.5 * (information + information.T))
     told = size > LEAST_TOLD

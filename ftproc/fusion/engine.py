@@ -21,7 +21,7 @@ from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import optimizer
 from ftproc.core.identification.likelihood import VERTICAL_PRECISION, jerk_bounds, shaped
-from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
+from ftproc.core.identification.profile import fit_profile, knot_length, median_level, with_allowance
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import isotropic
 from ftproc.fusion import alternatives, first_track, screening
@@ -31,20 +31,22 @@ from ftproc.fusion.events import Events, Seen, merge
 from ftproc.records import FloatArray
 
 FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 18, 8
+OTHER_KNOTS = 1.5  # times the distance of the knots of the jerk profile, before they are laid out anew
 LEVEL_STEPS, PROFILE_STEPS, LAST_STEPS = 4, 3, 8
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after the first rounds
 STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that may still change
 NOISE_STEP = 4.0  # times its variance that the noise of a component moves in a round
 START_SIGMA = (30.0, 10.0, 20.0)  # m, m/s, m/s2: at least, of the state at the start
 START_INFLATION = 25.0  # on its variance
+FIRST_MEMORIES = (5.0, 20.0, 80.0)  # intervals of the densest station: of the filters that begin the search
 SHARES = (1.0, 0.25, 0.06, 0.0)  # of what is unknown of the readings, which is taken for noise at first: ever less
 FEWEST_KEPT = 0.5  # of what screening trusts, in each component of a station
 
 
 class Fused(NamedTuple):
     """events, weight (rows, 3) of each station; sigma (m, 3) noise; constants; model; start; found: the smoother's run
-    that the rest belongs to; rounds, settled: of the decisions; unexamined: places where
-    no work was left to look for other hypotheses."""
+    that the rest belongs to; own (m, 3): the noise that each component shows by itself; rounds, settled: of the
+    decisions; unexamined: places where no work was left to look for other hypotheses."""
 
     stations: list[Seen]
     events: Events
@@ -56,6 +58,7 @@ class Fused(NamedTuple):
     start: Start
     found: Biased
     rates: FloatArray
+    own: FloatArray
     rounds: int = 0
     settled: bool = False
     unexamined: int = 0
@@ -81,7 +84,7 @@ def fuse(
         raise Alone
     trusted = [screening.agreeing(s, each, track) for s, each in zip(stations, screened, strict=True)]
     prior = np.stack([station.prior for station in stations])
-    current = _begin(stations, screened, trusted, track, sigma, Constants.unknown(prior), jerk_psd)
+    current = _begin(stations, screened, trusted, track, Constants.unknown(prior), gate, jerk_psd)
     say = progress or (lambda text: None)
     looks, search = 0, alternatives.Search(sum(len(s.time_s) for s in stations))
     for number in range(MOST_ROUNDS):
@@ -98,9 +101,10 @@ def fuse(
 
 def _begin(
     stations: list[Seen], screened: list[screening.Screened], weight: list[FloatArray], track: first_track.Track,
-    sigma: FloatArray, constants: Constants, jerk_psd: float | None,
+    constants: Constants, gate: float, jerk_psd: float | None,
 ) -> Fused:  # fmt: skip
     """The first smoother run, along the first track."""
+    sigma = np.stack([each.sigma for each in screened])
     range_m = np.array([np.median(np.linalg.norm(track.state[:, :3] - s.place, axis=1)) for s in stations])
     events = merge(stations, constants.estimate, range_m)
     state = track.at(events.time_s)
@@ -111,12 +115,18 @@ def _begin(
     start = Start(first, state[first], covariance)
     log = events.weighted(weight)
     wide = screening.with_biases(events, stations, state, sigma)
-    near = screening.Near(state[:, :3], float(np.median(track.sigma)), screening.interval(stations))
-    model = Model(wide**2, isotropic(jerk_psd or screening.first_jerk(log, wide**2, start, near)))
-    found = smooth_biased(log, model, start, _directions(events, state, constants))
-    rates = np.tile(np.array(outlier_chain.START_RATES), (len(stations), 3, 1))
     possible = [each.possible for each in screened]
-    begun = Fused(stations, events, weight, possible, sigma, constants, model, start, found, rates)
+    scales, interval_s = scales_of(log, wide**2), screening.interval(stations)
+    levels = [jerk_psd] if jerk_psd else [scales.jerk_psd(memory * interval_s) for memory in FIRST_MEMORIES]
+    whole = alternatives.Neighbourhood(
+        log, events.gathered(possible), log.weight, wide, np.ones(len(state), bool), True, start,
+        tuple(Model(wide**2, isotropic(level)) for level in levels), gate,
+    )  # fmt: skip
+    model, decided = screening.first_decisions(whole)
+    weight = [events.of(s, decided) for s in range(len(stations))]
+    found = smooth_biased(log._replace(weight=decided), model, start, _directions(events, state, constants))
+    rates = np.tile(np.array(outlier_chain.START_RATES), (len(stations), 3, 1))
+    begun = Fused(stations, events, weight, possible, sigma, constants, model, start, found, rates, sigma)
     for share in SHARES:
         noise = np.maximum(sigma, share * wide) ** 2
         begun = _smoothed(begun._replace(model=model._replace(noise_variance=noise)))
@@ -157,8 +167,8 @@ def _reassessed(
             continue
         start = Start(0, state[here.start], np.diag(np.repeat(alternatives.FREE, 3) ** 2))
         near = alternatives.Neighbourhood(
-            log.part(here)._replace(weight=weight[here]), possible[here], believed[here], current.sigma, inside, start,
-            alternatives.calm_levels(current.model, here, events.time_s), gate,
+            log.part(here)._replace(weight=weight[here]), possible[here], believed[here], current.sigma, inside,
+            place.together, start, alternatives.calm_levels(current.model, here, events.time_s), gate,
         )  # fmt: skip
         found = alternatives.likeliest(near, search)
         if found is not None:
@@ -210,16 +220,22 @@ def _tuned(current: Fused, jerk_psd: float | None, first: int | None) -> Fused:
 
 
 def _profile(log: Observations, starts: list[Start], model: Model) -> Model:
-    """The likeliest profile, from the model's, whose length follows the span of the events: the clocks move it."""
-    return fit_profile(log, starts, _of_length(log, model), PROFILE_STEPS)
+    """The likeliest profile, from the model's."""
+    return fit_profile(log, starts, _on_knots(log, model), PROFILE_STEPS)
 
 
-def _of_length(log: Observations, model: Model) -> Model:
-    """The model with as many pieces as its profile needs over the events."""
+def _on_knots(log: Observations, model: Model) -> Model:
+    """The model with as many knots as its profile needs over the events, whose span the clocks move; farther apart or
+    closer together where the jerk has become another than the one that they were laid out for."""
     if not math.isfinite(model.knot_s):
         return model
-    knots = max(math.ceil(scales_of(log, model.noise_variance).span_s / model.knot_s), 1)
-    return model._replace(jerk=model.jerk[np.minimum(np.arange(knots), len(model.jerk) - 1)])
+    scales = scales_of(log, model.noise_variance)
+    knot_s = knot_length(scales, float(np.median(model.jerk[:, 0])))
+    if model.knot_s / OTHER_KNOTS < knot_s < model.knot_s * OTHER_KNOTS:
+        knot_s = model.knot_s
+    middle_s = (np.arange(max(math.ceil(scales.span_s / knot_s), 1)) + 0.5) * knot_s
+    before = np.minimum((middle_s / model.knot_s).astype(int), len(model.jerk) - 1)
+    return model._replace(jerk=model.jerk[before], knot_s=knot_s)
 
 
 def _level(log: Observations, starts: list[Start], model: Model) -> Model:
@@ -269,7 +285,7 @@ def _last(current: Fused) -> Fused:
     """The run to publish: with a little more process noise than is likeliest."""
     if math.isfinite(current.model.knot_s):
         log = current.log
-        polished = fit_profile(log, [current.start], _of_length(log, current.model), LAST_STEPS)
+        polished = fit_profile(log, [current.start], _on_knots(log, current.model), LAST_STEPS)
         current = current._replace(model=with_allowance(log, polished))
     return _smoothed(_smoothed(current))
 

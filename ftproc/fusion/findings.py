@@ -21,6 +21,7 @@ WRONG_S, WRONG_ROWS = 3.0, 6  # seconds and rows that all of a station's reading
 BRIDGED = 4  # rows within that are good by chance
 SILENT_S, SILENT_INTERVALS = 10.0, 25.0  # without a reading
 LATE = 0.03  # of the flight
+SCATTERED = 5.0  # times its own noise
 IMPROBABLE = 4.0  # prior sigmas of a bias
 FEWEST = 10  # readings of a component, for its share of rejections to mean anything
 ALONE_S = 3.0  # of a stretch that only one station carries while others are rejected
@@ -107,6 +108,7 @@ def remarks(fused: Fused, sigma_m: FloatArray, zero_s: float) -> list[Remark]:
         *_clocks(fused),
         *_told(fused),
         *_improbable(fused),
+        *_scattered(fused),
         *_rejections(fused),
         *_stretches(fused, zero_s),
         *_poorly(fused, sigma_m, zero_s),
@@ -144,6 +146,18 @@ def _improbable(fused: Fused) -> Iterator[Remark]:
                     f"the {word} of {station.name} is {times:.0f} times its 1-sigma of the range file: check its "
                     "place, its clock and its conventions, or that 1-sigma",
                 )
+
+
+def _scattered(fused: Fused) -> Iterator[Remark]:
+    """Stations whose readings are far from the fused trajectory, beside the noise that they show by themselves."""
+    for s, station in enumerate(fused.stations):
+        times = max((fused.sigma[s, c] / fused.own[s, c] for c in station.components), default=0.0)
+        if times > SCATTERED:
+            yield Remark(
+                SUSPECT,
+                f"{station.name} contradicts the others: its readings scatter about the fused trajectory by "
+                f"{times:.0f} times their own noise; check its place, its clock and its conventions",
+            )
 
 
 def _rejections(fused: Fused) -> Iterator[Remark]:

@@ -9,17 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ftproc.core.editing import two_pass
-from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import smooth_log
-from ftproc.core.identification.scales import scales_of
+from ftproc.core.filtering.records import Model
 from ftproc.core.model import stations as geometry
-from ftproc.core.model.motion import isotropic
+from ftproc.fusion import alternatives
 from ftproc.fusion.events import CLOCK, Events, Seen
 from ftproc.fusion.first_track import Track
 from ftproc.records import FloatArray
 
-FIRST_MEMORIES = (3.0, 8.0, 20.0, 50.0, 120.0)  # intervals of the densest station: of the filter that begins the search
-NEAR, NEAR_SHARE = 8.0, 0.9  # 1-sigmas of the first track, within which such a share of the smoothed one lies
 LEAST_NOISE = (1e-4, 1e-8, 1e-8)  # m, rad, rad
 FEWEST = 20  # readings, for the noise or the median of a component
 FEWEST_KEPT = 0.5  # of a component: a track that contradicts more is wrong itself
@@ -77,14 +73,6 @@ def agreeing(station: Seen, screened: Screened, track: Track) -> FloatArray:
     return weight
 
 
-class Near(NamedTuple):
-    """The first track at the events (n, 3), m, its typical 1-sigma, and the interval of the densest station."""
-
-    position: FloatArray
-    sigma_m: float
-    interval_s: float
-
-
 def with_biases(events: Events, stations: list[Seen], state: FloatArray, sigma: FloatArray) -> FloatArray:
     """(m, 3) how far readings may be off, with the biases and clocks that are yet unknown."""
     rate = np.abs(design(events, state)[:, :, 2])
@@ -95,19 +83,12 @@ def with_biases(events: Events, stations: list[Seen], state: FloatArray, sigma: 
     return wide
 
 
-def first_jerk(log: Observations, noise_variance: FloatArray, start: Start, near: Near) -> float:
-    """The likeliest of a few jerk densities, m^2/s^5, among those with which the smoother stays near the first track: a
-    filter that has lost it finds all readings vague, and so likely."""
-    scales = scales_of(log, noise_variance)
-    found: list[tuple[float, float]] = []
-    for memory in FIRST_MEMORIES:
-        jerk_psd = scales.jerk_psd(memory * near.interval_s)
-        run = smooth_log(log, Model(noise_variance, isotropic(jerk_psd)), [start])
-        away = np.linalg.norm(run.state[start.sample :, :3] - near.position[start.sample :], axis=1)
-        if found and not np.quantile(away, NEAR_SHARE) < NEAR * near.sigma_m:
-            break
-        found.append((run.log_likelihood, jerk_psd))
-    return max(found)[1]
+def first_decisions(whole: alternatives.Neighbourhood) -> tuple[Model, FloatArray]:
+    """The likeliest model and decisions (n, 3) of a whole flight, from the weights of its log."""
+    search = alternatives.Search(0)
+    ends = [(alternatives.Steps(whole, model, search).settled(whole.log.weight), model) for model in whole.levels]
+    best, model = max(ends, key=lambda each: each[0].likelihood)
+    return model, best.weight
 
 
 def interval(stations: list[Seen]) -> float:

@@ -85,6 +85,8 @@ FLY, NEXT = (
     for name, seed, duration_s in (("circle", 1, 600), ("next", 2, 200))
 )
 TRAIN = "ftproc train --log circle.csv --truth circle.gps.csv -o theodolite.safetensors"
+RANGE = "ftproc simulate --scenario range-radar --seed 7 --duration 60 -o range --truth range/truth.parquet"
+FUSE = "ftproc filter --fuse range/range.toml --smooth -o best.parquet"
 STUDY = "ftproc train --scenario manoeuvre-clean --jerk 0.1 --editing none --compare-starts"
 TIMES = "; times vary from machine to machine"
 COUNTS = "; how many files are mutated in its time varies from machine to machine"
@@ -95,9 +97,12 @@ BLOCKS = {
     "filter": session(FILTER, before=(SIMULATE,)),
     "score": session(
         SCORE, before=(SIMULATE, FILTER),
-        only=("flight", "method", "samples", "mean position", "position", "velocity RMSE", "share", "the sigmas",
-              "range outliers", "recall", "F1"),
+        only=("flight", "method", "samples", "mean position", "position", "velocity RMSE", "share", "the sigmas"),
     ),
+    "fuse": session(
+        FUSE, before=(RANGE,), only=("range/range.toml", "radar        range bias", "azimuth zero", "verdict")
+    ),
+    "fuse-score": session(RANGE, FUSE, "ftproc score best.parquet --truth range/truth.parquet"),
     "train": session(FLY, TRAIN, only=("filter:", "smoother:", "Position error")),
     "train-use": session(
         "ftproc filter next.csv --smooth --model none -o plain.csv --summary none",

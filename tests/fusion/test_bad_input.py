@@ -121,3 +121,28 @@ def test_options_that_mean_nothing(run, folder):
     assert "does nothing without --fuse" in run("filter", "radar.csv", "--write-calibration", "x").err
     assert "never overwritten" in run("filter", "--fuse", "range.toml", "-o", "radar.csv").err
     assert (folder / "radar.csv").read_text().startswith("time_s")
+
+
+@pytest.mark.parametrize("station", ["radar", "theodolite2"])
+def test_a_station_a_kilometre_off_its_place(run, folder, station):
+    path = folder / "range.toml"
+    head, _, tail = path.read_text().partition(f"[station.{station}]")
+    moved = re.sub(r"lat_deg = (\S+)", lambda m: f"lat_deg = {float(m[1]) + 0.009}", tail, count=1)
+    path.write_text(f"{head}[station.{station}]{moved}")
+    result = run("filter", "--fuse", "range.toml", "--smooth", "-o", "best.parquet")
+    assert (result.code, result.err) == (0, "")
+    assert re.search("verdict    (suspect|unreliable)", result.out)
+    assert "check its place, its clock and its conventions" in result.out
+
+
+@pytest.mark.parametrize(("sigma", "sentence"), [("0", "all clocks are taken as exact"), ("0.08", "no clock is the")])
+def test_clocks_that_are_all_alike(run, folder, sigma, sentence):
+    path = folder / "range.toml"
+    path.write_text(re.sub("clock_offset_sigma_s = .*", f"clock_offset_sigma_s = {sigma}", path.read_text()))
+    result = run("filter", "--fuse", "range.toml", "--smooth", "-o", "best.parquet")
+    assert (result.code, result.err) == (0, "")
+    assert sentence in result.out
+    if sigma != "0":
+        biases = pd.read_csv("best.biases.csv").query("parameter == 'clock_s'")
+        assert "common clock" in result.out
+        assert biases.sigma.min() > 0.6 * 0.08 / len(biases) ** 0.5  # what they share is as vague as before

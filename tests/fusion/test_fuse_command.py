@@ -57,6 +57,8 @@ def test_a_single_station_is_the_case_of_one(run, folder):
     for east, name in zip("yx" if north else "xy", "xy", strict=True):
         assert one[f"{name}_m"].to_numpy() == pytest.approx(alone[f"{east}_m"].to_numpy(), rel=1e-9)
     assert one.z_m.to_numpy() == pytest.approx(alone.z_m.to_numpy(), rel=1e-9)
+    for name in ("sigma_z_m", "vz_mps", "sigma_vz_mps", "nis"):
+        assert one[name].to_numpy() == pytest.approx(alone[name].to_numpy(), rel=1e-9, nan_ok=True)
 
 
 def test_a_range_file_is_printed_for_logs(run, folder):
@@ -67,9 +69,30 @@ def test_a_range_file_is_printed_for_logs(run, folder):
     assert "[station.theodolite2]" in result.out
 
 
-def test_a_fused_flight_that_goes_astray_is_not_called_consistent(run, tmp_path, monkeypatch):
-    """A short flight with one radar and theodolites that the first decisions do not survive."""
+def test_a_flight_that_two_radars_lose_together_is_not_called_consistent(run, tmp_path, monkeypatch):
+    """Each follows another target for a while, and no reading of the flight is left."""
     monkeypatch.chdir(tmp_path)
-    ranges.write(simulate_range("range-radar", 5, 40.0), ".", None)
+    ranges.write(simulate_range("range-radars", 103), ".", None)
     found = json.loads(run("filter", "--fuse", "range.toml", "--smooth", "-o", "best.parquet", "--summary", "json").out)
-    assert found["trust"]["verdict"] == "unreliable"
+    assert found["trust"]["verdict"] != "consistent"
+
+
+@pytest.mark.parametrize(
+    ("scenario", "seed", "duration_s"),
+    [
+        ("range-radar", 5, 40.0),  # the first decisions must find the jerk with the outliers, not one after the other
+        ("range-dme", 101, None),  # the radar, which has most components, follows another target for 17 s
+        ("range-theodolites", 102, None),  # the last two seconds of one azimuth are wrong
+    ],
+)
+def test_hard_flights_stay_within_their_sigmas(run, tmp_path, monkeypatch, scenario, seed, duration_s):
+    monkeypatch.chdir(tmp_path)
+    simulated = simulate_range(scenario, seed, duration_s)
+    ranges.write(simulated, ".", None)
+    assert run("filter", "--fuse", "range.toml", "--smooth", "-o", "best.parquet").code == 0
+    best, truth = pd.read_parquet("best.parquet"), simulated.truth
+    best = best[best.time_s.between(truth.time_s[0], truth.time_s[-1])]
+    at = np.stack([np.interp(best.time_s, truth.time_s, truth.position_m[:, k]) for k in range(3)], 1)
+    off = np.abs(best[["x_m", "y_m", "z_m"]].to_numpy() - at)
+    sigma = best[["sigma_x_m", "sigma_y_m", "sigma_z_m"]].to_numpy()
+    assert (off < 5 * sigma + 0.05).mean() > 0.999

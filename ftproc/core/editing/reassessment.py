@@ -74,8 +74,8 @@ def _until_settled(record: Record, decision: Decision, profile: Model | None) ->
     """Decide again from the calm level until nothing changes, or ROUNDS times.
 
     A round that rejects much of what was good is not believed: where the smallest noise that explains the readings
-    left is taken for theirs, ever fewer are left. Nor is the outcome, if it makes all readings together less likely than
-    the decisions before did, each with a jerk profile of its own: then turns are taken for patches.
+    left is taken for theirs, ever fewer are left. Nor is the outcome, if it makes all readings together less likely
+    than the decisions before did, each with a jerk profile of its own: then turns are taken for patches.
     """
     first = decision._replace(model=profile or _profile(record, decision))
     profile = first.model

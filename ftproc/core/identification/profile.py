@@ -20,7 +20,7 @@ from ftproc.core.identification.likelihood import (
     jerk_bounds,
     shaped,
 )
-from ftproc.core.identification.scales import scales_of
+from ftproc.core.identification.scales import Scales, scales_of
 
 FloatArray = NDArray[np.float64]
 
@@ -42,8 +42,7 @@ def fit_profile(log: Observations, starts: list[Start], level: Model, steps: int
     scales = scales_of(log, level.noise_variance)
     knot_s = level.knot_s
     if not math.isfinite(knot_s):
-        memory_s = scales.memory_s(float(level.jerk[0, 0]))
-        knot_s = max(KNOT_MEMORIES * memory_s, KNOT_SAMPLES * scales.interval_s, scales.span_s / MAX_KNOTS)
+        knot_s = knot_length(scales, float(level.jerk[0, 0]))
     knots = max(math.ceil(scales.span_s / knot_s), 1)
 
     merged = 1 if log.sites is not None else decimation.how_many(scales, level, knot_s)
@@ -77,6 +76,12 @@ def roughness(model: Model) -> float:
     """What a jerk profile takes from the log-likelihood: it is a random walk from knot to knot."""
     walk = np.diff(np.log(model.jerk[:, 0]))
     return 0.5 * WALK_PRECISION * float(walk @ walk)
+
+
+def knot_length(scales: Scales, jerk_psd: float) -> float:
+    """Seconds from knot to knot of the profile of a flight with such a typical jerk density."""
+    memories, samples = KNOT_MEMORIES * scales.memory_s(jerk_psd), KNOT_SAMPLES * scales.interval_s
+    return max(memories, samples, scales.span_s / MAX_KNOTS)
 
 
 def median_level(model: Model) -> Model:
