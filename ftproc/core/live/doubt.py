@@ -12,16 +12,19 @@ AGAIN_S, GROWTH, SAMPLES = 0.5, 0.2, 3  # between looks: so long, or this share 
 
 
 class Doubt(NamedTuple):
-    """When a track in doubt is looked at: not before this row and this time. since_s: since when it is in doubt."""
+    """When a track in doubt is looked at: not before this row and this time. since_s: when it was first looked at and
+    stayed in doubt; NaN where it is not."""
 
     row: int = 0
     time_s: float = -math.inf
-    since_s: float = 0.0
+    since_s: float = math.nan
 
     def is_due(self, window: Window, row: int) -> bool:
         return row >= self.row and float(window.time_s[-1]) >= self.time_s and window.in_doubt()
 
     def after_edit(self, window: Window, row: int) -> Doubt:
         now_s = float(window.time_s[-1])
-        since_s = self.since_s if window.in_doubt() else now_s
+        if not window.in_doubt():
+            return Doubt(row + SAMPLES, now_s + AGAIN_S)
+        since_s = now_s if math.isnan(self.since_s) else self.since_s
         return Doubt(row + SAMPLES, now_s + max(AGAIN_S, GROWTH * (now_s - since_s)), since_s)
