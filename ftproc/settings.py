@@ -39,7 +39,6 @@ class FilterSettings:
 
     method: str = "ga-bpnn-ukf"
     editing: str = "two-pass"  # two-pass | live | forward | none
-    lag_s: float = 0.0  # of live editing: the estimate at t rests on readings up to t + lag_s
     smooth: bool = False
     noise: Noise | None = None  # 1-sigma of range m, azimuth rad, elevation rad; each may be None
     jerk_psd_m2ps5: float | None = None  # spectral density of white jerk
@@ -52,6 +51,7 @@ class FilterSettings:
     ecef: bool = False  # with a site: earth-centred coordinates too
     geoid_m: float | None = None  # height of the geoid above the ellipsoid at the site
     parameters: Parameters = ()  # of the method, by name; `ftproc filter --list-methods NAME` explains them
+    lag_s: float = 0.0  # of live editing: the estimate at t rests on readings up to t + lag_s
 
     def parameter(self, name: str) -> float | None:
         """The parameter of the method by its name; None when it is not set."""

@@ -160,6 +160,7 @@ def test_every_filter_option_can_be_kept_in_a_file():
         "target",
         "fuse",
         "write_calibration",
+        "follow",
     }
     options = {p.name for p in command.params if isinstance(p, click.Option)} - about_the_run
     assert options <= {key.option for _, _, key in every()}

@@ -50,6 +50,7 @@ method = "ukf"
 model = "none"
 smooth = true
 editing = "forward"
+lag_s = 1.5
 jerk_psd_m2ps5 = 5
 gate = 3.5
 max_patch_s = 9
@@ -76,7 +77,7 @@ def test_every_key_is_understood():
     found = config.Recipe.of(config.parse(FULL, "s.toml"))
     assert found.settings == FilterSettings(
         "ukf", "forward", True, (3.048, None, pytest.approx(20 * math.pi / 648000)), 5.0, 3.5, 9.0, 150, 7, True,
-        (48.0, 11.5, 612.0), True, 46.2, (("window", 6.0), ("m", 0.01)),
+        (48.0, 11.5, 612.0), True, 46.2, (("window", 6.0), ("m", 0.01)), 1.5,
     )  # fmt: skip
     assert found.station == Station(
         "north", "anticlockwise", pytest.approx(math.pi / 2), "zenith",
@@ -135,6 +136,7 @@ OPTIONS = st.fixed_dictionaries(
         "jerk": numbers,
         "gate": st.floats(5, 50),
         "max_patch": numbers,
+        "lag": st.floats(0, 3600),
         "weight_form": st.just("gain"),
         "ecef": st.just(True),
         "set": st.sampled_from(["window=6", "m = 0.01, F_range_m=3e2"]),

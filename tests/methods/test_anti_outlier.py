@@ -68,7 +68,8 @@ def test_patches_and_isolated_outliers_are_distinguished(dirty, editing):
     patch = (codes(dirty) == 2) & large & np.isfinite(dirty.log.measurement)
     assert np.isin(found.label[spike], (ISOLATED, PATCH)).mean() > 0.98
     assert (found.label[spike] == ISOLATED).mean() > 0.7
-    assert (found.label[patch] == PATCH).mean() > 0.95
+    # What begins a patch is not yet one when it comes.
+    assert (found.label[patch] == PATCH).mean() > (0.95 if editing == "two-pass" else 0.8)
 
 
 def test_smoother_comes_only_when_asked(dirty):

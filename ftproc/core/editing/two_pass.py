@@ -241,9 +241,7 @@ def _first(
 
 def _examined(record: Record, decision: Decision, known: Known) -> tuple[Record, Decision]:
     """The decisions made again where the noise is not even, and where they do not explain the log."""
-    found = record, decision
-    found = likelier(found, allow_for_late_stamps(*found))
-    found = allow_for_tails(*found)
+    found = allow_for_tails(*allow_for_late_stamps(record, decision))
     for _ in range(DRIFT_ROUNDS):
         before, found = found, likelier(found, allow_for_drift(*found))
         if found is before or found[1].weight.sum() <= before[1].weight.sum():

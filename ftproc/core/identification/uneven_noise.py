@@ -82,7 +82,7 @@ def stamp_variance(log: Observations, smoothed: SmootherRun, model: Model) -> tu
     tries = [likeliest(first - np.r_[0.0, 0.0, 0.0, less], first - 35.0) for less in (0.0, 4.0)]
     best, found = min(tries, key=lambda each: each[0])
     late = plain - best > max(LEAST_GAIN, SHARE * len(used))
-    late &= math.exp(found[3]) < float(np.median(np.diff(log.time_s))) ** 2  # else they would not be in order
+    late = late and math.exp(found[3]) < float(np.median(np.diff(log.time_s))) ** 2  # else they would not be in order
     return np.exp(found[:3]), math.exp(found[3]) if late else 0.0
 
 

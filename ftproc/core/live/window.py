@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing import outlier_chain, two_pass
-from ftproc.core.editing.predictive_chain import OPEN, chains_of, run_predictive, run_predictive_coloured
+from ftproc.core.live.predictive_chain import OPEN, chains_of, run_predictive, run_predictive_coloured
 from ftproc.core.filtering.forward import Span
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven, empty_rows
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
