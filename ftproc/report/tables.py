@@ -77,12 +77,14 @@ def patches(view: View) -> str:
          p.component, f"{p.readings:,}", "-" if p.size != p.size else f"{p.size:+,.3g} {p.unit}")
         for p in sorted(found, key=lambda p: -p.readings)[:MOST_PATCHES]
     ]  # fmt: skip
-    note = "A click on a start zooms all figures over time to the patch. Size: median of reading minus estimate."
+    note = "Size: median of reading minus estimate."
     if len(found) > MOST_PATCHES:
         note = f"The {MOST_PATCHES} longest of {len(found):,}. {note}"
+    click = "A click on a start zooms all figures over time to the patch."
     body = table(("start, s", "end, s", "component", "readings", "size"), rows, "numbers patches", links=1)
     whole = '<button data-from="" data-to="">Show the whole log.</button>'
-    return f'<section><h2>Outlier patches</h2>{body}<p class="note">{note} {whole}</p></section>'
+    links = f'<span class="click">{click} {whole}</span>'
+    return f'<section><h2>Outlier patches</h2>{body}<p class="note">{note} {links}</p></section>'
 
 
 def score(view: View) -> str:
