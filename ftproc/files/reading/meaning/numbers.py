@@ -23,6 +23,7 @@ _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
 _THOUSANDS = r"^[+-]?\d{1,3}(,\d{3})+$"
 _FORTRAN = r"^([+-]?\d*\.?\d*)[DdQ]([+-]?\d{1,3})$"
+_MOSTLY = 0.5  # share of the cells that must have Fortran's exponents: a single one is a slip
 
 #: For a cell: None if it is right, else what it is not and (perhaps empty) the cure.
 Check = Callable[[str], tuple[str, str] | None]
@@ -104,17 +105,14 @@ def _plainly_written(text: pa.ChunkedArray, decimal_comma: bool) -> pa.ChunkedAr
     """The cells with E for Fortran's D, and without marks between thousands where a cell has both marks."""
     import pyarrow.compute as pc
 
-    def any_like(pattern: str) -> bool:
-        return bool(pc.any(pc.match_substring_regex(text, pattern)).as_py())
+    def share(pattern: str) -> float:
+        return float(pc.mean(pc.match_substring_regex(text, pattern)).as_py() or 0.0)
 
-    if any_like(_FORTRAN):
+    if share(_FORTRAN) > _MOSTLY:
         text = pc.replace_substring_regex(text, _FORTRAN, r"\1E\2")
     for mark, point in ((",", "."), (".", ","))[: 1 + decimal_comma]:
         grouped = rf"^[+-]?(\d{{1,3}}(\{mark}\d{{3}})+|\d+)(\{point}\d*)?$"
-        if (
-            any_like(rf"^[+-]?\d{{1,3}}(\{mark}\d{{3}})+\{point}\d*$")
-            and pc.all(pc.match_substring_regex(text, grouped)).as_py()
-        ):
+        if share(rf"^[+-]?\d{{1,3}}(\{mark}\d{{3}})+\{point}\d*$") and share(grouped) == 1.0:
             return pc.replace_substring(text, mark, "")
     return text
 
