@@ -38,15 +38,17 @@ def unboxed(data: bytes) -> bytes:
 def rows_only(body: memoryview, names: Sequence[str], separator: str, widths: Sequence[int]) -> tuple[memoryview, str]:
     """The rows without comment lines among them and lines of text below them; and in words what was left out."""
     words, comments = "", 0
-    if _has_comments(body):
+    whole = body.tobytes()
+    if _has_comments(whole):
         found = [line for line in _COMMENT.finditer(body) if not _is_row(line[0], names, separator, widths)]
         ends = [0, *(line.end() for line in found)]
         starts = [*(line.start() for line in found), len(body)]
         comments = len(found)
         if comments:
-            body = memoryview(b"".join(body[low:high] for low, high in zip(ends, starts, strict=True)))
+            whole = b"".join(body[low:high] for low, high in zip(ends, starts, strict=True))
+            body = memoryview(whole)
             words += f", {comments} comment lines among the rows"
-    repeated = _repeated_names(body, names, separator, widths)
+    repeated = _repeated_names(whole, names, separator, widths)
     if repeated:
         ends, starts = [0, *(end for _, end in repeated)], [*(start for start, _ in repeated), len(body)]
         body = memoryview(b"".join(body[low:high] for low, high in zip(ends, starts, strict=True)))
@@ -75,19 +77,16 @@ def _is_row(
     return len(cells) == len(names) and layout.is_data(cells if whole else cells[1:])
 
 
-def _has_comments(body: memoryview) -> bool:
+def _has_comments(whole: bytes) -> bool:
     """Whether a line of the rows is a comment."""
-    whole = body.tobytes()
     marks = [mark for mark in (b"#", b"%", b"/", b"!") if mark in whole]
-    return bool(marks) and re.search(rb"(?m)^[ \t]*(?:#|%|//|!)", body) is not None
+    return bool(marks) and re.search(rb"(?m)^[ \t]*(?:#|%|//|!)", whole) is not None
 
 
-def _repeated_names(
-    body: memoryview, names: Sequence[str], separator: str, widths: Sequence[int]
-) -> list[tuple[int, int]]:
+def _repeated_names(whole: bytes, names: Sequence[str], separator: str, widths: Sequence[int]) -> list[tuple[int, int]]:
     """Where the names stand once more among the rows, as on each page of a printout or in files that were put together;
     with the lines around them that are no rows."""
-    whole, first = body.tobytes(), names[0].encode()
+    first = names[0].encode()
     if not first or names[0].isdigit() or first not in whole:
         return []
     found: list[tuple[int, int]] = []
