@@ -93,10 +93,10 @@ def score(trajectory: Any, truth: Any = None) -> Score:
 
 
 def write_report(trajectory: Any, target: str | Path, truth: Any = None) -> None:
-    """Write an HTML page that shows a trajectory, and with a truth its errors (records or files).
+    """Write a page that shows a trajectory, and with a truth its errors (records or files): HTML, or a PDF by its name.
 
     A trajectory from `filter_log` is shown with its raw readings. Raises InputError, OutputError, UsageError (no
-    plotly).
+    plotly; no browser for a PDF).
     """
     from ftproc import report
 

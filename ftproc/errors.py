@@ -92,6 +92,13 @@ def nearest(word: str, known: Iterable[str], alike: float = 0.6) -> str:
     return f'; did you mean "{by_lower[close[0]]}"?' if close else ""
 
 
+def quoted(text: str) -> str:
+    """As a shell takes it."""
+    import shlex
+
+    return shlex.quote(text)
+
+
 def row_named(row: int) -> str:
     """A row of a file for messages, by the 0-based number that the `row` column of a trajectory has."""
     return f"row {row} (the first data row is 0)"

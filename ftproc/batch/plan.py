@@ -13,7 +13,7 @@ from ftproc.files.writing import atomic
 
 INDEX = "index.html"
 _REPORT = "--report"
-_PAGES = (".html", ".htm")
+_PAGES = (".html", ".htm", ".pdf")
 #: Ending of the trajectory's name by that of the log's, where it is not .csv.
 _SUFFIX = {".parquet": ".parquet", ".feather": ".feather"}
 _PACKED = (".gz", ".bz2", ".xz", ".zst", ".zip")
@@ -156,7 +156,7 @@ def _page_directory(report: str, several: bool) -> Path | None:
             raise UsageError(f"{_REPORT} {report}: there are several reports to write; name a directory.")
         return None
     if report == "-" or path.suffix:
-        raise UsageError(f"{_REPORT} {report}: end the name in .html, or in / if it is a directory.")
+        raise UsageError(f"{_REPORT} {report}: end the name in .html or .pdf, or in / if it is a directory.")
     return path
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from ftproc.config.recipe import Recipe
-from ftproc.errors import FtprocError, failure, printable
+from ftproc.errors import FtprocError, failure, printable, quoted
 from ftproc.files.layout import CANONICAL
 from ftproc.quality.summary import line
 from ftproc.records import MeasurementLog
@@ -71,8 +71,9 @@ def first_commands() -> str:
     """The commands to try when no log is named: with a log of this directory, if there is one."""
     here = (path.name for path in sorted(Path().iterdir()) if path.name.lower().endswith(_LOGS) and path.is_file())
     logs = [name for name in here if ".truth." not in name and ".trajectory." not in name]
-    name = printable(logs[0]) if logs else "flight.csv"
+    name = quoted(printable(logs[0])) if logs else "flight.csv"
+    page = quoted(f"{Path(printable(logs[0])).stem}.html") if logs else "flight.html"
     made = "" if logs else f"\n  ftproc simulate --scenario zuo2021-outliers -o {name}"
-    tried = [f"ftproc filter {name} --explain", f"ftproc filter {name} --smooth --report {Path(name).stem}.html"]
+    tried = [f"ftproc filter {name} --explain", f"ftproc filter {name} --smooth --report {page}"]
     tried += [] if made else [f"ftproc filter {name} --write-config > station.toml"]
     return f"Name at least one log. Three commands to try:{made}" + "".join(f"\n  {command}" for command in tried)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import click
 
+from ftproc import report
 from ftproc.batch import plan, run
 from ftproc.batch.tasks import Outcome, model_for
 from ftproc.cli import explaining
@@ -24,7 +25,6 @@ from ftproc.files.writing.trajectories import plain
 from ftproc.methods import registry
 from ftproc.methods.registry import EVERY
 from ftproc.quality.summary import line
-from ftproc.report.style import require_plotly
 from ftproc.settings import NO_MODEL, PACKAGED
 
 _ASK_FOR_NOTHING = (("model", PACKAGED), ("model", NO_MODEL))
@@ -85,7 +85,7 @@ def filter_logs(request: Request, recipe: Recipe, debug: bool) -> int:
     if request.scheduler is not None and request.jobs > 1:
         raise UsageError("--jobs is for processes on this machine, --scheduler for a cluster; give one of the two.")
     if request.report is not None:
-        require_plotly()
+        report.check(request.report)
     registry.check_parameters(recipe.settings)
     methods = _applicable(recipe) if recipe.settings.method == EVERY else None
     named = (name for name in (recipe.model, request.config) if isinstance(name, str))

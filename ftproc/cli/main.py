@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 import traceback
+from pathlib import Path
 from typing import Any
 
 import click
@@ -12,7 +13,7 @@ import click
 from ftproc import __version__
 from ftproc.cli import process
 from ftproc.cli.command import CONTEXT, DEBUG, debug_option, write_examples
-from ftproc.errors import failure, interruption, nearest
+from ftproc.errors import failure, interruption, nearest, quoted
 
 COMMANDS = ("simulate", "train", "filter", "score")
 
@@ -45,6 +46,8 @@ class Program(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         name = args[0]
         if name not in COMMANDS and not name.startswith("-") and not ctx.resilient_parsing:
+            if Path(name).is_file():
+                ctx.fail(f'There is no command "{name}". To filter that log: {ctx.command_path} filter {quoted(name)}.')
             ctx.fail(f'There is no command "{name}"{nearest(name, COMMANDS) or "."}')
         return super().resolve_command(ctx, args)
 

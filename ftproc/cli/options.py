@@ -153,10 +153,11 @@ def output(what: str, metavar: str, required: bool = False) -> Callable[[F], F]:
 
 def report(what: str) -> Callable[[F], F]:
     text = (
-        f"Write an HTML page that shows {what}; it opens in any browser, without a network. FILE.html for one, or a "
-        'directory for a page of each and an index.html that lists them. Needs plotly: pip install "plotly>=6.0".'
+        f"Write a page that shows {what}. FILE.html: it opens in any browser, without a network; FILE.pdf: printed by "
+        "Chromium, Chrome or Edge, one of which must be there; a directory: an HTML page of each, and an index.html "
+        'that lists them. Needs plotly: pip install "plotly>=6.0".'
     )
-    return click.option("--report", type=FILE, metavar="FILE.html|DIR", help=text)
+    return click.option("--report", type=FILE, metavar="FILE.html|FILE.pdf|DIR", help=text)
 
 
 def units(text: str) -> Callable[[F], F]:

@@ -59,12 +59,11 @@ def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: 
     from ftproc.errors import InputError
     from ftproc.files.reading import trajectories as trajectory_files
     from ftproc.report.index import Entry, write
-    from ftproc.report.style import require_plotly
     from ftproc.scoring import render, score
     from ftproc.scoring.matching import exchanged_axes
 
     if report is not None:
-        require_plotly()
+        pages.check(report)
     places, index = plan.pages(trajectories, report, truths)
     scores, entries, failed = [], [], False
     known: dict[str, Truth] = {}

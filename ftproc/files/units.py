@@ -30,7 +30,9 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
             "utcsec",
         ),
         *("irigtime", "sampletime", "timetag", "clock", "systime", "itow", "utcsod", "utctod", "utcseconds"),
-        *("timestamputc", "unixtimestamp", "excel", "exceldate", "exceltime", "missiontime", "zeit", "uhrzeit"),
+        *("timestamputc", "unixtimestamp", "excel", "exceldate", "exceltime", "missiontime", "ts", "met"),
+        *("missionelapsedtime", "zeit", "uhrzeit", "temps", "tiempo", "tempo", "czas", "tid", "tijd", "cas", "время"),
+        *("时间", "時間", "時刻", "시간"),
     ),
     "range": (
         "range",
@@ -47,8 +49,25 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
         "entfernung",
         "schragentfernung",
         "schragdistanz",
+        *("distanceoblique", "distanciainclinada", "distanciaobliqua", "дальность", "наклоннаядальность"),
+        *("斜距", "斜距离", "斜距離", "경사거리"),
     ),
-    "azimuth": ("azimuth", "az", "a", "azimuthangle", "azangle", "azim", "azi", "azmth", "bearing", "brg", "azimut"),
+    "azimuth": (
+        *("azimuth", "az", "a", "azimuthangle", "azangle", "azim", "azi", "azmth", "bearing", "brg", "azimut"),
+        *(
+            "acimut",
+            "azymut",
+            "azimute",
+            "gisement",
+            "baring",
+            "peilung",
+            "азимут",
+            "пеленг",
+            "方位角",
+            "方位",
+            "방위각",
+        ),
+    ),
     "elevation": (
         "elevation",
         "el",
@@ -59,19 +78,30 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
         "elevangle",
         "altitudeangle",
         "hohenwinkel",
+        *("elevationswinkel", "elevacion", "elevazione", "elevacao", "elevatie", "elewacja", "elevace", "hojdvinkel"),
+        *("уголместа", "俯仰角", "俯仰", "仰角", "高低角", "高度角", "고각", "앙각"),
     ),
 }
 
 #: Names that other things have too: used where no column has one of ALIASES.
 WEAK_ALIASES: Mapping[str, tuple[str, ...]] = {
     "time": ("date", "gpst", "daytime"),
-    "range": ("dist", "sd", "distance", "slantdistance", "slopedistance", "slopedist", "slant"),
+    "range": (
+        *("dist", "sd", "distance", "slantdistance", "slopedistance", "slopedist", "slant", "distanz", "distancia"),
+        *("distanza", "odległosc", "avstand", "afstand", "距离", "距離", "거리"),
+    ),
     "azimuth": ("theta", "hz", "horizontalangle", "horizontaldirection", "hzangle", "hangle", "ha", "horangle"),
-    "elevation": ("v", "verticalangle", "vertangle", "vangle", "va", "elv", "alt", "altitude"),
+    "elevation": ("v", "verticalangle", "vertangle", "vangle", "va", "elv", "alt", "altitude", "site"),
 }
 
-#: Weak aliases that need an angle's unit, because alone they are a height.
-ANGLES_BY_UNIT = ("alt", "altitude")
+#: Weak aliases that need an angle's unit, because alone they are a height or a place.
+ANGLES_BY_UNIT = ("alt", "altitude", "site")
+
+#: Names of angles of which none says whether it is the azimuth, and from where the other one counts.
+EITHER_ANGLE = ("theta", "phi", "pan", "tilt")
+
+#: Names in German, in which Grad are degrees.
+GERMAN = frozenset(["zeit", "uhrzeit", "entfernung", "schragentfernung", "schragdistanz", "hohenwinkel", "distanz"])
 
 #: Names of zenith angles, which are 90 degrees minus the elevation.
 ZENITH_ALIASES = ("zenith", "zenithangle", "zenithdistance", "zen", "zd", "za", "zendist", "zenang", "zenithdist")
@@ -80,7 +110,21 @@ ZENITH_ALIASES = ("zenith", "zenithangle", "zenithdistance", "zen", "zd", "za", 
 QUALIFIERS = frozenset(
     [
         *("measured", "meas", "raw", "obs", "observed", "target", "tgt", "track", "trk", "radar", "sensor", "tracker"),
-        *("polar", "value", "angle", "reading", "laser", "instrument", "theodolite", "the"),
+        *(
+            "polar",
+            "value",
+            "angle",
+            "reading",
+            "laser",
+            "instrument",
+            "theodolite",
+            "the",
+            "true",
+            "los",
+            "look",
+            "to",
+        ),
+        *("to", "from", "corrected", "station"),
     ]
 )
 
@@ -88,7 +132,22 @@ QUALIFIERS = frozenset(
 NOT_UNITS = frozenset(
     [
         *("rate", "dot", "sigma", "std", "err", "error", "bias", "res", "residual", "flag", "valid", "snr", "rcs"),
-        *("ok", "quality", "id", "status", "type", "gate", "ref", "mps2", "mode", "sd", "var", "variance", "rms"),
+        *(
+            "ok",
+            "quality",
+            "id",
+            "status",
+            "type",
+            "gate",
+            "ref",
+            "mps2",
+            "mode",
+            "sd",
+            "var",
+            "variance",
+            "rms",
+            "outlier",
+        ),
         *("velocity", "speed", "vel", "doppler", "acc", "cmd", "command", "commanded", "offset", "corr", "lag"),
         *("correction", "width", "beamwidth", "max", "min", "ground", "horizontal", "cov", "uncertainty", "idx"),
         *(
@@ -155,15 +214,15 @@ UNITS: Mapping[str, Mapping[str, Unit]] = {
 
 #: Unit -> its other spellings, in small letters without blanks and points.
 _SPELLINGS: Mapping[str, tuple[str, ...]] = {
-    "s": ("sec", "secs", "second", "seconds"),
-    "ms": ("msec", "msecs", "millisec", "millisecond", "milliseconds"),
+    "s": ("sec", "secs", "second", "seconds", "epsec", "с", "сек", "秒"),
+    "ms": ("msec", "msecs", "millisec", "millisecond", "milliseconds", "мс", "毫秒"),
     "us": ("usec", "usecs", "microsec", "microsecond", "microseconds", "μs", "μsec"),
     "ns": ("nsec", "nsecs", "nanosec", "nanosecond", "nanoseconds"),
     "min": ("mins", "minute", "minutes"),
     "h": ("hr", "hrs", "hour", "hours"),
     "d": ("day", "days"),
-    "m": ("meter", "meters", "metre", "metres", "mtr", "mtrs"),
-    "km": ("kms", "kilometer", "kilometers", "kilometre", "kilometres"),
+    "m": ("meter", "meters", "metre", "metres", "mtr", "mtrs", "м", "米"),
+    "km": ("kms", "kilometer", "kilometers", "kilometre", "kilometres", "км", "公里", "千米"),
     "ft": ("feet", "foot"),
     "kft": ("kilofeet", "kfeet"),
     "nmi": ("nauticalmile", "nauticalmiles", "nautmile", "nautmiles", "nautmi", "nautical"),
@@ -172,8 +231,8 @@ _SPELLINGS: Mapping[str, tuple[str, ...]] = {
     "kyd": ("kyds", "kyard", "kyards", "kiloyard", "kiloyards"),
     "cm": ("centimeter", "centimeters", "centimetre", "centimetres"),
     "mm": ("millimeter", "millimeters", "millimetre", "millimetres"),
-    "rad": ("rads", "radian", "radians"),
-    "deg": ("degs", "degree", "degrees", "°", "dd", "decimaldegrees", "decdeg"),
+    "rad": ("rads", "radian", "radians", "рад", "弧度"),
+    "deg": ("degs", "degree", "degrees", "°", "dd", "decimaldegrees", "decdeg", "град", "度"),
     "mrad": ("mrads", "milliradian", "milliradians"),
     "mil": ("mils", "mil6400", "mils6400", "6400mil", "6400mils", "natomil", "natomils"),
     "mil6300": ("mils6300", "6300mil", "6300mils", "streck"),

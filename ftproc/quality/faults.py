@@ -99,7 +99,12 @@ def allowed_for(s: Mapping[str, Any]) -> Iterator[str]:
 def step_in_words(step: Mapping[str, Any]) -> str:
     """A step of a summary, such as: azimuth steps by -4.1 mrad at 60.1 s."""
     what = "the clock jumps" if step["component"] == "clock" else f"{step['component']} steps"
-    return f"{what} by {_size(step, 'size')} at {step['time_s']:.6g} s"
+    return f"{what} by {size_in_words(step)} at {step['time_s']:.6g} s"
+
+
+def size_in_words(step: Mapping[str, Any]) -> str:
+    """Its size, such as -4.1 mrad."""
+    return _size(step, "size")
 
 
 def _size(fault: Mapping[str, Any], what: str) -> str:

@@ -1,7 +1,7 @@
-"""The report: one HTML page with the verdict, the summary and the figures of a trajectory.
+"""The report: one page, HTML or PDF, with the verdict, the summary and the figures of a trajectory.
 
     from ftproc import report
-    report.write(trajectory, "flight.html")     # one self-contained page
+    report.write(trajectory, "flight.html")     # one self-contained page; flight.pdf: printed on A4
     report.plot(trajectory, "residuals")        # one of its figures
 
 plotly draws the figures; it is an extra (`report`), loaded when first used. Calls `quality`, `scoring` and `files`.
@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ftproc.errors import UsageError, encodable
-from ftproc.files.writing import atomic
+from ftproc.errors import UsageError
+from ftproc.report.browser import printing
 from ftproc.report.style import require_plotly
 
 if TYPE_CHECKING:
@@ -23,17 +23,23 @@ if TYPE_CHECKING:
 
 
 def write(trajectory: Trajectory, target: Target, truth: Truth | None = None) -> None:
-    """Write the page of a trajectory, whole or not at all; with a truth also its errors.
+    """Write the page of a trajectory, whole or not at all; with a truth also its errors. A name in .pdf: printed.
 
-    A trajectory read from a file has no raw readings. The same trajectory gives the same bytes. Raises OutputError;
-    UsageError when plotly is not installed.
+    A trajectory read from a file has no raw readings. The same trajectory gives the same bytes of HTML. Raises
+    OutputError; UsageError when plotly, or a browser for a PDF, is not installed.
     """
-    require_plotly()
+    check(target)
     from ftproc.report.page import page
 
-    text = page(trajectory, truth)
-    with atomic.replacing(target) as stream:
-        stream.write(encodable(text).encode())
+    printing.write(page(trajectory, truth), target)
+
+
+def check(target: Target) -> None:
+    """Raise UsageError, before any work is done, when what the report needs is not installed: plotly, and for a PDF a
+    browser."""
+    require_plotly()
+    if printing.is_pdf(target):
+        printing.require_browser(target)
 
 
 def plot(trajectory: Trajectory, what: str = "track") -> go.Figure:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ftproc.records import FloatArray, IntArray
 from ftproc.report import style
+from ftproc.report.patches import Step
 from ftproc.report.style import require_plotly
 from ftproc.report.thinning import Timeline
 
@@ -19,6 +20,7 @@ EDGE = 0.01  # of the duration, free before and after it
 FEW = 30  # samples, up to which a line has dots
 MANY_MARKS = 3000  # from which WebGL draws them
 CROWDED, SMALLER = (300, 3000), 0.7  # numbers of marks from which they shrink, each time by this factor
+LABEL_PX, LABELS_BELOW = 14, 3  # of height, and labels of steps that are put below each other
 DASHES = ("solid", "dash", "dot")  # of x, y, z, which differ in print too
 
 
@@ -98,6 +100,18 @@ def marks(
         x=time_s[chosen], y=inside, name=kind.name, mode="markers", marker={**kind.marker, "size": size}, **beyond,
         hovertemplate=f"%{{x:.6~f}} s<br>{shown}<extra>{kind.name}</extra>",
     )  # fmt: skip
+
+
+def step_lines(figure: go.Figure, steps: Sequence[Step], row: int, column: int = 0, labelled: bool = True) -> None:
+    """Upright lines where steps were bridged, through the plot in a row (from 0); with what happened beside them."""
+    for number, step in enumerate(steps):
+        label = {"text": step.words, "font": {"size": 11, "color": style.PURPLE}, "bgcolor": "rgba(255,255,255,0.8)"}
+        after = step.time_s < np.mean(figure.layout.xaxis.range)  # on the side with more room
+        figure.add_vline(
+            step.time_s, row=row + 1, col=column + 1, line={"color": style.PURPLE, "width": 1.2, "dash": "dashdot"},
+            **({"annotation": label, "annotation_position": f"top {'right' if after else 'left'}",
+                "annotation_yshift": -LABEL_PX * (number % LABELS_BELOW)} if labelled else {}),
+        )  # fmt: skip
 
 
 def span(*values: FloatArray, margin: float) -> tuple[float, float]:

@@ -28,7 +28,7 @@ from ftproc.report.view import View, view
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-_HERE = Path(__file__).parent
+_BROWSER = Path(__file__).parent / "browser"
 
 #: The nested functions around plotly's script, for module loaders; for each a browser would parse all 5 MB again.
 _WRAPPER = re.compile(
@@ -123,7 +123,7 @@ def _sha256(script: str) -> str:
 
 @cache
 def _text(file: str) -> str:
-    return (_HERE / file).read_text(encoding="utf-8")
+    return (_BROWSER / file).read_text(encoding="utf-8")
 
 
 class _Library(NamedTuple):

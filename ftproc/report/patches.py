@@ -1,4 +1,4 @@
-"""The outlier patches of a trajectory, and the seconds with most outliers."""
+"""The outlier patches of a trajectory, the steps that were bridged, and the seconds with most outliers."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ftproc.quality import faults
 from ftproc.records import COMPONENTS, ISOLATED, MISSING, PATCH
 from ftproc.report.style import RESIDUAL_UNIT
 from ftproc.report.view import View
@@ -23,6 +24,26 @@ class Patch(NamedTuple):
     readings: int
     size: float
     unit: str
+
+
+class Step(NamedTuple):
+    """A step that stays, which the estimate bridges. component: one of COMPONENTS, or `clock`. size: with its unit.
+    words: what happened, with size and time."""
+
+    component: str
+    time_s: float
+    size: str
+    words: str
+
+
+def steps(view: View) -> list[Step]:
+    """The steps within the times of the view, by their time."""
+    times = view.trajectory.time_s
+    found = [
+        Step(step["component"], step["time_s"], faults.size_in_words(step), faults.step_in_words(step))
+        for step in view.summary.get("steps", ())
+    ]
+    return sorted((step for step in found if times[0] <= step.time_s <= times[-1]), key=lambda step: step.time_s)
 
 
 def patches(view: View) -> list[Patch]:

@@ -10,7 +10,7 @@ import numpy as np
 from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, FloatArray, IntArray
 from ftproc.report import drawing, style
 from ftproc.report.drawing import Drawn
-from ftproc.report.patches import worst
+from ftproc.report.patches import steps, worst
 from ftproc.report.thinning import MOST_MARKED
 from ftproc.report.view import View
 
@@ -19,6 +19,8 @@ ROOM = 0.35  # share of the trajectory's extent, above and below it, where outli
 FOOT = 0.08  # share of the height, below the lowest outlier, where missing readings are marked
 LARGEST = 3.0  # gates; larger residuals are drawn there
 LARGEST_SIGMAS = 12.0  # the same where the gate is not known
+
+CLOCK = "clock"  # a step of it
 
 NO_RESIDUALS = "This method publishes no residuals with sigmas."
 NOT_KNOWN = "A trajectory file does not hold the raw readings; the page of `ftproc filter --report` shows them."
@@ -50,6 +52,7 @@ def readings(view: View) -> Drawn:
             traces.append(drawing.marks(timeline.time_s, value, chosen[flag, c], kind, within, total))
         traces.append(drawing.line(timeline, view.cleaned[:, c], "estimate", style.ESTIMATE))
         _add(figure, traces, row, named)
+        _add_steps(figure, view, row, c)
     where = "An outlier beyond the axis is drawn at its edge; point at it for its value."
     if view.reading is None:
         where = f"{NOT_KNOWN} Outliers are marked at the estimate."
@@ -91,9 +94,12 @@ def residuals(view: View) -> Drawn:
         if gate is not None:
             traces += [drawing.level(timeline, sign * gate, f"gate of {gate:g} sigmas") for sign in (-1, 1)]
         _add(figure, traces, row, named)
+        _add_steps(figure, view, row, c)
     note = "Decisions also rest on neighbouring readings: some inside the gate are outliers, some outside are not."
     if view.trajectory.metadata.get("settings", {}).get("editing") == "none":
         note = "No reading was edited: the gate was not used."
+    if steps(view):
+        note += " A step is taken out of the readings on its shorter side."
     return Drawn(figure, f"{_WHAT[known.residual_kind]}. {note}")
 
 
@@ -107,6 +113,12 @@ def _add(figure: Any, traces: Iterable[Any], row: int, named: set[str]) -> None:
         if len(trace.x):
             drawing.add(figure, trace, row, first=trace.name not in named)
             named.add(trace.name)
+
+
+def _add_steps(figure: Any, view: View, row: int, c: int) -> None:
+    """Lines at the steps of a component, and of the clock, which moves all of them."""
+    own = [step for step in steps(view) if step.component in (COMPONENTS[c], CLOCK)]
+    drawing.step_lines(figure, own, row)
 
 
 def _marked_at(view: View, raw: FloatArray, c: int, flag: int, foot: float) -> FloatArray:

@@ -7,15 +7,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
+import numpy as np
+
 from ftproc.quality import summary as figures
 from ftproc.quality import verdict
 from ftproc.records import COMPONENTS, Trajectory
 from ftproc.report.patches import patches as found_patches
+from ftproc.report.patches import steps as found_steps
 from ftproc.report.style import GREY, VERDICT
 from ftproc.report.view import View
 from ftproc.scoring import render
 
 MOST_PATCHES = 200  # that are listed
+AROUND_STEP = 0.02  # of the duration, on each side of a step to which figures are zoomed
 _LONGEST_LIST = 6  # values; a longer list is shown by its extremes
 
 
@@ -68,21 +72,36 @@ def summary(view: View) -> str:
 
 
 def patches(view: View) -> str:
-    """The outlier patches, each a button that zooms all figures over time to it."""
-    found = found_patches(view)
-    if not found:
+    """The steps that stay and the outlier patches, each a button that zooms all figures over time to it."""
+    found, steps = found_patches(view), found_steps(view)
+    if not (found or steps):
         return ""
+    around = AROUND_STEP * float(np.ptp(view.trajectory.time_s))
     rows = [
-        (f'<button data-from="{p.start_s!r}" data-to="{p.end_s!r}">{p.start_s:,.2f}</button>', f"{p.end_s:,.2f}",
-         p.component, f"{p.readings:,}", "-" if p.size != p.size else f"{p.size:+,.3g} {p.unit}")
+        (_zoom(s.time_s, s.time_s - around, s.time_s + around), "stays", f"{s.component}, a step", "-", s.size)
+        for s in steps
+    ]  # fmt: skip
+    rows += [
+        (_zoom(p.start_s, p.start_s, p.end_s), f"{p.end_s:,.2f}", p.component, f"{p.readings:,}",
+         "-" if p.size != p.size else f"{p.size:+,.3g} {p.unit}")
         for p in sorted(found, key=lambda p: -p.readings)[:MOST_PATCHES]
     ]  # fmt: skip
-    note = "A click on a start zooms all figures over time to the patch. Size: median of reading minus estimate."
+    note = "Size: median of reading minus estimate." if found else ""
     if len(found) > MOST_PATCHES:
         note = f"The {MOST_PATCHES} longest of {len(found):,}. {note}"
+    if steps:
+        note = f"A step stays: the estimate bridges it, and follows the longer side. {note}".strip()
+    click = "A click on a start zooms all figures over time to it."
+    title = " and ".join(["Steps"] * bool(steps) + ["Outlier patches"] * bool(found)).replace("and O", "and o")
     body = table(("start, s", "end, s", "component", "readings", "size"), rows, "numbers patches", links=1)
     whole = '<button data-from="" data-to="">Show the whole log.</button>'
-    return f'<section><h2>Outlier patches</h2>{body}<p class="note">{note} {whole}</p></section>'
+    links = f'<span class="click">{click} {whole}</span>'
+    return f'<section><h2>{title}</h2>{body}<p class="note">{note} {links}</p></section>'
+
+
+def _zoom(shown_s: float, start_s: float, end_s: float) -> str:
+    """A time as a button that zooms to a stretch."""
+    return f'<button data-from="{start_s!r}" data-to="{end_s!r}">{shown_s:,.2f}</button>'
 
 
 def score(view: View) -> str:

@@ -10,6 +10,7 @@ from ftproc.quality import consistency
 from ftproc.records import FloatArray
 from ftproc.report import drawing, style
 from ftproc.report.drawing import DASHES, Drawn
+from ftproc.report.patches import steps
 from ftproc.report.style import require_plotly
 from ftproc.report.view import View, load_factor, speed
 
@@ -47,6 +48,7 @@ def nis(view: View) -> Drawn:
     if not view.timeline.thinned:
         top = max(top, float(np.nanquantile(value, 0.995)))
     figure.update_yaxes(range=[0, top])
+    _add_steps(figure, view)
     note = (
         "Above the bounds the sigmas are too small, below too large. 99 of 100 means of a consistent filter lie "
         "between them; they are at least 20 % of a sigma wide."
@@ -62,6 +64,7 @@ def sigmas(view: View) -> Drawn:
     figure = drawing.rows(view.timeline, ["σ position, m", "σ velocity, m/s"], 440)
     _triples(figure, view, sigma)
     figure.update_yaxes(type="log", tickvals=TICKS, ticktext=[f"{tick:g}" for tick in TICKS])
+    _add_steps(figure, view, 2)
     return Drawn(figure, "1 sigma of the estimate, along the axes.")
 
 
@@ -80,6 +83,7 @@ def motion(view: View) -> Drawn:
     for row, (title, value) in enumerate(known):
         drawing.add(figure, drawing.line(view.timeline, value, title.split(",")[0], style.BLUE), row)
     figure.update_layout(showlegend=False, margin_t=14)
+    _add_steps(figure, view, len(known))
     note = "Height over the station."
     if len(known) == len(parts):
         note += " Load factor: specific force across the direction of flight, z being the vertical."
@@ -95,6 +99,7 @@ def correction(view: View) -> Drawn:
         return Drawn(None, "No network correction: this is the plain filter or smoother.")
     figure = drawing.rows(view.timeline, ["position, m", "velocity, m/s"], 440)
     _triples(figure, view, added)
+    _add_steps(figure, view, 2)
     return Drawn(figure, "The estimate minus the correction is the plain filter.")
 
 
@@ -118,7 +123,15 @@ def errors(view: View) -> Drawn:
             for sign in (-1, 1):
                 limit = drawing.line(view.timeline, sign * bound[:, k], f"{WITHIN} sigmas", style.BLACK, "dash", 1)
                 drawing.add(figure, limit, axis, column, first and sign < 0)
+    _add_steps(figure, view, 3, columns)
     return Drawn(figure, "")
+
+
+def _add_steps(figure: go.Figure, view: View, rows: int = 1, columns: int = 1) -> None:
+    """Lines at the steps through all plots, with labels in the uppermost."""
+    for row in range(rows):
+        for column in range(columns):
+            drawing.step_lines(figure, steps(view), row, column, labelled=not row)
 
 
 def _triples(figure: go.Figure, view: View, value: FloatArray) -> None:

@@ -81,7 +81,7 @@ def ground(view: View) -> Drawn:
         _spot(figure, 0.0, 0.0, "station", "triangle-up-open")
     axes = "xy"
     figure.update_layout(**style.LAYOUT, height=HEIGHT)
-    figure.update_xaxes(**style.axis(title={"text": names[axes[across]], "standoff": 8}, nticks=6, tickangle=0))
+    figure.update_xaxes(**style.axis(title={"text": names[axes[across]], "standoff": 8}, nticks=4, tickangle=0))
     figure.update_yaxes(
         **style.axis(title={"text": names[axes[up]], "standoff": 8}, nticks=8, scaleanchor="x", scaleratio=1)
     )  # fmt: skip

@@ -51,7 +51,7 @@ def _at(path: Path, time_s: FloatArray, measurement: FloatArray) -> tuple[FloatA
     times, first = np.unique(table[:, 0], return_index=True)
     path_of = make_interp_spline(times, table[first, 1:], k=3)
     after = np.clip(np.searchsorted(times, time_s), 1, len(times) - 1)
-    known = (times[after] - times[after - 1] <= max(LONGEST_HOLE_S, 2 * float(np.median(np.diff(times)))))
+    known = times[after] - times[after - 1] <= max(LONGEST_HOLE_S, 2 * float(np.median(np.diff(times))))
     known &= (time_s >= times[0]) & (time_s <= times[-1]) & np.isfinite(measurement).all(1)
 
     def off(late_s: float) -> FloatArray:

@@ -245,3 +245,19 @@ def test_the_pages_name_only_options_that_there_are():
     for page in (*PAGES, *(ROOT / "sample_data").glob("*.toml")):
         named = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", page.read_text()))
         assert named - known - {"--help"} == set(), page
+
+
+def test_a_log_in_place_of_a_command_gets_the_command(run, here):
+    (here / "my log.csv").write_text("t,R\n0,1\n")
+    result = run("my log.csv")
+    assert result.code == 2
+    assert result.err == (
+        "ftproc: There is no command \"my log.csv\". To filter that log: ftproc filter 'my log.csv'. See ftproc -h.\n"
+    )
+    assert "ftproc filter 'my log.csv' --smooth --report 'my log.html'" in run("filter").err
+
+
+def test_a_range_file_and_a_log_of_the_wrong_command_get_the_right_one(run, flight):
+    (flight.parent / "range.toml").write_text("[station.radar]\nlog = 'radar.csv'\n")
+    assert run("filter", "range.toml").err.endswith("of several stations: ftproc filter --fuse range.toml.\n")
+    assert run("score", flight).err == f"ftproc: {flight}: this is a log, no trajectory: ftproc filter {flight}.\n"

@@ -87,6 +87,7 @@ def test_score_of_several(run, clean, flight):
     [
         (["a.csv"], "r.html", (["r.html"], None)),
         (["a.csv"], "R.HTM", (["R.HTM"], None)),
+        (["a.csv"], "r.pdf", (["r.pdf"], None)),
         (["d/a.trajectory.csv.gz", "d/b.parquet"], "r", (["r/a.report.html", "r/b.report.html"], "r/index.html")),
         (
             ["d/a.ukf.trajectory.csv", "d/a.ekf.trajectory.csv"],
@@ -104,9 +105,9 @@ def test_places(here, names, given, expected):
 @pytest.mark.parametrize(
     ("names", "given", "kind", "sentence"),
     [
-        (["a.csv"], "r.pdf", UsageError, "--report r.pdf: end the name in .html, or in / if it is a directory."),
+        (["a.csv"], "r.ps", UsageError, "--report r.ps: end the name in .html or .pdf, or in / if it is a directory."),
         (["a.csv"], "-", UsageError, "--report -: end the name in .html"),
-        (["a.csv", "b.csv"], "r.html", UsageError, "there are several reports to write; name a directory."),
+        (["a.csv", "b.csv"], "r.pdf", UsageError, "there are several reports to write; name a directory."),
         (["x/a.csv", "y/a.csv"], "r/", UsageError, "r/a.report.html would be the page of two trajectories"),
         (["a.csv"], "none/r.html", OutputError, "there is no directory none; create it first"),
         (["a.csv"], "log.html", OutputError, "log.html: this is the input log.html, which is never overwritten. Give "

@@ -146,3 +146,20 @@ def test_clocks_that_are_all_alike(run, folder, sigma, sentence):
         biases = pd.read_csv("best.biases.csv").query("parameter == 'clock_s'")
         assert "common clock" in result.out
         assert biases.sigma.min() > 0.6 * 0.08 / len(biases) ** 0.5  # what they share is as vague as before
+
+
+def test_the_report_is_a_page_or_a_pdf_and_is_refused_before_the_work(run, folder, monkeypatch):
+    monkeypatch.setenv("PATH", str(folder / "empty"))
+    for name, why in (
+        ("best.ps", "--report best.ps: end the name in .html or .pdf, or in / if it is a directory."),
+        ("best.pdf", "best.pdf: a PDF is printed by Chromium, Google Chrome or Microsoft Edge"),
+    ):
+        result = run("filter", "--fuse", "range.toml", "-o", "best.parquet", "--report", name)
+        assert (result.code, result.out) == (2, "")
+        assert why in result.err
+    (folder / "radar.html").write_text((folder / "radar.csv").read_text())
+    text = (folder / "range.toml").read_text().replace('"radar.csv"', '"radar.html"')
+    (folder / "range.toml").write_text(text)
+    result = run("filter", "--fuse", "range.toml", "-o", "best.parquet", "--report", "radar.html")
+    assert "which is never overwritten" in result.err
+    assert not (folder / "best.parquet").exists()

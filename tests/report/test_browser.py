@@ -10,6 +10,7 @@ import pytest
 
 from ftproc import report
 from ftproc.records import ISOLATED
+from ftproc.report.browser import printing
 from ftproc.report.page import _text
 from tests.report.browser import NEEDED, Opened, browser
 from tests.report.flights import filtered, flight, hostile
@@ -182,6 +183,30 @@ def test_the_link_of_a_patch_zooms_all_figures_over_time(usual):
     page.wait_for_function(f"() => ({ranges})().every(r => r[0] < {start} && r[1] > {end} && r[1] - r[0] < 20)")
     page.locator("button[data-from='']").click()
     page.wait_for_function(f"() => JSON.stringify(({ranges})()) === JSON.stringify({whole})")
+
+
+def test_a_page_for_paper_is_drawn_for_it_at_once(context, tmp_path):
+    """In the widths of A4 before anyone prints; the track in space as a picture."""
+    report.write(filtered(), tmp_path / "window.html", flight().truth)
+    (tmp_path / "page.html").write_bytes(printing.on_paper((tmp_path / "window.html").read_bytes()))
+    opened = Opened(context, tmp_path / "page.html")
+    assert opened.complaints == []
+    sizes = opened.page.evaluate(
+        "() => Object.fromEntries(Array.from(document.querySelectorAll('figure')).map(f => [f.id, f._fullLayout ?"
+        " [f._fullLayout.width, f._fullLayout.height] : [f.querySelector('img').naturalWidth, 0]]))"
+    )
+    assert sizes.pop("track")[0] > 1000
+    assert {name: width for name, (width, _) in sizes.items()} == {
+        **dict.fromkeys(("errors", "readings", "worst", "residuals", "nis", "sigmas", "motion"), 680), "ground": 340,
+    }  # fmt: skip
+    assert all(100 < height <= 900 for _, height in sizes.values())
+    before = opened.page.evaluate("() => document.getElementById('readings')._fullLayout.height")
+    opened.page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert opened.page.evaluate("() => document.getElementById('readings')._fullLayout.height") == before
+    opened.page.emulate_media(media="print")
+    seen = "() => Array.from(document.querySelectorAll('.modebar, .click')).filter(e => e.offsetParent).length"
+    assert opened.page.evaluate(seen) == 0
+    opened.page.close()
 
 
 @pytest.mark.parametrize("medium", ["wide", "telephone", "print"])

@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from ftproc.batch import plan
 from ftproc.cli.command import stated
 from ftproc.cli.progress import Progress
 from ftproc.correction import model_file
@@ -59,7 +60,8 @@ def fuse_logs(ctx: click.Context, debug: bool) -> int:
     output = given.get("output") or f"{Path(given['fuse']).stem}.trajectory.parquet"
     if Path(output).is_dir() or output.endswith("/"):
         output = str(Path(output) / f"{Path(given['fuse']).stem}.trajectory.parquet")
-    _check(range_, output, settings, given)
+    _check(range_, output, settings)
+    given["report"] = _page(range_, output, given.get("report"))
     began = time.monotonic()
     try:
         with Progress() as progress:
@@ -97,7 +99,7 @@ def _refuse_idle(ctx: click.Context, given: Mapping[str, Any]) -> None:
             )
 
 
-def _check(range_: Range, output: str, settings: FilterSettings, given: Mapping[str, Any]) -> None:
+def _check(range_: Range, output: str, settings: FilterSettings) -> None:
     """Raise UsageError or OutputError for outputs that cannot be."""
     inputs = [range_.path, *(each.log for each in range_.instruments)]
     if output != "-":
@@ -108,11 +110,17 @@ def _check(range_: Range, output: str, settings: FilterSettings, given: Mapping[
     maps.check(output, range_.origin)
     if settings.ecef and range_.origin is None:
         raise UsageError("--ecef needs the origin on the earth: write lat_deg, lon_deg and height_m in [origin].")
-    if given.get("report") is not None:
-        from ftproc.report.style import require_plotly
 
-        require_plotly()
-        atomic.refuse_overwriting(given["report"], [*inputs, output], "--report")
+
+def _page(range_: Range, output: str, report: str | None) -> str | None:
+    """The file of the page, if there is one; makes the directory. Raises UsageError or OutputError."""
+    if report is None:
+        return None
+    from ftproc import report as pages
+
+    pages.check(report)
+    (page,), _ = plan.pages([output], report, [range_.path, *(each.log for each in range_.instruments)])
+    return page
 
 
 def _write(found: flight.Flight, output: str, given: Mapping[str, Any], range_: Range) -> list[str]:
@@ -133,7 +141,7 @@ def _write(found: flight.Flight, output: str, given: Mapping[str, Any], range_: 
         _make(folder)
         calibration.write(range_, found.constants, folder)
         places.append(f"{folder}/")
-    if given.get("report") is not None:
+    if given["report"] is not None:
         from ftproc.report.fused import write
 
         write(found, given["report"])

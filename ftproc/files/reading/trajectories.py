@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ftproc.errors import InputError
+from ftproc.errors import InputError, quoted
 from ftproc.files import layout, remote
 from ftproc.files.layout import POSITION, Target
 from ftproc.files.reading import columns
@@ -26,6 +26,8 @@ def read(source: tables.Source) -> Trajectory:
     Raises InputError for a missing column or time, a cell that is no finite number, or an unreadable file.
     """
     header = tables.read_header(source)
+    if set(layout.MEASUREMENT) & set(header.names) and not set(POSITION) & set(header.names):
+        raise InputError(f"{header.source}: this is a log, no trajectory: ftproc filter {quoted(header.source)}.")
     known = [name for name in layout.TRAJECTORY if name in header.names or name in ("time_s", *POSITION)]
     others = [name for name in header.names if name not in layout.TRAJECTORY]
     found, extra = columns.load(header, known, others)

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ftproc.errors import encodable
-from ftproc.files.writing import atomic
+from ftproc.report import check
 from ftproc.report import write as write_single
-from ftproc.report.style import require_plotly
+from ftproc.report.browser import printing
 
 if TYPE_CHECKING:
     from ftproc.files.layout import Target
@@ -18,13 +17,11 @@ if TYPE_CHECKING:
 
 
 def write(flight: Flight, target: Target) -> None:
-    """Write the page of a fused flight, whole or not at all. Raises OutputError; UsageError without plotly."""
-    require_plotly()
+    """Write the page of a fused flight, whole or not at all; as `report.write` does."""
+    check(target)
     if flight.fused is None:
         write_single(flight.trajectory, target)
         return
     from ftproc.report.fused.page import page
 
-    text = page(flight)
-    with atomic.replacing(target) as stream:
-        stream.write(encodable(text).encode())
+    printing.write(page(flight), target)

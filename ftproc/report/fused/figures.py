@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 PALETTE = (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.SKY, style.VERMILLION)
 SIGHTS = 12  # lines of sight that are drawn of each station
-ROW_PX, BAR_PX = 130, 34
+ROW_PX, BAR_PX, BIAS_PX = 130, 34, 26  # of height
 LIMIT = 8.0  # sigmas, at which farther residuals are drawn
 PIECES = 400  # of the flight, each of which a station has or has not carried
 
@@ -50,11 +50,11 @@ def station_map(flight: Flight, fused: Fused) -> Drawn:
     for s, station in enumerate(fused.stations):
         figure.add_scatter(
             x=[station.place[0]], y=[station.place[1]], mode="markers+text", name=station.name, text=[station.name],
-            textposition="bottom center", showlegend=False,
+            textposition="bottom center", showlegend=False, cliponaxis=False,
             marker={"color": colour(s), "symbol": "triangle-up", "size": 11},
         )  # fmt: skip
     figure.update_layout(**style.LAYOUT, height=HEIGHT)
-    figure.update_xaxes(**style.axis(title={"text": "x (east), m", "standoff": 8}, nticks=6, tickangle=0))
+    figure.update_xaxes(**style.axis(title={"text": "x (east), m", "standoff": 8}, nticks=4, tickangle=0))
     figure.update_yaxes(
         **style.axis(title={"text": "y (north), m", "standoff": 8}, nticks=8, scaleanchor="x", scaleratio=1)
     )
@@ -125,10 +125,10 @@ def biases(flight: Flight, fused: Fused) -> Drawn:
         error_x={"type": "data", "array": sigma, "color": style.BLUE}, marker={"color": style.BLUE, "size": 6},
     )  # fmt: skip
     figure.update_layout(
-        **{**style.LAYOUT, "margin": {"l": 210, "r": 44, "t": 36, "b": 46}}, height=90 + 22 * len(names)
+        **{**style.LAYOUT, "margin": {"l": 210, "r": 44, "t": 36, "b": 46}}, height=90 + BIAS_PX * len(names)
     )
     figure.update_xaxes(**style.axis(title={"text": "in 1-sigmas of before", "standoff": 8}))
-    figure.update_yaxes(**style.axis())
+    figure.update_yaxes(**style.axis(tickmode="linear", dtick=1))
     return Drawn(figure, "Reading minus truth; azimuths anticlockwise from east, clocks log minus true time.")
 
 
@@ -159,7 +159,7 @@ def carried(flight: Flight, fused: Fused) -> Drawn:
             zmin=0,
             zmax=1,
             colorscale=[[0, style.VERMILLION], [1, style.BLUE]],
-            colorbar={"title": {"text": "used"}, "len": 0.9},
+            colorbar={"title": {"text": "used"}, "len": 1, "tickvals": [0, 1], "tickformat": ".0%"},
             hovertemplate="%{x:.6~f} s<br>%{y}: %{z:.0%} used<extra></extra>",
         )
     )

@@ -50,7 +50,7 @@ def test_a_bad_cell_far_down_a_long_file(make: Make) -> None:
             "t;R\n0;999,5\n1;1.000\n",
             'row 1 (the first data row is 0), column "R": "1.000" is not a number with a decimal comma',
         ),
-        ("t;R\n0;1.000,5\n", '"1.000,5" is not a number'),
+        ("t;R\n0;1.00,5\n", '"1.00,5" is not a number'),
         ("t,R\n12:34:56.5,1\n12:34:61,1\n", '"12:34:61" is not a possible time of day like the first one, 12:34:56.5'),
         ("t,R\n0,12:34:56\n", '"12:34:56" is not a number'),
         (

@@ -204,3 +204,28 @@ def test_what_a_user_should_know_of_the_columns() -> None:
         "no column is taken for range and elevation; not used: x, y",
     )
     assert remarks(["time_s", "range_m"], resolve("log.csv", ["time_s", "range_m"], {}, {}), False) == ()
+
+
+@pytest.mark.parametrize(
+    ("names", "answer"),
+    [
+        (
+            ["time_s", "range_m", "elevation_rad", "drive azimuth_rad"],
+            "--columns azimuth='drive azimuth_rad', or --",
+        ),
+        (["time_s", "range_m", "azimuth_rad", "phi"], "--columns elevation=phi, or --columns elevation=none"),
+        (["time_s", "rho", "theta", "phi"], "--columns azimuth=theta,elevation=phi or --columns azimuth=phi,elev"),
+        (["time_s", "azimuth_rad", "elevation_rad", "range fine_m"], "--columns range='range fine_m', or --columns"),
+    ],
+)
+def test_a_component_is_not_left_out_without_a_word(names: list[str], answer: str) -> None:
+    with pytest.raises(InputError) as question:
+        resolve("a.csv", names, {}, {})
+    assert answer in str(question.value)
+
+
+@pytest.mark.parametrize("other", ["azimuth_rate_dps", "azimuth_sigma_rad", "azimuth offset (deg)", "heading"])
+def test_what_is_of_another_kind_is_no_component(other: str) -> None:
+    assert set(resolve("a.csv", ["time_s", "range_m", "elevation_rad", other], {}, {})) == {
+        "time", "range", "elevation",
+    }  # fmt: skip

@@ -18,7 +18,7 @@ from ftproc.records import FloatArray, IntArray
 if TYPE_CHECKING:
     import pyarrow as pa
 
-_CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2}(?:[.,]\d*)?)(?:\s*(?P<half>[AaPp])\.?[Mm]\.?)?"
+_CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2}(?:[.,]\d*|:\d{3})?)(?:\s*(?P<half>[AaPp])\.?[Mm]\.?)?"
 _ZONE = r"\s*(?P<zone>Z|z|UTC|UT|GMT|[+-]\d{2}(?::?\d{2})?)?"
 _YEAR_FIRST = r"(?P<year>\d{4})[-/.](?P<month>\d{1,2})[-/.](?P<day>\d{1,2})"
 _COMPACT = r"(?P<year>(?:19|20)\d{2})(?P<month>\d{2})(?P<day>\d{2})"
@@ -42,7 +42,9 @@ _DATES = {
 STAMPS: Mapping[str, str] = {
     **{f"{name} and time of day": f"{date}{_BETWEEN}{_CLOCK}{_ZONE}" for name, date in _DATES.items()},
     "day of year and time of day": rf"(?P<doy>\d{{1,3}})[-:/.T ]+{_CLOCK}{_ZONE}",
-    "time of day": f"[T]?{_CLOCK}{_ZONE}",
+    "time of day": f"T?{_CLOCK}{_ZONE}",
+    "duration": rf"(?:T?[+]|[+]?0 days )(?:0 days )?{_CLOCK}",
+    "hours, minutes and seconds": r"(?P<hour>\d{1,2})h\s*(?P<minute>\d{1,2})m\s*(?P<second>\d{1,2}(?:[.,]\d*)?)s?",
     "compact time of day": r"(?P<hour>\d{2})(?P<minute>\d{2})(?P<second>\d{2}(?:\.\d*)?)(?P<zone>Z|z)",
 }
 DATES: Mapping[str, str] = {**_DATES, "day of year": r"(?P<doy>\d{1,3})"}
@@ -208,7 +210,7 @@ def _field(fields: pa.ChunkedArray, name: str) -> FloatArray | None:
 
     if name not in [field.name for field in fields.type]:
         return None
-    cells = pc.replace_substring(pc.struct_field(fields, name), ",", ".")
+    cells = pc.replace_substring_regex(pc.struct_field(fields, name), "[,:]", ".")
     cells = pc.if_else(pc.equal(cells, ""), None, cells)
     return arrow.to_numpy(cells.cast(pa.float64()))
 

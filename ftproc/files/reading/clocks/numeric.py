@@ -10,6 +10,7 @@ from ftproc.files.reading.clocks.clock import DAY_S, WEEK_S, Clock, unrolled
 from ftproc.files.reading.meaning.schema import Column
 from ftproc.records import FloatArray
 
+BARE = "numbers in s"  # as is assumed
 UNIX_EPOCH = "1970-01-01T00:00:00Z"
 #: Day counts: stems of names -> (day of 1970-01-01, words).
 _DAY_COUNTS = {
@@ -57,7 +58,7 @@ def read(values: FloatArray, column: Column) -> Clock:
     period = {"day": DAY_S, "week": WEEK_S, "gps": WEEK_S}.get(kind)
     if kind in ("day", "week") and period and 2 * period < most <= 1e3 * period:
         return _in_seconds(values / 1e3, kind, column, "numbers in ms, by their size")
-    return _in_seconds(values, kind, column, "numbers in s")
+    return _in_seconds(values, kind, column, BARE)
 
 
 def _typical(known: FloatArray) -> float:

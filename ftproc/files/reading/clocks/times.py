@@ -10,10 +10,12 @@ import numpy as np
 
 from ftproc.errors import InputError
 from ftproc.files import arrow, leap_seconds
+from ftproc.files.layout import CANONICAL
 from ftproc.files.reading.clocks import notations, numeric
 from ftproc.files.reading.clocks.clock import DAY_S, Clock, unrolled
 from ftproc.files.reading.meaning.numbers import Origin, as_text, not_a_number, numbers, parsed, without_text
 from ftproc.files.reading.meaning.schema import Column
+from ftproc.files.units import UNITS, unit_named
 from ftproc.records import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -24,6 +26,12 @@ _MAX_TICKS = 2**63 - 1
 _FIRST_DAY, _LAST_DAY = (int(np.datetime64(day).astype(int)) for day in ("0001-01-01", "9999-12-31"))
 _PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 STAMPED = "timestamps, in s since 00:00 UTC of the first day"
+_COUNTED = (  # whole cells: from the start of a flight, and with a unit
+    r"^[TL]\s?(?P<number>[+-]\d+\.?\d*)\s*(?P<unit>[A-Za-z]*)$",
+    r"^(?P<number>[+-]?\d+\.?\d*)\s*(?P<unit>[A-Za-z]+)$",
+)
+_SAMPLE = 2000  # times by which the step is judged
+_LEAST_STEP_S, _MOST_STEP_S = 1e-4, 20.0  # of instruments; the rest is asked about where no unit is stated
 _NO_ZONE = ("the timestamps name no time zone and are taken for UTC",)
 
 
@@ -48,9 +56,46 @@ def read(column: pa.ChunkedArray, origin: Origin, described: Column) -> Clock:
     if without_text(column) is None:
         text = as_text(column)
         if parsed(text, origin.decimal_comma) is None:
-            return stamped(text, origin)
+            counted_up = _with_unit(text)
+            return stamped(text, origin) if counted_up is None else counted_up
         column = text
-    return numeric.read(numbers(column, origin), described)
+    clock = numeric.read(numbers(column, origin), described)
+    if clock.words == numeric.BARE and not described.unit_is_stated and described.name != CANONICAL["time"]:
+        _ask_about_unit(clock.time_s, origin)
+    return clock
+
+
+def _with_unit(text: pa.ChunkedArray) -> Clock | None:
+    """The clock of cells such as `12.5 sec` or `T+12.5`; None of others."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    found = [pc.extract_regex(text, pattern=pattern) for pattern in _COUNTED]
+    fields = next((some for some in found if some.null_count <= text.null_count), None)
+    if fields is None:
+        return None
+    words = {word or "s" for word in pc.unique(pc.struct_field(fields, "unit")).to_pylist() if word is not None}
+    units = {unit_named("time", word) for word in words}
+    unit = units.pop() if len(units) == 1 else None
+    if unit is None:
+        return None
+    values = arrow.to_numpy(pc.struct_field(fields, "number").cast(pa.float64()))
+    return Clock(unit.to_si(values), "", f"numbers in {unit.name}, as every cell says")
+
+
+def _ask_about_unit(time_s: FloatArray, origin: Origin) -> None:
+    """Raise InputError, a question, for times without a unit of which half lie so near or far that s are unlikely."""
+    steps = np.abs(np.diff(time_s[:_SAMPLE]))
+    steps = steps[steps > 0]
+    typical = float(np.median(steps)) if len(steps) else 1.0
+    if _LEAST_STEP_S <= typical < _MOST_STEP_S:
+        return
+    units = [f"time={u.name}" for u in UNITS["time"].values()
+             if _LEAST_STEP_S <= typical * u.multiply / u.divide < _MOST_STEP_S]  # fmt: skip
+    raise InputError(
+        f'{origin.source}: the times in column "{origin.column}" lie {typical:.3g} apart, and no unit is stated. Say '
+        f"{' or '.join(f'--units {unit}' for unit in units)}{' or ' if units else ''}--units time=s."
+    )
 
 
 def seconds(

@@ -29,6 +29,7 @@ MISSING_WORDS = (
 )
 
 _HEAD = 1 << 20  # bytes of a large file that contain its header line
+_START = 256  # bytes that show whether a table is drawn
 _PLAIN_ROWS = 20  # under the names, that are looked at before a file counts as plain
 _BLOCK = 8 << 20  # bytes of a large file that are parsed at once
 _SEPARATOR_NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks", "": "fixed widths"}
@@ -37,7 +38,8 @@ _PARSED, _PARSED_OF_A_COLUMN = 1 << 20, 256  # bytes that pyarrow parses at once
 
 def text_file(name: str, path: Path, widths: Sequence[int] = ()) -> TableHeader:
     """A text file. widths: of its columns, in characters. Of a large file only the head is read. Raises InputError."""
-    if path.stat().st_size > content.LARGE and not widths:
+    large = path.stat().st_size > content.LARGE and not widths
+    if large and not trimming.is_boxed(content.read(name, path, limit=_START)):
         return _large_file(name, path)
     return text_bytes(name, content.read(name, path), widths)
 
@@ -188,6 +190,8 @@ class CsvText(NamedTuple):
 def split(source: str, data: bytes, widths: Sequence[int] = (), cut: bool = False) -> CsvText:
     """The layout of `data`, of a whole file or the beginning of one (`cut`). Raises InputError unless it is text."""
     text = encoding.as_utf8(source, data, cut and len(data) >= _HEAD)
+    if not (cut or text.was):
+        text = text._replace(data=trimming.unboxed(text.data))
     if not text.data.strip():
         raise InputError(f"{source}: the file is empty; expected a header line and rows.")
     plain = None if widths else _plain(text.data)

@@ -24,6 +24,9 @@ _OTHER_KINDS = {
     b"PK\x03\x04": "is a zip archive or an Excel workbook; give it the name .zip or .xlsx",
     b"ARROW1": "is an Arrow file; give it the name .arrow",
     b"\x89HDF": "is an HDF5 file; give it the name .h5",
+    b"\x89PNG": "is a picture; name the log",
+    b"\xff\xd8\xff": "is a picture; name the log",
+    b"GIF8": "is a picture; name the log",
     b"%PDF": "is a PDF document; save the table in it as CSV",
     b"\xd0\xcf\x11\xe0": "is an old Office document (it has NUL bytes); save the sheet as .xlsx or CSV",
 }

@@ -34,6 +34,12 @@ _WITH_BLANKS = re.compile(
     r')\s*"?'
 )
 _RULE = re.compile(r"[-=_+*#|,;\s]*[-=_]{2,}[-=_+*#|,;\s]*")
+#: Columns without a name above them: the name that they get -> how the rows begin.
+_UNNAMED = {
+    "Date": r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s+\d{1,2}:\d{2}",
+    "DOY": r"\s*\d{1,3}\s+\d{1,2}:\d{2}",
+    "row": r"\s*\"?(\d+)\"?\s",  # as R numbers them
+}
 _NOTHING = re.compile(r"\s*[\"']?(nan|null|none|n/?a|nil|[-*?.]+|)[\"']?\s*", re.IGNORECASE)
 
 
@@ -179,7 +185,8 @@ def _heading(line: str, separator: str, width: int, block: Sequence[str], widths
     if separator == BLANKS:
         ways += [re.split(r"\s{2,}|\t", bare.strip()), _joined_brackets(bare), _aligned(bare, block, width)]
         ways += [[cell.strip() for cell in bare.split(mark)] for mark in (",", ";", "|") if mark in bare]
-        ways += [["Date", *way] for way in (bare.split(), _joined_brackets(bare)) if _begins_with_date(block)]
+        first = next((name for name, pattern in _UNNAMED.items() if _begin_with(block, pattern)), "")
+        ways += [[first, *way] for way in (bare.split(), _joined_brackets(bare)) if first]
     elif separator == "\t":
         ways += [bare.split(), _joined_brackets(bare)]
     for cells in ways:
@@ -192,8 +199,12 @@ def _heading(line: str, separator: str, width: int, block: Sequence[str], widths
     return None
 
 
-def _begins_with_date(block: Sequence[str]) -> bool:
-    return all(re.match(r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s+\d{1,2}:\d{2}", row) for row in block)
+def _begin_with(block: Sequence[str], pattern: str) -> bool:
+    """Whether all rows begin so; a number that the pattern catches goes on by one."""
+    found = [match for row in block if (match := re.match(pattern, row))]
+    numbers = [int(match[1]) for match in found if match.groups()]
+    steps = (later - before for before, later in itertools.pairwise(numbers))
+    return len(found) == len(block) and all(step == 1 for step in steps)
 
 
 def _joined_brackets(line: str) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 import tempfile
@@ -47,6 +48,8 @@ FORMATS: Mapping[str, Callable[[str, Path, How], TableHeader]] = {
 _BINARY = (b"PAR1", b"ARROW1", b"PK\x03\x04", b"\x89HDF", b"MATLAB")
 _BINARY_KINDS = (".parquet", ".arrow", ".xlsx", ".h5", ".mat")
 _DEEPEST = 3  # of packed files inside each other
+
+_RANGE = re.compile(rb"(?m)^\s*\[(?:origin|station\.)")  # tables of a range file
 
 #: Endings of files that are no logs -> the command line that takes them.
 _OTHERS = {
@@ -117,6 +120,8 @@ def _opened(name: str, how: How, scratch: _Scratch) -> TableHeader:
 def _of_file(name: str, path: Path, how: How, scratch: _Scratch, deep: int = 0) -> TableHeader:
     lower = path.name.lower()
     other = next((cure for ending, cure in _OTHERS.items() if lower.endswith(ending)), None)
+    if lower.endswith(".toml") and path.is_file() and _RANGE.search(path.read_bytes()):
+        other = "this is a range file, of several stations: ftproc filter --fuse {name}"
     if other is not None:
         raise InputError(f"{name}: {other.format(name=name)}.")
     head = content.read(name, path, limit=8)

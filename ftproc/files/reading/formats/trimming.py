@@ -1,4 +1,4 @@
-"""What is no row of a text: comment lines among the rows, and lines below them."""
+"""What is no row of a text: comment lines and repeated names among the rows, lines below them, and drawn boxes."""
 
 from __future__ import annotations
 
@@ -9,26 +9,59 @@ from ftproc.files.reading.formats import layout
 
 _FOOTER = 30  # lines at the end of a file, at most
 _COMMENT = re.compile(rb"(?m)^[ \t]*(?:#|%|//|!)[^\r\n]*(?:\r\n|\r|\n|\Z)")
+#: First cells of rows below the table that sum it up, in small letters.
+_SUMS = frozenset(
+    [
+        *("mean", "average", "avg", "median", "min", "minimum", "max", "maximum", "sum", "total", "totals", "count"),
+        *("std", "stdev", "std dev", "stddev", "sigma", "standard deviation", "rms", "variance", "var"),
+        *("mittelwert", "mittel", "summe", "anzahl", "moyenne", "promedio", "media", "平均", "平均值", "среднее"),
+    ]
+)
+_COUNTED = re.compile(r"\W*\d[\d,.]*\s+(rows?|records?|lines?|samples?|points?|entries|zeilen)\b.*", re.IGNORECASE)
+_UNDER = 3  # lines under repeated names, at most, such as units and a rule
 _LAST = 4096  # bytes in which the last line is looked for
+
+
+def is_boxed(data: bytes) -> bool:
+    """Whether a text begins with a bar or a rule of a drawn table."""
+    return re.match(rb"\s*(?:\||\+[-=+]+\+)", data) is not None
+
+
+def unboxed(data: bytes) -> bytes:
+    """A table without the bars at the ends of its lines and the rules that databases and Markdown draw round it."""
+    if not is_boxed(data):
+        return data
+    without_rules = re.sub(rb"(?m)^[ \t]*[|+][-=+|: \t]*-[-=+|: \t]*(?:\r\n|\r|\n|\Z)", b"", data)
+    return re.sub(rb"(?m)^[ \t]*\|(.*)\|[ \t]*(?=\r?$)", rb"\1", without_rules)
 
 
 def rows_only(body: memoryview, names: Sequence[str], separator: str, widths: Sequence[int]) -> tuple[memoryview, str]:
     """The rows without comment lines among them and lines of text below them; and in words what was left out."""
     words, comments = "", 0
-    if _has_comments(body):
+    whole = body.tobytes()
+    if _has_comments(whole):
         found = [line for line in _COMMENT.finditer(body) if not _is_row(line[0], names, separator, widths)]
         ends = [0, *(line.end() for line in found)]
         starts = [*(line.start() for line in found), len(body)]
         comments = len(found)
         if comments:
-            body = memoryview(b"".join(body[low:high] for low, high in zip(ends, starts, strict=True)))
+            whole = b"".join(body[low:high] for low, high in zip(ends, starts, strict=True))
+            body = memoryview(whole)
             words += f", {comments} comment lines among the rows"
+    repeated = _repeated_names(whole, names, separator, widths)
+    if repeated:
+        ends, starts = [0, *(end for _, end in repeated)], [*(start for start, _ in repeated), len(body)]
+        body = memoryview(b"".join(body[low:high] for low, high in zip(ends, starts, strict=True)))
+        words += f", the names repeated {len(repeated)} times"
+    begins_with_number = _begins_with_number(body, separator, widths)
     end = len(body)
     footer = 0
     while footer < _FOOTER:
         tail = bytes(body[max(end - _LAST, 0) : end])
         line = re.search(rb"(?:\A|[\r\n])([^\r\n]+)[\r\n]*\Z", tail)
-        if line is None or not _is_footer(line[1].decode("utf-8", "replace"), names, separator, widths):
+        text = "" if line is None else line[1].decode("utf-8", "replace")
+        summed = begins_with_number and _is_sum(layout.split(text, separator, widths), names)
+        if line is None or not (summed or _is_footer(text, names, separator, widths)):
             break
         end -= len(tail) - line.start(1)
         footer += 1
@@ -36,17 +69,65 @@ def rows_only(body: memoryview, names: Sequence[str], separator: str, widths: Se
     return body[:end], words
 
 
-def _is_row(line: bytes, names: Sequence[str], separator: str, widths: Sequence[int]) -> bool:
-    """Whether a line that begins as comments do is a row with a bad first cell, such as #VALUE!."""
+def _is_row(
+    line: bytes, names: Sequence[str], separator: str, widths: Sequence[int], whole: bool = False
+) -> bool:  # fmt: skip
+    """Whether a line is a row; unless `whole`, its first cell may be bad and begin as comments do, such as #VALUE!."""
     cells = layout.split(line.decode("utf-8", "replace").strip(), separator, widths)
-    return len(cells) == len(names) and layout.is_data(cells[1:])
+    return len(cells) == len(names) and layout.is_data(cells if whole else cells[1:])
 
 
-def _has_comments(body: memoryview) -> bool:
+def _has_comments(whole: bytes) -> bool:
     """Whether a line of the rows is a comment."""
-    whole = body.tobytes()
     marks = [mark for mark in (b"#", b"%", b"/", b"!") if mark in whole]
-    return bool(marks) and re.search(rb"(?m)^[ \t]*(?:#|%|//|!)", body) is not None
+    return bool(marks) and re.search(rb"(?m)^[ \t]*(?:#|%|//|!)", whole) is not None
+
+
+def _repeated_names(whole: bytes, names: Sequence[str], separator: str, widths: Sequence[int]) -> list[tuple[int, int]]:
+    """Where the names stand once more among the rows, as on each page of a printout or in files that were put together;
+    with the lines around them that are no rows."""
+    first = names[0].encode()
+    if not first or names[0].isdigit() or first not in whole:
+        return []
+    found: list[tuple[int, int]] = []
+    bare = _bare("".join(names))
+    for line in re.finditer(rb"(?m)^[^\r\n]*" + re.escape(first) + rb"[^\r\n]*(?:\r\n|\r|\n|\Z)", whole):
+        if _bare(line[0].decode("utf-8", "replace")) != bare:
+            continue
+        start, end = line.span()
+        for _ in range(_FOOTER):
+            above = re.search(rb"(?:\A|(?<=[\r\n]))[^\r\n]*(?:\r\n|\r|\n)\Z", whole[max(start - _LAST, 0) : start])
+            if above is None or _is_row(above[0], names, separator, widths, whole=True):
+                break
+            start -= len(above[0])
+        for _ in range(_UNDER):
+            below = layout.LINE.match(whole, end)
+            if below is None or below.end() == end or _is_row(below[0], names, separator, widths, whole=True):
+                break
+            end = below.end()
+        found.append((max(start, found[-1][1]) if found else start, end))
+    return found
+
+
+def _bare(line: str) -> str:
+    return re.sub(r"[\s,;|\"']", "", line)
+
+
+def _begins_with_number(body: memoryview, separator: str, widths: Sequence[int]) -> bool:
+    """Whether the first cell of the first row is a number or a time, so that a word there is a summary."""
+    line = layout.LINE.match(bytes(body[:_LAST]))
+    cells = layout.split(line[1].decode("utf-8", "replace"), separator, widths) if line else []
+    filled = [cell for cell in cells if cell]
+    return bool(filled) and layout.is_data(filled[:1])
+
+
+def _is_sum(cells: Sequence[str], names: Sequence[str]) -> bool:
+    """Whether as many cells as in a row sum up the rows, or a word stands alone: the mean, EOF, the number of rows."""
+    filled = [cell for cell in cells if cell]
+    if len(cells) != len(names) or not filled or layout.is_data(filled[:1]):
+        return False
+    alone = len(filled) < len(cells) and (len(filled) == 1 or (len(filled) == 2 and filled[1].isdigit()))
+    return filled[0].strip(" :.").lower() in _SUMS or (alone and filled[0][0].isalpha())
 
 
 def _is_footer(line: str, names: Sequence[str], separator: str, widths: Sequence[int]) -> bool:
@@ -57,4 +138,6 @@ def _is_footer(line: str, names: Sequence[str], separator: str, widths: Sequence
     if widths:
         return not layout.is_data(cells) and bool(re.match(r"\s*[A-Za-z#*=-]", line))
     different = len(cells) != len(names)
+    if different and _COUNTED.fullmatch(line.strip()):
+        return True
     return different and bool(re.match(r"\s*[A-Za-z#*=<-]", line)) and not layout.is_data(cells, strictly=True)

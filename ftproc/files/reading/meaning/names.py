@@ -19,7 +19,7 @@ from ftproc.files.units import (
 _BRACKETS = re.compile(r"(.*?)[\s_.,:/-]*[(\[{<]\s*(.*?)\s*[)\]}>]\s*")
 _LAST = re.compile(r"(.*\S)(?:\s*/\s*|\s+in\s+|\s*,\s*|[\s_.-]+)(\S+)", re.IGNORECASE)
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
-_NOT_WORDS = re.compile(r"[^0-9a-zµμ°]+")
+_NOT_WORDS = re.compile(r"(?:[^\w°]|_)+")
 _VALUE = re.compile(r"[._/](val|value)$", re.IGNORECASE)  # how decoders end the path of a value
 
 #: Units of other quantities, by which a column is known for something else.
@@ -150,10 +150,12 @@ def _without_in(text: str) -> str:
 def _words(text: str) -> tuple[str, tuple[str, ...], str]:
     """Stem and words of the last part of a path such as `CAT048.I040.RHO`, and the path before it."""
     context, _, last = text.rpartition("/") if "/" in text else text.rpartition(".")
-    if not re.sub(r"[^A-Za-z]", "", last):
+    parts = _NOT_WORDS.split(last.lower())
+    if not re.search(r"[^\W\d_]", last) or all(part in QUALIFIERS for part in parts if part):  # such as Az.Angle
         context, last = "", text
     spaced = unicodedata.normalize("NFKD", _CAMEL.sub(" ", last)).lower()
     spaced = "".join(letter for letter in spaced if not unicodedata.combining(letter))
+    spaced = unicodedata.normalize("NFC", spaced)
     words = tuple(word for word in _NOT_WORDS.split(spaced) if word)
     if len(words) > 1 and words[0].isdigit():  # such as 048_040_RHO
         digits = [k for k, word in enumerate(words) if word.isdigit()]

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
 _THOUSANDS = r"^[+-]?\d{1,3}(,\d{3})+$"
+_FORTRAN = r"^([+-]?\d*\.?\d*)[DdQ]([+-]?\d{1,3})$"
+_MOSTLY = 0.5  # share of the cells that must have Fortran's exponents: a single one is a slip
 
 #: For a cell: None if it is right, else what it is not and (perhaps empty) the cure.
 Check = Callable[[str], tuple[str, str] | None]
@@ -89,6 +91,7 @@ def parsed(text: pa.ChunkedArray, decimal_comma: bool) -> FloatArray | None:
     import pyarrow as pa
     import pyarrow.compute as pc
 
+    text = _plainly_written(text, decimal_comma)
     if decimal_comma and _has_comma(text):
         # A point in such a column would separate thousands; "?" makes it no number.
         text = pc.replace_substring(pc.replace_substring(text, ".", "?"), ",", ".")
@@ -96,6 +99,22 @@ def parsed(text: pa.ChunkedArray, decimal_comma: bool) -> FloatArray | None:
         return arrow.to_numpy(text.cast(pa.float64()))
     except pa.ArrowInvalid:
         return None
+
+
+def _plainly_written(text: pa.ChunkedArray, decimal_comma: bool) -> pa.ChunkedArray:
+    """The cells with E for Fortran's D, and without marks between thousands where a cell has both marks."""
+    import pyarrow.compute as pc
+
+    def share(pattern: str) -> float:
+        return float(pc.mean(pc.match_substring_regex(text, pattern)).as_py() or 0.0)
+
+    if share(_FORTRAN) > _MOSTLY:
+        text = pc.replace_substring_regex(text, _FORTRAN, r"\1E\2")
+    for mark, point in ((",", "."), (".", ","))[: 1 + decimal_comma]:
+        grouped = rf"^[+-]?(\d{{1,3}}(\{mark}\d{{3}})+|\d+)(\{point}\d*)?$"
+        if share(rf"^[+-]?\d{{1,3}}(\{mark}\d{{3}})+\{point}\d*$") and share(grouped) == 1.0:
+            return pc.replace_substring(text, mark, "")
+    return text
 
 
 def as_text(column: pa.ChunkedArray) -> pa.ChunkedArray:

@@ -12,16 +12,19 @@ Two columns that could be the same quantity are an error, not a guess.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from ftproc.errors import InputError, nearest
+from ftproc.errors import InputError, nearest, quoted
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
 from ftproc.files.reading.meaning import parts
 from ftproc.files.reading.meaning.names import Name, taken_apart
-from ftproc.files.units import ALIASES, NOT_UNITS, QUANTITIES, UNITS, Unit, si_unit, unit_named
+from ftproc.files.units import ALIASES, EITHER_ANGLE, GERMAN, NOT_UNITS, QUANTITIES, UNITS, Unit, si_unit, unit_named
 
+#: Words of NOT_UNITS with which a column may still be the quantity.
+_OF_THE_QUANTITY = frozenset(["true", "corr", "raw", "ref"])
 _OF_A_TRAJECTORY = ("row", "x_m", "vx_mps", "sigma_x_m", "outlier_range", "nis")
 
 
@@ -74,6 +77,10 @@ def resolve(
     if not columns and set(_OF_A_TRAJECTORY) <= set(names):
         raise InputError(f"{source}: this is a trajectory that ftproc wrote, no log: ftproc score {source}.")
     apart = [taken_apart(name, unit) for name, unit in zip(names, unit_row or [""] * len(names), strict=True)]
+    if any(name.stem in GERMAN for name in apart):  # whose Grad are degrees, unless the values say otherwise
+        apart = [
+            name._replace(unit="") if re.search(r"[(\[] *grad *[)\]]$", name.text, re.I) else name for name in apart
+        ]
     table = _Table(source, names, apart, units)
     found: dict[str, Column] = {}
     taken = {place for name in columns.values() if name != ABSENT for place in table.places(name)}
@@ -88,6 +95,9 @@ def resolve(
             found[quantity] = column
             taken |= set(column.positions)
     _check_complete(source, names, found, columns)
+    for quantity in QUANTITIES:
+        if quantity not in found and columns.get(quantity) != ABSENT:
+            _refuse_alike(table, [k for k in range(len(names)) if k not in taken], quantity)
     return found
 
 
@@ -178,6 +188,8 @@ def _recognised(table: _Table, quantity: str, free: Sequence[int]) -> Column | N
         fits = [place for place in fits if table.apart[place].unit]
     elif (roles := parts.found(quantity, {place: table.apart[place] for place in free})) is not None:
         return table.joint(quantity, roles, f"their names: {', '.join(roles)}")
+    if not fits and quantity == "azimuth":
+        _refuse_either(table, free)
     fits = fits or [place for place in free if table.apart[place].means(quantity) == 2]
     if not fits:
         zenith = [place for place in free if quantity == "elevation" and table.apart[place].is_zenith()]
@@ -220,6 +232,33 @@ def _refuse_unknown_unit(table: _Table, free: Sequence[int], quantity: str) -> N
             f'{table.source}: "{unit}" in column "{name}" is not a unit of {quantity}; understood are '
             f"{', '.join(UNITS[quantity])}. Convert the column and rename it, "
             f"or say --columns {quantity}={name} --units {quantity}=UNIT{_or_absent(quantity)}."
+        )
+
+
+def _refuse_alike(table: _Table, free: Sequence[int], quantity: str) -> None:
+    """Ask about a column that may be the quantity, so that it is not left out without a word."""
+    known = {alias for alias in ALIASES[quantity] if len(alias) > 1}
+    other = NOT_UNITS - _OF_THE_QUANTITY
+    for place in free if quantity != "time" else ():
+        apart, name = table.apart[place], table.names[place]
+        words = set(apart.words)
+        either = quantity != "range" and apart.core() in EITHER_ANGLE
+        if not apart.foreign and (either or (known & words and not other & words)):
+            raise InputError(
+                f'{table.source}: column "{name}" may be the {quantity}. Say --columns {quantity}={quoted(name)}, or '
+                f"--columns {quantity}={ABSENT} if it is something else."
+            )
+
+
+def _refuse_either(table: _Table, free: Sequence[int]) -> None:
+    """Ask which of two angles is the azimuth where their names, such as theta and phi, leave it open."""
+    names = [table.names[place] for place in free if table.apart[place].core() in EITHER_ANGLE]
+    if len(names) > 1:
+        one, other = map(quoted, names[:2])
+        raise InputError(
+            f'{table.source}: "{names[0]}" and "{names[1]}" are the azimuth and the other angle, in an order that the '
+            f"names leave open. Say --columns azimuth={one},elevation={other} or --columns "
+            f"azimuth={other},elevation={one}; add --elevation-from zenith if the other angle counts from the vertical."
         )
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.errors import InputError
+from ftproc.errors import InputError, quoted
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning import names, rows, schema
 from ftproc.records import COMPONENTS, FloatArray, IntArray, MeasurementLog
@@ -54,7 +54,7 @@ def refuse(header: TableHeader, found: Mapping[str, schema.Column], log: Measure
         shown = ", ".join(column.values[:6]) + (", ..." if count > 6 else "")
         raise InputError(
             f'{header.source}: column "{column.name}" tells {count} targets apart ({shown}), whose rows alternate. '
-            f"Say --target {_quoted(f'{column.name}={first}')} for one, --target {_quoted(column.name)} for a "
+            f"Say --target {quoted(f'{column.name}={first}')} for one, --target {quoted(column.name)} for a "
             "trajectory of each, or --target none if it is one target after all."
         )
     if mixed:
@@ -64,19 +64,12 @@ def refuse(header: TableHeader, found: Mapping[str, schema.Column], log: Measure
         else:
             mine = found[COMPONENTS[split[0]]]
             value = split[1] * mine.unit.divide / mine.unit.multiply
-            below, above = (_quoted(f"{mine.name}{test}{value:.6g}") for test in "<>")
+            below, above = (quoted(f"{mine.name}{test}{value:.6g}") for test in "<>")
             cure = f"Say --where {below} or --where {above}"
         raise InputError(
             f"{header.source}: the rows alternate between two tracks, and no column tells the targets apart. {cure}, "
             "or --target none if it is one target after all."
         )
-
-
-def _quoted(text: str) -> str:
-    """As a shell takes it."""
-    import shlex
-
-    return shlex.quote(text)
 
 
 def _numbers_targets(name: str) -> bool:

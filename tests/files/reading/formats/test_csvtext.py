@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ftproc.errors import InputError
 from ftproc.files.reading import logs
 from ftproc.files.writing import flights
 from tests.files.conftest import Make, refused
@@ -100,3 +101,30 @@ def test_damaged_gzip(make: Make) -> None:
     broken = bytearray(packed)
     broken[15] ^= 0xFF
     assert "not a gzip file, or a damaged one" in refused(make(bytes(broken), "log.csv.gz"))
+
+
+@pytest.mark.parametrize("last", ["x,2,3,4", "Mode,2,3,4", "x,2,,", "Mean,2,3,4,5,6\n2,1002,1,0.1"])
+def test_a_row_that_is_no_summary_is_not_left_out(last: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(f"{HEADER}0,1000,1,0.1\n1,1001,1,0.1\n{last}\n")
+    if last == "x,2,,":  # a word and a whole number alone, as in: Total rows, 1200
+        assert len(logs.read(path)) == 2
+        return
+    with pytest.raises(InputError, match="row 2"):
+        logs.read(path)
+
+
+def test_a_summary_is_told_from_rows_that_begin_with_such_words(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("gain,time_s,range_m\n" + "".join(f"Max,{k},{1000 + k}\n" for k in range(40)))
+    assert len(logs.read(path)) == 40
+
+
+def test_a_drawn_table_that_is_large_is_read_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ftproc.files.reading.formats.content.LARGE", 1000)
+    rows = "".join(f"| {k} | {1000 + k} | 1.0 | 0.1 |\n" for k in range(200))
+    path = tmp_path / "a.txt"
+    path.write_text(f"| time_s | range_m | azimuth_rad | elevation_rad |\n|---|---|---|---|\n{rows}")
+    log = logs.read(path)
+    assert log.time_s.tolist() == list(range(200))
+    assert log.measurement[:, 0].tolist() == [1000.0 + k for k in range(200)]

@@ -4,9 +4,12 @@
 (function () {
   const PAPER = 680; // CSS pixels between the margins of an A4 or Letter page
   const LOWER = 0.7; // share of the height, so that two figures fit a page
+  const HALF = 470, TALLEST = 900; // CSS pixels of half a page, and of a page, under the title of a section
+  const SHARP = 3; // pixels of a picture on paper, per CSS pixel
+  const paper = "paper" in document.documentElement.dataset; // drawn to be printed, and for nothing else
   const BROAD = 1.6; // width over height from which the whole space is visible with its labels
   const COLUMNS = 400; // of a figure; in each the lowest and the highest mark of a kind are drawn
-  const config = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
+  const config = { displaylogo: false, responsive: !paper, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
   const places = Array.from(document.querySelectorAll("figure"));
 
   function bytes(base64) {
@@ -78,6 +81,14 @@
   // Factor on the distance of the eye for an element of this size.
   function distance(width, height) { return Math.max(1, (BROAD * height) / width); }
 
+  // The size of a figure between the margins of a page.
+  function printed(place) {
+    const width = PAPER / place.parentNode.querySelectorAll("figure").length;
+    const whole = parseInt(place.dataset.height, 10);
+    const height = LOWER * whole <= HALF ? LOWER * whole : Math.min(whole, TALLEST);
+    return { width: width, height: height, autosize: false };
+  }
+
   function moved(eye, factor) { return { x: factor * eye.x, y: factor * eye.y, z: factor * eye.z }; }
 
   async function draw(place) {
@@ -85,9 +96,20 @@
     const figure = JSON.parse(data.textContent);
     const crowded = thin(figure);
     const camera = figure.layout.scene && figure.layout.scene.camera;
+    if (paper) {
+      Object.assign(figure.layout, printed(place));
+      place.style.height = figure.layout.height + "px";
+    }
     if (camera) {
-      place.away = distance(place.clientWidth, place.clientHeight);
+      place.away = distance(figure.layout.width || place.clientWidth, place.clientHeight);
       camera.eye = moved(camera.eye, place.away);
+    }
+    if (paper && camera) { // a picture: what WebGL draws may not be on its canvas when the page is printed
+      const picture = new Image(figure.layout.width, figure.layout.height);
+      picture.src = await Plotly.toImage(figure, { format: "png", width: picture.width, height: picture.height, scale: SHARP });
+      await picture.decode();
+      place.replaceChildren(picture);
+      return;
     }
     await Plotly.newPlot(place, figure.data, figure.layout, config);
     if (!crowded.size) return;
@@ -146,17 +168,16 @@
     });
   }
 
-  addEventListener("beforeprint", function () {
-    places.forEach(function (place) {
-      const width = PAPER / place.parentNode.querySelectorAll("figure").length;
-      resize(place, { width: width, height: LOWER * parseInt(place.dataset.height, 10), autosize: false });
+  if (!paper) {
+    addEventListener("beforeprint", function () {
+      places.forEach(function (place) { resize(place, printed(place)); });
     });
-  });
-  addEventListener("afterprint", function () {
-    places.forEach(function (place) {
-      resize(place, { width: null, height: parseInt(place.dataset.height, 10), autosize: true });
+    addEventListener("afterprint", function () {
+      places.forEach(function (place) {
+        resize(place, { width: null, height: parseInt(place.dataset.height, 10), autosize: true });
+      });
     });
-  });
+  }
   // An open document inside the page delays the load event until all is drawn, so that printing at load has all figures.
   const hold = document.body.appendChild(document.createElement("iframe"));
   hold.hidden = true;
