@@ -36,14 +36,15 @@ def rows(folder: Path) -> Iterator[tuple[str, ...]]:
         away = (trajectory.state[:, :3] - true)[known, :axes]
         inside = np.abs(away) <= 3 * trajectory.sigma[known, :axes]
         yield (
-            truth.parent.name, str(len(log)), *(f"{np.median(np.linalg.norm(each, axis=1)):.3g}" for each in (raw, away)),
+            truth.parent.name, str(len(log)),
+            *(f"{np.median(np.linalg.norm(each, axis=1)):.3g}" for each in (raw, away)),
             f"{100 * inside.mean():.1f} %", f"{100 * np.isin(trajectory.outlier[:, :axes], (1, 2)).mean():.1f} %",
             trajectory.metadata["summary"]["trust"]["verdict"],
         )  # fmt: skip
 
 
 def _at(path: Path, time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The truth (n, 3) m at the times of the readings, moved to them by constant offsets, and where it is known (n,)."""
+    """The truth (n, 3) m at the times of the readings, moved to them by constant offsets, and where it is known."""
     import pyarrow.parquet as pq
 
     columns = pq.read_table(path, columns=["time_s", "x_m", "y_m", "z_m"])

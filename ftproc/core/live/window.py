@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing import outlier_chain, two_pass
-from ftproc.core.live.predictive_chain import OPEN, chains_of, run_predictive, run_predictive_coloured
 from ftproc.core.filtering.forward import Span
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven, empty_rows
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.identification.scales import scales_of
+from ftproc.core.live.predictive_chain import OPEN, chains_of, run_predictive, run_predictive_coloured
 from ftproc.core.live.readings import LONGEST_ISOLATED, Columns, Labels, Repeats
 from ftproc.core.live.readmission import Open, readmitted
 from ftproc.core.model.motion import Profile
