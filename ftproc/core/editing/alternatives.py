@@ -82,10 +82,11 @@ class Search:
     only if they have changed. unexamined: those beyond the MOST of a look, and those that no work was left for; work is
     counted in samples that are smoothed, not in seconds, so that a result does not depend on the machine."""
 
-    def __init__(self, samples: int) -> None:
+    def __init__(self, samples: int, at_least: int = WORK) -> None:
+        """at_least: how much work any log is worth."""
         self.tried: set[Island] = set()
         self.unexamined: set[Island] = set()
-        self.work = WORK + WORK_PER_SAMPLE * samples
+        self.work = at_least + WORK_PER_SAMPLE * samples
 
     def take(self, island: Island) -> bool:
         """Whether there is work left for an island."""

@@ -38,7 +38,8 @@ FEWEST_KEPT = 0.5  # share of what screening trusts that must survive the decisi
 class Record(NamedTuple):
     """What stays the same while decisions are made: the log, the readings that may be good at all (n, 3), what
     screening trusts (n, 3) and the noise 1-sigma (3,) that it saw, what the user has fixed, the gate in sigmas, the
-    1-sigma (3,) that rounding alone makes, and how the noise of single readings differs, if it does."""
+    1-sigma (3,) that rounding alone makes, and how the noise of single readings differs, if it does. live: of a window
+    that moves on, which is soon looked at again. white: whether the noise is taken for white and even."""
 
     time_s: FloatArray
     measurement: FloatArray
@@ -49,6 +50,8 @@ class Record(NamedTuple):
     gate: float
     rounding: FloatArray
     uneven: Uneven | None = None
+    live: bool = False
+    white: bool = False
 
     def weighted(self, weight: FloatArray) -> Observations:
         """The log with weights (n, 3)."""

@@ -172,14 +172,14 @@ def edit(
     reading that agrees with its neighbours.
     """
     measurement, copied = without_copies(time_s, measurement)
-    record, decision = _decided(time_s, measurement, known, segment_of, short)
+    record, decision = _decided(time_s, measurement, known, segment_of, live, short)
     found: list[Step] = []
     for _ in range(0 if live else STEP_ROUNDS):
         new = steps.find(record, decision) if _told_from_noise(decision) else []
         if not new:
             break
         found, log = sorted([*found, *new], key=lambda s: s.sample), record.weighted(decision.weight)
-        record, decision = _decided(time_s, steps.bridged(log, decision.model, new), known, segment_of, short)
+        record, decision = _decided(time_s, steps.bridged(log, decision.model, new), known, segment_of, live, short)
     if segment_of is None and not short:
         decision = allow_for_colour(record, decision)
     log = record.weighted(decision.weight)
@@ -203,7 +203,7 @@ def _told_from_noise(decision: Decision) -> bool:
 
 
 def _decided(
-    time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: Model | None, short: bool
+    time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: Model | None, live: bool, white: bool
 ) -> tuple[Record, Decision]:
     """The decisions on a log as if it had no steps, with a jerk profile."""
     jerk_psd = known.jerk_psd
@@ -215,6 +215,7 @@ def _decided(
     coarse = np.where(rounding > COARSE * sigma, np.sqrt(12) * rounding, 0.0)
     uneven = uneven_noise.repeated(measurement, coarse)
     record = Record(time_s, measurement, possible, screened * possible, sigma, fixed, known.gate, rounding, uneven)
+    record = record._replace(live=live, white=white)
     noise = np.where(np.isfinite(known.sigma), known.sigma, sigma) ** 2
     begin = partial(_first, record, segment_of=segment_of, noise=noise, jerk_psd=jerk_psd)
     found = _examined(*begin(record.screened), known)
@@ -241,8 +242,8 @@ def _first(
 
 def _examined(record: Record, decision: Decision, known: Known) -> tuple[Record, Decision]:
     """The decisions made again where the noise is not even, and where they do not explain the log."""
-    found = allow_for_tails(*allow_for_late_stamps(record, decision))
-    for _ in range(DRIFT_ROUNDS):
+    found = (record, decision) if record.white else allow_for_tails(*allow_for_late_stamps(record, decision))
+    for _ in range(0 if record.white else DRIFT_ROUNDS):
         before, found = found, likelier(found, allow_for_drift(*found))
         if found is before or found[1].weight.sum() <= before[1].weight.sum():
             break
