@@ -70,7 +70,7 @@ def written(log, path):
 def test_followed_rows_leave_before_the_input_ends(log, tmp_path):
     written(log, tmp_path / "log.csv")
     command = [sys.executable, "-m", "ftproc", "filter", "-", "--follow", "jsonl", "--lag", "1"]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+    with subprocess.Popen(command, bufsize=0, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         text = (tmp_path / "log.csv").read_bytes()
         process.stdin.write(text[: len(text) // 2])
         process.stdin.flush()

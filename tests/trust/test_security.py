@@ -58,8 +58,10 @@ def offences(source: str) -> list[str]:
 
 
 def test_no_code_from_files_is_run() -> None:
+    """One module starts a process, without a shell: the browser that prints a page."""
     for path in PACKAGE.rglob("*.py"):
-        assert offences(path.read_text()) == [], path
+        printing = path.relative_to(PACKAGE).as_posix() == "report/browser/printing.py"
+        assert [what.partition(": ")[2] for what in offences(path.read_text())] == ["subprocess"] * printing, path
 
 
 @pytest.mark.parametrize(
