@@ -93,10 +93,11 @@ def test_without_columns_it_is_the_smoother():
     log = observed(np.zeros((3, PARAMETERS)))
     plain = smooth_log(log, MODEL, [START])
     found = smooth_biased(log, MODEL, START, directions(log, np.zeros((3 * PARAMETERS, 0))))
-    assert np.array_equal(found.run.state, plain.state)
-    assert np.array_equal(found.run.sigma, plain.sigma)
-    assert np.array_equal(found.run.residual, plain.residual, equal_nan=True)
-    assert found.run.log_likelihood == plain.log_likelihood
+    # Two kernels: the compiler may order the sums of one in another way.
+    np.testing.assert_allclose(found.run.state, plain.state, rtol=1e-9, atol=1e-7)
+    np.testing.assert_allclose(found.run.sigma, plain.sigma, rtol=1e-9)
+    np.testing.assert_allclose(found.run.residual, plain.residual, rtol=1e-9, atol=1e-9)
+    assert found.run.log_likelihood == pytest.approx(plain.log_likelihood, rel=1e-12)
     assert not found.spread.any()
 
 
