@@ -43,7 +43,7 @@ fused = $(OUT)/$(notdir $(patsubst %/,%,$(dir $(1)))).fused.parquet
 seen = $(firstword $(wildcard $(dir $(1))truth.parquet $(dir $(1))truth.csv))
 ranges := $(wildcard $(RANGES))
 $(foreach range,$(ranges),$(eval range-of-$(patsubst $(OUT)/%.fused.parquet,%,$(call fused,$(range))) := $(range)))
-told := $(foreach range,$(ranges),$(if $(call seen,$(range)),$(range)))
+known := $(foreach range,$(ranges),$(if $(call seen,$(range)),$(range)))
 
 program := $(shell find ftproc -name '*.py' -o -name '*.safetensors')
 
@@ -67,10 +67,10 @@ help: ## this list
 	@echo 'a station file beside it (STEM.toml) for reading it. RANGES="flight7/range.toml" fuses the logs of a range file.'
 
 run: $(outputs) $(foreach range,$(ranges),$(call fused,$(range))) ## filter the LOGS to OUT with FLAGS, then print the score table
-ifneq ($(scored)$(told),)
+ifneq ($(scored)$(known),)
 	@echo
 	@$(ftproc) score $(foreach log,$(scored),$(call output,$(log)) --truth $(call truth,$(log))) \
-	  $(foreach range,$(told),$(call fused,$(range)) --truth $(call seen,$(range)))
+	  $(foreach range,$(known),$(call fused,$(range)) --truth $(call seen,$(range)))
 else
 	@echo 'No log has a truth beside it, so there is nothing to score.'
 endif

@@ -12,8 +12,7 @@ from ftproc.cli.command import DEBUG, Command, start_quickly
 _EXAMPLES = """
 ftproc simulate --scenario zuo2021-outliers -o flight.csv
 ftproc filter flight.csv --smooth --report flight.html
-ftproc simulate --scenario range -o range/
-ftproc filter --fuse range/range.toml --smooth -o best.parquet
+ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
 """
 
 

@@ -14,7 +14,6 @@ from ftproc.errors import UsageError
 _EXAMPLES = """
 ftproc simulate --scenario zuo2021-outliers --seed 3 -o flight.csv --truth flight.truth.csv
 ftproc simulate --scenario manoeuvre --duration 30 --outliers isolated=0.05:8-100,range.offset=1:20:60m -o hard.parquet
-ftproc simulate --scenario radar --units range=km,azimuth=deg,elevation=deg --azimuth-from north -o radar.csv
 ftproc simulate --scenario range --seed 3 -o flight/ --truth flight/truth.parquet
 """
 #: Options that a flight for several stations does not take.

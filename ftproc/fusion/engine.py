@@ -31,7 +31,7 @@ from ftproc.fusion.events import Events, Seen, merge
 from ftproc.records import FloatArray
 
 FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 18, 8
-OTHER_KNOTS = 1.5  # times the distance of the knots of the jerk profile, before they are laid out anew
+OTHER_KNOTS = 1.5  # times the distance of the knots of the jerk profile, before they are laid out again
 LEVEL_STEPS, PROFILE_STEPS, LAST_STEPS = 4, 3, 8
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after the first rounds
 STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that may still change
@@ -45,7 +45,7 @@ FEWEST_KEPT = 0.5  # of what screening trusts, in each component of a station
 
 class Fused(NamedTuple):
     """events, weight (rows, 3) of each station; sigma (m, 3) noise; constants; model; start; found: the smoother's run
-    that the rest belongs to; own (m, 3): the noise that each component shows by itself; rounds, settled: of the
+    that the rest belongs to; own (m, 3): the noise that each component shows alone; rounds, settled: of the
     decisions; unexamined: places where no work was left to look for other hypotheses."""
 
     stations: list[Seen]
@@ -126,11 +126,11 @@ def _begin(
     weight = [events.of(s, decided) for s in range(len(stations))]
     found = smooth_biased(log._replace(weight=decided), model, start, _directions(events, state, constants))
     rates = np.tile(np.array(outlier_chain.START_RATES), (len(stations), 3, 1))
-    begun = Fused(stations, events, weight, possible, sigma, constants, model, start, found, rates, sigma)
+    current = Fused(stations, events, weight, possible, sigma, constants, model, start, found, rates, sigma)
     for share in SHARES:
         noise = np.maximum(sigma, share * wide) ** 2
-        begun = _smoothed(begun._replace(model=model._replace(noise_variance=noise)))
-    return begun
+        current = _smoothed(current._replace(model=model._replace(noise_variance=noise)))
+    return current
 
 
 def _directions(events: Events, state: FloatArray, constants: Constants) -> Directions:

@@ -1,4 +1,4 @@
-"""What is believed of a station's readings before there is a fused track: what each component says by itself, and then
+"""What is believed of a station's readings before there is a fused track: what each component says alone, and then
 what a first track does not contradict."""
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Screened(NamedTuple):
 
 
 def screen(station: Seen) -> Screened:
-    """A station by itself."""
+    """A station alone."""
     z = station.measurement
     weight, sigma, least = np.isfinite(z).astype(float), np.ones(3), two_pass.rounding_sigma(z)
     for c in station.components:

@@ -82,9 +82,8 @@ def test_recursive_editing(share, bound, gain_form):
     flights = [flight(seed, share) for seed in SEEDS]
     found = [error(f.log, f.truth.position_m, editing="forward", gain_form=gain_form) for f in flights]
     assert np.median(found) <= bound
-    assert (
-        np.mean(np.array(found) <= 2.5 * bound) >= 0.75
-    )  # a patch that lies in the first readings is not known for one
+    # A patch that lies in the first readings is not known for one.
+    assert np.mean(np.array(found) <= 2.5 * bound) >= 0.75
 
 
 @pytest.mark.parametrize("method", ["ukf", "ekf"])

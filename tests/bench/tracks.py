@@ -73,5 +73,7 @@ def _at(path: Path, time_s: FloatArray, measurement: FloatArray) -> tuple[FloatA
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 2 or not Path(sys.argv[1]).is_dir():
+        sys.exit("Name one folder of tracks: python -m tests.bench.tracks FOLDER")
     for line in markdown(HEADER, rows(Path(sys.argv[1]))):
         print(line, flush=True)

@@ -39,7 +39,7 @@ def test_help_ends_with_examples(run, name, flag):
     assert result.code == 0
     assert result.err == ""
     examples = result.out.partition("\nExamples:\n")[2].splitlines()
-    assert 2 <= len(examples) <= 4
+    assert 2 <= len(examples) <= 3
     assert all(line.startswith("  ftproc ") for line in examples)
 
 

@@ -6,6 +6,7 @@ python -m tests.docs [--slow] [--kept] [NAME...]
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import tempfile
 from pathlib import Path
@@ -27,7 +28,11 @@ def main() -> None:
         parser.error(f"there is no block {', '.join(sorted(unknown))}; there are {', '.join(BLOCKS)}")
     if not asked.names:
         picture.main()
-    names = asked.names or [name for name, block in BLOCKS.items() if asked.slow or not block.slow]
+    names = asked.names or [
+        name
+        for name, block in BLOCKS.items()
+        if (asked.slow or not block.slow) and (not block.needs or block.needs in os.environ)
+    ]
     with tempfile.TemporaryDirectory() as folder:
         shell = Shell(Path(folder), asked.kept)
         for name in names:

@@ -14,12 +14,14 @@ CUT = "..."
 
 class Block(NamedTuple):
     """commands: those whose outputs the block shows, as a reader types them. shown: makes the Markdown of commands and
-    outputs. before: commands that make the files they need. slow: takes minutes, and is made only when asked for."""
+    outputs. before: commands that make the files they need. slow: takes minutes, and is made only when asked for.
+    needs: variable of the environment without which it is made only when named."""
 
     commands: tuple[str, ...]
     shown: Callable[[Sequence[str], Sequence[str]], str]
     before: tuple[str, ...] = ()
     slow: bool = False
+    needs: str = ""
 
     def text(self, name: str, shell: Shell) -> str:
         """The Markdown that the commands make now. Raises RuntimeError when one of them fails."""
@@ -67,9 +69,9 @@ def session(*commands: str, only: tuple[str, ...] = (), before: tuple[str, ...] 
     return Block(commands, partial(_session, only), before, slow)
 
 
-def table(command: str, slow: bool = True, note: str = "", without: str = "") -> Block:
+def table(command: str, slow: bool = True, note: str = "", without: str = "", needs: str = "") -> Block:
     """A table that a command prints."""
-    return Block((command,), partial(_table, note, without), slow=slow)
+    return Block((command,), partial(_table, note, without), slow=slow, needs=needs)
 
 
 SIMULATE = "ftproc simulate --scenario zuo2021-outliers --seed 3 -o flight.csv --truth flight.truth.csv"
@@ -99,9 +101,6 @@ BLOCKS = {
         SCORE, before=(SIMULATE, FILTER),
         only=("flight", "method", "samples", "mean position", "position", "velocity RMSE", "share", "the sigmas"),
     ),
-    "fuse": session(
-        FUSE, before=(RANGE,), only=("range/range.toml", "radar        range bias", "azimuth zero", "verdict")
-    ),
     "fuse-score": session(RANGE, FUSE, "ftproc score best.parquet --truth range/truth.parquet"),
     "train": session(FLY, TRAIN, only=("filter:", "smoother:", "Position error")),
     "train-use": session(
@@ -118,6 +117,7 @@ BLOCKS = {
     ),
     "samples": table("python -m tests.bench samples", slow=False),
     "accuracy": table("python -m tests.bench accuracy"),
+    "tracks": table('python -m tests.bench.tracks "$TRACKS"', needs="TRACKS"),
     "instruments": table("python -m tests.bench instruments"),
     "zuo2021": table("python -m tests.acceptance.zuo2021"),
     "correction": table("python -m tests.bench correction", note=DIGITS),

@@ -15,7 +15,7 @@ from tests.docs.pages import PAGES, filled, texts
 from tests.docs.shell import ROOT, Shell
 
 NUMBER = re.compile(r"[-+]?(?:\d+\.\d+(?:e[-+]\d+)?|\d\.?\d*e[-+]\d+)")  # not a count
-MOST_LINES = 230
+MOST_LINES = 200
 
 
 @pytest.fixture(scope="module")

@@ -145,7 +145,7 @@ def test_clocks_that_are_all_alike(run, folder, sigma, sentence):
     if sigma != "0":
         biases = pd.read_csv("best.biases.csv").query("parameter == 'clock_s'")
         assert "common clock" in result.out
-        assert biases.sigma.min() > 0.6 * 0.08 / len(biases) ** 0.5  # what they share is as vague as before
+        assert biases.sigma.min() > 0.6 * 0.08 / len(biases) ** 0.5  # what they share is as uncertain as before
 
 
 def test_the_report_is_a_page_or_a_pdf_and_is_refused_before_the_work(run, folder, monkeypatch):

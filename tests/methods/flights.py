@@ -11,7 +11,7 @@ from ftproc.settings import FilterSettings
 
 SIGMA = np.array([3.0, 2e-4, 2e-4])
 TIME = 0.1 * np.arange(600)
-UNCONFIRMED = 30  # samples at most before a live track is confirmed; for two readings each instant, twice as many
+UNCONFIRMED = 30  # samples at most before a track that is edited as it comes is confirmed
 
 PATHS = {
     "radial": lambda t: np.stack([-9000 + 100 * t, 0 * t, 500 + 0 * t], 1),
@@ -37,11 +37,18 @@ def turned(position, angle):
 
 
 def rms(trajectory, position, rows=slice(None)):
-    """Of the samples with an estimate; a track that is edited as it comes has none before it is confirmed."""
-    error = np.sum((trajectory.state[rows, :3] - position[rows]) ** 2, 1)
-    known = np.isfinite(error)
-    assert known[UNCONFIRMED:].all()
-    return np.sqrt(np.mean(error[known]))
+    """Of the samples with an estimate: all, but for those before a track that is edited as it comes is confirmed."""
+    first = begins(trajectory)
+    assert np.isfinite(trajectory.state[first:]).all()
+    error = np.sum((trajectory.state[:, :3] - position) ** 2, 1)[rows]
+    return np.sqrt(np.mean(error[np.isfinite(error)]))
+
+
+def begins(trajectory):
+    """The first sample with an estimate."""
+    first = trajectory.metadata["summary"]["rows_without_estimate"]
+    assert first <= (UNCONFIRMED if trajectory.metadata["settings"]["editing"] in ("live", "forward") else 0)
+    return first
 
 
 def held(trajectory, position):

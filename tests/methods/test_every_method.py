@@ -22,8 +22,8 @@ NAMES = [name for name, method in registry.METHODS.items() if not method.own_mod
 ROOM = {"wavelet-akf": 2.0}
 
 
-def run(log, name):
-    return pipeline.filter_log(log, FilterSettings(method=name))
+def run(log, name, seed=0):
+    return pipeline.filter_log(log, FilterSettings(method=name, seed=seed))
 
 
 @cache
@@ -104,7 +104,11 @@ def test_cut_costs_nothing(name, path):
     away = turned(position, np.pi / 2)
     here, there = (run(measured(where, times), name) for where in (position, away))
     by_chance = registry.METHODS[name].random
-    assert rms(here, position) == pytest.approx(rms(there, away), rel=0.6 if by_chance else 1e-2)
+    seeds = range(3 if by_chance else 1)
+    mean, mean_away = (
+        np.mean([rms(run(measured(where, times), name, seed), where) for seed in seeds]) for where in (position, away)
+    )
+    assert mean == pytest.approx(mean_away, rel=0.4 if by_chance else 1e-2)
     azimuth = here.measurement[:, 1]
     assert (np.abs(azimuth[np.isfinite(azimuth)]) <= np.pi).all()
     if not by_chance:

@@ -11,7 +11,7 @@ from ftproc import pipeline
 from ftproc.records import MISSING
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
-from tests.methods.flights import PATHS, TIME, UNCONFIRMED, held, measured, rms, run, turned
+from tests.methods.flights import PATHS, TIME, begins, held, measured, rms, run, turned
 from tests.trust.long_runs import is_diverged
 
 SETTINGS = [
@@ -86,7 +86,7 @@ def test_second_reading_at_every_instant_helps(settings):
     position = PATHS["orbit"](TIME)
     double = run(measured(position[twice], TIME[twice]), **settings)
     assert rms(double, position[twice]) < rms(run(measured(position), **settings), position)
-    assert (double.sigma[UNCONFIRMED:] > 0).all()
+    assert (double.sigma[begins(double) :] > 0).all()
 
 
 @pytest.mark.parametrize("settings", SETTINGS, ids=str)
@@ -114,7 +114,7 @@ def test_gap_of_half_a_minute(path, settings):
     trajectory = run(log, **settings)
     assert rms(trajectory, position, slice(0, 300)) < 2.5
     assert rms(trajectory, position, AFTER) < 2.5
-    assert (trajectory.sigma[UNCONFIRMED:] > 0).all()
+    assert (trajectory.sigma[begins(trajectory) :] > 0).all()
 
 
 @pytest.mark.parametrize("smooth", [False, True])
@@ -125,7 +125,7 @@ def test_gap_of_minutes_with_recursive_editing(path, seconds, smooth):
     trajectory = run(log, editing="forward", smooth=smooth)
     assert rms(trajectory, position, slice(0, 300)) < 4
     assert rms(trajectory, position, AFTER) < 8
-    assert (trajectory.sigma[UNCONFIRMED:] > 0).all()
+    assert (trajectory.sigma[begins(trajectory) :] > 0).all()
 
 
 @pytest.mark.parametrize("smooth", [False, True])

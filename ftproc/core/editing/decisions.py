@@ -24,10 +24,8 @@ TUNING_ROUNDS = 3
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after these rounds: some would
 # alternate for ever, each time changing what the smoother says of themselves
 STILL = 1e-4  # share of the readings that may still change sides when the decisions stand still
-IMPRECISE = (
-    0.3  # share of the variance that late time stamps make by which they move the components apart: the rates at
-)
-# which these change are not known better, and do not stay the same
+IMPRECISE = 0.3  # share of the variance of late time stamps by which they move the components apart: the rates at which
+# these change are not known better, and do not stay the same
 TAILS, RARE = 0.5, 0.005  # share of what lies outside the gate that lies just outside, and of all readings, to be tails
 MOST_IN_TAILS = 0.05  # share of all readings: of more, nobody knows whether they are tails or outliers
 NORMALLY, FADING = 3.0, 1.0  # times as many as a normal distribution has there, and as farther out

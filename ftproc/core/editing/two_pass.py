@@ -175,7 +175,7 @@ def edit(
     record, decision = _decided(time_s, measurement, known, segment_of, live, short)
     found: list[Step] = []
     for _ in range(0 if live else STEP_ROUNDS):
-        new = steps.find(record, decision) if _told_from_noise(decision) else []
+        new = steps.find(record, decision) if _clear_of_noise(decision) else []
         if not new:
             break
         found, log = sorted([*found, *new], key=lambda s: s.sample), record.weighted(decision.weight)
@@ -196,7 +196,7 @@ def edit(
     return Edited(log, decision.model, decision.starts, smoothed, decision, faults)
 
 
-def _told_from_noise(decision: Decision) -> bool:
+def _clear_of_noise(decision: Decision) -> bool:
     """Whether steps stand out of the noise: not where it is correlated, or where late time stamps or a variance that
     drifts look like many."""
     return not (decision.model.coloured or decision.stamp_s > 0 or decision.drifts)

@@ -24,10 +24,7 @@ LEAST_GAIN, SHARE = 15.0, 0.1  # in log-likelihood, and for each sample, for lat
 STEPS = 30
 WINDOW, SHORTEST_WINDOW = 60, 24  # readings from which a variance is taken, of a long log and of a short one
 FEWEST_WINDOWS = 6
-CHI2_MEDIAN, MEDIAN_SPREAD = (
-    0.45494,
-    2.66,
-)  # of chi-square with one degree: median, and sqrt(n) sigma of its estimate's log
+CHI2_MEDIAN, MEDIAN_SPREAD = 0.45494, 2.66  # of chi-square with one degree, and sqrt(n) sigma of its log's estimate
 SMALLEST = 1e-6  # square of a residual, in sigmas: a component that is computed from others has none
 LEAST_DRIFT = 0.15  # 1-sigma of ln(variance) over the windows, beyond chance
 LARGEST_DRIFT = 6.0  # of ln(variance)

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from ftproc.core.live.window import Window
 
-AGAIN_S, GROWTH, SAMPLES = 0.5, 0.2, 3  # between looks: so long, or this share of the time since it is in doubt, and so
-# many samples
+AGAIN_S, GROWTH = 0.5, 0.2  # between looks: so long, or this share of the time since it is in doubt,
+SAMPLES = 3  # and so many samples
 
 
 class Doubt(NamedTuple):

@@ -62,10 +62,8 @@ class LiveEditor:
         self.next_edit, self.next_refresh = FEWEST, 0
         self.doubt = Doubt()
         self.refreshed = 0  # rows that the last refresh has seen
-        self.smoothed: tuple[int, SmootherRun, FloatArray] | None = (
-            None  # the newest part, from this row on, if there is
-        )
-        # a lag, with its labels
+        # The newest part, from this row on, with its labels, if there is a lag.
+        self.smoothed: tuple[int, SmootherRun, FloatArray] | None = None
 
     @property
     def model(self) -> Model:

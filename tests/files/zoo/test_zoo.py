@@ -16,9 +16,9 @@ from ftproc.records import MeasurementLog
 from ftproc.settings import Station
 from tests.files.zoo.animals import all_animals
 from tests.files.zoo.flight import Animal, flight
-from tests.files.zoo.wild import all_wild
+from tests.files.zoo.others import all_others
 
-ANIMALS = [*all_animals(), *all_wild()]
+ANIMALS = [*all_animals(), *all_others()]
 MOST_QUESTIONS = 0.1  # share of the animals
 
 

@@ -185,6 +185,6 @@ def languages() -> Iterator[Animal]:
         yield _degrees(name, head)
 
 
-def all_wild() -> Iterator[Animal]:
+def all_others() -> Iterator[Animal]:
     for house in (footers, exports, clocks, names, languages):
         yield from house()
