@@ -24,8 +24,8 @@ TUNING_ROUNDS = 3
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after these rounds: some would
 # alternate for ever, each time changing what the smoother says of themselves
 STILL = 1e-4  # share of the readings that may still change sides when the decisions stand still
-IMPRECISE = 0.3  # share of the variance of late time stamps by which they move the components apart: the rates at which
-# these change are not known better, and do not stay the same
+IMPRECISE = (0.3, 0.03, 0.003)  # shares of the variance of late time stamps by which they may move the components
+# apart: the rates at which these change are not known better, and do not stay the same
 TAILS, RARE = 0.5, 0.005  # share of what lies outside the gate that lies just outside, and of all readings, to be tails
 MOST_IN_TAILS = 0.05  # share of all readings: of more, nobody knows whether they are tails or outliers
 NORMALLY, FADING = 3.0, 1.0  # times as many as a normal distribution has there, and as farther out
@@ -66,7 +66,8 @@ class Record(NamedTuple):
 class Decision(NamedTuple):
     """Weights (n, 3), the model and starts they were made with, the estimated outlier rates (3, 3), how many rounds it
     took, whether they stand still, for how many places no work was left to look for alternatives, the 1-sigma of the
-    time stamps, s, whether the noise drifts, and a model with correlated noise that explains the log as well."""
+    time stamps, s, the log-probability of their being as late as they are, whether the noise drifts, and a model with
+    correlated noise that explains the log as well."""
 
     weight: FloatArray
     model: Model
@@ -76,6 +77,7 @@ class Decision(NamedTuple):
     settled: bool = False
     unexamined: int = 0
     stamp_s: float = 0.0
+    stamps: float = 0.0
     drifts: bool = False
     alternative: coloured_noise.Coloured | None = None
 
@@ -102,24 +104,42 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
     )
 
 
-def allow_for_late_stamps(record: Record, decision: Decision) -> tuple[Record, Decision]:
+def allow_for_late_stamps(record: Record, decision: Decision, imprecise: float) -> tuple[Record, Decision]:
     """The record with noise that grows with the rates of the readings, and the decisions made again, if time stamps
-    are late now and then."""
+    are late now and then. imprecise: see IMPRECISE."""
     log = record.weighted(decision.weight)
     smoothed = smooth_log(log, decision.model, decision.starts)
     variance, stamp_variance = uneven_noise.stamp_variance(log, smoothed, decision.model)
     if stamp_variance == 0.0:
         return record, decision
-    uneven = record.uneven or Uneven.none(len(record.time_s))
     late = np.sqrt(stamp_variance) * uneven_noise.rates(smoothed.state)
     variance = np.maximum(variance, record.rounding**2)
     variance = np.where(record.fixed.noise, decision.model.noise_variance, variance)
-    record = record._replace(
-        sigma=np.sqrt(variance), uneven=Uneven(uneven.times + IMPRECISE * late**2 / variance, late)
-    )
+    record = record._replace(sigma=np.sqrt(variance), uneven=_with_late(record, late, variance, imprecise))
     model = median_level(decision.model)._replace(noise_variance=variance)
     found = decision._replace(model=model, stamp_s=float(np.sqrt(stamp_variance)))
     return record, decide(record, found, tune_first=True)
+
+
+def allow_for_very_late_stamps(
+    record: Record, decision: Decision, imprecise: float, even: Record
+) -> tuple[Record, Decision]:
+    """The record with a variance for each time stamp, and the decisions made again: a few may be so late that all
+    readings of their samples, and then those around them, look like outliers. even: the record as it was before late
+    stamps were allowed for."""
+    log = record.weighted(decision.weight)
+    smoothed = smooth_log(log, decision.model, decision.starts)
+    stamps = uneven_noise.each_stamp(log, smoothed, decision.model, decision.stamp_s**2)
+    late = np.sqrt(stamps.variance)[:, None] * uneven_noise.rates(smoothed.state)
+    uneven = _with_late(even, late, decision.model.noise_variance, imprecise)
+    record = even._replace(sigma=record.sigma, uneven=uneven)
+    return record, decide(record, decision._replace(stamps=stamps.log_probability), tune_first=True)
+
+
+def _with_late(record: Record, late: FloatArray, variance: FloatArray, imprecise: float) -> Uneven:
+    """How the noise differs where late stamps add late (n, 3) to the readings, beside noise of variance (3,)."""
+    times = 1.0 if record.uneven is None else record.uneven.times
+    return Uneven(times + imprecise * late**2 / variance, late)
 
 
 def allow_for_tails(record: Record, decision: Decision) -> tuple[Record, Decision]:

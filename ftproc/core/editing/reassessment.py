@@ -122,14 +122,15 @@ def likelier(
 
 
 def _likelihood(record: Record, decision: Decision) -> float:
-    """Log-probability of all readings, of the decisions on them and of the jerk profile."""
+    """Log-probability of all readings, of the decisions on them, of late time stamps and of the jerk profile."""
     model, calm = decision.model, median_level(decision.model)
     log = record.weighted(decision.weight)
     smoothed = smooth_log(log, model, _starts(record, decision.weight, calm), residuals_only=True)
     whole = alternatives.Neighbourhood(
         record.time_s, record.measurement, record.possible, model, decision.rates, record.gate, record.uneven
     )
-    return smoothed.log_likelihood + alternatives.rejections(whole, decision.weight, smoothed) - roughness(model)
+    rejected = alternatives.rejections(whole, decision.weight, smoothed)
+    return smoothed.log_likelihood + rejected + decision.stamps - roughness(model)
 
 
 def _stands_out(time_s: FloatArray, profile: Model) -> NDArray[np.bool_]:

@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 from ftproc.core.editing import jump_patches, outlier_chain, screening, steps
 from ftproc.core.editing.copies import KindArray, without_copies
 from ftproc.core.editing.decisions import (
+    IMPRECISE,
     Decision,
     Record,
     allow_for_colour,
     allow_for_drift,
     allow_for_late_stamps,
     allow_for_tails,
+    allow_for_very_late_stamps,
     decide,
 )
 from ftproc.core.editing.reassessment import likelier, reassess
@@ -46,6 +48,7 @@ COARSE = 0.5  # of a component's noise: rounding that makes so much of it decide
 OUTVOTED = 0.5  # share of a window's parabolas that a reading is off
 FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
 TURN, EDGE = 6, 3  # readings in a row that a turn may have, and on each side of its ends that do not jump
+STAMP_ROUNDS = 3  # of estimating how late each time stamp is
 DRIFT_ROUNDS = 3  # of following the noise: where it grows, each finds readings that the next can follow
 HOPELESS = 200.0  # in log-probability, by which another hypothesis is behind if it is not followed up
 FEW_MORE = 0.01  # of the readings: those that such a hypothesis may reject beyond the others, to be believed
@@ -224,8 +227,7 @@ def _decided(
         other = begin(turns)
         if likelier(found, other, HOPELESS) is other:
             other = _examined(*other, known)
-            if other[1].weight.sum() > found[1].weight.sum() - FEW_MORE * possible.sum():
-                found = likelier(found, other)
+            found = _believed(found, other)
     return found
 
 
@@ -242,12 +244,35 @@ def _first(
 
 def _examined(record: Record, decision: Decision, known: Known) -> tuple[Record, Decision]:
     """The decisions made again where the noise is not even, and where they do not explain the log."""
-    found = (record, decision) if record.white else allow_for_tails(*allow_for_late_stamps(record, decision))
+    found = (record, decision)
+    if not record.white:
+        found = allow_for_tails(*_with_late_stamps(record, decision))
     for _ in range(0 if record.white else DRIFT_ROUNDS):
         before, found = found, likelier(found, allow_for_drift(*found))
         if found is before or found[1].weight.sum() <= before[1].weight.sum():
             break
     return found if known.jerk_psd is not None else (found[0], reassess(*found))
+
+
+def _with_late_stamps(record: Record, decision: Decision) -> tuple[Record, Decision]:
+    """The decisions made again if time stamps are late now and then, and a few of them by far more."""
+    likeliest = (record, decision)
+    for imprecise in IMPRECISE:
+        found = allow_for_late_stamps(record, decision, imprecise)
+        if found[1].stamp_s == 0:
+            break
+        for _ in range(STAMP_ROUNDS):
+            before, found = found, _believed(found, allow_for_very_late_stamps(*found, imprecise, record))
+            if found is before:
+                break
+        likeliest = found if imprecise == IMPRECISE[0] else _believed(likeliest, found)
+    return likeliest
+
+
+def _believed(found: tuple[Record, Decision], other: tuple[Record, Decision]) -> tuple[Record, Decision]:
+    """The other hypothesis, if it is likelier and does not reject many more readings to be so."""
+    least = found[1].weight.sum() - FEW_MORE * found[0].possible.sum()
+    return likelier(found, other) if other[1].weight.sum() > least else found
 
 
 def _may_turn(decision: Decision, jumps_only: FloatArray) -> bool:

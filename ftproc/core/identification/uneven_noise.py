@@ -1,14 +1,15 @@
 """Noise that is not the same for all readings of a component: late time stamps, drifting variance, coarse rounding.
 
 What is found is how many times the variance of a component's noise that of each reading is. Time stamps that are off by
-sigma_t add (sigma_t dz/dt)^2, the same sigma_t for the three components; the variance may drift with elevation, range
-or signal, so slowly that the residuals of a stretch show it; and a reading that repeats the one before, because the
-target has not moved by a rounding step, says nothing new.
+sigma_t add (sigma_t dz/dt)^2, the same sigma_t for the three components; a few stamps may be off by far more. The
+variance may drift with elevation, range or signal, so slowly that the residuals of a stretch show it; and a reading
+that repeats the one before, because the target has not moved by a rounding step, says nothing new.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ FloatArray = NDArray[np.float64]
 
 TAILS = 4.0  # degrees of freedom of the distribution that outliers hardly move
 LEAST_GAIN, SHARE = 15.0, 0.1  # in log-likelihood, and for each sample, for late stamps to be believed
+STAMP_TAILS, STAMP_ROUNDS = 2.0, 100  # degrees of freedom of how late the stamps are: a few, by very much
+STAMP_SCALES = np.logspace(-2, 8, 101)  # of the usual variance of a stamp, for integrals over it
 STEPS = 30
 WINDOW, SHORTEST_WINDOW = 60, 24  # readings from which a variance is taken, of a long log and of a short one
 FEWEST_WINDOWS = 6
@@ -81,6 +84,48 @@ def stamp_variance(log: Observations, smoothed: SmootherRun, model: Model) -> tu
     late = plain - best > max(LEAST_GAIN, SHARE * len(used))
     late = late and math.exp(found[3]) < float(np.median(np.diff(log.time_s))) ** 2  # else they would not be in order
     return np.exp(found[:3]), math.exp(found[3]) if late else 0.0
+
+
+class Stamps(NamedTuple):
+    """How far time stamps are off. variance: (n,) of each, s^2. typical: the usual one, s^2. log_probability: of the
+    stamps being off by anything that Student's distribution allows, against that of these variances."""
+
+    variance: FloatArray
+    typical: float
+    log_probability: float
+
+
+def each_stamp(log: Observations, smoothed: SmootherRun, model: Model, typical: float) -> Stamps:
+    """The variance of each time stamp, if how far they are off has Student's distribution. typical: the usual one to
+    begin with, s^2.
+
+    By expectation and maximisation: what the readings of a sample together say of its stamp, beside what is usual.
+    """
+    uneven = log.uneven or Uneven.none(len(log.time_s))
+    used = np.isfinite(smoothed.residual) & np.isfinite(smoothed.residual_variance)
+    reading = model.noise_variance * uneven.times + uneven.late**2
+    on_time = np.where(used, np.maximum(smoothed.residual_variance - reading, 0.0) + model.noise_variance, 1.0)
+    speed = np.where(used, rates(smoothed.state), 0.0)
+    error = 1 / np.maximum((speed**2 / on_time).sum(1), 1e-300)
+    off2 = (error * (speed * np.where(used, smoothed.residual, 0.0) / on_time).sum(1)) ** 2
+    each = np.full(len(speed), typical)
+    for _ in range(STAMP_ROUNDS):
+        share = each / (each + error)
+        each = (STAMP_TAILS * typical + share * error + share**2 * off2) / (STAMP_TAILS + 1)
+        typical = 1 / float(np.mean(1 / each))
+    # Student's distribution is a mixture of normal ones, whose variances have an inverse gamma distribution.
+    half = 0.5 * STAMP_TAILS
+    mixed, any_off = np.log(STAMP_SCALES), np.zeros_like(off2)
+    weights = half * (-mixed - 1 / STAMP_SCALES)
+    weights = np.exp(weights - weights.max())
+    for weight, scale in zip(weights / weights.sum(), STAMP_SCALES, strict=True):
+        any_off += weight * np.exp(_normal(off2, scale * typical + error))
+    return Stamps(each, typical, float((np.log(any_off) - _normal(off2, each + error)).sum()))
+
+
+def _normal(square: FloatArray, variance: FloatArray) -> FloatArray:
+    """ln(density) of normal distributions of mean zero, without a constant."""
+    return -0.5 * (np.log(variance) + square / variance)
 
 
 def drift(log: Observations, smoothed: SmootherRun) -> FloatArray | None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from scipy import stats
 
 from ftproc.core.editing import screening, two_pass
-from ftproc.core.filtering.records import Uneven
+from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification import uneven_noise
 from ftproc.core.model.frames import from_cartesian, wrap
@@ -18,15 +21,16 @@ from tests.simulated import simulate
 KNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
 
 
-def circle(seed, n=1500, dt=0.1, late_s=0.0, sigma=(0.01, 2e-5, 2e-5), tails=None):
-    """A drone on a wandering circle 80 m away that stands still now and then, and its readings with late stamps."""
+def circle(seed, n=1500, dt=0.1, late_s=0.0, sigma=(0.01, 2e-5, 2e-5), tails=None, very_late=0.0):
+    """A drone on a wandering circle 80 m away that stands still now and then, and its readings with late stamps, of
+    which a share is very late."""
     rng = np.random.default_rng(seed)
     fine = np.arange(-20, n * dt + 20, 0.01)
     speed = np.clip(np.convolve(rng.normal(0, 60, len(fine)), np.ones(600) / 600, "same"), 0, None)
     angle = np.cumsum(speed) * 0.01 / 40
     path = np.stack([80 + 30 * np.cos(angle), 30 * np.sin(angle), 20 + 5 * np.sin(0.7 * angle)], 1)
     time = dt * np.arange(n)
-    seen = time + late_s * rng.standard_normal(n)
+    seen = time + late_s * rng.standard_normal(n) * np.where(np.random.default_rng(seed).random(n) < very_late, 20, 1)
     position, moved = (np.stack([np.interp(t, fine, p) for p in path.T], 1) for t in (time, seen))
     noise = rng.standard_normal((n, 3)) if tails is None else rng.standard_t(tails, (n, 3))
     z = from_cartesian(moved) + np.array(sigma) * noise
@@ -72,6 +76,51 @@ def test_late_stamps_are_found_and_are_no_outliers():
     assert found.decision.stamp_s == pytest.approx(0.01, rel=0.3)
     error = np.abs(found.smoothed.state[:, :3] - truth)
     assert (error < 3 * found.smoothed.sigma[:, :3]).mean() > 0.9
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(("seed", "very_late"), [(7, 0.03), (8, 0.03), (8, 0.0)])
+def test_the_track_does_not_follow_late_stamps(seed, very_late):
+    """Three of a hundred stamps are off by 0.2 s, when all readings of a sample are off by as much as 1 m."""
+    time, z, truth = circle(seed, n=900, late_s=0.01, very_late=very_late)
+    found = two_pass.edit(time, z, KNOWN)
+    assert (found.weight == 0).mean() < 0.03
+    assert np.linalg.norm(found.smoothed.state[:, :3] - truth, axis=1).std() < 0.03
+
+
+def test_a_stamp_that_is_very_late_is_given_a_variance_of_its_own():
+    time, z, truth = circle(7, n=600, late_s=0.002)
+    speed = np.gradient(truth, time, axis=0)
+    state = np.hstack([truth, speed, np.zeros_like(truth)])
+    residual = np.random.default_rng(1).normal(size=z.shape) * [0.01, 2e-5, 2e-5] + 0.002 * uneven_noise.rates(state)
+    fast = np.argsort(-np.linalg.norm(speed, axis=1))[:5]
+    residual[fast] += 0.3 * uneven_noise.rates(state[fast])
+    noise = np.array([0.01, 2e-5, 2e-5]) ** 2
+    smoothed = SimpleNamespace(residual=residual, residual_variance=np.tile(noise, (len(z), 1)), state=state)
+    log = Observations(time, z, np.ones_like(z))
+    stamps = uneven_noise.each_stamp(log, smoothed, Model(noise, np.ones((1, 3))), 0.01**2)
+    assert np.sqrt(stamps.variance[fast]) == pytest.approx(np.full(5, 0.3 / np.sqrt(3)), rel=0.1)
+    assert np.median(np.sqrt(stamps.variance)) < 0.005
+
+
+@pytest.mark.parametrize(("tails", "favoured"), [(None, False), (2.0, True)])
+def test_log_probability_of_stamps(tails, favoured):
+    """Student's distribution, integrated on a fine grid, of errors of the stamps that are known almost exactly."""
+    rng = np.random.default_rng(3)
+    late = 0.01 * (rng.standard_normal(2000) if tails is None else rng.standard_t(tails, 2000))
+    state = np.tile([100.0, 0, 0, 10.0, 0, 0, 0, 0, 0], (2000, 1))
+    residual = np.full((2000, 3), np.nan)
+    residual[:, 0] = 10 * late
+    variance = np.full((2000, 3), 1e-8)
+    smoothed = SimpleNamespace(residual=residual, residual_variance=variance, state=state)
+    log = Observations(np.arange(2000.0), residual, np.isfinite(residual).astype(float))
+    stamps = uneven_noise.each_stamp(log, smoothed, Model(np.full(3, 1e-8), np.ones((1, 3))), 0.01**2)
+    scale = np.sqrt(stamps.typical)
+    students = stats.t.logpdf(late / scale, 2) - np.log(scale)
+    each = stats.norm.logpdf(late, scale=np.sqrt(stamps.variance + 1e-10))
+    assert stamps.log_probability == pytest.approx((students - each).sum(), rel=0.02)
+    usual = stats.norm.logpdf(late, scale=late.std())
+    assert (students.sum() > usual.sum()) == favoured
 
 
 @pytest.mark.compiled
