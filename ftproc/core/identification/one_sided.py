@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import Observations
 from ftproc.core.filtering.smoother import SmootherRun
+from ftproc.core.identification import optimizer
 
 FloatArray = NDArray[np.float64]
 
@@ -25,6 +26,7 @@ FLAT, FINE = 0.2, 0.4  # the same of what is missing to the kurtosis of 3, where
 LEANS = 0.15  # skewness from which it is clear on which side the errors are
 LEAST_GAIN = 10.0  # in log-likelihood, over errors of either sign
 LEAST_SHARE = 0.15  # of the readings
+LARGEST, STEPS, TOLERANCE = 6.0, 100, 1e-4  # of a parameter of the fit; of the search for it, and its last gain
 CAUTION = 2.0  # times the standard error that the peak would have, if the honest readings were known
 
 
@@ -92,31 +94,47 @@ class _Fit(NamedTuple):
 
 def _likeliest(residual: FloatArray, both: bool) -> _Fit:
     """The fit to residuals (n,) with errors above zero, or of either sign."""
-    from scipy.optimize import minimize
-    from scipy.special import expit, log_ndtr  # for logs with such errors only
 
-    def exponential(x: FloatArray, sigma: float, error: float) -> FloatArray:
-        """Log-density of normal noise plus an exponential error."""
-        density: FloatArray = (
-            0.5 * (sigma / error) ** 2 - x / error - math.log(error) + log_ndtr(x / sigma - sigma / error)
-        )
-        return density
+    def cost(theta: FloatArray) -> tuple[float, FloatArray]:
+        found, slope = _log_density(residual - theta[0], theta, both)
+        return -float(found.sum()), -slope.sum(1)
 
-    def natural(theta: FloatArray) -> tuple[float, float, float, float]:
-        place, log_sigma, odds, log_error = (float(v) for v in theta)
-        return place, math.exp(log_sigma), float(expit(odds)), math.exp(log_error)
+    curvature, bound = np.full(4, len(residual) / 4), np.full(4, LARGEST)
+    tries = []
+    for size in (0.7, 2.0):
+        start = np.array([0.0 if both else -0.7, math.log(0.5), 0.0, math.log(size)])
+        theta = optimizer.minimise(cost, start, curvature, -bound, bound, STEPS, TOLERANCE)
+        tries.append((cost(theta)[0], theta))
+    least, (place, log_sigma, odds, log_error) = min(tries, key=lambda each: each[0])
+    return _Fit((float(place), math.exp(log_sigma), 1 / (1 + math.exp(-odds)), math.exp(log_error)), -least)
 
-    def cost(theta: FloatArray) -> float:
-        place, sigma, share, error = natural(np.clip(theta, -6.0, 6.0))
-        x = residual - place
-        plain = -0.5 * (x / sigma) ** 2 - math.log(sigma) - 0.5 * math.log(2 * math.pi)
-        wrong = exponential(x, sigma, error)
-        if both:
-            wrong = np.logaddexp(wrong, exponential(-x, sigma, error)) - math.log(2)
-        return -float(np.sum(np.logaddexp(math.log1p(-share) + plain, math.log(share) + wrong)))
 
-    starts = [np.array([0.0 if both else -0.7, math.log(0.5), 0.0, math.log(size)]) for size in (0.7, 2.0)]
-    found = min(
-        (minimize(cost, s, method="Nelder-Mead", options={"maxiter": 400}) for s in starts), key=lambda f: f.fun
-    )
-    return _Fit(natural(np.clip(found.x, -6.0, 6.0)), -float(found.fun))
+def _log_density(x: FloatArray, theta: FloatArray, both: bool) -> tuple[FloatArray, FloatArray]:
+    """(n,) log-density of errors x, and (4, n) its derivatives by the parameters: place, ln(1-sigma) of the noise,
+    log-odds and ln(mean) of the errors that add to it."""
+    sigma, error, odds = math.exp(theta[1]), math.exp(theta[3]), theta[2]
+    rare, usual = -math.log1p(math.exp(-odds)), -math.log1p(math.exp(odds))
+    plain = usual - 0.5 * (x / sigma) ** 2 - math.log(sigma) - 0.5 * math.log(2 * math.pi)
+    sides = [_exponential(sign * x, sigma, error) for sign in ((1.0, -1.0) if both else (1.0,))]
+    wrong = [rare + density - math.log(len(sides)) for density, _ in sides]
+    total = np.logaddexp.reduce([plain, *wrong])
+    share = np.exp(plain - total)
+    slope = share * np.stack([x / sigma**2, (x / sigma) ** 2 - 1, np.full_like(x, -math.exp(rare)), 0 * x])
+    for density, (_, (by_x, by_sigma, by_error)), sign in zip(wrong, sides, (1.0, -1.0), strict=False):
+        share = np.exp(density - total)
+        slope += share * np.stack([-sign * by_x, by_sigma, np.full_like(x, math.exp(usual)), by_error])
+    return total, slope
+
+
+def _exponential(x: FloatArray, sigma: float, error: float) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+    """(n,) log-density of normal noise plus an exponential error, and its derivatives by x, ln(sigma) and ln(error)."""
+    from scipy.special import log_ndtr  # for logs with such errors only
+
+    z = x / sigma - sigma / error
+    below = log_ndtr(z)
+    ratio = np.exp(-0.5 * z**2 - 0.5 * math.log(2 * math.pi) - below)
+    density = 0.5 * (sigma / error) ** 2 - x / error - math.log(error) + below
+    by_x = ratio / sigma - 1 / error
+    by_sigma = (sigma / error) ** 2 - ratio * (x / sigma + sigma / error)
+    by_error = x / error - (sigma / error) ** 2 - 1 + ratio * sigma / error
+    return density, (by_x, by_sigma, by_error)

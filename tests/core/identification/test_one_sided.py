@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from ftproc.core.filtering.records import Observations
 from ftproc.core.filtering.smoother import SmootherRun
@@ -66,3 +67,20 @@ def test_flat_errors_of_coarse_rounding_are_no_fault():
     log, run, scale = residuals(noise)
     assert one_sided.find(log, run, FINE) != []
     assert one_sided.find(log, run, scale / np.sqrt(3)) == []
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_density_is_the_convolution_and_its_slope_the_derivative(both):
+    theta = np.array([0.1, -0.3, 0.4, 0.2])
+    x = np.linspace(-4.0, 6.0, 23)
+    found, slope = one_sided._log_density(x - theta[0], theta, both)
+    sigma, share, error = np.exp(theta[1]), 1 / (1 + np.exp(-theta[2])), np.exp(theta[3])
+    late = np.linspace(0.0, 60.0, 200_001)
+    normal = stats.norm(scale=sigma).pdf
+    for k, off in enumerate(x - theta[0]):
+        sides = [np.trapezoid(normal(sign * off - late) * np.exp(-late / error) / error, late) for sign in (1, -1)]
+        wrong = sum(sides) / 2 if both else sides[0]
+        assert found[k] == pytest.approx(np.log((1 - share) * normal(off) + share * wrong), abs=1e-6)
+    for k, step in enumerate(1e-6 * np.eye(4)):
+        above, below = (one_sided._log_density(x - t[0], t, both)[0] for t in (theta + step, theta - step))
+        np.testing.assert_allclose(slope[k], (above - below) / 2e-6, atol=1e-6)
