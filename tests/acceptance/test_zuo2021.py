@@ -74,11 +74,11 @@ def test_smoother_is_below_the_filter(share, bound):
     assert smoothed.max() <= 2 * bound
 
 
-@pytest.mark.parametrize("gain_form", [False, True])
-@pytest.mark.parametrize(("share", "bound"), FORWARD.items())
-def test_recursive_editing(share, bound, gain_form):
+@pytest.mark.parametrize(("share", "gain_form"), [*((share, False) for share in FORWARD), (0.1, True)])
+def test_recursive_editing(share, gain_form):
     """The paper's gate, with R divided by its weight m and, to the letter, with the gain multiplied by it. It knows at
     each sample only those before it."""
+    bound = FORWARD[share]
     flights = [flight(seed, share) for seed in SEEDS]
     found = [error(f.log, f.truth.position_m, editing="forward", gain_form=gain_form) for f in flights]
     assert np.median(found) <= bound
@@ -89,7 +89,7 @@ def test_recursive_editing(share, bound, gain_form):
 @pytest.mark.parametrize("method", ["ukf", "ekf"])
 def test_filters_without_editing(method):
     """As good on the clean flight; so far off with outliers that no bound above could be kept without editing."""
-    for share in (0.0, *SHARES):
+    for share in (0.0, 0.1):
         flights = [flight(seed, share) for seed in SEEDS]
         found = np.mean([error(f.log, f.truth.position_m, method=method) for f in flights])
         assert found > 8 if share else found <= 0.72

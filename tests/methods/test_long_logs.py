@@ -16,12 +16,13 @@ from ftproc.settings import FilterSettings
 from tests.simulated import simulate
 
 UNKNOWN = np.full(3, np.nan)
+GIVEN = {"noise": (5.0, 1e-4, 1e-4), "jerk_psd_m2ps5": 10.0}
 SPEC = "isolated=0.03:6-300,offset=4:8-30:8-200,nan=0.01,gap=3:4-20"
 
 
 @pytest.fixture(scope="module")
 def flight():
-    return simulate("manoeuvre", seed=3, duration_s=700.0, dt_s=0.1, outliers=SPEC)
+    return simulate("manoeuvre", seed=3, duration_s=420.0, dt_s=0.1, outliers=SPEC)
 
 
 def start_of(log, rows):
@@ -41,14 +42,12 @@ def kept(parts):
     }
 
 
-@pytest.mark.parametrize(
-    "given", [{}, {"noise": (5.0, 1e-4, 1e-4), "jerk_psd_m2ps5": 10.0}], ids=["found", "specified"]
-)
+@pytest.mark.parametrize("given", [{}, GIVEN], ids=["found", "specified"])
 @pytest.mark.parametrize("block", [300, 1000])
 def test_recursion_in_blocks_is_the_recursion_bit_for_bit(flight, given, block):
     settings = FilterSettings(editing="forward", **given)
     log = replace(flight.log, measurement=flight.log.measurement.copy())
-    log.measurement[2500:3500, 2] = np.nan  # longer than a block, and than what is remembered
+    log.measurement[2500:3600, 2] = np.nan  # longer than a block, and than what is remembered
     whole = list(live.parts(record(log), settings, len(log)))
     parts = list(live.parts(record(log), settings, block))
     assert len(parts) == -(-len(log) // block)
@@ -65,7 +64,7 @@ def test_run_of_outliers_over_a_seam_has_one_label_also_where_another_component_
     log.measurement[1000:, 2] = np.nan
     # Two lie before the seam, and what makes it a patch behind it.
     log.measurement[1198:1205, 0] += [800, -900, 1200, -700, 1000, -800, 900]
-    settings = FilterSettings(editing="forward", noise=(5.0, 1e-4, 1e-4), jerk_psd_m2ps5=10.0)
+    settings = FilterSettings(editing="forward", **GIVEN)
     one = kept(live.parts(record(log), settings, len(log)))
     many = kept(live.parts(record(log), settings, 300))
     np.testing.assert_array_equal(many["label"], one["label"])
@@ -75,7 +74,7 @@ def test_run_of_outliers_over_a_seam_has_one_label_also_where_another_component_
 def test_start_later_than_the_first_block(flight):
     log = replace(flight.log, measurement=flight.log.measurement.copy())
     log.measurement[:900, 0] = np.nan
-    settings = FilterSettings(editing="forward", noise=(5.0, 1e-4, 1e-4), jerk_psd_m2ps5=10.0)
+    settings = FilterSettings(editing="forward", **GIVEN)
     one = kept(live.parts(record(log), settings, len(log)))
     many = kept(live.parts(record(log), settings, 300))
     np.testing.assert_array_equal(many["state"], one["state"])
@@ -116,9 +115,9 @@ def test_segments_agree_with_the_whole(in_segments, smooth):
     assert error[1] < 1.05 * error[0]
 
 
-def test_segments_are_the_same_in_any_number_of_threads(flight, in_segments):
+def test_segments_are_the_same_in_any_number_of_threads(in_segments):
     in_segments(1500, 800, 200)
-    log = start_of(flight.log, 3000)
+    log = simulate("manoeuvre", seed=3, duration_s=300.0, dt_s=0.1, outliers="isolated=0.03:6-300,nan=0.01").log
     found = []
     for count in (1, 3):
         threads.use(count)
@@ -134,23 +133,24 @@ def test_segment_without_a_component_looks_farther(flight, in_segments):
     """The elevation is missing throughout a segment and its margins: the neighbours' readings carry it through."""
     log = start_of(flight.log, 2600)
     log.measurement[800:1700, 2] = np.nan
-    whole = pipeline.filter_log(log)
+    settings = FilterSettings(**GIVEN)
+    whole = pipeline.filter_log(log, settings)
     in_segments(1200, 500, 50)
-    cut = pipeline.filter_log(log)
+    cut = pipeline.filter_log(log, settings)
     assert np.isfinite(cut.state).all()
     good = np.r_[0:750, 1800 : len(log)]
     away = np.abs(cut.state[good, :3] - whole.state[good, :3]) / whole.sigma[good, :3]
     assert np.median(away) < 0.3
     inside = (1040, 1560)
     assert inside in anti_outlier.segments(record(log))
-    part = anti_outlier._segment(record(log), FilterSettings(), None, inside)
+    part = anti_outlier._segment(record(log), settings, None, inside)
     assert part.first < 800
     assert (part.estimate.run.since_start[part.low : part.high] > 0).all()
 
 
 def test_specified_noise_is_taken(flight, in_segments):
-    in_segments(3000, 2000, 300)
-    cut = pipeline.filter_log(flight.log, FilterSettings(noise=(7.0, None, None), jerk_psd_m2ps5=5.0))
+    in_segments(1500, 1000, 200)
+    cut = pipeline.filter_log(start_of(flight.log, 2000), FilterSettings(noise=(7.0, None, None), jerk_psd_m2ps5=5.0))
     settings = cut.metadata["settings"]
     assert settings["noise_range_m"] == pytest.approx(7.0)
     assert cut.metadata["summary"]["jerk_psd_m2ps5"]["median"] == pytest.approx(5.0)
