@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ftproc.errors import quoted
 from ftproc.files import conventions
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.schema import Column, listed
+from ftproc.files.words import NOT_UNITS
+from ftproc.records import COMPONENTS
 from ftproc.settings import Station
 
 Understood = Mapping[str, Any]
@@ -26,14 +30,15 @@ def describe(
     epoch: of the times. conventions: of the angles, and what was corrected. doubts: each with the option that settles
     it."""
     used = {place for column in found.values() for place in column.positions}
+    unused = [name for place, name in enumerate(header.names) if place not in used and name]
     return {
         "file": header.form or "table",
         "columns": {quantity: _column(column) for quantity, column in found.items()},
-        "not_used": [name for place, name in enumerate(header.names) if place not in used and name],
+        "not_used": unused,
         "clock": clock.words,
         "epoch": clock.epoch,
         "conventions": _conventions(station, found),
-        "doubts": [*_others(found), *doubts, *clock.doubts, *_axis(station, found)],
+        "doubts": [*_others(found), *_absent(found, unused), *doubts, *clock.doubts, *_axis(station, found)],
     }
 
 
@@ -59,6 +64,14 @@ def _others(found: Mapping[str, Column]) -> list[str]:
         for quantity, column in found.items()
         if column.others
     ]
+
+
+def _absent(found: Mapping[str, Column], unused: Sequence[str]) -> list[str]:
+    """A question for each quantity that is not there, where a column is left that may be it."""
+    names = [taken_apart(name) for name in unused]
+    free = [quoted(name.text) for name in names if not (name.foreign or NOT_UNITS & {*name.words})]
+    absent = [quantity for quantity in COMPONENTS if quantity not in found]
+    return [f"nothing is taken for the {q}: if {free[0]} is it, say --columns {q}={free[0]}" for q in absent if free]
 
 
 def _axis(station: Station, found: Mapping[str, Column]) -> list[str]:

@@ -8,7 +8,8 @@ from ftproc.errors import InputError
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import parse_units
 from ftproc.files.reading.meaning.schema import remarks, resolve
-from ftproc.files.units import ALIASES, UNITS
+from ftproc.files.units import UNITS
+from ftproc.files.words import ALIASES
 
 
 def found(

@@ -60,7 +60,7 @@ def _large_file(name: str, path: Path) -> TableHeader:
         return split(name, content.read(name, path, known=before)).load(numeric, others)
 
     def blocks(numeric: Sequence[int]) -> Blocks | None:
-        if head.encoding.startswith("UTF"):
+        if head.encoding:  # in which the rows are elsewhere than in UTF-8
             return None
         rows = max(bytes(head.body).count(b"\n"), 1) * before.st_size // _HEAD
         return Blocks((text.load(numeric, ()) for text in in_blocks(path, head, before)), rows)

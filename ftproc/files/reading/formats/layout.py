@@ -13,7 +13,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ftproc.errors import InputError
-from ftproc.files.units import QUANTITIES, unit_named
+from ftproc.files.units import unit_named
+from ftproc.files.words import QUANTITIES
 
 #: How comment lines begin. A semicolon does so too, where it is not the separator.
 COMMENTS = ("#", "%", "//", "!", "*", "REM ", "C ")

@@ -6,14 +6,15 @@ import re
 import unicodedata
 from typing import NamedTuple
 
-from ftproc.files.units import (
+from ftproc.files.units import unit_named
+from ftproc.files.words import (
     ALIASES,
-    ANGLES_BY_UNIT,
+    ONLY_BY_UNIT,
     QUALIFIERS,
     QUANTITIES,
     WEAK_ALIASES,
     ZENITH_ALIASES,
-    unit_named,
+    plain_letters,
 )
 
 _BRACKETS = re.compile(r"(.*?)[\s_.,:/-]*[(\[{<]\s*(.*?)\s*[)\]}>]\s*")
@@ -50,7 +51,7 @@ class Name(NamedTuple):
     def means(self, quantity: str) -> int:
         """0: not this quantity; 1: by one of its names; 2: by a name that other things have too."""
         unit = unit_named(quantity, self.unit) if self.unit else None
-        if self.foreign or (self.unit and unit is None) or (self.stem in ANGLES_BY_UNIT and unit is None):
+        if self.foreign or (self.unit and unit is None) or (self.stem in ONLY_BY_UNIT and unit is None):
             return 0
         for rank, aliases in ((1, ALIASES), (2, WEAK_ALIASES)):
             if self.stem in aliases[quantity]:
@@ -70,7 +71,7 @@ class Name(NamedTuple):
 
 def taken_apart(text: str, unit: str = "") -> Name:
     """A name, and the cell under it in a row of units (which wins)."""
-    plain = unicodedata.normalize("NFC", text).strip().strip("\"'#%;!").strip()
+    plain = unicodedata.normalize("NFKC", text.replace("º", "°")).strip().strip("\"'#%;!:").strip()
     plain = _VALUE.sub("", plain)
     found, notation, foreign = "", "", False
     bracketed = _BRACKETS.fullmatch(plain)
@@ -153,10 +154,7 @@ def _words(text: str) -> tuple[str, tuple[str, ...], str]:
     parts = _NOT_WORDS.split(last.lower())
     if not re.search(r"[^\W\d_]", last) or all(part in QUALIFIERS for part in parts if part):  # such as Az.Angle
         context, last = "", text
-    spaced = unicodedata.normalize("NFKD", _CAMEL.sub(" ", last)).lower()
-    spaced = "".join(letter for letter in spaced if not unicodedata.combining(letter))
-    spaced = unicodedata.normalize("NFC", spaced)
-    words = tuple(word for word in _NOT_WORDS.split(spaced) if word)
+    words = tuple(word for word in _NOT_WORDS.split(plain_letters(_CAMEL.sub(" ", last))) if word)
     if len(words) > 1 and words[0].isdigit():  # such as 048_040_RHO
         digits = [k for k, word in enumerate(words) if word.isdigit()]
         cut = next((k for k in range(len(words)) if k not in digits), 0)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from ftproc.files.reading.meaning.names import Name
-from ftproc.files.units import ALIASES, WEAK_ALIASES
+from ftproc.files.words import ALIASES, WEAK_ALIASES
 
 _SECONDS_OF_WEEK = frozenset(
     ["tow", "sow", "gpstow", "gpssow", "timeofweek", "secondsofweek", "secofweek", "itow", "gpsseconds", "weekseconds"]

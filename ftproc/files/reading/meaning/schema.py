@@ -21,7 +21,8 @@ from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
 from ftproc.files.reading.meaning import parts
 from ftproc.files.reading.meaning.names import Name, taken_apart
-from ftproc.files.units import ALIASES, EITHER_ANGLE, GERMAN, NOT_UNITS, QUANTITIES, UNITS, Unit, si_unit, unit_named
+from ftproc.files.units import UNITS, Unit, si_unit, unit_named
+from ftproc.files.words import ALIASES, EITHER_ANGLE, GERMAN, NOT_UNITS, QUANTITIES
 
 #: Words of NOT_UNITS with which a column may still be the quantity.
 _OF_THE_QUANTITY = frozenset(["true", "corr", "raw", "ref"])
