@@ -17,7 +17,7 @@ from ftproc.files.reading.clocks import joint, times
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.meaning import plausibility, readings, rows, schema, several
+from ftproc.files.reading.meaning import plausibility, proposal, readings, rows, schema, several
 from ftproc.files.reading.meaning.numbers import Origin
 from ftproc.records import FloatArray, IntArray, MeasurementLog
 from ftproc.settings import Station
@@ -45,7 +45,7 @@ class _Plan(NamedTuple):
 
 class _Converted(NamedTuple):
     """quantities: in SI units. found: the columns with the units that their cells show. notes: what was done.
-    undecided: see `readings.Readings`."""
+    undecided: see `readings.undecided`."""
 
     quantities: dict[str, FloatArray]
     found: Found
@@ -89,7 +89,8 @@ def read(
     conventions.check(station)
     unit_of, column_of = parse_units(units), parse_columns(columns)
     header = tables.read_header(source, extract.widths)
-    found = schema.resolve(header.source, header.names, unit_of, column_of, header.units)
+    propose = proposal.by_values(header)
+    found = schema.resolve(header.source, header.names, unit_of, column_of, header.units, propose)
     plan = _Plan(header, found, station, _conditions(header, extract), one_target=bool(extract.target))
     if keep_columns:
         wanted = plan.positions()
@@ -252,7 +253,8 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
     decided = dict(found)
     notes: list[str] = []
     clock = Clock(np.empty(0), "", "")
-    place, undecided = 0, False
+    read_here: dict[str, readings.Readings] = {}
+    place = 0
     for quantity, column in found.items():
         mine = columns[place : place + len(column.positions)]
         place += len(mine)
@@ -267,12 +269,13 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
                 clock = times.read(mine[0], origin, column)
             quantities[quantity] = clock.time_s
             continue
-        found_here = readings.read(mine, origin, column)
-        decided[quantity] = found_here.column
-        quantities[quantity] = found_here.column.unit.to_si(found_here.values)
-        notes += found_here.notes
-        undecided = undecided or found_here.undecided
-    return _Converted(quantities, decided, clock, tuple(notes), undecided)
+        read_here[quantity] = readings.read(mine, origin, column)
+    read_here = readings.without_sentinels(read_here)
+    for quantity, each in read_here.items():
+        decided[quantity] = each.column
+        quantities[quantity] = each.column.unit.to_si(each.values)
+        notes += each.notes
+    return _Converted(quantities, decided, clock, tuple(notes), readings.undecided(read_here))
 
 
 def _in_time_order(source: str, quantities: Mapping[str, FloatArray], extra: pa.Table | None) -> MeasurementLog:

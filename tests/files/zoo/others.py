@@ -99,7 +99,7 @@ def exports() -> Iterator[Animal]:
     yield Animal("two files put together", written("a.csv", text), first_s=0)
     sentences = zip(clock(F.moments(), "%H%M%S.%f"), F.r, F.a, F.e, strict=True)
     text = "".join(f"$PTRK,{c},{r:.4f},{a:.8f},{e:.8f},*42\n" for c, r, a, e in sentences)
-    said = {"asks": "--columns time=1,range=2", "answer": {"columns": "time=2,range=3,azimuth=4,elevation=5"}}
+    said = {"asks": "--columns time=2,range=3", "answer": {"columns": "time=2,range=3,azimuth=4,elevation=5"}}
     yield Animal("sentences", written("a.txt", text), first_s=SOD, **said)
     columns = (STAMPS.tolist(), F.r.tolist(), F.a.tolist(), F.e.tolist())
     nested = [

@@ -41,6 +41,8 @@ _UNNAMED = {
     "DOY": r"\s*\d{1,3}\s+\d{1,2}:\d{2}",
     "row": r"\s*\"?(\d+)\"?\s",  # as R numbers them
 }
+_NUMBERED = re.compile(r"^\d+\s*[:=)]\s*(?=[^\W\d])")  # a number before a name: `1:time`
+_ENUMERATED = re.compile(r"[\s#%;*]*(?:columns?|col|fields?)?[\s.]*#?(\d+)\s*[:=.)-]\s*([^\W\d].*)", re.IGNORECASE)
 _NOTHING = re.compile(r"\s*[\"']?(nan|null|none|n/?a|nil|[-*?.]+|)[\"']?\s*", re.IGNORECASE)
 
 
@@ -104,7 +106,7 @@ def _longest(filled: Sequence[int], rows: dict[int, list[str]]) -> tuple[int, in
             length += 1
         elif fits:
             start, length, width = index, 1, len(cells)
-        elif length and _is_empty_row(cells, width):
+        elif length and len(cells) == width and (_is_empty_row(cells) or is_data(cells[:1])):
             length += 1
         else:
             length = 0
@@ -113,8 +115,8 @@ def _longest(filled: Sequence[int], rows: dict[int, list[str]]) -> tuple[int, in
     return best
 
 
-def _is_empty_row(cells: Sequence[str], width: int) -> bool:
-    return len(cells) == width and all(_NOTHING.fullmatch(cell) for cell in cells)
+def _is_empty_row(cells: Sequence[str]) -> bool:
+    return all(_NOTHING.fullmatch(cell) for cell in cells)
 
 
 def is_comment(text: str) -> bool:
@@ -130,11 +132,10 @@ def _with_names(
     width = len(rows[filled[start]])
     block = [lines[number] for number in filled[start : start + 50]]
     top = start
-    while (
-        top
-        and not _RULE.fullmatch(lines[filled[top - 1]])
-        and (is_data(rows[filled[top - 1]], strictly=True) or _is_empty_row(rows[filled[top - 1]], width))
-    ):
+    while top and not _RULE.fullmatch(lines[filled[top - 1]]):
+        above = rows[filled[top - 1]]
+        if not (is_data(above, strictly=True) or (len(above) == width and _is_empty_row(above))):
+            break
         top -= 1
     units: list[str] = []
     place = top - 1
@@ -145,8 +146,9 @@ def _with_names(
         if cells is not None and _is_units(cells) and place:
             units, place = cells, place - 1
     names = None if place < 0 else _heading(lines[filled[place]], separator, width, block, widths)
-    if names is not None and sum(bool(_CELL.fullmatch(name)) for name in names) > len(names) / 2:
+    if names is not None and sum(bool(_CELL.fullmatch(_NUMBERED.sub("", name))) for name in names) > len(names) / 2:
         names = None
+    names = _enumerated([lines[number] for number in filled[:top]], width) or names
     if names is None and top < start:  # the numbers above belong to something else
         return _with_names(lines, filled, start, separator, {**rows, **{n: [""] for n in filled[top:start]}}, widths)
     if names is None and place >= 0 and top - place == 1 and (cells := _mismatched(lines[filled[place]], separator)):
@@ -157,6 +159,12 @@ def _with_names(
         units = []
     first = filled[top]
     return Layout(found, first, separator, units, max(place, 0) if names is not None else top, names is not None, width)
+
+
+def _enumerated(above: Sequence[str], width: int) -> list[str] | None:
+    """The names of columns that lines above the table number: `Column 2: range (m)`."""
+    found = {int(match[1]): match[2].strip() for line in above if (match := _ENUMERATED.fullmatch(line))}
+    return [found[k] for k in range(1, width + 1)] if sorted(found) == list(range(1, width + 1)) else None
 
 
 def _mismatched(line: str, separator: str) -> list[str]:

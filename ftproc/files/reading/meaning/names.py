@@ -21,6 +21,7 @@ _BRACKETS = re.compile(r"(.*?)[\s_.,:/-]*[(\[{<]\s*(.*?)\s*[)\]}>]\s*")
 _LAST = re.compile(r"(.*\S)(?:\s*/\s*|\s+in\s+|\s*,\s*|[\s_.-]+)(\S+)", re.IGNORECASE)
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 _NOT_WORDS = re.compile(r"(?:[^\w°]|_)+")
+_NUMBERED = re.compile(r"^\d+\s*[:=)]\s*(?=[^\W\d])")  # the number of a column before its name
 _VALUE = re.compile(r"[._/](val|value)$", re.IGNORECASE)  # how decoders end the path of a value
 
 #: Units of other quantities, by which a column is known for something else.
@@ -32,7 +33,12 @@ _FOREIGN = frozenset(
     ]
 )
 #: Words in brackets that are notations of a time or an angle.
-NOTATIONS = frozenset(["utc", "gps", "gpst", "hms", "hhmmss", "dms", "ddmmss", "dddmmss", "dmmss", "zulu", "z", "tai"])
+NOTATIONS = frozenset(
+    [
+        *("utc", "gps", "gpst", "hms", "hhmmss", "dms", "ddmmss", "dddmmss", "dmmss", "zulu", "z", "tai"),
+        *("t", "true"),  # from true north
+    ]
+)
 
 
 class Name(NamedTuple):
@@ -72,7 +78,7 @@ class Name(NamedTuple):
 def taken_apart(text: str, unit: str = "") -> Name:
     """A name, and the cell under it in a row of units (which wins)."""
     plain = unicodedata.normalize("NFKC", text.replace("º", "°")).strip().strip("\"'#%;!:").strip()
-    plain = _VALUE.sub("", plain)
+    plain = _VALUE.sub("", _NUMBERED.sub("", plain))
     found, notation, foreign = "", "", False
     bracketed = _BRACKETS.fullmatch(plain)
     if bracketed:

@@ -60,12 +60,22 @@ class Origin(NamedTuple):
 
 def numbers(column: pa.ChunkedArray, origin: Origin) -> FloatArray:
     """(n,) float64, NaN where missing. Raises InputError for the first cell that is no finite number."""
+    return finite(loosely(column, origin), origin)
+
+
+def loosely(column: pa.ChunkedArray, origin: Origin) -> FloatArray:
+    """(n,) float64, NaN where missing, perhaps infinite. Raises InputError for the first cell that is no number."""
     values = without_text(column)
     if values is None:
         text = as_text(column)
         values = parsed(text, origin.decimal_comma)
         if values is None:
             raise origin.first_bad_cell(text, not_a_number(text, origin.decimal_comma))
+    return values
+
+
+def finite(values: FloatArray, origin: Origin) -> FloatArray:
+    """The values. Raises InputError for the first that is infinite."""
     infinite = np.isinf(values)
     if infinite.any():
         row = int(np.argmax(infinite))

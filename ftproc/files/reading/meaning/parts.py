@@ -85,8 +85,9 @@ def _angle(quantity: str, names: Mapping[int, Name]) -> dict[str, int] | None:
     for stem in (*ALIASES[quantity], *WEAK_ALIASES[quantity]):
         mine = {place: name for place, name in names.items() if name.stem == stem}
         roles = {role: _only(mine, partial(_has_unit, words)) for role, words in _ANGLE.items()}
-        if len(mine) >= 3 and None not in roles.values():
-            return {role: place for role, place in roles.items() if place is not None}
+        known = {role: place for role, place in roles.items() if place is not None}
+        if len(known) == len(mine) > 1 and {"deg", "min"} <= set(known):
+            return known
     return None
 
 
