@@ -63,7 +63,7 @@ WEAK_ALIASES: Mapping[str, tuple[str, ...]] = {
         """
     ),
     "azimuth": _split("theta hz horizontalangle horizontaldirection hzangle hangle ha horangle horizangle аз β"),
-    "elevation": _split("v verticalangle vertangle vangle va elv alt altitude site ум ε"),
+    "elevation": _split("v verticalangle vertangle vangle va elv alt altitude site depression depressionangle ум ε"),
 }
 
 #: Weak aliases that need a unit, because alone they are a height, a place or anything.
@@ -84,7 +84,7 @@ ZENITH_ALIASES = _split(
 )
 
 #: Names of angles below the horizontal.
-DEPRESSIONS = ("depression", "depressionangle", "depr")
+DEPRESSIONS = ("depression", "depressionangle")
 
 #: Words of a name that say nothing about the quantity.
 QUALIFIERS = frozenset(

@@ -13,11 +13,11 @@ from ftproc.errors import InputError
 from ftproc.files import conventions
 from ftproc.files.options import ABSENT, Condition, Extract, parse_columns, parse_units, parse_where
 from ftproc.files.reading import large, understanding
-from ftproc.files.reading.clocks import joint, times
+from ftproc.files.reading.clocks import joint, numeric, times
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.meaning import plausibility, proposal, readings, rows, schema, several
+from ftproc.files.reading.meaning import motion, plausibility, proposal, readings, rows, schema, several
 from ftproc.files.reading.meaning.numbers import Origin
 from ftproc.records import FloatArray, IntArray, MeasurementLog
 from ftproc.settings import Station
@@ -153,7 +153,7 @@ def _in_blocks(plan: _Plan) -> MeasurementLog | None:
     if spooled is None:
         return None
     log, sample = spooled
-    judged = plausibility.judged(header.source, sample, plan.found, plan.station)
+    judged = _judged(plan, sample, plan.found, clocks[0])
     if judged.found != plan.found:
         return _in_blocks(plan._replace(found=judged.found))
     timed = large.readings(sample)[~np.isnan(sample["time"])]
@@ -170,7 +170,7 @@ def _at_once(plan: _Plan) -> MeasurementLog:
         raise InputError(f"{header.source}: there are column names but no rows.")
     kept, notes = _kept(plan, table, chosen)
     converted = _converted(header, found, table.columns if kept is None else table.take(kept).columns)
-    judged = plausibility.judged(header.source, converted.quantities, converted.found, plan.station)
+    judged = _judged(plan, converted.quantities, converted.found, converted.clock)
     quantities = dict(converted.quantities)
     for quantity, column in judged.found.items():
         before = converted.found[quantity].unit
@@ -185,8 +185,25 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     if not plan.one_target:
         several.refuse(header, judged.found, log)
     notes = (*notes, *converted.notes, *converted.clock.notes)
-    explained = _explained(plan, replace(log, epoch=converted.clock.epoch), converted.clock, notes, judged.doubts)
+    clock = converted.clock
+    if judged.found["time"].unit != converted.found["time"].unit:
+        clock = clock._replace(words=f"numbers in {judged.found['time'].unit.name}, by the motion")
+    explained = _explained(plan, replace(log, epoch=clock.epoch), clock, notes, judged.doubts)
     return conventions.apply(explained, explained.station)
+
+
+def _judged(
+    plan: _Plan, quantities: Mapping[str, FloatArray], found: Found, clock: Clock
+) -> plausibility.Judged:  # fmt: skip
+    """The units and conventions that the values show, see `plausibility` and `motion`."""
+    judged = plausibility.judged(plan.header.source, quantities, found, plan.station)
+    time = found["time"]
+    bare_time = not (time.unit_is_stated or clock.epoch) and clock.words.startswith(numeric.BARE)
+    in_si = {q: v if judged.found[q].unit == found[q].unit else
+             judged.found[q].unit.to_si(v * found[q].unit.divide / found[q].unit.multiply)
+             for q, v in quantities.items()}  # fmt: skip
+    decided = motion.judged(plan.header.source, in_si, judged.found, bare_time)
+    return judged._replace(found=decided)
 
 
 def _loaded(plan: _Plan) -> list[int]:
@@ -263,8 +280,7 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
         origin = Origin(header.source, column.name, expected, header.decimal_comma)
         if quantity == "time":
             if len(mine) > 1:
-                units = dict(zip(column.roles, column.written, strict=True))
-                clock = joint.read(dict(zip(column.roles, mine, strict=True)), origin, units)
+                clock = joint.read(dict(zip(column.roles, mine, strict=True)), origin, column)
             else:
                 clock = times.read(mine[0], origin, column)
             quantities[quantity] = clock.time_s

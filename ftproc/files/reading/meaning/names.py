@@ -22,6 +22,7 @@ _LAST = re.compile(r"(.*\S)(?:\s*/\s*|\s+in\s+|\s*,\s*|[\s_.-]+)(\S+)", re.IGNOR
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 _NOT_WORDS = re.compile(r"(?:[^\w°]|_)+")
 _NUMBERED = re.compile(r"^\d+\s*[:=)]\s*(?=[^\W\d])")  # the number of a column before its name
+_OF_UTC = ("utc", "gmt")  # behind the name of a time
 _VALUE = re.compile(r"[._/](val|value)$", re.IGNORECASE)  # how decoders end the path of a value
 
 #: Units of other quantities, by which a column is known for something else.
@@ -67,7 +68,8 @@ class Name(NamedTuple):
 
     def core(self) -> str:
         """The stem without words that say nothing about the quantity, such as `radar1`."""
-        return "".join(word for word in self.words if word.rstrip("0123456789") not in QUALIFIERS)
+        said = [word for word in self.words if word.rstrip("0123456789") not in QUALIFIERS]
+        return "".join(word for k, word in enumerate(said) if not (k and word in _OF_UTC)).rstrip("0123456789")
 
     def is_zenith(self) -> bool:
         """Whether it names zenith angles."""

@@ -20,6 +20,7 @@ from ftproc.files.reading.meaning.numbers import (
 )
 from ftproc.files.reading.meaning.schema import Column
 from ftproc.files.units import UNITS, unit_named
+from ftproc.files.words import DEPRESSIONS
 from ftproc.records import FloatArray
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ NUMBERS = (*(sign * value for value in (*_NINES, *_LIMITS) for sign in (1, -1)),
 
 _FAR = 20.0  # typical steps from the neighbours, for a number that stands out among others
 _DMS = (
-    r"^(?P<sign>[+-]?)(?P<deg>\d{1,3})\s*[°ºd:\- ]\s*(?P<min>\d{1,2})\s*(?:['’′m:\- ]\s*"
+    r"^(?P<sign>[+-]?)(?P<deg>\d{1,3})\s*[°ºd:\- ]\s*(?P<min>\d{1,2}(?:[.,]\d+)?)\s*(?:['’′m:\- ]\s*"
     r"(?:(?P<sec>\d{1,2}(?:[.,]\d*)?)\s*(?:\"|''|”|″|s)?)?)?$"
 )
 _WITH_UNIT = r"^(?P<number>[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[A-Za-z°º]+)$"
@@ -112,6 +113,9 @@ def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) 
         words += (f'"{described.name}" is infinite {endless.sum()} times, which is taken for a missing reading',)
         values = np.where(endless, np.nan, values)
     values = finite(values, origin)
+    if described.key in DEPRESSIONS:
+        values = -values
+        words += (f'"{described.name}" counts downwards and is turned round',)
     if described.notation in ("dms", "ddmmss", "dddmmss", "dmmss") and described.quantity != "range":
         return Readings(_from_digits(values), _in_degrees(described), words)
     return Readings(values, described, words)
@@ -245,13 +249,14 @@ def _with_units(text: pa.ChunkedArray, origin: Origin, described: Column) -> Rea
     if fields.null_count > text.null_count:
         return None
     written = [word for word in pc.unique(pc.struct_field(fields, "unit")).to_pylist() if word]
+    from_north = described.quantity == "azimuth" and written in (["T"], ["TN"])
     units = {unit_named(described.quantity, word) for word in written}
     unit = units.pop() if len(units) == 1 else None
-    if unit is None:
+    if unit is None and not from_north:
         return None
     cells = pc.replace_substring(pc.struct_field(fields, "number"), ",", ".")
     values = numbers(pc.if_else(pc.equal(cells, ""), None, cells).cast(pa.float64()), origin)
-    return Readings(values, described._replace(unit=unit, unit_in_name=True))
+    return Readings(values, described if unit is None else described._replace(unit=unit, unit_in_name=True))
 
 
 def _from_digits(values: FloatArray) -> FloatArray:

@@ -34,7 +34,7 @@ class Column(NamedTuple):
     positions: in the file, one for each of `roles`: ("value",), ("date", "time"), ("deg", "min", "sec"), ...
     key: the stem of the name, by which clocks are told apart. notation: from the name, such as `dms`. why: the column
     was taken. others: columns that could be the quantity too. zenith: the name is that of a zenith angle. written:
-    the units in the names of several columns.
+    the units in the names of several columns. fraction: the unit of a fraction of the second beside the time.
     """
 
     quantity: str
@@ -50,6 +50,7 @@ class Column(NamedTuple):
     others: tuple[str, ...] = ()
     zenith: bool = False
     written: tuple[str, ...] = ()
+    fraction: str = ""
 
     @property
     def position(self) -> int:
@@ -124,7 +125,8 @@ class _Table(NamedTuple):
         stated = unit_named(quantity, name.unit) if name.unit else None
         chosen = UNITS[quantity][unit] if unit else stated or si_unit(quantity)
         return Column(
-            quantity, (position,), self.names[position], chosen, unit is not None, stated is not None, key=name.stem,
+            quantity, (position,), self.names[position], chosen, unit is not None, stated is not None,
+            key=name.stem if name.means(quantity) != 2 else name.core(),
             notation=name.notation, why=why, others=tuple(others), zenith=quantity == "elevation" and name.is_zenith(),
         )  # fmt: skip
 
@@ -134,7 +136,12 @@ class _Table(NamedTuple):
         chosen = UNITS[quantity][unit] if unit else si_unit(quantity)
         name = " + ".join(self.names[place] for place in places)
         written = tuple(self.apart[place].unit for place in places)
-        return Column(quantity, places, name, chosen, unit is not None, False, tuple(roles), why=why, written=written)
+        time = self.apart[roles["time"]] if "time" in roles else self.apart[places[0]]
+        fraction = parts.unit_of_fraction(self.apart[roles["fraction"]]) if "fraction" in roles else ""
+        return Column(
+            quantity, places, name, chosen, unit is not None, False, tuple(roles), time.stem, time.notation, why,
+            written=written, fraction=fraction,
+        )  # fmt: skip
 
 
 def remarks(names: Sequence[str], found: Mapping[str, Column], timestamps: bool) -> tuple[str, ...]:
