@@ -90,6 +90,9 @@ def read(
     unit_of, column_of = parse_units(units), parse_columns(columns)
     header = tables.read_header(source, extract.widths)
     propose = proposal.by_values(header)
+    if "time" not in column_of and not schema.has_time(header.names, header.units):
+        index = proposal.the_moments(header, range(len(header.names)))
+        column_of = column_of if index is None else {**column_of, "time": str(index + 1)}
     found = schema.resolve(header.source, header.names, unit_of, column_of, header.units, propose)
     plan = _Plan(header, found, station, _conditions(header, extract), one_target=bool(extract.target))
     if keep_columns:

@@ -28,6 +28,7 @@ MISSING_WORDS = (
     *("NULL", "Null", "null", "None", "none", "1.#IND", "-1.#IND", "1.#QNAN", "-1.#QNAN"),
 )
 
+_QUOTED_COMMA = re.compile(rb'"[+-]?\d+,(?:\d{1,2}|\d{4,})"')  # a decimal comma, that does not separate thousands
 _HEAD = 1 << 20  # bytes of a large file that contain its header line
 _PLAIN_ROWS = 20  # under the names, that are looked at before a file counts as plain
 _BLOCK = 8 << 20  # bytes of a large file that are parsed at once
@@ -51,9 +52,8 @@ def text_bytes(name: str, data: bytes, widths: Sequence[int] = ()) -> TableHeade
     if known is not None:
         return known
     text = split(name, data, widths)
-    return TableHeader(
-        text.source, text.names, text.load, decimal_comma=text.delimiter != ",", units=text.units, form=text.form
-    )
+    commas = text.delimiter != "," or _QUOTED_COMMA.search(text.body, 0, _HEAD) is not None
+    return TableHeader(text.source, text.names, text.load, commas, units=text.units, form=text.form)
 
 
 def _tagged(name: str, data: bytes) -> TableHeader | None:

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ftproc.errors import InputError
+from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.units import unit_named
 from ftproc.files.words import QUANTITIES
 
@@ -153,6 +154,12 @@ def _with_names(
         return _with_names(lines, filled, start, separator, {**rows, **{n: [""] for n in filled[top:start]}}, widths)
     if names is None and place >= 0 and top - place == 1 and (cells := _mismatched(lines[filled[place]], separator)):
         names = cells  # the rows have too many or too few cells, and are refused
+    over = [lines[number] for number in filled[max(place - 1, 0) : place + 1]]
+    if names is None and separator == BLANKS:
+        names = _stacked(over, block, width)
+    elif names is not None and not all(names) and len(over) > 1:  # groups of columns, such as merged cells
+        groups = split(over[0], separator, widths)
+        names = [name or group for name, group in zip(names, groups, strict=True)] if len(groups) == width else names
     numbers = [str(k + 1) for k in range(width)]
     found = numbers if names is None else names
     if len(units) != len(found):
@@ -224,6 +231,22 @@ def _joined_brackets(line: str) -> list[str]:
 
 def _aligned(line: str, block: Sequence[str], width: int) -> list[str]:
     """The words of a line by the column of numbers that each stands above."""
+    found = _above_columns(line, block, width)
+    return found if found and all(found) else []
+
+
+def _stacked(over: Sequence[str], block: Sequence[str], width: int) -> list[str] | None:
+    """The names of columns that stand in two lines, one word above the other; None unless several are known."""
+    parts = [_above_columns(line, block, width) for line in over]
+    if len(parts) < 2 or not all(parts):
+        return None
+    names = [" ".join(filter(None, words)) for words in zip(*parts, strict=True)]
+    known = [name for name in map(taken_apart, names) if any(name.means(quantity) for quantity in QUANTITIES)]
+    return names if all(names) and len(known) > 1 else None
+
+
+def _above_columns(line: str, block: Sequence[str], width: int) -> list[str]:
+    """The words above each column of numbers, "" where there are none; nothing if the rows do not line up."""
     spans = [[(m.start(), m.end()) for m in re.finditer(r"\S+", row)] for row in block]
     spans = [row for row in spans if len(row) == width]
     if not spans:
@@ -233,8 +256,7 @@ def _aligned(line: str, block: Sequence[str], width: int) -> list[str]:
     for word in re.finditer(r"\S+", line):
         centre = (word.start() + word.end()) / 2
         cells[min(range(width), key=lambda k: abs(middles[k] - centre))].append(word[0])
-    found = [" ".join(words) for words in cells]
-    return found if all(found) else []
+    return [" ".join(words) for words in cells]
 
 
 def first_line(source: str, data: bytes) -> tuple[list[str], str, int]:

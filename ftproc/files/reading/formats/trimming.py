@@ -60,7 +60,8 @@ def rows_only(body: memoryview, names: Sequence[str], separator: str, widths: Se
         tail = bytes(body[max(end - _LAST, 0) : end])
         line = re.search(rb"(?:\A|[\r\n])([^\r\n]+)[\r\n]*\Z", tail)
         text = "" if line is None else line[1].decode("utf-8", "replace")
-        summed = begins_with_number and _is_sum(layout.split(text, separator, widths), names)
+        cells = layout.split(text, separator, widths)
+        summed = begins_with_number and len(cells) == len(names) and is_sum(cells)
         if line is None or not (summed or _is_footer(text, names, separator, widths)):
             break
         end -= len(tail) - line.start(1)
@@ -121,10 +122,10 @@ def _begins_with_number(body: memoryview, separator: str, widths: Sequence[int])
     return bool(filled) and layout.is_data(filled[:1])
 
 
-def _is_sum(cells: Sequence[str], names: Sequence[str]) -> bool:
+def is_sum(cells: Sequence[str]) -> bool:
     """Whether as many cells as in a row sum up the rows, or a word stands alone: the mean, EOF, the number of rows."""
     filled = [cell for cell in cells if cell]
-    if len(cells) != len(names) or not filled or layout.is_data(filled[:1]):
+    if not filled or layout.is_data(filled[:1]):
         return False
     alone = len(filled) < len(cells) and (len(filled) == 1 or (len(filled) == 2 and filled[1].isdigit()))
     return filled[0].strip(" :.").lower() in _SUMS or (alone and filled[0][0].isalpha())

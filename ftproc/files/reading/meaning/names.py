@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from ftproc.files.units import unit_named
@@ -177,3 +178,12 @@ _ASTERIX = {("rho", "040"): "nmi", ("theta", "040"): "deg", ("tod", "140"): "s",
 def _asterix_unit(word: str, context: str) -> str:
     parts = {part.removeprefix("i") for part in _NOT_WORDS.split(context)}
     return next((unit for (name, item), unit in _ASTERIX.items() if name == word and item in parts), "")
+
+
+def of_radar(names: Sequence[Name]) -> list[Name]:
+    """The names; RHO and THETA of a file that has other items of ASTERIX too, with the units of that standard."""
+    words = {word for name in names for word in (*name.words, *_NOT_WORDS.split(name.text.lower()))}
+    if not ({"sac", "sic"} <= words or {"rho", "theta", "polar", "coordinates"} <= words):
+        return list(names)
+    units = {"rho": "nmi", "theta": "deg"}
+    return [name._replace(unit=name.unit or units.get(name.stem, "")) for name in names]

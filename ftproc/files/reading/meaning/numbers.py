@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
 _THOUSANDS = r"^[+-]?\d{1,3}(,\d{3})+$"
+_GROUPED = "^[+-]?\\d{1,3}([\u00a0\u202f\u2009 '’]\\d{3})+([.,]\\d*)?$"  # by blanks or apostrophes
+_PLAIN_OR_GROUPED = "^[+-]?(\\d{1,3}([\u00a0\u202f\u2009 '’]\\d{3})+|\\d+)([.,]\\d*)?$"
 _FORTRAN = r"^([+-]?\d*\.?\d*)[DdQ]([+-]?\d{1,3})$"
 _MOSTLY = 0.5  # share of the cells that must have Fortran's exponents: a single one is a slip
 
@@ -120,6 +122,8 @@ def _plainly_written(text: pa.ChunkedArray, decimal_comma: bool) -> pa.ChunkedAr
 
     if share(_FORTRAN) > _MOSTLY:
         text = pc.replace_substring_regex(text, _FORTRAN, r"\1E\2")
+    if share(_GROUPED) and share(_PLAIN_OR_GROUPED) == 1.0:
+        text = pc.replace_substring_regex(text, "[\u00a0\u202f\u2009 '’]", "")
     for mark, point in ((",", "."), (".", ","))[: 1 + decimal_comma]:
         grouped = rf"^[+-]?(\d{{1,3}}(\{mark}\d{{3}})+|\d+)(\{point}\d*)?$"
         if share(rf"^[+-]?\d{{1,3}}(\{mark}\d{{3}})+\{point}\d*$") and share(grouped) == 1.0:

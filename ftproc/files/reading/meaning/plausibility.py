@@ -190,10 +190,11 @@ def _ask_about_zenith(
     if half_deg <= _STEEP_DEG or column.key == "elevation" or column.name == CANONICAL["elevation"]:
         return
     if column.unit.name == "rad" and not column.unit_is_stated:
-        say = ",".join(f"{q}=UNIT" for q in known if not decided[q].unit_is_stated)
+        bare = [quantity for quantity in known if not decided[quantity].unit_is_stated]
+        deg, rad = (",".join(f"{quantity}={unit}" for quantity in bare) for unit in ("deg", "rad"))
         raise InputError(
             f'{source}: no unit is stated for "{column.name}", and half of it lies beyond {sizes.half:.4g}. '
-            f"Say --units {say.replace('UNIT', 'deg')}, or --units {say.replace('UNIT', 'rad')} --elevation-from horizon."
+            f"Say --units {deg}, or --units {rad} --elevation-from horizon."
         )
     raise InputError(
         f'{source}: half of column "{column.name}" lies beyond {half_deg:.4g} deg, as zenith angles do. '

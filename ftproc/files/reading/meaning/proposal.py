@@ -18,6 +18,7 @@ from ftproc.records import FloatArray
 if TYPE_CHECKING:
     import pyarrow as pa
 
+_UNNAMED = ("", "index", "__index_level_0__", "Unnamed: 0")
 _ROWS = 2000
 _MOST_COLUMNS = 60
 _RISES = 0.98  # of the steps of a time are forward
@@ -26,6 +27,22 @@ _RISES = 0.98  # of the steps of a time are forward
 def by_values(header: TableHeader) -> Propose:
     """How columns of a table are proposed: the time goes forward, the others vary and are numbers."""
     return partial(_proposed, header)
+
+
+def the_moments(header: TableHeader, free: Sequence[int]) -> int | None:
+    """The column of timestamps or durations among those that have no name, as pandas writes its index; or None."""
+    places = [place for place in free if header.names[place] in _UNNAMED]
+    table = header.load([], places) if places else None
+    found = [place for k, place in enumerate(places) if table is not None and _are_moments(table.column(k))]
+    return found[0] if len(found) == 1 else None
+
+
+def _are_moments(column: pa.ChunkedArray) -> bool:
+    import pyarrow as pa
+
+    if pa.types.is_temporal(column.type):
+        return True
+    return without_text(column) is None and bool(notations.matching(as_text(column), notations.STAMPS))
 
 
 def _proposed(header: TableHeader, free: Sequence[int], sought: Sequence[str]) -> Mapping[str, int]:

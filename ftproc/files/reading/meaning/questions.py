@@ -119,7 +119,7 @@ def check_complete(source: str, names: Sequence[str], found: Mapping[str, tuple[
         what = f"x_m, y_m, z_m are columns of a truth, for `{command}`, not of a log: it has {what}"
     hint = nearest(CANONICAL[wanted], [names[place] for place in free])
     similar = next(({wanted: place} for place in free if hint and f'"{names[place]}"' in hint), {})
-    proposed = similar or proposed
+    proposed = proposed if set(proposed) == set(sought) else similar or proposed
     say = answer(names, proposed) if wanted in proposed or (wanted == "range" and proposed) else ""
     raise InputError(
         f"{source}: {what} (expected {CANONICAL[wanted]} or {' or '.join(ALIASES[wanted][:2])}){hint or '.'} "
