@@ -103,7 +103,8 @@ NOT_UNITS = frozenset(
     rate dot sigma std err error bias res residual flag valid snr rcs ok quality id status type gate ref mps2
     mode sd var variance rms outlier velocity speed vel doppler acc cmd command commanded offset corr lag
     correction width beamwidth max min ground horizontal cov uncertainty idx index count no number code lock
-    signal power servo encoder counts raw true truth filt filtered smooth smoothed
+    signal power servo encoder counts raw true truth
+    filt filtered smooth smoothed sac sic cat category fl typ len trn tn
     """
     )
 )

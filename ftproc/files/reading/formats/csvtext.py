@@ -29,6 +29,7 @@ MISSING_WORDS = (
 )
 
 _QUOTED_COMMA = re.compile(rb'"[+-]?\d+,(?:\d{1,2}|\d{4,})"')  # a decimal comma, that does not separate thousands
+_TAGGED = re.compile(rb"[=:]\s*[\"']?[+-]?\.?\d|^\s*[$!][A-Z]|^\*?\d\d[\d.]{4}[+-]\w{8}")
 _HEAD = 1 << 20  # bytes of a large file that contain its header line
 _PLAIN_ROWS = 20  # under the names, that are looked at before a file counts as plain
 _BLOCK = 8 << 20  # bytes of a large file that are parsed at once
@@ -52,17 +53,17 @@ def text_bytes(name: str, data: bytes, widths: Sequence[int] = ()) -> TableHeade
     if known is not None:
         return known
     text = split(name, data, widths)
-    commas = text.delimiter != "," or _QUOTED_COMMA.search(text.body, 0, _HEAD) is not None
+    commas = text.delimiter != "," or len(_QUOTED_COMMA.findall(text.body, 0, _HEAD)) > 2
     return TableHeader(text.source, text.names, text.load, commas, units=text.units, form=text.form)
 
 
 def _tagged(name: str, data: bytes) -> TableHeader | None:
     """A text whose lines say what each value is; None if it is none."""
     head = data[:_HEAD]
-    if not re.search(rb"[=:]\s*[\"']?[+-]?\.?\d|^\s*[$!][A-Z]", head) or _plain(head) is not None:
+    if not _TAGGED.search(head) or _plain(head) is not None:
         return None
     text = encoding.as_utf8(name, data).data.decode("utf-8", "replace")
-    return tagged.sentences(name, text) or tagged.pairs(name, text)
+    return tagged.sentences(name, text) or tagged.survey(name, text) or tagged.pairs(name, text)
 
 
 def _large_file(name: str, path: Path) -> TableHeader:

@@ -36,7 +36,7 @@ class How(NamedTuple):
 
 #: What a name ends in -> the reader of that kind of file, from its name (for messages) and path.
 FORMATS: Mapping[str, Callable[[str, Path, How], TableHeader]] = {
-    **dict.fromkeys((".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".prn"), _text),
+    **dict.fromkeys((".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".prn", ".gsi"), _text),
     ".parquet": lambda name, path, how: columnar.parquet(name, path),
     **dict.fromkeys((".feather", ".arrow", ".arrows", ".ipc"), lambda name, path, how: columnar.feather(name, path)),
     **dict.fromkeys((".jsonl", ".ndjson", ".json"), lambda name, path, how: documents.json_file(name, path)),

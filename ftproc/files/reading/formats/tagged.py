@@ -1,5 +1,5 @@
-"""Lines that say what each value is: `R=1234.5 AZ=12.3`, as loggers and programs print, and sentences with a checksum,
-as NMEA instruments send."""
+"""Lines that say what each value is: `R=1234.5 AZ=12.3`, as loggers and programs print, sentences with a checksum, as
+NMEA instruments send, and words with an index, as total stations store."""
 
 from __future__ import annotations
 
@@ -31,6 +31,20 @@ _STANDARD = {
         *("sentence", "target_number", "range", "bearing", "bearing_ref", "target_speed", "course_speed", "course_ref"),
         *("cpa_min", "tcpa_min", "unit", "name_id", "status", "own_ref", "utc", "acquisition_mode"),
     )
+}
+_WORD = re.compile(r"(?P<index>\d\d)[\d.]{3}(?P<unit>[\d.])(?P<sign>[+-])(?P<digits>[\dA-Za-z.]{8}|[\dA-Za-z.]{16})")
+_GSI = {"11": "point", "18": "clock", "19": "date", "21": "Hz", "22": "V", "31": "SD"}
+#: Digit of the unit -> the unit and its counts.
+_GSI_UNITS = {
+    "0": ("m", 1e3),
+    "6": ("m", 1e4),
+    "8": ("m", 1e5),
+    "1": ("ft", 1e3),
+    "7": ("ft", 1e4),
+    "2": ("gon", 1e5),
+    "3": ("deg", 1e5),
+    "4": ("dddmmss", 1e1),
+    "5": ("mil", 1e4),
 }
 _UNITS = {"N": "nmi", "K": "km", "S": "mi"}
 
@@ -72,6 +86,35 @@ def sentences(name: str, text: str) -> TableHeader | None:
     left = len(lines) - kinds[chosen]
     form = f"text, sentences {chosen}" + ("" if known else ", no column names") + (f", {left} others" if left else "")
     return _table(name, names, [[*row, *[""] * (width - len(row))] for row in cells], form)
+
+
+def survey(name: str, text: str) -> TableHeader | None:
+    """The words of Leica's GSI format, of 8 or 16 digits: `21.322+27912345` is a horizontal angle in gon; None of
+    other texts."""
+    lines = [line.strip().lstrip("*").split() for line in text.splitlines() if line.strip()]
+    blocks = [[_WORD.fullmatch(word) for word in line] for line in lines]
+    if not blocks or not all(all(block) for block in blocks[:_SAMPLE]):
+        return None
+    rows = [_of_block([word for word in block if word]) for block in blocks]
+    names = list(dict.fromkeys(key for row in rows for key in row))
+    return _table(name, names, [[row.get(key) for key in names] for row in rows], "text, words of GSI")
+
+
+def _of_block(words: Sequence[re.Match[str]]) -> dict[str, str]:
+    """Names and values of the words of one line."""
+    found: dict[str, str] = {}
+    for word in words:
+        name, digits = _GSI.get(word["index"], f"WI{word['index']}"), word["sign"] + word["digits"]
+        unit, scale = _GSI_UNITS.get(word["unit"], ("", 0.0))
+        if name in ("Hz", "V", "SD") and scale and digits[1:].isdigit():
+            found[f"{name} ({unit})"] = f"{int(digits) / scale:.9g}"
+        else:
+            found[name] = word["digits"][-8:]
+    if {"clock", "date"} <= found.keys():  # year, seconds and ms; month, day, hour and minute
+        clock, date = found.pop("clock"), found.pop("date")
+        day = f"20{clock[:2]}-{date[:2]}-{date[2:4]}"
+        found["time"] = f"{day} {date[4:6]}:{date[6:]}:{clock[2:4]}.{clock[4:7]}"
+    return found
 
 
 def _rows(text: str) -> list[str]:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from ftproc.files.units import unit_named
 from ftproc.files.words import (
     ALIASES,
+    EITHER_ANGLE,
     ONLY_BY_UNIT,
     QUALIFIERS,
     QUANTITIES,
@@ -70,6 +71,8 @@ class Name(NamedTuple):
     def core(self) -> str:
         """The stem without words that say nothing about the quantity, such as `radar1`."""
         said = [word for word in self.words if word.rstrip("0123456789") not in QUALIFIERS]
+        if any(word in aliases for word in said for aliases in ALIASES.values()):  # such as theta_az
+            said = [word for word in said if word not in EITHER_ANGLE]
         return "".join(word for k, word in enumerate(said) if not (k and word in _OF_UTC)).rstrip("0123456789")
 
     def is_zenith(self) -> bool:
@@ -161,7 +164,9 @@ def _words(text: str) -> tuple[str, tuple[str, ...], str]:
     """Stem and words of the last part of a path such as `CAT048.I040.RHO`, and the path before it."""
     context, _, last = text.rpartition("/") if "/" in text else text.rpartition(".")
     parts = _NOT_WORDS.split(last.lower())
-    if not re.search(r"[^\W\d_]", last) or all(part in QUALIFIERS for part in parts if part):  # such as Az.Angle
+    around = set(_NOT_WORDS.split(context.lower())) - {""}
+    letter = len(last) == 1 and not around <= QUALIFIERS  # such as Mode 3/A
+    if letter or not re.search(r"[^\W\d_]", last) or all(part in QUALIFIERS for part in parts if part):  # Az.Angle
         context, last = "", text
     words = tuple(word for word in _NOT_WORDS.split(plain_letters(_CAMEL.sub(" ", last))) if word)
     if len(words) > 1 and words[0].isdigit():  # such as 048_040_RHO

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ftproc.errors import InputError, row_named
+from ftproc.errors import InputError, quoted, row_named
 from ftproc.files import arrow
 from ftproc.files.reading.formats.csvtext import MISSING_WORDS
 from ftproc.records import FloatArray
@@ -19,6 +19,7 @@ from ftproc.records import FloatArray
 if TYPE_CHECKING:
     import pyarrow as pa
 
+_EVENT = re.compile(r"[A-Za-z][A-Za-z ]{2,20}")
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
 _THOUSANDS = r"^[+-]?\d{1,3}(,\d{3})+$"
@@ -42,6 +43,8 @@ class Origin(NamedTuple):
 
     def bad_cell(self, row: int, text: str, why: str, cure: str = "") -> InputError:
         """The error for the cell in 0-based data row `row`."""
+        if not cure and self.expected.startswith("a time") and _EVENT.fullmatch(text):
+            cure = f"Correct the cell, or leave such rows out with --where {quoted(f'{self.column}!={text}')}."
         return InputError(
             f'{self.source}: {row_named(row)}, column "{self.column}": '
             f'"{" ".join(text[:60].split())}" is not {why}; expected {self.expected}. {cure or self.cure}'
