@@ -44,7 +44,9 @@ def _netcdf(name: str, path: Path) -> TableHeader:
 
     try:
         with netcdf_file(path, mmap=False) as file:
-            found = {key: (np.array(each[:]), getattr(each, "units", b"")) for key, each in file.variables.items()}
+            found: dict[str, tuple[Any, bytes]] = {
+                key: (np.array(each[:]), getattr(each, "units", b"")) for key, each in file.variables.items()
+            }
     except Exception as error:  # scipy raises many kinds for damaged files
         reason = first_line(error)
         raise InputError(f"{name}: not a netCDF file, or a damaged one ({reason}); copy it again.") from error

@@ -19,7 +19,7 @@ from ftproc.records import FloatArray
 if TYPE_CHECKING:
     import pyarrow as pa
 
-_EVENT = re.compile(r"[A-Za-z][A-Za-z ]{2,20}")
+_EVENT = re.compile(r"[A-Za-z][A-Za-z ]{3,20}")
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
 _THOUSANDS = r"^[+-]?\d{1,3}(,\d{3})+$"

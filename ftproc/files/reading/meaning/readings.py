@@ -65,8 +65,10 @@ _MARKS = r"^[-*?./_#+]+$"
 _A_WORD = r"^[^\d\s][^\d]{0,11}$"  # that stands repeatedly for a number
 #: Numbers that mean "no reading" where they stand out.
 _NINES = tuple(10.0**digits - 10.0**-k for digits in range(2, 8) for k in range(4))
-_LIMITS = (32767.0, 32768.0, 65535.0, 1e10, 1e20, 1e30, 1e35, 1e37, 1e38, 1e99, 9.99e37, 9.99e99, 9.9e37)
-_LIMITS += (9.96921e36, 9.969209968386869e36, 3.402823e38, 3.4028235e38, 3.4028234663852886e38, 1.79769313486231e308)
+_LIMITS = (
+    *(32767.0, 32768.0, 65535.0, 1e10, 1e20, 1e30, 1e35, 1e37, 1e38, 1e99, 9.99e37, 9.99e99, 9.9e37, 9.96921e36),
+    *(9.969209968386869e36, 3.402823e38, 3.4028235e38, 3.4028234663852886e38, 1.79769313486231e308),
+)
 _NO_RANGE = (0.0, -1.0)
 NUMBERS = (*(sign * value for value in (*_NINES, *_LIMITS) for sign in (1, -1)), *_NO_RANGE)
 
