@@ -60,7 +60,7 @@ def text_bytes(name: str, data: bytes, widths: Sequence[int] = ()) -> TableHeade
 def _tagged(name: str, data: bytes) -> TableHeader | None:
     """A text whose lines say what each value is; None if it is none."""
     head = data[:_HEAD]
-    if not _TAGGED.search(head) or _plain(head) is not None:
+    if _plain(head) is not None or not _TAGGED.search(head):
         return None
     text = encoding.as_utf8(name, data).data.decode("utf-8", "replace")
     return tagged.sentences(name, text) or tagged.survey(name, text) or tagged.pairs(name, text)

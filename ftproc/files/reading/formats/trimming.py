@@ -86,6 +86,8 @@ def _sentences(whole: bytes, names: Sequence[str], separator: str, widths: Seque
     if widths or len(names) < 2:
         return []
     letters = np.frombuffer(whole, np.uint8)
+    if not len(letters) or letters.max() < ord("A"):  # digits and marks only
+        return []
     starts = np.flatnonzero(letters == ord("\n")) + 1
     first = letters[starts[starts < len(letters)]]
     odd = starts[: len(first)][np.isin(first | 0x20, _LETTERS) | (first == ord("*")) | (first == ord("-"))]

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.errors import InputError
 from ftproc.files.reading.meaning.schema import Column
@@ -16,7 +17,7 @@ from ftproc.files.units import UNITS, Unit
 from ftproc.files.words import QUANTITIES
 from ftproc.records import FloatArray
 
-_MOST_ROWS = 4000  # that are looked at
+_MOST_ROWS = 1000  # that are looked at
 _FEWEST = 24
 _BLOCKS = 24
 _LARGER = 3.0  # times the step from row to row is the way of a target that moves
@@ -48,7 +49,7 @@ _NOISE_RAD = ((5e-3, 1.0), (0.01, 0.3), (0.03, 0.02), (math.inf, 2e-3))
 
 
 class _Sample(NamedTuple):
-    """Some rows in time order, in the units of the file: times (n,) and readings (n, 3); NaN in absent columns."""
+    """Some rows, in the units of the file: times (n,) and readings (n, 3); NaN in absent columns."""
 
     time: FloatArray
     readings: FloatArray
@@ -73,10 +74,10 @@ def judged(
     if any(found[quantity].unit.name != "rad" for quantity in angles):  # settled by the values alone
         angles = []
     open_ones = [*(["time"] if bare_time else []), *(["range"] if "range" in bare else []), *angles]
-    sample = _sample(quantities, found) if open_ones else None
-    if sample is None:
+    samples = _samples(quantities, found) if open_ones else None
+    if samples is None:
         return dict(found)
-    choices = sorted(_choices(sample, found, open_ones), key=lambda choice: -choice.odds)
+    choices = sorted(_choices(*samples, found, open_ones), key=lambda choice: -choice.odds)
     best = choices[0]
     standing = next(c for c in choices if all(c.units[q] == next(iter(UNITS[q].values())) for q in open_ones))
     rest = max((choice.odds for choice in choices if choice is not standing), default=0.0)
@@ -88,19 +89,26 @@ def judged(
     raise _question(source, found, likely, standing)
 
 
-def _sample(quantities: Mapping[str, FloatArray], found: Mapping[str, Column]) -> _Sample | None:
-    """Rows with all that the log has, in the units of the file; None for too few, or a target that does not move."""
-    raw = {q: quantities[q] * column.unit.divide / column.unit.multiply for q, column in found.items()}
-    columns = np.column_stack(list(raw.values()))
-    rows = np.flatnonzero(np.isfinite(columns).all(1))[: _MOST_ROWS * 10]
+def _samples(quantities: Mapping[str, FloatArray], found: Mapping[str, Column]) -> tuple[_Sample, _Sample] | None:
+    """The first rows with all that the log has, and such rows of the whole log, in time order; None for too few."""
+    rows = np.flatnonzero(np.isfinite(np.column_stack(list(quantities.values()))).all(1))
     if len(rows) < _FEWEST:
         return None
-    rows = rows[np.argsort(raw["time"][rows], kind="stable")]
-    parts = [raw[q][rows] if q in raw else np.full(len(rows), np.nan) for q in QUANTITIES]
+    return _in_file_units(quantities, found, rows[:_MOST_ROWS]), _in_file_units(
+        quantities, found, rows[:: 1 + len(rows) // _MOST_ROWS]
+    )
+
+
+def _in_file_units(
+    quantities: Mapping[str, FloatArray], found: Mapping[str, Column], rows: NDArray[np.intp]
+) -> _Sample:  # fmt: skip
+    rows = rows[np.argsort(quantities["time"][rows], kind="stable")]
+    raw = {q: quantities[q][rows] * column.unit.divide / column.unit.multiply for q, column in found.items()}
+    parts = [raw.get(quantity, np.full(len(rows), np.nan)) for quantity in QUANTITIES]
     return _Sample(parts[0], np.column_stack(parts[1:]))
 
 
-def _choices(sample: _Sample, found: Mapping[str, Column], open_ones: Sequence[str]) -> list[_Choice]:
+def _choices(near: _Sample, far: _Sample, found: Mapping[str, Column], open_ones: Sequence[str]) -> list[_Choice]:
     ways: list[list[tuple[dict[str, Unit], float]]] = []
     for kind, members in (("time", ["time"]), ("range", ["range"]), ("angle", ["azimuth", "elevation"])):
         mine = [quantity for quantity in members if quantity in open_ones]
@@ -111,26 +119,30 @@ def _choices(sample: _Sample, found: Mapping[str, Column], open_ones: Sequence[s
     choices = []
     for way in itertools.product(*ways):
         units = fixed | {quantity: unit for each, _ in way for quantity, unit in each.items()}
-        choices.append(_Choice(units, math.prod(prior for _, prior in way) * _likelihood(sample, units)))
+        choices.append(_Choice(units, math.prod(prior for _, prior in way) * _likelihood(near, far, units)))
     return choices
 
 
-def _likelihood(sample: _Sample, units: Mapping[str, Unit]) -> float:
+def _likelihood(near: _Sample, far: _Sample, units: Mapping[str, Unit]) -> float:
     """How likely the rate, the speed, the distance and the noise of the angles are in these units."""
-    time_s = units["time"].to_si(sample.time)
-    si = np.column_stack([units[q].to_si(sample.readings[:, k]) if q in units else sample.readings[:, k]
-                          for k, q in enumerate(QUANTITIES[1:])])  # fmt: skip
-    steps = np.diff(time_s)
+    steps = np.diff(units["time"].to_si(near.time))
     steps = steps[steps > 0]
     odds = _at(_STEP_S, float(np.median(steps))) if len(steps) else 1.0
     if "range" in units:
+        si = _in_si(far, units)
         odds *= _at(_RANGE_M, float(np.median(np.abs(si[:, 0]))))
-        speed = _speed(time_s, _positions(si))
+        speed = _speed(units["time"].to_si(far.time), _positions(si))
         odds *= 1.0 if speed is None else _at(_SPEED, speed)
+    si = _in_si(near, units)
     for k in (1, 2):
         if QUANTITIES[1 + k] in units:
             odds *= _at(_NOISE_RAD, _noise(np.unwrap(si[:, k]) if k == 1 else si[:, k]))
     return odds
+
+
+def _in_si(sample: _Sample, units: Mapping[str, Unit]) -> FloatArray:
+    columns = [(q, sample.readings[:, k]) for k, q in enumerate(QUANTITIES[1:])]
+    return np.column_stack([units[q].to_si(values) if q in units else values for q, values in columns])
 
 
 def _positions(si: FloatArray) -> FloatArray:
