@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from ftproc.files import remote
-from ftproc.files.units import QUANTITIES, si_unit
+from ftproc.files.units import si_unit
+from ftproc.files.words import QUANTITIES
 from ftproc.records import COMPONENTS
 
 Target = str | Path

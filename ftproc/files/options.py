@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from ftproc.errors import UsageError, nearest
-from ftproc.files.units import ALIASES, QUANTITIES, UNITS, unit_named
+from ftproc.files.units import UNITS, unit_named
+from ftproc.files.words import ALIASES, QUANTITIES
 
 #: `--columns range=none`: the file has no such quantity, whatever its columns are called.
 ABSENT = "none"

@@ -1,4 +1,4 @@
-"""The names and units that logs have: quantities, their aliases, and factors to SI (seconds, metres, radians)."""
+"""The units that logs have: their spellings, and factors to SI (seconds, metres, radians)."""
 
 from __future__ import annotations
 
@@ -6,168 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from ftproc.records import COMPONENTS, FloatArray
-
-#: What a log is made of, in the order of its canonical columns.
-QUANTITIES = ("time", *COMPONENTS)
-
-#: Names of each quantity, the full name first; small letters and digits only, as names of columns are compared.
-ALIASES: Mapping[str, tuple[str, ...]] = {
-    "time": (
-        *("time", "t", "timestamp", "datetime", "utc", "gps", "tod", "sod", "tow", "sow", "epoch", "irig", "irigb"),
-        *("jd", "mjd", "seconds", "secs", "sec", "elapsed", "elapsedtime", "elapsedseconds", "timeofday"),
-        *("secondsofday", "secofday", "timeofweek", "secondsofweek", "gpstime", "gpstow", "gpsseconds", "utctime"),
-        *("timeutc", "timegps", "utctimestamp", "utcdatetime", "datetimeutc", "dateandtime", "unix", "unixtime"),
-        *(
-            "posix",
-            "posixtime",
-            "epochtime",
-            "juliandate",
-            "julianday",
-            "modifiedjuliandate",
-            "stamp",
-            "zulu",
-            "utcsec",
-        ),
-        *("irigtime", "sampletime", "timetag", "clock", "systime", "itow", "utcsod", "utctod", "utcseconds"),
-        *("timestamputc", "unixtimestamp", "excel", "exceldate", "exceltime", "missiontime", "ts", "met"),
-        *("missionelapsedtime", "zeit", "uhrzeit", "temps", "tiempo", "tempo", "czas", "tid", "tijd", "cas", "время"),
-        *("时间", "時間", "時刻", "시간"),
-    ),
-    "range": (
-        "range",
-        "r",
-        "slantrange",
-        "sr",
-        "rng",
-        "rho",
-        "slrange",
-        "slrng",
-        "slantrng",
-        "srange",
-        "srng",
-        "entfernung",
-        "schragentfernung",
-        "schragdistanz",
-        *("distanceoblique", "distanciainclinada", "distanciaobliqua", "дальность", "наклоннаядальность"),
-        *("斜距", "斜距离", "斜距離", "경사거리"),
-    ),
-    "azimuth": (
-        *("azimuth", "az", "a", "azimuthangle", "azangle", "azim", "azi", "azmth", "bearing", "brg", "azimut"),
-        *(
-            "acimut",
-            "azymut",
-            "azimute",
-            "gisement",
-            "baring",
-            "peilung",
-            "азимут",
-            "пеленг",
-            "方位角",
-            "方位",
-            "방위각",
-        ),
-    ),
-    "elevation": (
-        "elevation",
-        "el",
-        "e",
-        "elevationangle",
-        "elangle",
-        "elev",
-        "elevangle",
-        "altitudeangle",
-        "hohenwinkel",
-        *("elevationswinkel", "elevacion", "elevazione", "elevacao", "elevatie", "elewacja", "elevace", "hojdvinkel"),
-        *("уголместа", "俯仰角", "俯仰", "仰角", "高低角", "高度角", "고각", "앙각"),
-    ),
-}
-
-#: Names that other things have too: used where no column has one of ALIASES.
-WEAK_ALIASES: Mapping[str, tuple[str, ...]] = {
-    "time": ("date", "gpst", "daytime"),
-    "range": (
-        *("dist", "sd", "distance", "slantdistance", "slopedistance", "slopedist", "slant", "distanz", "distancia"),
-        *("distanza", "odległosc", "avstand", "afstand", "距离", "距離", "거리"),
-    ),
-    "azimuth": ("theta", "hz", "horizontalangle", "horizontaldirection", "hzangle", "hangle", "ha", "horangle"),
-    "elevation": ("v", "verticalangle", "vertangle", "vangle", "va", "elv", "alt", "altitude", "site"),
-}
-
-#: Weak aliases that need an angle's unit, because alone they are a height or a place.
-ANGLES_BY_UNIT = ("alt", "altitude", "site")
-
-#: Names of angles of which none says whether it is the azimuth, and from where the other one counts.
-EITHER_ANGLE = ("theta", "phi", "pan", "tilt")
-
-#: Names in German, in which Grad are degrees.
-GERMAN = frozenset(["zeit", "uhrzeit", "entfernung", "schragentfernung", "schragdistanz", "hohenwinkel", "distanz"])
-
-#: Names of zenith angles, which are 90 degrees minus the elevation.
-ZENITH_ALIASES = ("zenith", "zenithangle", "zenithdistance", "zen", "zd", "za", "zendist", "zenang", "zenithdist")
-
-#: Words of a name that say nothing about the quantity.
-QUALIFIERS = frozenset(
-    [
-        *("measured", "meas", "raw", "obs", "observed", "target", "tgt", "track", "trk", "radar", "sensor", "tracker"),
-        *(
-            "polar",
-            "value",
-            "angle",
-            "reading",
-            "laser",
-            "instrument",
-            "theodolite",
-            "the",
-            "true",
-            "los",
-            "look",
-            "to",
-        ),
-        *("to", "from", "corrected", "station"),
-    ]
-)
-
-#: Words that make a column something other than the quantity; they are not unknown units.
-NOT_UNITS = frozenset(
-    [
-        *("rate", "dot", "sigma", "std", "err", "error", "bias", "res", "residual", "flag", "valid", "snr", "rcs"),
-        *(
-            "ok",
-            "quality",
-            "id",
-            "status",
-            "type",
-            "gate",
-            "ref",
-            "mps2",
-            "mode",
-            "sd",
-            "var",
-            "variance",
-            "rms",
-            "outlier",
-        ),
-        *("velocity", "speed", "vel", "doppler", "acc", "cmd", "command", "commanded", "offset", "corr", "lag"),
-        *("correction", "width", "beamwidth", "max", "min", "ground", "horizontal", "cov", "uncertainty", "idx"),
-        *(
-            "index",
-            "count",
-            "no",
-            "number",
-            "code",
-            "lock",
-            "signal",
-            "power",
-            "servo",
-            "encoder",
-            "counts",
-            "raw",
-            "true",
-            "truth",
-        ),
-    ]
-)
+from ftproc.files.words import QUANTITIES
+from ftproc.records import FloatArray
 
 
 class Unit(NamedTuple):
@@ -202,6 +42,11 @@ _ANGLES = (
     Unit("grad", math.pi, 200.0),  # 400 to the turn
     Unit("gon", math.pi, 200.0),  # the surveyors' name of grad
     Unit("mgon", math.pi, 200e3),
+    Unit("urad", divide=1e6),
+    Unit("mdeg", math.pi, 180e3),
+    Unit("cdeg", math.pi, 18e3),
+    Unit("turn", 2 * math.pi),
+    Unit("bam16", math.pi, 32768.0),  # 65536 to the turn
     Unit("arcmin", math.pi, 10_800.0),
     Unit("arcsec", math.pi, 648e3),
 )
@@ -213,15 +58,15 @@ UNITS: Mapping[str, Mapping[str, Unit]] = {
 }
 
 #: Unit -> its other spellings, in small letters without blanks and points.
-_SPELLINGS: Mapping[str, tuple[str, ...]] = {
-    "s": ("sec", "secs", "second", "seconds", "epsec", "с", "сек", "秒"),
+SPELLINGS: Mapping[str, tuple[str, ...]] = {
+    "s": ("sec", "secs", "second", "seconds", "epsec", "с", "сек", "秒", "초"),
     "ms": ("msec", "msecs", "millisec", "millisecond", "milliseconds", "мс", "毫秒"),
     "us": ("usec", "usecs", "microsec", "microsecond", "microseconds", "μs", "μsec"),
     "ns": ("nsec", "nsecs", "nanosec", "nanosecond", "nanoseconds"),
     "min": ("mins", "minute", "minutes"),
     "h": ("hr", "hrs", "hour", "hours"),
     "d": ("day", "days"),
-    "m": ("meter", "meters", "metre", "metres", "mtr", "mtrs", "м", "米"),
+    "m": ("meter", "meters", "metre", "metres", "mtr", "mtrs", "м", "米", "미터"),
     "km": ("kms", "kilometer", "kilometers", "kilometre", "kilometres", "км", "公里", "千米"),
     "ft": ("feet", "foot"),
     "kft": ("kilofeet", "kfeet"),
@@ -231,10 +76,18 @@ _SPELLINGS: Mapping[str, tuple[str, ...]] = {
     "kyd": ("kyds", "kyard", "kyards", "kiloyard", "kiloyards"),
     "cm": ("centimeter", "centimeters", "centimetre", "centimetres"),
     "mm": ("millimeter", "millimeters", "millimetre", "millimetres"),
-    "rad": ("rads", "radian", "radians", "рад", "弧度"),
-    "deg": ("degs", "degree", "degrees", "°", "dd", "decimaldegrees", "decdeg", "град", "度"),
+    "rad": ("rads", "radian", "radians", "рад", "弧度", "라디안"),
+    "deg": ("degs", "degree", "degrees", "°", "dd", "decimaldegrees", "decdeg", "град", "гр", "度", "도"),
     "mrad": ("mrads", "milliradian", "milliradians"),
-    "mil": ("mils", "mil6400", "mils6400", "6400mil", "6400mils", "natomil", "natomils"),
+    "urad": ("urads", "μrad", "microrad", "microrads", "microradian", "microradians"),
+    "mdeg": ("millideg", "millidegree", "millidegrees"),
+    "cdeg": ("centideg", "centidegree", "centidegrees"),
+    "turn": ("turns", "rev", "revs", "revolution", "revolutions", "cycles"),
+    "bam16": ("bam", "bams"),
+    "mil": (
+        *("mils", "mil6400", "mils6400", "6400mil", "6400mils", "natomil", "natomils"),
+        *("strich", "artilleriestrich", "a‰", "‰", "₥"),
+    ),
     "mil6300": ("mils6300", "6300mil", "6300mils", "streck"),
     "mil6000": ("mils6000", "6000mil", "6000mils"),
     "gon": ("gons", "grads", "grade", "grades", "gradian", "gradians"),
@@ -242,7 +95,7 @@ _SPELLINGS: Mapping[str, tuple[str, ...]] = {
     "arcmin": ("arcmins", "arcminute", "arcminutes", "minofarc"),
     "arcsec": ("arcsecs", "arcsecond", "arcseconds", "asec", "secofarc"),
 }
-_BY_SPELLING = {word: name for name, words in _SPELLINGS.items() for word in words}
+_BY_SPELLING = {word: name for name, words in SPELLINGS.items() for word in words}
 
 
 def unit_named(quantity: str, word: str) -> Unit | None:

@@ -19,7 +19,7 @@ from ftproc.errors import InputError, UsageError
 from ftproc.files import conventions
 from ftproc.files.options import parse_columns, parse_units
 from ftproc.files.reading.meaning import schema
-from ftproc.files.units import QUANTITIES
+from ftproc.files.words import QUANTITIES
 from ftproc.live.live import Live
 from ftproc.records import FloatArray, MeasurementLog, Trajectory
 

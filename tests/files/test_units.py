@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ftproc.files.units import QUANTITIES, UNITS, si_unit
+from ftproc.files.units import UNITS, si_unit
+from ftproc.files.words import QUANTITIES
 
 ONE_IN_SI = [
     ("time", "s", 1.0),

@@ -12,7 +12,7 @@ from ftproc.files.layout import OUTLIER
 from ftproc.files.reading.clocks.times import seconds
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning.numbers import Origin, numbers
-from ftproc.files.reading.meaning.schema import listed
+from ftproc.files.reading.meaning.questions import listed
 from ftproc.records import FlagArray, FloatArray
 
 if TYPE_CHECKING:

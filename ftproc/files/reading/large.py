@@ -21,6 +21,7 @@ from ftproc.settings import Station
 if TYPE_CHECKING:
     import pyarrow as pa
 
+_DENSE_ROWS = 5000  # at the beginning, of which none is left out
 _SAMPLE_ROWS = 100_000  # for checks of the whole log, such as its units
 
 #: A block -> its quantities in SI units, and the instant of its time zero (or "").
@@ -57,7 +58,8 @@ def _into(spool: _Spool, source: str, blocks: Blocks, convert: Convert, station:
             quantities, epoch = convert(table)
             quantities["time"] = times.continued(quantities["time"], epoch)
             spool.add(conventions.apply(_timed(source, quantities), station), len(table))
-            sampled.append({name: values[::every].copy() for name, values in quantities.items()})
+            dense = 0 if sampled else _DENSE_ROWS
+            sampled.append({q: np.r_[values[:dense], values[dense::every]] for q, values in quantities.items()})
     except Changed:
         raise
     except (InputError, _OutOfOrder):

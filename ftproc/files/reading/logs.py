@@ -12,13 +12,11 @@ import numpy as np
 from ftproc.errors import InputError
 from ftproc.files import conventions
 from ftproc.files.options import ABSENT, Condition, Extract, parse_columns, parse_units, parse_where
-from ftproc.files.reading import large, understanding
-from ftproc.files.reading.clocks import joint, times
+from ftproc.files.reading import converting, large, understanding
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.meaning import plausibility, readings, rows, schema, several
-from ftproc.files.reading.meaning.numbers import Origin
+from ftproc.files.reading.meaning import plausibility, proposal, rows, schema, several, stamps
 from ftproc.records import FloatArray, IntArray, MeasurementLog
 from ftproc.settings import Station
 
@@ -41,17 +39,6 @@ class _Plan(NamedTuple):
     def positions(self) -> list[int]:
         """Of the columns of all quantities, in their order."""
         return [place for column in self.found.values() for place in column.positions]
-
-
-class _Converted(NamedTuple):
-    """quantities: in SI units. found: the columns with the units that their cells show. notes: what was done.
-    undecided: see `readings.Readings`."""
-
-    quantities: dict[str, FloatArray]
-    found: Found
-    clock: Clock
-    notes: tuple[str, ...]
-    undecided: bool
 
 
 def read(
@@ -89,7 +76,11 @@ def read(
     conventions.check(station)
     unit_of, column_of = parse_units(units), parse_columns(columns)
     header = tables.read_header(source, extract.widths)
-    found = schema.resolve(header.source, header.names, unit_of, column_of, header.units)
+    propose = proposal.by_values(header)
+    if "time" not in column_of and not schema.has_time(header.names, header.units):
+        index = proposal.the_moments(header, range(len(header.names)))
+        column_of = column_of if index is None else {**column_of, "time": str(index + 1)}
+    found = schema.resolve(header.source, header.names, unit_of, column_of, header.units, propose)
     plan = _Plan(header, found, station, _conditions(header, extract), one_target=bool(extract.target))
     if keep_columns:
         wanted = plan.positions()
@@ -135,7 +126,7 @@ def _in_blocks(plan: _Plan) -> MeasurementLog | None:
     clocks: list[Clock] = []
 
     def convert(table: pa.Table) -> tuple[dict[str, FloatArray], str]:
-        converted = _converted(header, plan.found, table.columns)
+        converted = converting.converted(header, plan.found, table.columns)
         clock = converted.clock
         if (
             converted.notes
@@ -152,11 +143,11 @@ def _in_blocks(plan: _Plan) -> MeasurementLog | None:
     if spooled is None:
         return None
     log, sample = spooled
-    judged = plausibility.judged(header.source, sample, plan.found, plan.station)
+    judged = converting.judged(header.source, sample, plan.found, clocks[0], plan.station)
     if judged.found != plan.found:
         return _in_blocks(plan._replace(found=judged.found))
     timed = large.readings(sample)[~np.isnan(sample["time"])]
-    if several.alternate(timed):
+    if several.alternate(timed) or log.duplicate_times > len(log) / 3:  # only the whole file shows what these are
         return None
     return _explained(plan, log, clocks[0]._replace(epoch=log.epoch), (), judged.doubts, timed)
 
@@ -168,13 +159,10 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     if table.num_rows == 0:
         raise InputError(f"{header.source}: there are column names but no rows.")
     kept, notes = _kept(plan, table, chosen)
-    converted = _converted(header, found, table.columns if kept is None else table.take(kept).columns)
-    judged = plausibility.judged(header.source, converted.quantities, converted.found, plan.station)
-    quantities = dict(converted.quantities)
-    for quantity, column in judged.found.items():
-        before = converted.found[quantity].unit
-        if column.unit != before:
-            quantities[quantity] = column.unit.to_si(quantities[quantity] * before.divide / before.multiply)
+    converted = converting.converted(header, found, table.columns if kept is None else table.take(kept).columns)
+    judged = converting.judged(header.source, converted.quantities, converted.found, converted.clock, plan.station)
+    quantities = converting.in_other_units(converted.quantities, converted.found, judged.found)
+    quantities["time"], spread = stamps.spread(quantities)
     extra = table.select(list(range(len(chosen), table.num_columns))) if plan.others else None
     log = _in_time_order(header.source, quantities, extra if kept is None or extra is None else extra.take(kept))
     if kept is not None:
@@ -183,8 +171,11 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     plan = plan._replace(found=judged.found)
     if not plan.one_target:
         several.refuse(header, judged.found, log)
-    notes = (*notes, *converted.notes, *converted.clock.notes)
-    explained = _explained(plan, replace(log, epoch=converted.clock.epoch), converted.clock, notes, judged.doubts)
+    notes = (*notes, *converted.notes, *converted.clock.notes, *spread)
+    clock = converted.clock
+    if judged.found["time"].unit != converted.found["time"].unit:
+        clock = clock._replace(words=f"numbers in {judged.found['time'].unit.name}, by the motion")
+    explained = _explained(plan, replace(log, epoch=clock.epoch), clock, notes, judged.doubts)
     return conventions.apply(explained, explained.station)
 
 
@@ -244,35 +235,6 @@ def _check_others(header: TableHeader, others: Iterable[int]) -> None:
                 f'{header.source}: column "{name}" is there twice, so both cannot be kept; rename one, '
                 "or leave --keep-columns out."
             )
-
-
-def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]) -> _Converted:
-    """The quantities in SI units. columns: of all quantities, in their order."""
-    quantities: dict[str, FloatArray] = {}
-    decided = dict(found)
-    notes: list[str] = []
-    clock = Clock(np.empty(0), "", "")
-    place, undecided = 0, False
-    for quantity, column in found.items():
-        mine = columns[place : place + len(column.positions)]
-        place += len(mine)
-        timestamp = " or an ISO-8601 timestamp" if quantity == "time" else ""
-        expected = f"{'an' if quantity[0] in 'ae' else 'a'} {quantity} in {column.unit.name}{timestamp}"
-        origin = Origin(header.source, column.name, expected, header.decimal_comma)
-        if quantity == "time":
-            if len(mine) > 1:
-                units = dict(zip(column.roles, column.written, strict=True))
-                clock = joint.read(dict(zip(column.roles, mine, strict=True)), origin, units)
-            else:
-                clock = times.read(mine[0], origin, column)
-            quantities[quantity] = clock.time_s
-            continue
-        found_here = readings.read(mine, origin, column)
-        decided[quantity] = found_here.column
-        quantities[quantity] = found_here.column.unit.to_si(found_here.values)
-        notes += found_here.notes
-        undecided = undecided or found_here.undecided
-    return _Converted(quantities, decided, clock, tuple(notes), undecided)
 
 
 def _in_time_order(source: str, quantities: Mapping[str, FloatArray], extra: pa.Table | None) -> MeasurementLog:

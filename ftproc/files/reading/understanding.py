@@ -8,7 +8,11 @@ from typing import Any
 from ftproc.files import conventions
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.meaning.schema import Column, listed
+from ftproc.files.reading.meaning.names import taken_apart
+from ftproc.files.reading.meaning.questions import answer, listed
+from ftproc.files.reading.meaning.schema import Column
+from ftproc.files.words import NOT_UNITS
+from ftproc.records import COMPONENTS
 from ftproc.settings import Station
 
 Understood = Mapping[str, Any]
@@ -26,14 +30,21 @@ def describe(
     epoch: of the times. conventions: of the angles, and what was corrected. doubts: each with the option that settles
     it."""
     used = {place for column in found.values() for place in column.positions}
+    unused = [name for place, name in enumerate(header.names) if place not in used and name]
     return {
         "file": header.form or "table",
         "columns": {quantity: _column(column) for quantity, column in found.items()},
-        "not_used": [name for place, name in enumerate(header.names) if place not in used and name],
+        "not_used": unused,
         "clock": clock.words,
         "epoch": clock.epoch,
         "conventions": _conventions(station, found),
-        "doubts": [*_others(found), *doubts, *clock.doubts, *_axis(station, found)],
+        "doubts": [
+            *_others(header.names, found),
+            *_absent(found, unused),
+            *doubts,
+            *clock.doubts,
+            *_axis(station, found),
+        ],
     }
 
 
@@ -53,12 +64,21 @@ def _conventions(station: Station, found: Mapping[str, Column]) -> list[str]:
     return lines + conventions.in_words(station)
 
 
-def _others(found: Mapping[str, Column]) -> list[str]:
+def _others(names: Sequence[str], found: Mapping[str, Column]) -> list[str]:
     return [
-        f"{', '.join(column.others)} could be the {quantity} too: if so, say --columns {quantity}={column.others[0]}"
+        f"{', '.join(column.others)} could be the {quantity} too: if so, say "
+        f"{answer(names, {quantity: names.index(column.others[0])})}"
         for quantity, column in found.items()
         if column.others
     ]
+
+
+def _absent(found: Mapping[str, Column], unused: Sequence[str]) -> list[str]:
+    """A doubt for each quantity that is not there, where columns are left that may be it."""
+    names = [taken_apart(name) for name in unused]
+    free = listed([name.text for name in names if not (name.foreign or NOT_UNITS & {*name.words})])
+    absent = [quantity for quantity in COMPONENTS if quantity not in found]
+    return [f"nothing is taken for the {q}: if one of {free} is it, say --columns {q}=NAME" for q in absent if free]
 
 
 def _axis(station: Station, found: Mapping[str, Column]) -> list[str]:

@@ -11,7 +11,8 @@ import numpy as np
 from ftproc.files import arrow
 from ftproc.files.layout import ACCELERATION, OUTLIER, POSITION, VELOCITY, Target
 from ftproc.files.options import parse_units
-from ftproc.files.units import QUANTITIES, UNITS, si_unit
+from ftproc.files.units import UNITS, si_unit
+from ftproc.files.words import QUANTITIES
 from ftproc.files.writing import tables
 from ftproc.records import FlagArray, FloatArray, MeasurementLog, Truth
 

@@ -8,7 +8,8 @@ from ftproc.errors import InputError
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import parse_units
 from ftproc.files.reading.meaning.schema import remarks, resolve
-from ftproc.files.units import ALIASES, UNITS
+from ftproc.files.units import UNITS
+from ftproc.files.words import ALIASES
 
 
 def found(
@@ -73,7 +74,7 @@ def test_components_may_be_absent_but_not_all() -> None:
     assert "neither range nor azimuth nor elevation" in sentence
     assert 'did you mean "Rnge"?' in sentence
     assert "Its columns are: time_s, Rnge, speed." in sentence
-    assert "--columns range=NAME" in sentence
+    assert "--columns range=Rnge." in sentence
 
 
 def test_a_log_without_time_lists_its_columns_and_the_nearest_one() -> None:
@@ -81,7 +82,7 @@ def test_a_log_without_time_lists_its_columns_and_the_nearest_one() -> None:
     assert "no time column (expected time_s or time or t)" in sentence
     assert 'did you mean "Tme_s"?' in sentence
     assert "Its columns are: Tme_s, range_m." in sentence
-    assert "--columns time=NAME" in sentence
+    assert "--columns time=Tme_s." in sentence
 
 
 def test_a_truth_is_not_taken_for_a_log_with_a_strange_azimuth() -> None:

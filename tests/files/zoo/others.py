@@ -99,7 +99,7 @@ def exports() -> Iterator[Animal]:
     yield Animal("two files put together", written("a.csv", text), first_s=0)
     sentences = zip(clock(F.moments(), "%H%M%S.%f"), F.r, F.a, F.e, strict=True)
     text = "".join(f"$PTRK,{c},{r:.4f},{a:.8f},{e:.8f},*42\n" for c, r, a, e in sentences)
-    said = {"asks": "--columns time=1,range=2", "answer": {"columns": "time=2,range=3,azimuth=4,elevation=5"}}
+    said = {"asks": "--columns time=2,range=3", "answer": {"columns": "time=2,range=3,azimuth=4,elevation=5"}}
     yield Animal("sentences", written("a.txt", text), first_s=SOD, **said)
     columns = (STAMPS.tolist(), F.r.tolist(), F.a.tolist(), F.e.tolist())
     nested = [
@@ -124,12 +124,9 @@ def clocks() -> Iterator[Animal]:
     yield _log("day and clock apart by a blank", "IRIG RNG AZ EL", apart, F.r, F.a, F.e, separator="  ", first_s=SOD)
     since_boot = [str(int(t * 1e6) + 53_000_000) for t in F.t]
     yield _timed("TimeUS", "TimeUS", since_boot, first_s=53)
-    yield _timed("us since the start, unsaid", "timestamp", since_boot, first_s=53, asks="--units time=us",
-                 answer={"units": "time=us"})  # fmt: skip
-    yield _timed("ms since the start, unsaid", "time", [str(int(t * 1e3) + 5300) for t in F.t], first_s=5.3,
-                 asks="--units time=ms", answer={"units": "time=ms"})  # fmt: skip
-    yield _timed("a share of the day", "Time", [f"{v:.12f}" for v in F.sod() / 86400], first_s=SOD,
-                 asks="--units time=d", answer={"units": "time=d"})  # fmt: skip
+    yield _timed("us since the start, unsaid", "timestamp", since_boot, first_s=53)
+    yield _timed("ms since the start, unsaid", "time", [str(int(t * 1e3) + 5300) for t in F.t], first_s=5.3)
+    yield _timed("a share of the day", "Time", [f"{v:.12f}" for v in F.sod() / 86400], first_s=SOD)
 
 
 def names() -> Iterator[Animal]:

@@ -17,8 +17,9 @@ from ftproc.settings import Station
 from tests.files.zoo.animals import all_animals
 from tests.files.zoo.flight import Animal, flight
 from tests.files.zoo.others import all_others
+from tests.files.zoo.strangers import all_strangers
 
-ANIMALS = [*all_animals(), *all_others()]
+ANIMALS = [*all_animals(), *all_others(), *all_strangers()]
 MOST_QUESTIONS = 0.1  # share of the animals
 
 

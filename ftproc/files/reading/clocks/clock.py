@@ -9,10 +9,11 @@ import numpy as np
 from ftproc.errors import row_named
 from ftproc.records import FloatArray
 
-DAY_S, WEEK_S = 86400.0, 604800.0
+HOUR_S, DAY_S, WEEK_S = 3600.0, 86400.0, 604800.0
 
 #: Periods in s of clocks that restart at zero, and when they do.
 _ROLLOVERS = {DAY_S: "midnight", WEEK_S: "the end of the GPS week"}
+_SHORT = {HOUR_S: "each hour"}  # those of clocks that show no hours
 _MAX_ROLLOVER_GAP_S = 600.0  # from the last time before to the first after
 _ROWS_AFTER = 20  # most of these must stay below; else the fall is a glitch
 
@@ -40,7 +41,13 @@ def unrolled(time_s: FloatArray, only: float | None = None) -> tuple[FloatArray,
         return time_s, ()
     row = np.flatnonzero(~np.isnan(time_s))
     time = time_s[row]
-    for period, what in _ROLLOVERS.items():
+    if only == DAY_S and _is_of_twelve_hours(time):
+        whole = np.array(time_s)
+        whole[row] = time % (DAY_S / 2) + (DAY_S / 2 if time[0] >= DAY_S / 2 else 0.0)
+        return whole, (
+            "the clock shows 12 hours and restarts at one o'clock, so that 12 hours are added from there on",
+        )
+    for period, what in (_SHORT if only in _SHORT else _ROLLOVERS).items():
         falls = _rollovers(time, period) if only in (None, period) else []
         if falls:
             turns = np.zeros(len(time))
@@ -50,6 +57,13 @@ def unrolled(time_s: FloatArray, only: float | None = None) -> tuple[FloatArray,
             notes = (f"the clock restarts at {what}, {row_named(int(row[k]))}: {period:.0f} s are added" for k in falls)
             return whole, tuple(notes)
     return time_s, ()
+
+
+def _is_of_twelve_hours(time: FloatArray) -> bool:
+    """Whether times of day run from 12:59 to 01:00, and forward otherwise."""
+    if not len(time) or time.min() < HOUR_S or time.max() >= 13 * HOUR_S:
+        return False
+    return bool((np.diff(time % (DAY_S / 2)) >= 0).all() and (np.diff(time) < -11 * HOUR_S).sum() == 1)
 
 
 def _rollovers(time: FloatArray, period: float) -> list[int]:

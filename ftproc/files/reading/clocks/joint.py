@@ -11,16 +11,43 @@ from ftproc.files import arrow, leap_seconds
 from ftproc.files.reading.clocks import notations, numeric, times
 from ftproc.files.reading.clocks.clock import DAY_S, WEEK_S, Clock, unrolled
 from ftproc.files.reading.meaning.numbers import Origin, as_text, numbers, parsed, without_text
-from ftproc.files.units import Unit, unit_named
+from ftproc.files.reading.meaning.schema import Column
+from ftproc.files.units import UNITS, Unit, unit_named
 from ftproc.records import FloatArray, IntArray
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
+_SEVERAL_DATES = ("the date can be read in several ways, so it is left open",)
 
-def read(columns: Mapping[str, pa.ChunkedArray], origin: Origin, units: Mapping[str, str]) -> Clock:
-    """The clock of several columns {role: column}, see `meaning.parts`. units: as written in their names. Raises
-    InputError as `times.read`."""
+
+def read(columns: Mapping[str, pa.ChunkedArray], origin: Origin, described: Column) -> Clock:
+    """The clock of several columns {role: column}, see `meaning.parts`. Raises InputError as `times.read`."""
+    units = dict(zip(described.roles, described.written, strict=True))
+    fraction = columns.get("fraction")
+    if fraction is None:
+        return _of_parts(columns, origin, units)
+    rest = {role: column for role, column in columns.items() if role != "fraction"}
+    if set(rest) == {"time"}:
+        alone = described._replace(roles=("value",), unit=unit_named("time", units["time"]) or described.unit)
+        whole = times.read(rest["time"], origin, alone._replace(unit_in_name=bool(units["time"])))
+    else:
+        whole = _of_parts(rest, origin, units)
+    return _with_fraction(whole, numbers(fraction, origin), UNITS["time"][described.fraction])
+
+
+def _with_fraction(clock: Clock, fraction: FloatArray, unit: Unit) -> Clock:
+    """The clock with fractions of the second of a column of their own, if it counts whole seconds without them."""
+    part = unit.to_si(fraction)
+    known = clock.time_s[np.isfinite(clock.time_s)]
+    if not (known == np.round(known)).all() or not ((part >= 0) & (part < 1)).all():
+        return clock
+    return clock._replace(
+        time_s=clock.time_s + part, words=f"{clock.words}, with fractions of the second in {unit.name}"
+    )
+
+
+def _of_parts(columns: Mapping[str, pa.ChunkedArray], origin: Origin, units: Mapping[str, str]) -> Clock:
     if "week" in columns:
         return _gps(columns, origin, unit_named("time", units["tow"]))
     clock = _own_moments(columns["time"], origin, unit_named("time", units["time"])) if "time" in columns else None
@@ -33,7 +60,9 @@ def read(columns: Mapping[str, pa.ChunkedArray], origin: Origin, units: Mapping[
     else:
         notes = ()
     words = f"{' and '.join(columns)} in columns of their own, in s since 00:00 of the first day"
-    return times.counted(day, second, dated, words, notes)
+    clock = times.counted(day, second, dated, words, notes)
+    several = "date" in columns and not dated
+    return clock._replace(doubts=_SEVERAL_DATES) if several else clock
 
 
 def _gps(columns: Mapping[str, pa.ChunkedArray], origin: Origin, unit: Unit | None) -> Clock:
@@ -132,6 +161,10 @@ def _dates_in_cells(column: pa.ChunkedArray, origin: Origin) -> tuple[IntArray, 
     middle = float(np.median(filled))
     if middle > 19e6:
         return _dates_in_text(as_text(column), origin)
+    if 10_100 < middle < 320_000 and not 3e4 <= middle < 7e4:  # of six digits
+        import pyarrow as pa
+
+        return _dates_in_text(pa.chunked_array([pa.array([f"{value:06.0f}" for value in filled], pa.string())]), origin)
     if middle < 367:
         return filled.astype(np.int64), False
     start = next(

@@ -19,14 +19,37 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2}(?:[.,]\d*|:\d{3})?)(?:\s*(?P<half>[AaPp])\.?[Mm]\.?)?"
-_ZONE = r"\s*(?P<zone>Z|z|UTC|UT|GMT|[+-]\d{2}(?::?\d{2})?)?"
+#: Zones by their usual letters, in hours ahead of UTC; those that several zones share are left out.
+_ZONES = {
+    "CET": 1,
+    "CEST": 2,
+    "EET": 2,
+    "EEST": 3,
+    "MSK": 3,
+    "WEST": 1,
+    "EST": -5,
+    "EDT": -4,
+    "CDT": -5,
+    "MST": -7,
+    "MDT": -6,
+    "PST": -8,
+    "PDT": -7,
+    "AKDT": -8,
+    "HST": -10,
+    "JST": 9,
+    "KST": 9,
+    "AEST": 10,
+    "AEDT": 11,
+}
+_ZONE = rf"\s*(?P<zone>Z|z|UTC|UT|GMT|[+-]\d{{2}}(?::?\d{{2}})?|{'|'.join(_ZONES)})?(?:\[[\w/]+\])?"
 _YEAR_FIRST = r"(?P<year>\d{4})[-/.](?P<month>\d{1,2})[-/.](?P<day>\d{1,2})"
 _COMPACT = r"(?P<year>(?:19|20)\d{2})(?P<month>\d{2})(?P<day>\d{2})"
 _DAY_FIRST = r"(?P<day>\d{1,2})[-/.](?P<month>\d{1,2})[-/.](?P<year>\d{4}|\d{2})"
 _MONTH_FIRST = r"(?P<month>\d{1,2})[-/.](?P<day>\d{1,2})[-/.](?P<year>\d{4}|\d{2})"
 _NAMED = r"(?P<day>\d{1,2})[-/. ](?P<name>[A-Za-z]{3,9})\.?[-/. ,]+(?P<year>\d{4}|\d{2})"
 _NAMED_FIRST = r"(?P<name>[A-Za-z]{3,9})\.?[-/. ](?P<day>\d{1,2})[-/. ,]+(?P<year>\d{4}|\d{2})"
-_ORDINAL = r"(?P<year>\d{4})[-:/. ](?P<doy>\d{3})"
+_ORDINAL = r"(?P<year>\d{4})[-:/. ]?(?P<doy>\d{3})"
+_DOTTED = _CLOCK.replace(":", "[.]", 2)  # as Oracle writes them
 _BETWEEN = r"[T _,;:]+\s*"
 
 _DATES = {
@@ -38,16 +61,25 @@ _DATES = {
     "month day year": _NAMED_FIRST,
     "year and day of year": _ORDINAL,
 }
+MINUTES = r"(?P<hour>)(?P<minute>\d{1,2}):(?P<second>\d{2}[.,]\d+)"  # as Excel shows times of day
 #: Name of a notation -> its pattern, for whole cells.
 STAMPS: Mapping[str, str] = {
     **{f"{name} and time of day": f"{date}{_BETWEEN}{_CLOCK}{_ZONE}" for name, date in _DATES.items()},
     "day of year and time of day": rf"(?P<doy>\d{{1,3}})[-:/.T ]+{_CLOCK}{_ZONE}",
     "time of day": f"T?{_CLOCK}{_ZONE}",
+    "day month year and time of day with dots": f"{_NAMED}{_BETWEEN}{_DOTTED}{_ZONE}",
+    "minutes and seconds": MINUTES,
     "duration": rf"(?:T?[+]|[+]?0 days )(?:0 days )?{_CLOCK}",
     "hours, minutes and seconds": r"(?P<hour>\d{1,2})h\s*(?P<minute>\d{1,2})m\s*(?P<second>\d{1,2}(?:[.,]\d*)?)s?",
     "compact time of day": r"(?P<hour>\d{2})(?P<minute>\d{2})(?P<second>\d{2}(?:\.\d*)?)(?P<zone>Z|z)",
 }
-DATES: Mapping[str, str] = {**_DATES, "day of year": r"(?P<doy>\d{1,3})"}
+DATES: Mapping[str, str] = {
+    **_DATES,
+    "day of year": r"(?P<doy>\d{1,3})",
+    "ddmmyy": r"(?P<day>\d{2})(?P<month>\d{2})(?P<year>\d{2})",
+    "yymmdd": r"(?P<year>\d{2})(?P<month>\d{2})(?P<day>\d{2})",
+    "mmddyy": r"(?P<month>\d{2})(?P<day>\d{2})(?P<year>\d{2})",
+}
 
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
            "mai", "mär", "okt", "dez")  # fmt: skip
@@ -111,6 +143,8 @@ def parsed(text: pa.ChunkedArray, pattern: str) -> Moments | None:
     hour, minute, second = (get(name) for name in ("hour", "minute", "second"))
     clock = np.zeros(len(matched))
     right = matched & right_day
+    if pattern == MINUTES:
+        hour = np.zeros(len(matched))
     if hour is not None and minute is not None and second is not None:
         half = _strings(fields, "half")
         if half is not None and any(half):
@@ -196,7 +230,7 @@ def _zones_alike(fields: pa.ChunkedArray, matched: NDArray[np.bool_]) -> NDArray
 
 def _offset(word: str) -> float:
     if word[:1] not in ("+", "-"):
-        return 0.0
+        return 3600.0 * _ZONES.get(word, 0)
     digits = word[1:].replace(":", "")
     return (-1.0 if word[0] == "-" else 1.0) * (3600 * int(digits[:2]) + 60 * int(digits[2:] or 0))
 

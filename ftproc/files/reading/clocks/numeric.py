@@ -17,19 +17,31 @@ _DAY_COUNTS = {
     "mjd": (40587.0, "modified Julian date"),
     "jd": (2440587.5, "Julian date"),
     "excel": (25569.0, "Excel date"),
+    "datenum": (719529.0, "Matlab's datenum"),
+    "days": (0.0, "days since 1970"),
 }
 _STEMS = {
     **dict.fromkeys(("mjd", "modifiedjuliandate"), "mjd"),
     **dict.fromkeys(("jd", "juliandate", "julianday"), "jd"),
+    "datenum": "datenum",
     **dict.fromkeys(("excel", "exceldate", "exceltime"), "excel"),
     **dict.fromkeys(("tow", "sow", "timeofweek", "secondsofweek", "gpstow", "itow"), "week"),
     **dict.fromkeys(("gps", "gpstime", "timegps", "gpsseconds", "gpst"), "gps"),
     **dict.fromkeys(("unix", "unixtime", "posix", "posixtime", "epoch", "epochtime"), "unix"),
     **dict.fromkeys(("timestamp", "unixtimestamp"), "unix"),
     **dict.fromkeys(("tod", "sod", "timeofday", "secondsofday", "secofday", "utcsod", "utctod", "day"), "day"),
+    **dict.fromkeys((f"{unit}{word}midnight" for unit in ("secs", "seconds", "sec", "time")
+                     for word in ("past", "after", "since")), "day"),
     **dict.fromkeys(("utc", "utctime", "timeutc", "zulu", "irig", "irigb", "irigtime", "daytime"), "day"),
 }  # fmt: skip
-_UNIX_FROM, _UNIX_TO = 1e8, 1e10  # s: 1973 to 2286
+_UNIX_FROM, _UNIX_TO = 1e8, 2.9e9  # s: 1973 to 2061
+_1904_FROM, _1904_TO = 3.5e9, 4.2e9  # s since 1904, as Macintosh and LabVIEW count: 2014 to 2037
+#: From, to, start in s before 1970, counts in a second, words.
+_TICKS = (
+    (_1904_FROM, _1904_TO, 2082844800, 1, "s since 1904 UTC"),
+    (6.2e17, 6.6e17, 62135596800, 10**7, "ticks of .NET, 100 ns since the year 1"),
+    (1.25e17, 1.42e17, 11644473600, 10**7, "Windows file times, 100 ns since 1601"),
+)
 _SURELY_UNIX = 1.5e9  # s: 2017; from there on seconds since 1980 are in the future
 _GPS_FROM = 3e8
 _SAMPLE = 2000  # times by which the size and the step are judged
@@ -49,15 +61,24 @@ def read(values: FloatArray, column: Column) -> Clock:
     counted = _day_count(kind, size, known)
     if counted:
         return _of_days(values, *_DAY_COUNTS[counted])
+    counted_from = next((entry for entry in _TICKS if entry[0] <= size < entry[1]), None)
+    if counted_from and kind in ("", "unix", "day"):
+        _, _, start, per_second, words = counted_from
+        seconds = values / per_second - start if per_second == 1 else (values - start * per_second) / per_second
+        return Clock(seconds, UNIX_EPOCH, f"{words}, by the size of the numbers")
     for power, name in ((1e9, "ns"), (1e6, "us"), (1e3, "ms")):
         if kind != "week" and column.name != CANONICAL["time"] and _UNIX_FROM <= size / power < _UNIX_TO:
             return Clock(values / power, UNIX_EPOCH, f"{name} since 1970 UTC, by the size of the numbers")
+    if kind in ("", "unix", "day") and _is_calendar(known):
+        return _of_calendar(values)
     if _is_hhmmss(kind, column.notation, values, most):
         seconds, notes = unrolled(from_hhmmss(values), DAY_S)
         return Clock(seconds, "", "time of day as hhmmss, in s since midnight", notes)
     period = {"day": DAY_S, "week": WEEK_S, "gps": WEEK_S}.get(kind)
     if kind in ("day", "week") and period and 2 * period < most <= 1e3 * period:
         return _in_seconds(values / 1e3, kind, column, "numbers in ms, by their size")
+    if column.unit.name != "s":  # as the motion shows
+        return _in_seconds(column.unit.to_si(values), kind, column, f"numbers in {column.unit.name}, by the motion")
     return _in_seconds(values, kind, column, BARE)
 
 
@@ -95,6 +116,10 @@ def _day_count(kind: str, size: float, known: FloatArray) -> str:
         return "jd"
     if 3e4 <= size < 4.9e4:
         return "excel"
+    if 7.2e5 <= size < 7.6e5:
+        return "datenum"
+    if 1.6e4 <= size < 2.4e4:
+        return "days"
     return "mjd" if 5.5e4 <= size < 7e4 else ""
 
 
@@ -116,6 +141,27 @@ def _is_hhmmss(kind: str, notation: str, values: FloatArray, most: float) -> boo
     if notation.startswith("hhmmss"):
         return True
     return kind in ("day", "") and DAY_S < most < 240_000 and is_hhmmss(values) and (kind == "day" or _jumps(values))
+
+
+def _is_calendar(known: FloatArray) -> bool:
+    """Whether all numbers are possible moments written as yyyymmddhhmmss."""
+    if known.min() < 1.97e13 or known.max() >= 2.1e13:
+        return False
+    day = np.floor(known / 1e6)
+    month, date = np.floor(day / 100) % 100, day % 100
+    return bool(((month >= 1) & (month <= 12) & (date >= 1) & (date <= 31)).all()) and is_hhmmss(known - day * 1e6)
+
+
+def _of_calendar(values: FloatArray) -> Clock:
+    day = np.floor(values / 1e6)
+    year, month = np.floor(np.nan_to_num(day, nan=19700101.0) / 1e4), np.floor(np.nan_to_num(day, nan=19700101.0) / 100)
+    months = ((year - 1970) * 12 + month % 100 - 1).astype(np.int64).astype("datetime64[M]").astype("datetime64[D]")
+    days = months.astype(np.int64) + np.nan_to_num(day, nan=1.0) % 100 - 1
+    first = int(days[np.isfinite(values)].min())
+    time_s = (days - first) * DAY_S + from_hhmmss(np.round(values - day * 1e6, 2))
+    words = "yyyymmddhhmmss, in s since 00:00 of the first day"
+    doubt = "the times have 14 digits, of which programs keep hundredths of a second"
+    return Clock(time_s, f"{np.datetime64(first, 'D')}T00:00:00Z", words, doubts=(doubt,))
 
 
 def _jumps(values: FloatArray) -> bool:

@@ -10,12 +10,11 @@ import numpy as np
 
 from ftproc.errors import InputError
 from ftproc.files import arrow, leap_seconds
-from ftproc.files.layout import CANONICAL
 from ftproc.files.reading.clocks import notations, numeric
-from ftproc.files.reading.clocks.clock import DAY_S, Clock, unrolled
+from ftproc.files.reading.clocks.clock import DAY_S, HOUR_S, Clock, unrolled
 from ftproc.files.reading.meaning.numbers import Origin, as_text, not_a_number, numbers, parsed, without_text
 from ftproc.files.reading.meaning.schema import Column
-from ftproc.files.units import UNITS, unit_named
+from ftproc.files.units import unit_named
 from ftproc.records import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -30,8 +29,7 @@ _COUNTED = (  # whole cells: from the start of a flight, and with a unit
     r"^[TL]\s?(?P<number>[+-]\d+\.?\d*)\s*(?P<unit>[A-Za-z]*)$",
     r"^(?P<number>[+-]?\d+\.?\d*)\s*(?P<unit>[A-Za-z]+)$",
 )
-_SAMPLE = 2000  # times by which the step is judged
-_LEAST_STEP_S, _MOST_STEP_S = 1e-4, 20.0  # of instruments; the rest is asked about where no unit is stated
+_MOST_OF_A_YEAR = 360  # days
 _NO_ZONE = ("the timestamps name no time zone and are taken for UTC",)
 
 
@@ -57,12 +55,21 @@ def read(column: pa.ChunkedArray, origin: Origin, described: Column) -> Clock:
         text = as_text(column)
         if parsed(text, origin.decimal_comma) is None:
             counted_up = _with_unit(text)
-            return stamped(text, origin) if counted_up is None else counted_up
+            return _on_gps(stamped(text, origin), described) if counted_up is None else counted_up
         column = text
-    clock = numeric.read(numbers(column, origin), described)
-    if clock.words == numeric.BARE and not described.unit_is_stated and described.name != CANONICAL["time"]:
-        _ask_about_unit(clock.time_s, origin)
-    return clock
+    return numeric.read(numbers(column, origin), described)
+
+
+def _on_gps(clock: Clock, described: Column) -> Clock:
+    """A clock of timestamps without a zone, in UTC although the name of the column says that they are in GPS time."""
+    if described.key not in ("gpst", "gpstime", "timegps") or not clock.epoch or _NO_ZONE[0] not in clock.doubts:
+        return clock
+    start = np.datetime64(clock.epoch.removesuffix("Z"), "s")
+    ahead = int(leap_seconds.before(start.astype("datetime64[D]").astype(np.int64)))
+    if described.key != "gpst":
+        doubt = f"taken for UTC, though named GPS: if it is GPS time, {ahead} s are to be taken off"
+        return clock._replace(doubts=(f'"{described.name}" is {doubt}',))
+    return clock._replace(epoch=f"{start - np.timedelta64(ahead, 's')}Z", words=f"{clock.words}, GPS time", doubts=())
 
 
 def _with_unit(text: pa.ChunkedArray) -> Clock | None:
@@ -81,21 +88,6 @@ def _with_unit(text: pa.ChunkedArray) -> Clock | None:
         return None
     values = arrow.to_numpy(pc.struct_field(fields, "number").cast(pa.float64()))
     return Clock(unit.to_si(values), "", f"numbers in {unit.name}, as every cell says")
-
-
-def _ask_about_unit(time_s: FloatArray, origin: Origin) -> None:
-    """Raise InputError, a question, for times without a unit of which half lie so near or far that s are unlikely."""
-    steps = np.abs(np.diff(time_s[:_SAMPLE]))
-    steps = steps[steps > 0]
-    typical = float(np.median(steps)) if len(steps) else 1.0
-    if _LEAST_STEP_S <= typical < _MOST_STEP_S:
-        return
-    units = [f"time={u.name}" for u in UNITS["time"].values()
-             if _LEAST_STEP_S <= typical * u.multiply / u.divide < _MOST_STEP_S]  # fmt: skip
-    raise InputError(
-        f'{origin.source}: the times in column "{origin.column}" lie {typical:.3g} apart, and no unit is stated. Say '
-        f"{' or '.join(f'--units {unit}' for unit in units)}{' or ' if units else ''}--units time=s."
-    )
 
 
 def seconds(
@@ -135,7 +127,7 @@ def stamped(text: pa.ChunkedArray, origin: Origin) -> Clock:
     if moments.zoned and not moments.has_day:
         words += " (UTC)"
     if not moments.has_day:
-        whole, notes = unrolled(moments.second, DAY_S)
+        whole, notes = unrolled(moments.second, HOUR_S if words == "minutes and seconds" else DAY_S)
         return Clock(whole, "", f"{words}, in s since midnight", notes)
     doubts: tuple[str, ...] = () if sure else ("day and month cannot be told apart, so the date is left open",)
     doubts += () if moments.zoned or not (moments.dated and sure) else _NO_ZONE
@@ -158,12 +150,24 @@ def likeliest(fits: Mapping[str, notations.Moments]) -> tuple[notations.Moments,
 def counted(day: IntArray, second: FloatArray, dated: bool, words: str, notes: tuple[str, ...] = ()) -> Clock:
     """Seconds since 00:00 of the first day, leap seconds counted."""
     known = day[np.isfinite(second)]
+    if not dated:
+        day = _over_new_year(day)
+        known = day[np.isfinite(second)]
     first = int(known.min()) if known.size else 0
     time_s = (day - first) * DAY_S + second
     if not dated:
         return Clock(time_s, "", words, notes)
     leaps = leap_seconds.before(day) - leap_seconds.before(np.array(first))
     return Clock(time_s + leaps, f"{np.datetime64(first, 'D')}T00:00:00Z", words, notes)
+
+
+def _over_new_year(day: IntArray) -> IntArray:
+    """Days of an unknown year, that go on counting after 31 December."""
+    falls = np.flatnonzero(np.diff(day) <= -_MOST_OF_A_YEAR) + 1
+    if len(falls) != 1 or day[falls[0]] != 1:
+        return day
+    later = np.arange(len(day)) >= falls[0]
+    return np.where(later, day + day[falls[0] - 1], day)
 
 
 def _no_time(text: pa.ChunkedArray, origin: Origin) -> InputError:

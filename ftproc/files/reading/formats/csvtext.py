@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ftproc.errors import InputError, first_line, row_named
-from ftproc.files.reading.formats import content, encoding, layout, trimming
+from ftproc.files.reading.formats import content, encoding, layout, tagged, trimming
 from ftproc.files.reading.formats.header import Blocks, TableHeader
 from ftproc.files.reading.formats.layout import BLANKS
 
@@ -28,8 +28,9 @@ MISSING_WORDS = (
     *("NULL", "Null", "null", "None", "none", "1.#IND", "-1.#IND", "1.#QNAN", "-1.#QNAN"),
 )
 
+_QUOTED_COMMA = re.compile(rb'"[+-]?\d+,(?:\d{1,2}|\d{4,})"')  # a decimal comma, that does not separate thousands
+_TAGGED = re.compile(rb"[=:]\s*[\"']?[+-]?\.?\d|^\s*[$!][A-Z]|^\*?\d\d[\d.]{4}[+-]\w{8}")
 _HEAD = 1 << 20  # bytes of a large file that contain its header line
-_START = 256  # bytes that show whether a table is drawn
 _PLAIN_ROWS = 20  # under the names, that are looked at before a file counts as plain
 _BLOCK = 8 << 20  # bytes of a large file that are parsed at once
 _SEPARATOR_NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks", "": "fixed widths"}
@@ -39,17 +40,30 @@ _PARSED, _PARSED_OF_A_COLUMN = 1 << 20, 256  # bytes that pyarrow parses at once
 def text_file(name: str, path: Path, widths: Sequence[int] = ()) -> TableHeader:
     """A text file. widths: of its columns, in characters. Of a large file only the head is read. Raises InputError."""
     large = path.stat().st_size > content.LARGE and not widths
-    if large and not trimming.is_boxed(content.read(name, path, limit=_START)):
-        return _large_file(name, path)
+    if large:
+        head = content.read(name, path, limit=_HEAD)
+        if not trimming.is_boxed(head) and _tagged(name, head[: head.rfind(b"\n") + 1]) is None:
+            return _large_file(name, path)
     return text_bytes(name, content.read(name, path), widths)
 
 
 def text_bytes(name: str, data: bytes, widths: Sequence[int] = ()) -> TableHeader:
     """The bytes of a text file. Raises InputError."""
+    known = None if widths else _tagged(name, data)
+    if known is not None:
+        return known
     text = split(name, data, widths)
-    return TableHeader(
-        text.source, text.names, text.load, decimal_comma=text.delimiter != ",", units=text.units, form=text.form
-    )
+    commas = text.delimiter != "," or len(_QUOTED_COMMA.findall(text.body, 0, _HEAD)) > 2
+    return TableHeader(text.source, text.names, text.load, commas, units=text.units, form=text.form)
+
+
+def _tagged(name: str, data: bytes) -> TableHeader | None:
+    """A text whose lines say what each value is; None if it is none."""
+    head = data[:_HEAD]
+    if _plain(head) is not None or not _TAGGED.search(head):
+        return None
+    text = encoding.as_utf8(name, data).data.decode("utf-8", "replace")
+    return tagged.sentences(name, text) or tagged.survey(name, text) or tagged.pairs(name, text)
 
 
 def _large_file(name: str, path: Path) -> TableHeader:
@@ -60,7 +74,7 @@ def _large_file(name: str, path: Path) -> TableHeader:
         return split(name, content.read(name, path, known=before)).load(numeric, others)
 
     def blocks(numeric: Sequence[int]) -> Blocks | None:
-        if head.encoding.startswith("UTF"):
+        if head.encoding:  # in which the rows are elsewhere than in UTF-8
             return None
         rows = max(bytes(head.body).count(b"\n"), 1) * before.st_size // _HEAD
         return Blocks((text.load(numeric, ()) for text in in_blocks(path, head, before)), rows)
@@ -227,7 +241,7 @@ def _plain(data: bytes) -> tuple[list[str], str, int] | None:
         if row is None or not row[1].strip():
             break
         cells = layout.split(row[1].decode("utf-8", "replace"), delimiter)
-        if len(cells) != len(names) or not layout.is_data(cells):
+        if len(cells) != len(names) or not (layout.is_data(cells) or layout.is_data(cells[:1])):
             return None
         place = row.end()
     return None if place == found.end() else (names, delimiter, found.end())

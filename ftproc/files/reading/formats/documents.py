@@ -54,7 +54,7 @@ def _records(name: str, text: str) -> list[Mapping[str, Any]]:
             found = json.loads(text)
         except json.JSONDecodeError:
             found = _by_line(name, text)
-        records = list(_deepest_list(found)) if not _is_columns(found) else _of_columns(found)
+        records = _of_rows(found) or (_of_columns(found) if _is_columns(found) else list(_deepest_list(found)))
     except RecursionError as error:
         raise InputError(f"{name}: this JSON nests too deeply; write one object for each reading.") from error
     if not records:
@@ -85,6 +85,28 @@ def _is_columns(found: Any) -> bool:
     return len(sizes) == 1 and sizes.pop() > 1 and flat
 
 
+def _of_rows(found: Any) -> list[Mapping[str, Any]]:
+    """The records of lists of values, perhaps beside the names, or of objects by the number of the row, as pandas
+    writes them; none of other documents."""
+    if (
+        isinstance(found, Mapping)
+        and found
+        and all(key.isdecimal() and isinstance(found[key], Mapping) for key in found)
+    ):
+        return list(found.values())
+    rows, names = found, None
+    if isinstance(found, Mapping):
+        rows, names = found.get("data", found.get("values")), found.get("columns", found.get("names"))
+    if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
+        return []
+    width = len(rows[0])
+    if width < 2 or any(len(row) != width or isinstance(row[0], list | Mapping) for row in rows):
+        return []
+    if not isinstance(names, list) or len(names) != width:
+        names = [str(k + 1) for k in range(width)]
+    return [dict(zip(map(str, names), row, strict=True)) for row in rows]
+
+
 def _cells(cells: Any) -> list[Any]:
     return list(cells.values()) if isinstance(cells, Mapping) else list(cells) if isinstance(cells, list) else [cells]
 
@@ -94,19 +116,20 @@ def _of_columns(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [dict(zip(names, row, strict=True)) for row in zip(*map(_cells, found.values()), strict=True)]
 
 
-def _deepest_list(found: Any, depth: int = 0) -> Iterator[Mapping[str, Any]]:
-    """The objects in lists of a document; an object that holds a list of objects gives these."""
+def _deepest_list(found: Any, above: Mapping[str, Any] | None = None, depth: int = 0) -> Iterator[Mapping[str, Any]]:
+    """The objects in lists of a document; an object that holds a list of objects gives these, with its plain values."""
     if depth > _DEEPEST:
         return
     if isinstance(found, list):
         for item in found:
-            yield from _deepest_list(item, depth + 1)
+            yield from _deepest_list(item, above, depth + 1)
     elif isinstance(found, Mapping):
         lists = [key for key, value in found.items() if _holds_records(value)]
         if not lists:
-            yield found
+            yield {**(above or {}), **found}
+        plain = {key: value for key, value in found.items() if not isinstance(value, list | Mapping)}
         for key in lists:
-            yield from _deepest_list(found[key], depth + 1)
+            yield from _deepest_list(found[key], {**(above or {}), **plain}, depth + 1)
 
 
 def _holds_records(value: Any, depth: int = 0) -> bool:

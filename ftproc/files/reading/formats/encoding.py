@@ -1,11 +1,14 @@
-"""Bytes -> UTF-8: byte order marks, UTF-16 and UTF-32 without one, Windows and Latin-1 text."""
+"""Bytes -> UTF-8: byte order marks, UTF-16 and UTF-32 without one, national encodings, Windows and Latin-1 text."""
 
 from __future__ import annotations
 
+import codecs
 import re
 from typing import NamedTuple
 
 from ftproc.errors import InputError
+from ftproc.files.units import SPELLINGS
+from ftproc.files.words import ALIASES, WEAK_ALIASES, plain_letters
 
 _MARKS = (
     (b"\xef\xbb\xbf", "utf-8", ""),
@@ -16,7 +19,29 @@ _MARKS = (
 )
 #: The share of NUL bytes at each place of four, in text without a mark.
 _BY_NULS = {"utf-32-le": "0111", "utf-32-be": "1110", "utf-16-le": "0101", "utf-16-be": "1010"}
+#: Encodings of which nothing in the file tells: that in which the most known words stand counts, else the first.
+_NATIONAL = {
+    "cp1252": "Windows or Latin-1",
+    "gb18030": "GBK",
+    "big5": "Big5",
+    "shift_jis": "Shift JIS",
+    "euc_kr": "EUC-KR",
+    "euc_jp": "EUC-JP",
+    "cp1251": "Windows-1251",
+    "koi8_r": "KOI8-R",
+    "cp866": "DOS-866",
+    "iso8859_5": "ISO 8859-5",
+    "cp1250": "Windows-1250",
+    "iso8859_2": "ISO 8859-2",
+    "cp1253": "Windows-1253",
+    "cp1254": "Windows-1254",
+    "mac_roman": "Mac Roman",
+    "cp437": "DOS-437",
+}
+_TABLES = (ALIASES, WEAK_ALIASES, SPELLINGS)
+_KNOWN = {word for table in _TABLES for words in table.values() for word in words if word[1:]}
 _SAMPLE = 4096
+_WORDS = 1 << 16  # bytes in which known words are looked for
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x19\x1c-\x1f]")
 
 _OTHER_KINDS = {
@@ -59,7 +84,20 @@ def as_utf8(source: str, data: bytes, cut: bool = False) -> Utf8:
         return Utf8(text, len(mark))
     if _CONTROL.search(text[:_SAMPLE]):
         raise InputError(f"{source}: this is not text, or a damaged file; save it as UTF-8 CSV.")
-    return Utf8(text.decode("cp1252", "replace").replace("\ufffd", "?").encode(), 0, "Windows or Latin-1")
+    national = max(_NATIONAL, key=lambda each: _known_words(text[:_WORDS], each))
+    return Utf8(text.decode(national, "replace").replace("\ufffd", "?").encode(), 0, _NATIONAL[national])
+
+
+def _known_words(sample: bytes, encoding: str) -> int:
+    """How many letters the known words have that a sample, read in an encoding, holds; -1 if it cannot be so."""
+    strict = "replace" if encoding == "cp1252" else "strict"
+    try:
+        text = codecs.getincrementaldecoder(encoding)(strict).decode(sample)  # its last letter may be cut
+    except UnicodeDecodeError:
+        return -1
+    phrases = {phrase for phrase in re.split(r"[^\w ]+|  +", text) if not phrase.isascii()}
+    known = sum(len(phrase) for phrase in phrases if plain_letters(phrase).replace(" ", "") in _KNOWN)
+    return known + bool(re.search(r"[(\[ ]°", text))
 
 
 def _is_utf8(text: bytes, cut: bool) -> bool:

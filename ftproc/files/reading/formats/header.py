@@ -38,13 +38,16 @@ class TableHeader:
     form: str = ""
 
 
-def of_arrow(table: pa.Table, source: str, form: str = "", units: Sequence[str] = ()) -> TableHeader:
+def of_arrow(
+    table: pa.Table, source: str, form: str = "", units: Sequence[str] = (), decimal_comma: bool = False
+) -> TableHeader:
     """The header of a table in memory."""
     return TableHeader(
         source,
         list(table.column_names),
         lambda numeric, others: table.select([*numeric, *others]),
-        metadata=table.schema.metadata or {},
+        decimal_comma,
+        table.schema.metadata or {},
         units=units,
         form=form,
     )

@@ -13,7 +13,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ftproc.errors import InputError
-from ftproc.files.units import QUANTITIES, unit_named
+from ftproc.files.reading.meaning.names import taken_apart
+from ftproc.files.units import unit_named
+from ftproc.files.words import QUANTITIES
 
 #: How comment lines begin. A semicolon does so too, where it is not the separator.
 COMMENTS = ("#", "%", "//", "!", "*", "REM ", "C ")
@@ -40,6 +42,8 @@ _UNNAMED = {
     "DOY": r"\s*\d{1,3}\s+\d{1,2}:\d{2}",
     "row": r"\s*\"?(\d+)\"?\s",  # as R numbers them
 }
+_NUMBERED = re.compile(r"^\d+\s*[:=)]\s*(?=[^\W\d])")  # a number before a name: `1:time`
+_ENUMERATED = re.compile(r"[\s#%;*]*(?:columns?|col|fields?)?[\s.]*#?(\d+)\s*[:=.)-]\s*([^\W\d].*)", re.IGNORECASE)
 _NOTHING = re.compile(r"\s*[\"']?(nan|null|none|n/?a|nil|[-*?.]+|)[\"']?\s*", re.IGNORECASE)
 
 
@@ -103,7 +107,7 @@ def _longest(filled: Sequence[int], rows: dict[int, list[str]]) -> tuple[int, in
             length += 1
         elif fits:
             start, length, width = index, 1, len(cells)
-        elif length and _is_empty_row(cells, width):
+        elif length and len(cells) == width and (_is_empty_row(cells) or is_data(cells[:1])):
             length += 1
         else:
             length = 0
@@ -112,8 +116,8 @@ def _longest(filled: Sequence[int], rows: dict[int, list[str]]) -> tuple[int, in
     return best
 
 
-def _is_empty_row(cells: Sequence[str], width: int) -> bool:
-    return len(cells) == width and all(_NOTHING.fullmatch(cell) for cell in cells)
+def _is_empty_row(cells: Sequence[str]) -> bool:
+    return all(_NOTHING.fullmatch(cell) for cell in cells)
 
 
 def is_comment(text: str) -> bool:
@@ -129,11 +133,10 @@ def _with_names(
     width = len(rows[filled[start]])
     block = [lines[number] for number in filled[start : start + 50]]
     top = start
-    while (
-        top
-        and not _RULE.fullmatch(lines[filled[top - 1]])
-        and (is_data(rows[filled[top - 1]], strictly=True) or _is_empty_row(rows[filled[top - 1]], width))
-    ):
+    while top and not _RULE.fullmatch(lines[filled[top - 1]]):
+        above = rows[filled[top - 1]]
+        if not (is_data(above, strictly=True) or (len(above) == width and _is_empty_row(above))):
+            break
         top -= 1
     units: list[str] = []
     place = top - 1
@@ -144,18 +147,31 @@ def _with_names(
         if cells is not None and _is_units(cells) and place:
             units, place = cells, place - 1
     names = None if place < 0 else _heading(lines[filled[place]], separator, width, block, widths)
-    if names is not None and sum(bool(_CELL.fullmatch(name)) for name in names) > len(names) / 2:
+    if names is not None and sum(bool(_CELL.fullmatch(_NUMBERED.sub("", name))) for name in names) > len(names) / 2:
         names = None
+    names = _enumerated([lines[number] for number in filled[:top]], width) or names
     if names is None and top < start:  # the numbers above belong to something else
         return _with_names(lines, filled, start, separator, {**rows, **{n: [""] for n in filled[top:start]}}, widths)
     if names is None and place >= 0 and top - place == 1 and (cells := _mismatched(lines[filled[place]], separator)):
         names = cells  # the rows have too many or too few cells, and are refused
+    over = [lines[number] for number in filled[max(place - 1, 0) : place + 1]]
+    if names is None and separator == BLANKS:
+        names = _stacked(over, block, width)
+    elif names is not None and not all(names) and len(over) > 1:  # groups of columns, such as merged cells
+        groups = split(over[0], separator, widths)
+        names = [name or group for name, group in zip(names, groups, strict=True)] if len(groups) == width else names
     numbers = [str(k + 1) for k in range(width)]
     found = numbers if names is None else names
     if len(units) != len(found):
         units = []
     first = filled[top]
     return Layout(found, first, separator, units, max(place, 0) if names is not None else top, names is not None, width)
+
+
+def _enumerated(above: Sequence[str], width: int) -> list[str] | None:
+    """The names of columns that lines above the table number: `Column 2: range (m)`."""
+    found = {int(match[1]): match[2].strip() for line in above if (match := _ENUMERATED.fullmatch(line))}
+    return [found[k] for k in range(1, width + 1)] if sorted(found) == list(range(1, width + 1)) else None
 
 
 def _mismatched(line: str, separator: str) -> list[str]:
@@ -215,6 +231,22 @@ def _joined_brackets(line: str) -> list[str]:
 
 def _aligned(line: str, block: Sequence[str], width: int) -> list[str]:
     """The words of a line by the column of numbers that each stands above."""
+    found = _above_columns(line, block, width)
+    return found if found and all(found) else []
+
+
+def _stacked(over: Sequence[str], block: Sequence[str], width: int) -> list[str] | None:
+    """The names of columns that stand in two lines, one word above the other; None unless several are known."""
+    parts = [_above_columns(line, block, width) for line in over]
+    if len(parts) < 2 or not all(parts):
+        return None
+    names = [" ".join(filter(None, words)) for words in zip(*parts, strict=True)]
+    known = [name for name in map(taken_apart, names) if any(name.means(quantity) for quantity in QUANTITIES)]
+    return names if all(names) and len(known) > 1 else None
+
+
+def _above_columns(line: str, block: Sequence[str], width: int) -> list[str]:
+    """The words above each column of numbers, "" where there are none; nothing if the rows do not line up."""
     spans = [[(m.start(), m.end()) for m in re.finditer(r"\S+", row)] for row in block]
     spans = [row for row in spans if len(row) == width]
     if not spans:
@@ -224,8 +256,7 @@ def _aligned(line: str, block: Sequence[str], width: int) -> list[str]:
     for word in re.finditer(r"\S+", line):
         centre = (word.start() + word.end()) / 2
         cells[min(range(width), key=lambda k: abs(middles[k] - centre))].append(word[0])
-    found = [" ".join(words) for words in cells]
-    return found if all(found) else []
+    return [" ".join(words) for words in cells]
 
 
 def first_line(source: str, data: bytes) -> tuple[list[str], str, int]:

@@ -36,13 +36,14 @@ class How(NamedTuple):
 
 #: What a name ends in -> the reader of that kind of file, from its name (for messages) and path.
 FORMATS: Mapping[str, Callable[[str, Path, How], TableHeader]] = {
-    **dict.fromkeys((".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".prn"), _text),
+    **dict.fromkeys((".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".prn", ".gsi"), _text),
     ".parquet": lambda name, path, how: columnar.parquet(name, path),
     **dict.fromkeys((".feather", ".arrow", ".arrows", ".ipc"), lambda name, path, how: columnar.feather(name, path)),
     **dict.fromkeys((".jsonl", ".ndjson", ".json"), lambda name, path, how: documents.json_file(name, path)),
     **dict.fromkeys((".xlsx", ".xlsm"), lambda name, path, how: workbook.workbook(name, path, how.part)),
-    **dict.fromkeys((".h5", ".hdf5", ".hdf"), lambda name, path, how: arrays.hdf5(name, path, how.part)),
+    **dict.fromkeys((".h5", ".hdf5", ".hdf", ".nc", ".nc4"), lambda name, path, how: arrays.hdf5(name, path, how.part)),
     ".mat": lambda name, path, how: arrays.matlab(name, path, how.part),
+    **dict.fromkeys((".npy", ".npz"), lambda name, path, how: arrays.saved_by_numpy(name, path)),
 }
 #: How files begin whose kind the name may not say.
 _BINARY = (b"PAR1", b"ARROW1", b"PK\x03\x04", b"\x89HDF", b"MATLAB")
@@ -59,6 +60,12 @@ _OTHERS = {
     ".kml": "this is a map, an output; name the log it was made of: ftproc filter LOG -o {name}",
     ".geojson": "this is a map, an output; name the log it was made of: ftproc filter LOG -o {name}",
     ".czml": "this is a map, an output; name the log it was made of: ftproc filter LOG -o {name}",
+    **dict.fromkeys((".ods", ".numbers"), "this spreadsheet is not understood; save it as .xlsx or .csv"),
+    **dict.fromkeys((".htm", ".pdf", ".doc", ".docx", ".rtf"), "this is a document; save the table in it as .csv"),
+    **dict.fromkeys(
+        (".db", ".sqlite", ".bag", ".db3", ".mcap", ".tdms", ".mf4", ".mdf", ".pcap", ".pkl", ".pickle", ".7z", ".rar"),
+        "this kind of file is not understood; export the track to .csv, .parquet, .xlsx, .h5 or .mat",
+    ),
     ".xls": "this is an old Excel workbook; save it as .xlsx or .csv",
 }
 

@@ -1,9 +1,11 @@
-"""What is no row of a text: comment lines and repeated names among the rows, lines below them, and drawn boxes."""
+"""What is no row of a text: comments, words and repeated names among the rows, lines below them, and drawn boxes."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+
+import numpy as np
 
 from ftproc.files.reading.formats import layout
 
@@ -18,6 +20,8 @@ _SUMS = frozenset(
     ]
 )
 _COUNTED = re.compile(r"\W*\d[\d,.]*\s+(rows?|records?|lines?|samples?|points?|entries|zeilen)\b.*", re.IGNORECASE)
+_FEW = 0.2  # of the lines, that may be words among the rows
+_LETTERS = np.arange(ord("a"), ord("z") + 1)
 _UNDER = 3  # lines under repeated names, at most, such as units and a rule
 _LAST = 4096  # bytes in which the last line is looked for
 
@@ -36,37 +40,68 @@ def unboxed(data: bytes) -> bytes:
 
 
 def rows_only(body: memoryview, names: Sequence[str], separator: str, widths: Sequence[int]) -> tuple[memoryview, str]:
-    """The rows without comment lines among them and lines of text below them; and in words what was left out."""
-    words, comments = "", 0
-    whole = body.tobytes()
+    """The rows without lines of text among and below them, and in words what was left out."""
+    whole, words = body.tobytes(), ""
     if _has_comments(whole):
-        found = [line for line in _COMMENT.finditer(body) if not _is_row(line[0], names, separator, widths)]
-        ends = [0, *(line.end() for line in found)]
-        starts = [*(line.start() for line in found), len(body)]
-        comments = len(found)
-        if comments:
-            whole = b"".join(body[low:high] for low, high in zip(ends, starts, strict=True))
-            body = memoryview(whole)
-            words += f", {comments} comment lines among the rows"
+        comments = [m.span() for m in _COMMENT.finditer(whole) if not _is_row(m[0], names, separator, widths)]
+        whole = _without(whole, comments)
+        words += f", {len(comments)} comment lines among the rows" if comments else ""
     repeated = _repeated_names(whole, names, separator, widths)
     if repeated:
-        ends, starts = [0, *(end for _, end in repeated)], [*(start for start, _ in repeated), len(body)]
-        body = memoryview(b"".join(body[low:high] for low, high in zip(ends, starts, strict=True)))
+        whole = _without(whole, repeated)
         words += f", the names repeated {len(repeated)} times"
-    begins_with_number = _begins_with_number(body, separator, widths)
-    end = len(body)
-    footer = 0
+    said = _sentences(whole, names, separator, widths)
+    if said:
+        whole = _without(whole, said)
+        words += f", {len(said)} lines of words among the rows"
+    end, footer = _end(whole, names, separator, widths)
+    words += f", {footer} lines below the table" if footer else ""
+    return memoryview(whole)[:end], words
+
+
+def _without(whole: bytes, spans: Sequence[tuple[int, int]]) -> bytes:
+    ends, starts = [0, *(end for _, end in spans)], [*(start for start, _ in spans), len(whole)]
+    return b"".join(whole[low:high] for low, high in zip(ends, starts, strict=True))
+
+
+def _end(whole: bytes, names: Sequence[str], separator: str, widths: Sequence[int]) -> tuple[int, int]:
+    """Where the last row ends, and the number of lines below it."""
+    begins_with_number = _begins_with_number(whole, separator, widths)
+    end, footer = len(whole), 0
     while footer < _FOOTER:
-        tail = bytes(body[max(end - _LAST, 0) : end])
+        tail = whole[max(end - _LAST, 0) : end]
         line = re.search(rb"(?:\A|[\r\n])([^\r\n]+)[\r\n]*\Z", tail)
         text = "" if line is None else line[1].decode("utf-8", "replace")
-        summed = begins_with_number and _is_sum(layout.split(text, separator, widths), names)
+        cells = layout.split(text, separator, widths)
+        summed = begins_with_number and len(cells) == len(names) and is_sum(cells)
         if line is None or not (summed or _is_footer(text, names, separator, widths)):
             break
         end -= len(tail) - line.start(1)
         footer += 1
-    words += f", {footer} lines below the table" if footer else ""
-    return body[:end], words
+    return end, footer
+
+
+def _sentences(whole: bytes, names: Sequence[str], separator: str, widths: Sequence[int]) -> list[tuple[int, int]]:
+    """Where lines of words stand among the rows, such as `*** LOST TRACK ***`, if they are few."""
+    if widths or len(names) < 2:
+        return []
+    letters = np.frombuffer(whole, np.uint8)
+    if not len(letters) or letters.max() < ord("A"):  # digits and marks only
+        return []
+    starts = np.flatnonzero(letters == ord("\n")) + 1
+    first = letters[starts[starts < len(letters)]]
+    odd = starts[: len(first)][np.isin(first | 0x20, _LETTERS) | (first == ord("*")) | (first == ord("-"))]
+    if not 0 < len(odd) <= _FEW * len(starts):
+        return []
+    found = []
+    for start in odd.tolist():
+        line = layout.LINE.match(whole, start)
+        assert line is not None
+        text = line[1].decode("utf-8", "replace")
+        cells = layout.split(text, separator)
+        if len(cells) != len(names) and not layout.is_data(cells) and re.match(r"[\W_]*[^\W\d_]{2}", text):
+            found.append((start, line.end()))
+    return found
 
 
 def _is_row(
@@ -113,18 +148,18 @@ def _bare(line: str) -> str:
     return re.sub(r"[\s,;|\"']", "", line)
 
 
-def _begins_with_number(body: memoryview, separator: str, widths: Sequence[int]) -> bool:
+def _begins_with_number(body: bytes, separator: str, widths: Sequence[int]) -> bool:
     """Whether the first cell of the first row is a number or a time, so that a word there is a summary."""
-    line = layout.LINE.match(bytes(body[:_LAST]))
+    line = layout.LINE.match(body[:_LAST])
     cells = layout.split(line[1].decode("utf-8", "replace"), separator, widths) if line else []
     filled = [cell for cell in cells if cell]
     return bool(filled) and layout.is_data(filled[:1])
 
 
-def _is_sum(cells: Sequence[str], names: Sequence[str]) -> bool:
+def is_sum(cells: Sequence[str]) -> bool:
     """Whether as many cells as in a row sum up the rows, or a word stands alone: the mean, EOF, the number of rows."""
     filled = [cell for cell in cells if cell]
-    if len(cells) != len(names) or not filled or layout.is_data(filled[:1]):
+    if not filled or layout.is_data(filled[:1]):
         return False
     alone = len(filled) < len(cells) and (len(filled) == 1 or (len(filled) == 2 and filled[1].isdigit()))
     return filled[0].strip(" :.").lower() in _SUMS or (alone and filled[0][0].isalpha())

@@ -10,27 +10,46 @@ from pathlib import Path
 from typing import Any
 
 from ftproc.errors import InputError, first_line
-from ftproc.files.reading.formats import content, layout
+from ftproc.files.reading.formats import content, layout, trimming
 from ftproc.files.reading.formats.header import TableHeader, of_arrow
+from ftproc.files.reading.meaning.names import taken_apart
+from ftproc.files.words import QUANTITIES
 
 
 def workbook(name: str, path: Path, sheet: str = "") -> TableHeader:
     """An .xlsx file. sheet: its name, else the first with rows. Raises InputError."""
     content.read(name, path, limit=1)  # for its messages
     _refuse_bomb(name, path)
-    for title, cells in _sheets(name, path, sheet):
-        lines = ["\t".join(_text(cell) for cell in row) for row in cells]
-        found = layout.find(lines)
-        if found is None or found.separator != "\t":
-            continue
-        rows = [row for row in cells[found.first :] if any(_text(cell) for cell in row)]
-        import pyarrow as pa
-
-        columns = [_column([row[place] for row in rows]) for place in range(found.cells)]
-        table = pa.Table.from_arrays(columns, names=found.names)
-        return of_arrow(table, name, f'Excel workbook, sheet "{title}"', found.units)
+    tables = [table for title, cells in _sheets(name, path, sheet) if (table := _table(name, title, cells)) is not None]
+    if tables:
+        return next(filter(_is_log, tables), tables[0])
     which = f'sheet "{sheet}" holds' if sheet else "no sheet holds"
     raise InputError(f"{name}: {which} {'no ' if sheet else 'a '}table of numbers under a line of names.")
+
+
+def _table(name: str, title: str, cells: list[tuple[Any, ...]]) -> TableHeader | None:
+    """The table of a sheet, or None."""
+    found = layout.find(["\t".join(_text(cell) for cell in row) for row in cells])
+    if found is None or found.separator != "\t":
+        return None
+    rows = [row for row in cells[found.first :] if any(_text(cell) for cell in row)]
+    last = len(rows)
+    while last > 1 and trimming.is_sum([_text(cell) for cell in rows[last - 1][: found.cells]]):
+        last -= 1
+    import pyarrow as pa
+
+    columns = [_column([row[place] for row in rows[:last]]) for place in range(found.cells)]
+    below = f", {len(rows) - last} lines below the table" if last < len(rows) else ""
+    table = pa.Table.from_arrays(columns, names=found.names)
+    return of_arrow(table, name, f'Excel workbook, sheet "{title}"{below}', found.units, decimal_comma=True)
+
+
+def _is_log(header: TableHeader) -> bool:
+    """Whether a table has the names of a time and of a reading."""
+    units = header.units or [""] * len(header.names)
+    names = [taken_apart(name, unit) for name, unit in zip(header.names, units, strict=True)]
+    found = {quantity for quantity in QUANTITIES for name in names if name.means(quantity)}
+    return "time" in found and len(found) > 1
 
 
 def _sheets(name: str, path: Path, sheet: str) -> Iterator[tuple[str, list[tuple[Any, ...]]]]:
@@ -84,4 +103,6 @@ def _column(cells: Sequence[Any]) -> Any:
         return pa.array(present, pa.timestamp("us"))
     if kinds == {dt.time}:
         return pa.array(present, pa.time64("us"))
+    if kinds == {dt.timedelta}:
+        return pa.array(present, pa.duration("us"))
     return pa.array([None if cell is None else _text(cell) for cell in present], pa.string())

@@ -4,22 +4,27 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Sequence
 from typing import NamedTuple
 
-from ftproc.files.units import (
+from ftproc.files.units import unit_named
+from ftproc.files.words import (
     ALIASES,
-    ANGLES_BY_UNIT,
+    EITHER_ANGLE,
+    ONLY_BY_UNIT,
     QUALIFIERS,
     QUANTITIES,
     WEAK_ALIASES,
     ZENITH_ALIASES,
-    unit_named,
+    plain_letters,
 )
 
 _BRACKETS = re.compile(r"(.*?)[\s_.,:/-]*[(\[{<]\s*(.*?)\s*[)\]}>]\s*")
 _LAST = re.compile(r"(.*\S)(?:\s*/\s*|\s+in\s+|\s*,\s*|[\s_.-]+)(\S+)", re.IGNORECASE)
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 _NOT_WORDS = re.compile(r"(?:[^\w°]|_)+")
+_NUMBERED = re.compile(r"^\d+\s*[:=)]\s*(?=[^\W\d])")  # the number of a column before its name
+_OF_UTC = ("utc", "gmt")  # behind the name of a time
 _VALUE = re.compile(r"[._/](val|value)$", re.IGNORECASE)  # how decoders end the path of a value
 
 #: Units of other quantities, by which a column is known for something else.
@@ -31,7 +36,12 @@ _FOREIGN = frozenset(
     ]
 )
 #: Words in brackets that are notations of a time or an angle.
-NOTATIONS = frozenset(["utc", "gps", "gpst", "hms", "hhmmss", "dms", "ddmmss", "dddmmss", "dmmss", "zulu", "z", "tai"])
+NOTATIONS = frozenset(
+    [
+        *("utc", "gps", "gpst", "hms", "hhmmss", "dms", "ddmmss", "dddmmss", "dmmss", "zulu", "z", "tai"),
+        *("t", "true"),  # from true north
+    ]
+)
 
 
 class Name(NamedTuple):
@@ -50,7 +60,7 @@ class Name(NamedTuple):
     def means(self, quantity: str) -> int:
         """0: not this quantity; 1: by one of its names; 2: by a name that other things have too."""
         unit = unit_named(quantity, self.unit) if self.unit else None
-        if self.foreign or (self.unit and unit is None) or (self.stem in ANGLES_BY_UNIT and unit is None):
+        if self.foreign or (self.unit and unit is None) or (self.stem in ONLY_BY_UNIT and unit is None):
             return 0
         for rank, aliases in ((1, ALIASES), (2, WEAK_ALIASES)):
             if self.stem in aliases[quantity]:
@@ -60,7 +70,10 @@ class Name(NamedTuple):
 
     def core(self) -> str:
         """The stem without words that say nothing about the quantity, such as `radar1`."""
-        return "".join(word for word in self.words if word.rstrip("0123456789") not in QUALIFIERS)
+        said = [word for word in self.words if word.rstrip("0123456789") not in QUALIFIERS]
+        if any(word in aliases for word in said for aliases in ALIASES.values()):  # such as theta_az
+            said = [word for word in said if word not in EITHER_ANGLE]
+        return "".join(word for k, word in enumerate(said) if not (k and word in _OF_UTC)).rstrip("0123456789")
 
     def is_zenith(self) -> bool:
         """Whether it names zenith angles."""
@@ -70,8 +83,8 @@ class Name(NamedTuple):
 
 def taken_apart(text: str, unit: str = "") -> Name:
     """A name, and the cell under it in a row of units (which wins)."""
-    plain = unicodedata.normalize("NFC", text).strip().strip("\"'#%;!").strip()
-    plain = _VALUE.sub("", plain)
+    plain = unicodedata.normalize("NFKC", text.replace("º", "°")).strip().strip("\"'#%;!:").strip()
+    plain = _VALUE.sub("", _NUMBERED.sub("", plain))
     found, notation, foreign = "", "", False
     bracketed = _BRACKETS.fullmatch(plain)
     if bracketed:
@@ -151,12 +164,11 @@ def _words(text: str) -> tuple[str, tuple[str, ...], str]:
     """Stem and words of the last part of a path such as `CAT048.I040.RHO`, and the path before it."""
     context, _, last = text.rpartition("/") if "/" in text else text.rpartition(".")
     parts = _NOT_WORDS.split(last.lower())
-    if not re.search(r"[^\W\d_]", last) or all(part in QUALIFIERS for part in parts if part):  # such as Az.Angle
+    around = set(_NOT_WORDS.split(context.lower())) - {""}
+    letter = len(last) == 1 and not around <= QUALIFIERS  # such as Mode 3/A
+    if letter or not re.search(r"[^\W\d_]", last) or all(part in QUALIFIERS for part in parts if part):  # Az.Angle
         context, last = "", text
-    spaced = unicodedata.normalize("NFKD", _CAMEL.sub(" ", last)).lower()
-    spaced = "".join(letter for letter in spaced if not unicodedata.combining(letter))
-    spaced = unicodedata.normalize("NFC", spaced)
-    words = tuple(word for word in _NOT_WORDS.split(spaced) if word)
+    words = tuple(word for word in _NOT_WORDS.split(plain_letters(_CAMEL.sub(" ", last))) if word)
     if len(words) > 1 and words[0].isdigit():  # such as 048_040_RHO
         digits = [k for k, word in enumerate(words) if word.isdigit()]
         cut = next((k for k in range(len(words)) if k not in digits), 0)
@@ -171,3 +183,12 @@ _ASTERIX = {("rho", "040"): "nmi", ("theta", "040"): "deg", ("tod", "140"): "s",
 def _asterix_unit(word: str, context: str) -> str:
     parts = {part.removeprefix("i") for part in _NOT_WORDS.split(context)}
     return next((unit for (name, item), unit in _ASTERIX.items() if name == word and item in parts), "")
+
+
+def of_radar(names: Sequence[Name]) -> list[Name]:
+    """The names; RHO and THETA of a file that has other items of ASTERIX too, with the units of that standard."""
+    words = {word for name in names for word in (*name.words, *_NOT_WORDS.split(name.text.lower()))}
+    if not ({"sac", "sic"} <= words or {"rho", "theta", "polar", "coordinates"} <= words):
+        return list(names)
+    units = {"rho": "nmi", "theta": "deg"}
+    return [name._replace(unit=name.unit or units.get(name.stem, "")) for name in names]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ftproc.errors import InputError, row_named
+from ftproc.errors import InputError, quoted, row_named
 from ftproc.files import arrow
 from ftproc.files.reading.formats.csvtext import MISSING_WORDS
 from ftproc.records import FloatArray
@@ -19,9 +19,12 @@ from ftproc.records import FloatArray
 if TYPE_CHECKING:
     import pyarrow as pa
 
+_EVENT = re.compile(r"[A-Za-z][A-Za-z ]{3,20}")
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
 _THOUSANDS = r"^[+-]?\d{1,3}(,\d{3})+$"
+_GROUPED = "^[+-]?\\d{1,3}([\u00a0\u202f\u2009 '’]\\d{3})+([.,]\\d*)?$"  # by blanks or apostrophes
+_PLAIN_OR_GROUPED = "^[+-]?(\\d{1,3}([\u00a0\u202f\u2009 '’]\\d{3})+|\\d+)([.,]\\d*)?$"
 _FORTRAN = r"^([+-]?\d*\.?\d*)[DdQ]([+-]?\d{1,3})$"
 _MOSTLY = 0.5  # share of the cells that must have Fortran's exponents: a single one is a slip
 
@@ -40,6 +43,8 @@ class Origin(NamedTuple):
 
     def bad_cell(self, row: int, text: str, why: str, cure: str = "") -> InputError:
         """The error for the cell in 0-based data row `row`."""
+        if not cure and self.expected.startswith("a time") and _EVENT.fullmatch(text):
+            cure = f"Correct the cell, or leave such rows out with --where {quoted(f'{self.column}!={text}')}."
         return InputError(
             f'{self.source}: {row_named(row)}, column "{self.column}": '
             f'"{" ".join(text[:60].split())}" is not {why}; expected {self.expected}. {cure or self.cure}'
@@ -60,12 +65,22 @@ class Origin(NamedTuple):
 
 def numbers(column: pa.ChunkedArray, origin: Origin) -> FloatArray:
     """(n,) float64, NaN where missing. Raises InputError for the first cell that is no finite number."""
+    return finite(loosely(column, origin), origin)
+
+
+def loosely(column: pa.ChunkedArray, origin: Origin) -> FloatArray:
+    """(n,) float64, NaN where missing, perhaps infinite. Raises InputError for the first cell that is no number."""
     values = without_text(column)
     if values is None:
         text = as_text(column)
         values = parsed(text, origin.decimal_comma)
         if values is None:
             raise origin.first_bad_cell(text, not_a_number(text, origin.decimal_comma))
+    return values
+
+
+def finite(values: FloatArray, origin: Origin) -> FloatArray:
+    """The values. Raises InputError for the first that is infinite."""
     infinite = np.isinf(values)
     if infinite.any():
         row = int(np.argmax(infinite))
@@ -110,6 +125,8 @@ def _plainly_written(text: pa.ChunkedArray, decimal_comma: bool) -> pa.ChunkedAr
 
     if share(_FORTRAN) > _MOSTLY:
         text = pc.replace_substring_regex(text, _FORTRAN, r"\1E\2")
+    if share(_GROUPED) and share(_PLAIN_OR_GROUPED) == 1.0:
+        text = pc.replace_substring_regex(text, "[\u00a0\u202f\u2009 '’]", "")
     for mark, point in ((",", "."), (".", ","))[: 1 + decimal_comma]:
         grouped = rf"^[+-]?(\d{{1,3}}(\{mark}\d{{3}})+|\d+)(\{point}\d*)?$"
         if share(rf"^[+-]?\d{{1,3}}(\{mark}\d{{3}})+\{point}\d*$") and share(grouped) == 1.0:

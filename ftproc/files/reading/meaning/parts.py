@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from ftproc.files.reading.meaning.names import Name
-from ftproc.files.units import ALIASES, WEAK_ALIASES
+from ftproc.files.words import ALIASES, WEAK_ALIASES
 
 _SECONDS_OF_WEEK = frozenset(
     ["tow", "sow", "gpstow", "gpssow", "timeofweek", "secondsofweek", "secofweek", "itow", "gpsseconds", "weekseconds"]
@@ -20,9 +20,18 @@ _TIME = {
     "month": ("month", "mon", "mo", "utcmonth"),
     "day": ("day", "dd", "dom", "dayofmonth", "utcday"),
     "hour": ("hour", "hours", "hr", "hrs", "hh", "h", "utchour"),
-    "minute": ("minute", "minutes", "min", "mins", "mi", "mn", "mm", "utcminute", "utcmin"),
-    "second": ("second", "seconds", "sec", "secs", "ss", "s", "utcsecond", "utcsec"),
+    "minute": ("minute", "minutes", "min", "mins", "mi", "mn", "mm", "m", "utcminute", "utcmin"),
+    "second": ("second", "seconds", "sec", "secs", "ss", "s", "utcsecond", "utcsec", "tvsec"),
 }
+#: Stems of the names of a fraction of the second beside whole seconds -> its unit.
+FRACTIONS = {
+    **dict.fromkeys(("ms", "msec", "msecs", "millis", "millisec", "millisecs", "millisecond", "milliseconds"), "ms"),
+    **dict.fromkeys(("us", "usec", "usecs", "micros", "microsec", "microsecond", "microseconds", "tvusec"), "us"),
+    **dict.fromkeys(
+        ("ns", "nsec", "nsecs", "nanos", "nanosec", "nanosecs", "nanosecond", "nanoseconds", "tvnsec"), "ns"
+    ),
+}
+_PREFIXES = ("utc", "gps", "gmt")  # of the names of parts, such as UTC_HH
 #: Times that do not count from a midnight, and parts of one.
 _ELAPSED = frozenset([*_TIME["second"], "t", "elapsed", "elapsedtime", "elapsedseconds", "missiontime"])
 #: Parts of an angle -> units in the names.
@@ -55,9 +64,7 @@ def _in_order(names: Sequence[Name]) -> dict[str, int] | None:
 
 def _time(names: Mapping[int, Name]) -> dict[str, int] | None:
     def one(role: str) -> int | None:
-        return _only(
-            names, lambda name: name.stem in _TIME[role] or "".join((name.stem, name.unit.lower())) in _TIME[role]
-        )
+        return _only(names, lambda name: bool(_spellings(name) & set(_TIME[role])))
 
     clock = [k for k, name in names.items() if name.stem in ALIASES["time"] and name.stem not in _ELAPSED]
     hms = {role: one(role) for role in ("hour", "minute", "second")}
@@ -66,7 +73,11 @@ def _time(names: Mapping[int, Name]) -> dict[str, int] | None:
         of_week = _only(names, lambda name: name.stem in _SECONDS_OF_WEEK)
         seconds = of_week if of_week is not None else next(iter(clock), hms["second"])
         return None if seconds is None else {"week": week, "tow": seconds}
+    fraction = _fraction(names)
+    clock = [place for place in clock if place != fraction]
     calendar = {role: one(role) for role in ("year", "month", "day")}
+    if calendar["month"] is None and hms["hour"] is None:  # MM beside YYYY and DD
+        calendar["month"] = _only(names, lambda name: name.stem == "mm")
     days = {role: place for role, place in calendar.items() if place is not None}
     if len(days) < 3:
         days = {role: place for role in ("year", "doy") if (place := one(role)) is not None}
@@ -75,18 +86,41 @@ def _time(names: Mapping[int, Name]) -> dict[str, int] | None:
     if date is not None:
         days = {"date": date}
     if None not in hms.values():
-        return {**days, **{role: place for role, place in hms.items() if place is not None}}
-    if days and not clock and hms["second"] is not None:
-        clock = [hms["second"]]
-    return {**days, "time": clock[0]} if days and clock else None
+        days |= {role: place for role, place in hms.items() if place is not None}
+    else:
+        clock += [hms["second"]] if not clock and hms["second"] is not None and (days or fraction is not None) else []
+        if not clock or not (days or fraction is not None):
+            return None
+        days |= {"time": clock[0]}
+    return days if fraction is None or fraction in days.values() else {**days, "fraction": fraction}
+
+
+def _fraction(names: Mapping[int, Name]) -> int | None:
+    """The column of a fraction of the second: `ms`, or `stamp.nanosec` beside `stamp.sec`."""
+    seconds = [name for name in names.values() if {name.stem, name.unit.lower()} & set(_TIME["second"])]
+    whole = {name.stem for name in seconds} | {word for name in seconds for word in name.text.lower().split(".")[-2:-1]}
+    beside = _only(names, lambda name: name.unit.lower() in FRACTIONS and name.stem in whole)
+    return _only(names, lambda name: bool(_spellings(name) & set(FRACTIONS))) if beside is None else beside
+
+
+def _spellings(name: Name) -> set[str]:
+    """The stem of a name, with its unit, and without a prefix such as UTC."""
+    core = "".join(word for k, word in enumerate(name.words) if k or word not in _PREFIXES)
+    return {name.stem, core, name.stem + name.unit.lower(), core + name.unit.lower()} - {""}
+
+
+def unit_of_fraction(name: Name) -> str:
+    """The unit of a fraction of the second."""
+    return next(FRACTIONS[word] for word in (*_spellings(name), name.unit.lower()) if word in FRACTIONS)
 
 
 def _angle(quantity: str, names: Mapping[int, Name]) -> dict[str, int] | None:
     for stem in (*ALIASES[quantity], *WEAK_ALIASES[quantity]):
         mine = {place: name for place, name in names.items() if name.stem == stem}
         roles = {role: _only(mine, partial(_has_unit, words)) for role, words in _ANGLE.items()}
-        if len(mine) >= 3 and None not in roles.values():
-            return {role: place for role, place in roles.items() if place is not None}
+        known = {role: place for role, place in roles.items() if place is not None}
+        if len(known) == len(mine) > 1 and {"deg", "min"} <= set(known):
+            return known
     return None
 
 

@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.errors import InputError
+from ftproc.errors import InputError, quoted
 from ftproc.files.layout import CANONICAL
+from ftproc.files.reading.meaning.questions import named
 from ftproc.files.reading.meaning.schema import Column
 from ftproc.files.units import UNITS, Unit
 from ftproc.records import FloatArray
@@ -152,11 +153,12 @@ def _check(source: str, quantity: str, sizes: _Angles, found: Mapping[str, Colum
     # Degrees end at 360; values beyond 400 are outliers.
     typical = sizes.most if quantity == "azimuth" and 370 < sizes.most <= 400 else sizes.half
     other = _likely_unit(quantity, typical, limit / (2 if quantity == "azimuth" else 1))  # one turn, straight up
+    say = f"--columns {quantity}={quoted(named(column.name, column.position))} --units {quantity}="
     raise InputError(
         f'{source}: half of column "{column.name}" lies beyond {sizes.half:.4g} {assumed.name}, which is no '
-        f"{what}: it looks like {other[1]}; use --columns {quantity}={column.name} --units {quantity}={other[0]}"
+        f"{what}: it looks like {other[1]}; use {say}{other[0]}"
         f"{_and_the_other_angle(quantity, found, other[0])}. "
-        f"If {assumed.name} is right, say --columns {quantity}={column.name} --units {quantity}={assumed.name}."
+        f"If {assumed.name} is right, say {say}{assumed.name}."
     )
 
 
@@ -187,6 +189,13 @@ def _ask_about_zenith(
     half_deg = math.degrees(sizes.half * column.unit.multiply / column.unit.divide)
     if half_deg <= _STEEP_DEG or column.key == "elevation" or column.name == CANONICAL["elevation"]:
         return
+    if column.unit.name == "rad" and not column.unit_is_stated:
+        bare = [quantity for quantity in known if not decided[quantity].unit_is_stated]
+        deg, rad = (",".join(f"{quantity}={unit}" for quantity in bare) for unit in ("deg", "rad"))
+        raise InputError(
+            f'{source}: no unit is stated for "{column.name}", and half of it lies beyond {sizes.half:.4g}. '
+            f"Say --units {deg}, or --units {rad} --elevation-from horizon."
+        )
     raise InputError(
         f'{source}: half of column "{column.name}" lies beyond {half_deg:.4g} deg, as zenith angles do. '
         "Say --elevation-from zenith if they are zenith angles, or --elevation-from horizon if the target was so high."

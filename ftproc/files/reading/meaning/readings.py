@@ -3,54 +3,100 @@ in the cells, degrees, minutes and seconds in one column or three."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ftproc.files.reading.meaning.numbers import Origin, as_text, not_a_number, numbers, parsed, without_text
+from ftproc.files.reading.meaning.numbers import (
+    Origin,
+    as_text,
+    finite,
+    loosely,
+    not_a_number,
+    numbers,
+    parsed,
+    without_text,
+)
 from ftproc.files.reading.meaning.schema import Column
 from ftproc.files.units import UNITS, unit_named
+from ftproc.files.words import DEPRESSIONS
 from ftproc.records import FloatArray
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-#: Words that mean "no reading" and are reported, beside those that every program writes.
+#: Words that mean "no reading" and are reported, beside those that every program writes; and marks without letters.
 WORDS = (
-    *("*", "**", "***", "****", "*****", "******", "-", "--", "---", "----", "-----", ".", "..", "...", "?", "??"),
     *("nil", "NIL", "missing", "MISSING", "invalid", "INVALID", "void", "lost", "LOST", "no data", "NO DATA", "nodata"),
     *("NODATA", "\\N", "n.a.", "N.A.", "x", "X", "blank", "BLANK", "no track", "NO TRACK", "unknown", "dropout"),
+    *(
+        "n/d",
+        "N/D",
+        "drop",
+        "DROP",
+        "bad",
+        "BAD",
+        "error",
+        "ERROR",
+        "out",
+        "nan(ind)",
+        "-nan(ind)",
+        "нет",
+        "нет данных",
+    ),
+    *(
+        "无",
+        "無",
+        "#DIV/0!",
+        "#VALUE!",
+        "#REF!",
+        "#NUM!",
+        "#NAME?",
+        "#NULL!",
+        "<null>",
+        "<NULL>",
+        "(null)",
+        "[]",
+        "nan%",
+    ),
 )
+_MARKS = r"^[-*?./_#+]+$"
+_A_WORD = r"^[^\d\s][^\d]{0,11}$"  # that stands repeatedly for a number
 #: Numbers that mean "no reading" where they stand out.
 _NINES = tuple(10.0**digits - 10.0**-k for digits in range(2, 8) for k in range(4))
-NUMBERS = tuple(sign * value for value in (*_NINES, 32768.0, 1e10, 1e20, 1e30, 1e35, 1e37) for sign in (1, -1))
+_LIMITS = (
+    *(32767.0, 32768.0, 65535.0, 1e10, 1e20, 1e30, 1e35, 1e37, 1e38, 1e99, 9.99e37, 9.99e99, 9.9e37, 9.96921e36),
+    *(9.969209968386869e36, 3.402823e38, 3.4028235e38, 3.4028234663852886e38, 1.79769313486231e308),
+)
+_NO_RANGE = (0.0, -1.0)
+NUMBERS = (*(sign * value for value in (*_NINES, *_LIMITS) for sign in (1, -1)), *_NO_RANGE)
 
 _FAR = 20.0  # typical steps from the neighbours, for a number that stands out among others
 _DMS = (
-    r"^(?P<sign>[+-]?)(?P<deg>\d{1,3})\s*[°ºd:\- ]\s*(?P<min>\d{1,2})\s*(?:['’′m:\- ]\s*"
+    r"^(?P<sign>[+-]?)(?P<deg>\d{1,3})\s*[°ºd:\- ]\s*(?P<min>\d{1,2}(?:[.,]\d+)?)\s*(?:['’′m:\- ]\s*"
     r"(?:(?P<sec>\d{1,2}(?:[.,]\d*)?)\s*(?:\"|''|”|″|s)?)?)?$"
 )
 _WITH_UNIT = r"^(?P<number>[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[A-Za-z°º]+)$"
 _MOST_TURN = 720.0  # deg
+_MOST_WORDS = 3  # that stand for missing numbers in one column
 
 
 class Readings(NamedTuple):
-    """values: (n,) in the unit of `column`, NaN where missing. notes: what was done to the cells.
-    undecided: one of NUMBERS is left, which may stand out among more rows."""
+    """values: (n,) in the unit of `column`, NaN where missing. notes: what was done to the cells."""
 
     values: FloatArray
     column: Column
     notes: tuple[str, ...] = ()
-    undecided: bool = False
 
 
 def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) -> Readings:
     """The readings of one quantity. Raises InputError for the first cell that is no finite number."""
     if len(columns) > 1:
-        degrees, minutes, seconds = (numbers(column, origin) for column in columns)
+        degrees, minutes, *seconds = (numbers(column, origin) for column in columns)
         sign = np.where(np.signbit(degrees), -1.0, 1.0)
-        return Readings(_joined(sign, np.abs(degrees), minutes, seconds), _in_degrees(described))
+        rest = seconds[0] if seconds else np.zeros(len(minutes))
+        return Readings(_joined(sign, np.abs(degrees), minutes, rest), _in_degrees(described))
     (column,) = columns
     words: tuple[str, ...] = ()
     if without_text(column) is None:
@@ -63,37 +109,62 @@ def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) 
                 if found is None:
                     raise origin.first_bad_cell(text, not_a_number(text, origin.decimal_comma))
                 return found._replace(notes=(*words, *found.notes))
-    values = numbers(column, origin)
+    values = loosely(column, origin)
+    endless = np.isinf(values)
+    if np.count_nonzero(endless) > 1:
+        words += (f'"{described.name}" is infinite {endless.sum()} times, which is taken for a missing reading',)
+        values = np.where(endless, np.nan, values)
+    values = finite(values, origin)
+    if described.key in DEPRESSIONS:
+        values = -values
+        words += (f'"{described.name}" counts downwards and is turned round',)
     if described.notation in ("dms", "ddmmss", "dddmmss", "dmmss") and described.quantity != "range":
         return Readings(_from_digits(values), _in_degrees(described), words)
-    values, sentinels = without_sentinels(values, described)
-    low, high = (float(end.reduce(values)) for end in (np.fmin, np.fmax)) if len(values) else (0.0, 0.0)
-    undecided = any(bool((values == number).any()) for number in NUMBERS if low <= number <= high)
-    return Readings(values, described, (*words, *sentinels), undecided)
+    return Readings(values, described, words)
 
 
-def without_sentinels(values: FloatArray, described: Column) -> tuple[FloatArray, tuple[str, ...]]:
-    """(n,) values without the numbers that mean "no reading", and a note on each such number."""
-    notes: list[str] = []
-    while (number := _sentinel(values, described.quantity)) is not None:
-        found = values == number
-        count = int(np.count_nonzero(found))
-        values = np.where(found, np.nan, values)
+def without_sentinels(found: Mapping[str, Readings]) -> dict[str, Readings]:
+    """The readings of all quantities without the numbers that mean "no reading", and a note on each such number. One
+    that does in one quantity does so too in the others in the same row."""
+    values = {quantity: each.values for quantity, each in found.items()}
+    notes = {quantity: list(each.notes) for quantity, each in found.items()}
+    gone: dict[tuple[str, float], np.ndarray] = {}
+    for quantity in found:
+        while (number := _sentinel(values[quantity], quantity)) is not None:
+            places = values[quantity] == number
+            for other in found:
+                mine = places & (values[other] == number)
+                values[other] = np.where(mine, np.nan, values[other])
+                gone[other, number] = gone.get((other, number), False) | mine
+    for (quantity, number), places in gone.items():
+        count = int(np.count_nonzero(places))
         times = "once" if count == 1 else f"{count} times"
-        notes.append(f'"{described.name}" is {number:.10g} {times}, which is taken for a missing reading')
-    return values, tuple(notes)
+        name = found[quantity].column.name
+        if count:
+            notes[quantity].append(f'"{name}" is {number:.10g} {times}, which is taken for a missing reading')
+    return {q: Readings(values[q], each.column, tuple(notes[q])) for q, each in found.items()}
+
+
+def undecided(found: Mapping[str, Readings]) -> bool:
+    """Whether one of NUMBERS is left, which may stand out among more rows."""
+    return any(_candidates(each.values, quantity) for quantity, each in found.items())
+
+
+def _candidates(values: FloatArray, quantity: str) -> list[float]:
+    """Those of NUMBERS that are among the values."""
+    if not len(values):
+        return []
+    low, high = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
+    sought = [n for n in NUMBERS if low <= n <= high and (quantity == "range" or n not in _NO_RANGE)]
+    return [number for number in sought if (values == number).any()]
 
 
 def _sentinel(values: FloatArray, quantity: str) -> float | None:
     """The first of NUMBERS that stands out, or None."""
-    if not len(values):
-        return None
-    low, high = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
-    for number in NUMBERS:
-        if low <= number <= high:
-            found = values == number
-            if found.any() and _stands_out(values, found, number, quantity == "range" and number < 0):
-                return number
+    impossible = quantity == "range"
+    for number in _candidates(values, quantity):
+        if _stands_out(values, values == number, number, impossible and number < -1):
+            return number
     return None
 
 
@@ -118,10 +189,15 @@ def _stands_out(values: FloatArray, found: np.ndarray, number: float, impossible
 
 
 def _without_words(text: pa.ChunkedArray, described: Column) -> tuple[pa.ChunkedArray, tuple[str, ...]]:
+    """The cells without words that stand for a missing number: known ones, and any that stand there repeatedly."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
-    said = pc.is_in(text, pa.array(WORDS, text.type))
+    said = pc.or_(pc.is_in(text, pa.array(WORDS, text.type)), pc.match_substring_regex(text, _MARKS))
+    counts = pc.value_counts(pc.filter(text, pc.match_substring_regex(text, _A_WORD))).to_pylist()
+    often = [each["values"] for each in counts if each["counts"] > 1 and each["counts"] < len(text) / 2]
+    if 0 < len(often) <= _MOST_WORDS:
+        said = pc.or_(said, pc.is_in(text, pa.array(often, text.type)))
     count = int(pc.sum(said).as_py() or 0)
     if not count or count == len(text) - text.null_count:
         return text, ()
@@ -175,13 +251,14 @@ def _with_units(text: pa.ChunkedArray, origin: Origin, described: Column) -> Rea
     if fields.null_count > text.null_count:
         return None
     written = [word for word in pc.unique(pc.struct_field(fields, "unit")).to_pylist() if word]
+    from_north = described.quantity == "azimuth" and written in (["T"], ["TN"])
     units = {unit_named(described.quantity, word) for word in written}
     unit = units.pop() if len(units) == 1 else None
-    if unit is None:
+    if unit is None and not from_north:
         return None
     cells = pc.replace_substring(pc.struct_field(fields, "number"), ",", ".")
     values = numbers(pc.if_else(pc.equal(cells, ""), None, cells).cast(pa.float64()), origin)
-    return Readings(values, described._replace(unit=unit, unit_in_name=True))
+    return Readings(values, described if unit is None else described._replace(unit=unit, unit_in_name=True))
 
 
 def _from_digits(values: FloatArray) -> FloatArray:

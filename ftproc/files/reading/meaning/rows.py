@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ftproc.errors import InputError, nearest
 from ftproc.files.options import Condition
 from ftproc.files.reading.meaning.numbers import as_text, parsed, without_text
-from ftproc.files.reading.meaning.schema import listed
+from ftproc.files.reading.meaning.questions import listed
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -13,18 +13,18 @@ Two columns that could be the same quantity are an error, not a guess.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from ftproc.errors import InputError, nearest, quoted
+from ftproc.errors import InputError, nearest
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
-from ftproc.files.reading.meaning import parts
-from ftproc.files.reading.meaning.names import Name, taken_apart
-from ftproc.files.units import ALIASES, EITHER_ANGLE, GERMAN, NOT_UNITS, QUANTITIES, UNITS, Unit, si_unit, unit_named
+from ftproc.files.reading.meaning import parts, questions
+from ftproc.files.reading.meaning.names import Name, of_radar, taken_apart
+from ftproc.files.reading.meaning.questions import Propose, answer, listed
+from ftproc.files.units import UNITS, Unit, si_unit, unit_named
+from ftproc.files.words import GERMAN, QUANTITIES
 
-#: Words of NOT_UNITS with which a column may still be the quantity.
-_OF_THE_QUANTITY = frozenset(["true", "corr", "raw", "ref"])
 _OF_A_TRAJECTORY = ("row", "x_m", "vx_mps", "sigma_x_m", "outlier_range", "nis")
 
 
@@ -34,7 +34,7 @@ class Column(NamedTuple):
     positions: in the file, one for each of `roles`: ("value",), ("date", "time"), ("deg", "min", "sec"), ...
     key: the stem of the name, by which clocks are told apart. notation: from the name, such as `dms`. why: the column
     was taken. others: columns that could be the quantity too. zenith: the name is that of a zenith angle. written:
-    the units in the names of several columns.
+    the units in the names of several columns. fraction: the unit of a fraction of the second beside the time.
     """
 
     quantity: str
@@ -50,6 +50,7 @@ class Column(NamedTuple):
     others: tuple[str, ...] = ()
     zenith: bool = False
     written: tuple[str, ...] = ()
+    fraction: str = ""
 
     @property
     def position(self) -> int:
@@ -66,11 +67,12 @@ def resolve(
     units: Mapping[str, str],
     columns: Mapping[str, str],
     unit_row: Sequence[str] = (),
+    propose: Propose = questions.nothing,
 ) -> dict[str, Column]:
     """The columns of the log among `names` of file `source`: {quantity: column}, the time first.
 
     units, columns: as `parse_units` and `parse_columns` return them. unit_row: the cells under the names, if there is
-    such a row.
+    such a row. propose: of the columns that are left, for the question which is which.
     Raises InputError if the time or every component is missing, if two columns fit one quantity, if a column of
     `--columns` is absent, and if a column's name and `--units` contradict each other.
     """
@@ -81,6 +83,7 @@ def resolve(
         apart = [
             name._replace(unit="") if re.search(r"[(\[] *grad *[)\]]$", name.text, re.I) else name for name in apart
         ]
+    apart = of_radar(apart)
     table = _Table(source, names, apart, units)
     found: dict[str, Column] = {}
     taken = {place for name in columns.values() if name != ABSENT for place in table.places(name)}
@@ -94,11 +97,17 @@ def resolve(
         if column is not None:
             found[quantity] = column
             taken |= set(column.positions)
-    _check_complete(source, names, found, columns)
+    questions.check_complete(source, names, {q: column.positions for q, column in found.items()}, propose)
     for quantity in QUANTITIES:
         if quantity not in found and columns.get(quantity) != ABSENT:
-            _refuse_alike(table, [k for k in range(len(names)) if k not in taken], quantity)
+            questions.refuse_alike(source, apart, [k for k in range(len(names)) if k not in taken], quantity)
     return found
+
+
+def has_time(names: Sequence[str], unit_row: Sequence[str] = ()) -> bool:
+    """Whether a column has a name of the time."""
+    apart = [taken_apart(name, unit) for name, unit in zip(names, unit_row or [""] * len(names), strict=True)]
+    return any(name.means("time") for name in apart) or parts.found("time", dict(enumerate(apart))) is not None
 
 
 class _Table(NamedTuple):
@@ -118,12 +127,13 @@ class _Table(NamedTuple):
         return [place for part in found for place in part] if all(found) else []
 
     def column(self, quantity: str, position: int, why: str, others: Sequence[str] = ()) -> Column:
-        _refuse_twice(self.source, self.names, self.names[position])
+        questions.refuse_twice(self.source, self.names, self.names[position])
         name, unit = self.apart[position], self.units.get(quantity)
         stated = unit_named(quantity, name.unit) if name.unit else None
         chosen = UNITS[quantity][unit] if unit else stated or si_unit(quantity)
         return Column(
-            quantity, (position,), self.names[position], chosen, unit is not None, stated is not None, key=name.stem,
+            quantity, (position,), self.names[position], chosen, unit is not None, stated is not None,
+            key=name.stem if name.means(quantity) != 2 else name.core(),
             notation=name.notation, why=why, others=tuple(others), zenith=quantity == "elevation" and name.is_zenith(),
         )  # fmt: skip
 
@@ -133,7 +143,12 @@ class _Table(NamedTuple):
         chosen = UNITS[quantity][unit] if unit else si_unit(quantity)
         name = " + ".join(self.names[place] for place in places)
         written = tuple(self.apart[place].unit for place in places)
-        return Column(quantity, places, name, chosen, unit is not None, False, tuple(roles), why=why, written=written)
+        time = self.apart[roles["time"]] if "time" in roles else self.apart[places[0]]
+        fraction = parts.unit_of_fraction(self.apart[roles["fraction"]]) if "fraction" in roles else ""
+        return Column(
+            quantity, places, name, chosen, unit is not None, False, tuple(roles), time.stem, time.notation, why,
+            written=written, fraction=fraction,
+        )  # fmt: skip
 
 
 def remarks(names: Sequence[str], found: Mapping[str, Column], timestamps: bool) -> tuple[str, ...]:
@@ -155,12 +170,6 @@ def remarks(names: Sequence[str], found: Mapping[str, Column], timestamps: bool)
     if absent and unused:
         lines.append(f"no column is taken for {' and '.join(absent)}; not used: {listed(unused)}")
     return tuple(lines)
-
-
-def listed(names: Sequence[str]) -> str:
-    """The columns of a file for a message, at most twenty of them."""
-    shown = ", ".join(names[:20])
-    return f"{shown} and {len(names) - 20} more" if len(names) > 20 else shown
 
 
 def _named(table: _Table, quantity: str, name: str) -> Column:
@@ -189,111 +198,30 @@ def _recognised(table: _Table, quantity: str, free: Sequence[int]) -> Column | N
     elif (roles := parts.found(quantity, {place: table.apart[place] for place in free})) is not None:
         return table.joint(quantity, roles, f"their names: {', '.join(roles)}")
     if not fits and quantity == "azimuth":
-        _refuse_either(table, free)
+        questions.refuse_either(table.source, table.apart, free)
     fits = fits or [place for place in free if table.apart[place].means(quantity) == 2]
     if not fits:
         zenith = [place for place in free if quantity == "elevation" and table.apart[place].is_zenith()]
         if zenith:
             return table.column(quantity, zenith[0], "its name, that of a zenith angle")
-        _refuse_unknown_unit(table, free, quantity)
+        questions.refuse_unknown_unit(table.source, table.apart, free, quantity)
         return None
     for place in fits:
-        _refuse_twice(table.source, names, names[place])
+        questions.refuse_twice(table.source, names, names[place])
     kinds = {(name.stem, name.unit, name.notation) for name in (table.apart[place] for place in fits)}
     if len(fits) > 1 and (quantity != "time" or len(kinds) < len(fits)):
         raise InputError(
             f"{table.source}: columns {' and '.join(names[place] for place in fits)} could each be the {quantity}. "
-            f"Say which one it is with --columns {quantity}={names[fits[0]]}."
+            f"Say which one it is with {answer(names, {quantity: fits[0]})}."
         )
+    fits.sort(key=lambda place: "140" not in table.apart[place].text)  # the radar's own time, in ASTERIX
     name, unit = table.apart[fits[0]], table.units.get(quantity)
     column = table.column(quantity, fits[0], "its name", [names[place] for place in fits[1:]])
     stated = unit_named(quantity, name.unit) if name.unit else None
     if stated and unit and stated.name != unit:
         raise InputError(
             f'{table.source}: the name of column "{column.name}" says {stated.name}, but --units says '
-            f"{quantity}={unit}. Leave --units out for it, or insist with --columns {quantity}={column.name} "
+            f"{quantity}={unit}. Leave --units out for it, or insist with {answer(names, {quantity: fits[0]})} "
             f"--units {quantity}={unit}."
         )
     return column
-
-
-def _refuse_twice(source: str, names: Sequence[str], name: str) -> None:
-    if names.count(name) > 1:
-        raise InputError(
-            f'{source}: column "{name}" is there {names.count(name)} times; '
-            f"rename or delete all but one. Its columns are: {listed(names)}."
-        )
-
-
-def _refuse_unknown_unit(table: _Table, free: Sequence[int], quantity: str) -> None:
-    """A log without a range may be angles-only; one with `range_furlong` is not."""
-    for name, unit in _units_unknown([table.apart[place] for place in free], quantity):
-        raise InputError(
-            f'{table.source}: "{unit}" in column "{name}" is not a unit of {quantity}; understood are '
-            f"{', '.join(UNITS[quantity])}. Convert the column and rename it, "
-            f"or say --columns {quantity}={name} --units {quantity}=UNIT{_or_absent(quantity)}."
-        )
-
-
-def _refuse_alike(table: _Table, free: Sequence[int], quantity: str) -> None:
-    """Ask about a column that may be the quantity, so that it is not left out without a word."""
-    known = {alias for alias in ALIASES[quantity] if len(alias) > 1}
-    other = NOT_UNITS - _OF_THE_QUANTITY
-    for place in free if quantity != "time" else ():
-        apart, name = table.apart[place], table.names[place]
-        words = set(apart.words)
-        either = quantity != "range" and apart.core() in EITHER_ANGLE
-        if not apart.foreign and (either or (known & words and not other & words)):
-            raise InputError(
-                f'{table.source}: column "{name}" may be the {quantity}. Say --columns {quantity}={quoted(name)}, or '
-                f"--columns {quantity}={ABSENT} if it is something else."
-            )
-
-
-def _refuse_either(table: _Table, free: Sequence[int]) -> None:
-    """Ask which of two angles is the azimuth where their names, such as theta and phi, leave it open."""
-    names = [table.names[place] for place in free if table.apart[place].core() in EITHER_ANGLE]
-    if len(names) > 1:
-        one, other = map(quoted, names[:2])
-        raise InputError(
-            f'{table.source}: "{names[0]}" and "{names[1]}" are the azimuth and the other angle, in an order that the '
-            f"names leave open. Say --columns azimuth={one},elevation={other} or --columns "
-            f"azimuth={other},elevation={one}; add --elevation-from zenith if the other angle counts from the vertical."
-        )
-
-
-def _units_unknown(names: Sequence[Name], quantity: str) -> Iterator[tuple[str, str]]:
-    """Column and unit, where a name of the quantity has a unit that is none of its units."""
-    for name in names:
-        if name.foreign or NOT_UNITS & {*name.words, name.unit.lower()}:
-            continue
-        if name.unit and name.stem in ALIASES[quantity] and len(name.stem) > 1:
-            yield name.text, name.unit
-        elif not name.unit and len(name.words) == 2 and name.words[0] in ALIASES[quantity] and len(name.words[0]) > 1:
-            yield name.text, name.words[1]
-
-
-def _or_absent(quantity: str) -> str:
-    return "" if quantity == "time" else f", or --columns {quantity}={ABSENT} if it is something else"
-
-
-def _check_complete(source: str, names: Sequence[str], found: Mapping[str, Column], columns: Mapping[str, str]) -> None:
-    if "time" in found and len(found) > 1:
-        return
-    if names and list(names) == [str(number) for number in range(1, len(names) + 1)]:
-        order = QUANTITIES if len(names) >= len(QUANTITIES) else ("time", "azimuth", "elevation")
-        raise InputError(
-            f"{source}: there is no line of column names. Say which column is which by their numbers, such as "
-            f"--columns {','.join(f'{q}={k}' for k, q in enumerate(order[: len(names)], 1))}."
-        )
-    wanted = "time" if "time" not in found else "range"
-    what = "no time column" if wanted == "time" else "neither range nor azimuth nor elevation"
-    if {"x_m", "y_m", "z_m"} <= set(names):
-        command = f"ftproc score TRAJECTORY --truth {source}"
-        what = f"x_m, y_m, z_m are columns of a truth, for `{command}`, not of a log: it has {what}"
-    hint = nearest(CANONICAL[wanted], [name for name in names if name not in columns.values()]) or "."
-    raise InputError(
-        f"{source}: {what} (expected {CANONICAL[wanted]} or {' or '.join(ALIASES[wanted][:2])}){hint} "
-        f"Its columns are: {listed(names)}. "
-        f"Name the right ones with --columns {','.join(f'{q}=NAME' for q in QUANTITIES if q not in found)}."
-    )

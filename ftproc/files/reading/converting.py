@@ -1,0 +1,83 @@
+"""Columns of a table -> the quantities of a log in SI units, and the units that their values show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ftproc.files.reading.clocks import joint, numeric, times
+from ftproc.files.reading.clocks.clock import Clock
+from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.meaning import motion, plausibility, readings, schema
+from ftproc.files.reading.meaning.numbers import Origin
+from ftproc.records import FloatArray
+from ftproc.settings import Station
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+Found = Mapping[str, schema.Column]
+
+
+class Converted(NamedTuple):
+    """quantities: in SI units. found: the columns with the units that their cells show. notes: what was done.
+    undecided: see `readings.undecided`."""
+
+    quantities: dict[str, FloatArray]
+    found: Found
+    clock: Clock
+    notes: tuple[str, ...]
+    undecided: bool
+
+
+def converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]) -> Converted:
+    """The quantities in SI units. columns: of all quantities, in their order."""
+    quantities: dict[str, FloatArray] = {}
+    decided = dict(found)
+    notes: list[str] = []
+    clock = Clock(np.empty(0), "", "")
+    read_here: dict[str, readings.Readings] = {}
+    place = 0
+    for quantity, column in found.items():
+        mine = columns[place : place + len(column.positions)]
+        place += len(mine)
+        timestamp = " or an ISO-8601 timestamp" if quantity == "time" else ""
+        expected = f"{'an' if quantity[0] in 'ae' else 'a'} {quantity} in {column.unit.name}{timestamp}"
+        origin = Origin(header.source, column.name, expected, header.decimal_comma)
+        if quantity == "time":
+            if len(mine) > 1:
+                clock = joint.read(dict(zip(column.roles, mine, strict=True)), origin, column)
+            else:
+                clock = times.read(mine[0], origin, column)
+            quantities[quantity] = clock.time_s
+            continue
+        read_here[quantity] = readings.read(mine, origin, column)
+    read_here = readings.without_sentinels(read_here)
+    for quantity, each in read_here.items():
+        decided[quantity] = each.column
+        quantities[quantity] = each.column.unit.to_si(each.values)
+        notes += each.notes
+    return Converted(quantities, decided, clock, tuple(notes), readings.undecided(read_here))
+
+
+def judged(
+    source: str, quantities: Mapping[str, FloatArray], found: Found, clock: Clock, station: Station
+) -> plausibility.Judged:  # fmt: skip
+    """The units and conventions that the values show, see `plausibility` and `motion`."""
+    by_size = plausibility.judged(source, quantities, found, station)
+    time = found["time"]
+    bare_time = not (time.unit_is_stated or clock.epoch) and clock.words.startswith(numeric.BARE)
+    in_si = in_other_units(quantities, found, by_size.found)
+    return by_size._replace(found=motion.judged(source, in_si, by_size.found, bare_time))
+
+
+def in_other_units(quantities: Mapping[str, FloatArray], found: Found, decided: Found) -> dict[str, FloatArray]:
+    """The quantities, which are in SI units if those of `found` are right, if those of `decided` are."""
+    return {
+        quantity: values
+        if (before := found[quantity].unit) == (after := decided[quantity].unit)
+        else after.to_si(values * before.divide / before.multiply)
+        for quantity, values in quantities.items()
+    }

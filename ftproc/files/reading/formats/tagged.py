@@ -1,0 +1,147 @@
+"""Lines that say what each value is: `R=1234.5 AZ=12.3`, as loggers and programs print, sentences with a checksum, as
+NMEA instruments send, and words with an index, as total stations store."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+
+from ftproc.files.reading.formats.header import TableHeader, of_arrow
+from ftproc.files.reading.meaning.names import taken_apart
+from ftproc.files.words import QUANTITIES
+
+_SAMPLE = 200  # lines by which a text is known
+_MOSTLY = 0.6  # of these hold several pairs
+_STAMP = r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}[T ])?\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?(?:\s?Z|\s?UTC|[+-]\d{2}:?\d{2})?"
+_NAME = r"[\"']?(?P<name>[^\W\d][\w./°-]*(?:\s?[(\[][^)\]=:]*[)\]])?)[\"']?"
+_VALUE = (
+    rf"(?P<value>\"[^\"]*\"|'[^']*'|{_STAMP}"
+    r"|[+-]?\.?\d[^\s,;{}\]\"'|]*(?:,\d+(?=\s*;|\s*$|\s+[^\W\d]))?(?:\s[A-Za-z°]{1,4}(?=\s*(?:[,;|]|$)))?"
+    r"|(?>[^\s,;{}=:\"'|]+)(?!\s*[=:]))"
+)
+_PAIR = re.compile(rf"(?<![\w.]){_NAME}\s*[=:]\s*{_VALUE}")
+_LEADING = re.compile(rf"\W*({_STAMP}|\d+\.\d+)(?=[\s,;|\])])")
+_RECORD = re.compile(r"\n-{3,}\s*\n")  # between records of one pair to a line
+_FEWEST = 2  # pairs in a row
+_SENTENCE = re.compile(r"[$!](?P<type>[A-Z][A-Z0-9]{2,7}),(?P<body>[^*]*?),?(?:\*[0-9A-Fa-f]{2})?\s*")
+#: The fields of the sentences that a standard describes, without the talker.
+_STANDARD = {
+    "TTM": (
+        *("sentence", "target_number", "range", "bearing", "bearing_ref", "target_speed", "course_speed", "course_ref"),
+        *("cpa_min", "tcpa_min", "unit", "name_id", "status", "own_ref", "utc", "acquisition_mode"),
+    )
+}
+_WORD = re.compile(r"(?P<index>\d\d)[\d.]{3}(?P<unit>[\d.])(?P<sign>[+-])(?P<digits>[\dA-Za-z.]{8}|[\dA-Za-z.]{16})")
+_GSI = {"11": "point", "18": "clock", "19": "date", "21": "Hz", "22": "V", "31": "SD"}
+#: Digit of the unit -> the unit and its counts.
+_GSI_UNITS = {
+    "0": ("m", 1e3),
+    "6": ("m", 1e4),
+    "8": ("m", 1e5),
+    "1": ("ft", 1e3),
+    "7": ("ft", 1e4),
+    "2": ("gon", 1e5),
+    "3": ("deg", 1e5),
+    "4": ("dddmmss", 1e1),
+    "5": ("mil", 1e4),
+}
+_UNITS = {"N": "nmi", "K": "km", "S": "mi"}
+
+
+def pairs(name: str, text: str) -> TableHeader | None:
+    """The columns of a text whose lines consist of names and values, each line a row; None if it is none."""
+    if not _is_tagged(_rows(text[: _SAMPLE * 200])[:_SAMPLE]):
+        return None
+    rows, others = [], 0
+    for line in _rows(text):
+        found = _pairs(line)
+        if _has_reading(found):
+            stamp = _LEADING.match(line)
+            rows.append(found if stamp is None else {**found, "Timestamp": stamp[1].replace(",", ".")})
+        else:
+            others += bool(line.strip())
+    names = list(dict.fromkeys(key for row in rows for key in row))
+    form = "text, names and values in each line" + (f", {others} other lines left out" if others else "")
+    return _table(name, names, [[row.get(key) for key in names] for row in rows], form)
+
+
+def sentences(name: str, text: str) -> TableHeader | None:
+    """The fields of sentences such as `$PTRK,120000.05,1234.5*42`, of the type of which there are the most; None if
+    the text holds others too."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    found = [_SENTENCE.fullmatch(line.strip()) for line in lines]
+    kinds = Counter(sentence["type"] for sentence in found if sentence)
+    if not kinds or sum(kinds.values()) < _MOSTLY * len(lines):
+        return None
+    known = [kind for kind in kinds if kind[-3:] in _STANDARD]
+    chosen = known[0] if known else kinds.most_common(1)[0][0]
+    cells = [[chosen, *sentence["body"].split(",")] for sentence in found if sentence and sentence["type"] == chosen]
+    width = max(map(len, cells))
+    names = [str(k + 1) for k in range(width)]
+    if known:
+        names = [*_STANDARD[chosen[-3:]], *names][:width]
+        unit = _UNITS.get(cells[0][names.index("unit")], "") if "unit" in names else ""
+        names = [f"{each}_{unit}" if each == "range" and unit else each for each in names]
+    left = len(lines) - kinds[chosen]
+    form = f"text, sentences {chosen}" + ("" if known else ", no column names") + (f", {left} others" if left else "")
+    return _table(name, names, [[*row, *[""] * (width - len(row))] for row in cells], form)
+
+
+def survey(name: str, text: str) -> TableHeader | None:
+    """The words of Leica's GSI format, of 8 or 16 digits: `21.322+27912345` is a horizontal angle in gon; None of
+    other texts."""
+    lines = [line.strip().lstrip("*").split() for line in text.splitlines() if line.strip()]
+    blocks = [[_WORD.fullmatch(word) for word in line] for line in lines]
+    if not blocks or not all(all(block) for block in blocks[:_SAMPLE]):
+        return None
+    rows = [_of_block([word for word in block if word]) for block in blocks]
+    names = list(dict.fromkeys(key for row in rows for key in row))
+    return _table(name, names, [[row.get(key) for key in names] for row in rows], "text, words of GSI")
+
+
+def _of_block(words: Sequence[re.Match[str]]) -> dict[str, str]:
+    """Names and values of the words of one line."""
+    found: dict[str, str] = {}
+    for word in words:
+        name, digits = _GSI.get(word["index"], f"WI{word['index']}"), word["sign"] + word["digits"]
+        unit, scale = _GSI_UNITS.get(word["unit"], ("", 0.0))
+        if name in ("Hz", "V", "SD") and scale and digits[1:].isdigit():
+            found[f"{name} ({unit})"] = f"{int(digits) / scale:.9g}"
+        else:
+            found[name] = word["digits"][-8:]
+    if {"clock", "date"} <= found.keys():  # year, seconds and ms; month, day, hour and minute
+        clock, date = found.pop("clock"), found.pop("date")
+        day = f"20{clock[:2]}-{date[:2]}-{date[2:4]}"
+        found["time"] = f"{day} {date[4:6]}:{date[6:]}:{clock[2:4]}.{clock[4:7]}"
+    return found
+
+
+def _rows(text: str) -> list[str]:
+    if len(_RECORD.findall(text)) > 2:
+        return [record.replace("\n", "; ") for record in _RECORD.split(text)]
+    return text.splitlines()
+
+
+def _is_tagged(lines: Sequence[str]) -> bool:
+    filled = [line for line in lines if line.strip()]
+    return bool(filled) and sum(_has_reading(_pairs(line)) for line in filled) >= _MOSTLY * len(filled)
+
+
+def _pairs(line: str) -> dict[str, str]:
+    return {pair["name"].strip(): pair["value"].strip("\"'") for pair in _PAIR.finditer(line)}
+
+
+def _has_reading(found: dict[str, str]) -> bool:
+    """Whether several pairs stand in a line, one of them a range or an angle."""
+    if len(found) < _FEWEST:
+        return False
+    names = [taken_apart(key) for key, value in found.items() if re.match(r"[+-]?\.?\d", value)]
+    return any(name.means(quantity) for name in names for quantity in QUANTITIES[1:])
+
+
+def _table(name: str, names: Sequence[str], rows: Sequence[Sequence[str | None]], form: str) -> TableHeader:
+    import pyarrow as pa
+
+    columns = [pa.array([row[place] for row in rows], pa.string()) for place in range(len(names))]
+    return of_arrow(pa.Table.from_arrays(columns, names=list(names)), name, form, decimal_comma=True)

@@ -1,0 +1,139 @@
+"""Questions about columns that a log may mean, each with the option that answers it, to be typed as it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+from ftproc.errors import InputError, nearest, quoted
+from ftproc.files.layout import CANONICAL
+from ftproc.files.options import ABSENT
+from ftproc.files.reading.meaning.names import Name
+from ftproc.files.units import UNITS
+from ftproc.files.words import ALIASES, EITHER_ANGLE, NOT_UNITS, QUANTITIES
+
+#: Words of NOT_UNITS with which a column may still be the quantity.
+_OF_THE_QUANTITY = frozenset(["true", "corr", "raw", "ref"])
+
+#: Free columns and quantities sought -> which column may be which, by the values; see `proposal`.
+Propose = Callable[[Sequence[int], Sequence[str]], Mapping[str, int]]
+
+
+def named(name: str, place: int) -> str:
+    """A column as `--columns` takes it: by its name, or by its number where the name has marks of the option."""
+    plain = name and not any(mark in name for mark in ",=+") and not name.isdecimal()
+    return name if plain else str(place + 1)
+
+
+def answer(names: Sequence[str], columns: Mapping[str, int]) -> str:
+    """`--columns range=RNG,azimuth=3`, as a shell takes it."""
+    return f"--columns {','.join(f'{q}={quoted(named(names[place], place))}' for q, place in columns.items())}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """The columns of a file for a message, at most twenty of them."""
+    shown = ", ".join(names[:20])
+    return f"{shown} and {len(names) - 20} more" if len(names) > 20 else shown
+
+
+def refuse_twice(source: str, names: Sequence[str], name: str) -> None:
+    if names.count(name) > 1:
+        raise InputError(
+            f'{source}: column "{name}" is there {names.count(name)} times; '
+            f"rename or delete all but one. Its columns are: {listed(names)}."
+        )
+
+
+def refuse_unknown_unit(source: str, apart: Sequence[Name], free: Sequence[int], quantity: str) -> None:
+    """A log without a range may be angles-only; one with `range_furlong` is not."""
+    names = [name.text for name in apart]
+    for place, unit in _units_unknown(apart, free, quantity):
+        raise InputError(
+            f'{source}: "{unit}" in column "{names[place]}" is not a unit of {quantity}; understood are '
+            f"{', '.join(UNITS[quantity])}. Convert the column and rename it, "
+            f"or say {answer(names, {quantity: place})} --units {quantity}=UNIT{_or_absent(quantity)}."
+        )
+
+
+def refuse_alike(source: str, apart: Sequence[Name], free: Sequence[int], quantity: str) -> None:
+    """Ask about a column that may be the quantity, so that it is not left out without a word."""
+    known = {alias for alias in ALIASES[quantity] if len(alias) > 1}
+    other = NOT_UNITS - _OF_THE_QUANTITY
+    for place in free if quantity != "time" else ():
+        name = apart[place]
+        words = set(name.words)
+        either = quantity != "range" and name.core() in EITHER_ANGLE
+        if not name.foreign and (either or (known & words and not other & words)):
+            say = answer([each.text for each in apart], {quantity: place})
+            raise InputError(
+                f'{source}: column "{name.text}" may be the {quantity}. Say {say}, or '
+                f"--columns {quantity}={ABSENT} if it is something else."
+            )
+
+
+def refuse_either(source: str, apart: Sequence[Name], free: Sequence[int]) -> None:
+    """Ask which of two angles is the azimuth where their names, such as theta and phi, leave it open."""
+    places = [place for place in free if apart[place].core() in EITHER_ANGLE][:2]
+    if len(places) > 1:
+        names = [name.text for name in apart]
+        one, other = (answer(names, {"azimuth": a, "elevation": e}) for a, e in (places, places[::-1]))
+        raise InputError(
+            f'{source}: "{names[places[0]]}" and "{names[places[1]]}" are the azimuth and the other angle, in an order '
+            f"that the names leave open. Say {one} or {other}; add --elevation-from zenith if the other angle counts "
+            "from the vertical."
+        )
+
+
+def _units_unknown(apart: Sequence[Name], free: Sequence[int], quantity: str) -> Iterator[tuple[int, str]]:
+    """Column and unit, where a name of the quantity has a unit that is none of its units."""
+    for place in free:
+        name = apart[place]
+        if name.foreign or NOT_UNITS & {*name.words, name.unit.lower()}:
+            continue
+        if name.unit and name.stem in ALIASES[quantity] and len(name.stem) > 1:
+            yield place, name.unit
+        elif not name.unit and len(name.words) == 2 and name.words[0] in ALIASES[quantity] and len(name.words[0]) > 1:
+            yield place, name.words[1]
+
+
+def _or_absent(quantity: str) -> str:
+    return "" if quantity == "time" else f", or --columns {quantity}={ABSENT} if it is something else"
+
+
+def check_complete(source: str, names: Sequence[str], found: Mapping[str, tuple[int, ...]], propose: Propose) -> None:
+    """Raise InputError, a question, if the time or every component is missing. found: positions of each quantity."""
+    if "time" in found and len(found) > 1:
+        return
+    taken = {place for places in found.values() for place in places}
+    free = [place for place in range(len(names)) if place not in taken]
+    sought = [quantity for quantity in QUANTITIES if quantity not in found]
+    proposed = propose(free, sought)
+    if names and list(names) == [str(number) for number in range(1, len(names) + 1)]:
+        raise InputError(
+            f"{source}: there is no line of column names. Say which column is which by their numbers, such as "
+            f"{answer(names, proposed or in_order(free, sought))}."
+        )
+    wanted = "time" if "time" not in found else "range"
+    what = "no time column" if wanted == "time" else "neither range nor azimuth nor elevation"
+    if {"x_m", "y_m", "z_m"} <= set(names):
+        command = f"ftproc score TRAJECTORY --truth {source}"
+        what = f"x_m, y_m, z_m are columns of a truth, for `{command}`, not of a log: it has {what}"
+    hint = nearest(CANONICAL[wanted], [names[place] for place in free])
+    similar = next(({wanted: place} for place in free if hint and f'"{names[place]}"' in hint), {})
+    proposed = proposed if set(proposed) == set(sought) else similar or proposed
+    say = answer(names, proposed) if wanted in proposed or (wanted == "range" and proposed) else ""
+    raise InputError(
+        f"{source}: {what} (expected {CANONICAL[wanted]} or {' or '.join(ALIASES[wanted][:2])}){hint or '.'} "
+        f"Its columns are: {listed(names)}. Name the right ones with "
+        f"{say or '--columns ' + ','.join(f'{quantity}=NAME' for quantity in sought)}."
+    )
+
+
+def in_order(free: Sequence[int], sought: Sequence[str]) -> Mapping[str, int]:
+    """The columns in the order of the quantities; without the range if there are too few."""
+    sought = sought if len(free) >= len(sought) else [quantity for quantity in sought if quantity != "range"]
+    return dict(zip(sought, free, strict=False))
+
+
+def nothing(free: Sequence[int], sought: Sequence[str]) -> Mapping[str, int]:
+    """No proposal."""
+    return {}

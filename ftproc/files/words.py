@@ -1,0 +1,118 @@
+"""The words of logs: the names that columns have, in small letters and digits only, as names are compared."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Mapping
+
+from ftproc.records import COMPONENTS
+
+#: What a log is made of, in the order of its canonical columns.
+QUANTITIES = ("time", *COMPONENTS)
+
+
+def _split(words: str) -> tuple[str, ...]:
+    return tuple(words.split())
+
+
+#: Names of each quantity, the full name first.
+ALIASES: Mapping[str, tuple[str, ...]] = {
+    "time": _split(
+        """
+        time t timestamp datetime utc gps tod sod tow sow epoch irig irigb jd mjd seconds secs sec elapsed
+        elapsedtime elapsedseconds timeofday secondsofday secofday secsofday timeofweek secondsofweek gpstime
+        gpstow gpsseconds utctime timeutc timegps utctimestamp utcdatetime datetimeutc dateandtime unix
+        unixtime posix posixtime epochtime timesinceepoch secondssinceepoch juliandate julianday
+        modifiedjuliandate datenum stamp zulu utcsec irigtime sampletime timetag clock systime itow utcsod
+        utctod utcseconds timestamputc unixtimestamp excel exceldate exceltime missiontime ts met
+        missionelapsedtime gmt gmttime localtime timecode ticks filetime secondsaftermidnight
+        secondspastmidnight secondssincemidnight secspastmidnight secpastmidnight secsaftermidnight
+        timepastmidnight timeaftermidnight timesincemidnight utcofposition zeit uhrzeit temps heure tiempo
+        hora tempo ora czas tid tijd cas zaman время час 时间 時間 時刻 时刻 시간
+        """
+    ),
+    "range": _split(
+        """
+        range r slantrange sr rng rho slrange slrng slantrng srange srng entfernung schragentfernung
+        schragdistanz distanceoblique distanciainclinada distanciaobliqua egikmesafe egikmenzil дальность
+        наклоннаядальность дальністьпохила дальність 斜距 斜距离 斜距離 경사거리
+        """
+    ),
+    "azimuth": _split(
+        """
+        azimuth az a azimuthangle azangle azim azi azmth bearing brg azimut acimut azymut azimute gisement
+        baring peilung азимут пеленг 方位角 方位 방위각
+        """
+    ),
+    "elevation": _split(
+        """
+        elevation el e elevationangle elangle elev elevangle altitudeangle hohenwinkel elevationswinkel
+        elevacion elevazione elevacao elevatie elewacja elevace hojdvinkel yukselis yukselisacisi уголместа
+        кутмісця 俯仰角 俯仰 仰角 高低角 高度角 고각 앙각
+        """
+    ),
+}
+
+#: Names that other things have too: used where no column has one of ALIASES.
+WEAK_ALIASES: Mapping[str, tuple[str, ...]] = {
+    "time": ("date", "gpst", "daytime"),
+    "range": _split(
+        """
+        dist sd distance slantdistance slopedistance slopedist slant distanz distancia distanza odległosc
+        avstand afstand mesafe d 距离 距離 거리
+        """
+    ),
+    "azimuth": _split("theta hz horizontalangle horizontaldirection hzangle hangle ha horangle horizangle аз β"),
+    "elevation": _split("v verticalangle vertangle vangle va elv alt altitude site depression depressionangle ум ε"),
+}
+
+#: Weak aliases that need a unit, because alone they are a height, a place or anything.
+ONLY_BY_UNIT = ("alt", "altitude", "site", "d", "β", "ε")
+
+#: Names of angles of which none says whether it is the azimuth, and from where the other one counts.
+EITHER_ANGLE = ("theta", "phi", "pan", "tilt")
+
+#: Names in German, in which Grad are degrees.
+GERMAN = frozenset(_split("zeit uhrzeit entfernung schragentfernung schragdistanz hohenwinkel distanz"))
+
+#: Names of zenith angles, which are 90 degrees minus the elevation.
+ZENITH_ALIASES = _split(
+    """
+    zenith zenithangle zenithdistance zen zd za zendist zenang zenithdist zenitdistanz zenitwinkel coelevation
+    coelevationangle offzenithangle offzenith colatitude зенитноерасстояние 天顶距
+    """
+)
+
+#: Names of angles below the horizontal.
+DEPRESSIONS = ("depression", "depressionangle")
+
+#: Words of a name that say nothing about the quantity.
+QUALIFIERS = frozenset(
+    _split(
+        """
+    measured meas raw obs observed target tgt track trk radar sensor tracker polar value angle reading laser
+    instrument theodolite the true los look to from corrected station angular
+    """
+    )
+)
+
+#: Words that make a column something other than the quantity; they are not unknown units.
+NOT_UNITS = frozenset(
+    _split(
+        """
+    rate dot sigma std err error bias res residual flag valid snr rcs ok quality id status type gate ref mps2
+    mode sd var variance rms outlier velocity speed vel doppler acc cmd command commanded offset corr lag
+    correction width beamwidth max min ground horizontal cov uncertainty idx index count no number code lock
+    signal power servo encoder counts raw true truth
+    filt filtered smooth smoothed sac sic cat category fl typ len trn tn
+    """
+    )
+)
+
+
+def plain_letters(text: str) -> str:
+    """Small letters without accents."""
+    bare = "".join(
+        letter for letter in unicodedata.normalize("NFKD", text).lower() if not unicodedata.combining(letter)
+    )
+    return unicodedata.normalize("NFC", bare)
