@@ -2,8 +2,9 @@
 
 One patch that is believed makes the good readings of the other stations look bad, and the decisions stand still there,
 because each supports the others. Where readings are rejected for a while, the decisions are made again over the
-neighbourhood alone: from those of now, from the screening, with each component and each station wrong in turn, and by
-continuing the flight into the place from both ends; the likeliest outcome is kept. The biases stay.
+neighbourhood alone: from those of now, from the screening, with each component and each station wrong in turn, from
+few components only, and by continuing the flight into the place from both ends; the likeliest outcome is kept. The
+biases stay.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from ftproc.records import FloatArray, IntArray
 TENSION, TENSION_S = 3.5, 2.0  # standard deviations of the sum of squares of so long a stretch, that are explained
 ROUNDS, FINALISTS, BETTER = 3, 3, 6.0  # of decisions; hypotheses that get them; in log-probability, to be taken
 RATES = np.array([0.03, 0.001, 0.93])  # isolated outlier; patch begins; goes on
+MOST_LIVE = 10  # components whose pairs and triples are tried; of more the majority decides
 LOST, FEWEST = 0.35, 12  # share rejected of a component, to be called lost; readings that a hypothesis leaves
 FREE = (50.0, 20.0, 20.0)  # m, m/s, m/s2: 1-sigma of the state where a neighbourhood begins
 MANOEUVRES = (16.0, 256.0)  # times the calm level: of manoeuvres that explain the decisions of now
@@ -155,10 +157,13 @@ def _hypotheses(near: Neighbourhood) -> Iterator[FloatArray]:
         if len(own) > 1:
             wrong.append(own)
     lost = [each for each in live if _share_lost(near, each) > LOST]
-    if len(lost) > 1:
-        wrong += [pair for pair in itertools.combinations(lost, 2) if pair[0][0] != pair[1][0]]
+    some_agree = len(lost) > 1 and len(live) <= MOST_LIVE
+    if some_agree:
+        wrong += [pair for pair in itertools.combinations(live, 2) if pair[0][0] != pair[1][0]]
     for channels in wrong:
         yield _without(near, base, channels)
+    for channels in itertools.combinations(live, 3) if some_agree and len(live) > 3 else ():
+        yield _without(near, base, tuple(each for each in live if each not in channels))
 
 
 def _continued(near: Neighbourhood, way: Steps) -> FloatArray:
