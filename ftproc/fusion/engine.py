@@ -18,16 +18,16 @@ from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.biases import Biased, Directions, smooth_biased
 from ftproc.core.filtering.forward import filter_log
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
-from ftproc.core.filtering.smoother import score_log
+from ftproc.core.filtering.smoother import SmootherRun, score_log, smooth_log
 from ftproc.core.identification import optimizer
 from ftproc.core.identification.likelihood import VERTICAL_PRECISION, jerk_bounds, shaped
 from ftproc.core.identification.profile import fit_profile, knot_length, median_level, with_allowance
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import isotropic
-from ftproc.fusion import alternatives, first_track, screening
+from ftproc.fusion import alternatives, first_track, places, screening
 from ftproc.fusion import constants as posterior
 from ftproc.fusion.constants import Constants
-from ftproc.fusion.events import Events, Seen, merge
+from ftproc.fusion.events import Events, Seen, merge, moved_to
 from ftproc.records import FloatArray
 
 FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 18, 8
@@ -86,7 +86,7 @@ def fuse(
     prior = np.stack([station.prior for station in stations])
     current = _begin(stations, screened, trusted, track, Constants.unknown(prior), gate, jerk_psd)
     say = progress or (lambda text: None)
-    looks, search = 0, alternatives.Search(sum(len(s.time_s) for s in stations))
+    looks, search = 0, places.Search(sum(len(s.time_s) for s in stations))
     for number in range(MOST_ROUNDS):
         say(f"round {number + 1}")
         level = number if number < FIRST_ROUNDS else None
@@ -111,8 +111,7 @@ def _begin(
     first = int(np.searchsorted(events.time_s, track.time_s[0]))
     first = min(first, len(events.time_s) - 1)
     spread = max(float(track.sigma[0]), START_SIGMA[0])
-    covariance = np.diag(np.repeat([spread, 100.0, 50.0], 3) ** 2)
-    start = Start(first, state[first], covariance)
+    start = Start(first, state[first], np.diag(np.repeat([spread, 100.0, 50.0], 3) ** 2))
     log = events.weighted(weight)
     wide = screening.with_biases(events, stations, state, sigma)
     possible = [each.possible for each in screened]
@@ -120,7 +119,7 @@ def _begin(
     levels = [jerk_psd] if jerk_psd else [scales.jerk_psd(memory * interval_s) for memory in FIRST_MEMORIES]
     whole = alternatives.Neighbourhood(
         log, events.gathered(possible), log.weight, wide, np.ones(len(state), bool), True, start,
-        tuple(Model(wide**2, isotropic(level)) for level in levels), gate,
+        tuple(Model(wide**2, isotropic(level)) for level in levels), gate, math.inf,
     )  # fmt: skip
     model, decided = screening.first_decisions(whole)
     weight = [events.of(s, decided) for s in range(len(stations))]
@@ -144,24 +143,22 @@ def _round(current: Fused, trusted: list[FloatArray], gate: float, jerk_psd: flo
     return _smoothed(now)
 
 
-def _reassessed(
-    current: Fused, trusted: list[FloatArray], gate: float, search: alternatives.Search
-) -> tuple[Fused, bool]:
+def _reassessed(current: Fused, trusted: list[FloatArray], gate: float, search: places.Search) -> tuple[Fused, bool]:
     """The decisions replaced by likelier ones where another hypothesis explains a place better; whether any was."""
     events, log = current.events, current.log
     possible, believed, weight = events.gathered(current.possible), events.gathered(trusted), log.weight.copy()
     state = current.found.run.state
     memory_s = scales_of(log, current.model.noise_variance).memory_s(float(np.median(current.model.jerk[:, 0])))
-    margin = alternatives.margin_s(events.time_s, memory_s)
+    margin = places.margin_s(events.time_s, memory_s)
     changed = False
     search.begin(float(np.median(current.model.jerk[:, 0])))
-    for place in alternatives.places(log, possible):
+    for place in places.find(log, possible):
         if not search.take(place):
             continue
         ends = np.searchsorted(events.time_s, [place.first_s - margin, place.last_s + margin])
         here = slice(max(int(ends[0]), current.start.sample), int(ends[1]))
-        inside = (events.time_s[here] >= place.first_s - alternatives.EDGE_S) & (
-            events.time_s[here] <= place.last_s + alternatives.EDGE_S
+        inside = (events.time_s[here] >= place.first_s - places.EDGE_S) & (
+            events.time_s[here] <= place.last_s + places.EDGE_S
         )
         if not inside.any():
             continue
@@ -169,6 +166,7 @@ def _reassessed(
         near = alternatives.Neighbourhood(
             log.part(here)._replace(weight=weight[here]), possible[here], believed[here], current.sigma, inside,
             place.together, start, alternatives.calm_levels(current.model, here, events.time_s), gate,
+            margin / places.MARGIN_MEMORIES,
         )  # fmt: skip
         found = alternatives.likeliest(near, search)
         if found is not None:
@@ -182,7 +180,9 @@ def _reassessed(
 
 
 def _decided(current: Fused, trusted: list[FloatArray], gate: float, first: int | None) -> Fused:
+    """Which readings are outliers; settled if few of those from the start on are decided anew."""
     run, weight, changed, total = current.found.run, [], 0, 0
+    started = (np.arange(len(current.events.time_s)) >= current.start.sample).astype(float)
     for s, before in enumerate(current.weight):
         residual = np.ascontiguousarray(current.events.of(s, run.residual))
         variance = np.ascontiguousarray(current.events.of(s, run.residual_variance))
@@ -191,7 +191,8 @@ def _decided(current: Fused, trusted: list[FloatArray], gate: float, first: int 
         decided = ((good > sure) & (current.possible[s] > 0)).astype(float)
         lost = decided.sum(0) < FEWEST_KEPT * trusted[s].sum(0)
         decided = np.where(lost, trusted[s], decided)
-        changed, total = changed + int((decided != before).sum()), total + int((current.possible[s] > 0).sum())
+        changed += int((decided != before)[current.events.of(s, started) > 0].sum())
+        total += int((current.possible[s] > 0).sum())
         weight.append(decided)
     settled = changed <= STILL * total and current.constants.moved < UNMOVED
     return current._replace(weight=weight, rounds=current.rounds + 1, settled=settled)
@@ -214,14 +215,11 @@ def _tuned(current: Fused, jerk_psd: float | None, first: int | None) -> Fused:
     starts = [current.start]
     if jerk_psd is None:
         log = current.log
-        fit = _level if first is not None else _profile
-        model = fit(log, starts, model)
+        if first is not None:
+            model = _level(log, starts, model)
+        else:
+            model = fit_profile(log, starts, _on_knots(log, model), PROFILE_STEPS)
     return current._replace(sigma=sigma, model=model)
-
-
-def _profile(log: Observations, starts: list[Start], model: Model) -> Model:
-    """The likeliest profile, from the model's."""
-    return fit_profile(log, starts, _on_knots(log, model), PROFILE_STEPS)
 
 
 def _on_knots(log: Observations, model: Model) -> Model:
@@ -259,26 +257,30 @@ def _level(log: Observations, starts: list[Start], model: Model) -> Model:
 
 def _smoothed(current: Fused) -> Fused:
     """Smooth at the biases' posterior of the run before, with the weights and the model of now."""
-    old = current.events
-    directions = _directions(old, current.found.run.state, current.constants)
-    constants = posterior.update(current.constants, current.found, directions)
+    old, state = current.events, current.found.run.state
+    constants = posterior.update(current.constants, current.found, _directions(old, state, current.constants))
     events = merge(current.stations, constants.estimate, old.sites.range_m)
-    state = _interpolated(old.time_s, current.found.run.state, events.time_s)
+    state = moved_to(old.time_s, state, events.time_s)
     head = current.found.run.heads[0]
     first = min(head.sample, len(events.time_s) - 1)
-    floor = np.repeat(START_SIGMA, 3) ** 2
-    covariance = START_INFLATION * head.covariance + np.diag(floor)
-    start = Start(first, state[first], covariance)
-    found = smooth_biased(events.weighted(current.weight), current.model, start, _directions(events, state, constants))
+    start = Start(first, state[first], START_INFLATION * head.covariance + np.diag(np.repeat(START_SIGMA, 3) ** 2))
+    log = events.weighted(current.weight)
+    found = smooth_biased(log, current.model, start, _directions(events, state, constants))
+    _lead_in(log, current.model, found.run)
     return current._replace(events=events, constants=constants, start=start, found=found)
 
 
-def _interpolated(time_s: FloatArray, state: FloatArray, wanted: FloatArray) -> FloatArray:
-    """(k, 9) states at other times, by the motion from the nearest one before."""
-    at = np.clip(np.searchsorted(time_s, wanted, side="right") - 1, 0, len(time_s) - 1)
-    late = (wanted - time_s[at])[:, None]
-    p, v, a = state[at, :3], state[at, 3:6], state[at, 6:]
-    return np.hstack([p + late * v + 0.5 * late**2 * a, v + late * a, a])
+def _lead_in(log: Observations, model: Model, run: SmootherRun) -> None:
+    """Smooth the events before the start too, in place: back in time from the smoothed state there."""
+    head = run.heads[0]
+    if head.sample == 0:
+        return
+    back = log.part(slice(head.sample, None, -1))
+    back.weight[0] = 0.0  # is in the head
+    first = model._replace(jerk=model.jerk[:1], knot_s=math.inf)
+    found = smooth_log(back, first, [head._replace(sample=0)])
+    for filled, values in zip(run[:6], found[:6], strict=True):
+        filled[: head.sample] = values[:0:-1]
 
 
 def _last(current: Fused) -> Fused:

@@ -76,3 +76,11 @@ def merge(stations: list[Seen], biases: FloatArray, range_m: FloatArray) -> Even
     axes = levelled(np.stack([each.axes for each in stations]), biases[:, 3:CLOCK])
     sites = Sites(station[order], np.stack([each.place for each in stations]), axes, range_m)
     return Events(time_s[order], station[order], row[order], np.ascontiguousarray(measurement[order]), sites)
+
+
+def moved_to(time_s: FloatArray, state: FloatArray, wanted: FloatArray) -> FloatArray:
+    """(k, 9) states at other times, by the motion from the nearest one before."""
+    at = np.clip(np.searchsorted(time_s, wanted, side="right") - 1, 0, len(time_s) - 1)
+    late = (wanted - time_s[at])[:, None]
+    p, v, a = state[at, :3], state[at, 3:6], state[at, 6:]
+    return np.hstack([p + late * v + 0.5 * late**2 * a, v + late * a, a])

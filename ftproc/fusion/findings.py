@@ -24,7 +24,7 @@ LATE = 0.03  # of the flight
 SCATTERED = 5.0  # times its own noise
 IMPROBABLE = 4.0  # prior sigmas of a bias
 FEWEST = 10  # readings of a component, for its share of rejections to mean anything
-ALONE_S = 3.0  # of a stretch that only one station carries while others are rejected
+CORRELATED, CORRELATED_SIGMAS = 0.3, 4.0  # of residuals that follow each other: coefficient, and in its 1-sigma
 
 #: Is said with every consistent fused flight.
 NOT_SHOWN = (
@@ -109,6 +109,7 @@ def remarks(fused: Fused, sigma_m: FloatArray, zero_s: float) -> list[Remark]:
         *_told(fused),
         *_improbable(fused),
         *_scattered(fused),
+        *_correlated(fused),
         *_rejections(fused),
         *_stretches(fused, zero_s),
         *_poorly(fused, sigma_m, zero_s),
@@ -158,6 +159,26 @@ def _scattered(fused: Fused) -> Iterator[Remark]:
                 f"{station.name} contradicts the others: its readings scatter about the fused trajectory by "
                 f"{times:.0f} times their own noise; check its place, its clock and its conventions",
             )
+
+
+def _correlated(fused: Fused) -> Iterator[Remark]:
+    """Components whose residuals keep their sign from reading to reading, as they do where readings are wrong alike."""
+    for s, station in enumerate(fused.stations):
+        residual, variance = (
+            fused.events.of(s, each) for each in (fused.found.run.residual, fused.found.run.residual_variance)
+        )
+        for c in station.components:
+            used = fused.weight[s][:, c] > 0
+            z = residual[used, c] / np.sqrt(variance[used, c])
+            if len(z) < FEWEST:
+                continue
+            coefficient = float(z[1:] @ z[:-1] / (z @ z))
+            if coefficient > max(CORRELATED, CORRELATED_SIGMAS / np.sqrt(len(z))):
+                yield Remark(
+                    SUSPECT,
+                    f"the {COMPONENTS[c]} residuals of {station.name} are correlated from reading to reading "
+                    f"(coefficient {coefficient:.2f}): outliers may be among its good readings, the sigmas too small",
+                )
 
 
 def _rejections(fused: Fused) -> Iterator[Remark]:

@@ -1,5 +1,5 @@
 """A first track from the readings of several stations: points where their lines of sight and ranges meet, second by
-second, each the best of a few candidates by a cost that a wrong station cannot dominate."""
+second, and through them the path that jumps least, by costs that a wrong station cannot dominate."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from ftproc.core.model import stations as model
 from ftproc.core.model.frames import from_cartesian, to_cartesian, unwrap, wrap
 from ftproc.fusion.events import Seen
-from ftproc.records import FloatArray
+from ftproc.records import FloatArray, IntArray
 
 MOST_POINTS, SHORTEST_S = 3000, 0.5  # of the track, and between two
 LONGEST_GAP, LONGEST_GAP_S = 6.0, 2.0  # intervals and seconds over which readings are interpolated
@@ -20,6 +20,8 @@ ROBUST = 5.0  # sigmas from which a reading loses its pull
 STEPS, POLISH = 12, 6
 WIDEST = 0.1  # of the distance: 1-sigma of a point that counts
 SMOOTHED = 4  # points on each side through which the track is drawn
+PATCH_S = 5.0  # over which a contradiction counts once: patches last
+PREDICTED, HARD, FAST = 2.0, 50.0, 2.0  # times its 1-sigma of a predicted point; m/s2; times the median speed
 AWAY = 4.0  # times the median distance from its neighbours, and sigmas, that a point may be off
 
 
@@ -59,18 +61,49 @@ def find(stations: list[Seen], weight: list[FloatArray], sigma: FloatArray) -> T
     if not seen.any():
         return None
     time_s, readings = time_s[seen], readings[seen]
-    best, cost = np.zeros((len(time_s), 3)), np.full(len(time_s), np.inf)
-    for candidate in _candidates(stations, readings):
-        candidate, found, _ = _fitted(stations, readings, allowed, candidate, POLISH)
-        better = np.isfinite(candidate).all(1) & (found < cost)
-        best[better], cost[better] = candidate[better], found[better]
-    best, cost, covariance = _fitted(stations, readings, allowed, best, POLISH)
-    spread = np.sqrt(np.maximum(np.trace(covariance, axis1=1, axis2=2), 0.0))
-    distance = np.min([np.linalg.norm(best - s.place, axis=1) for s in stations], 0)
-    good = np.isfinite(cost) & np.isfinite(spread) & (spread < WIDEST * np.maximum(distance, 100.0))
-    if good.sum() < 3:
+    found = [_fitted(stations, readings, allowed, each, POLISH) for each in _candidates(stations, readings)]
+    if not found:
         return None
-    return _drawn(time_s[good], best[good], spread[good])
+    points, costs = np.stack([each[0] for each in found]), np.stack([each[1] for each in found])
+    spreads = np.stack([_spread(each[2]) for each in found])
+    distance = np.min([np.linalg.norm(points - s.place, axis=2) for s in stations], 0)
+    costs = np.where(spreads < WIDEST * np.maximum(distance, 100.0), costs, np.inf)
+    there = np.isfinite(costs).any(0)
+    if there.sum() < 3:
+        return None
+    time_s, points, costs, spreads = time_s[there], points[:, there], costs[:, there], spreads[:, there]
+    along = (_likeliest_path(time_s, points, costs, spreads), np.arange(len(time_s)))
+    return _drawn(time_s, points[along], spreads[along])
+
+
+def _spread(covariance: FloatArray) -> FloatArray:
+    """(g,) 1-sigma of points, m."""
+    found: FloatArray = np.sqrt(np.maximum(np.trace(covariance, axis1=1, axis2=2), 0.0))
+    return found
+
+
+def _likeliest_path(time_s: FloatArray, points: FloatArray, costs: FloatArray, spreads: FloatArray) -> IntArray:
+    """(g,) which of the candidates (k, g, 3) a flight goes through that seldom jumps and contradicts few readings.
+    costs, spreads (k, g): the cost is infinite where there is no candidate. By the Viterbi algorithm."""
+    interval = np.diff(time_s)
+    step = np.linalg.norm(np.diff(points, axis=1), axis=2)
+    both = np.isfinite(costs[:, 1:]) & np.isfinite(costs[:, :-1])
+    speed = float(np.median(np.where(both, step / interval, np.nan)[both])) if both.any() else 0.0
+    reached, came = costs[:, 0], np.zeros(costs.shape, int)
+    velocity, moving = np.zeros_like(points[:, 0]), np.zeros(len(points), bool)
+    for k, dt in enumerate(interval, 1):
+        expected = points[:, k - 1] + dt * velocity
+        allowed = PREDICTED * spreads[:, k - 1] + np.where(moving, 0.5 * HARD * dt**2, FAST * speed * dt)
+        off = np.linalg.norm(points[None, :, k] - expected[:, None], axis=2)
+        total = reached[:, None] + np.log1p((off / (allowed[:, None] + spreads[None, :, k])) ** 2)
+        came[:, k] = total.argmin(0)
+        reached = total.min(0) + costs[:, k] * min(dt / PATCH_S, 1.0)
+        moving = both[:, k - 1]
+        velocity = np.where(moving[:, None], points[:, k] - points[:, k - 1], 0.0) / dt
+    path = np.full(len(time_s), int(reached.argmin()))
+    for k in range(len(time_s) - 1, 0, -1):
+        path[k - 1] = came[path[k], k]
+    return path
 
 
 def _on_grid(station: Seen, weight: FloatArray, time_s: FloatArray) -> FloatArray:
@@ -104,7 +137,7 @@ def _candidates(stations: list[Seen], readings: FloatArray) -> list[FloatArray]:
         found.append(_nearest_point(stations[a].place, sight[a], stations[b].place, sight[b]))
     for a, b in itertools.product(angles, ranges):
         if a != b:
-            found.append(_on_sphere(stations[a].place, sight[a], stations[b].place, readings[:, b, 0]))
+            found += _on_sphere(stations[a].place, sight[a], stations[b].place, readings[:, b, 0])
     if len(ranges) >= 3 and not angles:
         middle = np.mean([s.place for s in stations], 0)
         reach = float(np.nanmedian(readings[:, ranges, 0]))
@@ -125,13 +158,14 @@ def _nearest_point(at: FloatArray, along: FloatArray, other: FloatArray, sight: 
     return 0.5 * (at + s[:, None] * along + other + t[:, None] * sight)
 
 
-def _on_sphere(at: FloatArray, along: FloatArray, centre: FloatArray, radius: FloatArray) -> FloatArray:
-    """(g, 3) the farther point of a line of sight at a distance from a centre, or its nearest to the centre."""
+def _on_sphere(at: FloatArray, along: FloatArray, centre: FloatArray, radius: FloatArray) -> list[FloatArray]:
+    """(g, 3) both points of a line of sight at a distance from a centre, or twice its nearest to the centre; NaN where
+    they are behind."""
     between = at - centre
     half = along @ between
     root = np.sqrt(np.maximum(half**2 - between @ between + radius**2, 0.0))
-    reach = root - half
-    return at + np.where(reach > 0, reach, np.nan)[:, None] * along
+    reaches = root - half, -root - half
+    return [at + np.where(reach > 0, reach, np.nan)[:, None] * along for reach in reaches]
 
 
 def _fitted(

@@ -11,7 +11,7 @@ import numpy as np
 from ftproc.core.editing import two_pass
 from ftproc.core.filtering.records import Model
 from ftproc.core.model import stations as geometry
-from ftproc.fusion import alternatives
+from ftproc.fusion import alternatives, places
 from ftproc.fusion.events import CLOCK, Events, Seen
 from ftproc.fusion.first_track import Track
 from ftproc.records import FloatArray
@@ -85,7 +85,7 @@ def with_biases(events: Events, stations: list[Seen], state: FloatArray, sigma: 
 
 def first_decisions(whole: alternatives.Neighbourhood) -> tuple[Model, FloatArray]:
     """The likeliest model and decisions (n, 3) of a whole flight, from the weights of its log."""
-    search = alternatives.Search(0)
+    search = places.Search(0)
     ends = [(alternatives.Steps(whole, model, search).settled(whole.log.weight), model) for model in whole.levels]
     best, model = max(ends, key=lambda each: each[0].likelihood)
     return model, best.weight

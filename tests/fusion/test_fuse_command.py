@@ -83,6 +83,8 @@ def test_a_flight_that_two_radars_lose_together_is_not_called_consistent(run, tm
         ("range-radar", 5, 40.0),  # the first decisions must find the jerk with the outliers, not one after the other
         ("range-dme", 101, None),  # the radar, which has most components, follows another target for 17 s
         ("range-theodolites", 102, None),  # the last two seconds of one azimuth are wrong
+        ("range-radars", 103, None),  # for 7 s both radars follow other targets, and not the same
+        ("range-dme", 102, None),  # at first only the DME sees it, then a line of sight meets its sphere twice
     ],
 )
 def test_hard_flights_stay_within_their_sigmas(run, tmp_path, monkeypatch, scenario, seed, duration_s):

@@ -17,7 +17,7 @@ from ftproc.correction import model_file
 from ftproc.errors import InputError, OutputError, UsageError, failure, printable
 from ftproc.files import layout
 from ftproc.files.writing import atomic, maps, tables, trajectories
-from ftproc.fusion import calibration, flight, results, summary
+from ftproc.fusion import flight, results, summary
 from ftproc.fusion.range_file import Range, load, template
 from ftproc.quality import summary as single
 from ftproc.quality.summary import line
@@ -139,7 +139,7 @@ def _write(found: flight.Flight, output: str, given: Mapping[str, Any], range_: 
     if given.get("write_calibration") is not None:
         folder = Path(given["write_calibration"])
         _make(folder)
-        calibration.write(range_, found.constants, folder)
+        results.write_calibration(range_, found.constants, folder)
         places.append(f"{folder}/")
     if given["report"] is not None:
         from ftproc.report.fused import write
