@@ -146,3 +146,33 @@ def test_first_state_from_the_edited_log_is_near_the_truth():
     start = first_state(log, edited.model.noise_variance, 0, slice(0, 200))
     error = position_error(start.state[None], flight.truth.position_m[:1])[0]
     assert error < 3 * np.sqrt(np.trace(start.covariance[:3, :3]))
+
+
+NOT_IN_SHORT_ONES = ("allow_for_late_stamps", "allow_for_tails", "allow_for_drift", "allow_for_colour")
+
+
+@pytest.mark.parametrize("short", [False, True])
+def test_noise_of_a_short_window_is_taken_for_white_and_even(monkeypatch, short):
+    """Neither late stamps nor tails, drift or correlation are asked for, in a window too short to tell."""
+    asked = []
+
+    def spied(name):
+        whole = getattr(two_pass, name)
+        return lambda *given: asked.append(name) or whole(*given)
+
+    for name in NOT_IN_SHORT_ONES:
+        monkeypatch.setattr(two_pass, name, spied(name))
+    flight = simulate("manoeuvre", seed=1, duration_s=10.0)
+    two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN, live=True, short=short)
+    assert set(asked) == (set() if short else set(NOT_IN_SHORT_ONES))
+
+
+def test_tails_of_a_short_window_are_no_wider_gate_and_its_drift_no_noise():
+    """What a long log would find in the same readings."""
+    flight = simulate("cruise", seed=5, duration_s=60.0, outliers="none")
+    growth = np.linspace(1, 5, len(flight.log))[:, None]
+    noise = flight.sigma * growth * np.random.default_rng(0).standard_normal((len(growth), 3))
+    measurement = flight.clean + noise
+    found = [two_pass.edit(flight.log.time_s, measurement, UNKNOWN, live=True, short=short) for short in (False, True)]
+    assert [each.decision.drifts for each in found] == [True, False]
+    assert [each.log.uneven is None for each in found] == [False, True]
