@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -176,3 +178,16 @@ def test_tails_of_a_short_window_are_no_wider_gate_and_its_drift_no_noise():
     found = [two_pass.edit(flight.log.time_s, measurement, UNKNOWN, live=True, short=short) for short in (False, True)]
     assert [each.decision.drifts for each in found] == [True, False]
     assert [each.log.uneven is None for each in found] == [False, True]
+
+
+@pytest.mark.parametrize(("kept", "rounds"), [((5, 7, 9), 2), ((5, 7, 7), 2), ((5, 5, 9), 1), ((5, 4, 9), 1)])
+def test_drift_is_asked_for_again_while_more_readings_are_used(monkeypatch, kept, rounds):
+    made = [(None, SimpleNamespace(weight=np.arange(10) < count)) for count in kept]
+    rest = iter(made[1:])
+    monkeypatch.setattr(two_pass, "DRIFT_ROUNDS", 2)
+    monkeypatch.setattr(two_pass, "allow_for_late_stamps", lambda *each: made[0])
+    monkeypatch.setattr(two_pass, "allow_for_tails", lambda *each: each)
+    monkeypatch.setattr(two_pass, "allow_for_drift", lambda *_: next(rest))
+    monkeypatch.setattr(two_pass, "likelier", lambda one, other: other)
+    found = two_pass._examined(SimpleNamespace(white=False), made[0][1], UNKNOWN._replace(jerk_psd=1.0))
+    assert found is made[rounds]

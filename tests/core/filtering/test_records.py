@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.filtering.forward import filter_log
-from ftproc.core.filtering.records import Start, between
+from ftproc.core.filtering.records import Start, Uneven, between
 from ftproc.core.filtering.smoother import smooth_log
 from tests.core.tracks import matched
 
@@ -43,3 +43,14 @@ def test_passes_over_a_log_with_two_starts_at_one_sample():
     ):
         np.testing.assert_array_equal(two.state, one.state)
         assert two.log_likelihood == one.log_likelihood
+
+
+def test_samples_carry_the_noise_of_each_reading():
+    a = matched(1, 3)
+    noise = np.array([4.0, 1e-6, 9e-6])
+    assert (a.log.samples(noise)["noise"] == noise).all()
+    assert not a.log.samples(noise)["late"].any()
+    times, late = np.arange(1.0, 10).reshape(3, 3), np.arange(9.0).reshape(3, 3)
+    samples = a.log._replace(uneven=Uneven(times, late)).samples(noise)
+    np.testing.assert_array_equal(samples["noise"], times * noise)
+    np.testing.assert_array_equal(samples["late"], late)

@@ -69,3 +69,15 @@ def test_a_track_that_is_not_in_doubt_is_not_looked_at():
 def test_a_few_samples_come_between_looks():
     """At long intervals samples count, not seconds."""
     assert set(np.diff(looks(2.0 * np.arange(10), np.ones(10)))) == {2.0 * SAMPLES}
+
+
+def test_a_doubt_that_comes_right_after_a_look_waits_a_little():
+    """Some samples and some time, both."""
+    doubt = Doubt().after_edit(Watched(np.array([5.0]), False), 10)
+
+    def due(row, time_s):
+        return doubt.is_due(Watched(np.array([time_s]), True), row)
+
+    assert not due(10 + SAMPLES - 1, 5.0 + 10 * AGAIN_S)
+    assert not due(10 + 10 * SAMPLES, 5.0 + 0.9 * AGAIN_S)
+    assert due(10 + SAMPLES, 5.0 + AGAIN_S)
