@@ -117,3 +117,19 @@ def test_the_search_for_alternatives_is_worth_more_in_a_log_that_was_flown_than_
     reassessment._until_settled(record._replace(live=live), decision, None)
     of_length = alternatives.WORK_PER_SAMPLE * len(record.time_s)
     assert {search.work for search in searches} == {of_length + (0 if live else alternatives.WORK)}
+
+
+def test_what_is_suspicious_in_one_component_is_decided_again(decided, monkeypatch):
+    record, decision = decided
+    settled = []
+    whole = reassessment._until_settled
+    monkeypatch.setattr(reassessment, "_until_settled", lambda *each: settled.append(each[0]) or whole(*each))
+    monkeypatch.setattr(reassessment, "AROUND", 20)
+    suspect = np.zeros_like(decision.weight, bool)
+    monkeypatch.setattr(reassessment, "_suspects", lambda *_: suspect)
+    reassessment.reassess(record, decision)
+    assert not settled
+    suspect[150, 1] = True
+    monkeypatch.setattr(reassessment, "_suspects", lambda part, *_: suspect[: len(part.time_s)])
+    reassessment.reassess(record, decision)
+    assert [part.time_s[0] <= record.time_s[150] <= part.time_s[-1] for part in settled] == [True]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.filtering.forward import filter_log
-from ftproc.core.filtering.records import Start, Uneven, between
+from ftproc.core.filtering.records import Model, Start, Uneven, between
 from ftproc.core.filtering.smoother import smooth_log
 from tests.core.tracks import matched
 
@@ -54,3 +54,13 @@ def test_samples_carry_the_noise_of_each_reading():
     samples = a.log._replace(uneven=Uneven(times, late)).samples(noise)
     np.testing.assert_array_equal(samples["noise"], times * noise)
     np.testing.assert_array_equal(samples["late"], late)
+
+
+def test_correlation_fades_with_the_interval():
+    """From the share of the correlated noise in all of it; to 1/e of that after the time in which it fades."""
+    model = Model(
+        np.array([1.0, 2.0, 4.0]), np.zeros((1, 6)), 1.0, np.array([3.0, 0.0, 4.0]), np.array([0.5, 1.0, 2.0])
+    )
+    share = np.array([0.75, 0.0, 0.5])
+    np.testing.assert_allclose(model.correlation(0.0), share)
+    np.testing.assert_allclose(model.correlation(0.5), share * np.exp([-1.0, -0.5, -0.25]))
