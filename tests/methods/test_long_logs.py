@@ -164,3 +164,16 @@ def test_correlated_noise_is_found_for_all_segments(in_segments):
     known = np.isin(flight.truth.time_s, flight.log.time_s)
     error = np.abs(cut.state[:, :3] - flight.truth.position_m[known]) / cut.sigma[:, :3]
     assert (error < 3).mean() > 0.97
+
+
+@pytest.mark.parametrize(("length", "count"), [(1, 1), (499, 1), (740, 1), (760, 2), (5_100, 10)])
+def test_segments_share_a_log_evenly(in_segments, length, count):
+    """One after the other, from its first sample to its last, as near to their size as they can be; one at least."""
+    in_segments(100, 500, 50)
+    log = Recording(0.1 * np.arange(length), np.zeros((length, 3)), UNKNOWN)
+    found = anti_outlier.segments(log)
+    assert len(found) == count
+    assert [low for low, _ in found] == [0, *(high for _, high in found[:-1])]
+    assert found[-1][1] == length
+    sizes = [high - low for low, high in found]
+    assert max(sizes) - min(sizes) <= 1

@@ -153,3 +153,13 @@ def test_spread_of_the_first_members():
     sigma = np.sqrt(np.diag(a.starts[0].covariance))
     scaled = (ensemble.spread(drawn) - a.starts[0].covariance) / np.outer(sigma, sigma)
     np.testing.assert_allclose(scaled, 0, atol=0.04)
+
+
+def test_a_missing_component_is_no_lost_track():
+    """Range and azimuth in turn: no sample is whole, but each is used."""
+    a = matched(6, 120)
+    z = a.z.copy()
+    z[20::2, 0] = z[21::2, 1] = np.nan
+    found, made = run("renpf", a._replace(z=z, weight=np.isfinite(z).astype(float)))
+    assert len(made) == 1
+    assert (found.weight[20:].max(1) > 0).mean() > 0.95

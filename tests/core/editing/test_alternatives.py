@@ -153,3 +153,17 @@ def test_neighbourhood_that_says_too_little_is_left():
     log = log._replace(possible=np.isfinite(log.measurement))
     wrong = wrong * log.possible
     np.testing.assert_array_equal(alternatives.try_alternatives(log, wrong, alternatives.Search(len(wrong))), wrong)
+
+
+def test_hole_is_filled_also_where_the_track_is_known_worse_than_the_noise():
+    """At long intervals even the readings at its edges are predicted several times worse than they are measured."""
+    a = matched(4, 80, dt=4.0, q=5.0)
+    hole = slice(30, 50)
+    weight = a.weight.copy()
+    weight[hole, 0] = 0.0
+    log = Neighbourhood(a.time, a.z, np.isfinite(a.z), a.model, RATES, 4.0)
+    first, smoothed = alternatives._step(log, weight)
+    assert smoothed.residual_variance[hole, 0].min() > (2 * alternatives.SURE) ** 2 * a.model.noise_variance[0]
+    steps = alternatives._filled(log, weight, 0, hole)
+    np.testing.assert_array_equal(steps[0].weight, first.weight)
+    assert steps[-1].weight[hole, 0].sum() >= 18

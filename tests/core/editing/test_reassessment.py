@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core.editing import reassessment, two_pass
-from tests.core.editing.test_two_pass import edit, flags
+from ftproc.core.editing import alternatives, reassessment, two_pass
+from tests.core.editing.test_two_pass import UNKNOWN, edit, flags
 from tests.simulated import simulate
 
 pytestmark = pytest.mark.compiled
@@ -50,3 +50,86 @@ def test_long_log_is_reassessed_in_spans_only(monkeypatch):
     rejected, large, good = flags(flight, in_spans)
     assert rejected[large].mean() > 0.98
     assert rejected[good].mean() < 0.002
+
+
+@pytest.fixture(scope="module")
+def decided():
+    """A record without outliers, and the decisions on it before they are reassessed."""
+    flight = simulate("cruise", seed=2, duration_s=40.0)
+    found = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(two_pass, "reassess", lambda *each: found.append(each) or each[1])
+        two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN)
+    return found[0]
+
+
+def without(decision, share):
+    """The decisions with a share of the good readings rejected, here and there."""
+    weight = decision.weight.copy()
+    weight[np.random.default_rng(0).random(weight.shape) < share] = 0.0
+    return decision._replace(weight=weight)
+
+
+def test_of_two_ways_to_understand_a_log_the_likelier_one_is_taken(decided):
+    record, right = decided
+    wrong = without(right, 0.15)
+    assert reassessment.likelier((record, right), (record, wrong))[1] is right
+    assert reassessment.likelier((record, wrong), (record, right))[1] is right
+    assert reassessment.likelier((record, right), (record, right))[1] is right
+
+
+def test_a_less_likely_way_is_taken_only_if_it_is_not_too_far_behind(decided):
+    record, right = decided
+    wrong = without(right, 0.01)
+    lost = reassessment._likelihood(*decided) - reassessment._likelihood(record, wrong)
+    assert lost > 5
+    assert reassessment.likelier((record, right), (record, wrong), behind=0.5 * lost)[1] is right
+    assert reassessment.likelier((record, right), (record, wrong), behind=2.0 * lost)[1] is wrong
+    assert reassessment.likelier((record, wrong), (record, right), behind=2.0 * lost)[1] is right
+
+
+@pytest.mark.parametrize("share", [0.05, 0.15])
+def test_decisions_that_make_the_whole_record_less_likely_are_refused(decided, monkeypatch, share):
+    """Whatever a round decides; and what makes it likelier stays."""
+    record, right = decided
+    wrong = without(right, share)
+    suspect = np.zeros_like(right.weight, bool)
+    suspect[100, 0] = True  # so that a round is made
+    monkeypatch.setattr(reassessment, "_suspects", lambda *_: suspect)
+    for before, again in ((right, wrong), (wrong, right)):
+        rounds = iter([again])
+        monkeypatch.setattr(
+            reassessment, "decide", lambda *_, tune_first, rounds=rounds, last=again: next(rounds, last)
+        )
+        found = reassessment._until_settled(record, before, None)
+        np.testing.assert_array_equal(found.weight, right.weight)
+        assert next(rounds, None) is None
+
+
+@pytest.mark.parametrize("live", [False, True])
+def test_the_search_for_alternatives_is_worth_more_in_a_log_that_was_flown_than_in_a_live_window(
+    decided, monkeypatch, live
+):
+    """A live window is soon looked at again: work is counted by its length alone."""
+    record, decision = decided
+    searches = []
+    monkeypatch.setattr(alternatives, "try_alternatives", lambda log, weight, search: searches.append(search) or weight)
+    reassessment._until_settled(record._replace(live=live), decision, None)
+    of_length = alternatives.WORK_PER_SAMPLE * len(record.time_s)
+    assert {search.work for search in searches} == {of_length + (0 if live else alternatives.WORK)}
+
+
+def test_what_is_suspicious_in_one_component_is_decided_again(decided, monkeypatch):
+    record, decision = decided
+    settled = []
+    whole = reassessment._until_settled
+    monkeypatch.setattr(reassessment, "_until_settled", lambda *each: settled.append(each[0]) or whole(*each))
+    monkeypatch.setattr(reassessment, "AROUND", 20)
+    suspect = np.zeros_like(decision.weight, bool)
+    monkeypatch.setattr(reassessment, "_suspects", lambda *_: suspect)
+    reassessment.reassess(record, decision)
+    assert not settled
+    suspect[150, 1] = True
+    monkeypatch.setattr(reassessment, "_suspects", lambda part, *_: suspect[: len(part.time_s)])
+    reassessment.reassess(record, decision)
+    assert [part.time_s[0] <= record.time_s[150] <= part.time_s[-1] for part in settled] == [True]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ftproc.core.filtering import forward
 from ftproc.core.filtering.records import Start
 from ftproc.core.model.frames import from_cartesian, wrap
 from tests import naive
@@ -95,3 +96,13 @@ def test_longest_patch_is_the_one_specified():
     run, again = edit(a, z, longest_patch_s=20.0)
     assert again == []
     assert not run.weight[100:160].any()
+
+
+def test_likelihood_is_that_of_the_readings_used():
+    """Of a run without outliers under a wide gate: that of the filter without a gate, from each start on."""
+    a = matched(2, 200)
+    again = Start(120, a.truth[120], a.starts[0].covariance)
+    starts = [a.starts[0], again]
+    run, _ = edit(a, starts=starts, gate=100.0)
+    plain = forward.filter_log(a.log, a.model, starts)
+    assert run.log_likelihood == pytest.approx(plain.log_likelihood, rel=1e-9)

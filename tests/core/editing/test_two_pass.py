@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -146,3 +148,46 @@ def test_first_state_from_the_edited_log_is_near_the_truth():
     start = first_state(log, edited.model.noise_variance, 0, slice(0, 200))
     error = position_error(start.state[None], flight.truth.position_m[:1])[0]
     assert error < 3 * np.sqrt(np.trace(start.covariance[:3, :3]))
+
+
+NOT_IN_SHORT_ONES = ("allow_for_late_stamps", "allow_for_tails", "allow_for_drift", "allow_for_colour")
+
+
+@pytest.mark.parametrize("short", [False, True])
+def test_noise_of_a_short_window_is_taken_for_white_and_even(monkeypatch, short):
+    """Neither late stamps nor tails, drift or correlation are asked for, in a window too short to tell."""
+    asked = []
+
+    def spied(name):
+        whole = getattr(two_pass, name)
+        return lambda *given: asked.append(name) or whole(*given)
+
+    for name in NOT_IN_SHORT_ONES:
+        monkeypatch.setattr(two_pass, name, spied(name))
+    flight = simulate("manoeuvre", seed=1, duration_s=10.0)
+    two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN, live=True, short=short)
+    assert set(asked) == (set() if short else set(NOT_IN_SHORT_ONES))
+
+
+def test_tails_of_a_short_window_are_no_wider_gate_and_its_drift_no_noise():
+    """What a long log would find in the same readings."""
+    flight = simulate("cruise", seed=5, duration_s=60.0, outliers="none")
+    growth = np.linspace(1, 5, len(flight.log))[:, None]
+    noise = flight.sigma * growth * np.random.default_rng(0).standard_normal((len(growth), 3))
+    measurement = flight.clean + noise
+    found = [two_pass.edit(flight.log.time_s, measurement, UNKNOWN, live=True, short=short) for short in (False, True)]
+    assert [each.decision.drifts for each in found] == [True, False]
+    assert [each.log.uneven is None for each in found] == [False, True]
+
+
+@pytest.mark.parametrize(("kept", "rounds"), [((5, 7, 9), 2), ((5, 7, 7), 2), ((5, 5, 9), 1), ((5, 4, 9), 1)])
+def test_drift_is_asked_for_again_while_more_readings_are_used(monkeypatch, kept, rounds):
+    made = [(None, SimpleNamespace(weight=np.arange(10) < count)) for count in kept]
+    rest = iter(made[1:])
+    monkeypatch.setattr(two_pass, "DRIFT_ROUNDS", 2)
+    monkeypatch.setattr(two_pass, "allow_for_late_stamps", lambda *each: made[0])
+    monkeypatch.setattr(two_pass, "allow_for_tails", lambda *each: each)
+    monkeypatch.setattr(two_pass, "allow_for_drift", lambda *_: next(rest))
+    monkeypatch.setattr(two_pass, "likelier", lambda one, other: other)
+    found = two_pass._examined(SimpleNamespace(white=False), made[0][1], UNKNOWN._replace(jerk_psd=1.0))
+    assert found is made[rounds]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core.filtering.records import Observations
+from ftproc.core.filtering.records import Observations, Start
 from ftproc.core.filtering.shifts import shifts
 from ftproc.core.filtering.smoother import score_log
 from ftproc.core.model.frames import from_cartesian
@@ -59,3 +59,15 @@ def test_without_a_step_the_scores_have_the_variance_that_they_state():
         score, information = shifts(a.log, a.model, a.starts)
         found.append(score[30] / np.sqrt(information[30]))
     assert np.sqrt(np.mean(np.square(found), 0)) == pytest.approx(1.0, abs=0.3)
+
+
+def test_each_stretch_between_starts_speaks_for_itself():
+    a = matched(5, 400, dt=0.2)
+    later = Start(250, a.truth[250], a.starts[0].covariance)
+    both = shifts(a.log, a.model, [*a.starts, later])
+    alone = [
+        shifts(part.log, part.model, part.starts)
+        for part in (a.part(slice(250), a.starts), a.part(slice(250, None), [later._replace(sample=0)]))
+    ]
+    for found, *parts in zip(both, *alone, strict=True):
+        np.testing.assert_allclose(found, np.concatenate(parts), rtol=1e-9)

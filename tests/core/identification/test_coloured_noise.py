@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from ftproc.core.editing import two_pass
 from ftproc.core.filtering.forward import filter_log
 from ftproc.core.filtering.smoother import score_log, smooth_log
+from ftproc.core.identification import coloured_noise
 from tests.core.tracks import matched
 from tests.simulated import simulate
 
@@ -117,3 +120,15 @@ def test_patches_are_no_correlated_noise():
     assert not two_pass.edit(
         flight.log.time_s, flight.log.measurement, two_pass.Known(UNKNOWN, None, 4.0)
     ).model.coloured
+
+
+@pytest.mark.parametrize("gap", [1, 2])
+def test_only_readings_that_are_used_are_neighbours(gap):
+    """Residuals of the readings used that are alike; those in between, which are not used, are of the other sign."""
+    a = matched(1, 600)
+    used = np.arange(600) % (gap + 1) != gap if gap == 2 else np.arange(600) % 2 == 0
+    off = np.repeat(np.random.default_rng(0).standard_normal(200), 3)
+    residual = np.where(used, off, -off)[:, None] * np.sqrt(2 * a.model.noise_variance)
+    smoothed = SimpleNamespace(residual=residual, residual_variance=np.tile(2 * a.model.noise_variance, (600, 1)))
+    log = a.log._replace(weight=np.repeat(used[:, None], 3, 1).astype(float))
+    assert coloured_noise.may_be(log, smoothed, a.model) == (gap == 2)

@@ -86,3 +86,15 @@ def test_only_dense_logs_are_merged(interval, expected):
     many = decimation.how_many(scales, model, 4.0)
     assert many == pytest.approx(expected, abs=3)
     assert many >= 1
+
+
+@pytest.mark.parametrize("knot_s", [0.5, 2.0, 8.0, np.inf])
+def test_no_more_is_merged_than_memory_and_knots_bear(knot_s):
+    """A long memory, so that it is the knots that say how many; without knots the memory says it."""
+    scales = Scales(0.01, 100.0, 1000.0, np.full(3, 10.0))
+    model = matched(1, 10, q=1e-3).model
+    memory_s = scales.memory_s(1e-3)
+    count = decimation.how_many(scales, model, knot_s)
+    bound = decimation.SHARE * min(memory_s, knot_s / 10) / scales.interval_s
+    assert count == int(np.clip(bound + decimation.ROUNDING, 1, decimation.MOST))
+    assert decimation.how_many(scales, model._replace(wander_variance=np.ones(3)), knot_s) == 1

@@ -69,6 +69,26 @@ def test_a_late_stamp_is_noise_that_the_components_share():
         )
 
 
+def test_late_stamps_are_believed_only_if_they_keep_the_readings_in_order():
+    """The same residuals, of stamps off by 20 ms, at longer and at shorter intervals than that."""
+    rng = np.random.default_rng(3)
+    n, late_s, sigma = 600, 0.02, np.array([0.1, 1e-4, 1e-4])
+    speed = rng.uniform(0, 60, (n, 1))
+    state = np.hstack([np.tile([300.0, 200.0, 100.0], (n, 1)), speed * rng.standard_normal((n, 3)), np.zeros((n, 3))])
+    residual = sigma * rng.standard_normal((n, 3)) + late_s * rng.standard_normal((n, 1)) * uneven_noise.rates(state)
+    smoothed = SimpleNamespace(residual=residual, residual_variance=np.tile(1.1 * sigma**2, (n, 1)), state=state)
+    model = Model(sigma**2, np.zeros((1, 6)))
+
+    def found(interval_s):
+        log = Observations(interval_s * np.arange(n), np.zeros((n, 3)), np.ones((n, 3)))
+        return uneven_noise.stamp_variance(log, smoothed, model)
+
+    noise, stamps = found(0.03)
+    np.testing.assert_allclose(np.sqrt(noise) / sigma, 1, atol=0.3)
+    assert np.sqrt(stamps) == pytest.approx(late_s, rel=0.2)
+    assert found(0.015)[1] == 0.0
+
+
 @pytest.mark.compiled
 def test_late_stamps_are_found_and_are_no_outliers():
     time, z, truth = circle(7, late_s=0.01)

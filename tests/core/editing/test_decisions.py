@@ -1,0 +1,53 @@
+"""When what is rejected are the tails of the noise, and what is kept in any case."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.core.editing import decisions
+
+GATE, SAMPLES = 4.0, 2000
+
+
+def residuals(near=0, far=0, outliers=0, run=1):
+    """Residuals in sigmas, so many of which lie just outside the gate, farther out, and very far, in runs."""
+    off = np.ones((SAMPLES, 3))
+    places = iter(range(10, SAMPLES, 10))
+    for count, size in ((near, 1.2 * GATE), (far, 1.7 * GATE), (outliers, 30 * GATE)):
+        for _ in range(count):
+            first = next(places)
+            off[first : first + run, 0] = size
+    return off
+
+
+@pytest.mark.parametrize(
+    ("of", "tails"),
+    [
+        ({"near": 60}, True),
+        ({"near": 45, "far": 15}, True),
+        ({"near": 25}, False),  # so few are none
+        ({"near": 20, "far": 40}, False),  # tails become thinner with the distance
+        ({"near": 40, "outliers": 60}, False),  # most are outliers
+        ({"near": 60, "outliers": 30}, True),
+        ({"near": 60, "run": 2}, False),  # tails come alone
+    ],
+)
+def test_tails_lie_just_outside_the_gate_alone_and_ever_fewer(of, tails):
+    off = residuals(**of)
+    assert decisions._has_tails(off, GATE, off.size) == tails
+
+
+def test_a_large_share_of_the_readings_is_no_tail():
+    off = np.ones((SAMPLES, 3))
+    off[::4] = 1.2 * GATE
+    assert not decisions._has_tails(off, GATE, off.size)
+
+
+def test_a_component_keeps_what_screening_trusts_if_almost_nothing_is_left():
+    screened = np.ones((10, 3))
+    decided = screened.copy()
+    decided[:6, 0] = decided[:5, 1] = 0.0
+    kept = decisions._keep_most(decided, screened)
+    np.testing.assert_array_equal(kept[:, 0], 1.0)
+    np.testing.assert_array_equal(kept[:, 1:], decided[:, 1:])
