@@ -19,14 +19,29 @@ ROW = 17  # where the bad cell is
 #: Cells that are no number, and words of their refusal.
 _NO_NUMBER = (
     *("abc", "12x4", "1.2.3", "1_000", "0x1F", "1d5", "5 m", "12°", "--5", "5-", "e5", "1e", "+"),
-    *("true", "FALSE", "=1+1", "'5", "@SUM(A1)", "#VALUE!", "#DIV/0!", "#REF!", "1/2", "∞", "١٢", "１２", "1 000"),
+    *("true", "FALSE", "=1+1", "'5", "@SUM(A1)", "1/2", "∞", "١٢", "１２"),
     *("2024-05-31", "12:34:56", "1;5", "nan nan", "5..", "1e+", "1e5.5", "0b1", "x" * 5000),
 )
 #: Cells that are no time, and among readings mean that there is none, which is said.
-_SAID_MISSING = ("-", "--", "***", ".", "..", "?", "NIL", "\\N", "no data", "missing")
+_SAID_MISSING = ("-", "--", "***", ".", "..", "?", "NIL", "\\N", "no data", "missing", "#VALUE!", "#DIV/0!")
 _NOT_FINITE = ("inf", "-inf", "INF", "Infinity", "-Infinity", "1e999", "-1e400")
 _MISSING = ("", " ", "NaN", "nan", "NA", "N/A", "null", "None", "#N/A", "1.#QNAN", "NaN(0)", '""')
-_ODD_NUMBERS = ("1e308", "-1e308", "1e-320", "-0.0", "1E2", "5.", ".5", " 5 ", '"5"', "1.0e+01", "007", "+5", "1e150")
+_ODD_NUMBERS = (
+    "1e308",
+    "-1e308",
+    "1e-320",
+    "-0.0",
+    "1E2",
+    "5.",
+    ".5",
+    " 5 ",
+    '"5"',
+    "1e1",
+    "007",
+    "+5",
+    "1e150",
+    "1 000",
+)
 
 
 def cells() -> Iterator[Case]:
@@ -50,7 +65,7 @@ def cells() -> Iterator[Case]:
             check = same_but(ROW, column, np.nan)
             yield Case("log", f"{name} cell {cell!r}", written(text(with_cell(ROW, column, cell))), None, check)
         for cell in _ODD_NUMBERS:
-            check = same_but(ROW, column, float(cell.strip('" ')))
+            check = same_but(ROW, column, float(cell.strip('" ').replace(" ", "")))
             yield Case("log", f"{name} cell {cell}", written(text(with_cell(ROW, column, cell))), None, check)
 
 
@@ -112,7 +127,7 @@ def bytes_() -> Iterator[Case]:
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600), "NUL"),
         (b"%PDF-1.4\n%\xe2\xe3\n", "PDF document"),
         (b'{"a": 1}', "no line of column names"),
-        (b"<html><body>", "Its columns are"),
+        (b"<html><body>", "no rows"),
         (b"Rar!\x1a\x07\x01\x00", "NUL"),
     ):
         yield Case("log", f"file of {content[:12]!r}", written(content), (what,))
@@ -211,7 +226,7 @@ def shapes() -> Iterator[Case]:
         yield Case("log", f"two {other}s", written(text([[*r, "1"] for r in good], both)), says)
         gone = HEADER.replace(name, "something")
         if other == "time":
-            yield Case("log", "no time", written(text(header=gone)), ("no time column", "--columns time=NAME"))
+            yield Case("log", "no time", written(text(header=gone)), ("no time column", "--columns time=something"))
         else:
             yield Case(
                 "log",
@@ -251,7 +266,7 @@ def shapes() -> Iterator[Case]:
         "log",
         "10,000 columns, none fits",
         written(",".join(f"c{i}" for i in range(10_000)) + "\n" + one),
-        ("and 9980 more",),
+        ("has 4 cells where the header has 10000",),
     )
     yield Case("log", "one endless line", written(HEADER + "\n" + "1" * 5_000_000), ("row 0 (",))
     yield Case("log", "one endless cell", written(HEADER + "\n0,1," + "1" * 3_000_000 + ",1\n"), ("row 0 (",))

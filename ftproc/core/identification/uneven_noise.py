@@ -110,17 +110,15 @@ def each_stamp(log: Observations, smoothed: SmootherRun, model: Model, typical: 
     off2 = (error * (speed * np.where(used, smoothed.residual, 0.0) / on_time).sum(1)) ** 2
     each = np.full(len(speed), typical)
     for _ in range(STAMP_ROUNDS):
-        share = each / (each + error)
-        each = (STAMP_TAILS * typical + share * error + share**2 * off2) / (STAMP_TAILS + 1)
+        known = each / (each + error)
+        each = (STAMP_TAILS * typical + known * error + known**2 * off2) / (STAMP_TAILS + 1)
         typical = 1 / float(np.mean(1 / each))
     # Student's distribution is a mixture of normal ones, whose variances have an inverse gamma distribution.
-    half = 0.5 * STAMP_TAILS
-    mixed, any_off = np.log(STAMP_SCALES), np.zeros_like(off2)
-    weights = half * (-mixed - 1 / STAMP_SCALES)
-    weights = np.exp(weights - weights.max())
-    for weight, scale in zip(weights / weights.sum(), STAMP_SCALES, strict=True):
-        any_off += weight * np.exp(_normal(off2, scale * typical + error))
-    return Stamps(each, typical, float((np.log(any_off) - _normal(off2, each + error)).sum()))
+    share = STAMP_SCALES ** (-0.5 * STAMP_TAILS) * np.exp(-0.5 * STAMP_TAILS / STAMP_SCALES)
+    mixed = np.full_like(off2, -np.inf)
+    for weight, scale in zip(np.log(share / share.sum()), STAMP_SCALES, strict=True):
+        mixed = np.logaddexp(mixed, weight + _normal(off2, scale * typical + error))
+    return Stamps(each, typical, float((mixed - _normal(off2, each + error)).sum()))
 
 
 def _normal(square: FloatArray, variance: FloatArray) -> FloatArray:

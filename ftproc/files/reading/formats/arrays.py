@@ -86,7 +86,7 @@ def saved_by_numpy(name: str, path: Path) -> TableHeader:
     """An .npy file, of a matrix or of records, or an .npz file with arrays of one length. Raises InputError."""
     content.read(name, path, limit=1)  # for its messages
     try:
-        found = np.load(path, allow_pickle=False)
+        found = np.load(path)
         arrays = {"": found} if isinstance(found, np.ndarray) else {key: found[key] for key in found.files}
     except Exception as error:  # numpy raises many kinds for damaged files
         reason = first_line(error)

@@ -53,7 +53,8 @@ def _proposed(header: TableHeader, free: Sequence[int], sought: Sequence[str]) -
     read = {place: _values(table.column(k), header.decimal_comma) for k, place in enumerate(places)}
     varied = {place: values for place, values in read.items() if len(values) > 1 and np.ptp(values) > 0}
     forward = [place for place, values in varied.items() if np.mean(np.diff(values) > 0) > _RISES]
-    counters = [place for place in forward if (np.diff(varied[place]) == 1).all() and len(forward) > 1]
+    spare = len(varied) > len(sought) and len(forward) > 1
+    counters = [place for place in forward if spare and (np.diff(varied[place]) == 1).all()]
     found: dict[str, int] = {}
     if "time" in sought:
         if not forward:

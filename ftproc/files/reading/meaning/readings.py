@@ -61,7 +61,7 @@ WORDS = (
         "nan%",
     ),
 )
-_MARKS = r"^[-*?./_#+]+$"
+_MARKS = r"^[-*?./_#]+$"
 _A_WORD = r"^[^\d\s][^\d]{0,11}$"  # that stands repeatedly for a number
 #: Numbers that mean "no reading" where they stand out.
 _NINES = tuple(10.0**digits - 10.0**-k for digits in range(2, 8) for k in range(4))
@@ -111,7 +111,7 @@ def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) 
                 return found._replace(notes=(*words, *found.notes))
     values = loosely(column, origin)
     endless = np.isinf(values)
-    if np.count_nonzero(endless) > 1:
+    if 1 < np.count_nonzero(endless) < len(values) / 2:
         words += (f'"{described.name}" is infinite {endless.sum()} times, which is taken for a missing reading',)
         values = np.where(endless, np.nan, values)
     values = finite(values, origin)

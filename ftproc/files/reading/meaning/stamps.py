@@ -19,7 +19,7 @@ def spread(quantities: Mapping[str, FloatArray]) -> tuple[FloatArray, tuple[str,
     """(n,) times with the rows of each second spread over it, if all times are whole and the target moves on within a
     second as it does from one to the next; else the times as they are. And a note."""
     time = quantities["time"]
-    if not len(time) or not np.isfinite(time).all() or (np.diff(time) < 0).any() or (time != np.round(time)).any():
+    if not len(time) or not np.isfinite(time).all() or (time[1:] < time[:-1]).any() or (time != np.round(time)).any():
         return time, ()
     second, first, count = np.unique(time, return_index=True, return_counts=True)
     usual = int(np.median(count))
