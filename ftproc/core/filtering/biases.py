@@ -26,8 +26,9 @@ from ftproc.core.compiled import empty, kernel, part, variant, zeros
 from ftproc.core.filtering import backward, smoother
 from ftproc.core.filtering.filters import FILTER, UPDATE, Filter, Filters, Update, Updates
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Estimates, Residuals, Span, extrapolated
+from ftproc.core.filtering.memory import scratch
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import SCORES, STATES, SmootherRun, scratch, smoothed_covariance
+from ftproc.core.filtering.smoother import SCORES, STATES, SmootherRun, smoothed_covariance
 from ftproc.core.signatures import Indices, Layout, Matrix, Vector
 
 FloatArray = NDArray[np.float64]

@@ -11,6 +11,7 @@ from ftproc.core.compiled import kernel, variant, zeros
 from ftproc.core.filtering import backward, smoother
 from ftproc.core.filtering.filters import FILTER, Filters, Updates
 from ftproc.core.filtering.forward import LEFT, Residuals, Span
+from ftproc.core.filtering.memory import memory_of
 from ftproc.core.filtering.records import Model, Observations, Start, between
 
 FloatArray = NDArray[np.float64]
@@ -48,7 +49,7 @@ def shifts(log: Observations, model: Model, starts: list[Start]) -> tuple[FloatA
     for start, stop in between(starts, n):
         first = zeros(FILTER)
         first["x"][0], first["p"][0], first["fade_s"] = start.state, start.covariance, FOREVER_S
-        memory = ShiftMemory(*smoother.memory_of(stop - start.sample, first, found, residuals))
+        memory = ShiftMemory(*memory_of(stop - start.sample, first, found, residuals))
         memory = memory._replace(back=zeros(backward.COLOURED))
         span = Span(start.sample, stop, start.sample)
         _sweep(span, samples, profile, memory, np.zeros_like(model.jerk), smoother.STATES)

@@ -15,41 +15,28 @@ Shephard 1992):
 * the score of the likelihood by each noise variance, 1/2 sum(u_i^2 - M_ii), and by each element of each piece of
   the jerk tensor, 1/2 sum of c(T) contracted with (r r' - N).
 
-A forward sweep keeps what each update leaves for the way back, of BLOCK samples at most; of a longer log it keeps the
-state before each block as well, and the way back filters all blocks but the last again.
+A forward sweep keeps what each update leaves for the way back, of `memory.BLOCK` samples at most; of a longer log it
+keeps the state before each block as well, and the way back filters all blocks but the last again.
 """
 
 from __future__ import annotations
 
 import math
-import threading
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import empty, kernel, part, variant, zeros
+from ftproc.core.compiled import kernel, part, variant, zeros
 from ftproc.core.filtering import backward, sites, ukf
-from ftproc.core.filtering.filters import (
-    COLOURED,
-    COLOURED_UPDATE,
-    UPDATE,
-    ColouredFilters,
-    ColouredUpdates,
-    Filter,
-    Filters,
-    Update,
-    Updates,
-    retain,
-)
-from ftproc.core.filtering.forward import ESTIMATED, LEFT, Estimates, Residuals, Span, advance, extrapolated
+from ftproc.core.filtering.filters import Filter, Update, retain
+from ftproc.core.filtering.forward import ESTIMATED, LEFT, Span, advance, extrapolated
+from ftproc.core.filtering.memory import ColouredMemory, Memory, memory_of
 from ftproc.core.filtering.records import Model, Observations, Sample, Samples, Start, between
 from ftproc.core.model import motion
 from ftproc.core.signatures import Matrix
 
 FloatArray = NDArray[np.float64]
-
-BLOCK = 1 << 16
 
 
 class SmootherRun(NamedTuple):
@@ -80,51 +67,6 @@ class SmootherRun(NamedTuple):
 
 #: What is wanted of a sweep: the likelihood, its scores too, the residuals of each sample too, the states too.
 LIKELIHOOD, SCORES, RESIDUALS, STATES = range(4)
-
-
-class Memory(NamedTuple):
-    """What a sweep works on: a `filters.Filter`, the filters before each block, the `filters.Update` of each sample of
-    a block, and one `backward.Backward`; and what it fills, sample by sample of the log."""
-
-    filters: Filters
-    before: Filters
-    block: Updates
-    back: backward.Backwards
-    estimates: Estimates
-    residuals: Residuals
-
-
-class ColouredMemory(NamedTuple):
-    """The same of a state that ends with the offsets of the measurements."""
-
-    filters: ColouredFilters
-    before: ColouredFilters
-    block: ColouredUpdates
-    back: backward.ColouredBackwards
-    estimates: Estimates
-    residuals: Residuals
-
-
-def memory_of(samples: int, first: Any, estimates: Any, residuals: Any) -> Any:
-    """For a span of so many samples that begins with a filter (an array of one record, which is changed)."""
-    coloured = first.dtype == COLOURED
-    before = empty(first.dtype, -(-samples // BLOCK))
-    block = scratch(COLOURED_UPDATE if coloured else UPDATE, min(samples, BLOCK))
-    back = zeros(backward.COLOURED if coloured else backward.BACKWARD)
-    return (ColouredMemory if coloured else Memory)(first, before, block, back, estimates, residuals)
-
-
-_held = threading.local()
-
-
-def scratch(layout: np.dtype[np.void], count: int) -> Any:
-    """`count` records with whatever they hold, until this thread asks again: memory that the system hands out anew,
-    page by page, would cost a sweep a good part of its time."""
-    held = getattr(_held, "records", {})
-    if layout not in held or len(held[layout]) < count:
-        held[layout] = empty(layout, count)
-    _held.records = held
-    return held[layout][:count]
 
 
 @part

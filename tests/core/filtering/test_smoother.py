@@ -79,7 +79,7 @@ def test_a_log_in_several_blocks_is_that_in_one(monkeypatch, n):
     a = matched(9, n, dt=0.2, missing=0.1, irregular=True, pieces=3)
     a = a._replace(weight=a.weight * np.random.default_rng(2).choice([0.0, 1.0, 1.0], a.weight.shape))
     one, scores = smooth(a), smoother.score_log(a.log, a.model, a.starts)
-    monkeypatch.setattr(smoother, "BLOCK", 64)
+    monkeypatch.setattr("ftproc.core.filtering.memory.BLOCK", 64)
     found, residuals = smooth(a), smoother.smooth_log(a.log, a.model, a.starts, residuals_only=True)
     for name in ("state", "sigma", "los_sigma", "residual", "residual_variance", "nis", "noise_score", "jerk_score"):
         np.testing.assert_array_equal(getattr(found, name), getattr(one, name), err_msg=name)
