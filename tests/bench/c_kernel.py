@@ -31,7 +31,7 @@ def compiled(folder: Path) -> Filter | None:
 
     def run(log: Observations, model: Model, start: Start) -> FilterRun:
         n = len(log.time_s)
-        taken = (*log, model.noise_variance, model.jerk, start.state.copy(), start.covariance.copy())
+        taken = (*log[:3], model.noise_variance, model.jerk, start.state.copy(), start.covariance.copy())
         filled: list[NDArray[Any]] = [np.empty((n, width)) for width in WIDTHS]
         filled += [np.full(n, np.nan), np.empty((n, 6)), np.empty(n, np.int64)]  # nis, los_sigma, since_start
         assert all(array.flags.c_contiguous for array in (*taken, *filled))

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven
-from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 from ftproc.core.identification import coloured_noise, uneven_noise
-from ftproc.core.identification.likelihood import Fixed, fit_level
+from ftproc.core.identification.likelihood import Fixed, fit_level, representative
 from ftproc.core.identification.profile import median_level
 
 FloatArray = NDArray[np.float64]
@@ -66,8 +66,8 @@ class Record(NamedTuple):
 class Decision(NamedTuple):
     """Weights (n, 3), the model and starts they were made with, the estimated outlier rates (3, 3), how many rounds it
     took, whether they stand still, for how many places no work was left to look for alternatives, the 1-sigma of the
-    time stamps, s, the log-probability of their being as late as they are, whether the noise drifts, and a model with
-    correlated noise that explains the log as well."""
+    time stamps, s, the log-probability of their being as late as they are, whether the noise drifts, a model with
+    correlated noise that explains the log as well, and the smoother's run by whose residuals `decide` made them."""
 
     weight: FloatArray
     model: Model
@@ -80,6 +80,7 @@ class Decision(NamedTuple):
     stamps: float = 0.0
     drifts: bool = False
     alternative: coloured_noise.Coloured | None = None
+    smoothed: SmootherRun | None = None
 
 
 def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
@@ -100,19 +101,20 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
         rounds += 1
         starts = find_starts(record.weighted(weight), model.noise_variance, float(model.jerk[0, 0]))
     return initial._replace(
-        weight=weight, model=model, starts=starts, rates=rates, rounds=initial.rounds + rounds, settled=settled
-    )
+        weight=weight, model=model, starts=starts, rates=rates, rounds=initial.rounds + rounds, settled=settled,
+        smoothed=smoothed,
+    )  # fmt: skip
 
 
 def allow_for_late_stamps(record: Record, decision: Decision, imprecise: float) -> tuple[Record, Decision]:
     """The record with noise that grows with the rates of the readings, and the decisions made again, if time stamps
     are late now and then. imprecise: see IMPRECISE."""
-    log = record.weighted(decision.weight)
-    smoothed = smooth_log(log, decision.model, decision.starts)
-    variance, stamp_variance = uneven_noise.stamp_variance(log, smoothed, decision.model)
+    log, model, starts = record.weighted(decision.weight), decision.model, decision.starts
+    part, inside = representative(log, starts, model.noise_variance, float(model.jerk[0, 0]))
+    variance, stamp_variance = uneven_noise.stamp_variance(part, smooth_log(part, model, inside), model)
     if stamp_variance == 0.0:
         return record, decision
-    late = np.sqrt(stamp_variance) * uneven_noise.rates(smoothed.state)
+    late = np.sqrt(stamp_variance) * uneven_noise.rates(smooth_log(log, model, starts).state)
     variance = np.maximum(variance, record.rounding**2)
     variance = np.where(record.fixed.noise, decision.model.noise_variance, variance)
     record = record._replace(sigma=np.sqrt(variance), uneven=_with_late(record, late, variance, imprecise))
@@ -145,8 +147,8 @@ def _with_late(record: Record, late: FloatArray, variance: FloatArray, imprecise
 def allow_for_tails(record: Record, decision: Decision) -> tuple[Record, Decision]:
     """The record with a wider gate, and the decisions made again, if most of what is rejected lies just outside it:
     then the noise has tails, and it is they that are rejected."""
-    log = record.weighted(decision.weight)
-    smoothed = smooth_log(log, decision.model, decision.starts, residuals_only=True)
+    smoothed = decision.smoothed
+    assert smoothed is not None
     off = np.abs(smoothed.residual) / np.sqrt(smoothed.residual_variance)
     off, gate = np.where(record.possible, off, 0.0), record.gate
     while gate < WIDEST_GATE * record.gate and _has_tails(off, gate, int(record.possible.sum())):
@@ -172,9 +174,8 @@ def _has_tails(off: FloatArray, gate: float, count: int) -> bool:
 
 def allow_for_drift(record: Record, decision: Decision) -> tuple[Record, Decision]:
     """The record with noise whose variance drifts, and the decisions made again, if it does."""
-    log = record.weighted(decision.weight)
-    smoothed = smooth_log(log, decision.model, decision.starts, residuals_only=True)
-    drifting = uneven_noise.drift(log, smoothed)
+    assert decision.smoothed is not None
+    drifting = uneven_noise.drift(record.weighted(decision.weight), decision.smoothed)
     if drifting is None:
         return record, decision
     uneven = record.uneven or Uneven.none(len(record.time_s))

@@ -134,13 +134,13 @@ def _decide(f: Filter, sample: Sample, gate: Gate, sigma: FloatArray) -> bool:
 @part
 def _update_by_gain(f: Filter) -> tuple[float, float]:
     """The paper's letter, K <- K m, with the covariance that any gain has: P - K Pxz' - Pxz K' + K S K'."""
-    x, p, e, used, s, pxz, gain = f.x, f.p, f.e, f.used, f.s, f.pxz, np.empty((9, 3))
+    x, p, e, used, s, pxz, gain = f.x, f.p, f.e, f.used, f.s, f.pxz, f.gain
     for i in range(3):
         for j in range(3):
             s[i, j] = f.c[i, j] + (f.noise[i] if i == j else 0.0)
     ukf.cross_covariance(f.p, f.h, f.pxz)
     nis, log_det = ukf.whiten(f)
-    ukf.gain_of(f, gain)
+    ukf.gain_of(f)
     for i in range(9):
         for j in range(3):
             gain[i, j] *= used[j]

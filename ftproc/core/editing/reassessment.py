@@ -107,18 +107,14 @@ def _until_settled(record: Record, decision: Decision, profile: Model | None) ->
     return found
 
 
-def likelier(
-    one: tuple[Record, Decision], other: tuple[Record, Decision], behind: float = 0.0
-) -> tuple[Record, Decision]:
-    """Of two ways to understand a log, that which makes all of its readings together likelier, each with a jerk profile
-    of its own; the other one too if its log-probability is behind by less than so much."""
-    if other[1] is one[1]:
-        return one
-    first, second = (
-        _likelihood(record, each._replace(model=_profile(record, each, COMPARED_STEPS)))
-        for record, each in (one, other)
-    )
-    return other if second > first - behind else one
+def likelier(one: tuple[Record, Decision], other: tuple[Record, Decision]) -> tuple[Record, Decision]:
+    """Of two ways to understand a log, that which makes all of its readings together likelier."""
+    return one if other[1] is one[1] or log_probability(*other) <= log_probability(*one) else other
+
+
+def log_probability(record: Record, decision: Decision) -> float:
+    """Of all readings of a log, as it is understood, with a jerk profile of its own."""
+    return _likelihood(record, decision._replace(model=_profile(record, decision, COMPARED_STEPS)))
 
 
 def _likelihood(record: Record, decision: Decision) -> float:

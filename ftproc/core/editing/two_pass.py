@@ -26,7 +26,7 @@ from ftproc.core.editing.decisions import (
     allow_for_very_late_stamps,
     decide,
 )
-from ftproc.core.editing.reassessment import likelier, reassess
+from ftproc.core.editing.reassessment import likelier, log_probability, reassess
 from ftproc.core.editing.runs import runs_of
 from ftproc.core.editing.steps import Step
 from ftproc.core.filtering.initialization import find_starts
@@ -223,11 +223,12 @@ def _decided(
     begin = partial(_first, record, segment_of=segment_of, noise=noise, jerk_psd=jerk_psd)
     found = _examined(*begin(record.screened), known)
     turns = jumps_only * possible
-    if jerk_psd is None and found[1].stamp_s == 0 and _may_turn(found[1], turns):
+    doubtful = _may_be_turns(found[1], turns)
+    if jerk_psd is None and found[1].stamp_s == 0 and doubtful.any():
         other = begin(turns)
-        if likelier(found, other, HOPELESS) is other:
-            other = _examined(*other, known)
-            found = _believed(found, other)
+        takes_in = (other[1].weight > found[1].weight)[doubtful].any()
+        if takes_in and log_probability(*other) > log_probability(*found) - HOPELESS:
+            found = _believed(found, _examined(*other, known))
     return found
 
 
@@ -275,18 +276,18 @@ def _believed(found: tuple[Record, Decision], other: tuple[Record, Decision]) ->
     return likelier(found, other) if other[1].weight.sum() > least else found
 
 
-def _may_turn(decision: Decision, jumps_only: FloatArray) -> bool:
-    """Whether the target may have turned where readings are rejected: where they do not stand still, or reject long
-    runs at whose ends nothing jumps."""
+def _may_be_turns(decision: Decision, jumps_only: FloatArray) -> NDArray[np.bool_]:
+    """(n, 3) rejected readings where the target may have turned: where the decisions do not stand still all of them,
+    else those of long runs at whose ends nothing jumps."""
+    found = np.asarray(decision.weight == 0, np.bool_)
     if not decision.settled:
-        return True
+        return found
     for c in range(3):
         jumps = np.cumsum(np.pad(jumps_only[:, c] == 0, (1, 0)))
-        for begin, end in runs_of(decision.weight[:, c] == 0):
+        for begin, end in runs_of(found[:, c]):
             edges = [(max(edge - EDGE, 0), min(edge + EDGE, len(jumps) - 1)) for edge in (begin, end)]
-            if end - begin >= TURN and all(jumps[high] == jumps[low] for low, high in edges):
-                return True
-    return False
+            found[begin:end, c] = end - begin >= TURN and all(jumps[high] == jumps[low] for low, high in edges)
+    return found
 
 
 def smoothed_starts(smoothed: SmootherRun) -> list[Start]:

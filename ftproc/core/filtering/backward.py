@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import part, record
-from ftproc.core.filtering.filters import OFFSETS, Filter
+from ftproc.core.filtering.filters import OFFSETS, Filter, Update
 from ftproc.core.filtering.forward import Estimated
 from ftproc.core.model import motion
 from ftproc.core.model.measurement import line_of_sight_sigma
@@ -71,7 +71,7 @@ ColouredBackwards = Annotated[Any, Layout(COLOURED)]
 
 
 @part
-def estimate(back: Backward, f: Filter) -> None:
+def estimate(back: Backward, f: Update) -> None:
     """The smoothed state x+ + P+ r and its covariance P+ - P+ N P+."""
     x, p, r, n, pn, state, cov = f.x, f.p, back.r, back.n, back.pn, back.state, back.cov
     for i in range(9):
@@ -96,7 +96,7 @@ def estimate(back: Backward, f: Filter) -> None:
 
 
 @part
-def store(back: Backward, f: Filter, row: Estimated) -> None:
+def store(back: Backward, f: Update, row: Estimated) -> None:
     """Keep the smoothed state of a sample and its sigmas."""
     for i in range(9):
         row.state[i] = back.state[i]
@@ -106,7 +106,7 @@ def store(back: Backward, f: Filter, row: Estimated) -> None:
 
 
 @part
-def store_shift(back: Backward, f: Filter, row: Shift) -> None:
+def store_shift(back: Backward, f: Update, row: Shift) -> None:
     """Keep the score and the information of a step that begins after a sample: of the offsets, r and N themselves, of
     the clock, those along the way that the state goes in a second."""
     r, n, state = back.r, back.n, back.state
@@ -121,9 +121,9 @@ def store_shift(back: Backward, f: Filter, row: Shift) -> None:
 
 
 @part
-def absorb(back: Backward, f: Filter) -> None:
-    """Take r and N back over the measurement of a sample; leave the leave-one-out residuals and their variances behind,
-    and add to the score of the noise."""
+def absorb(back: Backward, f: Update, residuals: bool) -> None:
+    """Take r and N back over the measurement of a sample, and add to the score of the noise; leave the leave-one-out
+    residuals and their variances behind, if they are wanted."""
     r, n, v, w, nu = back.r, back.n, back.v, back.w, back.nu
     y, g, u = f.y, f.g, f.u
     for i in range(3):
@@ -135,14 +135,14 @@ def absorb(back: Backward, f: Filter) -> None:
         for j in range(len(r)):
             near = u0 * n[0, j] + u1 * n[1, j] + u2 * n[2, j] + u3 * n[3, j] + u4 * n[4, j]
             nu[i, j] = near + u5 * n[5, j] + u6 * n[6, j] + u7 * n[7, j] + u8 * n[8, j]
-        for k in range(OFFSETS, len(r)):
+        for k in range(OFFSETS, u.shape[1]):
             v[i] -= u[i, k] * r[k]
             for j in range(len(r)):
                 nu[i, j] += u[i, k] * n[k, j]
     for i in range(3):
         for j in range(i + 1):
             t = 1.0 if i == j else 0.0
-            for a in range(len(r)):
+            for a in range(u.shape[1]):
                 t += u[i, a] * nu[j, a]
             w[i, j] = t
             w[j, i] = t
@@ -166,11 +166,11 @@ def absorb(back: Backward, f: Filter) -> None:
                     t += g[i, a] * w[i, j] * g[j, b]
             n[a, b] = t
             n[b, a] = t
-    _leave_out(back, f)
+    _leave_out(back, f, residuals)
 
 
 @part
-def _absorb_offsets(back: Backward, f: Filter) -> None:
+def _absorb_offsets(back: Backward, f: Update) -> None:
     """What the offsets, which H sees by a unit matrix, add to `absorb`: their rows and columns of r and N, against all
     of the state. (nu is still that of before; N's position block is yet to be changed.)"""
     r, n, v, w, nu, g, root = back.r, back.n, back.v, back.w, back.nu, f.g, f.root
@@ -202,7 +202,7 @@ def _absorb_offsets(back: Backward, f: Filter) -> None:
 
 
 @part
-def _leave_out(back: Backward, f: Filter) -> None:
+def _leave_out(back: Backward, f: Update, residuals: bool) -> None:
     """Residual and variance of each component without itself, and the score of the noise, from v and W, and from r and
     N before the measurement."""
     v, w, root = back.v, back.w, f.root
@@ -217,12 +217,12 @@ def _leave_out(back: Backward, f: Filter) -> None:
             back.residual[i] = pull / m
             back.variance[i] = 1 / m + f.noise[i] * (1 - 1 / f.used[i])
             back.noise_score[i] += 0.5 * (pull * pull - m) * f.noise[i] / f.used[i]
-        else:  # not used: what all the rest predicts is the smoothed estimate itself
+        elif residuals:  # not used: what all the rest predicts is the smoothed estimate itself
             _predict_reading(back, f, i)
 
 
 @part
-def _predict_reading(back: Backward, f: Filter, i: int) -> None:
+def _predict_reading(back: Backward, f: Update, i: int) -> None:
     """The same of a component that is not used; P H' before the measurement is P+ H' + U'U H'."""
     p, h, u, column = f.p, f.h, f.u, back.pn
     u0 = u[0, 0] * h[i, 0] + u[0, 1] * h[i, 1] + u[0, 2] * h[i, 2]

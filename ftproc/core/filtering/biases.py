@@ -24,16 +24,18 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import empty, kernel, part, variant, zeros
 from ftproc.core.filtering import backward, smoother
-from ftproc.core.filtering.filters import FILTER, Filter, Filters
+from ftproc.core.filtering.filters import FILTER, UPDATE, Filter, Filters, Update, Updates
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Estimates, Residuals, Span, extrapolated
+from ftproc.core.filtering.memory import scratch
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import BLOCK, SCORES, STATES, SmootherRun, smoothed_covariance
+from ftproc.core.filtering.smoother import SCORES, STATES, SmootherRun, smoothed_covariance
 from ftproc.core.signatures import Indices, Layout, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
 Cube = Annotated[NDArray[np.float64], Layout(np.dtype(np.float64), 3)]
 
 PARAMETERS = 6  # of a station: range, azimuth, elevation, tilt about its x and about its y, clock
+BLOCK = 1024  # samples of which S and C are kept
 LEAST_LEFT = 1e-6  # of a reading's information: what biases leave of it at least
 
 
@@ -52,8 +54,9 @@ class Memory(NamedTuple):
     sample and white (BLOCK, 3, m) C; score (m,), info (m, m); spread (n, 9) the variance that biases add to the
     filter's state."""
 
-    block: Filters
+    filters: Filters
     before: Filters
+    block: Updates
     back: backward.Backwards
     estimates: Estimates
     residuals: Residuals
@@ -126,11 +129,11 @@ def _carry(memory: Any, f: Filter, k: int, interval: float, place: int) -> None:
 
 
 @part
-def _carry_back(memory: Any, f: Filter, k: int, interval: float, place: int, kept: int) -> None:
-    if kept == SCORES:
+def _carry_back(memory: Any, update: Update, k: int, interval: float, place: int, wanted: int) -> None:
+    if wanted == SCORES:
         return
     a, white, s = memory.adjoint, memory.white[place], memory.in_block[place]
-    g, u, p, root, m, h = f.g, f.u, f.p, f.root, len(memory.score), 0.5 * interval * interval
+    g, u, p, root, m, h = update.g, update.u, update.p, update.root, len(memory.score), 0.5 * interval * interval
     row, left = memory.estimates[k], memory.residuals[k]
     added, lost, smoothed = np.zeros(9), np.zeros(3), np.zeros(9)
     for c in range(m):
@@ -146,11 +149,11 @@ def _carry_back(memory: Any, f: Filter, k: int, interval: float, place: int, kep
             v1 -= u[1, i] * a[i, c]
             v2 -= u[2, i] * a[i, c]
         for i in range(3):
-            if f.used[i] > 0:
+            if update.used[i] > 0:
                 share = root[0, i] * v0 + root[1, i] * v1 + root[2, i] * v2
             else:
                 share = _derivative(memory, k, i, c)
-                share += f.h[i, 0] * smoothed[0] + f.h[i, 1] * smoothed[1] + f.h[i, 2] * smoothed[2]
+                share += update.h[i, 0] * smoothed[0] + update.h[i, 1] * smoothed[1] + update.h[i, 2] * smoothed[2]
             lost[i] += share * share
         for i in range(3):
             a[i, c] += g[0, i] * v0 + g[1, i] * v1 + g[2, i] * v2
@@ -159,17 +162,17 @@ def _carry_back(memory: Any, f: Filter, k: int, interval: float, place: int, kep
             a[i + 3, c] += interval * a[i, c]
         for i in range(9):
             memory.state[i, c] = smoothed[i]
-    if kept == STATES:
+    if wanted == STATES:
         for i in range(9):
             row.sigma[i] = math.sqrt(row.sigma[i] * row.sigma[i] + added[i])
     for i in range(3):
-        if not f.used[i] > 0:
+        if not update.used[i] > 0:
             left.residual_variance[i] += lost[i]
         else:
-            told = 1 / (left.residual_variance[i] - f.noise[i] * (1 - 1 / f.used[i]))
+            told = 1 / (left.residual_variance[i] - update.noise[i] * (1 - 1 / update.used[i]))
             rest = max(told - lost[i], LEAST_LEFT * told)
             left.residual[i] *= told / rest
-            left.residual_variance[i] = 1 / rest + f.noise[i] * (1 - 1 / f.used[i])
+            left.residual_variance[i] = 1 / rest + update.noise[i] * (1 - 1 / update.used[i])
 
 
 _sweep_biased = kernel(
@@ -191,13 +194,10 @@ def smooth_biased(log: Observations, model: Model, start: Start, directions: Dir
     assert log.sites is not None
     n, m, first = len(log.time_s), directions.columns.shape[1], start.sample
     blocks, rows = -(-(n - first) // BLOCK), min(n - first, BLOCK)
-    before, block = empty(FILTER, blocks), empty(FILTER, rows)
-    before[:1] = model.filter(start)
-    for name in ("wander", "fade_s"):
-        block[name] = before[name][0]
     estimates, residuals = zeros(ESTIMATED, n), zeros(LEFT, n)
     memory = Memory(
-        block, before, zeros(backward.BACKWARD), estimates, residuals,
+        model.filter(start), empty(FILTER, blocks), scratch(UPDATE, rows), zeros(backward.BACKWARD), estimates,
+        residuals,
         np.ascontiguousarray(log.sites.station), np.ascontiguousarray(directions.design),
         np.ascontiguousarray(directions.columns),
         np.zeros((9, m)), np.zeros((9, m)), np.zeros((blocks, 9, m)), np.zeros((rows, 9, m)),
@@ -206,7 +206,7 @@ def smooth_biased(log: Observations, model: Model, start: Start, directions: Dir
     jerk = np.zeros_like(model.jerk)
     samples, profile = log.samples(model.noise_variance), model.profile(log.time_s)
     likelihood = _sweep_biased(Span(first, n, first), samples, profile, memory, jerk, STATES)
-    covariance = smoothed_covariance(block["p"][0], memory.back["n_first"][0])[:9, :9]
+    covariance = smoothed_covariance(memory.block["p"][0], memory.back["n_first"][0])[:9, :9]
     covariance += memory.state @ memory.state.T
     head = Start(first, memory.back["state"][0, :9].copy(), covariance)
     estimates[:first], residuals[:first] = extrapolated(log, model, head)

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, variant, zeros
 from ftproc.core.filtering import backward, smoother
-from ftproc.core.filtering.filters import COLOURED, ColouredFilters
+from ftproc.core.filtering.filters import FILTER, Filters, Updates
 from ftproc.core.filtering.forward import LEFT, Residuals, Span
+from ftproc.core.filtering.memory import memory_of
 from ftproc.core.filtering.records import Model, Observations, Start, between
 
 FloatArray = NDArray[np.float64]
@@ -19,10 +20,12 @@ FOREVER_S = 1e300  # correlation time of an offset that stays
 
 
 class ShiftMemory(NamedTuple):
-    """`smoother.ColouredMemory` where steps take the place of estimates."""
+    """`smoother.Memory` where steps take the place of estimates, and the way back knows of offsets: forward they are
+    zero."""
 
-    block: ColouredFilters
-    before: ColouredFilters
+    filters: Filters
+    before: Filters
+    block: Updates
     back: backward.ColouredBackwards
     estimates: backward.Shifts
     residuals: Residuals
@@ -44,9 +47,10 @@ def shifts(log: Observations, model: Model, starts: list[Start]) -> tuple[FloatA
     found = zeros(backward.SHIFT, n)
     residuals = zeros(LEFT, n)
     for start, stop in between(starts, n):
-        first = zeros(COLOURED)
-        first["x"][0, :9], first["p"][0, :9, :9], first["fade_s"] = start.state, start.covariance, FOREVER_S
-        memory = ShiftMemory(*smoother.memory_of(stop - start.sample, first, found, residuals))
+        first = zeros(FILTER)
+        first["x"][0], first["p"][0], first["fade_s"] = start.state, start.covariance, FOREVER_S
+        memory = ShiftMemory(*memory_of(stop - start.sample, first, found, residuals))
+        memory = memory._replace(back=zeros(backward.COLOURED))
         span = Span(start.sample, stop, start.sample)
         _sweep(span, samples, profile, memory, np.zeros_like(model.jerk), smoother.STATES)
     return found["score"].copy(), found["information"].copy()

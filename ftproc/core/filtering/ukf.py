@@ -118,9 +118,16 @@ def cross_covariance(p: FloatArray, h: FloatArray, pxz: FloatArray) -> None:
     """P_xz = P H' for an H that sees the position, and the offsets if there are such."""
     for i in range(len(p)):
         for j in range(3):
-            pxz[i, j] = p[i, 0] * h[j, 0] + p[i, 1] * h[j, 1] + p[i, 2] * h[j, 2]
-            if len(p) > OFFSETS:
-                pxz[i, j] += p[i, OFFSETS + j]
+            pxz[i, j] = shared(p, h, i, j)
+
+
+@part
+def shared(p: FloatArray, h: FloatArray, i: int, j: int) -> float:
+    """The covariance of a number of the state with a component: an element of P H'."""
+    v = p[i, 0] * h[j, 0] + p[i, 1] * h[j, 1] + p[i, 2] * h[j, 2]
+    if len(p) > OFFSETS:
+        v += p[i, OFFSETS + j]
+    return float(v)
 
 
 @part
@@ -161,23 +168,19 @@ def update(f: Filter) -> tuple[float, float]:
 
 
 @part
-def gain_of(f: Filter, gain: FloatArray) -> None:
+def gain_of(f: Filter) -> None:
     """K = U' L^-1, one row for each number of the state."""
     for i in range(len(f.x)):
         for j in range(3):
-            gain[i, j] = f.u[0, i] * f.root[0, j] + f.u[1, i] * f.root[1, j] + f.u[2, i] * f.root[2, j]
+            f.gain[i, j] = f.u[0, i] * f.root[0, j] + f.u[1, i] * f.root[1, j] + f.u[2, i] * f.root[2, j]
 
 
 @part
 def _restore_joseph(f: Filter) -> None:
     """Turn P - U'U (already in p) into the Joseph form, which keeps P >= 0 when the prior dwarfs the noise; P_xz is
     that of the prior."""
-    p, used, h, c, pxz = f.p, f.used, f.h, f.c, f.pxz
-    gain = np.empty((len(f.x), 3))
-    gain_of(f, gain)
-    residue = np.empty((len(f.x), 3))  # (I - K H) P H': zero in exact arithmetic but for the measurement noise
-    cross_covariance(p, h, residue)
-    rest = np.zeros((3, 3))  # S - H P- H': noise and bend of h
+    p, used, h, c, pxz, gain, rest = f.p, f.used, f.h, f.c, f.pxz, f.gain, f.rest
+    gain_of(f)
     for i in range(3):
         for j in range(3):
             rest[i, j] = c[i, j] + shared_noise(f, i, j)
@@ -188,11 +191,14 @@ def _restore_joseph(f: Filter) -> None:
         if used[i] > 0:
             rest[i, i] = max(rest[i, i], 0.0) + f.noise[i] / used[i]
     for i in range(len(f.x)):
+        # (I - K H) P H' is zero in exact arithmetic but for the measurement noise; here its row is still unchanged.
+        w0, w1, w2 = -shared(p, h, i, 0), -shared(p, h, i, 1), -shared(p, h, i, 2)
+        for k in range(3):
+            w0 += gain[i, k] * rest[k, 0]
+            w1 += gain[i, k] * rest[k, 1]
+            w2 += gain[i, k] * rest[k, 2]
         for j in range(i + 1):
-            v = p[i, j]
-            for k in range(3):
-                spread = gain[i, 0] * rest[0, k] + gain[i, 1] * rest[1, k] + gain[i, 2] * rest[2, k]
-                v += (spread - residue[i, k]) * gain[j, k]
+            v = p[i, j] + w0 * gain[j, 0] + w1 * gain[j, 1] + w2 * gain[j, 2]
             p[i, j] = v
             p[j, i] = v
     for i in range(len(f.x)):  # what is left of a variance is not known better than what was taken from it

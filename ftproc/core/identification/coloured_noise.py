@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import SmootherRun, score_log
+from ftproc.core.filtering.smoother import SmootherRun, likelihood_of, score_log
 from ftproc.core.identification import optimizer
 from ftproc.core.identification.likelihood import (
     VERTICAL_PRECISION,
@@ -97,7 +97,7 @@ def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fi
     model = model._replace(wander_variance=np.where(correlated, model.wander_variance, 0.0))
     level = fit_profile(part, starts, fit_level(part, starts, white, fixed), PROFILE_STEPS)
     model = fit_profile(part, starts, model, PROFILE_STEPS)
-    gain = score_log(part, model, starts).log_likelihood - score_log(part, level, starts).log_likelihood
+    gain = likelihood_of(part, model, starts) - likelihood_of(part, level, starts)
     slowest = float(model.fade_s[correlated].max(initial=0.0))
     return Coloured(
         median_level(model),
@@ -147,9 +147,7 @@ class _Search:
         for c in range(3):
             moved = theta.copy()
             moved[6 + c] += STEP
-            fades[c] = (
-                score_log(self.log, self.model(moved), self.starts).log_likelihood - found.log_likelihood
-            ) / STEP
+            fades[c] = (likelihood_of(self.log, self.model(moved), self.starts) - found.log_likelihood) / STEP
         slope = -np.r_[found.noise, found.wander, fades, by_axis.sum(), by_axis[5] - pull]
         return -found.log_likelihood + 0.5 * pull * theta[10], slope
 

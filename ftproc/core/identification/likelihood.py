@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import score_log
+from ftproc.core.filtering.smoother import likelihood_of, score_log
 from ftproc.core.identification import optimizer
 from ftproc.core.identification.scales import EXACT, Scales, scales_of
 from ftproc.core.model.motion import isotropic
@@ -73,7 +73,7 @@ def first_jerk(log: Observations, noise_variance: FloatArray) -> float:
     def likelihood(jerk_psd: float) -> float:
         starts = find_starts(log, noise_variance, jerk_psd)
         part, starts = representative(log, starts, noise_variance, jerk_psd)
-        found = score_log(part, Model(noise_variance, isotropic(jerk_psd)), starts).log_likelihood
+        found = likelihood_of(part, Model(noise_variance, isotropic(jerk_psd)), starts)
         return found if math.isfinite(found) else -math.inf
 
     return max((scales.jerk_psd(memory * scales.interval_s) for memory in FIRST_MEMORIES), key=likelihood)

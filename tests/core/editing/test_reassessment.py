@@ -78,16 +78,6 @@ def test_of_two_ways_to_understand_a_log_the_likelier_one_is_taken(decided):
     assert reassessment.likelier((record, right), (record, right))[1] is right
 
 
-def test_a_less_likely_way_is_taken_only_if_it_is_not_too_far_behind(decided):
-    record, right = decided
-    wrong = without(right, 0.01)
-    lost = reassessment._likelihood(*decided) - reassessment._likelihood(record, wrong)
-    assert lost > 5
-    assert reassessment.likelier((record, right), (record, wrong), behind=0.5 * lost)[1] is right
-    assert reassessment.likelier((record, right), (record, wrong), behind=2.0 * lost)[1] is wrong
-    assert reassessment.likelier((record, wrong), (record, right), behind=2.0 * lost)[1] is right
-
-
 @pytest.mark.parametrize("share", [0.05, 0.15])
 def test_decisions_that_make_the_whole_record_less_likely_are_refused(decided, monkeypatch, share):
     """Whatever a round decides; and what makes it likelier stays."""

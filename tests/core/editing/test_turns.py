@@ -54,7 +54,7 @@ def test_turns_are_not_patches(monkeypatch):
     assert np.median(largest) < 20
     assert largest.max() < 200
     assert rejected.max() < 0.03
-    monkeypatch.setattr(two_pass, "_may_turn", lambda decision, jumps_only: False)
+    monkeypatch.setattr(two_pass, "_may_be_turns", lambda decision, jumps_only: np.zeros(jumps_only.shape, bool))
     assert np.median(edited(flights[:4])[0]) > 50
 
 

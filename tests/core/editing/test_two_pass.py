@@ -185,7 +185,7 @@ def test_drift_is_asked_for_again_while_more_readings_are_used(monkeypatch, kept
     made = [(None, SimpleNamespace(weight=np.arange(10) < count)) for count in kept]
     rest = iter(made[1:])
     monkeypatch.setattr(two_pass, "DRIFT_ROUNDS", 2)
-    monkeypatch.setattr(two_pass, "allow_for_late_stamps", lambda *each: made[0])
+    monkeypatch.setattr(two_pass, "_with_late_stamps", lambda *_: made[0])
     monkeypatch.setattr(two_pass, "allow_for_tails", lambda *each: each)
     monkeypatch.setattr(two_pass, "allow_for_drift", lambda *_: next(rest))
     monkeypatch.setattr(two_pass, "likelier", lambda one, other: other)

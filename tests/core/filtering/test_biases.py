@@ -101,6 +101,18 @@ def test_without_columns_it_is_the_smoother():
     assert not found.spread.any()
 
 
+def test_several_blocks_are_as_one(monkeypatch):
+    log = observed(np.zeros((3, PARAMETERS)))
+    columns = np.eye(3 * PARAMETERS)[:, [0, 7, 13]]
+    one = smooth_biased(log, MODEL, START, directions(log, columns))
+    monkeypatch.setattr("ftproc.core.filtering.biases.BLOCK", 50)
+    found = smooth_biased(log, MODEL, START, directions(log, columns))
+    for name in ("state", "sigma", "residual", "residual_variance"):
+        np.testing.assert_array_equal(getattr(found.run, name), getattr(one.run, name), err_msg=name)
+    np.testing.assert_array_equal(found.spread, one.spread)
+    np.testing.assert_allclose(found.info, one.info, rtol=1e-12)
+
+
 @pytest.mark.parametrize("parameter", range(PARAMETERS))
 @pytest.mark.parametrize("station", range(3))
 def test_the_score_is_the_slope_of_the_likelihood(station, parameter):

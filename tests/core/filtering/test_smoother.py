@@ -73,6 +73,22 @@ def test_block_boundaries_leave_no_seam(n):
     np.testing.assert_allclose(found.state[-1], run.state[-1], rtol=1e-12)
 
 
+@pytest.mark.parametrize("n", [63, 64, 65, 200])
+def test_a_log_in_several_blocks_is_that_in_one(monkeypatch, n):
+    """To the last bit, whatever is wanted; only sums over blocks may be rounded otherwise."""
+    a = matched(9, n, dt=0.2, missing=0.1, irregular=True, pieces=3)
+    a = a._replace(weight=a.weight * np.random.default_rng(2).choice([0.0, 1.0, 1.0], a.weight.shape))
+    one, scores = smooth(a), smoother.score_log(a.log, a.model, a.starts)
+    monkeypatch.setattr("ftproc.core.filtering.memory.BLOCK", 64)
+    found, residuals = smooth(a), smoother.smooth_log(a.log, a.model, a.starts, residuals_only=True)
+    for name in ("state", "sigma", "los_sigma", "residual", "residual_variance", "nis", "noise_score", "jerk_score"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(one, name), err_msg=name)
+    np.testing.assert_array_equal(residuals.residual, one.residual)
+    np.testing.assert_array_equal(residuals.residual_variance, one.residual_variance)
+    np.testing.assert_array_equal(smoother.score_log(a.log, a.model, a.starts).jerk, scores.jerk)
+    assert found.log_likelihood == one.log_likelihood == smoother.likelihood_of(a.log, a.model, a.starts)
+
+
 def test_block_length_does_not_matter():
     """The same record behind 50 silent samples, which shift every block."""
     a = matched(8, 300, dt=0.1)

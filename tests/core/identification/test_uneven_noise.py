@@ -211,3 +211,11 @@ def test_repeats_count_once_where_chance_does_not_make_them():
 def test_drift_of_even_noise_is_none():
     a = matched(4, 3000)
     assert uneven_noise.drift(a.log, smooth_log(a.log, a.model, a.starts, residuals_only=True)) is None
+
+
+@pytest.mark.parametrize(("n", "count"), [(120, 2), (130, 7), (7, 7), (61, 6)])
+def test_windows_are_those_of_numpy(n, count):
+    values = np.random.default_rng(n).normal(size=n)
+    for what in (np.median, np.mean):
+        expected = [what(window) for window in np.array_split(values, count)]
+        np.testing.assert_allclose(uneven_noise._of_windows(values, count, what), expected, rtol=1e-14)
