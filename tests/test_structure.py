@@ -16,7 +16,7 @@ MOST_FILES, MOST_LINES, MOST_PARAMETERS = 14, 300, 7
 FLOORS = (
     ("errors", "settings"),
     ("records", "__init__"),
-    ("core.signatures", "core.threads", "core.processes"),
+    ("core.signatures", "core.threads", "core.processes", "core.pacing"),
     ("core.compiled",),
     ("core.model",),
     ("core.filtering",),

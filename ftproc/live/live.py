@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ftproc.core.live.editor import Published
+from ftproc.core.live.rows import Published
 from ftproc.core.model.frames import from_cartesian
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import live, registry

@@ -14,8 +14,9 @@ from ftproc.core.filtering.initialization import find_starts, first_state
 from ftproc.core.filtering.records import FilterRun, Model
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification.likelihood import Fixed, first_jerk, fit_level
-from ftproc.core.live.editor import LiveEditor, Published
+from ftproc.core.live.editor import LiveEditor
 from ftproc.core.live.recursive import Gating
+from ftproc.core.live.rows import Published
 from ftproc.core.model.motion import isotropic
 from ftproc.methods import preparing
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording

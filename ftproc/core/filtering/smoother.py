@@ -27,6 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import pacing
 from ftproc.core.compiled import kernel, part, variant, zeros
 from ftproc.core.filtering import backward, sites, ukf
 from ftproc.core.filtering.filters import Filter, Update, retain
@@ -217,6 +218,7 @@ class _Swept(NamedTuple):
 
 def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) -> _Swept:
     n = len(log.time_s)
+    pacing.swept(n)
     samples, profile = log.samples(model.noise_variance), model.profile(log.time_s)
     sweep = _sweep_coloured if model.coloured else _sweep
     estimates, residuals = zeros(ESTIMATED, n if wanted == STATES else 0), zeros(LEFT, n if wanted >= RESIDUALS else 0)

@@ -32,14 +32,16 @@ ALLOWANCE = 1.4  # on the likeliest jerk: too little makes sigmas dishonest, a l
 LONGEST_MEMORY = 1.0  # knots: less jerk than gives the filter such a memory shows in no knot, so none has less
 
 
-def fit_profile(log: Observations, starts: list[Start], level: Model, steps: int) -> Model:
+def fit_profile(
+    log: Observations, starts: list[Start], level: Model, steps: int, scales: Scales | None = None
+) -> Model:
     """A jerk density that follows the flight, knot by knot; the noise stays. `level` has a single one, or a profile
-    of this same log to continue from.
+    of this same log to continue from. scales: of the log, if they are known.
 
     One ratio of vertical to horizontal jerk holds for the whole flight: aircraft turn harder than they pitch, and
     range and angles see the two differently.
     """
-    scales = scales_of(log, level.noise_variance)
+    scales = scales or scales_of(log, level.noise_variance)
     knot_s = level.knot_s
     if not math.isfinite(knot_s):
         knot_s = knot_length(scales, float(level.jerk[0, 0]))
@@ -90,9 +92,10 @@ def median_level(model: Model) -> Model:
     return model._replace(jerk=level * model.jerk[:1] / model.jerk[0, 0], knot_s=np.inf)
 
 
-def with_allowance(log: Observations, model: Model) -> Model:
-    """The model with a little more jerk than is likeliest, and nowhere less than shows in a knot of its profile."""
-    scales = scales_of(log, model.noise_variance)
+def with_allowance(log: Observations, model: Model, scales: Scales | None = None) -> Model:
+    """The model with a little more jerk than is likeliest, and nowhere less than shows in a knot of its profile.
+    scales: of the log, if they are known."""
+    scales = scales or scales_of(log, model.noise_variance)
     knot_s = min(model.knot_s, scales.span_s)
     least = scales.jerk_psd(LONGEST_MEMORY * knot_s)
     return model._replace(jerk=np.maximum(ALLOWANCE * model.jerk, least * ISOTROPIC))

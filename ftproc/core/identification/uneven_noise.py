@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core import pacing
 from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification import optimizer
@@ -63,6 +64,7 @@ def stamp_variance(log: Observations, smoothed: SmootherRun, model: Model) -> tu
     typical = float(np.median(model.noise_variance / np.maximum(np.mean(speed2, 0), 1e-300)))
 
     def cost(theta: FloatArray) -> tuple[float, FloatArray]:
+        pacing.swept(len(used))
         white, stamps = np.exp(theta[:3]), math.exp(theta[3])
         variance = predicted + white + stamps * speed2
         ratio = square / (TAILS * variance)

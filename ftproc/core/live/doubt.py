@@ -20,7 +20,8 @@ class Doubt(NamedTuple):
     since_s: float = math.nan
 
     def is_due(self, window: Window, row: int) -> bool:
-        return row >= self.row and float(window.time_s[-1]) >= self.time_s and window.in_doubt()
+        """Whether it is time to look at a track that is in doubt."""
+        return row >= self.row and float(window.time_s[-1]) >= self.time_s
 
     def after_edit(self, window: Window, row: int) -> Doubt:
         now_s = float(window.time_s[-1])

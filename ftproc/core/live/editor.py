@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing.two_pass import Known
 from ftproc.core.filtering.initialization import FEWEST_READINGS, shortest_gap
-from ftproc.core.filtering.records import ROW, Model, empty_rows
+from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.live.doubt import Doubt
-from ftproc.core.live.window import Sizes, Window
+from ftproc.core.live.pieces import Sizes
+from ftproc.core.live.rows import Published, Waiting, unknown_rows
+from ftproc.core.live.window import Window
 
 FloatArray = NDArray[np.float64]
 
@@ -31,21 +32,11 @@ ASSUMED_READING, ASSUMED_SIGMA = (10_000.0, 0.0, 0.0), (10.0, 1e-3, 1e-3)  # m, 
 YOUNG, SOONEST, ROUND = 0.25, 4, 128  # all of the window is looked at when it has grown by this share, but not
 # sooner and not later than after so many samples, or while the track is in doubt
 REFRESH_S = 0.1  # between refreshes of the newest part, or one sample
+WORK_S, WORK_PER_S = 0.05, 160_000  # between turns at a look at all of the window, or one sample; and how much of it
+# there is for each second that the readings last: so many samples that are filtered
 WINDOW_S, WINDOW_SAMPLES = 30.0, (300, 1500)  # of the window: the longer of the two, up to so many samples
 NEAR_S, NEAR_SAMPLES = 8.0, (120, 400)  # of its newest part, beside the lag
 BLOCK = 4096  # samples between looks at a window that has nothing to learn
-
-
-class Published(NamedTuple):
-    """Rows that leave. first: number of the first, from zero. rows: `Row` records (n,), NaN where there is no estimate.
-    label: (n, 3) as of `outlier_chain.label_runs`. known: (n,) whether there is an estimate. reacquired: (n,) whether a
-    lost track was found again there."""
-
-    first: int
-    rows: Any
-    label: FloatArray
-    known: NDArray[np.bool_]
-    reacquired: NDArray[np.bool_]
 
 
 class LiveEditor:
@@ -56,11 +47,11 @@ class LiveEditor:
         self.known, self.lag_s, self.kind = known, lag_s, window
         self.window: Window | None = None
         self.confirmed_once = False
-        self.waiting = _Waiting(np.empty(0), np.empty((0, 3)))
+        self.waiting = Waiting(np.empty(0), np.empty((0, 3)))
         self.absent: tuple[int, ...] = ()
         self.count = self.published = 0  # rows taken, and rows that have left
-        self.next_edit, self.next_refresh = FEWEST, 0
-        self.doubt = Doubt()
+        self.next_edit, self.next_refresh, self.next_work = FEWEST, 0, 0
+        self.doubt, self.doubted = Doubt(), False  # and whether it is why a look at all of the window has begun
         self.refreshed = 0  # rows that the last refresh has seen
         # The newest part, from this row on, with its labels, if there is a lag.
         self.smoothed: tuple[int, SmootherRun, FloatArray] | None = None
@@ -109,7 +100,7 @@ class LiveEditor:
             return False
         if self.window is None:
             parts = (np.insert(old, place, new, 0) for old, new in zip(self.waiting, row, strict=True))
-            self.waiting = _Waiting(*parts)
+            self.waiting = Waiting(*parts)
             self.count += 1
             return True
         if self.lag_s == 0 or place <= self.window.near:
@@ -146,7 +137,8 @@ class LiveEditor:
         if (window.used_lately(LATELY) < AGREE).any() or not self._vagueness(window) < VAGUE:
             return
         self.window, self.confirmed_once = window, True
-        self.waiting = _Waiting(np.empty(0), np.empty((0, 3)))
+        self.waiting = Waiting(np.empty(0), np.empty((0, 3)))
+        self.next_edit = self.count + self._samples_between_edits(window)
         self._edited(window)
 
     def _vagueness(self, window: Window) -> float:
@@ -163,7 +155,7 @@ class LiveEditor:
         low = max(min(len(window) - window.sizes.near, self.published - self._first), 0)
         measurement = window.measurement[low:].copy()
         measurement[:, list(self.absent)] = np.nan
-        self.waiting = _Waiting(window.time_s[low:].copy(), measurement)
+        self.waiting = Waiting(window.time_s[low:].copy(), measurement)
         self.window, self.absent, self.next_edit = None, (), self.count + FEWEST_READINGS
 
     def _with_stand_ins(self, measurement: FloatArray) -> FloatArray:
@@ -186,7 +178,10 @@ class LiveEditor:
         times = np.diff(time_s)
         interval_s = float(np.median(times[times > 0])) if (times > 0).any() else 1.0
         self.longest_s = shortest_gap(interval_s)
-        self.samples_a_refresh = max(1, math.ceil(REFRESH_S / interval_s - 1e-6))
+        self.samples_a_refresh, self.samples_a_turn = (
+            max(1, math.ceil(each_s / interval_s - 1e-6)) for each_s in (REFRESH_S, WORK_S)
+        )
+        self.work_a_turn = WORK_PER_S * interval_s * self.samples_a_turn
         near = int(np.clip(NEAR_S / interval_s, *NEAR_SAMPLES)) + int(self.lag_s / interval_s)
         return Sizes(max(int(np.clip(WINDOW_S / interval_s, *WINDOW_SAMPLES)), 2 * near), near, self.lag_s)
 
@@ -194,7 +189,7 @@ class LiveEditor:
         """How far the rows can be taken at once: to the next look, the next gap, the first reading of a component that
         was absent, or where a row must leave that no refresh has seen."""
         assert self.window is not None
-        high = min(len(time_s), low + max(min(self.next_refresh, self.next_edit) - self.count, 1))
+        high = min(len(time_s), low + max(self._next_look(self.window) - self.count, 1))
         if self.lag_s > 0:
             unseen = np.concatenate([self.window.time_s[self.refreshed - self._first :], time_s[low:high]])
             if time_s[low] > unseen[0] + self.lag_s:
@@ -211,24 +206,46 @@ class LiveEditor:
         if time_s - window.time_s[-1] > self.longest_s:
             self.next_edit = min(self.next_edit, self.count + FEWEST_READINGS + 1)
 
+    def _next_look(self, window: Window) -> int:
+        """How many rows there are when there is something to do again."""
+        return min(self.next_refresh, self.next_edit if window.under_way is None else self.next_work)
+
     def _look(self, window: Window) -> None:
-        doubted = self.count >= self.next_refresh and self.doubt.is_due(window, self.count)
-        if self.count >= self.next_edit or doubted:
+        if self.count < self._next_look(window):
+            return
+        in_doubt = window.in_doubt()
+        if window.under_way is not None and self.doubted != in_doubt:
+            window.under_way = None  # what it began with is not so
+        doubted = in_doubt and self.count >= self.next_refresh and self.doubt.is_due(window, self.count)
+        if window.under_way is None and (doubted or self.count >= self.next_edit):
+            self.doubted, self.next_work = in_doubt, self.count
+            self.next_edit = self.count + self._samples_between_edits(window)
             window.sizes = self._sizes(window.time_s)
             window.trim()
-            lost = window.in_doubt()
-            try:
-                window.edit()
-            except ValueError:  # a component has too few readings that agree
-                window.refresh()
-            if lost and not window.in_doubt():
-                window.reacquired.append(len(window) - 1)
-            self._edited(window)
-        elif self.count >= self.next_refresh:
+            window.begin()
+            if window.under_way is None:
+                self._edited(window)
+        if window.under_way is not None and self.count >= self.next_work:
+            self._go_on(window)
+        if self.count >= self.next_refresh:
             self._refresh(window)
 
+    def _go_on(self, window: Window) -> None:
+        """A turn at the look at all of the window."""
+        self.next_work = self.count + self.samples_a_turn
+        try:
+            window.go_on(self.work_a_turn)
+        except ValueError:  # a component has too few readings that agree
+            window.refresh()
+        if window.under_way is None:
+            if self.doubted and not window.in_doubt():
+                window.reacquired.append(len(window) - 1)
+            self._edited(window)
+
+    def _samples_between_edits(self, window: Window) -> int:
+        return int(np.clip(YOUNG * self.count, SOONEST, ROUND)) if window.learns else BLOCK
+
     def _edited(self, window: Window) -> None:
-        self.next_edit = self.count + (int(np.clip(YOUNG * self.count, SOONEST, ROUND)) if window.learns else BLOCK)
         self.doubt = self.doubt.after_edit(window, self.count)
         self._seen(window)
 
@@ -262,7 +279,7 @@ class LiveEditor:
         if self.window is None:
             missing = ~np.isfinite(self.waiting.measurement[low : low + n])
             nothing = np.zeros(n, bool)
-            return [Published(first, _unknown_rows(n), np.where(missing, 3.0, 0.0), nothing, nothing)]
+            return [Published(first, unknown_rows(n), np.where(missing, 3.0, 0.0), nothing, nothing)]
         window = self.window
         rows, label = window.shown(low, low + n)
         if self.smoothed is not None:
@@ -273,21 +290,3 @@ class LiveEditor:
         label[:, list(self.absent)] = 3.0
         again = np.isin(np.arange(low, low + n), window.reacquired)
         return [Published(first, rows, label, np.ones(n, bool), again)]
-
-
-class _Waiting(NamedTuple):
-    """Rows before there is a track."""
-
-    time_s: FloatArray
-    measurement: FloatArray
-
-    def with_row(self, time_s: FloatArray, measurement: FloatArray) -> _Waiting:
-        return _Waiting(np.concatenate([self.time_s, time_s]), np.concatenate([self.measurement, measurement]))
-
-
-def _unknown_rows(n: int) -> Any:
-    """`Row` records without an estimate."""
-    rows = empty_rows(n)
-    for name in ROW.names or ():
-        rows[name] = 0.0 if name in ("weight", "since_start") else np.nan
-    return rows

@@ -1,4 +1,5 @@
-"""Where the newest readings are rejected: is it a patch, or the track that is wrong?
+"""The decisions on the newest part, made again; and where its newest readings are rejected: is it a patch, or the track
+that is wrong?
 
 Each rejected reading alone lies off a prediction that has become vague since, and all of them lie off it together. But
 if the last of them are good, each makes the next one likely. So the log-probability of all readings of the newest part
@@ -14,12 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.editing import patch_likelihood
+from ftproc.core.editing import outlier_chain, patch_likelihood
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import smooth_log
 
 FloatArray = NDArray[np.float64]
 
+ROUNDS = 3  # of smoothing and deciding
 MARGIN = 5.0  # by which the log-probability of other decisions must be better
 
 
@@ -32,6 +34,20 @@ class Open(NamedTuple):
     model: Model
     start: Start
     rates: FloatArray
+
+
+def settled(case: Open, gate: float) -> Open:
+    """Smooth and decide by turns until the decisions stand still; gate: in sigmas."""
+    for _ in range(ROUNDS):
+        smoothed = smooth_log(case.log, case.model, [case.start], residuals_only=True)
+        good = outlier_chain.classify(
+            smoothed.residual, smoothed.residual_variance, case.model.reading_variance, case.rates.copy(), gate
+        )
+        weight = ((good > 0.5) & case.possible).astype(float)
+        if (weight == case.log.weight).all():
+            break
+        case = case._replace(log=case.log._replace(weight=weight))
+    return case
 
 
 def readmitted(case: Open) -> FloatArray | None:

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from ftproc.core.editing import gate, two_pass
 from ftproc.core.editing.track import REACQUIRE_SAMPLES, GatedRecursion, Track
 from ftproc.core.filtering.records import Model, Observations, empty_rows
+from ftproc.core.live.pieces import Sizes
 from ftproc.core.live.readings import Columns, Labels
-from ftproc.core.live.window import Sizes, Window
+from ftproc.core.live.window import Window
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 PATCH_S, PATCH_SAMPLES = 1.5, 12  # the longest patch expected is the longer of the two
 
@@ -50,11 +52,14 @@ class GatedWindow(Window):
         """Whether noise or process noise are yet to be found."""
         return self.track is None or not (np.isfinite(self.known.sigma).all() and self.known.jerk_psd is not None)
 
-    def edit(self) -> None:
-        if not self.learns:
+    def begin(self) -> None:
+        if self.learns:
+            super().begin()
+        else:
             self.refresh()
-            return
-        super().edit()
+
+    def _adopt(self, found: two_pass.Edited, samples: IntArray) -> None:
+        super()._adopt(found, samples)
         if self.track is None:
             rows, label = super().shown(0, len(self))
             self.gated, self.gated_labels = Columns(rows=rows, label=label, used=super().decided), Labels()

@@ -9,7 +9,8 @@ profile follow; and brings the filter to the newest sample.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,30 +20,23 @@ from ftproc.core.filtering.forward import Span
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven, empty_rows
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 from ftproc.core.identification.profile import fit_profile, with_allowance
-from ftproc.core.identification.scales import scales_of
+from ftproc.core.identification.scales import Scales, scales_of
+from ftproc.core.live.pieces import Sizes, piece, predicted, stretched
 from ftproc.core.live.predictive_chain import OPEN, chains_of, run_predictive, run_predictive_coloured
 from ftproc.core.live.readings import LONGEST_ISOLATED, Columns, Labels, Repeats
-from ftproc.core.live.readmission import Open, readmitted
+from ftproc.core.live.readmission import Open, readmitted, settled
+from ftproc.core.live.whole import Whole
 from ftproc.core.model.motion import Profile
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-ROUNDS = 3  # of smoothing and deciding in a refresh
 SHORT = 160  # samples: with fewer, nothing is said of how the noise of single readings differs
 YOUNG, JUMPY = 40, 1.5  # samples with which a track is young, and intervals that its filter must remember
 RECENT = 50  # samples whose noise the next ones are taken to have
 DOUBTED, DOUBT = 12, 0.4  # readings, and share of them: with fewer good ones the track is in doubt
 JERK_STEPS = 2  # of the search for the jerk profile in a refresh
 SLIDES = 0.25  # of the newest part that it is longer before it is cut
-
-
-class Sizes(NamedTuple):
-    """Samples of the window, and of its newest part, where decisions are open; lag_s: for which samples wait in it."""
-
-    window: int
-    near: int
-    lag_s: float = 0.0
 
 
 class Window:
@@ -59,6 +53,7 @@ class Window:
         self.repeats, self.labels = Repeats(), Labels()
         self.next_times, self.next_late = np.ones(3), np.zeros(3)  # how the noise of the next readings differs
         self.reacquired: list[int] = []  # samples at which a lost track was found again
+        self.under_way: Whole | None = None
         nothing, ones = np.zeros((0, 3)), np.ones((0, 3))
         self.kept = Columns(
             time_s=np.empty(0), measurement=nothing, possible=nothing > 0, weight=nothing, label=nothing, times=ones,
@@ -114,20 +109,46 @@ class Window:
     def edit(self) -> None:
         """Decide on all of the window anew. Raises ValueError when a component has no reading that agrees, or the few
         readings that there are lie on a track that only a filter without memory could follow."""
-        readings = np.where(self.kept["possible"], self.measurement, np.nan)
-        found = two_pass.edit(
-            self.time_s.copy(), readings, self.known, live=True, short=self.white or len(self) < SHORT
-        )
+        self.begin()
+        self.go_on(math.inf)
+
+    def begin(self) -> None:
+        """Begin to decide on all of the window anew; `under_way` is None if that was all."""
+        readings, short = np.where(self.kept["possible"], self.measurement, np.nan), self.white or len(self) < SHORT
+        edit = partial(two_pass.edit, self.time_s.copy(), readings, self.known, live=True, short=short)
+        self.under_way = Whole(edit, len(self))
+
+    def go_on(self, samples: float) -> None:
+        """Go on with what is under way, for the work of filtering so many samples. Errors as of `edit`."""
+        assert self.under_way is not None
+        begun = self.under_way
+        self.under_way = None
+        if not begun.go_on(samples):
+            self.under_way = begun
+        else:
+            self._adopt(begun.found, begun.samples)
+
+    def _adopt(self, found: two_pass.Edited, samples: IntArray) -> None:
+        """Take over the decisions, noise and process noise of an edit, and where it leads; samples: those it knew."""
         scales = scales_of(found.log, found.model.noise_variance)
         if len(self) < YOUNG and scales.memory_s(float(found.model.jerk[:, 0].max())) < JUMPY * scales.interval_s:
             raise ValueError("the readings jump too much for the track of anything that flies")
-        self.kept["weight"][:], self.rates = found.weight, found.decision.rates
-        uneven = found.log.uneven or Uneven.none(len(self))
-        self.kept["times"][:], self.kept["late"][:] = uneven
-        self.near = max(min(len(self) - self.sizes.near, self._waiting()), found.starts[0].sample, 0)
+        kept, self.rates = self.kept, found.decision.rates
+        uneven = found.log.uneven or Uneven.none(len(samples))
+        new = np.delete(np.arange(len(self)), samples)
+        kept["weight"][samples] = found.weight
+        kept["weight"][new], kept["times"][new], kept["late"][new] = OPEN, *_typical(*uneven)
+        kept["times"][samples], kept["late"][samples] = uneven
+        kept["weight"][~kept["possible"]] = 0.0
+        starts = [start._replace(sample=int(samples[start.sample])) for start in found.starts]
+        if len(new):
+            log, start = self._observed(slice(0, len(self))), starts[-1]
+            span = Span(start.sample, len(self), start.sample)
+            kept["weight"][new] = self._filtered(log, span, found.model, found.model.filter(start))["weight"][new]
         model = found.model
-        self.anchor = self._ahead(found.starts, model, self.near)
-        passed = _piece(float(self.time_s[self.near] - self.time_s[0]), model)
+        self.near = max(min(len(self) - self.sizes.near, self._waiting()), starts[0].sample, 0)
+        self.anchor = self._ahead(starts, model, self.near)
+        passed = piece(float(self.time_s[self.near] - self.time_s[0]), model)
         self.model = self.allowed = model._replace(jerk=model.jerk[min(passed, len(model.jerk) - 1) :])
         self.refresh()
 
@@ -138,7 +159,7 @@ class Window:
         log.weight[sample] = 0.0
         filters = model.filter(start)
         self._filtered(log, Span(start.sample, sample + 1, start.sample), model, filters)
-        return _predicted(filters)
+        return predicted(filters)
 
     def trim(self) -> int:
         """Forget what is more than the window's size, but nothing that waits for its lag; how many samples."""
@@ -172,6 +193,8 @@ class Window:
         self._bar(self._take(time_s, measurement))
         self.kept.insert(place)
         self.reacquired = [sample + (sample >= place) for sample in self.reacquired]
+        if self.under_way is not None:
+            self.under_way.make_room(place)
 
     def _take(self, time_s: FloatArray, measurement: FloatArray) -> list[tuple[IntArray, int]]:
         """Keep the next readings, undecided where they may be good at all: no target is at the station, or behind it,
@@ -222,44 +245,31 @@ class Window:
         """Decide again on the newest part, let the jerk profile follow, and filter that part anew."""
         self._slide()
         near = slice(self.near, len(self))
-        self.model = _stretched(self.model, float(self.time_s[-1] - self.time_s[self.near]))
-        self._decide(near)
-        log = self._observed(near)
-        open_ = Open(log, self.kept["possible"][near], self._with_allowance(log), self.anchor, self.rates)
-        other = readmitted(open_)
+        self.model = stretched(self.model, float(self.time_s[-1] - self.time_s[self.near]))
+        log, gate = self._observed(near), self.known.gate
+        scales = scales_of(log, self.model.noise_variance)
+        self.allowed = self._with_allowance(log, scales)
+        case = settled(Open(log, self.kept["possible"][near], self.allowed, self.anchor, self.rates), gate)
+        other = readmitted(case)
         if other is not None:
-            self.kept["weight"][near] = other
-            self._decide(near)
-            log = self._observed(near)
+            case = settled(case._replace(log=log._replace(weight=other)), gate)
+        log = case.log
+        self.kept["weight"][near] = log.weight
         if self.known.jerk_psd is None:
-            self.model = fit_profile(log, [self.anchor], self.model, JERK_STEPS)
-        self.allowed = self._with_allowance(log)
+            self.model = fit_profile(log, [self.anchor], self.model, JERK_STEPS, scales)
+            self.allowed = self._with_allowance(log, scales)
         self.filters, self.chains = self.allowed.filter(self.anchor), self._chains(self.allowed)
         span = Span(0, len(log.time_s), 0)
         self.kept["rows"][near] = self._filtered(log, span, self.allowed, self.filters, self.chains)
         self.kept["label"][near] = outlier_chain.label_runs(log.weight, log.measurement, LONGEST_ISOLATED)
         self.labels.reset(log.weight, log.measurement)
-        self.next_times, self.next_late = np.median(self.kept["times"][-RECENT:], 0), self.kept["late"][-1].copy()
-
-    def _decide(self, near: slice) -> None:
-        """Smooth and decide in turn until the decisions stand still."""
-        weight, possible = self.kept["weight"][near], self.kept["possible"][near]
-        for _ in range(ROUNDS):
-            log = self._observed(near)
-            smoothed = smooth_log(log, self._with_allowance(log), [self.anchor], residuals_only=True)
-            good = outlier_chain.classify(
-                smoothed.residual, smoothed.residual_variance, self.model.reading_variance, self.rates.copy(),
-                self.known.gate,
-            )  # fmt: skip
-            weight[:] = (good > 0.5) & possible
-            if (weight == log.weight).all():
-                break
+        self.next_times, self.next_late = _typical(self.kept["times"], self.kept["late"])
 
     def _chains(self, model: Model) -> Any:
         return chains_of(self.rates, model.reading_variance, self.known.gate)
 
-    def _with_allowance(self, log: Observations) -> Model:
-        return self.model if self.known.jerk_psd is not None else with_allowance(log, self.model)
+    def _with_allowance(self, log: Observations, scales: Scales) -> Model:
+        return self.model if self.known.jerk_psd is not None else with_allowance(log, self.model, scales)
 
     def _slide(self) -> None:
         """Move the newest part on, by whole pieces of its jerk profile if there are such."""
@@ -269,7 +279,7 @@ class Window:
         times, first_s = self.time_s, float(self.time_s[self.near])
         ahead = min(self.near + beyond, self._waiting())
         if math.isfinite(self.model.knot_s):
-            pieces = _piece(float(times[ahead]) - first_s, self.model)
+            pieces = piece(float(times[ahead]) - first_s, self.model)
             ahead = min(ahead, int(np.searchsorted(times, first_s + pieces * self.model.knot_s)))
         if ahead <= self.near:
             return
@@ -277,23 +287,12 @@ class Window:
         log.weight[-1] = 0.0
         filters = self.allowed.filter(self.anchor)
         self._filtered(log, Span(0, len(log.time_s), 0), self.allowed, filters)
-        self.anchor, self.near = _predicted(filters), ahead
-        passed = _piece(float(times[ahead]) - first_s, self.model)
+        self.anchor, self.near = predicted(filters), ahead
+        passed = piece(float(times[ahead]) - first_s, self.model)
         jerk = self.model.jerk
         self.model = self.model._replace(jerk=jerk[min(passed, len(jerk) - 1) :])
 
 
-def _predicted(filters: Any) -> Start:
-    """A filter's state as the start of what follows."""
-    return Start(0, filters["x"][0, :9].copy(), filters["p"][0, :9, :9].copy())
-
-
-def _piece(after_s: float, model: Model) -> int:
-    """The piece of a jerk profile that holds so long after its beginning."""
-    return int((after_s + 1e-9) / model.knot_s) if math.isfinite(model.knot_s) else 0
-
-
-def _stretched(model: Model, span_s: float) -> Model:
-    """The model with as many pieces of its jerk profile as the span needs; the last one goes on."""
-    pieces = max(math.ceil(span_s / model.knot_s), 1)
-    return model._replace(jerk=model.jerk[np.minimum(np.arange(pieces), len(model.jerk) - 1)])
+def _typical(times: FloatArray, late: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """How the noise of the readings after some others differs, see `Uneven`: (3,) each."""
+    return np.median(times[-RECENT:], 0), late[-1].copy()

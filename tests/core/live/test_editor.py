@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core.live import editor
-from ftproc.core.live.window import Window
 from ftproc.methods import live
 from ftproc.settings import FilterSettings
 from tests.simulated import simulate
@@ -27,11 +25,11 @@ def flight():
 
 def rows(log, stop, way, step):
     """The rows that have left an editor after `stop` readings that came `step` at a time."""
-    edited = live.editor(FilterSettings(**WAYS[way]))
+    editor = live.editor(FilterSettings(**WAYS[way]))
     found = []
     for low in range(0, stop, step):
         high = min(low + step, stop)
-        found += edited.push(log.time_s[low:high], log.measurement[low:high])
+        found += editor.push(log.time_s[low:high], log.measurement[low:high])
     names = ("state", "sigma", "nis", "weight", "innovation")
     parts = {name: np.concatenate([each.rows[name] for each in found]) for name in names}
     return {**parts, "label": np.concatenate([each.label for each in found])}
@@ -98,15 +96,3 @@ def test_memory_is_constant(flight):
         editor.push(flight.log.time_s + 12.1 * k, flight.log.measurement)
         sizes.append(len(editor.window))
     assert max(sizes) <= 2 * 4096 + 2 * editor.window.sizes.window
-
-
-@pytest.mark.parametrize(("way", "learns"), [("live", True), ("specified", False)])
-def test_all_of_the_window_is_looked_at_while_there_is_something_to_learn(flight, monkeypatch, way, learns):
-    """When it has grown by a share, and often enough later."""
-    looks = []
-    whole = Window.edit
-    monkeypatch.setattr(Window, "edit", lambda window: looks.append(made.count) or whole(window))
-    made = live.editor(FilterSettings(**WAYS[way]))
-    made.push(flight.log.time_s[:200], flight.log.measurement[:200])
-    assert np.diff(looks).max(initial=0) <= editor.ROUND
-    assert (len(looks) > 5) == learns

@@ -1,0 +1,35 @@
+"""How much a window keeps, and what its newest part begins with: the filter's prediction there, and the pieces of the
+jerk profile that hold from there on."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ftproc.core.filtering.records import Model, Start
+
+
+class Sizes(NamedTuple):
+    """Samples of the window, and of its newest part, where decisions are open; lag_s: for which samples wait in it."""
+
+    window: int
+    near: int
+    lag_s: float = 0.0
+
+
+def predicted(filters: Any) -> Start:
+    """A filter's state as the start of what follows."""
+    return Start(0, filters["x"][0, :9].copy(), filters["p"][0, :9, :9].copy())
+
+
+def piece(after_s: float, model: Model) -> int:
+    """The piece of a jerk profile that holds so long after its beginning."""
+    return int((after_s + 1e-9) / model.knot_s) if math.isfinite(model.knot_s) else 0
+
+
+def stretched(model: Model, span_s: float) -> Model:
+    """The model with as many pieces of its jerk profile as the span needs; the last one goes on."""
+    pieces = max(math.ceil(span_s / model.knot_s), 1)
+    return model._replace(jerk=model.jerk[np.minimum(np.arange(pieces), len(model.jerk) - 1)])

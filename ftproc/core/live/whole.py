@@ -1,0 +1,25 @@
+"""All of the window decided on anew by two-pass editing, a little at a time, while readings go on coming."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing.two_pass import Edited
+from ftproc.core.pacing import Paced
+
+IntArray = NDArray[np.int64]
+
+
+class Whole(Paced[Edited]):
+    """An edit that has begun. samples: where the readings that it knows are in the window."""
+
+    def __init__(self, edit: Callable[[], Edited], count: int) -> None:
+        super().__init__(edit)
+        self.samples: IntArray = np.arange(count)
+
+    def make_room(self, place: int) -> None:
+        """A sample has come in between, at a place of the window."""
+        self.samples[self.samples >= place] += 1
