@@ -203,7 +203,8 @@ def test_a_model_lies_beside_its_file(tmp_path, monkeypatch):
         ("[azimuth]\nsense = 'clokwise'", '[azimuth] sense = "clokwise": expected "clockwise" or "anticlockwise"; did '
          'you mean "clockwise"?'),
         ("[azimuth]\nunit = 'km'", '[azimuth] unit = "km": expected "rad" or "deg" or "mrad" or "mil" or "mil6300" or '
-         '"mil6000" or "grad" or "gon" or "mgon" or "arcmin" or "arcsec".'),
+         '"mil6000" or "grad" or "gon" or "mgon" or "urad" or "mdeg" or "cdeg" or "turn" or "bam16" or "arcmin" or '
+         '"arcsec".'),
         ("[azimuth]\nbias_deg = 'x'", '[azimuth] bias_deg = "x": expected a number.'),
         ("[range]\ncolumn = ''", '[range] column = "": expected a text in quotes.'),
         ("[refraction]\npressure_hpa = 101325", "[refraction] pressure_hpa = 101325: expected a number from 300 to "

@@ -20,7 +20,7 @@ from ftproc.core.signatures import Flags, Indices, Matrix, Vector
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-SHARE, KNOT_SHARE = 0.5, 1 / 6  # of the filter's memory, and of a knot of the jerk profile, that is merged
+SHARE = 0.5  # of the filter's memory, that is merged
 MOST = 16  # readings
 CALMER = 0.9  # share of the flight with less jerk than the memory is computed for
 ROUNDING = 0.01  # of a reading: times are rounded, and must not decide where the number comes out even
@@ -32,7 +32,7 @@ def how_many(scales: Scales, model: Model, knot_s: float) -> int:
         return 1
     noise = float(scales.noise_m.min()) ** 2
     memory = (noise * scales.interval_s / float(np.quantile(model.jerk[:, 0], CALMER))) ** (1 / 6)
-    wanted = min(SHARE * memory, KNOT_SHARE * knot_s) / scales.interval_s
+    wanted = SHARE * min(memory, knot_s / 10) / scales.interval_s
     return int(np.clip(wanted + ROUNDING, 1, MOST))
 
 

@@ -42,7 +42,7 @@ class Scales(NamedTuple):
 
     def memory_s(self, jerk_psd: float) -> float:
         """The memory of a filter for this jerk density, m^2/s^5."""
-        return float((self.typical_noise_m**2 * self.interval_s / jerk_psd) ** (1 / 6))
+        return float((self.typical_noise_m**2 * self.interval_s / max(jerk_psd, 1e-300)) ** (1 / 6))
 
     def jerk_psd(self, memory_s: float) -> float:
         """The jerk density, m^2/s^5, that gives a filter this memory."""

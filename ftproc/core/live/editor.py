@@ -231,10 +231,10 @@ class LiveEditor:
             self._refresh(window)
 
     def _go_on(self, window: Window) -> None:
-        """A turn at the look at all of the window."""
+        """A turn at the look at all of the window; the whole of it where the track is in doubt."""
         self.next_work = self.count + self.samples_a_turn
         try:
-            window.go_on(self.work_a_turn)
+            window.go_on(math.inf if self.doubted else self.work_a_turn)
         except ValueError:  # a component has too few readings that agree
             window.refresh()
         if window.under_way is None:

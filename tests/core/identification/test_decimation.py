@@ -95,6 +95,6 @@ def test_no_more_is_merged_than_memory_and_knots_bear(knot_s):
     model = matched(1, 10, q=1e-3).model
     memory_s = scales.memory_s(1e-3)
     count = decimation.how_many(scales, model, knot_s)
-    bound = min(decimation.SHARE * memory_s, decimation.KNOT_SHARE * knot_s) / scales.interval_s
+    bound = decimation.SHARE * min(memory_s, knot_s / 10) / scales.interval_s
     assert count == int(np.clip(bound + decimation.ROUNDING, 1, decimation.MOST))
     assert decimation.how_many(scales, model._replace(wander_variance=np.ones(3)), knot_s) == 1
