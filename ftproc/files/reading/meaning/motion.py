@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -91,7 +92,7 @@ def judged(
 
 def _samples(quantities: Mapping[str, FloatArray], found: Mapping[str, Column]) -> tuple[_Sample, _Sample] | None:
     """The first rows with all that the log has, and such rows of the whole log, in time order; None for too few."""
-    rows = np.flatnonzero(np.isfinite(np.column_stack(list(quantities.values()))).all(1))
+    rows = np.flatnonzero(np.logical_and.reduce([np.isfinite(values) for values in quantities.values()]))
     if len(rows) < _FEWEST:
         return None
     return _in_file_units(quantities, found, rows[:_MOST_ROWS]), _in_file_units(
@@ -116,28 +117,45 @@ def _choices(near: _Sample, far: _Sample, found: Mapping[str, Column], open_ones
             priors = _PRIORS[kind].items()
             ways.append([({q: UNITS[q][name] for q in mine}, prior) for name, prior in priors])
     fixed = {quantity: column.unit for quantity, column in found.items()}
-    choices = []
+    choices, likelihood = [], _likelihoods(near, far)
     for way in itertools.product(*ways):
         units = fixed | {quantity: unit for each, _ in way for quantity, unit in each.items()}
-        choices.append(_Choice(units, math.prod(prior for _, prior in way) * _likelihood(near, far, units)))
+        choices.append(_Choice(units, math.prod(prior for _, prior in way) * likelihood(units)))
     return choices
 
 
-def _likelihood(near: _Sample, far: _Sample, units: Mapping[str, Unit]) -> float:
-    """How likely the rate, the speed, the distance and the noise of the angles are in these units."""
-    steps = np.diff(units["time"].to_si(near.time))
-    steps = steps[steps > 0]
-    odds = _at(_STEP_S, float(np.median(steps))) if len(steps) else 1.0
-    if "range" in units:
-        si = _in_si(far, units)
-        odds *= _at(_RANGE_M, float(np.median(np.abs(si[:, 0]))))
-        speed = _speed(units["time"].to_si(far.time), _positions(si))
-        odds *= 1.0 if speed is None else _at(_SPEED, speed)
-    si = _in_si(near, units)
-    for k in (1, 2):
-        if QUANTITIES[1 + k] in units:
-            odds *= _at(_NOISE_RAD, _noise(np.unwrap(si[:, k]) if k == 1 else si[:, k]))
-    return odds
+def _likelihoods(near: _Sample, far: _Sample) -> Callable[[Mapping[str, Unit]], float]:
+    """How likely the rate, the speed, the distance and the noise of the angles are, by the units; each is found once
+    for all choices that agree in the units it depends on."""
+
+    @cache
+    def rate(unit: Unit) -> float:
+        steps = np.diff(unit.to_si(near.time))
+        steps = steps[steps > 0]
+        return _at(_STEP_S, float(np.median(steps))) if len(steps) else 1.0
+
+    @cache
+    def placed(units: tuple[tuple[str, Unit], ...]) -> tuple[FloatArray, float]:
+        si = _in_si(far, dict(units))
+        return _positions(si), _at(_RANGE_M, float(np.median(np.abs(si[:, 0]))))
+
+    @cache
+    def noise(k: int, unit: Unit) -> float:
+        angle = unit.to_si(near.readings[:, k])
+        return _at(_NOISE_RAD, _noise(np.unwrap(angle) if k == 1 else angle))
+
+    def likelihood(units: Mapping[str, Unit]) -> float:
+        odds = rate(units["time"])
+        if "range" in units:
+            position, distance = placed(tuple((q, units[q]) for q in QUANTITIES[1:] if q in units))
+            speed = _speed(units["time"].to_si(far.time), position)
+            odds *= distance * (1.0 if speed is None else _at(_SPEED, speed))
+        for k in (1, 2):
+            if QUANTITIES[1 + k] in units:
+                odds *= noise(k, units[QUANTITIES[1 + k]])
+        return odds
+
+    return likelihood
 
 
 def _in_si(sample: _Sample, units: Mapping[str, Unit]) -> FloatArray:
@@ -153,9 +171,10 @@ def _positions(si: FloatArray) -> FloatArray:
 
 def _speed(time_s: FloatArray, position: FloatArray) -> float | None:
     """The usual speed, or None if the way is hidden in the noise."""
-    blocks = np.array_split(np.arange(len(time_s)), min(_BLOCKS, len(time_s) // 5))
-    middle = np.array([np.median(position[block], axis=0) for block in blocks])
-    moment = np.array([np.median(time_s[block]) for block in blocks])
+    count = min(_BLOCKS, len(time_s) // 5)
+    size = len(time_s) // count
+    middle = np.median(position[: count * size].reshape(count, size, 3), axis=1)
+    moment = np.median(time_s[: count * size].reshape(count, size), axis=1)
     way = float(np.linalg.norm(np.ptp(middle, axis=0)))
     step = float(np.median(np.linalg.norm(np.diff(position, axis=0), axis=1)))
     past = np.diff(moment) > 0
