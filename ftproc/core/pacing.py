@@ -44,7 +44,7 @@ class _Work:
 
 
 class Paced(Generic[T]):
-    """Work that goes on when it is told to; its thread ends with it."""
+    """Work that goes on as far as `go_on` lets it; its thread ends with it."""
 
     def __init__(self, work: Callable[[], T]) -> None:
         self._work, self._found = _Work(), list[T]()
@@ -82,8 +82,9 @@ def _run(work: _Work, function: Callable[[], T], found: list[T]) -> None:
     try:
         found.append(function())
     except _GivenUp:
-        return
+        pass
     except Exception as error:
         work.error = error
-    work.done = True
-    work.pause.release()
+    finally:
+        work.done = True
+        work.pause.release()

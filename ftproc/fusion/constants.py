@@ -20,8 +20,8 @@ from ftproc.records import FloatArray, IntArray
 NAMES = ("range_m", "azimuth_rad", "elevation_rad", "tilt_east_rad", "tilt_north_rad", "clock_s")
 WORDS = ("range bias", "azimuth zero", "elevation zero", "tilt about east", "tilt about north", "clock offset")
 ALLOWANCE = 1.7  # on the variance that the readings leave: manoeuvres are not white jerk, noise is not quite white
-LEAST_TOLD = 0.05  # of the prior's information: less in a direction says nothing
-TOLD = 0.9  # of the prior's 1-sigma: a parameter that stays above it is not observable
+LEAST_SEEN = 0.05  # of the prior's information: less in a direction says nothing
+OBSERVED = 0.9  # of the prior's 1-sigma: a parameter that stays above it is not observable
 FARTHEST = 6.0  # prior sigmas that a bias may be off: more of it is a wrong place, clock or target
 
 
@@ -33,7 +33,7 @@ class Constants(NamedTuple):
     estimate: FloatArray
     covariance: FloatArray
     prior: FloatArray
-    untold: FloatArray
+    unobserved: FloatArray
     moved: float = np.inf
 
     @classmethod
@@ -48,9 +48,9 @@ class Constants(NamedTuple):
 
     @property
     def observable(self) -> NDArray[np.bool_]:
-        """(m, PARAMETERS) whether the flight has told more of it than was known."""
-        told: NDArray[np.bool_] = self.sigma < TOLD * self.prior
-        return told
+        """(m, PARAMETERS) whether the flight shows more of it than was known."""
+        observed: NDArray[np.bool_] = self.sigma < OBSERVED * self.prior
+        return observed
 
     def columns(self) -> FloatArray:
         """Directions for `core.filtering.biases`: a root of the covariance."""
@@ -72,10 +72,10 @@ def update(constants: Constants, found: Biased, directions: Directions) -> Const
     into = np.linalg.inv(directions.columns[free] / prior[free, None])
     information, score = into.T @ found.info @ into, into.T @ found.score  # in units of the prior
     information, score = information / ALLOWANCE, score / ALLOWANCE
-    information, score, untold = _without_common_clock(constants.prior, free, information, score)
+    information, score, unobserved = _without_common_clock(constants.prior, free, information, score)
     size, turn = np.linalg.eigh(0.5 * (information + information.T))
-    told = size > LEAST_TOLD
-    size, along = np.where(told, size, 0.0), np.where(told, turn.T @ score, 0.0)
+    seen = size > LEAST_SEEN
+    size, along = np.where(seen, size, 0.0), np.where(seen, turn.T @ score, 0.0)
     here = constants.estimate.ravel()[free] / prior[free]
     step = turn @ ((along - turn.T @ here) / (1 + size))
     covariance = np.zeros((len(prior), len(prior)))
@@ -84,9 +84,9 @@ def update(constants: Constants, found: Biased, directions: Directions) -> Const
     estimate[free] = np.clip(estimate[free] + prior[free] * step, -FARTHEST * prior[free], FARTHEST * prior[free])
     vague = np.zeros((0, len(prior)))
     moved = float(np.max(np.abs(step) * prior[free] / np.sqrt(np.diag(covariance)[free])))
-    if untold is not None:
+    if unobserved is not None:
         vague = np.zeros((1, len(prior)))
-        vague[0, free] = untold
+        vague[0, free] = unobserved
     return Constants(estimate.reshape(constants.prior.shape), covariance, constants.prior, vague, moved)
 
 
@@ -105,17 +105,17 @@ def _without_common_clock(
     return information - np.outer(pull, pull) / size, score - pull * float(common @ score) / size, common
 
 
-def cannot_be_told(constants: Constants, names: list[str]) -> list[str]:
+def not_observable(constants: Constants, names: list[str]) -> list[str]:
     """In words: the common clock, and parameters that stay as they were."""
-    found = ["common clock"] if len(constants.untold) else []
+    found = ["common clock"] if len(constants.unobserved) else []
     sigma, prior = constants.sigma, constants.prior
     for parameter, word in enumerate(WORDS):
         vague = [
             n
             for n, s, p in zip(names, sigma[:, parameter], prior[:, parameter], strict=True)
-            if p > 0 and s >= TOLD * p
+            if p > 0 and s >= OBSERVED * p
         ]
-        if not vague or (parameter == CLOCK and len(constants.untold)):
+        if not vague or (parameter == CLOCK and len(constants.unobserved)):
             continue
         if len(vague) > 1 and len(vague) == int((prior[:, parameter] > 0).sum()):
             found.append(f"common {word}")

@@ -106,7 +106,7 @@ def remarks(fused: Fused, sigma_m: FloatArray, zero_s: float) -> list[Remark]:
     reading."""
     return [
         *_clocks(fused),
-        *_told(fused),
+        *_unobserved(fused),
         *_improbable(fused),
         *_scattered(fused),
         *_correlated(fused),
@@ -130,10 +130,10 @@ def _clocks(fused: Fused) -> Iterator[Remark]:
         yield Remark(CONSISTENT, text)
 
 
-def _told(fused: Fused) -> Iterator[Remark]:
-    untold = posterior.cannot_be_told(fused.constants, [station.name for station in fused.stations])
-    if untold:
-        yield Remark(CONSISTENT, f"cannot be told: {'; '.join(untold)} (1-sigma stays at the prior's)")
+def _unobserved(fused: Fused) -> Iterator[Remark]:
+    unobserved = posterior.not_observable(fused.constants, [station.name for station in fused.stations])
+    if unobserved:
+        yield Remark(CONSISTENT, f"cannot be told: {'; '.join(unobserved)} (1-sigma stays at the prior's)")
 
 
 def _improbable(fused: Fused) -> Iterator[Remark]:

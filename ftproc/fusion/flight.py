@@ -173,7 +173,7 @@ def summarize(fused: Fused, sigma: FloatArray, zero_s: float) -> dict[str, Any]:
             {"station": e.station, "from_s": e.first_s + zero_s, "to_s": e.last_s + zero_s, "what": e.kind}
             for e in findings.stretches(fused)
         ],
-        "cannot_be_told": posterior.cannot_be_told(fused.constants, [station.name for station in fused.stations]),
+        "cannot_be_told": posterior.not_observable(fused.constants, [station.name for station in fused.stations]),
         "jerk_psd_m2ps5": {"lowest": jerk.min(), "median": float(np.median(jerk)), "highest": jerk.max()},
         "rounds": fused.rounds,
         "editing_converged": fused.settled,

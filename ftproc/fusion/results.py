@@ -157,21 +157,23 @@ def write_calibration(range_: Range, constants: Constants, folder: Path) -> None
 def calibration(instrument: Instrument, constants: Constants, s: int) -> str:
     """The station file with the biases of a flight."""
     options = dict(instrument.options)
-    estimate, told = constants.estimate[s], constants.observable[s]
+    estimate, observed = constants.estimate[s], constants.observable[s]
     station = instrument.recipe.station
     sense = -1.0 if (station.azimuth_sense or SENSE[station.azimuth_from]) == "clockwise" else 1.0
     zenith = -1.0 if station.elevation_from == "zenith" else 1.0
     before = options.get("bias") or (0.0, 0.0, 0.0)
     signs = (1.0, sense, zenith)  # in the sense of the readings as they are written
-    options["bias"] = tuple(before[c] + signs[c] * float(estimate[c]) if told[c] else before[c] for c in range(3))
-    if told[CLOCK]:
+    options["bias"] = tuple(before[c] + signs[c] * float(estimate[c]) if observed[c] else before[c] for c in range(3))
+    if observed[CLOCK]:
         options["time_offset_s"] = options.get("time_offset_s", 0.0) - float(estimate[CLOCK])
     if instrument.site is not None:
         options.setdefault("site", instrument.site)
     head = "# Biases, reading minus truth, and the time to add, as a fused flight has shown them.\n"
-    if told[3:CLOCK].any():
+    if observed[3:CLOCK].any():
         tilts = " and ".join(
-            f"{1e3 * estimate[3 + j]:.4g} mrad about {axis}" for j, axis in enumerate(("east", "north")) if told[3 + j]
+            f"{1e3 * estimate[3 + j]:.4g} mrad about {axis}"
+            for j, axis in enumerate(("east", "north"))
+            if observed[3 + j]
         )
         head += f"# Tilts, which a station file does not hold: {tilts}.\n"
     assert all(math.isfinite(value) for value in options["bias"])

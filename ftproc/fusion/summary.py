@@ -51,8 +51,8 @@ def bias_rows(s: Mapping[str, Any]) -> list[tuple[str, ...]]:
         for k, (name, each) in enumerate(part["biases"].items()):
             unit = name.rpartition("_")[2]
             figures = (amount(each[key], unit) for key in ("estimate", "sigma", "prior_sigma"))
-            told = "" if each["observable"] else "not observable"
-            found.append((station if k == 0 else "", WORDS[NAMES.index(name)], *figures, told))
+            remark = "" if each["observable"] else "not observable"
+            found.append((station if k == 0 else "", WORDS[NAMES.index(name)], *figures, remark))
     return found
 
 

@@ -6,7 +6,7 @@ networks are the paper's: update minus prediction in, truth minus estimate out, 
 with momentum, on other noise of the same flight; held-out flights decide how much of their answers is applied. Errors
 are the paper's (eqs 20, 21): the mean over the samples of the length of the position error, in m.
 
-The paper does not say what its filters were told. `untuned` is what someone tells them who does not know the angles'
+The paper does not say what its filters assume. `untuned` is what someone specifies who does not know the angles'
 noise, to which the paper adds none: then there is something to learn, and errors are of the paper's size.
 """
 

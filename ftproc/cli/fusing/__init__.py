@@ -160,8 +160,8 @@ def _make(folder: Path) -> None:
 def _show(found: flight.Flight, places: list[str], form: str, elapsed_s: float, on_stdout: bool) -> None:
     metadata = found.trajectory.metadata
     if form == "json":
-        told = {"log": metadata["log"], "method": metadata["method"], **metadata["summary"], "output": places[0]}
-        click.echo(json.dumps(trajectories.plain(told), indent=2), err=on_stdout)
+        shown = {"log": metadata["log"], "method": metadata["method"], **metadata["summary"], "output": places[0]}
+        click.echo(json.dumps(trajectories.plain(shown), indent=2), err=on_stdout)
     elif form == "text":
         text = summary.text(metadata) if found.fused is not None else single.text(metadata)
         lines = [text, line("time", f"{elapsed_s:.2f} s"), *(f"  -> {place}" for place in places if place != "-")]

@@ -116,23 +116,23 @@ def gate(time: Vector, z: Vector, how: Predictor, check_first: bool) -> Vector:
     """
     weight = np.zeros(len(z))
     t, v, count = np.zeros(how.window), np.zeros(how.window), 0
-    pending, begun, rejected = np.zeros(how.order + 1, np.int64), not check_first, 0
+    pending, started, rejected = np.zeros(how.order + 1, np.int64), not check_first, 0
     for k in range(len(z)):
         if not math.isfinite(z[k]):
             continue
         expected = extrapolate(t, v, count, how.order, time[k]) if count else z[k]
         off = difference(z[k], expected, how.angular)
         agreed = abs(off) <= allowed(how, count, time[k] - t[count - 1] if count else 0.0)
-        if begun and not agreed:
+        if started and not agreed:
             rejected += 1
             if rejected < how.longest:
                 continue
-            begun, count, expected, off = not check_first, 0, z[k], 0.0
+            started, count, expected, off = not check_first, 0, z[k], 0.0
         rejected = 0
-        if begun:
+        if started:
             weight[k] = 1.0
         elif agreed and count > how.order:
-            begun = True
+            started = True
             for i in range(len(pending)):
                 weight[pending[i]] = 1.0
             weight[k] = 1.0

@@ -106,21 +106,36 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
     )  # fmt: skip
 
 
-def allow_for_late_stamps(record: Record, decision: Decision, imprecise: float) -> tuple[Record, Decision]:
-    """The record with noise that grows with the rates of the readings, and the decisions made again, if time stamps
-    are late now and then. imprecise: see IMPRECISE."""
+class LateStamps(NamedTuple):
+    """Time stamps that are late now and then. sigma_s: 1-sigma, s. late: (n, 3) what that adds to the readings, m, rad,
+    rad. variance: (3,) of the noise beside it."""
+
+    sigma_s: float
+    late: FloatArray
+    variance: FloatArray
+
+
+def late_stamps(record: Record, decision: Decision) -> LateStamps | None:
+    """Whether time stamps are late now and then, by the residuals that the decisions leave."""
     log, model, starts = record.weighted(decision.weight), decision.model, decision.starts
     part, inside = representative(log, starts, model.noise_variance, float(model.jerk[0, 0]))
     variance, stamp_variance = uneven_noise.stamp_variance(part, smooth_log(part, model, inside), model)
     if stamp_variance == 0.0:
-        return record, decision
-    late = np.sqrt(stamp_variance) * uneven_noise.rates(smooth_log(log, model, starts).state)
-    variance = np.maximum(variance, record.rounding**2)
-    variance = np.where(record.fixed.noise, decision.model.noise_variance, variance)
-    record = record._replace(sigma=np.sqrt(variance), uneven=_with_late(record, late, variance, imprecise))
-    model = median_level(decision.model)._replace(noise_variance=variance)
-    found = decision._replace(model=model, stamp_s=float(np.sqrt(stamp_variance)))
-    return record, decide(record, found, tune_first=True)
+        return None
+    late = math.sqrt(stamp_variance) * uneven_noise.rates(smooth_log(log, model, starts).state)
+    variance = np.where(record.fixed.noise, model.noise_variance, np.maximum(variance, record.rounding**2))
+    return LateStamps(math.sqrt(stamp_variance), late, variance)
+
+
+def allow_for_late_stamps(
+    record: Record, decision: Decision, stamps: LateStamps, imprecise: float
+) -> tuple[Record, Decision]:
+    """The record with noise that grows with the rates of the readings, and the decisions made again. imprecise: see
+    IMPRECISE."""
+    uneven = _with_late(record, stamps.late, stamps.variance, imprecise)
+    record = record._replace(sigma=np.sqrt(stamps.variance), uneven=uneven)
+    model = median_level(decision.model)._replace(noise_variance=stamps.variance)
+    return record, decide(record, decision._replace(model=model, stamp_s=stamps.sigma_s), tune_first=True)
 
 
 def allow_for_very_late_stamps(
@@ -144,11 +159,17 @@ def _with_late(record: Record, late: FloatArray, variance: FloatArray, imprecise
     return Uneven(times + imprecise * late**2 / variance, late)
 
 
+def _residuals(record: Record, decision: Decision) -> SmootherRun:
+    """What the readings used say of each other: the run that the decisions were made by, if they stand still."""
+    if decision.settled and decision.smoothed is not None:
+        return decision.smoothed
+    return smooth_log(record.weighted(decision.weight), decision.model, decision.starts, residuals_only=True)
+
+
 def allow_for_tails(record: Record, decision: Decision) -> tuple[Record, Decision]:
     """The record with a wider gate, and the decisions made again, if most of what is rejected lies just outside it:
     then the noise has tails, and it is they that are rejected."""
-    smoothed = decision.smoothed
-    assert smoothed is not None
+    smoothed = _residuals(record, decision)
     off = np.abs(smoothed.residual) / np.sqrt(smoothed.residual_variance)
     off, gate = np.where(record.possible, off, 0.0), record.gate
     while gate < WIDEST_GATE * record.gate and _has_tails(off, gate, int(record.possible.sum())):
@@ -174,8 +195,7 @@ def _has_tails(off: FloatArray, gate: float, count: int) -> bool:
 
 def allow_for_drift(record: Record, decision: Decision) -> tuple[Record, Decision]:
     """The record with noise whose variance drifts, and the decisions made again, if it does."""
-    assert decision.smoothed is not None
-    drifting = uneven_noise.drift(record.weighted(decision.weight), decision.smoothed)
+    drifting = uneven_noise.drift(record.weighted(decision.weight), _residuals(record, decision))
     if drifting is None:
         return record, decision
     uneven = record.uneven or Uneven.none(len(record.time_s))

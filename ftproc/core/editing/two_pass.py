@@ -25,6 +25,7 @@ from ftproc.core.editing.decisions import (
     allow_for_tails,
     allow_for_very_late_stamps,
     decide,
+    late_stamps,
 )
 from ftproc.core.editing.reassessment import likelier, log_probability, reassess
 from ftproc.core.editing.runs import runs_of
@@ -257,11 +258,11 @@ def _examined(record: Record, decision: Decision, known: Known) -> tuple[Record,
 
 def _with_late_stamps(record: Record, decision: Decision) -> tuple[Record, Decision]:
     """The decisions made again if time stamps are late now and then, and a few of them by far more."""
-    likeliest = (record, decision)
+    stamps, likeliest = late_stamps(record, decision), (record, decision)
+    if stamps is None:
+        return likeliest
     for imprecise in IMPRECISE:
-        found = allow_for_late_stamps(record, decision, imprecise)
-        if found[1].stamp_s == 0:
-            break
+        found = allow_for_late_stamps(record, decision, stamps, imprecise)
         for _ in range(STAMP_ROUNDS):
             before, found = found, _believed(found, allow_for_very_late_stamps(*found, imprecise, record))
             if found is before:

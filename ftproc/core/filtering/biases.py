@@ -169,9 +169,9 @@ def _carry_back(memory: Any, update: Update, k: int, interval: float, place: int
         if not update.used[i] > 0:
             left.residual_variance[i] += lost[i]
         else:
-            told = 1 / (left.residual_variance[i] - update.noise[i] * (1 - 1 / update.used[i]))
-            rest = max(told - lost[i], LEAST_LEFT * told)
-            left.residual[i] *= told / rest
+            known = 1 / (left.residual_variance[i] - update.noise[i] * (1 - 1 / update.used[i]))
+            rest = max(known - lost[i], LEAST_LEFT * known)
+            left.residual[i] *= known / rest
             left.residual_variance[i] = 1 / rest + update.noise[i] * (1 - 1 / update.used[i])
 
 

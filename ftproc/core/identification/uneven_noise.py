@@ -90,11 +90,10 @@ def stamp_variance(log: Observations, smoothed: SmootherRun, model: Model) -> tu
 
 
 class Stamps(NamedTuple):
-    """How far time stamps are off. variance: (n,) of each, s^2. typical: the usual one, s^2. log_probability: of the
-    stamps being off by anything that Student's distribution allows, against that of these variances."""
+    """How far time stamps are off. variance: (n,) of each, s^2. log_probability: of the stamps being off by anything
+    that Student's distribution allows, against that of these variances."""
 
     variance: FloatArray
-    typical: float
     log_probability: float
 
 
@@ -121,7 +120,7 @@ def each_stamp(log: Observations, smoothed: SmootherRun, model: Model, typical: 
     mixed = np.full_like(off2, -np.inf)
     for weight, scale in zip(np.log(share / share.sum()), STAMP_SCALES, strict=True):
         mixed = np.logaddexp(mixed, weight + _normal(off2, scale * typical + error))
-    return Stamps(each, typical, float((mixed - _normal(off2, each + error)).sum()))
+    return Stamps(each, float((mixed - _normal(off2, each + error)).sum()))
 
 
 def _normal(square: FloatArray, variance: FloatArray) -> FloatArray:

@@ -51,7 +51,7 @@ class LiveEditor:
         self.absent: tuple[int, ...] = ()
         self.count = self.published = 0  # rows taken, and rows that have left
         self.next_edit, self.next_refresh, self.next_work = FEWEST, 0, 0
-        self.doubt, self.doubted = Doubt(), False  # and whether it is why a look at all of the window has begun
+        self.doubt, self.doubted = Doubt(), False  # and whether it is why all of the window is looked at
         self.refreshed = 0  # rows that the last refresh has seen
         # The newest part, from this row on, with its labels, if there is a lag.
         self.smoothed: tuple[int, SmootherRun, FloatArray] | None = None

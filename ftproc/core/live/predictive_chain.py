@@ -89,7 +89,7 @@ def _weigh(chains: Chains, i: int, innovation: float, variance: float) -> float:
 
 @part
 def _predictive(f: Filter, sample: Sample, records: ChainRecords, row: Row) -> tuple[float, bool]:
-    """The update of a sample with the readings that are good, as far as can be told by then."""
+    """The update of a sample with the readings that are good, as far as is known by then."""
     chains = records[0]
     ukf.expect(f)
     ukf.innovate(sample, f)

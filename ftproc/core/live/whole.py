@@ -14,7 +14,7 @@ IntArray = NDArray[np.int64]
 
 
 class Whole(Paced[Edited]):
-    """An edit that has begun. samples: where the readings that it knows are in the window."""
+    """An edit under way. samples: where the readings that it knows are in the window."""
 
     def __init__(self, edit: Callable[[], Edited], count: int) -> None:
         super().__init__(edit)

@@ -121,12 +121,11 @@ class Window:
     def go_on(self, samples: float) -> None:
         """Go on with what is under way, for the work of filtering so many samples. Errors as of `edit`."""
         assert self.under_way is not None
-        begun = self.under_way
-        self.under_way = None
-        if not begun.go_on(samples):
-            self.under_way = begun
+        whole, self.under_way = self.under_way, None
+        if whole.go_on(samples):
+            self._adopt(whole.found, whole.samples)
         else:
-            self._adopt(begun.found, begun.samples)
+            self.under_way = whole
 
     def _adopt(self, found: two_pass.Edited, samples: IntArray) -> None:
         """Take over the decisions, noise and process noise of an edit, and where it leads; samples: those it knew."""

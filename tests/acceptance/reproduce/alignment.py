@@ -247,6 +247,6 @@ same gate, and shows what the gate does without particles. {few} members cannot 
 shrinks faster than the error, the normalised innovation grows, the gate shuts, and no reading opens it again. The paper
 reports but a few false alarms, which needs more members than it names, or larger noises than those of its table 1.
 
-Our filters are told the true noises of the sensors; the paper does not say what its filters were told. What is left of
+Our filters know the true noises of the sensors; the paper does not say what noises its filters assume. What is left of
 the level error is what the accelerometers' bias of 1e-4 g cannot be told from, 0.0057 degrees.
 """

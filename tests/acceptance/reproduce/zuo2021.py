@@ -30,7 +30,7 @@ estimate; gradient descent with momentum) on {flights} other flights of the same
 weights, GA-BPNN-UKF's after the genetic search. Held-out flights decide how much of a network's answer is applied,
 output by output.
 
-The paper does not say what noise and process noise its filters were told. Rows `untuned`: 3.16 m, {angle:g} rad,
+The paper does not say what noise and process noise its filters assume. Rows `untuned`: 3.16 m, {angle:g} rad,
 {angle:g} rad and a jerk PSD of {jerk:g} m²/s⁵, as of someone who knows the range's noise only, for the paper adds none
 to the angles. Other rows: found from the log. `forward` is the paper's editing, a recursive gate whose weight m scales
 the gain and which puts the prediction in place of patches; `two-pass` is the program's own. Filters without editing are

@@ -150,7 +150,7 @@ def test_first_state_from_the_edited_log_is_near_the_truth():
     assert error < 3 * np.sqrt(np.trace(start.covariance[:3, :3]))
 
 
-NOT_IN_SHORT_ONES = ("allow_for_late_stamps", "allow_for_tails", "allow_for_drift", "allow_for_colour")
+NOT_IN_SHORT_ONES = ("late_stamps", "allow_for_tails", "allow_for_drift", "allow_for_colour")
 
 
 @pytest.mark.parametrize("short", [False, True])

@@ -1,6 +1,6 @@
 """Samples of stations that are not at the origin, and the columns that biases add to the smoother.
 
-The columns are derivatives: so they are held against what a smoother that is told other biases does, and the
+The columns are derivatives: so they are held against what a smoother with other biases does, and the
 information against the likelihood's own curvature.
 """
 
@@ -37,7 +37,7 @@ def rotation(seed):
 
 
 def observed(biases, n=240, seed=1):
-    """Readings of three stations of which two have no range, by a filter that is told `biases` (3, 6)."""
+    """Readings of three stations of which two have no range, by a filter that knows `biases` (3, 6)."""
     rng = np.random.default_rng(seed)
     time_s, station = np.sort(rng.uniform(0, 30, n)), rng.integers(0, 3, n)
     axes = np.stack([np.eye(3), rotation(1) @ np.eye(3), np.eye(3)])
@@ -45,8 +45,8 @@ def observed(biases, n=240, seed=1):
     z = stations.measured(flown(time_s)[:, :3], PLACES[station], axes[station]) + rng.normal(size=(n, 3)) * NOISE
     z[station > 0, 0] = np.nan
     z[rng.random((n, 3)) < 0.05] = np.nan
-    told = stations.levelled(axes, biases[:, 3:5])
-    sites = Sites(station, PLACES, told, np.full(3, 1e4))
+    tilted = stations.levelled(axes, biases[:, 3:5])
+    sites = Sites(station, PLACES, tilted, np.full(3, 1e4))
     weight = np.isfinite(z) * (rng.random((n, 3)) > 0.1)
     return Observations(time_s - biases[station, 5], z - biases[station, :3], weight.astype(float), None, sites)
 
@@ -134,8 +134,8 @@ def test_columns_are_the_derivative_of_the_smoothed_state():
     log = observed(np.zeros((3, PARAMETERS)))
     plain = smooth_log(log, MODEL, [START])
     found = smooth_biased(log, MODEL, START, directions(log, column))
-    told = smooth_log(observed(column.reshape(3, PARAMETERS)), MODEL, [START])
-    moved = np.abs(told.state - plain.state)[:, :6]
+    known = smooth_log(observed(column.reshape(3, PARAMETERS)), MODEL, [START])
+    moved = np.abs(known.state - plain.state)[:, :6]
     added = np.sqrt(found.run.sigma**2 - plain.sigma**2)[:, :6]
     assert added == pytest.approx(moved, rel=0.02, abs=0.02 * moved.max(0).min())
 

@@ -135,7 +135,7 @@ def test_log_probability_of_stamps(tails, favoured):
     smoothed = SimpleNamespace(residual=residual, residual_variance=variance, state=state)
     log = Observations(np.arange(2000.0), residual, np.isfinite(residual).astype(float))
     stamps = uneven_noise.each_stamp(log, smoothed, Model(np.full(3, 1e-8), np.ones((1, 3))), 0.01**2)
-    scale = np.sqrt(stamps.typical)
+    scale = 1 / np.sqrt(np.mean(1 / stamps.variance))
     students = stats.t.logpdf(late / scale, 2) - np.log(scale)
     each = stats.norm.logpdf(late, scale=np.sqrt(stamps.variance + 1e-10))
     assert stamps.log_probability == pytest.approx((students - each).sum(), rel=0.02)
