@@ -21,8 +21,6 @@ FloatArray = NDArray[np.float64]
 
 MAX_ROUNDS = 8
 TUNING_ROUNDS = 3
-READMITTED = 0.8  # probability of being good from which a rejected reading is used again after these rounds: some would
-# alternate for ever, each time changing what the smoother says of themselves
 STILL = 1e-4  # share of the readings that may still change sides when the decisions stand still
 IMPRECISE = (0.3, 0.03, 0.003)  # shares of the variance of late time stamps by which they may move the components
 # apart: the rates at which these change are not known better, and do not stay the same
@@ -84,9 +82,13 @@ class Decision(NamedTuple):
 
 
 def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
-    """Tune, smooth and classify in turn until the decisions stand still."""
+    """Tune, smooth and classify in turn until the decisions stand still.
+
+    Some readings would alternate for ever, each time changing what the smoother says of themselves: once the model
+    stands still, it is the mean of the rounds that decides on them.
+    """
     weight, model, starts, rates = initial.weight, initial.model, initial.starts, initial.rates.copy()
-    rounds, settled = 0, False
+    rounds, settled, mean = 0, False, np.zeros_like(weight)
     while rounds < MAX_ROUNDS and not settled:
         log = record.weighted(weight)
         if rounds < TUNING_ROUNDS and (tune_first or rounds > 0) and not model.coloured:
@@ -94,8 +96,8 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
         smoothed = smooth_log(log, model, starts, residuals_only=True)
         noise = model.reading_variance
         good = outlier_chain.classify(smoothed.residual, smoothed.residual_variance, noise, rates, record.gate)
-        sure = np.where((weight > 0) | (rounds < TUNING_ROUNDS), 0.5, READMITTED)
-        decided = _keep_most(((good > sure) & record.possible).astype(float), record.screened)
+        mean += (good - mean) / max(rounds - TUNING_ROUNDS + 1, 1)
+        decided = _keep_most(((mean > 0.5) & record.possible).astype(float), record.screened)
         settled = int((decided != weight).sum()) <= STILL * weight.size and (rounds > 0 or not tune_first)
         weight = decided
         rounds += 1
@@ -213,7 +215,9 @@ def allow_for_colour(record: Record, decision: Decision) -> Decision:
         return decision
     found = coloured_noise.fit_coloured(log, starts, median_level(decision.model), record.fixed)
     if found.likelier and found.separable:
-        return decide(record, decision._replace(model=found.model), tune_first=False)
+        coloured = decision._replace(model=found.model)
+        again = decide(record, coloured, tune_first=False)
+        return again if again.settled else coloured
     return decision._replace(alternative=found) if found.possible else decision
 
 

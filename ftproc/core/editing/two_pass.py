@@ -267,7 +267,7 @@ def _with_late_stamps(record: Record, decision: Decision) -> tuple[Record, Decis
             before, found = found, _believed(found, allow_for_very_late_stamps(*found, imprecise, record))
             if found is before:
                 break
-        likeliest = found if imprecise == IMPRECISE[0] else _believed(likeliest, found)
+        likeliest = _believed(likeliest, found)
     return likeliest
 
 

@@ -23,7 +23,7 @@ from ftproc.core.identification import optimizer
 FloatArray = NDArray[np.float64]
 
 TAILS = 4.0  # degrees of freedom of the distribution that outliers hardly move
-LEAST_GAIN, SHARE = 15.0, 0.1  # in log-likelihood, and for each sample, for late stamps to be believed
+LEAST_GAIN, SHARE = 15.0, 0.07  # in log-likelihood, and for each sample, for late stamps to be believed
 STAMP_TAILS, STAMP_ROUNDS = 2.0, 100  # degrees of freedom of how late the stamps are: a few, by very much
 STAMP_SCALES = np.logspace(-2, 8, 101)  # of the usual variance of a stamp, for integrals over it
 STEPS = 30
