@@ -179,11 +179,14 @@ def edit(
     record, decision = _decided(time_s, measurement, known, segment_of, live, short)
     found: list[Step] = []
     for _ in range(0 if live else STEP_ROUNDS):
-        new = steps.find(record, decision) if _clear_of_noise(decision) else []
+        new = [] if decision.model.coloured else steps.find(record, decision)  # noise that wanders looks like many
         if not new:
             break
-        found, log = sorted([*found, *new], key=lambda s: s.sample), record.weighted(decision.weight)
-        record, decision = _decided(time_s, steps.bridged(log, decision.model, new), known, segment_of, live, short)
+        log = record.weighted(decision.weight)
+        other = _decided(time_s, steps.bridged(log, decision.model, new), known, segment_of, live, short)
+        if min(decision.stamp_s, other[1].stamp_s) > 0:  # then it may be late stamps that look like steps
+            break
+        (record, decision), found = other, sorted([*found, *new], key=lambda s: s.sample)
     if segment_of is None and not short:
         decision = allow_for_colour(record, decision)
     log = record.weighted(decision.weight)
@@ -198,12 +201,6 @@ def edit(
         smoothed = smooth_log(log, decision.model, decision.starts)
     faults = Faults(copied, tuple(found), tuple(leaning))
     return Edited(log, decision.model, decision.starts, smoothed, decision, faults)
-
-
-def _clear_of_noise(decision: Decision) -> bool:
-    """Whether steps stand out of the noise: not where it is correlated, or where late time stamps or a variance that
-    drifts look like many."""
-    return not (decision.model.coloured or decision.stamp_s > 0 or decision.drifts)
 
 
 def _decided(

@@ -42,6 +42,18 @@ def test_a_step_is_found_with_its_place_and_size_and_the_longer_side_is_kept(c, 
     assert found.weight.mean() > 0.98
 
 
+@pytest.mark.parametrize(("c", "k"), [(0, 100), (1, 350), (2, 300)])
+def test_a_step_in_noise_that_grows(c, k):
+    a = flight(c)
+    z = a.z + np.random.default_rng(c).standard_normal(a.z.shape) * SIGMA * np.linspace(0, 3, N)[:, None]
+    z[k:, c] += 20 * SIGMA[c]
+    found = edit(a, z)
+    assert found.decision.drifts
+    (step,) = found.faults.steps
+    assert (step.component, step.sample) == (c, pytest.approx(k, abs=1))
+    assert step.size == pytest.approx(20 * SIGMA[c], abs=5 * step.sigma)
+
+
 def _at(c, value):
     return value * np.eye(3)[c]
 
