@@ -18,14 +18,14 @@ from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.live.doubt import Doubt
 from ftproc.core.live.pieces import Sizes
-from ftproc.core.live.rows import Published, Waiting, unknown_rows
+from ftproc.core.live.rows import LATELY, Published, Waiting, unknown_rows, widened
 from ftproc.core.live.window import Window
 
 FloatArray = NDArray[np.float64]
 
 FEWEST = 16  # samples before a track may be confirmed,
 GROWTH = 1.25  # and times as many at the next attempt
-LATELY, AGREE = 8, 0.6  # readings of a component, and share of them that must be good for a track to be confirmed
+NEWEST, AGREE = 8, 0.6  # readings of a component, and share of them that must be good for a track to be confirmed
 VAGUE = 1.0  # times the noise of a single reading, as 1-sigma of the position: then there is no track
 PATIENCE = 64  # samples after which the noise of a component with few readings is assumed
 ASSUMED_READING, ASSUMED_SIGMA = (10_000.0, 0.0, 0.0), (10.0, 1e-3, 1e-3)  # m, rad, rad: of what was hardly seen
@@ -134,7 +134,7 @@ class LiveEditor:
             window.edit()
         except ValueError:  # a component has too few readings that agree
             return
-        if (window.used_lately(LATELY) < AGREE).any() or not self._vagueness(window) < VAGUE:
+        if (window.used_lately(NEWEST) < AGREE).any() or not self._vagueness(window) < VAGUE:
             return
         self.window, self.confirmed_once = window, True
         self.waiting = Waiting(np.empty(0), np.empty((0, 3)))
@@ -281,7 +281,9 @@ class LiveEditor:
             nothing = np.zeros(n, bool)
             return [Published(first, unknown_rows(n), np.where(missing, 3.0, 0.0), nothing, nothing)]
         window = self.window
-        rows, label = window.shown(low, low + n)
+        before = min(LATELY - 1, low)
+        rows, label = window.shown(low - before, low + n)
+        rows, label = widened(rows, before), label[before:]
         if self.smoothed is not None:
             begin, smoothed, labels = self.smoothed
             label = labels[first - begin : stop - begin].copy()

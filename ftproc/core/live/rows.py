@@ -11,6 +11,8 @@ from ftproc.core.filtering.records import ROW, empty_rows
 
 FloatArray = NDArray[np.float64]
 
+LATELY = 8  # samples whose innovations tell whether the sigmas hold
+
 
 class Published(NamedTuple):
     """Rows that leave. first: number of the first, from zero. rows: `Row` records (n,), NaN where there is no estimate.
@@ -40,3 +42,16 @@ def unknown_rows(n: int) -> Any:
     for name in ROW.names or ():
         rows[name] = 0.0 if name in ("weight", "since_start") else np.nan
     return rows
+
+
+def widened(rows: Any, before: int) -> Any:
+    """The rows after so many, their sigmas as much larger as the innovations of the last samples are than expected: a
+    filter that has only seen calm flight learns of a manoeuvre after it has begun."""
+    informed = np.isfinite(rows["nis"])
+    nis, used = np.where(informed, rows["nis"], 0.0), np.where(informed, (rows["weight"] > 0).sum(1), 0)
+    lately = np.ones(LATELY)
+    ratio = np.convolve(nis, lately)[: len(rows)] / np.maximum(np.convolve(used, lately)[: len(rows)], 1.0)
+    found, times = rows[before:], np.sqrt(np.maximum(ratio[before:], 1.0))[:, None]
+    found["sigma"] *= times
+    found["los_sigma"] *= times
+    return found
