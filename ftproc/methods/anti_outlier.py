@@ -62,8 +62,9 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     edited = two_pass.edit(readings.time_s, readings.measurement, known, usual)
     starts = two_pass.smoothed_starts(edited.smoothed)
     run, smoothed = forward.filter_log(edited.log, edited.model, starts), edited.smoothed
-    if edited.decision.alternative is not None:
-        run, smoothed = _worse_of(edited, run, edited.decision.alternative.model)
+    other = edited.decision.slowest if edited.decision.alternative is None else edited.decision.alternative.model
+    if other is not None:
+        run, smoothed = _worse_of(edited, run, other)
     shifts = edited.faults.shifts
     if shifts:
         run, smoothed = _widened(run, shifts), _widened(smoothed, shifts)

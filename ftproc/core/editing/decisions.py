@@ -78,6 +78,7 @@ class Decision(NamedTuple):
     stamps: float = 0.0
     drifts: bool = False
     alternative: coloured_noise.Coloured | None = None
+    slowest: Model | None = None
     smoothed: SmootherRun | None = None
 
 
@@ -215,7 +216,7 @@ def allow_for_colour(record: Record, decision: Decision) -> Decision:
         return decision
     found = coloured_noise.fit_coloured(log, starts, median_level(decision.model), record.fixed)
     if found.likelier and found.separable:
-        coloured = decision._replace(model=found.model)
+        coloured = decision._replace(model=found.model, slowest=found.slowest)
         again = decide(record, coloured, tune_first=False)
         return again if again.settled else coloured
     return decision._replace(alternative=found) if found.possible else decision

@@ -39,7 +39,7 @@ FEWEST, EVEN = 3, 5.0  # readings in a rejected run, and second differences in s
 AROUND, MEMORIES = (100, 400), 6.0  # samples on each side that decide between step and manoeuvre, and memories
 MARGIN = 8.0  # by which the log-probability of a stretch with a step must be better, and ln of the places for it
 MOST = 8  # steps that are weighed at a time
-SMALLEST = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
+SMALLEST = 7.0  # sigmas of the noise: a smaller step of one component may be an end of a weak patch
 SMALL = 0.7  # times that, before its size is found with the outliers beside it
 PATCHES = 12, 24, 48  # readings in a patch, of which a step may be an end
 STAYS = 0.75  # share of the readings on either side of a step that must be good
@@ -240,7 +240,7 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
             bridge = bridge._replace(record=bridge.record._replace(measurement=log.measurement))
         if not with_it.likelihood > without.likelihood + MARGIN or not _stays(stretch.record, weight, step):
             return None
-        if _size(stretch, bridge, step) < SMALLEST:
+        if step.component != CLOCK and _size(stretch, bridge, step) < SMALLEST:
             return None
         least = max(_likelihood(stretch, weight) for weight in (stretch.decided, stretch.taken_in))
         most = _likelihood(bridge, weight) - stretch.margin

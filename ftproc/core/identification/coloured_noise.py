@@ -45,14 +45,17 @@ STEP = 0.02  # of ln(tau), for differences
 LARGEST = 1e4  # times the variance that white noise would have
 NEGLIGIBLE = 0.02  # share of a component's variance, and correlation of neighbours
 LEAST_GAIN = 8.0  # in log-likelihood, for each component whose noise is called correlated
+REFUTED = 0.5  # in log-likelihood, by which other parameters may be less likely: one standard deviation
 INDEPENDENT = 20.0  # correlation times that a log must last for noise and motion to be separated
 
 
 class Coloured(NamedTuple):
-    """A model with correlated noise. likelier: it is much likelier than that of white noise; possible: or about as
-    likely. separable: the log lasts long enough to tell such noise from motion."""
+    """A model with correlated noise, and one whose noise wanders as slowly and as far as the log allows. likelier: the
+    first is much likelier than that of white noise; possible: or likelier. separable: the log lasts long enough to tell
+    such noise from motion."""
 
     model: Model
+    slowest: Model
     likelier: bool
     possible: bool
     separable: bool
@@ -91,19 +94,21 @@ def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fi
     search = _Search(part, starts, white, fixed, scales)
     tries = [search.run(search.first(fade, calm), FIRST_STEPS) for fade in FIRST_FADES for calm in FIRST_CALMS]
     theta = search.run(min(tries, key=lambda theta: search.cost(theta)[0]), STEPS)
-    model = search.model(theta)
+    model, slowest = search.model(theta), search.model(search.slowest(theta))
     neighbours = np.exp(-scales.interval_s / model.fade_s) * model.wander_variance / model.reading_variance
     correlated = neighbours > NEGLIGIBLE
-    model = model._replace(wander_variance=np.where(correlated, model.wander_variance, 0.0))
+    model, slowest = (
+        each._replace(wander_variance=np.where(correlated, each.wander_variance, 0.0)) for each in (model, slowest)
+    )
     level = fit_profile(part, starts, fit_level(part, starts, white, fixed), PROFILE_STEPS)
     model = fit_profile(part, starts, model, PROFILE_STEPS)
     gain = likelihood_of(part, model, starts) - likelihood_of(part, level, starts)
-    slowest = float(model.fade_s[correlated].max(initial=0.0))
     return Coloured(
         median_level(model),
+        slowest,
         likelier=bool(correlated.any()) and gain > LEAST_GAIN * int(correlated.sum()),
-        possible=bool(correlated.any()) and gain > -LEAST_GAIN,
-        separable=slowest < scales.span_s / INDEPENDENT,
+        possible=bool(correlated.any()) and gain > LEAST_GAIN,
+        separable=float(model.fade_s[correlated].max(initial=0.0)) < scales.span_s / INDEPENDENT,
     )
 
 
@@ -150,6 +155,19 @@ class _Search:
             fades[c] = (likelihood_of(self.log, self.model(moved), self.starts) - found.log_likelihood) / STEP
         slope = -np.r_[found.noise, found.wander, fades, by_axis.sum(), by_axis[5] - pull]
         return -found.log_likelihood + 0.5 * pull * theta[10], slope
+
+    def slowest(self, theta: FloatArray) -> FloatArray:
+        """The parameters with the slowest and largest offsets that the log does not refute. Over a few samples an
+        offset of twice the variance that fades half as fast looks the same, and what is slower than that, motion."""
+        allowed = self.cost(theta)[0] + REFUTED
+        for c in range(3):
+            while True:
+                slower = theta.copy()
+                slower[[3 + c, 6 + c]] += math.log(2)
+                if (slower > self.upper).any() or self.cost(slower)[0] > allowed:
+                    break
+                theta = slower
+        return theta
 
     def run(self, theta: FloatArray, steps: int) -> FloatArray:
         """The likeliest parameters, after so many steps at most."""
