@@ -24,6 +24,7 @@ class FaultStatistics:
     def __init__(self) -> None:
         self.copies = np.zeros((len(COMPONENTS), 3), int)
         self.steps: list[dict[str, Any]] = []
+        self.doubtful: list[dict[str, Any]] = []
         self.one_sided: dict[str, dict[str, Any]] = {}
 
     def add(self, time_s: FloatArray, faults: Faults) -> None:
@@ -32,7 +33,8 @@ class FaultStatistics:
         for step in faults.steps:
             sizes = {"size": step.size, "sigma": step.sigma}
             found = {"component": NAMES[step.component], "time_s": float(time_s[step.sample])}
-            self.steps.append(found | {f"{what}_{UNITS[step.component]}": size for what, size in sizes.items()})
+            found |= {f"{what}_{UNITS[step.component]}": size for what, size in sizes.items()}
+            (self.steps if step.sure else self.doubtful).append(found)
         for one in faults.one_sided:
             name, unit = NAMES[one.component], UNITS[one.component]
             found = {"component": name, "share": one.share, f"error_{unit}": one.error, f"shift_{unit}": one.shift}
@@ -41,7 +43,8 @@ class FaultStatistics:
 
     def figures(self) -> dict[str, Any]:
         """JSON-serialisable; units are in the names."""
-        return {"steps": self.steps, "one_sided_errors": list(self.one_sided.values())}
+        one_sided = list(self.one_sided.values())
+        return {"steps": self.steps, "doubtful_steps": self.doubtful, "one_sided_errors": one_sided}
 
     def of_component(self, c: int) -> dict[str, int]:
         """How many readings of a component were not measured."""
@@ -71,6 +74,9 @@ def suspicious(s: Mapping[str, Any]) -> Iterator[str]:
         named = "; ".join(step_in_words(step) for step in steps[:MOST_STEPS])
         rest = f"; and {len(steps) - MOST_STEPS} more" if len(steps) > MOST_STEPS else ""
         yield f"{named}{rest}: the estimate follows the longer side, which may be the wrong one"
+    if s["doubtful_steps"]:
+        named = "; ".join(step_in_words(step) for step in s["doubtful_steps"][:MOST_STEPS])
+        yield f"either {named}, or readings beside it are a patch of outliers: the estimate takes them for good"
     if s["clock_set_back"]:
         back = s["clock_set_back"]
         yield f"the time goes back by {-back['by_s']:.3g} s at row {back['row']}, and rows before and after it overlap"

@@ -34,6 +34,14 @@ def test_steps_are_named_with_component_size_unit_and_time():
     assert words() == []
 
 
+def test_a_step_that_may_be_a_patch_is_named_as_both():
+    (text,) = words((Step(0, 70, -58.1, 9.0, sure=False),))
+    assert text == (
+        "either range steps by -58.1 m at 7 s, or readings beside it are a patch of outliers: "
+        "the estimate takes them for good"
+    )
+
+
 def test_errors_on_one_side_in_words():
     known, unknown = words(one_sided=(OneSided(0, 0.52, 13.0, 5.1, 0.2), OneSided(2, 0.0, 0.0, 0.0, 0.0)))
     assert known == (

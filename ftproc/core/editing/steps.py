@@ -39,7 +39,7 @@ FEWEST, EVEN = 3, 5.0  # readings in a rejected run, and second differences in s
 AROUND, MEMORIES = (100, 400), 6.0  # samples on each side that decide between step and manoeuvre, and memories
 MARGIN = 8.0  # by which the log-probability of a stretch with a step must be better, and ln of the places for it
 MOST = 8  # steps that are weighed at a time
-SMALLEST = 7.0  # sigmas of the noise: a smaller step of one component may be an end of a weak patch
+SMALLEST = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
 SMALL = 0.7  # times that, before its size is found with the outliers beside it
 PATCHES = 12, 24, 48  # readings in a patch, of which a step may be an end
 STAYS = 0.75  # share of the readings on either side of a step that must be good
@@ -50,12 +50,14 @@ END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which
 
 class Step(NamedTuple):
     """From a sample on the readings of a component (range, azimuth, elevation) are larger by `size` m, rad, rad, or,
-    where it is CLOCK, their times by so many seconds. sigma: 1-sigma of the size. The longer side is kept."""
+    where it is CLOCK, their times by so many seconds. sigma: 1-sigma of the size. The longer side is kept. sure: that
+    it is no patch."""
 
     component: int
     sample: int
     size: float
     sigma: float
+    sure: bool = True
 
     def moved(self, samples: int) -> tuple[slice, float]:
         """Which of so many samples are moved to the other side, and the sign of what is taken out of them."""
@@ -79,7 +81,7 @@ class Stretch(NamedTuple):
 
 
 def find(record: Record, decision: Decision) -> list[Step]:
-    """The steps in a log whose outliers were decided as if it had none."""
+    """The steps in a log whose outliers were decided as if it had none; some are not sure."""
     calm = median_level(decision.model)
     weight = _taken_in(record, decision, calm)
     log = record.weighted(weight)
@@ -94,7 +96,7 @@ def find(record: Record, decision: Decision) -> list[Step]:
     for step in candidates:
         near = slice(max(step.sample - around, 0), step.sample + around)
         known, one = ([s._replace(sample=s.sample - near.start) for s in some] for some in (found, [step]))
-        known = [s for s in known if 0 < s.sample < near.stop - near.start]
+        known = [s for s in known if s.sure and 0 < s.sample < near.stop - near.start]
         model, part = _from(decision.model, record.time_s, near), record.part(near)
         own = slice(None) if step.component == CLOCK else step.component
         taken = decision.weight[near].copy()
@@ -240,13 +242,12 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
             bridge = bridge._replace(record=bridge.record._replace(measurement=log.measurement))
         if not with_it.likelihood > without.likelihood + MARGIN or not _stays(stretch.record, weight, step):
             return None
-        if step.component != CLOCK and _size(stretch, bridge, step) < SMALLEST:
+        if _size(stretch, bridge, step) < SMALLEST:
             return None
         least = max(_likelihood(stretch, weight) for weight in (stretch.decided, stretch.taken_in))
         most = _likelihood(bridge, weight) - stretch.margin
-        if most <= least or any(_likelihood(stretch, patch) >= most for patch in _patches(stretch, step)):
-            return None
-        return step
+        sure = all(_likelihood(stretch, patch) < most for patch in _patches(stretch, step))
+        return step._replace(sure=sure) if most > least else None
     except ValueError:  # a component has too few readings there
         return None
 

@@ -69,7 +69,8 @@ class Known(NamedTuple):
 
 class Faults(NamedTuple):
     """What is wrong with the readings beyond outliers, and was taken out of them. copied: (n, 3) kinds of those that
-    were not measured, see `copies`. steps: that stay. one_sided: components of which many errors have one sign."""
+    were not measured, see `copies`. steps: that stay; those that are not sure were left in. one_sided: components of
+    which many errors have one sign."""
 
     copied: KindArray
     steps: tuple[Step, ...] = ()
@@ -78,7 +79,8 @@ class Faults(NamedTuple):
     @property
     def shifts(self) -> tuple[Step, ...]:
         """What was taken out of the readings, in components or the clock, and is uncertain."""
-        return (*self.steps, *(Step(each.component, 0, each.shift, each.sigma) for each in self.one_sided))
+        steps = (step for step in self.steps if step.sure)
+        return (*steps, *(Step(each.component, 0, each.shift, each.sigma) for each in self.one_sided))
 
     def rows(self, low: int, high: int) -> Faults:
         """Of the samples [low, high) alone."""
@@ -177,9 +179,10 @@ def edit(
     """
     measurement, copied = without_copies(time_s, measurement)
     record, decision = _decided(time_s, measurement, known, segment_of, live, short)
-    found: list[Step] = []
+    found, doubtful = list[Step](), list[Step]()
     for _ in range(0 if live else STEP_ROUNDS):
         new = [] if decision.model.coloured else steps.find(record, decision)  # noise that wanders looks like many
+        new, doubtful = ([step for step in new if step.sure == sure] for sure in (True, False))
         if not new:
             break
         log = record.weighted(decision.weight)
@@ -199,7 +202,7 @@ def edit(
     if leaning:
         log = one_sided.without(log, leaning)
         smoothed = smooth_log(log, decision.model, decision.starts)
-    faults = Faults(copied, tuple(found), tuple(leaning))
+    faults = Faults(copied, (*found, *doubtful), tuple(leaning))
     return Edited(log, decision.model, decision.starts, smoothed, decision, faults)
 
 

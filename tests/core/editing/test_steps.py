@@ -54,6 +54,18 @@ def test_a_step_in_noise_that_grows(c, k):
     assert step.size == pytest.approx(20 * SIGMA[c], abs=5 * step.sigma)
 
 
+@pytest.mark.parametrize("interval_s", [1.0, 3.0])
+def test_a_step_that_the_motion_can_hide_may_be_a_patch_and_is_left_in(interval_s):
+    a = matched(1, 400, dt=interval_s, q=5.0, distance=9000.0)
+    z = a.z.copy()
+    z[180:, 1] += 10 * SIGMA[1]
+    found = edit(a, z)
+    (step,) = found.faults.steps
+    assert (step.component, step.sample, step.sure) == (1, pytest.approx(180, abs=1), False)
+    assert found.faults.shifts == ()
+    assert (found.log.measurement == z).all()
+
+
 def _at(c, value):
     return value * np.eye(3)[c]
 
