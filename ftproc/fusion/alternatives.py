@@ -111,7 +111,8 @@ def likeliest(near: Neighbourhood, search: Search) -> FloatArray | None:
     work from the search."""
     now = near.log.weight
     ways = [Steps(near, model, search) for model in near.levels]
-    if not near.together and not _tense(near, ways[0].model):
+    few = len(_live(near)) <= MOST_LIVE
+    if not (near.together and few) and not _tense(near, ways[0].model):
         return None
     hypotheses = itertools.chain(_hypotheses(near), (_continued(near, way) for way in ways))
     tried = [way for way in (ways[0].of(each) for each in hypotheses) if math.isfinite(way[0].likelihood)]
@@ -143,14 +144,10 @@ def _tense(near: Neighbourhood, calm: Model) -> bool:
 
 def _hypotheses(near: Neighbourhood) -> Iterator[FloatArray]:
     """First decisions (n, 3) to begin with."""
-    weight, inside, station = near.log.weight, near.inside, near.station
+    weight, inside = near.log.weight, near.inside
     base = np.where(inside[:, None], near.trusted, weight) * near.possible
     yield base
-    live = [
-        (s, c)
-        for s, c in itertools.product(range(len(near.sigma)), range(3))
-        if (near.possible[inside & (station == s), c] > 0).any()
-    ]
+    live = _live(near)
     wrong: list[tuple[Channel, ...]] = [(each,) for each in live]
     for s in range(len(near.sigma)):
         own = tuple(each for each in live if each[0] == s)
@@ -164,6 +161,15 @@ def _hypotheses(near: Neighbourhood) -> Iterator[FloatArray]:
         yield _without(near, base, channels)
     for channels in itertools.combinations(live, 3) if some_agree and len(live) > 3 else ():
         yield _without(near, base, tuple(each for each in live if each not in channels))
+
+
+def _live(near: Neighbourhood) -> list[Channel]:
+    """The channels that have readings in the place."""
+    return [
+        (s, c)
+        for s, c in itertools.product(range(len(near.sigma)), range(3))
+        if (near.possible[near.inside & (near.station == s), c] > 0).any()
+    ]
 
 
 def _continued(near: Neighbourhood, way: Steps) -> FloatArray:

@@ -19,6 +19,7 @@ from ftproc.records import COMPONENTS, FloatArray
 
 WRONG_S, WRONG_ROWS = 3.0, 6  # seconds and rows that all of a station's readings are rejected: another target
 BRIDGED = 4  # rows within that are good by chance
+DETERMINED, UNCHECKED_S = 3, 10.0  # components that determine a place with nothing to spare, for longer than a patch
 SILENT_S, SILENT_INTERVALS = 10.0, 25.0  # without a reading
 LATE = 0.03  # of the flight
 SCATTERED = 5.0  # times its own noise
@@ -64,10 +65,13 @@ def stretches(fused: Fused) -> list[Stretch]:
 
 def _elsewhere(fused: Fused, s: int, time_s: FloatArray) -> Iterator[tuple[float, float]]:
     """From and to where all readings of a station are rejected."""
-    possible, used = fused.possible[s] > 0, fused.weight[s] > 0
-    rows = np.flatnonzero(possible.any(1))
-    bad = _closed(~np.asarray(used[rows].any(1)), BRIDGED)
-    for first, last in runs_of(bad):
+    yield from _long_runs(time_s, fused.possible[s].max(1), fused.weight[s].max(1))
+
+
+def _long_runs(time_s: FloatArray, possible: FloatArray, weight: FloatArray) -> Iterator[tuple[float, float]]:
+    """From and to where none of the possible readings are used; (n,) each."""
+    rows = np.flatnonzero(possible > 0)
+    for first, last in runs_of(_closed(weight[rows] <= 0, BRIDGED)):
         if last - first >= WRONG_ROWS and time_s[rows[last - 1]] - time_s[rows[first]] >= WRONG_S:
             yield float(time_s[rows[first]]), float(time_s[rows[last - 1]])
 
@@ -112,6 +116,7 @@ def remarks(fused: Fused, sigma_m: FloatArray, zero_s: float) -> list[Remark]:
         *_correlated(fused),
         *_rejections(fused),
         *_stretches(fused, zero_s),
+        *_unchecked(fused, zero_s),
         *_poorly(fused, sigma_m, zero_s),
         *_unsettled(fused),
     ]
@@ -215,6 +220,30 @@ def _stretches(fused: Fused, zero_s: float) -> Iterator[Remark]:
                 f"{each.station} and {other} contradict each other {when}, and nobody else saw the target: it is open "
             )
             yield Remark(SUSPECT, text + f"which is right; {each.station} is left out")
+
+
+def _unchecked(fused: Fused, zero_s: float) -> Iterator[Remark]:
+    """Where a component of a station that goes on is rejected, and what is left no more than determines the target."""
+    times = [each.time_s - fused.constants.estimate[s, CLOCK] for s, each in enumerate(fused.stations)]
+    for s, station in enumerate(fused.stations):
+        for c in station.components:
+            for ends in _long_runs(times[s], fused.possible[s][:, c], fused.weight[s][:, c]):
+                left = [
+                    k
+                    for k, other in enumerate(fused.stations)
+                    for each in other.components
+                    if _mostly_used(fused, times[k], ends, k, each)
+                ]
+                if s in left and len(left) <= DETERMINED and ends[1] - ends[0] > UNCHECKED_S:
+                    when = f"from {ends[0] + zero_s:.6g} to {ends[1] + zero_s:.6g} s"
+                    text = f"the {COMPONENTS[c]} of {station.name} is rejected {when}, and no reading that is left "
+                    yield Remark(SUSPECT, text + "checks its others: it may follow another target")
+
+
+def _mostly_used(fused: Fused, time_s: FloatArray, ends: tuple[float, float], s: int, c: int) -> bool:
+    """Whether most of a component's possible readings are used from one time to another."""
+    here = (time_s >= ends[0]) & (time_s <= ends[1]) & (fused.possible[s][:, c] > 0)
+    return bool(here.any() and (fused.weight[s][here, c] > 0).mean() > 0.5)
 
 
 def _carries(fused: Fused, s: int, during: Stretch) -> bool:

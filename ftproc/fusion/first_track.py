@@ -18,6 +18,7 @@ LONGEST_GAP, LONGEST_GAP_S = 6.0, 2.0  # intervals and seconds over which readin
 ALLOWANCE = 1.5  # on noise and prior of a reading
 ROBUST = 5.0  # sigmas from which a reading loses its pull
 STEPS, POLISH = 12, 6
+MOST_CANDIDATES = 12  # that are fitted to all readings: those that are often among the best of the moment
 WIDEST = 0.1  # of the distance: 1-sigma of a point that counts
 SMOOTHED = 4  # points on each side through which the track is drawn
 PATCH_S = 5.0  # over which a contradiction counts once: patches last
@@ -61,7 +62,13 @@ def find(stations: list[Seen], weight: list[FloatArray], sigma: FloatArray) -> T
     if not seen.any():
         return None
     time_s, readings = time_s[seen], readings[seen]
-    found = [_fitted(stations, readings, allowed, each, POLISH) for each in _candidates(stations, readings)]
+    candidates = _candidates(stations, readings)
+    if len(candidates) > MOST_CANDIDATES:
+        costs = np.stack([_fitted(stations, readings, allowed, each, 0)[1] for each in candidates])
+        leading = np.argsort(costs, 0)[:MOST_CANDIDATES]
+        times = np.bincount(leading[np.isfinite(np.take_along_axis(costs, leading, 0))], minlength=len(candidates))
+        candidates = [candidates[k] for k in np.argsort(-times, kind="stable")[:MOST_CANDIDATES]]
+    found = [_fitted(stations, readings, allowed, each, POLISH) for each in candidates]
     if not found:
         return None
     points, costs = np.stack([each[0] for each in found]), np.stack([each[1] for each in found])
