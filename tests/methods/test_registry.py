@@ -108,7 +108,7 @@ def test_a_model_for_the_ekf_corrects_the_ekf_and_only_that():
 
 def test_only_options_that_change_something_are_accepted():
     """Each option with each method and way of editing: refused where the trajectory stays the same, bit for bit."""
-    log = simulation.simulate("zuo2021-outliers", seed=1).log
+    log = simulation.simulate("zuo2021-outliers", seed=1, duration_s=30.0).log
     changes = {
         "--editing": ({"editing": "forward"}, {"editing": "none"}, {"editing": "two-pass"}),
         "--lag": ({"lag_s": 1.0},),
