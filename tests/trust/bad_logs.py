@@ -252,9 +252,9 @@ def shapes() -> Iterator[Case]:
         yield Case("log", f"header {header[:24]!r}", written(content), (words,))
     yield Case("log", "huge header", written("t" * 1_000_000 + ",R\n0,1\n"), ("no line of column names",))
     keep = {"keep_columns": True}
-    wide = HEADER + "," + ",".join(f"c{i}" for i in range(10_000))
-    cells_ = [[*row, *["1"] * 10_000] for row in good]
-    yield Case("log", "10,000 columns kept", written(text(cells_, wide)), None, same, options=keep)
+    wide = HEADER + "," + ",".join(f"c{i}" for i in range(3000))
+    cells_ = [[*row, *["1"] * 3000] for row in good]
+    yield Case("log", "3000 columns kept", written(text(cells_, wide)), None, same, options=keep)
     wide = HEADER + "," + ",".join(f"c{i}" for i in range(1000))
     cells_ = [[*row, *["1"] * 1000] for row in good]
     yield Case("log", "1000 columns", written(text(cells_, wide)), None, same)
