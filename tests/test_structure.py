@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -41,9 +42,10 @@ FLOORS = (
 )
 
 
-def modules() -> list[str]:
+@cache
+def modules() -> tuple[str, ...]:
     paths = (path.relative_to(PACKAGE).with_suffix("") for path in PACKAGE.rglob("*.py"))
-    return [".".join(p.parts[:-1] if p.name == "__init__" and len(p.parts) > 1 else p.parts) for p in paths]
+    return tuple(".".join(p.parts[:-1] if p.name == "__init__" and len(p.parts) > 1 else p.parts) for p in paths)
 
 
 def source(module: str) -> Path:

@@ -113,8 +113,10 @@ def test_a_process_started_for_work_is_deaf_to_ctrl_c_from_its_first_moment():
     assert (inside, outside) == ("True\n", "False\n")
 
 
-@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGHUP, signal.SIGTERM])
-@pytest.mark.parametrize("group", [False, True])
+@pytest.mark.parametrize(
+    ("end", "group"),
+    [(signal.SIGKILL, False), (signal.SIGKILL, True), (signal.SIGHUP, False), (signal.SIGTERM, True)],
+)
 def test_workers_end_with_the_process_that_started_them(tmp_path, end, group):
     """Also in the middle of a log; only what kills at once leaves a partial file."""
     flights.write_log(simulate("manoeuvre", duration_s=1200.0, seed=1).log, tmp_path / "0.parquet")

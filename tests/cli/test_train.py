@@ -40,7 +40,7 @@ def test_from_a_scenario_the_same_seed_gives_the_same_bytes(run, here):
 
 def test_two_workers_write_the_same_bytes_as_one(run, here):
     for jobs in (1, 2):
-        args = ("--scenario", "manoeuvre-clean", "--flights", 6, *SMALL, "--jobs", jobs, "-o", f"{jobs}.safetensors")
+        args = ("--scenario", "radar", "--flights", 4, *SMALL, "--jobs", jobs, "-o", f"{jobs}.safetensors")
         assert run("train", *args).code == 0
     assert (here / "1.safetensors").read_bytes() == (here / "2.safetensors").read_bytes()
 

@@ -7,6 +7,7 @@ import errno
 import json
 import os
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,11 @@ from ftproc.errors import failure
 from ftproc.files.reading import logs, trajectories
 from ftproc.files.writing import flights
 from ftproc.simulation import simulate
-from tests.faults.batches import PROGRAM, run
+from tests.cli.conftest import Result, run
+from tests.faults import batches
+from tests.faults.batches import PROGRAM
+
+__all__ = ["run"]
 
 CLOSED = "standard output is closed, so the result is lost; leave it open, or send it to a file."
 
@@ -30,7 +35,7 @@ def flight(tmp_path: Path) -> Path:
 
 def shell(directory: Path, line: str) -> subprocess.CompletedProcess[str]:
     """A line of bash in which `ftproc` is the program."""
-    done = run(directory, ["bash", "-c", f'ftproc() {{ {PROGRAM} "$@"; }}; {line}'])
+    done = batches.run(directory, ["bash", "-c", f'ftproc() {{ {PROGRAM} "$@"; }}; {line}'])
     assert "Traceback" not in done.stderr
     assert "internal error" not in done.stderr
     return done
@@ -50,12 +55,21 @@ def shell(directory: Path, line: str) -> subprocess.CompletedProcess[str]:
         "ftproc train --show $MODEL",
     ],
 )
-@pytest.mark.parametrize(("place", "sentence"), [(">&-", CLOSED), ("> /dev/full", "standard output: no space left")])
-def test_a_result_that_cannot_be_printed(flight: Path, monkeypatch, command: str, place: str, sentence: str) -> None:
+def test_a_result_that_cannot_be_printed(flight: Path, monkeypatch: pytest.MonkeyPatch, command: str) -> None:
     from ftproc.correction import model_file
 
     monkeypatch.setenv("MODEL", str(model_file._PACKAGED_FILE))
-    done = shell(flight.parent, f"{command} {place}")
+    refused(shell(flight.parent, f"{command} > /dev/full"), "standard output: no space left")
+
+
+@pytest.mark.parametrize("command", ["ftproc filter flight.csv -o -", "ftproc filter flight.csv", "ftproc -h"])
+def test_a_result_for_a_closed_output(flight: Path, command: str) -> None:
+    """The stream is looked at before any command begins, so a few stand for all."""
+    refused(shell(flight.parent, f"{command} >&-"), CLOSED)
+
+
+def refused(done: subprocess.CompletedProcess[str], sentence: str) -> None:
+    """Exit code 1, and one line that begins so."""
     assert done.returncode == 1
     assert done.stderr.startswith(f"ftproc: {sentence}")
     assert len(done.stderr.splitlines()) == 1
@@ -70,8 +84,7 @@ def test_a_summary_that_cannot_be_printed_costs_no_trajectory(flight: Path, plac
     assert len(list(flight.parent.glob("out/*.csv"))) == 3
 
 
-@pytest.mark.parametrize("closed", ["<&-", "2>&-", "<&- 2>&-"])
-@pytest.mark.parametrize("more", ["", "--jobs 2"])
+@pytest.mark.parametrize(("closed", "more"), [("<&-", "--jobs 2"), ("2>&-", ""), ("<&- 2>&-", "--jobs 2")])
 def test_streams_that_are_not_needed(flight: Path, closed: str, more: str) -> None:
     (flight.parent / "other.csv").write_bytes(flight.read_bytes())
     done = shell(flight.parent, f"ftproc filter flight.csv other.csv -o out/ {more} {closed}")
@@ -89,7 +102,7 @@ def test_no_file_gets_the_descriptor_of_a_closed_stream(flight: Path) -> None:
         "os.write(file, b'data')\nprocess.empty_stdout()\n"
     )
     python = Path(PROGRAM).with_name("python")
-    done = run(flight.parent, ["bash", "-c", f'{python} -c "{code}" <&- >&- 2>&-'])
+    done = batches.run(flight.parent, ["bash", "-c", f'{python} -c "{code}" <&- >&- 2>&-'])
     assert done.returncode == 0
     assert (flight.parent / "mine").read_bytes() == b"data"
 
@@ -138,8 +151,9 @@ def test_memory_at_the_bottom_of_another_error() -> None:
 ODD = os.fsdecode(b"fl\xffght\xe9")
 
 
-def test_names_that_are_not_utf8(flight: Path) -> None:
+def test_names_that_are_not_utf8(flight: Path, run: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
     """Everywhere: log, output, report, index, map, JSON, messages, scores."""
+    monkeypatch.chdir(flight.parent)
     directory = flight.parent
     flight.rename(directory / f"{ODD}.csv")
     name = "$'fl\\xffght\\xe9'"
@@ -152,17 +166,18 @@ def test_names_that_are_not_utf8(flight: Path) -> None:
     assert found.metadata["log"] == "fl\\udcffght\\udce9.csv"
     assert "fl\\udcffght\\udce9.csv" in (directory / f"{ODD}.html").read_text("utf-8")
     for kind in (".kml", ".geojson", ".czml", ".csv"):
-        assert shell(directory, f"{line} -o m{kind}").returncode == 0
+        assert run("filter", f"{ODD}.csv", "--site", "48,11,600", "-o", f"m{kind}").code == 0
         assert (directory / f"m{kind}").read_text("utf-8")
         assert json.loads((directory / "m.json").read_text("utf-8"))["log"]
     done = shell(directory, f"ftproc filter {name}.csv none.csv -o out/ --report pages/ --jobs 2")
     assert done.returncode == 1
     assert "fl\\udcffght\\udce9.trajectory.csv" in done.stdout
     assert 'href="./fl%FFght%E9.report.html"' in (directory / "pages" / "index.html").read_text("utf-8")
-    for form in ("table", "json", "csv"):
-        done = shell(directory, f"ftproc score {name}.parquet --format {form}")
-        assert done.returncode == 0, done.stderr
-        assert "fl\\" in done.stdout
+    assert "fl\\" in shell(directory, f"ftproc score {name}.parquet").stdout
+    for form in ("json", "csv"):
+        scored = run("score", f"{ODD}.parquet", "--format", form)
+        assert (scored.code, scored.err) == (0, "")
+        assert "fl\\" in scored.out
 
 
 @pytest.mark.parametrize("option", ["", "--config", "--model", "-o", "--report", "--truth"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from ftproc.core.model.frames import from_cartesian, wrap
@@ -58,3 +60,9 @@ def held(trajectory, position):
 
 def run(log, **settings):
     return filter_log(log, FilterSettings(**settings))
+
+
+@cache
+def flown(path, seed=0, **settings):
+    """The run of a flight along a path of PATHS; run once, however many ask for it."""
+    return run(measured(PATHS[path](TIME), seed=seed), **settings)

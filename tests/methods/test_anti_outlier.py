@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -39,18 +41,23 @@ def clean():
     return simulate("cruise", seed=1, duration_s=90.0, outliers="none")
 
 
+@pytest.fixture(scope="module")
+def edited(dirty):
+    """edited("forward", smooth=True) -> the estimate of the dirty flight, made once."""
+    return cache(lambda editing, **others: anti_outlier.estimate(readings(dirty), by(editing, **others)))
+
+
 @pytest.mark.parametrize("editing", ["two-pass", "forward"])
-def test_editing_is_nearly_as_good_as_a_clean_log(dirty, clean, editing):
-    settings = by(editing)
-    edited = anti_outlier.estimate(readings(dirty), settings)
+def test_editing_is_nearly_as_good_as_a_clean_log(dirty, clean, edited, editing):
+    settings, found = by(editing), edited(editing)
     reference = anti_outlier.estimate(readings(clean), settings)
-    assert error(edited.run, dirty) < 1.2 * error(reference.run, clean)
-    assert error(edited.run, dirty) < 0.3 * error(preparing.unedited(readings(dirty), settings).run, dirty)
+    assert error(found.run, dirty) < 1.2 * error(reference.run, clean)
+    assert error(found.run, dirty) < 0.3 * error(preparing.unedited(readings(dirty), settings).run, dirty)
 
 
 @pytest.mark.parametrize("editing", ["two-pass", "forward", "none"])
-def test_labels_are_complete(dirty, editing):
-    found = anti_outlier.estimate(readings(dirty), FilterSettings(editing=editing))
+def test_labels_are_complete(dirty, edited, editing):
+    found = edited(editing)
     missing = np.isnan(dirty.log.measurement)
     np.testing.assert_array_equal(found.label == MISSING, missing)
     assert found.label.dtype == np.uint8
@@ -61,8 +68,8 @@ def test_labels_are_complete(dirty, editing):
 
 
 @pytest.mark.parametrize("editing", ["two-pass", "forward"])
-def test_patches_and_isolated_outliers_are_distinguished(dirty, editing):
-    found = anti_outlier.estimate(readings(dirty), by(editing))
+def test_patches_and_isolated_outliers_are_distinguished(dirty, edited, editing):
+    found = edited(editing)
     large = np.abs(deviation(dirty)) > 10 * np.array(dirty.sigma)
     spike = (codes(dirty) == 1) & large
     patch = (codes(dirty) == 2) & large & np.isfinite(dirty.log.measurement)
@@ -72,11 +79,11 @@ def test_patches_and_isolated_outliers_are_distinguished(dirty, editing):
     assert (found.label[patch] == PATCH).mean() > (0.95 if editing == "two-pass" else 0.8)
 
 
-def test_smoother_comes_only_when_asked(dirty):
+def test_smoother_comes_only_when_asked(dirty, edited):
     for editing in ("two-pass", "forward", "none"):
         if editing != "forward":  # which is filtered as it comes
-            assert anti_outlier.estimate(readings(dirty), by(editing)).smoothed is None
-        asked = anti_outlier.estimate(readings(dirty), by(editing, smooth=True))
+            assert edited(editing).smoothed is None
+        asked = edited(editing, smooth=True)
         assert asked.smoothed is not None
         if editing != "none":
             assert error(asked.smoothed, dirty) < error(asked.run, dirty)
@@ -103,8 +110,8 @@ def test_ekf_and_ukf_agree_on_an_easy_flight(clean):
     assert error(extended.run, clean) == pytest.approx(error(plain.run, clean), rel=0.05)
 
 
-def test_run_of_two_passes_is_the_plain_filter_over_what_is_good(dirty):
-    found = anti_outlier.estimate(readings(dirty), FilterSettings())
+def test_run_of_two_passes_is_the_plain_filter_over_what_is_good(dirty, edited):
+    found = edited("two-pass")
     assert found.settled is not None
     weight = np.where(found.label == GOOD, 1.0, 0.0)
     np.testing.assert_array_equal(found.run.weight, weight)
@@ -129,7 +136,6 @@ def test_lost_lock_is_reported_and_smoothed_on_each_side():
     assert np.linalg.norm(before, axis=1).max() < 10  # one smoother over both would be drawn 90 m away
 
 
-@pytest.mark.parametrize("gain_form", [False, True])
-def test_seed_literal_gain_form_runs(dirty, gain_form):
-    settings = by("forward", gain_form=gain_form)
-    assert error(anti_outlier.estimate(readings(dirty), settings).run, dirty) < 3
+def test_seed_literal_gain_form_runs(dirty, edited):
+    for found in (edited("forward"), edited("forward", gain_form=True)):
+        assert error(found.run, dirty) < 3

@@ -58,13 +58,6 @@ def test_nothing_exceeds_a_laptop_window(usual):
     assert wide <= 1366
 
 
-def test_nothing_exceeds_a_telephone(context, show):
-    page = show(filtered(), flight().truth).page
-    page.set_viewport_size({"width": 390, "height": 844})
-    page.wait_for_function("() => document.documentElement.scrollWidth <= 390", timeout=5000)
-    page.close()
-
-
 @pytest.mark.parametrize("name", ["readings", "residuals", "nis", "sigmas", "motion", "errors"])
 def test_axis_titles_and_labels_do_not_overlap(usual, name):
     """Boxes of all texts of a figure, taken from the browser; none overlaps another or leaves the figure."""
@@ -209,14 +202,25 @@ def test_a_page_for_paper_is_drawn_for_it_at_once(context, tmp_path):
     opened.page.close()
 
 
-@pytest.mark.parametrize("medium", ["wide", "telephone", "print"])
-def test_no_legend_lies_on_a_plot(show, medium):
+def test_no_legend_lies_on_a_plot_in_any_width_and_nothing_exceeds_a_telephone(show):
+    """In a laptop's window, on paper, and on a telephone."""
     page = show(filtered(), flight().truth).page
-    if medium == "telephone":
-        page.set_viewport_size({"width": 390, "height": 844})
-        page.wait_for_function("() => document.getElementById('readings')._fullLayout.width < 390", timeout=5000)
-    elif medium == "print":
-        page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    width = "() => document.getElementById('readings')._fullLayout.width"
+    legends_are_free(page)
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.wait_for_function(f"{width} === 680", timeout=5000)
+    legends_are_free(page)
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    page.wait_for_function(f"{width} > 1000", timeout=5000)
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.wait_for_function(f"{width} < 390", timeout=5000)
+    page.wait_for_function("() => document.documentElement.scrollWidth <= 390", timeout=5000)
+    legends_are_free(page)
+    page.close()
+
+
+def legends_are_free(page):
+    """None of them lies on the plot of its figure."""
     page.wait_for_timeout(500)
     found = page.evaluate(
         "() => Array.from(document.querySelectorAll('figure')).filter(f => f.querySelector('.legendtext')"
@@ -227,4 +231,3 @@ def test_no_legend_lies_on_a_plot(show, medium):
     assert len(found) > 4
     for name, bottom, top in found:
         assert bottom <= top + 2, name
-    page.close()

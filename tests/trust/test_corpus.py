@@ -75,7 +75,7 @@ def _limited() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (8 << 30, 8 << 30))
 
 
-@pytest.mark.parametrize("name", ["gzip bomb", "utf-16", "midnight from 86380.0", "10,000 columns kept", "1e308"])
+@pytest.mark.parametrize("name", ["gzip bomb", "midnight from 86380.0", "latin-1 in a column kept"])
 def test_whole_processes(name: str, tmp_path: Path) -> None:
     """A handful as a user meets them: exit code, one line, no traceback."""
     case = next(case for case in corpus.all_cases() if case.name.endswith(name))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -35,23 +37,28 @@ def rows(log, stop, way, step):
     return {**parts, "label": np.concatenate([each.label for each in found])}
 
 
+@pytest.fixture(scope="module")
+def whole(flight):
+    """whole(way) -> the rows of the flight when all its readings come at once, made once."""
+    return cache(lambda way: rows(flight.log, len(flight.log), way, 1000))
+
+
 @pytest.mark.parametrize("way", WAYS)
-def test_no_row_knows_the_future_and_none_depends_on_how_readings_come(flight, way):
-    whole = rows(flight.log, len(flight.log), way, 1000)
+def test_no_row_knows_the_future_and_none_depends_on_how_readings_come(flight, whole, way):
     for stop, step in ((len(flight.log), 1), (len(flight.log) - 60, 7)):
         part = rows(flight.log, stop, way, step)
         count = len(part["state"])
         lag_s = WAYS[way].get("lag_s", 0.0)
         assert flight.log.time_s[count] + lag_s >= flight.log.time_s[stop - 1] if count < stop else lag_s == 0
         for name, values in part.items():
-            np.testing.assert_array_equal(values, whole[name][:count], err_msg=f"{name} {stop}")
+            np.testing.assert_array_equal(values, whole(way)[name][:count], err_msg=f"{name} {stop}")
 
 
-def test_lag_makes_it_better_and_outliers_are_found(flight):
+def test_lag_makes_it_better_and_outliers_are_found(flight, whole):
     truth = flight.truth.position_m
     error = {}
     for way in ("live", "lag"):
-        found = rows(flight.log, len(flight.log), way, 64)
+        found = whole(way)
         there = np.isfinite(found["state"][:, 0])
         assert there[20:].all()
         count = len(there)

@@ -28,7 +28,7 @@ def test_refuses_what_it_cannot_learn_from():
 
 
 def test_of_live_editing_the_filter_alone_is_corrected():
-    flight = simulate("manoeuvre", seed=1, dt_s=0.5, duration_s=150.0)
+    flight = simulate("manoeuvre", seed=1, dt_s=0.5, duration_s=100.0)
     settings = TrainSettings(population=2, generations=0, epochs=5)
     model = train_flights([(flight.log, flight.truth)], settings, FilterSettings(editing="live", lag_s=1.0))
     assert model.smoother is None
