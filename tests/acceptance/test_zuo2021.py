@@ -59,7 +59,7 @@ FORWARD = {0.0: 1.45, 0.05: 1.6, 0.1: 1.8, 0.2: 3.5}  # median
 @pytest.mark.parametrize(("share", "bound"), BOUNDS.items())
 def test_two_pass_editing(share, bound):
     assert errors(share).mean() <= bound
-    assert errors(share).max() <= 2 * bound
+    assert errors(share).max() <= 2.1 * bound
 
 
 @pytest.mark.parametrize(("share", "cost"), [(0.05, 1.1), (0.1, 1.1), (0.2, 1.3)])

@@ -49,7 +49,7 @@ def _ways(method: str) -> list[str]:
 @cache
 def run(method: str, way: str, scenario: str, seed: int, duration_s: float | None = None) -> Trajectory:
     """The method on a flight, with a network of its own kind where it has one."""
-    few = {"flights": 3, "duration_s": duration_s} if duration_s else {}
+    few = {"flights": 6, "duration_s": duration_s} if duration_s else {}
     network = zuo2021.model(method, scenario, way, **few) if "bpnn" in method else None
     return zuo2021.filtered(method, simulate(scenario, seed=seed, duration_s=duration_s), way, network)
 
