@@ -51,6 +51,14 @@ def test_fixed_values_stay():
     assert all_fixed is guess
 
 
+@pytest.mark.parametrize("known", [(), (0, 2)])
+def test_noise_is_found_where_only_the_jerk_and_other_noise_are_fixed(known):
+    a = matched(4, 400, q=30.0)
+    fixed = np.isin(np.arange(3), known)
+    found = level(a, noise=4.0, jerk=30.0, fixed=Fixed(fixed, True))
+    np.testing.assert_allclose(np.sqrt(found.noise_variance), np.where(fixed, 2.0, 1.0) * SIGMA, rtol=0.1)
+
+
 def test_rejected_readings_do_not_count():
     a = matched(5, 600, q=30.0)
     bad = np.random.default_rng(5).random(a.z.shape) < 0.2
