@@ -49,7 +49,7 @@ class Workers:
     ) -> None:
         if error is not None:
             self._held.close()
-        self._pool.shutdown(wait=True, cancel_futures=True)
+        self._pool.shutdown(wait=True, cancel_futures=error is not None)
         self._held.close()
 
 

@@ -34,8 +34,8 @@ def multiple(readings: Readings, settings: FilterSettings) -> Estimate:
     """Filter by three models at once; every reading is used. `model` of the result is the middle one."""
     model, starts = prepare(readings, settings)
     log = readings.unedited()
-    interval = typical_interval(log.time_s) if len(log.time_s) > 1 else 1.0
-    sojourn_s = settings.parameter("sojourn_s") or max(SOJOURN_S, SOJOURN_SAMPLES * interval)
+    usual_s = max(SOJOURN_S, SOJOURN_SAMPLES * typical_interval(log.time_s))
+    sojourn_s = settings.parameter("sojourn_s") or usual_s
     levels = (settings.parameter("ratio") or SPREAD) ** np.array([-1.0, 0.0, 1.0])
     jumps = imm.Jumps(levels[:, None] * model.jerk[0], sojourn_s)
     run, _ = imm.filter_log(log, model, starts, jumps)

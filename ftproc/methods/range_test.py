@@ -88,7 +88,6 @@ def outlier_kalman(readings: Readings, settings: FilterSettings, improved: bool 
         log.time_s, log.reading, model, settings.parameter("r") or settings.gate,
         SMALL_GAIN if small is None else small, improved,
     )  # fmt: skip
-    weight[(np.arange(len(value))[:, None] < begin) & (seen > 0)] = 0.0 if improved else 1.0
     return channels.estimate(readings, log, Cleaned(value, weight, rest[0], rest[1], np.sqrt(variance)))
 
 

@@ -47,11 +47,13 @@ def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterable[s
         yield "| " + " | ".join(row) + " |"
 
 
-def main() -> None:
+def main(names: Sequence[str]) -> None:
     """Print and keep the tables that are named, or all."""
+    if unknown := [name for name in names if name not in TABLES]:
+        sys.exit(f"there is no table {', '.join(unknown)}; there are {', '.join(TABLES)}")
     KEPT.parent.mkdir(exist_ok=True)
     with KEPT.open("w", encoding="utf-8") as kept:
-        for name in sys.argv[1:] or TABLES:
+        for name in names or TABLES:
             table = TABLES[name]
             for line in chain([f"\n{table.__doc__}\n"], markdown(table.HEADER, table.rows())):
                 print(line, file=kept, flush=True)
@@ -59,4 +61,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

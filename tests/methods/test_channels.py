@@ -39,3 +39,15 @@ def test_blindly_nothing_is_known_before_the_first_reading():
     found = channels.look(Readings(time_s, measured(path(time_s), time_s).measurement, UNKNOWN), FilterSettings(), True)
     assert found.led == 0
     np.testing.assert_array_equal(found.time_s, time_s)
+
+
+def test_positions_and_velocities_are_those_of_the_readings_and_their_rates():
+    time_s, step_s = TIME[:150], 1e-4
+    readings = Readings(time_s, measured(path(time_s), time_s).measurement, UNKNOWN)
+    value, before, after = (from_cartesian(path(time_s + late)) for late in (0.0, -step_s, step_s))
+    cleaned = channels.Cleaned(value, np.ones_like(value), rate=(after - before) / (2 * step_s))
+    state = channels.estimate(readings, channels.look(readings, FilterSettings(), True), cleaned).run.state
+    np.testing.assert_allclose(state[:, :3], path(time_s), rtol=1e-9)
+    velocity = (path(time_s + step_s) - path(time_s - step_s)) / (2 * step_s)
+    np.testing.assert_allclose(state[:, 3:6], velocity, atol=1e-4)
+    assert np.isnan(state[:, 6:]).all()

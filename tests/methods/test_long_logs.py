@@ -95,6 +95,16 @@ def in_segments(monkeypatch):
     return use
 
 
+@pytest.mark.parametrize(("editing", "longest"), [("two-pass", 500), ("none", 100)])
+def test_a_short_log_is_edited_as_a_whole_and_a_long_one_filtered_so_without_editing(in_segments, editing, longest):
+    in_segments(longest, 100, 50)
+    log = record(start_of(simulate("manoeuvre", seed=3, duration_s=60.0).log, 400))
+    settings = FilterSettings(editing=editing)
+    (part,) = anti_outlier.parts(log, settings)
+    assert (part.first, part.low, part.high) == (0, 0, len(log))
+    np.testing.assert_array_equal(part.estimate.run.state, anti_outlier.estimate(log.whole(), settings).run.state)
+
+
 @pytest.mark.parametrize("smooth", [False, True])
 def test_segments_agree_with_the_whole(in_segments, smooth):
     """Half of all samples within 0.15 of their sigma, 99 % within 1, also at the seams, and as accurate. (Decisions

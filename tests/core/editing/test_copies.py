@@ -57,6 +57,19 @@ def test_interpolated_between_rows(every, to):
     assert (kind[~there][:-every] != HELD).all()
 
 
+@pytest.mark.parametrize("gaps", [1, 3])
+def test_gaps_that_a_line_fills_do_not_make_an_instrument_slow(gaps):
+    """A few readings on lines, exactly as between rows, are left to the editing of outliers."""
+    z = readings()
+    for first in 60 * np.arange(1, gaps + 1):
+        near = slice(first, first + 10)
+        z[near] = np.stack(
+            [np.interp(TIME[near], TIME[[first, first + 9]], z[[first, first + 9], c]) for c in range(3)], 1
+        )
+    _, kind = without_copies(TIME, z)
+    assert (kind == MEASURED).all()
+
+
 def test_knots_between_rows_are_moved_onto_the_curve_through_them():
     """A curve that is seen every 0.63 s, on lines in between."""
     own = np.arange(0.0, 61.0, 0.63)

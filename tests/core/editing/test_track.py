@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ftproc.core.editing.track import REACQUIRE_SAMPLES, reacquire
 from ftproc.core.filtering import forward
 from ftproc.core.filtering.records import Start
 from ftproc.core.model.frames import from_cartesian, wrap
@@ -96,6 +97,23 @@ def test_longest_patch_is_the_one_specified():
     run, again = edit(a, z, longest_patch_s=20.0)
     assert again == []
     assert not run.weight[100:160].any()
+
+
+@pytest.mark.parametrize("samples", [10, 60, 200])
+def test_a_track_is_re_acquired_from_the_newest_readings_alone(samples):
+    """What came before them, and what comes after, says nothing; fewer, at the beginning, do as well."""
+    a = matched(8, 260, q=20.0)
+    noise, sample = a.model.noise_variance, samples - 1
+    used = slice(max(samples - REACQUIRE_SAMPLES, 0), samples)
+    z = spoiled(a, slice(0, used.start), np.full(3, 500.0))
+    z = spoiled(a._replace(z=z), slice(samples, None), np.full(3, 500.0))
+    found = reacquire(a.time, z, noise, sample)
+    alone = reacquire(a.time[used], a.z[used], noise, sample - used.start)
+    assert found.sample == sample
+    np.testing.assert_array_equal(found.state, alone.state)
+    np.testing.assert_array_equal(found.covariance, alone.covariance)
+    sigma = np.sqrt(np.diag(found.covariance))
+    assert (np.abs(found.state - a.truth[sample]) < 5 * sigma).all()
 
 
 def test_likelihood_is_that_of_the_readings_used():

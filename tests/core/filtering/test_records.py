@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.filtering.forward import filter_log
-from ftproc.core.filtering.records import Model, Start, Uneven, between
+from ftproc.core.filtering.records import Model, Sites, Start, Uneven, between
 from ftproc.core.filtering.smoother import smooth_log
 from tests.core.tracks import matched
 
@@ -54,6 +54,16 @@ def test_samples_carry_the_noise_of_each_reading():
     samples = a.log._replace(uneven=Uneven(times, late)).samples(noise)
     np.testing.assert_array_equal(samples["noise"], times * noise)
     np.testing.assert_array_equal(samples["late"], late)
+
+
+@pytest.mark.parametrize("rows", [slice(2, 7), np.array([0, 3, 8])])
+def test_a_part_of_a_log_keeps_what_belongs_to_its_samples(rows):
+    """How the noise of its readings differs, and the stations that took them."""
+    a, noise = matched(1, 10), np.array([4.0, 1e-6, 9e-6]) * np.array([[1.0], [2.0]])
+    uneven = Uneven(np.arange(1.0, 31).reshape(10, 3), np.arange(30.0).reshape(10, 3))
+    sites = Sites(np.arange(10) % 2, np.array([[0.0, 0, 0], [1, 2, 3]]), np.tile(np.eye(3), (2, 1, 1)), np.ones(2))
+    log = a.log._replace(uneven=uneven, sites=sites)
+    np.testing.assert_array_equal(log.part(rows).samples(noise), log.samples(noise)[rows])
 
 
 def test_correlation_fades_with_the_interval():

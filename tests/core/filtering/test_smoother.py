@@ -151,6 +151,13 @@ def test_smoothed_covariance_is_positive_even_if_rounding_ate_it():
     np.testing.assert_allclose(half, p / 2, rtol=1e-6)
 
 
+@pytest.mark.parametrize("n", [0.0, 1e-9])
+def test_smoothed_covariance_of_what_is_wholly_correlated(n):
+    """Two states that are one have a covariance without an inverse."""
+    p = np.full((2, 2), 9.0)
+    np.testing.assert_allclose(smoother.smoothed_covariance(p, n * np.eye(2)), p, rtol=1e-6)
+
+
 @pytest.mark.compiled
 def test_smoother_beats_the_filter_and_its_sigmas_hold_the_truth():
     ratio, inside = [], []

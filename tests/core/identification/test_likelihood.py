@@ -51,6 +51,42 @@ def test_fixed_values_stay():
     assert all_fixed is guess
 
 
+def test_a_long_log_is_represented_by_stretches_of_all_of_it():
+    n = 2 * likelihood.SPANS * likelihood.SPAN
+    a = matched(7, n, missing=0.05)
+    blind = slice(0, 2 * likelihood.SPAN)  # where no track can begin
+    weight = a.weight.copy()
+    weight[blind, 0] = 0.0
+    for log in (a.log, a.log._replace(weight=weight)):
+        part, starts = likelihood.representative(log, a.starts, a.model.noise_variance, 1.0)
+        rows = np.searchsorted(a.time, part.time_s)
+        np.testing.assert_array_equal(part.measurement, a.z[rows])
+        assert len(rows) <= likelihood.SPANS * likelihood.SPAN
+        assert rows[-1] == n - 1
+        assert np.diff(rows).max() < 1.5 * n / likelihood.SPANS
+        for start in starts:  # each stretch has one, at its beginning
+            assert (np.abs(start.state - a.truth[rows[start.sample]]) < 6 * np.sqrt(np.diag(start.covariance))).all()
+        assert {start.sample for start in starts} >= {0, *(np.flatnonzero(np.diff(rows) > 1) + 1)}
+    assert rows[0] >= blind.stop - likelihood.SPAN
+
+
+def test_a_log_stands_for_itself_if_it_is_short_or_no_stretch_of_it_can_be_tracked():
+    a = matched(7, 3 * likelihood.SPANS * likelihood.SPAN)
+    short, blind = a.part(slice(0, 200), a.starts), a.log._replace(weight=np.zeros_like(a.weight))
+    for log in (short.log, blind):
+        part, starts = likelihood.representative(log, a.starts, a.model.noise_variance, 1.0)
+        assert part is log
+        assert starts is a.starts
+
+
+@pytest.mark.parametrize("known", [(), (0, 2)])
+def test_noise_is_found_where_only_the_jerk_and_other_noise_are_fixed(known):
+    a = matched(4, 400, q=30.0)
+    fixed = np.isin(np.arange(3), known)
+    found = level(a, noise=4.0, jerk=30.0, fixed=Fixed(fixed, True))
+    np.testing.assert_allclose(np.sqrt(found.noise_variance), np.where(fixed, 2.0, 1.0) * SIGMA, rtol=0.1)
+
+
 def test_rejected_readings_do_not_count():
     a = matched(5, 600, q=30.0)
     bad = np.random.default_rng(5).random(a.z.shape) < 0.2

@@ -57,6 +57,7 @@ def test_stations_count_by_the_components_that_are_used():
     sites = Sites(np.array([0, 1, 0, 1]), np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.array([1000.0, 3000.0]))
     found = scales_of(log(np.arange(4), np.ones(4), weight, sites=sites), np.tile(NOISE, (2, 1)))
     assert found.range_m == 2000.0
+    assert (found.interval_s, found.span_s) == (1.0, 3.0)
     np.testing.assert_allclose(np.sort(found.noise_m), [1.0, 2.0, 3.0, 3.0, 6.0])
 
 

@@ -225,6 +225,19 @@ def test_drift_of_even_noise_is_none():
     assert uneven_noise.drift(a.log, smooth_log(a.log, a.model, a.starts, residuals_only=True)) is None
 
 
+@pytest.mark.parametrize("n", [600, 4000])
+def test_a_drift_is_followed_however_long_the_log(n):
+    """Noise that grows and fades every 600 readings, of one component."""
+    a, swell = matched(4, n), np.exp(np.sin(2 * np.pi * np.arange(n) / 600))
+    run = smooth_log(a.log, a.model, a.starts, residuals_only=True)
+    residual = run.residual.copy()
+    residual[:, 1] *= np.sqrt(swell)
+    found = uneven_noise.drift(a.log, run._replace(residual=residual))
+    assert (found[:, [0, 2]] == 1).all()
+    off = np.log(found[:, 1] / swell)
+    assert np.std(off) < 0.4 * np.std(np.log(swell))
+
+
 @pytest.mark.parametrize(("n", "count"), [(120, 2), (130, 7), (7, 7), (61, 6)])
 def test_windows_are_those_of_numpy(n, count):
     values = np.random.default_rng(n).normal(size=n)

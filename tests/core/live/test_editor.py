@@ -96,10 +96,13 @@ def test_a_wrong_first_stretch_is_no_track(flight):
     assert off.max() < 100
 
 
-def test_memory_is_constant(flight):
+def test_memory_is_constant_and_rows_stay_with_their_readings(flight):
     editor = live.editor(FilterSettings(**WAYS["specified"]))
-    sizes = []
+    sizes, missing = [], np.isnan(flight.log.measurement)
     for k in range(60):
-        editor.push(flight.log.time_s + 12.1 * k, flight.log.measurement)
+        found = editor.push(flight.log.time_s + 12.1 * k, flight.log.measurement)
         sizes.append(len(editor.window))
+        if k > 0:  # the track is confirmed
+            rows = np.concatenate([each.rows["innovation"] for each in found])
+            np.testing.assert_array_equal(np.isnan(rows), missing)
     assert max(sizes) <= 2 * 4096 + 2 * editor.window.sizes.window

@@ -59,3 +59,15 @@ def test_readings_that_are_not_possible_stay_out(good):
     found = readmission.readmitted(open_)
     np.testing.assert_array_equal(found[-4:, 0], 0.0)
     np.testing.assert_array_equal(found[:-4] if good else found[60:-4], 1.0)
+
+
+@pytest.mark.parametrize("patch", [slice(40, 41), slice(60, 72)])
+def test_decisions_stand_still_where_the_outliers_are_left_out(patch):
+    """From decisions that reject all ranges, and from themselves; a reading that is not possible stays out."""
+    open_ = case(120, patch, sigmas=40.0)
+    open_.possible[10, 2] = False
+    expected = np.ones_like(open_.log.weight)
+    expected[patch, 0] = expected[10, 2] = 0.0
+    found = readmission.settled(open_, 4.0)
+    np.testing.assert_array_equal(found.log.weight, expected)
+    np.testing.assert_array_equal(readmission.settled(found, 4.0).log.weight, expected)

@@ -1,0 +1,40 @@
+"""What all methods begin with."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.methods import anti_outlier, kalman, robust
+from ftproc.methods.estimate import Readings
+from ftproc.settings import FilterSettings
+from tests.methods.flights import PATHS, TIME, measured
+
+UNKNOWN = np.full(3, np.nan)
+
+
+def helix(time_s, spoiled=()):
+    z = measured(PATHS["helix"](time_s), time_s).measurement
+    z[list(spoiled)] += [300.0, 0.05, 0.05]
+    return Readings(time_s, z, UNKNOWN)
+
+
+@pytest.mark.parametrize("spoiled", [(), (1, 4)])
+@pytest.mark.parametrize("method", [anti_outlier.estimate, kalman.converted, robust.huber])
+def test_every_method_begins_with_the_state_that_two_passes_find(method, spoiled):
+    readings = helix(TIME[:200], spoiled)
+    edited = anti_outlier.estimate(readings, FilterSettings()).run
+    first = method(readings, FilterSettings(editing="none")).run
+    assert edited.since_start[0] == first.since_start[0] == 0
+    np.testing.assert_allclose(first.predicted[0], edited.predicted[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize(("dt_s", "sojourn_s"), [(0.1, 5.0), (1.0, 20.0)])
+def test_a_model_of_several_holds_for_five_seconds_or_twenty_intervals(dt_s, sojourn_s):
+    readings = helix(dt_s * np.arange(120))
+    usual, said, other = (
+        kalman.multiple(readings, FilterSettings(method="imm-ukf", parameters=parameters)).run.state
+        for parameters in ((), (("sojourn_s", sojourn_s),), (("sojourn_s", 3 * sojourn_s),))
+    )
+    np.testing.assert_array_equal(usual, said)
+    assert (usual != other).any()
