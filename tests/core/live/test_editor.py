@@ -11,6 +11,8 @@ from ftproc.methods import live
 from ftproc.settings import FilterSettings
 from tests.simulated import simulate
 
+pytestmark = pytest.mark.compiled
+
 SPEC = "isolated=0.05:6-300,offset=2:8-30:20-200,stuck=1:8-20,nan=0.02"
 WAYS = {
     "live": {"editing": "live"},

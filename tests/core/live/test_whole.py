@@ -18,6 +18,8 @@ from ftproc.methods import live
 from ftproc.settings import FilterSettings
 from tests.simulated import simulate
 
+pytestmark = pytest.mark.compiled
+
 UNKNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
 
 

@@ -9,6 +9,8 @@ from ftproc.core.editing import two_pass
 from ftproc.core.live.window import SHORT, Sizes, Window
 from tests.simulated import simulate
 
+pytestmark = pytest.mark.compiled
+
 KNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
 
 
