@@ -2,7 +2,7 @@
 
 Each round smooths the events of all stations with the readings that are believed (`core.filtering.biases`), moves the
 biases to their posterior, the noise of each station to what its leave-one-out residuals show, the process noise to its
-likelihood's maximum, and decides anew, station by station and component by component, which readings are outliers: by
+likelihood's maximum, and decides again, station by station and component by component, which readings are outliers: by
 the same hidden Markov chain as for a single log, on residuals in which all other stations take part.
 """
 
@@ -180,7 +180,7 @@ def _reassessed(current: Fused, trusted: list[FloatArray], gate: float, search: 
 
 
 def _decided(current: Fused, trusted: list[FloatArray], gate: float, first: int | None) -> Fused:
-    """Which readings are outliers; settled if few of those from the start on are decided anew."""
+    """Which readings are outliers; settled if few of those from the start on are decided otherwise."""
     run, weight, changed, total = current.found.run, [], 0, 0
     started = (np.arange(len(current.events.time_s)) >= current.start.sample).astype(float)
     for s, before in enumerate(current.weight):

@@ -64,10 +64,7 @@ def find(stations: list[Seen], weight: list[FloatArray], sigma: FloatArray) -> T
     time_s, readings = time_s[seen], readings[seen]
     candidates = _candidates(stations, readings)
     if len(candidates) > MOST_CANDIDATES:
-        costs = np.stack([_fitted(stations, readings, allowed, each, 0)[1] for each in candidates])
-        leading = np.argsort(costs, 0)[:MOST_CANDIDATES]
-        times = np.bincount(leading[np.isfinite(np.take_along_axis(costs, leading, 0))], minlength=len(candidates))
-        candidates = [candidates[k] for k in np.argsort(-times, kind="stable")[:MOST_CANDIDATES]]
+        candidates = _leading(candidates, [_fitted(stations, readings, allowed, each, 0)[1] for each in candidates])
     found = [_fitted(stations, readings, allowed, each, POLISH) for each in candidates]
     if not found:
         return None
@@ -153,6 +150,14 @@ def _candidates(stations: list[Seen], readings: FloatArray) -> list[FloatArray]:
             start = np.tile(middle + offset, (len(readings), 1))
             found.append(_fitted(stations, readings, np.full((len(stations), 3), reach / 20), start, STEPS)[0])
     return found
+
+
+def _leading(candidates: list[FloatArray], costs: list[FloatArray]) -> list[FloatArray]:
+    """The candidates that are most often among the best of a moment. costs: (g,) of each."""
+    order = np.argsort(costs, 0)[:MOST_CANDIDATES]
+    there = np.isfinite(np.take_along_axis(np.stack(costs), order, 0))
+    times = np.bincount(order[there], minlength=len(candidates))
+    return [candidates[k] for k in np.argsort(-times, kind="stable")[:MOST_CANDIDATES]]
 
 
 def _nearest_point(at: FloatArray, along: FloatArray, other: FloatArray, sight: FloatArray) -> FloatArray:

@@ -47,6 +47,26 @@ def test_the_path_stays_with_the_radar_that_does_not_jump():
         assert np.median(error_m(stations)[45:75]) < 30.0
 
 
+def test_of_many_stations_the_few_that_follow_another_target_do_not_lead():
+    """Of 28 points that two lines of sight make, 12 are fitted; 18 of them are of a station that is elsewhere."""
+    turn = 2 * np.pi * np.arange(8) / 8
+    places = np.c_[6000 * np.cos(turn), 4000 + 6000 * np.sin(turn), np.zeros(8)]
+    away = [seen(f"foe {k}", places[k], (1, 2), offset_m=900.0 * (k + 1), away=(0.0, 61.0)) for k in range(3)]
+    right = [seen(f"theodolite {k}", places[k], (1, 2)) for k in range(3, 8)]
+    for stations in ([*away, *right], [*right, *away]):
+        assert np.median(error_m(stations)) < 30.0
+
+
+def test_those_lead_that_are_often_among_the_best_of_a_moment():
+    costs = np.random.default_rng(1).uniform(1, 2, (30, 50))
+    best = [3, 4, 8, 11, 12, 13, 17, 20, 21, 25, 28, 29]
+    costs[best] -= 1.0
+    costs[best, ::3] += 2.0
+    costs[5, :10], costs[6] = 0.0, np.inf  # the best for a while; nowhere
+    leading = first_track._leading([np.full((50, 3), k) for k in range(30)], list(costs))
+    assert {int(each[0, 0]) for each in leading} == set(best)
+
+
 def test_readings_that_meet_nowhere_give_no_track():
     pair = [seen("one", (0, 0, 0), (0,)), seen("two", (900, 0, 0), (0,))]
     weight = [np.isfinite(each.measurement).astype(float) for each in pair]

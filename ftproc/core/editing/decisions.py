@@ -65,7 +65,8 @@ class Decision(NamedTuple):
     """Weights (n, 3), the model and starts they were made with, the estimated outlier rates (3, 3), how many rounds it
     took, whether they stand still, for how many places no work was left to look for alternatives, the 1-sigma of the
     time stamps, s, the log-probability of their being as late as they are, whether the noise drifts, a model with
-    correlated noise that explains the log as well, and the smoother's run by whose residuals `decide` made them."""
+    correlated noise that explains the log as well or better, but is not followed, that with the slowest noise of the
+    one that is followed, and the smoother's run by whose residuals `decide` made them."""
 
     weight: FloatArray
     model: Model
@@ -208,8 +209,8 @@ def allow_for_drift(record: Record, decision: Decision) -> tuple[Record, Decisio
 
 
 def allow_for_colour(record: Record, decision: Decision) -> Decision:
-    """The decisions made again with correlated noise, if the noise is correlated; where such a model is as good as that
-    of white noise, or cannot be separated from motion, it is an alternative."""
+    """The decisions made again with correlated noise, if the noise is correlated; where such a model is only a little
+    better than that of white noise, or cannot be separated from motion, it is an alternative."""
     log, starts = record.weighted(decision.weight), decision.starts
     smoothed = smooth_log(log, decision.model, starts, residuals_only=True)
     if not coloured_noise.may_be(log, smoothed, decision.model):

@@ -29,75 +29,76 @@ ROUNDS = 3
 
 
 @part
-def _chain(
-    residual: FloatArray,
-    variance: FloatArray,
-    noise: float,
-    stretch: float,
-    rates: FloatArray,
-    good: FloatArray,
-    counts: FloatArray,
-) -> None:
-    """Forward-backward recursion: fills good (n,) = P(good | all) and the expected transition counts (3, 3)."""
-    n = len(residual)
-    isolated, begins, stays = rates
-    step = np.empty((3, 3))
-    for i in range(2):
-        step[i, 0], step[i, 1], step[i, 2] = 1 - isolated - begins, isolated, begins
-    step[2, 0], step[2, 1], step[2, 2] = (1 - stays) * (1 - isolated), (1 - stays) * isolated, stays
-    likely, filtered = np.ones((n, 2)), np.zeros((n, 3))
-    ahead = step[0].copy()
-    for k in range(n):
-        if not math.isfinite(residual[k]):
+def _likely(residual: Matrix, variance: Matrix, c: int, noise: float, stretch: float, likely: FloatArray) -> None:
+    """Fill likely (n, 2): how likely the residual of component c is of a good reading and of a bad one, against the
+    likelier of the two; -1 where it is missing."""
+    for k in range(len(likely)):
+        r, v = residual[k, c], variance[k, c]
+        if not math.isfinite(r):
+            likely[k, 0] = -1.0
             continue
-        narrow = stretch * variance[k]
+        narrow = stretch * v
         wide = narrow + WIDE * WIDE * noise
-        ratio = 0.5 * residual[k] ** 2 * (1 / narrow - 1 / wide) - 0.5 * math.log(wide / narrow)
-        likely[k, 0] = math.exp(min(0.0, -ratio))
-        likely[k, 1] = math.exp(min(0.0, ratio))
-        total = 0.0
-        for j in range(3):
-            filtered[k, j] = ahead[j] * likely[k, min(j, 1)] + 1e-300
-            total += filtered[k, j]
-        for j in range(3):
-            filtered[k, j] /= total
-        for j in range(3):
-            ahead[j] = filtered[k, 0] * step[0, j] + filtered[k, 1] * step[1, j] + filtered[k, 2] * step[2, j]
-    back, behind = np.ones(3), np.ones(3)
-    later = -1
-    counts[:] = 0.0
-    for k in range(n - 1, -1, -1):
-        good[k] = 0.0
-        if not math.isfinite(residual[k]):
+        ratio = 0.5 * r**2 * (1 / narrow - 1 / wide) - 0.5 * math.log(wide / narrow)
+        less = math.exp(-abs(ratio))
+        likely[k, 0] = less if ratio > 0 else 1.0
+        likely[k, 1] = 1.0 if ratio > 0 else less
+
+
+@part
+def _chain(
+    likely: FloatArray, filtered: FloatArray, rates: FloatArray, good: FloatArray, c: int, counts: FloatArray
+) -> None:
+    """Forward-backward recursion: fills good (n, 3) of component c with P(good | all), zero where missing, and the
+    expected number of transitions, counts (5,): to isolated outliers and to patches, and all, of readings outside
+    patches; within patches, and all, of those inside. filtered: (n, 3), to work in.
+
+    What follows a good reading and what follows an isolated outlier is the same.
+    """
+    isolated, begins, stays = rates
+    fine = 1 - isolated - begins
+    ends_fine, ends_isolated = (1 - stays) * (1 - isolated), (1 - stays) * isolated
+    ahead0, ahead1, ahead2 = fine, isolated, begins
+    for k in range(len(likely)):
+        if likely[k, 0] < 0:
             continue
-        if later >= 0:
-            total = 0.0
-            for i in range(3):
-                behind[i] = 0.0
-                for j in range(3):
-                    behind[i] += step[i, j] * likely[later, min(j, 1)] * back[j]
-                total += filtered[k, i] * behind[i]
-            for i in range(3):
-                for j in range(3):
-                    pair = filtered[k, i] * step[i, j] * likely[later, min(j, 1)] * back[j]
-                    counts[i, j] += pair / max(total, 1e-300)
-            scale = behind[0] + behind[1] + behind[2]
-            for i in range(3):
-                back[i] = behind[i] / scale
-        total = 0.0
-        for i in range(3):
-            total += filtered[k, i] * back[i]
-        good[k] = filtered[k, 0] * back[0] / max(total, 1e-300)
-        later = k
+        f0, f1, f2 = ahead0 * likely[k, 0] + 1e-300, ahead1 * likely[k, 1] + 1e-300, ahead2 * likely[k, 1] + 1e-300
+        share = 1 / (f0 + f1 + f2)
+        f0, f1, f2 = f0 * share, f1 * share, f2 * share
+        filtered[k, 0], filtered[k, 1], filtered[k, 2] = f0, f1, f2
+        outside = f0 + f1
+        ahead0 = outside * fine + f2 * ends_fine
+        ahead1 = outside * isolated + f2 * ends_isolated
+        ahead2 = outside * begins + f2 * stays
+    counts[:] = 0.0
+    later0 = later1 = later2 = -1.0  # how likely each state makes the readings after it, times that of the next one
+    for k in range(len(likely) - 1, -1, -1):
+        good[k, c] = 0.0
+        if likely[k, 0] < 0:
+            continue
+        f0, f1, f2 = filtered[k, 0], filtered[k, 1], filtered[k, 2]
+        outside, inside = 1.0, 1.0
+        if later0 >= 0:
+            outside = fine * later0 + isolated * later1 + begins * later2
+            inside = ends_fine * later0 + ends_isolated * later1 + stays * later2
+            share = 1 / max((f0 + f1) * outside + f2 * inside, 1e-300)
+            counts[0] += share * (f0 + f1) * isolated * later1
+            counts[1] += share * (f0 + f1) * begins * later2
+            counts[2] += share * (f0 + f1) * outside
+            counts[3] += share * f2 * stays * later2
+            counts[4] += share * f2 * inside
+            share = 1 / (outside + inside)
+            outside, inside = outside * share, inside * share
+        good[k, c] = f0 * outside / max((f0 + f1) * outside + f2 * inside, 1e-300)
+        later0, later1, later2 = likely[k, 0] * outside, likely[k, 1] * outside, likely[k, 1] * inside
 
 
 @part
 def _estimate_rates(counts: FloatArray, rates: FloatArray) -> None:
     """Baum-Welch update of the rates, drawn towards rare outliers where the log says little."""
-    outside = counts[0].sum() + counts[1].sum()
-    isolated = (counts[0, 1] + counts[1, 1] + 0.005 * PRIOR_SAMPLES) / (outside + PRIOR_SAMPLES)
-    begins = (counts[0, 2] + counts[1, 2] + 0.0005 * PRIOR_SAMPLES) / (outside + PRIOR_SAMPLES)
-    stays = (counts[2, 2] + START_RATES[2] * PRIOR_SAMPLES) / (counts[2].sum() + PRIOR_SAMPLES)
+    isolated = (counts[0] + 0.005 * PRIOR_SAMPLES) / (counts[2] + PRIOR_SAMPLES)
+    begins = (counts[1] + 0.0005 * PRIOR_SAMPLES) / (counts[2] + PRIOR_SAMPLES)
+    stays = (counts[3] + START_RATES[2] * PRIOR_SAMPLES) / (counts[4] + PRIOR_SAMPLES)
     rates[0] = min(isolated, MAX_RATES[0])
     rates[1] = min(begins, MAX_RATES[1])
     rates[2] = min(max(stays, MIN_STAY), MAX_RATES[2])
@@ -111,14 +112,12 @@ def classify(residual: Matrix, variance: Matrix, noise_variance: Vector, rates: 
     """
     stretch = (gate / NATURAL_GATE) ** 2
     n = residual.shape[0]
-    good, counts, column = np.zeros((n, 3)), np.zeros((3, 3)), np.zeros(n)
+    good, counts, likely, filtered = np.empty((n, 3)), np.empty(5), np.empty((n, 2)), np.empty((n, 3))
     for c in range(3):
-        r, v = residual[:, c].copy(), variance[:, c].copy()
+        _likely(residual, variance, c, noise_variance[c], stretch, likely)
         for _ in range(ROUNDS):
-            _chain(r, v, noise_variance[c], stretch, rates[c], column, counts)
+            _chain(likely, filtered, rates[c], good, c, counts)
             _estimate_rates(counts, rates[c])
-        for k in range(n):
-            good[k, c] = column[k]
     return good
 
 

@@ -25,8 +25,10 @@ from ftproc.core.identification.scales import scales_of
 FloatArray = NDArray[np.float64]
 
 ROUNDS = 6
+TURN, EDGE = 6, 3  # readings in a row that a turn may have, and on each side of its ends that do not jump
 LEAST_KEPT = 0.8  # of the readings of a component that were good before the first round
 MARGIN = 5.0  # in log-probability, by which the decisions made again may be less likely than those before
+FEW_MORE = 0.01  # of the readings: those that another hypothesis may reject beyond the first, to be believed
 OTHER_LEVEL = 2.5  # times the jerk level at which an alternative was tried, before it is tried again
 PROFILE_STEPS, COMPARED_STEPS = 3, 12  # of the search for the jerk profile; where two are compared
 STANDS_OUT = 8.0  # times the median of the jerk profile
@@ -46,10 +48,8 @@ def reassess(record: Record, decision: Decision) -> Decision:
     if len(widened) <= SHORT_LOG and widened.mean() > MOST:
         return _until_settled(record, decision, profile)
     weight, unexamined = decision.weight.copy(), 0
-    # A span is too short to tell the noise from.
-    known = record._replace(fixed=record.fixed._replace(noise=np.ones(3, bool)))
     for span in _spans(widened):
-        part = known.part(span)
+        part = _short(record, span)
         try:
             starts = _starts(part, weight[span], calm)
         except ValueError:  # a component has too few readings there
@@ -107,9 +107,48 @@ def _until_settled(record: Record, decision: Decision, profile: Model | None) ->
     return found
 
 
+def may_be_turns(decision: Decision, jumps_only: FloatArray) -> NDArray[np.bool_]:
+    """(n, 3) rejected readings where the target may have turned: where the decisions do not stand still all of them,
+    else those of long runs at whose ends nothing jumps."""
+    found = np.asarray(decision.weight == 0, np.bool_)
+    if not decision.settled:
+        return found
+    for c in range(3):
+        jumps = np.cumsum(np.pad(jumps_only[:, c] == 0, (1, 0)))
+        for begin, end in runs_of(found[:, c]):
+            edges = [(max(edge - EDGE, 0), min(edge + EDGE, len(jumps) - 1)) for edge in (begin, end)]
+            found[begin:end, c] = end - begin >= TURN and all(jumps[high] == jumps[low] for low, high in edges)
+    return found
+
+
+def with_turns(record: Record, decision: Decision, weight: FloatArray, doubtful: NDArray[np.bool_]) -> Decision:
+    """The decisions on a long log, made again from these weights (n, 3) on around each doubtful reading (n, 3), where
+    that takes some of these in and is likelier."""
+    calm, found = median_level(decision.model), decision.weight.copy()
+    for span in _spans(_widened(np.asarray(doubtful.any(1), np.bool_))):
+        part = _short(record, span)
+        try:
+            one, other = (
+                Decision(each[span], calm, _starts(part, each[span], calm), decision.rates) for each in (found, weight)
+            )
+        except ValueError:  # a component has too few readings there
+            continue
+        other = decide(part, other, tune_first=True)
+        if (other.weight > one.weight)[doubtful[span]].any():
+            other = _until_settled(part, other, None)
+            found[span] = believed((part, one), (part, other))[1].weight
+    return decision._replace(weight=found, starts=_starts(record, found, calm))
+
+
 def likelier(one: tuple[Record, Decision], other: tuple[Record, Decision]) -> tuple[Record, Decision]:
     """Of two ways to understand a log, that which makes all of its readings together likelier."""
     return one if other[1] is one[1] or log_probability(*other) <= log_probability(*one) else other
+
+
+def believed(found: tuple[Record, Decision], other: tuple[Record, Decision]) -> tuple[Record, Decision]:
+    """The other hypothesis, if it is likelier and does not reject many more readings to be so."""
+    least = found[1].weight.sum() - FEW_MORE * found[0].possible.sum()
+    return likelier(found, other) if other[1].weight.sum() > least else found
 
 
 def log_probability(record: Record, decision: Decision) -> float:
@@ -154,6 +193,11 @@ def _spans(marked: NDArray[np.bool_]) -> Iterator[slice]:
         pieces = max(1, round((end - begin) / LONGEST_SPAN))
         for low, high in itertools.pairwise(np.linspace(begin, end, pieces + 1).astype(int)):
             yield slice(low, high)
+
+
+def _short(record: Record, span: slice) -> Record:
+    """The record of a stretch that is too short to tell the noise from."""
+    return record.part(span)._replace(fixed=record.fixed._replace(noise=np.ones(3, bool)))
 
 
 def _suspects(record: Record, decision: Decision, calm: Model, profile: Model) -> NDArray[np.bool_]:

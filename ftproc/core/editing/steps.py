@@ -43,7 +43,7 @@ SMALLEST = 7.0  # sigmas of the noise: a smaller step may be an end of a weak pa
 SMALL = 0.7  # times that, before its size is found with the outliers beside it
 PATCHES = 12, 24, 48  # readings in a patch, of which a step may be an end
 STAYS = 0.75  # share of the readings on either side of a step that must be good
-SIZES = 2  # times that the size of a step is found anew, as the decisions beside it change
+SIZES = 2  # times that the size of a step is found again, as the decisions beside it change
 PROFILE_STEPS = 3  # of the search for the jerk profile of a stretch
 END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step cannot be told from a patch
 

@@ -27,8 +27,15 @@ from ftproc.core.editing.decisions import (
     decide,
     late_stamps,
 )
-from ftproc.core.editing.reassessment import likelier, log_probability, reassess
-from ftproc.core.editing.runs import runs_of
+from ftproc.core.editing.reassessment import (
+    SHORT_LOG,
+    believed,
+    likelier,
+    log_probability,
+    may_be_turns,
+    reassess,
+    with_turns,
+)
 from ftproc.core.editing.steps import Step
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
@@ -48,12 +55,11 @@ WINDOWS = (31, 75)  # samples: the short one follows manoeuvres, the long one se
 COARSE = 0.5  # of a component's noise: rounding that makes so much of it decides how its readings repeat
 OUTVOTED = 0.5  # share of a window's parabolas that a reading is off
 FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
-TURN, EDGE = 6, 3  # readings in a row that a turn may have, and on each side of its ends that do not jump
 STAMP_ROUNDS = 3  # of estimating how late each time stamp is
 DRIFT_ROUNDS = 3  # of following the noise: where it grows, each finds readings that the next can follow
 HOPELESS = 200.0  # in log-probability, by which another hypothesis is behind if it is not followed up
-FEW_MORE = 0.01  # of the readings: those that such a hypothesis may reject beyond the others, to be believed
 PROFILE_STEPS = 4  # of the search for the jerk profile, once the decisions are made
+STEP_MARGIN = 8.0  # in log-probability, by which steps must explain a log better than late stamps do
 STEP_ROUNDS = 4  # of looking for steps: where one is bridged, another may show
 START_INFLATION = 2.0  # on the covariance of a smoothed state that starts a filter over the same record
 
@@ -187,7 +193,7 @@ def edit(
             break
         log = record.weighted(decision.weight)
         other = _decided(time_s, steps.bridged(log, decision.model, new), known, segment_of, live, short)
-        if min(decision.stamp_s, other[1].stamp_s) > 0:  # then it may be late stamps that look like steps
+        if _may_be_late_stamps((record, decision), other):
             break
         (record, decision), found = other, sorted([*found, *new], key=lambda s: s.sample)
     if segment_of is None and not short:
@@ -204,6 +210,13 @@ def edit(
         smoothed = smooth_log(log, decision.model, decision.starts)
     faults = Faults(copied, (*found, *doubtful), tuple(leaning))
     return Edited(log, decision.model, decision.starts, smoothed, decision, faults)
+
+
+def _may_be_late_stamps(without: tuple[Record, Decision], bridged: tuple[Record, Decision]) -> bool:
+    """Whether it may be late time stamps that look like steps: they are left where the steps are bridged, or explain
+    the log as well."""
+    late = [decision.stamp_s > 0 for _, decision in (without, bridged)]
+    return all(late) or (any(late) and log_probability(*bridged) < log_probability(*without) + STEP_MARGIN)
 
 
 def _decided(
@@ -224,12 +237,14 @@ def _decided(
     begin = partial(_first, record, segment_of=segment_of, noise=noise, jerk_psd=jerk_psd)
     found = _examined(*begin(record.screened), known)
     turns = jumps_only * possible
-    doubtful = _may_be_turns(found[1], turns)
+    doubtful = may_be_turns(found[1], turns)
     if jerk_psd is None and found[1].stamp_s == 0 and doubtful.any():
+        if found[1].settled and len(time_s) > SHORT_LOG:
+            return found[0], with_turns(*found, turns, doubtful)
         other = begin(turns)
         takes_in = (other[1].weight > found[1].weight)[doubtful].any()
         if takes_in and log_probability(*other) > log_probability(*found) - HOPELESS:
-            found = _believed(found, _examined(*other, known))
+            found = believed(found, _examined(*other, known))
     return found
 
 
@@ -264,31 +279,11 @@ def _with_late_stamps(record: Record, decision: Decision) -> tuple[Record, Decis
     for imprecise in IMPRECISE:
         found = allow_for_late_stamps(record, decision, stamps, imprecise)
         for _ in range(STAMP_ROUNDS):
-            before, found = found, _believed(found, allow_for_very_late_stamps(*found, imprecise, record))
+            before, found = found, believed(found, allow_for_very_late_stamps(*found, imprecise, record))
             if found is before:
                 break
-        likeliest = _believed(likeliest, found)
+        likeliest = believed(likeliest, found)
     return likeliest
-
-
-def _believed(found: tuple[Record, Decision], other: tuple[Record, Decision]) -> tuple[Record, Decision]:
-    """The other hypothesis, if it is likelier and does not reject many more readings to be so."""
-    least = found[1].weight.sum() - FEW_MORE * found[0].possible.sum()
-    return likelier(found, other) if other[1].weight.sum() > least else found
-
-
-def _may_be_turns(decision: Decision, jumps_only: FloatArray) -> NDArray[np.bool_]:
-    """(n, 3) rejected readings where the target may have turned: where the decisions do not stand still all of them,
-    else those of long runs at whose ends nothing jumps."""
-    found = np.asarray(decision.weight == 0, np.bool_)
-    if not decision.settled:
-        return found
-    for c in range(3):
-        jumps = np.cumsum(np.pad(jumps_only[:, c] == 0, (1, 0)))
-        for begin, end in runs_of(found[:, c]):
-            edges = [(max(edge - EDGE, 0), min(edge + EDGE, len(jumps) - 1)) for edge in (begin, end)]
-            found[begin:end, c] = end - begin >= TURN and all(jumps[high] == jumps[low] for low, high in edges)
-    return found
 
 
 def smoothed_starts(smoothed: SmootherRun) -> list[Start]:

@@ -56,9 +56,12 @@ def find_starts(log: Observations, noise_variance: FloatArray, jerk_psd: float) 
     """
     time_s, measurement, weight = log[:3]
     starts = [first_start(log, noise_variance)]
+    longest_s = shortest_gap(median(time_s[1:] - time_s[:-1]) if len(time_s) > 1 else 0.0)
+    time, z, used = (np.ascontiguousarray(each) for each in log[:3])
+    if not _has_gap(time, z, used, longest_s):
+        return starts
     good = (weight > 0) & np.isfinite(measurement)
-    interval_s = median(time_s[1:] - time_s[:-1]) if len(time_s) > 1 else 0.0
-    gaps = gaps_of(time_s, good, shortest_gap(interval_s))
+    gaps = gaps_of(time_s, good, longest_s)
     edges = [*sorted(gaps), len(time_s)]
     for low, high in itertools.pairwise(edges):
         if low <= starts[-1].sample or (good[low:high].sum(0) < FEWEST_READINGS).any():
@@ -105,6 +108,21 @@ def gaps_of(
         if last_good_s is not None and times[0] - last_good_s[c] > longest_s:
             found.setdefault(int(seen[0]), (float(times[0] - last_good_s[c]), WIDEST_BLIND_BRIDGE))
     return found
+
+
+@kernel
+def _has_gap(time: Vector, z: Matrix, weight: Matrix, longest_s: float) -> bool:
+    """Whether there is a gap between samples, or between good readings of a component: see `gaps_of`."""
+    for c in range(3):
+        last = math.inf
+        for k in range(len(time)):
+            if weight[k, c] > 0 and math.isfinite(z[k, c]):
+                if time[k] - last > longest_s:
+                    return True
+                last = time[k]
+            if k > 0 and time[k] - time[k - 1] > longest_s:
+                return True
+    return False
 
 
 def first_state(log: Observations, noise_variance: FloatArray, sample: int, within: slice) -> Start:

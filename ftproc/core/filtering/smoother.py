@@ -228,7 +228,7 @@ def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) ->
         likelihood += sweep(Span(start.sample, stop, start.sample), samples, profile, memory, jerk, wanted)
         noise += memory.back["noise_score"][0]
         wander += memory.back["wander_score"][0]
-        if wanted == STATES or (wanted == RESIDUALS and start.sample > 0):
+        if wanted == STATES or (wanted == RESIDUALS and 0 < start.sample == starts[0].sample):
             covariance = smoothed_covariance(memory.block["p"][0], memory.back["n_first"][0])[:9, :9]
             heads.append(Start(start.sample, memory.back["state"][0, :9].copy(), covariance))
     return _Swept(Scores(likelihood, noise, wander, jerk), estimates, residuals, tuple(heads))
@@ -248,7 +248,8 @@ def smooth_log(log: Observations, model: Model, starts: list[Start], residuals_o
     """Smooth the whole log; the record on each side of a start separately. Samples before the first start are
     extrapolated.
 
-    residuals_only: states and sigmas are left out (of no sample), which saves a third of the time, and most heads.
+    residuals_only: states and sigmas are left out (of no sample), which saves a third of the time, and all heads but
+    that of a first start after the first sample.
     """
     scores, estimates, residuals, heads = _swept(log, model, starts, RESIDUALS if residuals_only else STATES)
     first = starts[0].sample

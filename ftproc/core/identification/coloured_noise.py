@@ -51,8 +51,8 @@ INDEPENDENT = 20.0  # correlation times that a log must last for noise and motio
 
 class Coloured(NamedTuple):
     """A model with correlated noise, and one whose noise wanders as slowly and as far as the log allows. likelier: the
-    first is much likelier than that of white noise; possible: or likelier. separable: the log lasts long enough to tell
-    such noise from motion."""
+    first is likelier than that of white noise by LEAST_GAIN for each component; possible: by that once. separable: the
+    log lasts long enough to tell such noise from motion."""
 
     model: Model
     slowest: Model
@@ -159,12 +159,12 @@ class _Search:
     def slowest(self, theta: FloatArray) -> FloatArray:
         """The parameters with the slowest and largest offsets that the log does not refute. Over a few samples an
         offset of twice the variance that fades half as fast looks the same, and what is slower than that, motion."""
-        allowed = self.cost(theta)[0] + REFUTED
+        least = likelihood_of(self.log, self.model(theta), self.starts) - REFUTED
         for c in range(3):
             while True:
                 slower = theta.copy()
                 slower[[3 + c, 6 + c]] += math.log(2)
-                if (slower > self.upper).any() or self.cost(slower)[0] > allowed:
+                if (slower > self.upper).any() or likelihood_of(self.log, self.model(slower), self.starts) < least:
                     break
                 theta = slower
         return theta

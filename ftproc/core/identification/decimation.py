@@ -23,6 +23,7 @@ IntArray = NDArray[np.int64]
 SHARE = 0.5  # of the filter's memory, that is merged
 MOST = 16  # readings
 CALMER = 0.9  # share of the flight with less jerk than the memory is computed for
+OFTEN = 0.7  # of the readings of the component that is seen most: else means of few stand at the wrong times
 ROUNDING = 0.01  # of a reading: times are rounded, and must not decide where the number comes out even
 
 
@@ -34,6 +35,13 @@ def how_many(scales: Scales, model: Model, knot_s: float) -> int:
     memory = (noise * scales.interval_s / float(np.quantile(model.jerk[:, 0], CALMER))) ** (1 / 6)
     wanted = SHARE * min(memory, knot_s / 10) / scales.interval_s
     return int(np.clip(wanted + ROUNDING, 1, MOST))
+
+
+def merged(log: Observations, starts: list[Start], count: int) -> tuple[Observations, list[Start]]:
+    """The log with `count` neighbours merged, or as it is where some components are seen far less often than others;
+    and its starts."""
+    seen = (log.weight > 0).sum(0)
+    return merge(log, starts, count) if count > 1 and seen.min() > OFTEN * seen.max() else (log, starts)
 
 
 def merge(log: Observations, starts: list[Start], count: int) -> tuple[Observations, list[Start]]:
@@ -99,4 +107,6 @@ def _means(
                 span = t[b] + late[b, c] - t[a] - late[a, c]
                 if number[a, c] > 0 and number[b, c] > 0 and span > 0:
                     merged[g, c] -= late[g, c] * wrapped(mean[b, c] - mean[a, c], c == 1) / span
+                else:  # nobody knows how far it has gone meanwhile
+                    merged[g, c] = math.nan
     return t, merged, number, group

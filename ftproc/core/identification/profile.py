@@ -47,9 +47,9 @@ def fit_profile(
         knot_s = knot_length(scales, float(level.jerk[0, 0]))
     knots = max(math.ceil(scales.span_s / knot_s), 1)
 
-    merged = 1 if log.sites is not None else decimation.how_many(scales, level, knot_s)
-    if merged > 1:
-        log, starts = decimation.merge(log, starts, merged)
+    if log.sites is None:
+        count = decimation.how_many(scales, level, knot_s)
+        log, starts = decimation.merged(log, starts, count)
 
     def unpack(theta: FloatArray) -> Model:
         return level._replace(jerk=shaped(theta[:knots], theta[knots]), knot_s=knot_s)

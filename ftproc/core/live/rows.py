@@ -46,7 +46,7 @@ def unknown_rows(n: int) -> Any:
 
 def widened(rows: Any, before: int) -> Any:
     """The rows after so many, their sigmas as much larger as the innovations of the last samples are than expected: a
-    filter that has only seen calm flight learns of a manoeuvre after it has begun."""
+    filter that has only seen calm flight learns of a manoeuvre late."""
     informed = np.isfinite(rows["nis"])
     nis, used = np.where(informed, rows["nis"], 0.0), np.where(informed, (rows["weight"] > 0).sum(1), 0)
     lately = np.ones(LATELY)

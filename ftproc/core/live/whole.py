@@ -1,4 +1,4 @@
-"""All of the window decided on anew by two-pass editing, a little at a time, while readings go on coming."""
+"""All of the window decided on again by two-pass editing, a little at a time, while readings go on coming."""
 
 from __future__ import annotations
 

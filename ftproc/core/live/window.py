@@ -107,13 +107,13 @@ class Window:
     # -- all of the window ------------------------------------------------------------------------------------------
 
     def edit(self) -> None:
-        """Decide on all of the window anew. Raises ValueError when a component has no reading that agrees, or the few
+        """Decide on all of the window again. Raises ValueError when a component has no reading that agrees, or the few
         readings that there are lie on a track that only a filter without memory could follow."""
         self.begin()
         self.go_on(math.inf)
 
     def begin(self) -> None:
-        """Begin to decide on all of the window anew; `under_way` is None if that was all."""
+        """Begin to decide on all of the window again; `under_way` is None if that was all."""
         readings, short = np.where(self.kept["possible"], self.measurement, np.nan), self.white or len(self) < SHORT
         edit = partial(two_pass.edit, self.time_s.copy(), readings, self.known, live=True, short=short)
         self.under_way = Whole(edit, len(self))
@@ -241,7 +241,7 @@ class Window:
     # -- the newest part --------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
-        """Decide again on the newest part, let the jerk profile follow, and filter that part anew."""
+        """Decide again on the newest part, let the jerk profile follow, and filter that part again."""
         self._slide()
         near = slice(self.near, len(self))
         self.model = stretched(self.model, float(self.time_s[-1] - self.time_s[self.near]))

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from ftproc.core.editing import decisions
+from ftproc.core.filtering.records import Model
+from ftproc.core.identification.coloured_noise import Coloured
 
 GATE, SAMPLES = 4.0, 2000
 
@@ -51,3 +55,18 @@ def test_a_component_keeps_what_screening_trusts_if_almost_nothing_is_left():
     kept = decisions._keep_most(decided, screened)
     np.testing.assert_array_equal(kept[:, 0], 1.0)
     np.testing.assert_array_equal(kept[:, 1:], decided[:, 1:])
+
+
+@pytest.mark.parametrize("settled", [True, False])
+def test_decisions_under_correlated_noise_are_taken_only_if_they_stand_still(monkeypatch, settled):
+    before = decisions.Decision(np.ones((4, 3)), Model(np.ones(3), np.ones((1, 6))), [], np.ones((3, 3)))
+    found = Coloured(before.model._replace(fade_s=np.full(3, 2.0)), before.model, True, True, True)
+    after = before._replace(weight=np.zeros((4, 3)), model=found.model, settled=settled)
+    monkeypatch.setattr(decisions, "smooth_log", lambda *args, **options: None)
+    monkeypatch.setattr(decisions, "decide", lambda record, decision, tune_first: after)
+    monkeypatch.setattr(decisions.coloured_noise, "may_be", lambda *args: True)
+    monkeypatch.setattr(decisions.coloured_noise, "fit_coloured", lambda *args: found)
+    record = SimpleNamespace(weighted=lambda weight: None, fixed=None)
+    decided = decisions.allow_for_colour(record, before)
+    assert decided.model is found.model
+    np.testing.assert_array_equal(decided.weight, after.weight if settled else before.weight)

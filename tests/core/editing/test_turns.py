@@ -54,7 +54,7 @@ def test_turns_are_not_patches(monkeypatch):
     assert np.median(largest) < 20
     assert largest.max() < 200
     assert rejected.max() < 0.03
-    monkeypatch.setattr(two_pass, "_may_be_turns", lambda decision, jumps_only: np.zeros(jumps_only.shape, bool))
+    monkeypatch.setattr(two_pass, "may_be_turns", lambda decision, jumps_only: np.zeros(jumps_only.shape, bool))
     assert np.median(edited(flights[:2])[0]) > 50
 
 
@@ -63,3 +63,11 @@ def test_noise_that_grows_with_nearness_is_noise():
     largest, rejected = edited(flights)
     assert largest.max() < 18
     assert rejected.max() < 0.05
+
+
+def test_turns_of_a_long_log_are_found_where_they_may_be(monkeypatch):
+    flights = [arrival(0, TURNS[0])]
+    monkeypatch.setattr(two_pass, "SHORT_LOG", 0)
+    assert edited(flights)[0][0] < 20
+    monkeypatch.setattr(two_pass, "with_turns", lambda record, decision, weight, doubtful: decision)
+    assert edited(flights)[0][0] > 50

@@ -191,3 +191,13 @@ def test_drift_is_asked_for_again_while_more_readings_are_used(monkeypatch, kept
     monkeypatch.setattr(two_pass, "likelier", lambda one, other: other)
     found = two_pass._examined(SimpleNamespace(white=False), made[0][1], UNKNOWN._replace(jerk_psd=1.0))
     assert found is made[rounds]
+
+
+@pytest.mark.parametrize(
+    ("late_s", "gained", "expected"),
+    [((0, 0), -99, False), ((0.01, 0.01), 99, True), ((0.01, 0), 5, True), ((0, 0.01), 5, True), ((0.01, 0), 9, False)],
+)
+def test_steps_must_explain_a_log_better_than_late_stamps_do(monkeypatch, late_s, gained, expected):
+    without, bridged = (("log", SimpleNamespace(stamp_s=stamp_s)) for stamp_s in late_s)
+    monkeypatch.setattr(two_pass, "log_probability", lambda _, decision: gained if decision is bridged[1] else 0.0)
+    assert two_pass._may_be_late_stamps(without, bridged) is expected

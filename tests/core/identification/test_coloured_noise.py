@@ -7,10 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from ftproc import pipeline
 from ftproc.core.editing import two_pass
 from ftproc.core.filtering.forward import filter_log
 from ftproc.core.filtering.smoother import score_log, smooth_log
 from ftproc.core.identification import coloured_noise
+from ftproc.settings import FilterSettings
 from tests.core.tracks import matched
 from tests.simulated import simulate
 
@@ -96,6 +98,21 @@ def test_correlated_noise_is_found_and_sigmas_stay_honest(samples, seed):
     np.testing.assert_allclose(np.sqrt(found.model.reading_variance), flight.sigma, rtol=0.25)
     assert (found.weight == 0).mean() < 0.01
     assert inside(flight, found) > 0.95
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("name", "interval_s", "duration_s"), [("manoeuvre", 0.05, 100.0), ("cruise", 0.1, 200.0), ("radar", 1.0, 600.0)]
+)
+@pytest.mark.parametrize("samples", [20, 60])
+def test_sigmas_allow_for_the_slowest_noise_that_the_log_does_not_refute(name, interval_s, duration_s, samples):
+    """How slow it is, and with it how large, the log says only vaguely."""
+    spec = f"isolated=0.01:6-100,correlation={samples * interval_s}"
+    flight = simulate(name, seed=10, duration_s=duration_s, outliers=spec)
+    found = pipeline.filter_log(flight.log, FilterSettings(smooth=True))
+    error = np.abs(found.state[:, :3] - flight.truth.position_m)
+    assert (error < 3 * found.sigma[:, :3]).all(1).mean() > 0.97
+    assert (error < 0.3 * found.sigma[:, :3]).all(1).mean() < 0.7
 
 
 @pytest.mark.compiled

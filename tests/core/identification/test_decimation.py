@@ -98,3 +98,16 @@ def test_no_more_is_merged_than_memory_and_knots_bear(knot_s):
     bound = decimation.SHARE * min(memory_s, knot_s / 10) / scales.interval_s
     assert count == int(np.clip(bound + decimation.ROUNDING, 1, decimation.MOST))
     assert decimation.how_many(scales, model._replace(wander_variance=np.ones(3)), knot_s) == 1
+
+
+def test_components_that_are_seen_seldom_are_not_merged_and_no_mean_stands_at_a_wrong_time():
+    a = matched(3, 120)
+    assert len(decimation.merged(a.log, a.starts, 4)[0].time_s) == 30
+    weight = a.weight.copy()
+    weight[np.arange(120) % 3 > 0, 1:] = 0.0
+    seldom = a.log._replace(weight=weight)
+    assert decimation.merged(seldom, a.starts, 4)[0] is seldom
+    weight = a.weight.copy()
+    weight[4:12, 1], weight[[0, 13], 1] = 0.0, 0.0  # neither neighbour says how far azimuth has gone
+    (_, z, *_), _ = decimation.merge(a.log._replace(weight=weight), a.starts, 2)
+    assert np.isnan(z[6, 1])

@@ -56,6 +56,18 @@ def test_no_row_knows_the_future_and_none_depends_on_how_readings_come(flight, w
             np.testing.assert_array_equal(values, whole(way)[name][:count], err_msg=f"{name} {stop}")
 
 
+def test_sigmas_of_rows_that_leave_follow_the_last_innovations(flight):
+    editor, times = live.editor(FilterSettings(editing="live")), []
+    for k in range(len(flight.log)):
+        leaving = editor.push(flight.log.time_s[k : k + 1], flight.log.measurement[k : k + 1])
+        if editor.window is not None and np.isfinite(leaving[-1].rows["sigma"][-1]).all():
+            (filtered, _) = editor.window.shown(len(editor.window) - 1, len(editor.window))
+            times.append(leaving[-1].rows["sigma"][-1] / filtered["sigma"][0])
+    assert np.ptp(times, axis=1).max() < 1e-9
+    assert np.min(times) > 1 - 1e-9
+    assert 0.2 < (np.array(times)[:, 0] > 1.01).mean() < 0.8
+
+
 def test_lag_makes_it_better_and_outliers_are_found(flight, whole):
     truth = flight.truth.position_m
     error = {}

@@ -80,7 +80,7 @@ def _gps(columns: Mapping[str, pa.ChunkedArray], origin: Origin, unit: Unit | No
         second, notes = unrolled(second, WEEK_S)
     whole = second + (week - first) * WEEK_S
     words = "GPS week and seconds, in s since the start of the first week"
-    if first < 1024:  # of ten bits, which begin anew every 1024 weeks
+    if first < 1024:  # of ten bits, which start again every 1024 weeks
         return Clock(whole, "", f"{words}; weeks below 1024 leave the year open", notes)
     return Clock(whole, leap_seconds.gps_epoch(first), words, notes)
 

@@ -64,7 +64,7 @@ class Changed(InputError):
 
 @contextlib.contextmanager
 def unchanged(name: str, stream: BinaryIO, known: os.stat_result | None = None) -> Iterator[None]:
-    """Raises Changed, after the block, when the file became shorter inside or was written anew; a log may grow.
+    """Raises Changed, after the block, when the file became shorter inside or was written again; a log may grow.
 
     known: the file as it was before the stream was opened.
     """
