@@ -64,10 +64,14 @@ class Labels:
 
     def add(self, used: FloatArray, measurement: FloatArray) -> FloatArray:
         """(n, 3) of the next readings; used (n, 3) above zero for those that are good."""
-        label = np.zeros(used.shape)
-        for row, good, there in zip(label, used > 0, np.isfinite(measurement), strict=True):
-            self.run = np.where(there, np.where(good, 0, self.run + 1), self.run)
-            row[:] = np.where(there, np.where(good, 0.0, np.where(self.run > LONGEST_ISOLATED, 2.0, 1.0)), 3.0)
+        label = np.full(used.shape, 3.0)
+        for c in range(3):
+            there = np.flatnonzero(np.isfinite(measurement[:, c]))
+            good = used[there, c] > 0
+            rejected = np.cumsum(~good) + self.run[c]  # up to each reading, less those up to the last good one
+            run = rejected - np.maximum.accumulate(np.where(good, rejected, 0))
+            label[there, c] = np.where(good, 0.0, np.where(run > LONGEST_ISOLATED, 2.0, 1.0))
+            self.run[c] = run[-1] if len(run) else self.run[c]
         return label
 
     def reset(self, used: FloatArray, measurement: FloatArray) -> None:
