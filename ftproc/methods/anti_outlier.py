@@ -62,7 +62,7 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     edited = two_pass.edit(readings.time_s, readings.measurement, known, usual)
     starts = two_pass.smoothed_starts(edited.smoothed)
     run, smoothed = forward.filter_log(edited.log, edited.model, starts), edited.smoothed
-    other = edited.decision.slowest if edited.decision.alternative is None else edited.decision.alternative.model
+    other = edited.decision.slowest if edited.decision.alternative is None else edited.decision.alternative.slowest
     if other is not None:
         run, smoothed = _worse_of(edited, run, other)
     shifts = edited.faults.shifts

@@ -217,7 +217,7 @@ def allow_for_colour(record: Record, decision: Decision) -> Decision:
         return decision
     found = coloured_noise.fit_coloured(log, starts, median_level(decision.model), record.fixed)
     if found.likelier and found.separable:
-        coloured = decision._replace(model=found.model, slowest=found.slowest)
+        coloured = decision._replace(model=found.fastest, slowest=found.slowest)
         again = decide(record, coloured, tune_first=False)
         return again if again.settled else coloured
     return decision._replace(alternative=found) if found.possible else decision

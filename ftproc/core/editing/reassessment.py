@@ -121,6 +121,11 @@ def may_be_turns(decision: Decision, jumps_only: FloatArray) -> NDArray[np.bool_
     return found
 
 
+def few(doubtful: NDArray[np.bool_]) -> bool:
+    """Whether most of the log is far from doubtful readings (n, 3)."""
+    return bool(_widened(np.asarray(doubtful.any(1), np.bool_)).mean() < MOST)
+
+
 def with_turns(record: Record, decision: Decision, weight: FloatArray, doubtful: NDArray[np.bool_]) -> Decision:
     """The decisions on a long log, made again from these weights (n, 3) on around each doubtful reading (n, 3), where
     that takes some of these in and is likelier."""

@@ -11,7 +11,6 @@ patch. So rejected runs that lie on a track of their own are taken in again befo
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -24,7 +23,7 @@ from ftproc.core.editing.decisions import Decision, Record
 from ftproc.core.editing.runs import runs_of
 from ftproc.core.filtering.initialization import find_starts, first_state
 from ftproc.core.filtering.records import Model, Observations
-from ftproc.core.filtering.shifts import shifts
+from ftproc.core.filtering.shifts import Shifts, shifts
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification.likelihood import Fixed, fit_level
 from ftproc.core.identification.profile import fit_profile, median_level
@@ -83,16 +82,17 @@ class Stretch(NamedTuple):
 def find(record: Record, decision: Decision) -> list[Step]:
     """The steps in a log whose outliers were decided as if it had none; some are not sure."""
     calm = median_level(decision.model)
-    weight = _taken_in(record, decision, calm)
-    log = record.weighted(weight)
-    scales = scales_of(log, calm.noise_variance)
+    decided = shifts(record.weighted(decision.weight), calm, decision.starts)
+    weight = _taken_in(record, decision, calm, decided.residual)
+    scales = scales_of(record.weighted(weight), calm.noise_variance)
     around = int(np.clip(MEMORIES * scales.memory_s(float(calm.jerk[0, 0])) / scales.interval_s, *AROUND))
     margin = MARGIN + math.log(4 * len(record.time_s))
     found: list[Step] = []
-    tries = [weight] if (weight == decision.weight).all() else [weight, decision.weight]
-    candidates = itertools.chain.from_iterable(
-        _standing_out(record.weighted(each), calm, around // 2) for each in tries
-    )
+    candidates = _standing_out(decided, calm, around // 2)
+    if (weight != decision.weight).any():
+        log = record.weighted(weight)
+        starts = find_starts(log, calm.noise_variance, float(calm.jerk[0, 0]))
+        candidates = [*_standing_out(shifts(log, calm, starts), calm, around // 2), *candidates]
     for step in candidates:
         near = slice(max(step.sample - around, 0), step.sample + around)
         known, one = ([s._replace(sample=s.sample - near.start) for s in some] for some in (found, [step]))
@@ -112,7 +112,7 @@ def refined(log: Observations, model: Model, steps: Sequence[Step]) -> tuple[Obs
     """The log and the steps with the sizes that all the record tells. log: with the steps bridged as they are."""
     if not steps:
         return log, []
-    score, information = shifts(log, model, find_starts(log, model.noise_variance, float(model.jerk[0, 0])))
+    score, information, _ = shifts(log, model, find_starts(log, model.noise_variance, float(model.jerk[0, 0])))
     rest, found = [], []
     for step in steps:
         at = step.sample - 1, step.component
@@ -168,14 +168,10 @@ def spread(state: FloatArray, steps: Sequence[Step]) -> tuple[FloatArray, FloatA
     return axes, lines
 
 
-def _taken_in(record: Record, decision: Decision, calm: Model) -> FloatArray:
-    """The decisions' weights (n, 3), but with the rejected runs whose readings lie on a track of their own."""
+def _taken_in(record: Record, decision: Decision, calm: Model, residual: FloatArray) -> FloatArray:
+    """The decisions' weights (n, 3), but with the rejected runs whose readings lie on a track of their own. residual:
+    (n, 3) leave-one-out, of these decisions."""
     weight = decision.weight.copy()
-    rejected = record.possible & (weight <= 0)
-    if not (rejected[:-1] & rejected[1:]).any():
-        return weight
-    log = record.weighted(decision.weight)
-    residual = smooth_log(log, calm, decision.starts, residuals_only=True).residual
     sigma = np.sqrt(calm.noise_variance)
     for c in range(3):
         seen = np.flatnonzero(record.possible[:, c])
@@ -186,13 +182,9 @@ def _taken_in(record: Record, decision: Decision, calm: Model) -> FloatArray:
     return weight
 
 
-def _standing_out(log: Observations, calm: Model, apart: int) -> list[Step]:
+def _standing_out(found: Shifts, calm: Model, apart: int) -> list[Step]:
     """The steps that stand out of a calm flight, the clearest first, and so many samples apart."""
-    try:
-        starts = find_starts(log, calm.noise_variance, float(calm.jerk[0, 0]))
-    except ValueError:
-        return []
-    score, information = shifts(log, calm, starts)
+    score, information = found.score.copy(), found.information
     small = SMALL * SMALLEST * np.sqrt(calm.noise_variance) * information[:, :3]
     score[:, :3] = np.where(np.abs(score[:, :3]) > small, score[:, :3], 0.0)
     size = np.divide(
@@ -200,15 +192,15 @@ def _standing_out(log: Observations, calm: Model, apart: int) -> list[Step]:
     )
     end = 1 + min(END, int(SHARE * len(size)))
     size[:end] = size[-end:] = 0.0
-    found: list[Step] = []
-    while len(found) < MOST and size.max() > LEAST:
+    steps: list[Step] = []
+    while len(steps) < MOST and size.max() > LEAST:
         k, c = (int(i) for i in np.unravel_index(int(size.argmax()), size.shape))
         estimate, sigma = score[k, c] / information[k, c], 1 / math.sqrt(information[k, c])
-        found.append(Step(c, k + 1, float(-estimate if c == CLOCK else estimate), sigma))
+        steps.append(Step(c, k + 1, float(-estimate if c == CLOCK else estimate), sigma))
         near = slice(max(k - apart, 0), k + apart)
         size[near, c] = 0.0
         size[near, CLOCK] = 0.0  # which is no jump where one component stands out more
-    return found
+    return steps
 
 
 def _from(model: Model, time_s: FloatArray, near: slice) -> Model:

@@ -28,8 +28,8 @@ from ftproc.core.editing.decisions import (
     late_stamps,
 )
 from ftproc.core.editing.reassessment import (
-    SHORT_LOG,
     believed,
+    few,
     likelier,
     log_probability,
     may_be_turns,
@@ -239,7 +239,7 @@ def _decided(
     turns = jumps_only * possible
     doubtful = may_be_turns(found[1], turns)
     if jerk_psd is None and found[1].stamp_s == 0 and doubtful.any():
-        if found[1].settled and len(time_s) > SHORT_LOG:
+        if found[1].settled and few(doubtful):
             return found[0], with_turns(*found, turns, doubtful)
         other = begin(turns)
         takes_in = (other[1].weight > found[1].weight)[doubtful].any()

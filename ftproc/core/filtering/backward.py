@@ -23,8 +23,8 @@ class Backward(Protocol):
 
     v, w, nu: v, W, U N of the smoother's head. state, cov: of the smoothed estimate (of the covariance only the blocks
     of position and velocity, and the diagonal). pn: P N. q: coefficients of Q. residual, variance: leave-one-out.
-    noise_score, wander_score: sums so far, of the white noise and of the offsets' variances. n_first: N+ of the first
-    sample.
+    noise_score, wander_score, fade_score: sums so far, of the white noise, and of the offsets' variances and
+    correlation times. n_first: N+ of the first sample.
     """
 
     r: Annotated[FloatArray, 9]
@@ -40,6 +40,7 @@ class Backward(Protocol):
     variance: Annotated[FloatArray, 3]
     noise_score: Annotated[FloatArray, 3]
     wander_score: Annotated[FloatArray, 3]
+    fade_score: Annotated[FloatArray, 3]
     n_first: Annotated[FloatArray, 9, 9]
 
 
@@ -268,3 +269,23 @@ def score_wander(back: Backward, f: Filter, interval: float) -> None:
         fade = math.exp(-interval / f.fade_s[i - OFFSETS])
         added = (1 - fade * fade) * f.wander[i - OFFSETS]
         back.wander_score[i - OFFSETS] += 0.5 * added * (back.r[i] * back.r[i] - back.n[i, i])
+
+
+@part
+def score_fade(back: Backward, earlier: Any, f: Filter, interval: float) -> None:
+    """Add to the score of the offsets' correlation times, by their logarithms, over the interval since an earlier
+    update, which was retained with its state: r' dPhi x+ + 1/2 (r r' - N) : d(Phi P+ Phi' + Q)."""
+    x, p, r, n, t = earlier.x, earlier.p, back.r, back.n, interval
+    for i in range(OFFSETS, len(x)):
+        fade = math.exp(-t / f.fade_s[i - OFFSETS])
+        slope = fade * t / f.fade_s[i - OFFSETS]
+        total = r[i] * x[i]
+        for j in range(3):
+            position = p[j, i] + t * p[3 + j, i] + 0.5 * t * t * p[6 + j, i]
+            total += (r[i] * r[j] - n[i, j]) * position
+            total += (r[i] * r[3 + j] - n[i, 3 + j]) * (p[3 + j, i] + t * p[6 + j, i])
+            total += (r[i] * r[6 + j] - n[i, 6 + j]) * p[6 + j, i]
+        for j in range(OFFSETS, len(x)):
+            total += (r[i] * r[j] - n[i, j]) * math.exp(-t / f.fade_s[j - OFFSETS]) * p[j, i]
+        lost = fade * f.wander[i - OFFSETS] * (r[i] * r[i] - n[i, i])
+        back.fade_score[i - OFFSETS] += slope * (total - lost)

@@ -31,12 +31,21 @@ class ShiftMemory(NamedTuple):
     residuals: Residuals
 
 
+class Shifts(NamedTuple):
+    """What a record says of a step between each sample and the next: score and information (n, 4), of which
+    score / information is the estimate and 1 / information its variance; and the leave-one-out residuals (n, 3) of a
+    record without steps."""
+
+    score: FloatArray
+    information: FloatArray
+    residual: FloatArray
+
+
 _sweep = kernel(variant(smoother.swept_through, __name__, "_sweep", memory=ShiftMemory, _store=backward.store_shift))
 
 
-def shifts(log: Observations, model: Model, starts: list[Start]) -> tuple[FloatArray, FloatArray]:
-    """What the record says of a step between each sample and the next: score and information (n, 4), of which
-    score / information is the estimate and 1 / information its variance (de Jong and Penzer 1998, section 3).
+def shifts(log: Observations, model: Model, starts: list[Start]) -> Shifts:
+    """What the record says of steps (de Jong and Penzer 1998, section 3).
 
     In the first three columns the readings of a component are larger from the next sample on, m, rad, rad: a shock of
     an offset of that component, which the smoother carries along at no variance. In the last the target is seconds
@@ -53,4 +62,6 @@ def shifts(log: Observations, model: Model, starts: list[Start]) -> tuple[FloatA
         memory = memory._replace(back=zeros(backward.COLOURED))
         span = Span(start.sample, stop, start.sample)
         _sweep(span, samples, profile, memory, np.zeros_like(model.jerk), smoother.STATES)
-    return found["score"].copy(), found["information"].copy()
+    return Shifts(
+        *(np.ascontiguousarray(each) for each in (found["score"], found["information"], residuals["residual"]))
+    )

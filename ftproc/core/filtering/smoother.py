@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from ftproc.core import pacing
 from ftproc.core.compiled import kernel, part, variant, zeros
 from ftproc.core.filtering import backward, sites, ukf
-from ftproc.core.filtering.filters import Filter, Update, retain
+from ftproc.core.filtering.filters import OFFSETS, Filter, Update, retain
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Span, advance, extrapolated
 from ftproc.core.filtering.memory import ColouredMemory, Memory, memory_of
 from ftproc.core.filtering.records import Model, Observations, Sample, Samples, Start, between
@@ -148,7 +148,7 @@ def _swept_through(
                 likelihood += gained
             if turn >= last and wanted >= SCORES:
                 whole = wanted == STATES or (wanted == RESIDUALS and (k == span.first or _leaves_some(f)))
-                retain(f, block[k - low], whole)
+                retain(f, block[k - low], whole or len(f.x) > OFFSETS)
                 if wanted >= RESIDUALS:
                     residuals[k].nis = nis
         if turn < last or wanted == LIKELIHOOD:
@@ -170,6 +170,10 @@ def _swept_through(
             if k > span.first:
                 backward.score_jerk(back, interval, jerk_score[motion.knot_index(samples[k].time_s, profile)])
                 backward.score_wander(back, f, interval)
+                if k > low:
+                    backward.score_fade(back, block[k - 1 - low], f, interval)
+                else:
+                    backward.score_fade(back, before[b], f, interval)
                 motion.adjoint(back, interval)
                 motion.wander_back(back, interval, f.fade_s)
             else:
@@ -199,11 +203,13 @@ def smoothed_covariance(p: FloatArray, n: FloatArray) -> FloatArray:
 
 
 class Scores(NamedTuple):
-    """The likelihood of a model and its slope: noise and wander (3,) by ln(variance), jerk (m, 6) by each element."""
+    """The likelihood of a model and its slope: noise and wander (3,) by ln(variance), fade (3,) by ln(correlation time)
+    of the offsets, jerk (m, 6) by each element."""
 
     log_likelihood: float
     noise: FloatArray
     wander: FloatArray
+    fade: FloatArray
     jerk: FloatArray
 
 
@@ -222,16 +228,18 @@ def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) ->
     samples, profile = log.samples(model.noise_variance), model.profile(log.time_s)
     sweep = _sweep_coloured if model.coloured else _sweep
     estimates, residuals = zeros(ESTIMATED, n if wanted == STATES else 0), zeros(LEFT, n if wanted >= RESIDUALS else 0)
-    noise, wander, jerk, likelihood, heads = np.zeros(3), np.zeros(3), np.zeros_like(model.jerk), 0.0, []
+    (noise, wander, fade), jerk = np.zeros((3, 3)), np.zeros_like(model.jerk)
+    likelihood, heads = 0.0, list[Start]()
     for start, stop in between(starts, n):
         memory = memory_of(stop - start.sample, model.filter(start), estimates, residuals)
         likelihood += sweep(Span(start.sample, stop, start.sample), samples, profile, memory, jerk, wanted)
         noise += memory.back["noise_score"][0]
         wander += memory.back["wander_score"][0]
+        fade += memory.back["fade_score"][0]
         if wanted == STATES or (wanted == RESIDUALS and 0 < start.sample == starts[0].sample):
             covariance = smoothed_covariance(memory.block["p"][0], memory.back["n_first"][0])[:9, :9]
             heads.append(Start(start.sample, memory.back["state"][0, :9].copy(), covariance))
-    return _Swept(Scores(likelihood, noise, wander, jerk), estimates, residuals, tuple(heads))
+    return _Swept(Scores(likelihood, noise, wander, fade, jerk), estimates, residuals, tuple(heads))
 
 
 def likelihood_of(log: Observations, model: Model, starts: list[Start]) -> float:

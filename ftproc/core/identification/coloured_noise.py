@@ -25,7 +25,7 @@ from ftproc.core.identification.likelihood import (
     representative,
     shaped,
 )
-from ftproc.core.identification.profile import fit_profile, median_level
+from ftproc.core.identification.profile import fit_profile
 from ftproc.core.identification.scales import Scales, scales_of
 
 FloatArray = NDArray[np.float64]
@@ -41,20 +41,20 @@ FIRST_FADES = (1.5, 6.0, 25.0)  # intervals: correlation times with which the se
 FIRST_CALMS = (1.0, 1e-3)  # and shares of the jerk that white noise leads to
 FIRST_STEPS, STEPS, PROFILE_STEPS = 5, 15, 4
 SHORTEST_FADE, LONGEST_FADE = 0.3, 0.5  # intervals, and spans of the log
-STEP = 0.02  # of ln(tau), for differences
 LARGEST = 1e4  # times the variance that white noise would have
 NEGLIGIBLE = 0.02  # share of a component's variance, and correlation of neighbours
 LEAST_GAIN = 8.0  # in log-likelihood, for each component whose noise is called correlated
-REFUTED = 0.5  # in log-likelihood, by which other parameters may be less likely: one standard deviation
+REFUTED = 0.5  # in log-likelihood, by which another component may be less likely: one standard deviation
 INDEPENDENT = 20.0  # correlation times that a log must last for noise and motion to be separated
 
 
 class Coloured(NamedTuple):
-    """A model with correlated noise, and one whose noise wanders as slowly and as far as the log allows. likelier: the
-    first is likelier than that of white noise by LEAST_GAIN for each component; possible: by that once. separable: the
-    log lasts long enough to tell such noise from motion."""
+    """The likeliest model with correlated noise, and those whose noise wanders as fast, and as slowly and far, as the
+    log allows. likelier: the first is likelier than that of white noise by LEAST_GAIN for each component; possible: by
+    that once. separable: the log lasts long enough to tell such noise, if it is fast, from motion."""
 
     model: Model
+    fastest: Model
     slowest: Model
     likelier: bool
     possible: bool
@@ -94,21 +94,23 @@ def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fi
     search = _Search(part, starts, white, fixed, scales)
     tries = [search.run(search.first(fade, calm), FIRST_STEPS) for fade in FIRST_FADES for calm in FIRST_CALMS]
     theta = search.run(min(tries, key=lambda theta: search.cost(theta)[0]), STEPS)
-    model, slowest = search.model(theta), search.model(search.slowest(theta))
+    found = [search.model(theta), *(search.model(search.along(theta, factor)) for factor in (0.5, 2.0))]
+    model = found[0]
     neighbours = np.exp(-scales.interval_s / model.fade_s) * model.wander_variance / model.reading_variance
     correlated = neighbours > NEGLIGIBLE
-    model, slowest = (
-        each._replace(wander_variance=np.where(correlated, each.wander_variance, 0.0)) for each in (model, slowest)
+    model, fastest, slowest = (
+        each._replace(wander_variance=np.where(correlated, each.wander_variance, 0.0)) for each in found
     )
     level = fit_profile(part, starts, fit_level(part, starts, white, fixed), PROFILE_STEPS)
-    model = fit_profile(part, starts, model, PROFILE_STEPS)
-    gain = likelihood_of(part, model, starts) - likelihood_of(part, level, starts)
+    gain = likelihood_of(part, fit_profile(part, starts, model, PROFILE_STEPS), starts)
+    gain -= likelihood_of(part, level, starts)
     return Coloured(
-        median_level(model),
+        model,
+        fastest,
         slowest,
         likelier=bool(correlated.any()) and gain > LEAST_GAIN * int(correlated.sum()),
         possible=bool(correlated.any()) and gain > LEAST_GAIN,
-        separable=float(model.fade_s[correlated].max(initial=0.0)) < scales.span_s / INDEPENDENT,
+        separable=float(fastest.fade_s[correlated].max(initial=0.0)) < scales.span_s / INDEPENDENT,
     )
 
 
@@ -148,25 +150,22 @@ class _Search:
         model = self.model(theta)
         found = score_log(self.log, model, self.starts)
         by_axis, pull = found.jerk[0] * model.jerk[0], VERTICAL_PRECISION * theta[10]
-        fades = np.zeros(3)
-        for c in range(3):
-            moved = theta.copy()
-            moved[6 + c] += STEP
-            fades[c] = (likelihood_of(self.log, self.model(moved), self.starts) - found.log_likelihood) / STEP
-        slope = -np.r_[found.noise, found.wander, fades, by_axis.sum(), by_axis[5] - pull]
+        slope = -np.r_[found.noise, found.wander, found.fade, by_axis.sum(), by_axis[5] - pull]
         return -found.log_likelihood + 0.5 * pull * theta[10], slope
 
-    def slowest(self, theta: FloatArray) -> FloatArray:
-        """The parameters with the slowest and largest offsets that the log does not refute. Over a few samples an
-        offset of twice the variance that fades half as fast looks the same, and what is slower than that, motion."""
-        least = likelihood_of(self.log, self.model(theta), self.starts) - REFUTED
+    def along(self, theta: FloatArray, factor: float) -> FloatArray:
+        """The parameters with offsets as much slower and larger, or faster and smaller, as the log does not refute.
+        Over a few samples an offset of twice the variance that fades half as fast looks the same, and what is slower
+        than that, motion."""
         for c in range(3):
+            least = likelihood_of(self.log, self.model(theta), self.starts) - REFUTED
             while True:
-                slower = theta.copy()
-                slower[[3 + c, 6 + c]] += math.log(2)
-                if (slower > self.upper).any() or likelihood_of(self.log, self.model(slower), self.starts) < least:
+                other = theta.copy()
+                other[[3 + c, 6 + c]] += math.log(factor)
+                inside = (other >= self.lower).all() and (other <= self.upper).all()
+                if not inside or likelihood_of(self.log, self.model(other), self.starts) < least:
                     break
-                theta = slower
+                theta = other
         return theta
 
     def run(self, theta: FloatArray, steps: int) -> FloatArray:

@@ -60,13 +60,15 @@ def test_a_component_keeps_what_screening_trusts_if_almost_nothing_is_left():
 @pytest.mark.parametrize("settled", [True, False])
 def test_decisions_under_correlated_noise_are_taken_only_if_they_stand_still(monkeypatch, settled):
     before = decisions.Decision(np.ones((4, 3)), Model(np.ones(3), np.ones((1, 6))), [], np.ones((3, 3)))
-    found = Coloured(before.model._replace(fade_s=np.full(3, 2.0)), before.model, True, True, True)
-    after = before._replace(weight=np.zeros((4, 3)), model=found.model, settled=settled)
+    slower, faster = (before.model._replace(fade_s=np.full(3, fade_s)) for fade_s in (2.0, 1.0))
+    found = Coloured(before.model, faster, slower, True, True, True)
+    after = before._replace(weight=np.zeros((4, 3)), model=faster, slowest=slower, settled=settled)
     monkeypatch.setattr(decisions, "smooth_log", lambda *args, **options: None)
     monkeypatch.setattr(decisions, "decide", lambda record, decision, tune_first: after)
     monkeypatch.setattr(decisions.coloured_noise, "may_be", lambda *args: True)
     monkeypatch.setattr(decisions.coloured_noise, "fit_coloured", lambda *args: found)
     record = SimpleNamespace(weighted=lambda weight: None, fixed=None)
     decided = decisions.allow_for_colour(record, before)
-    assert decided.model is found.model
+    assert decided.model is faster
+    assert decided.slowest is slower
     np.testing.assert_array_equal(decided.weight, after.weight if settled else before.weight)

@@ -65,9 +65,9 @@ def test_noise_that_grows_with_nearness_is_noise():
     assert rejected.max() < 0.05
 
 
-def test_turns_of_a_long_log_are_found_where_they_may_be(monkeypatch):
+def test_turns_are_looked_for_where_they_may_be(monkeypatch):
     flights = [arrival(0, TURNS[0])]
-    monkeypatch.setattr(two_pass, "SHORT_LOG", 0)
+    monkeypatch.setattr(two_pass, "few", lambda doubtful: True)
     assert edited(flights)[0][0] < 20
     monkeypatch.setattr(two_pass, "with_turns", lambda record, decision, weight, doubtful: decision)
     assert edited(flights)[0][0] > 50

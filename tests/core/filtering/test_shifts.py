@@ -17,7 +17,7 @@ pytestmark = pytest.mark.compiled
 @pytest.mark.parametrize(("c", "k"), [(0, 30), (1, 12), (2, 55)])
 def test_score_and_information_are_slope_and_bend_of_the_likelihood(c, k):
     a = matched(3, 80, dt=0.4, q=4.0, irregular=True, missing=0.2, distance=40_000.0)
-    score, information = shifts(a.log, a.model, a.starts)
+    score, information, _ = shifts(a.log, a.model, a.starts)
     size = 0.02 * SIGMA[c]
 
     def likelihood(shift):
@@ -32,7 +32,7 @@ def test_score_and_information_are_slope_and_bend_of_the_likelihood(c, k):
 
 def test_nothing_is_said_of_a_step_after_the_last_sample():
     a = matched(4, 20, dt=0.5)
-    score, information = shifts(a.log, a.model, a.starts)
+    score, information, _ = shifts(a.log, a.model, a.starts)
     assert not score[-1].any()
     assert not information[-1].any()
     assert (information[:-1] > 0).all()
@@ -47,7 +47,7 @@ def test_a_jump_of_the_clock_is_found_with_its_size_and_its_sigma():
         moved = a.truth[:, :3] + late * a.truth[:, 3:6] + 0.5 * late**2 * a.truth[:, 6:]
         z = a.z.copy()
         z[k:] += from_cartesian(moved)[k:] - from_cartesian(a.truth[:, :3])[k:]
-        score, information = shifts(Observations(a.time, z, a.weight), a.model, a.starts)
+        score, information, _ = shifts(Observations(a.time, z, a.weight), a.model, a.starts)
         off.append((score[k - 1, 3] / information[k - 1, 3] - late) * np.sqrt(information[k - 1, 3]))
     assert np.sqrt(np.mean(np.square(off))) < 1.5
 
@@ -56,7 +56,7 @@ def test_without_a_step_the_scores_have_the_variance_that_they_state():
     found = []
     for seed in range(60):
         a = matched(seed, 60, dt=0.5, distance=30_000.0)
-        score, information = shifts(a.log, a.model, a.starts)
+        score, information, _ = shifts(a.log, a.model, a.starts)
         found.append(score[30] / np.sqrt(information[30]))
     assert np.sqrt(np.mean(np.square(found), 0)) == pytest.approx(1.0, abs=0.3)
 

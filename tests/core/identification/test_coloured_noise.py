@@ -9,6 +9,7 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.core.editing import two_pass
+from ftproc.core.filtering import memory
 from ftproc.core.filtering.forward import filter_log
 from ftproc.core.filtering.smoother import score_log, smooth_log
 from ftproc.core.identification import coloured_noise
@@ -57,12 +58,16 @@ def test_leave_one_out_residuals_are_those_of_a_run_without_the_reading():
         assert run.residual_variance[k, c] == pytest.approx(without.residual_variance[k, c], rel=0.01)
 
 
-def test_scores_are_the_slopes_of_the_likelihood():
+@pytest.mark.parametrize("block", [7, 1000])
+def test_scores_are_the_slopes_of_the_likelihood(monkeypatch, block):
+    """Also where the way back goes over several blocks."""
+    monkeypatch.setattr(memory, "BLOCK", block)
     a = matched(2, 150, missing=0.2, irregular=True)
     model = coloured(a)
     scores = score_log(a.log, model, a.starts)
     step = 1e-4
-    for name, score in (("noise_variance", scores.noise), ("wander_variance", scores.wander)):
+    by_name = {"noise_variance": scores.noise, "wander_variance": scores.wander, "fade_s": scores.fade}
+    for name, score in by_name.items():
         for c in range(3):
             value = []
             for sign in (1, -1):
