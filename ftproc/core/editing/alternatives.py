@@ -31,7 +31,7 @@ AROUND = 80  # samples on each side that the comparison looks at
 ROUNDS = 5
 MARGIN = 5.0  # by which the log-probability of another decision must be better
 MOST = 100  # comparisons in one look
-WORK, WORK_PER_SAMPLE = 250_000, 60  # samples that one search may smooth, and for each sample of the log
+WORK, WORK_PER_SAMPLE = 250_000, 60  # samples that may be smoothed for a log, and for each of its samples
 STEPS = 14  # of filling a hole, or of taking out what stands out most
 FITS = 2.5  # sigmas off at which a reading is taken into a hole
 SURE, ALMOST = 1.5, 1.3  # times the noise, or the smallest sigma in the hole: where the track is known well enough
@@ -77,21 +77,28 @@ class Island(NamedTuple):
         return Island(self.component, *(place - samples for place in self[1:]))
 
 
-class Search:
-    """A search for alternatives in a log of so many samples. tried: islands that were examined; they are examined again
-    only if they have changed. unexamined: those beyond the MOST of a look, and those that no work was left for; work is
-    counted in samples that are smoothed, not in seconds, so that a result does not depend on the machine."""
+class Work:
+    """What the search for alternatives in a log of so many samples may still cost, in all hypotheses about it: counted
+    in samples that are smoothed, not in seconds, so that a result does not depend on the machine."""
 
     def __init__(self, samples: int, at_least: int = WORK) -> None:
         """at_least: how much work any log is worth."""
+        self.left = at_least + WORK_PER_SAMPLE * samples
+
+
+class Search:
+    """A search for alternatives. tried: islands that were examined; they are examined again only if they have changed.
+    unexamined: those beyond the MOST of a look, and those that no work was left for."""
+
+    def __init__(self, work: Work) -> None:
         self.tried: set[Island] = set()
         self.unexamined: set[Island] = set()
-        self.work = at_least + WORK_PER_SAMPLE * samples
+        self.work = work
 
     def take(self, island: Island) -> bool:
         """Whether there is work left for an island."""
-        (self.tried if self.work > 0 else self.unexamined).add(island)
-        return self.work > 0
+        (self.tried if self.work.left > 0 else self.unexamined).add(island)
+        return self.work.left > 0
 
 
 class Step(NamedTuple):
@@ -116,7 +123,7 @@ def try_alternatives(log: Neighbourhood, weight: FloatArray, search: Search) -> 
             steps = [*decisions(part, result[near]), *_alternatives(part, result[near], island.shifted(low))]
         except ValueError:  # a component has too few readings there
             continue
-        search.work -= len(steps) * len(part.time_s)
+        search.work.left -= len(steps) * len(part.time_s)
         likeliest = max(steps, key=lambda step: step.likelihood)
         if likeliest.likelihood > steps[0].likelihood + MARGIN:
             result[near] = likeliest.weight

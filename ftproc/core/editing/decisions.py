@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing import outlier_chain
+from ftproc.core.editing.alternatives import Work
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
@@ -34,8 +35,8 @@ FEWEST_KEPT = 0.5  # share of what screening trusts that must survive the decisi
 class Record(NamedTuple):
     """What stays the same while decisions are made: the log, the readings that may be good at all (n, 3), what
     screening trusts (n, 3) and the noise 1-sigma (3,) that it saw, what the user has fixed, the gate in sigmas, the
-    1-sigma (3,) that rounding alone makes, and how the noise of single readings differs, if it does. live: of a window
-    that moves on, which is soon looked at again. white: whether the noise is taken for white and even."""
+    1-sigma (3,) that rounding alone makes, what work is left for alternatives, and how the noise of single readings
+    differs, if it does. white: whether the noise is taken for white and even."""
 
     time_s: FloatArray
     measurement: FloatArray
@@ -45,8 +46,8 @@ class Record(NamedTuple):
     fixed: Fixed
     gate: float
     rounding: FloatArray
+    work: Work
     uneven: Uneven | None = None
-    live: bool = False
     white: bool = False
 
     def weighted(self, weight: FloatArray) -> Observations:

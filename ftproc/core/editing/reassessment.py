@@ -79,7 +79,7 @@ def _until_settled(record: Record, decision: Decision, profile: Model | None) ->
     """
     first = decision._replace(model=profile or _profile(record, decision))
     profile = first.model
-    search = alternatives.Search(len(record.time_s), 0 if record.live else alternatives.WORK)
+    search = alternatives.Search(record.work)
     tried_at = np.inf
     for _ in range(ROUNDS):
         profile = profile or _profile(record, decision)

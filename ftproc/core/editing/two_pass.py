@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing import jump_patches, outlier_chain, screening, steps
+from ftproc.core.editing.alternatives import WORK, Work
 from ftproc.core.editing.copies import KindArray, without_copies
 from ftproc.core.editing.decisions import (
     IMPRECISE,
@@ -184,7 +185,8 @@ def edit(
     reading that agrees with its neighbours.
     """
     measurement, copied = without_copies(time_s, measurement)
-    record, decision = _decided(time_s, measurement, known, segment_of, live, short)
+    work = Work(len(time_s), 0 if live else WORK)  # a window that moves on is soon looked at again
+    record, decision = _decided(time_s, measurement, known, segment_of, work, short)
     found, doubtful = list[Step](), list[Step]()
     for _ in range(0 if live else STEP_ROUNDS):
         new = [] if decision.model.coloured else steps.find(record, decision)  # noise that wanders looks like many
@@ -192,7 +194,7 @@ def edit(
         if not new:
             break
         log = record.weighted(decision.weight)
-        other = _decided(time_s, steps.bridged(log, decision.model, new), known, segment_of, live, short)
+        other = _decided(time_s, steps.bridged(log, decision.model, new), known, segment_of, work, short)
         if _may_be_late_stamps((record, decision), other):
             break
         (record, decision), found = other, sorted([*found, *new], key=lambda s: s.sample)
@@ -220,7 +222,7 @@ def _may_be_late_stamps(without: tuple[Record, Decision], bridged: tuple[Record,
 
 
 def _decided(
-    time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: Model | None, live: bool, white: bool
+    time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: Model | None, work: Work, white: bool
 ) -> tuple[Record, Decision]:
     """The decisions on a log as if it had no steps, with a jerk profile."""
     jerk_psd = known.jerk_psd
@@ -231,8 +233,9 @@ def _decided(
     rounding = rounding_sigma(measurement)
     coarse = np.where(rounding > COARSE * sigma, np.sqrt(12) * rounding, 0.0)
     uneven = uneven_noise.repeated(measurement, coarse)
-    record = Record(time_s, measurement, possible, screened * possible, sigma, fixed, known.gate, rounding, uneven)
-    record = record._replace(live=live, white=white)
+    record = Record(
+        time_s, measurement, possible, screened * possible, sigma, fixed, known.gate, rounding, work, uneven, white
+    )
     noise = np.where(np.isfinite(known.sigma), known.sigma, sigma) ** 2
     begin = partial(_first, record, segment_of=segment_of, noise=noise, jerk_psd=jerk_psd)
     found = _examined(*begin(record.screened), known)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part
 from ftproc.core.filtering.records import Observations, Start
-from ftproc.core.model.measurement import wrapped
+from ftproc.core.model.measurement import NO_RANGE_M, wrapped
 from ftproc.core.signatures import Indices, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
@@ -31,20 +31,18 @@ ONE_SECOND = 1.0  # in which a target may have passed its own range, if all its 
 def first_start(log: Observations, noise_variance: FloatArray) -> Start:
     """The start of a log: at its first sample, or, where its position would be too vague there, where every component
     has been seen once. Errors as in `first_state`."""
-    good = (log.weight > 0) & np.isfinite(log.measurement)
-    if not good.any(0).all():
-        raise ValueError(int(np.argmin(good.any(0))))
     everything = slice(0, len(log.time_s))
     start = first_state(log, noise_variance, 0, everything)
-    seen = int(good.argmax(0).max())
-    if seen > 0 and not _vague(start) <= INFLATION * WIDEST_BRIDGE:
-        start = first_state(log, noise_variance, seen, everything)
+    if not _vague(start) <= INFLATION * WIDEST_BRIDGE:
+        seen = int(((log.weight > 0) & np.isfinite(log.measurement)).argmax(0).max())
+        start = first_state(log, noise_variance, seen, everything) if seen > 0 else start
     return start
 
 
 def _vague(start: Start) -> float:
     """1-sigma of a start's position, in ranges."""
-    return float(np.sqrt(np.trace(start.covariance[:3, :3])) / np.linalg.norm(start.state[:3]))
+    (x, y, z), covariance = start.state[:3].tolist(), start.covariance
+    return math.sqrt(covariance[0, 0] + covariance[1, 1] + covariance[2, 2]) / max(math.hypot(x, y, z), NO_RANGE_M)
 
 
 def find_starts(log: Observations, noise_variance: FloatArray, jerk_psd: float) -> list[Start]:
@@ -133,16 +131,30 @@ def first_state(log: Observations, noise_variance: FloatArray, sample: int, with
     Raises ValueError with the component's index when a component has no good reading in the span.
     """
     time, z, weight = (np.ascontiguousarray(each) for each in log[:3])
-    fits, spans = np.empty((3, 6)), np.empty(3)
-    for c in range(3):
-        chosen = _nearest(time, z, weight, sample, within.start, within.stop, c)
-        if len(chosen) == 0:
-            raise ValueError(c)
-        spans[c] = _fit(time, z, chosen, sample, c, math.sqrt(noise_variance[c]), fits[c])
-    return Start(sample, *_to_state(fits, float(spans.max())))
+    state, covariance = _first_state(time, z, weight, sample, within.start, within.stop, np.sqrt(noise_variance))
+    if math.isnan(state[0]):
+        seen = ((weight > 0) & np.isfinite(z))[within].any(0)
+        if not seen.all():
+            raise ValueError(int(np.argmin(seen)))
+    return Start(sample, state, covariance)
 
 
 @kernel
+def _first_state(
+    time: Vector, z: Matrix, weight: Matrix, sample: int, first: int, last: int, sigma: Vector
+) -> tuple[Vector, Matrix]:
+    """The state at a sample from its nearest readings among the samples [first, last), and its covariance; NaN where a
+    component has none. sigma (3,) of the readings."""
+    fits, span = np.empty((3, 6)), 0.0
+    for c in range(3):
+        chosen = _nearest(time, z, weight, sample, first, last, c)
+        if len(chosen) == 0:
+            return np.full(9, math.nan), np.full((9, 9), math.nan)
+        span = max(span, _fit(time, z, chosen, sample, c, sigma[c], fits[c]))
+    return _to_state(fits, span)
+
+
+@part
 def _nearest(time: Vector, z: Matrix, weight: Matrix, sample: int, first: int, last: int, c: int) -> Indices:
     """The SAMPLES good readings of a component nearest in time to `sample` among the samples [first, last), or as many
     as there are, in their order."""
@@ -170,7 +182,7 @@ def _nearest(time: Vector, z: Matrix, weight: Matrix, sample: int, first: int, l
     return near[low:high].copy()
 
 
-@kernel
+@part
 def _fit(time: Vector, z: Matrix, chosen: Indices, sample: int, c: int, sigma: float, fit: Vector) -> float:
     """The parabola through the chosen readings at the time of `sample`: value, rate and its change there, and the
     1-sigma of each, in fit (6,). Returns the seconds over which the readings extend; without any, rates are unknown
@@ -254,7 +266,7 @@ def _least_squares(t: FloatArray, v: FloatArray, curved: bool, span: float, fit:
         fit[2] = 2 * bend
 
 
-@kernel
+@part
 def _to_state(fits: Matrix, span: float) -> tuple[Vector, Matrix]:
     """From range, azimuth, elevation with their first and second derivatives, rows of `_fit` (3, 6), to a Cartesian
     state with its covariance. span: the longest of the fits, s."""

@@ -28,7 +28,7 @@ def followed(component=0, begin=190, end=215, flank=8, sigmas=12.0):
 @pytest.mark.parametrize("component", range(3))
 def test_patch_that_was_followed_is_given_up(component):
     log, wrong, right = followed(component)
-    found = alternatives.try_alternatives(log, wrong, alternatives.Search(len(wrong)))
+    found = alternatives.try_alternatives(log, wrong, alternatives.Search(alternatives.Work(len(wrong))))
     np.testing.assert_array_equal(found[190:215, component], 0.0)
     assert (found == right).mean() > 0.998
 
@@ -45,13 +45,13 @@ def test_far_patch_beside_other_outliers_is_given_up(component):
         right[outlier, component] = wrong[outlier, component] = 0.0
     log.measurement[240:250, component] += noise * np.array([70, -40, 55, -80, 30, 90, -60, 45, -75, 65])
     right[240:250, component] = wrong[240:250, component] = 0.0
-    found = alternatives.try_alternatives(log, wrong, alternatives.Search(len(wrong)))
+    found = alternatives.try_alternatives(log, wrong, alternatives.Search(alternatives.Work(len(wrong))))
     np.testing.assert_array_equal(found[165:255, component], right[165:255, component])
 
 
 def test_islands_are_tried_once():
     log, wrong, _ = followed()
-    search = alternatives.Search(len(wrong))
+    search = alternatives.Search(alternatives.Work(len(wrong)))
     search.tried = set(alternatives.islands(log.time_s, wrong, log.possible))
     np.testing.assert_array_equal(alternatives.try_alternatives(log, wrong, search), wrong)
     (again,) = search.tried
@@ -60,23 +60,23 @@ def test_islands_are_tried_once():
     assert again in search.tried
 
 
-def test_a_search_ends_when_its_work_is_done(monkeypatch):
+def test_the_searches_in_a_log_end_when_its_work_is_done(monkeypatch):
     log, wrong, _ = followed()
-    search = alternatives.Search(len(wrong))
-    before = search.work
+    work = alternatives.Work(len(wrong))
+    before, search = work.left, alternatives.Search(work)
     alternatives.try_alternatives(log, wrong, search)
-    assert before - 40 * len(wrong) < search.work < before
+    assert before - 40 * len(wrong) < work.left < before
     assert not search.unexamined
     monkeypatch.setattr(alternatives, "MOST", 0)
-    many = alternatives.Search(len(wrong))
+    many = alternatives.Search(work)
     alternatives.try_alternatives(log, wrong, many)
     assert many.unexamined == search.tried
     monkeypatch.undo()
-    search.work = 0
-    search.tried.clear()
-    np.testing.assert_array_equal(alternatives.try_alternatives(log, wrong, search), wrong)
-    assert search.unexamined == set(alternatives.islands(log.time_s, wrong, log.possible))
-    assert not search.tried
+    work.left = 0
+    another = alternatives.Search(work)
+    np.testing.assert_array_equal(alternatives.try_alternatives(log, wrong, another), wrong)
+    assert another.unexamined == set(alternatives.islands(log.time_s, wrong, log.possible))
+    assert not another.tried
 
 
 def test_the_worst_go_first_and_take_no_good_ones_with_them():
@@ -105,11 +105,15 @@ def test_hole_is_filled_from_its_edges_and_not_with_the_patch(component):
 @pytest.mark.parametrize("component", range(3))
 def test_right_decisions_stay(component):
     log, _, right = followed(component)
-    np.testing.assert_array_equal(alternatives.try_alternatives(log, right, alternatives.Search(len(right))), right)
+    np.testing.assert_array_equal(
+        alternatives.try_alternatives(log, right, alternatives.Search(alternatives.Work(len(right)))), right
+    )
     two = right.copy()  # good readings between two real patches are no patch
     two[225:235, component] = 0.0
     log.measurement[225:235, component] += 20 * np.sqrt(log.model.noise_variance[component])
-    np.testing.assert_array_equal(alternatives.try_alternatives(log, two, alternatives.Search(len(two))), two)
+    np.testing.assert_array_equal(
+        alternatives.try_alternatives(log, two, alternatives.Search(alternatives.Work(len(two)))), two
+    )
 
 
 def test_islands_lie_between_two_rejected_runs():
@@ -152,7 +156,9 @@ def test_neighbourhood_that_says_too_little_is_left():
     log.measurement[:, 2] = np.nan
     log = log._replace(possible=np.isfinite(log.measurement))
     wrong = wrong * log.possible
-    np.testing.assert_array_equal(alternatives.try_alternatives(log, wrong, alternatives.Search(len(wrong))), wrong)
+    np.testing.assert_array_equal(
+        alternatives.try_alternatives(log, wrong, alternatives.Search(alternatives.Work(len(wrong)))), wrong
+    )
 
 
 def test_hole_is_filled_also_where_the_track_is_known_worse_than_the_noise():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core.editing import alternatives, reassessment, two_pass
+from ftproc.core.editing import reassessment, two_pass
 from tests.core.editing.test_two_pass import UNKNOWN, edit, flags
 from tests.simulated import simulate
 
@@ -94,19 +94,6 @@ def test_decisions_that_make_the_whole_record_less_likely_are_refused(decided, m
         found = reassessment._until_settled(record, before, None)
         np.testing.assert_array_equal(found.weight, right.weight)
         assert next(rounds, None) is None
-
-
-@pytest.mark.parametrize("live", [False, True])
-def test_the_search_for_alternatives_is_worth_more_in_a_log_that_was_flown_than_in_a_live_window(
-    decided, monkeypatch, live
-):
-    """A live window is soon looked at again: work is counted by its length alone."""
-    record, decision = decided
-    searches = []
-    monkeypatch.setattr(alternatives, "try_alternatives", lambda log, weight, search: searches.append(search) or weight)
-    reassessment._until_settled(record._replace(live=live), decision, None)
-    of_length = alternatives.WORK_PER_SAMPLE * len(record.time_s)
-    assert {search.work for search in searches} == {of_length + (0 if live else alternatives.WORK)}
 
 
 def test_what_is_suspicious_in_one_component_is_decided_again(decided, monkeypatch):

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ftproc.core.editing import decisions, two_pass
+from ftproc.core.editing import alternatives, decisions, reassessment, two_pass
 from ftproc.core.filtering.initialization import first_state
 from ftproc.core.filtering.records import Observations
 from tests.core.tracks import matched, position_error
@@ -201,3 +201,23 @@ def test_steps_must_explain_a_log_better_than_late_stamps_do(monkeypatch, late_s
     without, bridged = (("log", SimpleNamespace(stamp_s=stamp_s)) for stamp_s in late_s)
     monkeypatch.setattr(two_pass, "log_probability", lambda _, decision: gained if decision is bridged[1] else 0.0)
     assert two_pass._may_be_late_stamps(without, bridged) is expected
+
+
+@pytest.mark.parametrize("live", [False, True])
+def test_alternatives_are_worth_more_work_in_a_log_that_was_flown_than_in_a_live_window(monkeypatch, live):
+    """A live window is soon looked at again. All hypotheses about a log, with steps and without, share the work."""
+    flight, made, used = simulate("manoeuvre", seed=2, duration_s=40.0, outliers="offset=6:8-20:8-100"), [], set()
+
+    def work(samples, at_least):
+        made.append((samples, at_least, alternatives.Work(samples, at_least)))
+        return made[0][2]
+
+    def search(of):
+        used.add(of)
+        return alternatives.Search(of)
+
+    monkeypatch.setattr(two_pass, "Work", work)
+    monkeypatch.setattr(reassessment, "alternatives", SimpleNamespace(**{**vars(alternatives), "Search": search}))
+    two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN, live=live)
+    assert [each[:2] for each in made] == [(len(flight.log), 0 if live else alternatives.WORK)]
+    assert used == {made[0][2]}
