@@ -189,7 +189,8 @@ def edit(
     record, decision = _decided(time_s, measurement, known, segment_of, work, short)
     found, doubtful = list[Step](), list[Step]()
     for _ in range(0 if live else STEP_ROUNDS):
-        new = [] if decision.model.coloured else steps.find(record, decision)  # noise that wanders looks like many
+        # Noise that wanders looks like many steps, and so do patches that there was no time to understand.
+        new = [] if decision.model.coloured or decision.unexamined else steps.find(record, decision)
         new, doubtful = ([step for step in new if step.sure == sure] for sure in (True, False))
         if not new:
             break
