@@ -102,30 +102,43 @@ def _derivative(memory: Any, k: int, i: int, c: int) -> float:
     return float(columns[at + i, c] + turning + design[k, i, 2] * columns[at + 5, c])
 
 
+# The innermost loops below go along the directions, which lie side by side in memory: there may be many.
+
+
 @part
 def _carry(memory: Any, f: Filter, k: int, interval: float, place: int) -> None:
     s, g, u, root, y, h = memory.state, f.g, f.u, f.root, f.y, 0.5 * interval * interval
-    m = s.shape[1]
-    for c in range(m):
-        for i in range(3):
+    white, m = memory.white[max(place, 0)], s.shape[1]
+    for i in range(3):
+        for c in range(m):
             s[i, c] += interval * s[i + 3, c] + h * s[i + 6, c]
             s[i + 3, c] += interval * s[i + 6, c]
+    for i in range(3):
+        g0, g1, g2 = g[i, 0], g[i, 1], g[i, 2]
+        for c in range(m):
+            white[i, c] = g0 * s[0, c] + g1 * s[1, c] + g2 * s[2, c]
+    for c in range(m):
         d0, d1, d2 = _derivative(memory, k, 0, c), _derivative(memory, k, 1, c), _derivative(memory, k, 2, c)
-        w0 = root[0, 0] * d0 + g[0, 0] * s[0, c] + g[0, 1] * s[1, c] + g[0, 2] * s[2, c]
-        w1 = root[1, 0] * d0 + root[1, 1] * d1 + g[1, 0] * s[0, c] + g[1, 1] * s[1, c] + g[1, 2] * s[2, c]
-        w2 = root[2, 0] * d0 + root[2, 1] * d1 + root[2, 2] * d2
-        w2 += g[2, 0] * s[0, c] + g[2, 1] * s[1, c] + g[2, 2] * s[2, c]
-        for i in range(9):
-            s[i, c] -= u[0, i] * w0 + u[1, i] * w1 + u[2, i] * w2
-        if place >= 0:
-            white = memory.white[place]
-            white[0, c], white[1, c], white[2, c] = w0, w1, w2
-            memory.score[c] += w0 * y[0] + w1 * y[1] + w2 * y[2]
-            for e in range(c + 1):
-                memory.info[c, e] += w0 * white[0, e] + w1 * white[1, e] + w2 * white[2, e]
-            for i in range(9):
-                memory.in_block[place, i, c] = s[i, c]
-                memory.spread[k, i] += s[i, c] * s[i, c]
+        white[0, c] += root[0, 0] * d0
+        white[1, c] += root[1, 0] * d0 + root[1, 1] * d1
+        white[2, c] += root[2, 0] * d0 + root[2, 1] * d1 + root[2, 2] * d2
+    for i in range(9):
+        u0, u1, u2 = u[0, i], u[1, i], u[2, i]
+        for c in range(m):
+            s[i, c] -= u0 * white[0, c] + u1 * white[1, c] + u2 * white[2, c]
+    if place < 0:
+        return
+    for c in range(m):
+        w0, w1, w2 = white[0, c], white[1, c], white[2, c]
+        memory.score[c] += w0 * y[0] + w1 * y[1] + w2 * y[2]
+        for e in range(c + 1):
+            memory.info[c, e] += w0 * white[0, e] + w1 * white[1, e] + w2 * white[2, e]
+    for i in range(9):
+        total = 0.0
+        for c in range(m):
+            memory.in_block[place, i, c] = s[i, c]
+            total += s[i, c] * s[i, c]
+        memory.spread[k, i] = total
 
 
 @part
@@ -133,46 +146,49 @@ def _carry_back(memory: Any, update: Update, k: int, interval: float, place: int
     if wanted == SCORES:
         return
     a, white, s = memory.adjoint, memory.white[place], memory.in_block[place]
+    smoothed, row, left = memory.state, memory.estimates[k], memory.residuals[k]
     g, u, p, root, m, h = update.g, update.u, update.p, update.root, len(memory.score), 0.5 * interval * interval
-    row, left = memory.estimates[k], memory.residuals[k]
-    added, lost, smoothed = np.zeros(9), np.zeros(3), np.zeros(9)
-    for c in range(m):
-        for i in range(9):
-            v = s[i, c]
-            for j in range(9):
-                v -= p[i, j] * a[j, c]
-            added[i] += v * v
-            smoothed[i] = v
-        v0, v1, v2 = white[0, c], white[1, c], white[2, c]
-        for i in range(9):
-            v0 -= u[0, i] * a[i, c]
-            v1 -= u[1, i] * a[i, c]
-            v2 -= u[2, i] * a[i, c]
-        for i in range(3):
-            if update.used[i] > 0:
-                share = root[0, i] * v0 + root[1, i] * v1 + root[2, i] * v2
-            else:
-                share = _derivative(memory, k, i, c)
-                share += update.h[i, 0] * smoothed[0] + update.h[i, 1] * smoothed[1] + update.h[i, 2] * smoothed[2]
-            lost[i] += share * share
-        for i in range(3):
-            a[i, c] += g[0, i] * v0 + g[1, i] * v1 + g[2, i] * v2
-        for i in range(3):
-            a[i + 6, c] += interval * a[i + 3, c] + h * a[i, c]
-            a[i + 3, c] += interval * a[i, c]
-        for i in range(9):
-            memory.state[i, c] = smoothed[i]
-    if wanted == STATES:
-        for i in range(9):
-            row.sigma[i] = math.sqrt(row.sigma[i] * row.sigma[i] + added[i])
+    for i in range(9):
+        for c in range(m):
+            smoothed[i, c] = s[i, c]
+        for j in range(9):
+            weight = p[i, j]
+            for c in range(m):
+                smoothed[i, c] -= weight * a[j, c]
+        if wanted == STATES:
+            added = 0.0
+            for c in range(m):
+                added += smoothed[i, c] * smoothed[i, c]
+            row.sigma[i] = math.sqrt(row.sigma[i] * row.sigma[i] + added)
     for i in range(3):
+        for j in range(9):
+            weight = u[i, j]
+            for c in range(m):
+                white[i, c] -= weight * a[j, c]
+    for i in range(3):
+        lost = 0.0
+        for c in range(m):
+            if update.used[i] > 0:
+                share = root[0, i] * white[0, c] + root[1, i] * white[1, c] + root[2, i] * white[2, c]
+            else:
+                share = _derivative(memory, k, i, c) + update.h[i, 0] * smoothed[0, c]
+                share += update.h[i, 1] * smoothed[1, c] + update.h[i, 2] * smoothed[2, c]
+            lost += share * share
         if not update.used[i] > 0:
-            left.residual_variance[i] += lost[i]
+            left.residual_variance[i] += lost
         else:
             known = 1 / (left.residual_variance[i] - update.noise[i] * (1 - 1 / update.used[i]))
-            rest = max(known - lost[i], LEAST_LEFT * known)
+            rest = max(known - lost, LEAST_LEFT * known)
             left.residual[i] *= known / rest
             left.residual_variance[i] = 1 / rest + update.noise[i] * (1 - 1 / update.used[i])
+    for i in range(3):
+        g0, g1, g2 = g[0, i], g[1, i], g[2, i]
+        for c in range(m):
+            a[i, c] += g0 * white[0, c] + g1 * white[1, c] + g2 * white[2, c]
+    for i in range(3):
+        for c in range(m):
+            a[i + 6, c] += interval * a[i + 3, c] + h * a[i, c]
+            a[i + 3, c] += interval * a[i, c]
 
 
 _sweep_biased = kernel(
