@@ -147,7 +147,7 @@ _CURES = (
     *("correct", "copy", "save", "say", "use", "give", "name", "write", "complete", "delete", "rename", "separate"),
     *("put", "fill", "unpack", "train", "convert", "check", "expected", "supported", "choose", "leave", "split"),
     *("count", "add", "sort", "there is no such file", "did you mean", "needs all", "must end in"),
-    *("its keys are", "the sections: "),
+    *("its keys are", "the sections: ", ": ftproc "),
 )
 
 
