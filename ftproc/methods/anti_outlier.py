@@ -18,8 +18,8 @@ from typing import TypeVar
 import numpy as np
 
 from ftproc.core import threads
-from ftproc.core.editing import steps, two_pass
-from ftproc.core.filtering import forward
+from ftproc.core.editing import two_pass
+from ftproc.core.filtering import bridging, forward
 from ftproc.core.filtering.records import FilterRun, Model
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 from ftproc.core.identification.likelihood import HORIZONTAL, VERTICAL
@@ -94,10 +94,10 @@ def _worse_of(edited: two_pass.Edited, run: FilterRun, other: Model) -> tuple[Fi
     )
 
 
-def _widened(run: Run, shifts: Sequence[steps.Step]) -> Run:
+def _widened(run: Run, shifts: Sequence[bridging.Step]) -> Run:
     """A run with sigmas that allow for the uncertain sizes of the shifts that were taken out of its readings."""
     sigma, los_sigma = run.sigma.copy(), run.los_sigma.copy()
-    along_axes, along_lines = steps.spread(run.state, shifts)
+    along_axes, along_lines = bridging.spread(run.state, shifts)
     sigma[:, :3] = np.sqrt(sigma[:, :3] ** 2 + along_axes)
     los_sigma[:, :3] = np.sqrt(los_sigma[:, :3] ** 2 + along_lines)
     return run._replace(sigma=sigma, los_sigma=los_sigma)

@@ -7,8 +7,8 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.core.editing.copies import HELD
-from ftproc.core.editing.steps import CLOCK, Step
 from ftproc.core.editing.two_pass import Faults
+from ftproc.core.filtering.bridging import CLOCK, Step
 from ftproc.core.identification.one_sided import OneSided
 from ftproc.quality import faults
 from ftproc.quality.verdict import CONSISTENT, SUSPECT

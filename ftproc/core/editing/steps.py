@@ -6,7 +6,8 @@ like a step to a filter that expects a calm flight, so each step that stands out
 without it: both with a process noise that follows the flight, and with outlier decisions of their own.
 
 Two-pass editing without steps follows one as motion, and rejects what lies beside it, or all that comes after it, as a
-patch. So rejected runs that lie on a track of their own are taken in again before steps are looked for.
+patch. So rejected runs that lie on a track of their own are taken in again before steps are looked for; and where the
+readings of a rejected run jump from one side of the track to the other, a step is weighed, too.
 """
 
 from __future__ import annotations
@@ -21,18 +22,17 @@ from numpy.typing import NDArray
 from ftproc.core.editing import alternatives
 from ftproc.core.editing.decisions import Decision, Record
 from ftproc.core.editing.runs import runs_of
-from ftproc.core.filtering.initialization import find_starts, first_state
-from ftproc.core.filtering.records import Model, Observations
+from ftproc.core.filtering.bridging import CLOCK, Step, bridged, refined
+from ftproc.core.filtering.initialization import find_starts
+from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.shifts import Shifts, shifts
-from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification.likelihood import Fixed, fit_level
 from ftproc.core.identification.profile import fit_profile, median_level
 from ftproc.core.identification.scales import scales_of
-from ftproc.core.model.frames import from_cartesian, line_of_sight_axes, wrap
+from ftproc.core.model.frames import wrap
 
 FloatArray = NDArray[np.float64]
 
-CLOCK = 3  # in place of a component
 LEAST = 5.0  # sigmas of a step's estimate that make it worth weighing
 FEWEST, EVEN = 3, 5.0  # readings in a rejected run, and second differences in sigmas, that may be a track
 AROUND, MEMORIES = (100, 400), 6.0  # samples on each side that decide between step and manoeuvre, and memories
@@ -42,27 +42,12 @@ SMALLEST = 7.0  # sigmas of the noise: a smaller step may be an end of a weak pa
 SMALL = 0.7  # times that, before its size is found with the outliers beside it
 PATCHES = 12, 24, 48  # readings in a patch, of which a step may be an end
 STAYS = 0.75  # share of the readings on either side of a step that must be good
+AGREE, BESIDE = 0.75, 7  # share of a rejected run on either side of the track, and readings that tell how far they jump
+JOINS = 0.3  # times as far off the track at one end of a run as at the other
+COARSELY = 4  # readings between the places of a step in a run that are tried first
 SIZES = 2  # times that the size of a step is found again, as the decisions beside it change
 PROFILE_STEPS = 3  # of the search for the jerk profile of a stretch
 END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step cannot be told from a patch
-
-
-class Step(NamedTuple):
-    """From a sample on the readings of a component (range, azimuth, elevation) are larger by `size` m, rad, rad, or,
-    where it is CLOCK, their times by so many seconds. sigma: 1-sigma of the size. The longer side is kept. sure: that
-    it is no patch."""
-
-    component: int
-    sample: int
-    size: float
-    sigma: float
-    sure: bool = True
-
-    def moved(self, samples: int) -> tuple[slice, float]:
-        """Which of so many samples are moved to the other side, and the sign of what is taken out of them."""
-        if 0 < self.sample < samples / 2:
-            return slice(0, self.sample), -1.0
-        return slice(self.sample, samples), 1.0
 
 
 class Stretch(NamedTuple):
@@ -88,7 +73,7 @@ def find(record: Record, decision: Decision) -> list[Step]:
     around = int(np.clip(MEMORIES * scales.memory_s(float(calm.jerk[0, 0])) / scales.interval_s, *AROUND))
     margin = MARGIN + math.log(4 * len(record.time_s))
     found: list[Step] = []
-    candidates = _standing_out(decided, calm, around // 2)
+    candidates = [*_beside_runs(record, decision, calm, decided.residual), *_standing_out(decided, calm, around // 2)]
     if (weight != decision.weight).any():
         log = record.weighted(weight)
         starts = find_starts(log, calm.noise_variance, float(calm.jerk[0, 0]))
@@ -104,68 +89,8 @@ def find(record: Record, decision: Decision) -> list[Step]:
         stretch = Stretch(part, decision.weight[near], taken, model, calm, decision.rates, margin)
         likelier = _likelier(stretch, known, one[0])
         if likelier is not None:
-            found.append(likelier._replace(sample=step.sample))
+            found.append(likelier._replace(sample=near.start + likelier.sample))
     return found
-
-
-def refined(log: Observations, model: Model, steps: Sequence[Step]) -> tuple[Observations, list[Step]]:
-    """The log and the steps with the sizes that all the record tells. log: with the steps bridged as they are."""
-    if not steps:
-        return log, []
-    score, information, _ = shifts(log, model, find_starts(log, model.noise_variance, float(model.jerk[0, 0])))
-    rest, found = [], []
-    for step in steps:
-        at = step.sample - 1, step.component
-        if information[at] > 0:
-            more = float(score[at] / information[at]) * (-1 if step.component == CLOCK else 1)
-            rest.append(step._replace(size=more))
-            step = step._replace(size=step.size + more, sigma=1 / math.sqrt(information[at]))
-        found.append(step)
-    return log._replace(measurement=bridged(log, model, rest)), found
-
-
-def bridged(log: Observations, model: Model, steps: Sequence[Step]) -> FloatArray:
-    """The readings (n, 3) as they would be without the steps: those of the shorter side moved to the other."""
-    z = log.measurement.copy()
-    for step in steps:
-        rows, sign = step.moved(len(z))
-        if step.component == CLOCK:
-            z[rows] -= _way(log.part(rows)._replace(measurement=z[rows]), model, sign * step.size)
-        else:
-            z[rows, step.component] -= sign * step.size
-    z[:, 1] = wrap(z[:, 1])
-    return z
-
-
-def _way(log: Observations, model: Model, late_s: float) -> FloatArray:
-    """(n, 3) by how much readings are larger than those of the target so many seconds later, which these readings alone
-    tell."""
-    try:
-        start = first_state(log, model.noise_variance, 0, slice(0, len(log.time_s)))
-    except ValueError:  # a component has no reading there, so nobody knows the way
-        return np.zeros_like(log.measurement)
-    state = smooth_log(log, median_level(model), [start]).state
-    position, velocity, acceleration = state[:, :3], state[:, 3:6], state[:, 6:]
-    further = position + late_s * (velocity + 0.5 * late_s * acceleration)
-    way: FloatArray = from_cartesian(position) - from_cartesian(further)
-    way[:, 1] = wrap(way[:, 1])
-    return way
-
-
-def spread(state: FloatArray, steps: Sequence[Step]) -> tuple[FloatArray, FloatArray]:
-    """(n, 3) variances, m2, that the uncertain sizes of the steps add to the positions of the states (n, 9) that were
-    moved: along x, y, z, and along the radial, cross and up axes."""
-    axes, lines = np.zeros((len(state), 3)), np.zeros((len(state), 3))
-    for step in steps:
-        rows, _ = step.moved(len(state))
-        position, velocity = state[rows, :3], state[rows, 3:6]
-        sight = line_of_sight_axes(position)
-        slant = np.linalg.norm(position, axis=1)[:, None]
-        ground = np.hypot(position[:, 0], position[:, 1])[:, None]
-        moves = (sight[:, 0], sight[:, 1] * ground, sight[:, 2] * slant, velocity)[step.component]
-        axes[rows] += (moves * step.sigma) ** 2
-        lines[rows] += (np.einsum("kij,kj->ki", sight, moves) * step.sigma) ** 2
-    return axes, lines
 
 
 def _taken_in(record: Record, decision: Decision, calm: Model, residual: FloatArray) -> FloatArray:
@@ -180,6 +105,35 @@ def _taken_in(record: Record, decision: Decision, calm: Model, residual: FloatAr
             if len(run) >= FEWEST and np.median(np.abs(np.diff(residual[run, c], 2))) < EVEN * sigma[c]:
                 weight[run, c] = 1.0
     return weight
+
+
+def _beside_runs(record: Record, decision: Decision, calm: Model, residual: FloatArray) -> list[Step]:
+    """The steps that rejected runs may hide, the largest first. residual: (n, 3) leave-one-out."""
+    found: list[tuple[float, Step]] = []
+    for c in range(3):
+        seen, sigma = np.flatnonzero(record.possible[:, c]), math.sqrt(calm.noise_variance[c])
+        for begin, end in runs_of(decision.weight[seen, c] <= 0):
+            for place, jump in _jumps(residual[seen[begin:end], c]):
+                if abs(jump) > SMALLEST * sigma and begin + place < len(seen):
+                    found.append((abs(jump) / sigma, Step(c, int(seen[begin + place]), jump, sigma)))
+    return [step for _, step in sorted(found, key=lambda each: -each[0])[:MOST]]
+
+
+def _jumps(off: FloatArray) -> Iterator[tuple[int, float]]:
+    """Where, and by how much, the readings of a rejected run may jump for good, from their distances off the track: a
+    track that is bent from before a step to after it lies between the two, or joins one of them slowly."""
+    n = len(off)
+    if n < 2 * FEWEST:
+        return
+    higher = np.cumsum(np.sign(off))  # readings above the track less those below, up to each
+    for place, other in ((int(higher.argmin()) + 1, higher[-1]), (int(higher.argmax()) + 1, -higher[-1])):
+        if min(place, n - place) >= FEWEST and 0.5 * (n + other) + abs(higher[place - 1]) >= AGREE * n:
+            yield place, float(np.median(off[place : place + BESIDE]) - np.median(off[max(place - BESIDE, 0) : place]))
+    first, last = float(np.median(off[:BESIDE])), float(np.median(off[-BESIDE:]))
+    if abs(last) < JOINS * abs(first):
+        yield 0, first
+    if abs(first) < JOINS * abs(last):
+        yield n, -last
 
 
 def _standing_out(found: Shifts, calm: Model, apart: int) -> list[Step]:
@@ -221,15 +175,16 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
     """The step, with the size that the stretch tells, if the stretch is likelier with it than without, given the steps
     that are known."""
     try:
-        stretch = _without(stretch, known)
+        stretch, step = _placed(_without(stretch, known), step)
         without, model = max(
             ((_decided(stretch, stretch.decided, model), model) for model in (stretch.model, stretch.calm)),
             key=lambda tried: tried[0].likelihood,
         )
-        bridge, weight = _without(stretch, [step]), stretch.taken_in
+        bridge, weights = _without(stretch, [step]), [stretch.taken_in, stretch.decided]
         for _ in range(SIZES):
-            with_it = _decided(bridge, weight, model)
+            with_it = max((_decided(bridge, each, model) for each in weights), key=lambda tried: tried.likelihood)
             weight = with_it.weight
+            weights = [weight]
             log, (step,) = refined(bridge.record.weighted(weight), model, [step])
             bridge = bridge._replace(record=bridge.record._replace(measurement=log.measurement))
         if not with_it.likelihood > without.likelihood + MARGIN or not _stays(stretch.record, weight, step):
@@ -242,6 +197,32 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
         return step._replace(sure=sure) if most > least else None
     except ValueError:  # a component has too few readings there
         return None
+
+
+def _placed(stretch: Stretch, step: Step) -> tuple[Stretch, Step]:
+    """The step where it is likeliest in the rejected run that it borders on, or lies in, and the stretch with that run
+    taken in: a filter that knows of no step follows one as motion, and rejects the readings around it."""
+    c = step.component
+    seen = np.flatnonzero(stretch.record.possible[:, c]) if c != CLOCK else np.zeros(0, int)
+    at = int(np.searchsorted(seen, step.sample))
+    runs = (
+        [run for run in runs_of(stretch.decided[seen, c] <= 0) if run[0] - 1 <= at <= run[1] + 1] if len(seen) else []
+    )
+    begin, end = max(runs, key=lambda run: int(run[1] - run[0]), default=(0, 0))
+    if end - begin < FEWEST:
+        return stretch, step
+    taken_in = stretch.taken_in.copy()
+    taken_in[seen[begin:end], c] = 1.0
+    stretch = stretch._replace(taken_in=taken_in)
+
+    def likelihood(place: int) -> float:
+        moved = _without(stretch, [step._replace(sample=int(seen[place]))])
+        return _decided(moved, taken_in, stretch.calm).likelihood
+
+    last = min(int(end), len(seen) - 1)
+    rough = max(range(int(begin), last + 1, COARSELY), key=likelihood)
+    nearby = range(max(rough - COARSELY + 1, 0), min(rough + COARSELY, len(seen)))
+    return stretch, step._replace(sample=int(seen[max(nearby, key=likelihood)]))
 
 
 def _patches(stretch: Stretch, step: Step) -> Iterator[FloatArray]:

@@ -37,7 +37,7 @@ from ftproc.core.editing.reassessment import (
     reassess,
     with_turns,
 )
-from ftproc.core.editing.steps import Step
+from ftproc.core.filtering.bridging import Step, bridged, refined
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
@@ -195,7 +195,7 @@ def edit(
         if not new:
             break
         log = record.weighted(decision.weight)
-        other = _decided(time_s, steps.bridged(log, decision.model, new), known, segment_of, work, short)
+        other = _decided(time_s, bridged(log, decision.model, new), known, segment_of, work, short)
         if _may_be_late_stamps((record, decision), other):
             break
         (record, decision), found = other, sorted([*found, *new], key=lambda s: s.sample)
@@ -205,7 +205,7 @@ def edit(
     if known.jerk_psd is None:
         profile = fit_profile(log, decision.starts, decision.model, PROFILE_STEPS)
         decision = decision._replace(model=with_allowance(log, profile))
-    log, found = steps.refined(log, decision.model, found)
+    log, found = refined(log, decision.model, found)
     smoothed = smooth_log(log, decision.model, decision.starts)
     leaning = [] if live else one_sided.find(log, smoothed, record.rounding)
     if leaning:

@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 from ftproc.core.editing import steps, two_pass
-from ftproc.core.editing.steps import CLOCK, Step
+from ftproc.core.filtering import bridging
+from ftproc.core.filtering.bridging import CLOCK, Step
 from ftproc.core.model.frames import from_cartesian, line_of_sight_axes, to_cartesian, wrap
 from tests.core.tracks import SIGMA, matched
+from tests.simulated import simulate
 
 pytestmark = pytest.mark.compiled
 
 UNKNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
 N = 500
+DIRT = "isolated=0.2:8-300,offset=2:10-30:20-200"
 
 
 def flight(seed):
@@ -37,7 +40,7 @@ def test_a_step_is_found_with_its_place_and_size_and_the_longer_side_is_kept(c, 
     assert 0.1 * SIGMA[c] < step.sigma < 3 * SIGMA[c]
     truth = a.truth[:, :3] if k > N / 2 else to_cartesian(from_cartesian(a.truth[:, :3]) - _at(c, size * SIGMA[c]))
     off = np.abs(found.smoothed.state[:, :3] - truth)
-    extra, _ = steps.spread(found.smoothed.state, found.faults.steps)
+    extra, _ = bridging.spread(found.smoothed.state, found.faults.steps)
     assert (off < 5 * np.sqrt(found.smoothed.sigma[:, :3] ** 2 + extra)).all(1).mean() > 0.98
     assert found.weight.mean() > 0.98
 
@@ -82,6 +85,36 @@ def test_both_angles_at_once_among_outliers_and_after_a_loss_of_track():
     assert all(195 <= s.sample <= 200 for s in found)
 
 
+def test_steps_that_hard_flying_hides_among_many_outliers():
+    """The filter follows such a step as motion, and rejects what lies beside it."""
+    found = 0
+    for seed in (0, 3, 5, 6, 7, 8, 9):
+        dirty = simulate("manoeuvre", seed=seed, duration_s=60.0, dt_s=0.1, outliers=DIRT)
+        c, k, z = seed % 3, 250 + 17 * seed, dirty.log.measurement.copy()
+        size = (-1) ** seed * 40 * dirty.sigma[c]
+        z[k:, c] += size
+        known = two_pass.edit(dirty.log.time_s, z, UNKNOWN).faults.steps
+        assert all(step.component == c and abs(step.sample - k) < 12 for step in known)
+        assert all(step.size == pytest.approx(size, rel=0.15) for step in known)
+        found += len(known)
+    assert found >= 6
+
+
+def test_where_readings_of_a_rejected_run_may_jump_for_good():
+    draw = np.random.default_rng(0)
+    bent = np.r_[np.linspace(0, -5, 20), np.linspace(5, 0, 20)] + 0.1 * draw.standard_normal(40)
+    bent[draw.choice(40, 6, replace=False)] += 300.0
+    ((place, jump),) = steps._jumps(bent)
+    assert (place, jump) == (pytest.approx(20, abs=1), pytest.approx(9, abs=1.5))
+    ((place, jump),) = steps._jumps(-bent)
+    assert (place, jump) == (pytest.approx(20, abs=1), pytest.approx(-9, abs=1.5))
+    joining = np.linspace(6, 0, 30) + 0.1
+    assert list(steps._jumps(joining)) == [(0, pytest.approx(5.5, abs=0.2))]
+    assert list(steps._jumps(joining[::-1])) == [(30, pytest.approx(-5.5, abs=0.2))]
+    assert list(steps._jumps(np.full(30, 7.0) + draw.standard_normal(30))) == []
+    assert list(steps._jumps(bent[:5])) == []
+
+
 @pytest.mark.parametrize("late", [0.4, -0.8])
 def test_a_clock_that_jumps(late):
     a = matched(11, N, dt=0.2, q=0.05, distance=7000.0)
@@ -115,7 +148,7 @@ def test_what_is_bridged_is_what_was_added():
     for step in added:
         rows, sign = step.moved(N)
         z[rows, step.component] += sign * step.size
-    back = steps.bridged(a._replace(z=z).log, a.model, added)
+    back = bridging.bridged(a._replace(z=z).log, a.model, added)
     np.testing.assert_allclose(back[:, [0, 2]], a.z[:, [0, 2]], atol=1e-9)
     np.testing.assert_allclose(wrap(back[:, 1] - a.z[:, 1]), 0, atol=1e-12)
 
@@ -124,7 +157,7 @@ def test_spread_is_the_move_of_the_position():
     a = flight(4)
     for c in range(3):
         step = Step(c, 300, 1.0, 1e-3 * (1000 if c == 0 else 1))
-        axes, lines = steps.spread(a.truth, [step])
+        axes, lines = bridging.spread(a.truth, [step])
         moved = to_cartesian(from_cartesian(a.truth[:, :3]) + _at(c, 1e-3 * step.sigma)) - a.truth[:, :3]
         np.testing.assert_allclose(np.sqrt(axes[300:]), 1e3 * np.abs(moved[300:]), rtol=1e-2, atol=1e-3)
         along = np.einsum("kij,kj->ki", line_of_sight_axes(a.truth[:, :3]), 1e3 * moved)
