@@ -44,7 +44,6 @@ PATCHES = 12, 24, 48  # readings in a patch, of which a step may be an end
 STAYS = 0.75  # share of the readings on either side of a step that must be good
 AGREE, BESIDE = 0.75, 7  # share of a rejected run on either side of the track, and readings that tell how far they jump
 JOINS = 0.3  # times as far off the track at one end of a run as at the other
-COARSELY = 4  # readings between the places of a step in a run that are tried first
 SIZES = 2  # times that the size of a step is found again, as the decisions beside it change
 PROFILE_STEPS = 3  # of the search for the jerk profile of a stretch
 END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step cannot be told from a patch
@@ -175,7 +174,7 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
     """The step, with the size that the stretch tells, if the stretch is likelier with it than without, given the steps
     that are known."""
     try:
-        stretch, step = _placed(_without(stretch, known), step)
+        stretch = _without(stretch, known)
         without, model = max(
             ((_decided(stretch, stretch.decided, model), model) for model in (stretch.model, stretch.calm)),
             key=lambda tried: tried[0].likelihood,
@@ -197,32 +196,6 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
         return step._replace(sure=sure) if most > least else None
     except ValueError:  # a component has too few readings there
         return None
-
-
-def _placed(stretch: Stretch, step: Step) -> tuple[Stretch, Step]:
-    """The step where it is likeliest in the rejected run that it borders on, or lies in, and the stretch with that run
-    taken in: a filter that knows of no step follows one as motion, and rejects the readings around it."""
-    c = step.component
-    seen = np.flatnonzero(stretch.record.possible[:, c]) if c != CLOCK else np.zeros(0, int)
-    at = int(np.searchsorted(seen, step.sample))
-    runs = (
-        [run for run in runs_of(stretch.decided[seen, c] <= 0) if run[0] - 1 <= at <= run[1] + 1] if len(seen) else []
-    )
-    begin, end = max(runs, key=lambda run: int(run[1] - run[0]), default=(0, 0))
-    if end - begin < FEWEST:
-        return stretch, step
-    taken_in = stretch.taken_in.copy()
-    taken_in[seen[begin:end], c] = 1.0
-    stretch = stretch._replace(taken_in=taken_in)
-
-    def likelihood(place: int) -> float:
-        moved = _without(stretch, [step._replace(sample=int(seen[place]))])
-        return _decided(moved, taken_in, stretch.calm).likelihood
-
-    last = min(int(end), len(seen) - 1)
-    rough = max(range(int(begin), last + 1, COARSELY), key=likelihood)
-    nearby = range(max(rough - COARSELY + 1, 0), min(rough + COARSELY, len(seen)))
-    return stretch, step._replace(sample=int(seen[max(nearby, key=likelihood)]))
 
 
 def _patches(stretch: Stretch, step: Step) -> Iterator[FloatArray]:
