@@ -179,13 +179,11 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
             ((_decided(stretch, stretch.decided, model), model) for model in (stretch.model, stretch.calm)),
             key=lambda tried: tried[0].likelihood,
         )
-        bridge, weights = _without(stretch, [step]), [stretch.taken_in, stretch.decided]
-        for _ in range(SIZES):
-            with_it = max((_decided(bridge, each, model) for each in weights), key=lambda tried: tried.likelihood)
-            weight = with_it.weight
-            weights = [weight]
-            log, (step,) = refined(bridge.record.weighted(weight), model, [step])
-            bridge = bridge._replace(record=bridge.record._replace(measurement=log.measurement))
+        with_it, bridge, step = max(
+            (_sized(stretch, step, weight, model) for weight in (stretch.taken_in, stretch.decided)),
+            key=lambda tried: tried[0].likelihood,
+        )
+        weight = with_it.weight
         if not with_it.likelihood > without.likelihood + MARGIN or not _stays(stretch.record, weight, step):
             return None
         if _size(stretch, bridge, step) < SMALLEST:
@@ -196,6 +194,17 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
         return step._replace(sure=sure) if most > least else None
     except ValueError:  # a component has too few readings there
         return None
+
+
+def _sized(stretch: Stretch, step: Step, weight: FloatArray, model: Model) -> tuple[alternatives.Step, Stretch, Step]:
+    """The decisions with a step bridged, from these weights (n, 3) on, the stretch without it, and its size."""
+    bridge = _without(stretch, [step])
+    for _ in range(SIZES):
+        with_it = _decided(bridge, weight, model)
+        weight = with_it.weight
+        log, (step,) = refined(bridge.record.weighted(weight), model, [step])
+        bridge = bridge._replace(record=bridge.record._replace(measurement=log.measurement))
+    return with_it, bridge, step
 
 
 def _patches(stretch: Stretch, step: Step) -> Iterator[FloatArray]:
