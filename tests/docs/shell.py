@@ -34,9 +34,10 @@ class Shell:
         """The same for a command that takes long: it runs in the project, its output is kept in KEPT/NAME.txt."""
         file = KEPT / f"{name}.txt"
         if not self.kept:
-            text = _run(command, ROOT)
+            if command not in self._outputs:
+                self._outputs[command] = _run(command, ROOT)
             KEPT.mkdir(parents=True, exist_ok=True)
-            file.write_text(text, encoding="utf-8")
+            file.write_text(self._outputs[command], encoding="utf-8")
         return file.read_text(encoding="utf-8")
 
 

@@ -70,7 +70,7 @@ def find(record: Record, decision: Decision) -> list[Step]:
     weight = _taken_in(record, decision, calm, decided.residual)
     scales = scales_of(record.weighted(weight), calm.noise_variance)
     around = int(np.clip(MEMORIES * scales.memory_s(float(calm.jerk[0, 0])) / scales.interval_s, *AROUND))
-    margin = MARGIN + math.log(4 * len(record.time_s))
+    margin, end = MARGIN + math.log(4 * len(record.time_s)), _end(len(record.time_s))
     found: list[Step] = []
     candidates = [*_beside_runs(record, decision, calm, decided.residual), *_standing_out(decided, calm, around // 2)]
     if (weight != decision.weight).any():
@@ -78,6 +78,9 @@ def find(record: Record, decision: Decision) -> list[Step]:
         starts = find_starts(log, calm.noise_variance, float(calm.jerk[0, 0]))
         candidates = [*_standing_out(shifts(log, calm, starts), calm, around // 2), *candidates]
     for step in candidates:
+        again = any(step.component == s.component and abs(step.sample - s.sample) < BESIDE for s in found)
+        if again or not end < step.sample <= len(record.time_s) - end:
+            continue
         near = slice(max(step.sample - around, 0), step.sample + around)
         known, one = ([s._replace(sample=s.sample - near.start) for s in some] for some in (found, [step]))
         known = [s for s in known if s.sure and 0 < s.sample < near.stop - near.start]
@@ -143,7 +146,7 @@ def _standing_out(found: Shifts, calm: Model, apart: int) -> list[Step]:
     size = np.divide(
         np.abs(score), np.sqrt(np.maximum(information, 0)), out=np.zeros_like(score), where=information > 0
     )
-    end = 1 + min(END, int(SHARE * len(size)))
+    end = _end(len(size))
     size[:end] = size[-end:] = 0.0
     steps: list[Step] = []
     while len(steps) < MOST and size.max() > LEAST:
@@ -154,6 +157,11 @@ def _standing_out(found: Shifts, calm: Model, apart: int) -> list[Step]:
         size[near, c] = 0.0
         size[near, CLOCK] = 0.0  # which is no jump where one component stands out more
     return steps
+
+
+def _end(samples: int) -> int:
+    """Samples at either end of so many in which a step cannot be told from a patch."""
+    return 1 + min(END, int(SHARE * samples))
 
 
 def _from(model: Model, time_s: FloatArray, near: slice) -> Model:

@@ -152,9 +152,9 @@ def _carry_back(memory: Any, update: Update, k: int, interval: float, place: int
         for c in range(m):
             smoothed[i, c] = s[i, c]
         for j in range(9):
-            weight = p[i, j]
+            pij = p[i, j]
             for c in range(m):
-                smoothed[i, c] -= weight * a[j, c]
+                smoothed[i, c] -= pij * a[j, c]
         if wanted == STATES:
             added = 0.0
             for c in range(m):
@@ -162,9 +162,9 @@ def _carry_back(memory: Any, update: Update, k: int, interval: float, place: int
             row.sigma[i] = math.sqrt(row.sigma[i] * row.sigma[i] + added)
     for i in range(3):
         for j in range(9):
-            weight = u[i, j]
+            uij = u[i, j]
             for c in range(m):
-                white[i, c] -= weight * a[j, c]
+                white[i, c] -= uij * a[j, c]
     for i in range(3):
         lost = 0.0
         for c in range(m):

@@ -109,18 +109,15 @@ def test_the_track_does_not_follow_late_stamps(seed, very_late):
 
 
 @pytest.mark.compiled
-def test_stamps_that_are_always_late_by_chance():
+@pytest.mark.parametrize("seed", range(1, 7))
+def test_stamps_that_are_always_late_by_chance(seed):
     """Each reading is as old as a queue makes it, 10 ms on average; that it is so on average, no log can show."""
-    rejected, largest = [], 0.0
-    for seed in range(1, 7):
-        time, z, truth = circle(seed, n=900)
-        seen = time - np.random.default_rng(100 + seed).exponential(0.01, len(time))
-        late = np.stack([np.interp(seen, time, np.unwrap(z[:, c])) for c in range(3)], 1)
-        found = two_pass.edit(time, late, KNOWN)
-        rejected.append((found.weight == 0).mean())
-        largest = max(largest, np.linalg.norm(found.smoothed.state[:, :3] - truth, axis=1).std())
-    assert np.mean(rejected) < 0.01
-    assert largest < 0.05
+    time, z, truth = circle(seed, n=900)
+    seen = time - np.random.default_rng(100 + seed).exponential(0.01, len(time))
+    late = np.stack([np.interp(seen, time, np.unwrap(z[:, c])) for c in range(3)], 1)
+    found = two_pass.edit(time, late, KNOWN)
+    assert (found.weight == 0).mean() < 0.03
+    assert np.linalg.norm(found.smoothed.state[:, :3] - truth, axis=1).std() < 0.03
 
 
 def test_a_stamp_that_is_very_late_is_given_a_variance_of_its_own():

@@ -42,7 +42,7 @@ def text_file(name: str, path: Path, widths: Sequence[int] = ()) -> TableHeader:
     large = path.stat().st_size > content.LARGE and not widths
     if large:
         head = content.read(name, path, limit=_HEAD)
-        if not trimming.is_boxed(head) and _tagged(name, head[: head.rfind(b"\n") + 1]) is None:
+        if not trimming.is_boxed(head) and _tagged(name, head[: head.rfind(b"\n") + 1], cut=True) is None:
             return _large_file(name, path)
     return text_bytes(name, content.read(name, path), widths)
 
@@ -57,12 +57,12 @@ def text_bytes(name: str, data: bytes, widths: Sequence[int] = ()) -> TableHeade
     return TableHeader(text.source, text.names, text.load, commas, units=text.units, form=text.form)
 
 
-def _tagged(name: str, data: bytes) -> TableHeader | None:
-    """A text whose lines say what each value is; None if it is none."""
+def _tagged(name: str, data: bytes, cut: bool = False) -> TableHeader | None:
+    """A text whose lines say what each value is; None if it is none. cut: `data` is only the beginning."""
     head = data[:_HEAD]
     if _plain(head) is not None or not _TAGGED.search(head):
         return None
-    text = encoding.as_utf8(name, data).data.decode("utf-8", "replace")
+    text = encoding.as_utf8(name, data, cut).data.decode("utf-8", "replace")
     return tagged.sentences(name, text) or tagged.survey(name, text) or tagged.pairs(name, text)
 
 

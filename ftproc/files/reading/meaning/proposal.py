@@ -52,9 +52,9 @@ def _proposed(header: TableHeader, free: Sequence[int], sought: Sequence[str]) -
     table = header.load([], places).slice(0, _ROWS)
     read = {place: _values(table.column(k), header.decimal_comma) for k, place in enumerate(places)}
     varied = {place: values for place, values in read.items() if len(values) > 1 and values.max() > values.min()}
-    forward = [place for place, values in varied.items() if np.mean(np.diff(values) > 0) > _RISES]
+    forward = [place for place, values in varied.items() if np.mean(values[1:] > values[:-1]) > _RISES]
     spare = len(varied) > len(sought) and len(forward) > 1
-    counters = [place for place in forward if spare and (np.diff(varied[place]) == 1).all()]
+    counters = [place for place in forward if spare and (varied[place][1:] == varied[place][:-1] + 1).all()]
     found: dict[str, int] = {}
     if "time" in sought:
         if not forward:
