@@ -1,6 +1,6 @@
 """`python -m tests.bench [NAME...]`: tables of the README and the guide, as Markdown on standard output and in
-out/bench.md. The names: samples, accuracy, methods, rivals, instruments, correction, speed, start, scale, pages,
-training."""
+out/bench.md. The names: samples, accuracy, methods, rivals, instruments, correction, speed, start, scale, live,
+pages, training."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from tests.bench import (
     accuracy,
     correction,
     instruments,
+    live,
     methods,
     pages,
     rivals,
@@ -33,6 +34,7 @@ TABLES = {
     "speed": speed,
     "start": start,
     "scale": scale,
+    "live": live,
     "pages": pages,
     "training": training,
 }

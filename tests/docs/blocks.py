@@ -131,6 +131,7 @@ BLOCKS = {
     "speed": table("python -m tests.bench speed", note=TIMES, without="bound"),
     "start": table("python -m tests.bench start", note=TIMES, without="bound"),
     "scale": table("FTPROC_BENCH_ROWS=1e7 python -m tests.bench scale", note=TIMES, without="bound"),
+    "live": table("FTPROC_BENCH_ROWS=1e6 python -m tests.bench live", note=TIMES, without="bound"),
     "reliability": table("python -m tests.trust", note=COUNTS, rows_of=f"(?!{VERDICTS})"),
     "verdicts": table("python -m tests.trust", rows_of=VERDICTS),
     "reference": Block(("python -m tests.docs.reference",), _as_it_is),

@@ -74,8 +74,8 @@ def as_utf8(source: str, data: bytes, cut: bool = False) -> Utf8:
     name = name or _by_nuls(data[:_SAMPLE])
     if name not in ("", "utf-8"):
         try:
-            text = codecs.getincrementaldecoder(name)().decode(data[len(mark) :], final=not cut)
-            return Utf8(text.encode(), len(mark), word or name[:6].upper())
+            decoded = codecs.getincrementaldecoder(name)().decode(data[len(mark) :], final=not cut)
+            return Utf8(decoded.encode(), len(mark), word or name[:6].upper())
         except UnicodeDecodeError as error:
             raise InputError(f"{source}: this is damaged {name[:6].upper()} text; save it as UTF-8.") from error
     if b"\0" in data[:_SAMPLE]:
