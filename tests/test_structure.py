@@ -33,6 +33,7 @@ FLOORS = (
     ("pipeline",),
     ("config", "report"),
     ("live",),
+    ("fusion.estimation",),
     ("fusion",),
     ("report.fused",),
     ("batch",),

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing.runs import runs_of
-from ftproc.fusion import constants as posterior
-from ftproc.fusion.engine import Fused
-from ftproc.fusion.events import CLOCK
+from ftproc.fusion.estimation import constants as posterior
+from ftproc.fusion.estimation.events import CLOCK
+from ftproc.fusion.estimation.whole import Fused
 from ftproc.quality import consistency
 from ftproc.quality.verdict import CONSISTENT, MANY_REJECTED, SUSPECT, TOO_MANY_REJECTED, UNRELIABLE, Remark
 from ftproc.records import COMPONENTS, FloatArray
@@ -46,7 +46,7 @@ class Stretch(NamedTuple):
 def stretches(fused: Fused) -> list[Stretch]:
     """What happened to each station, in the order of time; times from the first reading."""
     found = []
-    begin, end = (float(fused.events.time_s[k]) for k in (0, -1))
+    begin, end = (float(fused.track.time_s[k]) for k in (0, -1))
     for s, station in enumerate(fused.stations):
         time_s = station.time_s - fused.constants.estimate[s, CLOCK]
         found += [Stretch(station.name, *ends, "another target") for ends in _elsewhere(fused, s, time_s)]
@@ -89,8 +89,7 @@ def _closed(flag: NDArray[np.bool_], most: int) -> NDArray[np.bool_]:
 def component_figures(fused: Fused, s: int) -> dict[str, Any]:
     """Counts, noise and the test of the residuals of a station, by component."""
     station, found = fused.stations[s], {}
-    residual = fused.events.of(s, fused.found.run.residual)
-    variance = fused.events.of(s, fused.found.run.residual_variance)
+    residual, variance = fused.residual[s], fused.residual_variance[s]
     for c in station.components:
         seen, used = np.isfinite(station.measurement[:, c]), fused.weight[s][:, c] > 0
         squares = residual[used, c] ** 2 / variance[used, c]
@@ -99,15 +98,14 @@ def component_figures(fused: Fused, s: int) -> dict[str, Any]:
             "good": int(used.sum()),
             "rejected": int((seen & ~used).sum()),
             "missing": int((~seen).sum()),
-            f"noise_{unit}": float(fused.sigma[s, c]),
+            f"noise_{unit}": float(fused.noise[s, c]),
             "residual_ratio": float(np.sqrt(squares.mean())) if len(squares) else None,
         }
     return found
 
 
-def remarks(fused: Fused, sigma_m: FloatArray, zero_s: float) -> list[Remark]:
-    """All remarks on a fused flight. sigma_m: (n, 3) of the published position. zero_s: the logs' time of the first
-    reading."""
+def remarks(fused: Fused, zero_s: float) -> list[Remark]:
+    """All remarks on a fused flight. zero_s: the logs' time of the first reading."""
     return [
         *_clocks(fused),
         *_unobserved(fused),
@@ -117,7 +115,7 @@ def remarks(fused: Fused, sigma_m: FloatArray, zero_s: float) -> list[Remark]:
         *_rejections(fused),
         *_stretches(fused, zero_s),
         *_unchecked(fused, zero_s),
-        *_poorly(fused, sigma_m, zero_s),
+        *_poorly(fused, zero_s),
         *_unsettled(fused),
     ]
 
@@ -157,7 +155,7 @@ def _improbable(fused: Fused) -> Iterator[Remark]:
 def _scattered(fused: Fused) -> Iterator[Remark]:
     """Stations whose readings are far from the fused trajectory, beside the noise that they show by themselves."""
     for s, station in enumerate(fused.stations):
-        times = max((fused.sigma[s, c] / fused.own[s, c] for c in station.components), default=0.0)
+        times = max((fused.noise[s, c] / fused.own[s, c] for c in station.components), default=0.0)
         if times > SCATTERED:
             yield Remark(
                 SUSPECT,
@@ -169,9 +167,7 @@ def _scattered(fused: Fused) -> Iterator[Remark]:
 def _correlated(fused: Fused) -> Iterator[Remark]:
     """Components whose residuals keep their sign from reading to reading, as they do where readings are wrong alike."""
     for s, station in enumerate(fused.stations):
-        residual, variance = (
-            fused.events.of(s, each) for each in (fused.found.run.residual, fused.found.run.residual_variance)
-        )
+        residual, variance = fused.residual[s], fused.residual_variance[s]
         for c in station.components:
             used = fused.weight[s][:, c] > 0
             z = residual[used, c] / np.sqrt(variance[used, c])
@@ -253,8 +249,8 @@ def _carries(fused: Fused, s: int, during: Stretch) -> bool:
     return bool((fused.weight[s][here] > 0).any())
 
 
-def _poorly(fused: Fused, sigma_m: FloatArray, zero_s: float) -> Iterator[Remark]:
-    for part in consistency.poorly_observable(fused.events.time_s, sigma_m)[:3]:
+def _poorly(fused: Fused, zero_s: float) -> Iterator[Remark]:
+    for part in consistency.poorly_observable(fused.track.time_s, fused.track.sigma[:, :3])[:3]:
         when = f"from {part['from_s'] + zero_s:.6g} to {part['to_s'] + zero_s:.6g} s"
         yield Remark(SUSPECT, f"the position is poorly observable {when}: 1 sigma up to {part['sigma_m']:.3g} m")
 

@@ -13,13 +13,14 @@ from ftproc.errors import InputError
 from ftproc.files import arrow
 from ftproc.files.conventions import CONVENTION
 from ftproc.files.writing import geodesy
-from ftproc.fusion import constants as posterior
-from ftproc.fusion import engine, findings, logs, results
-from ftproc.fusion.constants import Constants
-from ftproc.fusion.engine import Fused
+from ftproc.fusion import findings, logs, results
+from ftproc.fusion.estimation import constants as posterior
+from ftproc.fusion.estimation import engine, whole
+from ftproc.fusion.estimation.constants import Constants
+from ftproc.fusion.estimation.whole import Fused
 from ftproc.fusion.range_file import Instrument, Range
 from ftproc.quality import verdict
-from ftproc.records import FloatArray, MeasurementLog, Trajectory
+from ftproc.records import MeasurementLog, Trajectory
 from ftproc.settings import FilterSettings
 
 if TYPE_CHECKING:
@@ -43,8 +44,12 @@ class Flight:
     zero_s: float = 0.0
 
 
+def _unheard(done: int, most: int) -> None:
+    """Progress that nobody asked for."""
+
+
 def fuse(
-    range_: Range, settings: FilterSettings, model: Model | None = None, say: Callable[[str], None] | None = None
+    range_: Range, settings: FilterSettings, model: Model | None = None, say: Callable[[int, int], None] = _unheard
 ) -> Flight:
     """The flight that the stations of a range have seen. model: the correction of a single station's filter.
 
@@ -56,7 +61,7 @@ def fuse(
     seen, zero_s = logs.as_seen(range_.instruments, read)
     logs.check_overlap(range_, seen)
     try:
-        fused = engine.fuse(seen, settings.gate, settings.jerk_psd_m2ps5, say)
+        fused = whole.fuse(seen, settings.gate, settings.jerk_psd_m2ps5, settings.smooth, say)
     except engine.Alone as cause:
         names = ", ".join(station.name for station in seen)
         raise InputError(
@@ -70,26 +75,20 @@ def fuse(
 def _flight(
     range_: Range, read: Sequence[MeasurementLog], fused: Fused, zero_s: float, settings: FilterSettings
 ) -> Flight:
-    events, run = fused.events, fused.found.run
-    state, sigma, nis = run.state, run.sigma, run.nis
-    if not settings.smooth:
-        causal = engine.filtered(fused)
-        state, sigma, nis = causal.state, causal.sigma, causal.nis
-    if not np.isfinite(state).all():
+    track = fused.track
+    if not np.isfinite(track.state).all():
         raise InputError(f"{range_.path}: the fused filter diverged; check the places, the clocks and the conventions.")
-    last = results.distinct(events.time_s)
     names = [station.name for station in fused.stations]
-    summary = summarize(fused, sigma, zero_s)
+    summary = summarize(fused, zero_s)
     metadata = _metadata(range_, settings, summary, fused)
-    n = len(last)
-    nothing = np.full((n, 3), np.nan)
+    n = len(track.time_s)
     trajectory = Trajectory(
-        range_.path, np.arange(n), events.time_s[last] + zero_s, nothing, state[last], sigma[last, :6],
-        np.zeros((n, 3), np.uint8), results.nis(events, nis), np.zeros((n, 6)), metadata,
+        range_.path, np.arange(n), track.time_s + zero_s, np.full((n, 3), np.nan), track.state, track.sigma[:, :6],
+        np.zeros((n, 3), np.uint8), track.nis, np.zeros((n, 6)), metadata,
         arrow.table({"stations": results.stations_used(fused).astype(np.int64)}),
     )  # fmt: skip
     located = _located(trajectory, range_, settings)
-    edited = {name: results.edited(fused, s, read[s], state) for s, name in enumerate(names)}
+    edited = {name: results.edited(fused, s, read[s]) for s, name in enumerate(names)}
     return Flight(located, edited, results.biases(fused.constants, names), fused.constants, fused, zero_s)
 
 
@@ -114,9 +113,9 @@ def _alone(range_: Range, log: MeasurementLog, settings: FilterSettings, model: 
     found = pipeline.filter_log(log, settings, model)
     turned = _from_origin(found, instrument, log.frame)
     (seen,), _ = logs.as_seen(range_.instruments, [log])
-    constants = Constants.unknown(seen.prior[None])
+    constants = Constants.before(seen.prior[None])
     used = (found.outlier == 0).any(1).astype(np.int64)
-    last = results.distinct(found.time_s)
+    last = whole.distinct(found.time_s)
     summary = {
         **found.metadata["summary"],
         "log": range_.path,
@@ -150,17 +149,17 @@ def _from_origin(found: Trajectory, instrument: Instrument, frame: str) -> Traje
     return replace(found, state=state, sigma=sigma)
 
 
-def summarize(fused: Fused, sigma: FloatArray, zero_s: float) -> dict[str, Any]:
+def summarize(fused: Fused, zero_s: float) -> dict[str, Any]:
     """The figures of a fused flight, JSON-serialisable; times as in the logs."""
-    events, jerk = fused.events, fused.model.jerk[:, [0, 3, 5]].mean(1)
-    said = findings.remarks(fused, sigma[:, :3], zero_s)
+    time_s, jerk = fused.track.time_s, fused.jerk[:, [0, 3, 5]].mean(1)
+    said = findings.remarks(fused, zero_s)
     trust = verdict.verdict(said)
     if trust["verdict"] == verdict.CONSISTENT:
         trust["not_shown"] = findings.NOT_SHOWN
     return {
-        "rows": len(results.distinct(events.time_s)),
+        "rows": len(time_s),
         "readings": int(sum((possible > 0).sum() for possible in fused.possible)),
-        "duration_s": float(events.time_s[-1] - events.time_s[0]),
+        "duration_s": float(time_s[-1] - time_s[0]),
         "stations": {
             station.name: {
                 "rows": len(station.time_s),
@@ -215,9 +214,9 @@ def _metadata(range_: Range, settings: FilterSettings, summary: dict[str, Any], 
             "gate": settings.gate,
             "site": range_.origin,
             "jerk_specified": settings.jerk_psd_m2ps5 is not None,
-            "jerk_psd_m2ps5": [float(q) for q in fused.model.jerk[:, 0]],
-            "jerk_vertical_ratio": float(fused.model.jerk[0, 5] / fused.model.jerk[0, 0]),
-            "jerk_knot_s": float(fused.model.knot_s) if len(fused.model.jerk) > 1 else None,
+            "jerk_psd_m2ps5": [float(q) for q in fused.jerk[:, 0]],
+            "jerk_vertical_ratio": float(fused.jerk[0, 5] / fused.jerk[0, 0]),
+            "jerk_knot_s": float(fused.knot_s) if len(fused.jerk) > 1 else None,
         },
         "sees": "the whole record",
         "model_sha256": None,

@@ -11,7 +11,7 @@ import numpy as np
 from ftproc.core.model.frames import wrap
 from ftproc.errors import InputError
 from ftproc.files.reading import logs
-from ftproc.fusion.events import Seen
+from ftproc.fusion.estimation.events import Seen
 from ftproc.fusion.range_file import Instrument, Range
 from ftproc.quality import sanity
 from ftproc.records import FloatArray, MeasurementLog

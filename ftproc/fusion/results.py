@@ -14,10 +14,10 @@ from ftproc.core.model import stations as geometry
 from ftproc.core.model.frames import wrap
 from ftproc.files import arrow, layout
 from ftproc.files.writing import atomic
-from ftproc.fusion import constants as posterior
-from ftproc.fusion.constants import Constants
-from ftproc.fusion.engine import Fused
-from ftproc.fusion.events import CLOCK, Events
+from ftproc.fusion.estimation import constants as posterior
+from ftproc.fusion.estimation.constants import Constants
+from ftproc.fusion.estimation.events import CLOCK
+from ftproc.fusion.estimation.whole import Fused
 from ftproc.fusion.range_file import Instrument, Range
 from ftproc.methods.preparing import labels
 from ftproc.records import COMPONENTS, MISSING, FloatArray, MeasurementLog, Trajectory
@@ -30,24 +30,9 @@ UNSEEN_S, UNSEEN_INTERVALS = 1.0, 2.5  # since its last used reading, until a st
 WITHOUT = ("row", *layout.MEASUREMENT, *layout.OUTLIER, *layout.CORRECTION)  # of a trajectory of one station
 
 
-def distinct(time_s: FloatArray) -> Any:
-    """The last of the events of each time, (m,) places."""
-    return np.flatnonzero(np.r_[time_s[1:] > time_s[:-1], True])
-
-
-def nis(events: Events, each: FloatArray) -> FloatArray:
-    """(m,) NIS of all events of one time together; NaN where none was used."""
-    last = distinct(events.time_s)
-    first = np.r_[0, last[:-1] + 1]
-    total = np.add.reduceat(np.nan_to_num(each), first)
-    known = np.add.reduceat(np.isfinite(each).astype(float), first)
-    found: FloatArray = np.where(known > 0, total, np.nan)
-    return found
-
-
 def stations_used(fused: Fused) -> FloatArray:
     """(m,) how many stations have a used reading within a few of their intervals of each distinct time."""
-    times = fused.events.time_s[distinct(fused.events.time_s)]
+    times = fused.track.time_s
     count = np.zeros(len(times))
     for s, station in enumerate(fused.stations):
         used = (station.time_s - fused.constants.estimate[s, CLOCK])[(fused.weight[s] > 0).any(1)]
@@ -60,15 +45,14 @@ def stations_used(fused: Fused) -> FloatArray:
     return count
 
 
-def edited(fused: Fused, s: int, log: MeasurementLog, state: FloatArray) -> pa.Table:
-    """A row for each row of a station's log, in its order and in its sense of the azimuth. state: (events, 9). Rows
-    without a time are missing. The cleaned reading is what the station would have read: its biases are in it."""
-    events, station, biases = fused.events, fused.stations[s], fused.constants.estimate[s]
-    here = events.of(s, state)
-    cleaned = geometry.measured(here[:, :3], station.place, events.sites.axes[s]) + biases[:3]
+def edited(fused: Fused, s: int, log: MeasurementLog) -> pa.Table:
+    """A row for each row of a station's log, in its order and in its sense of the azimuth. Rows without a time are
+    missing. The cleaned reading is what the station would have read: its biases are in it."""
+    station, biases = fused.stations[s], fused.constants.estimate[s]
+    cleaned = geometry.measured(fused.position[s], station.place, fused.axes[s]) + biases[:3]
     near = np.where(np.isfinite(station.measurement[:, 1]), station.measurement[:, 1], 0.0)
     cleaned[:, 1] = near + wrap(cleaned[:, 1] - near)
-    residual, variance = (events.of(s, each) for each in (fused.found.run.residual, fused.found.run.residual_variance))
+    residual, variance = fused.residual[s].copy(), fused.residual_variance[s]
     label = labels(fused.weight[s], station.measurement)
     if log.frame == "north-east-up":
         cleaned[:, 1], residual[:, 1] = math.pi / 2 - cleaned[:, 1], -residual[:, 1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ftproc.fusion.constants import NAMES, WORDS
+from ftproc.fusion.estimation.constants import NAMES, WORDS
 from ftproc.quality import verdict
 from ftproc.quality.summary import counted, line
 

@@ -15,12 +15,11 @@ def flight(residual):
     n = len(residual)
     three = np.full((n, 3), np.nan)
     three[:, 1] = residual
-    run = SimpleNamespace(residual=three, residual_variance=np.full((n, 3), 4.0))
     station = SimpleNamespace(name="theodolite", components=[1])
     return SimpleNamespace(
         stations=[station],
-        events=SimpleNamespace(of=lambda s, values: values),
-        found=SimpleNamespace(run=run),
+        residual=[three],
+        residual_variance=[np.full((n, 3), 4.0)],
         weight=[np.where(np.isfinite(three), 1.0, 0.0)],
     )
 

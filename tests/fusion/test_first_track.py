@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ftproc.core.model import stations as geometry
-from ftproc.fusion import first_track
-from ftproc.fusion.events import Seen
+from ftproc.fusion.estimation import first_track
+from ftproc.fusion.estimation.events import Seen
 
 TIME_S = np.arange(0.0, 60.0, 0.5)
 PATH = np.c_[-3000.0 + 100.0 * TIME_S, np.full_like(TIME_S, 4000.0), np.full_like(TIME_S, 1500.0)]

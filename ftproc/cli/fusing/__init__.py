@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import time
 from collections.abc import Mapping
@@ -65,15 +66,8 @@ def fuse_logs(ctx: click.Context, debug: bool) -> int:
     began = time.monotonic()
     try:
         with Progress() as progress:
-            count = 0
-
-            def say(text: str) -> None:
-                nonlocal count
-                count += 1
-                progress("fusing", min(count, 20), 20)
-
             model = model_file.named(PACKAGED) if len(range_.instruments) == 1 else None
-            found = flight.fuse(range_, settings, model, say)
+            found = flight.fuse(range_, settings, model, functools.partial(progress, "fusing"))
     except InputError as error:
         if debug:
             click.echo(failure(error).trace, err=True)

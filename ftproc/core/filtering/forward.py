@@ -188,7 +188,7 @@ def extrapolated(log: Observations, model: Model, start: Start) -> tuple[Any, An
     estimates, residuals = zeros(ESTIMATED, start.sample), zeros(LEFT, start.sample)
     if start.sample:
         extrapolate = _extrapolate_coloured if model.coloured else _extrapolate
-        samples = log.samples(model.noise_variance)
+        samples = log.part(slice(start.sample + 1)).samples(model.noise_variance)
         extrapolate(samples, model.profile(log.time_s), model.filter(start), estimates, residuals)
     return estimates, residuals
 

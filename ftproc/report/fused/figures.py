@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ftproc.core.model.frames import to_cartesian
-from ftproc.fusion import constants, findings
-from ftproc.fusion.engine import Fused
-from ftproc.fusion.events import CLOCK
+from ftproc.fusion import findings
+from ftproc.fusion.estimation import constants
+from ftproc.fusion.estimation.events import CLOCK
+from ftproc.fusion.estimation.whole import Fused
 from ftproc.fusion.flight import Flight
 from ftproc.records import COMPONENTS, FloatArray
 from ftproc.report import style
@@ -63,15 +64,15 @@ def station_map(flight: Flight, fused: Fused) -> Drawn:
 
 def _sights(fused: Fused, s: int) -> tuple[FloatArray, FloatArray]:
     """x and y of lines from a station along used readings to the track, with breaks."""
-    station, events = fused.stations[s], fused.events
+    station = fused.stations[s]
     used = np.flatnonzero((fused.weight[s] > 0).any(1))
     chosen = used[np.linspace(0, len(used) - 1, min(SIGHTS, len(used))).astype(int)] if len(used) else used
-    target = events.of(s, fused.found.run.state)[chosen, :3]
+    target = fused.position[s][chosen]
     reading = station.measurement[chosen] - fused.constants.estimate[s, :3]
     away = np.linalg.norm(target - station.place, axis=1)
     seen = np.asarray((fused.weight[s][chosen, 1:] > 0).all(1))
     reading[:, 0] = away
-    ends = np.where(seen[:, None], station.place + to_cartesian(reading) @ events.sites.axes[s], target)
+    ends = np.where(seen[:, None], station.place + to_cartesian(reading) @ fused.axes[s], target)
     x, y = (
         np.stack([np.full(len(ends), station.place[a]), ends[:, a], np.full(len(ends), np.nan)], 1).ravel()
         for a in (0, 1)
@@ -83,15 +84,12 @@ def residuals(flight: Flight, fused: Fused) -> Drawn:
     """Leave-one-out residuals of each component of each station in their sigmas; the rejected ones marked."""
     shown = [(s, c) for s, station in enumerate(fused.stations) for c in station.components]
     titles = [f"{fused.stations[s].name} {COMPONENTS[c][:2]}" for s, c in shown]
-    timeline = Timeline.of(fused.events.time_s + flight.zero_s)
+    timeline = Timeline.of(fused.track.time_s + flight.zero_s)
     figure = rows(timeline, titles, 80 + ROW_PX * len(shown))
     rejected = sum(int(((w == 0) & (p > 0)).sum()) for w, p in zip(fused.weight, fused.possible, strict=True))
     for row, (s, c) in enumerate(shown):
-        events = fused.events
         time_s = fused.stations[s].time_s - fused.constants.estimate[s, CLOCK] + flight.zero_s
-        scaled = events.of(s, fused.found.run.residual)[:, c] / np.sqrt(
-            events.of(s, fused.found.run.residual_variance)[:, c]
-        )
+        scaled = fused.residual[s][:, c] / np.sqrt(fused.residual_variance[s][:, c])
         used = fused.weight[s][:, c] > 0
         own = Timeline.of(time_s)
         add(figure, dots(own, np.where(used, scaled, np.nan), "used", style.GREY), row, first=row == 0)
@@ -135,7 +133,7 @@ def biases(flight: Flight, fused: Fused) -> Drawn:
 def carried(flight: Flight, fused: Fused) -> Drawn:
     """Which station carried which stretch: by the number of its readings that are used, piece by piece."""
     go = require_plotly()
-    begin, end = (float(fused.events.time_s[k]) for k in (0, -1))
+    begin, end = (float(fused.track.time_s[k]) for k in (0, -1))
     edges = np.linspace(begin, end, PIECES + 1)
     middle = 0.5 * (edges[1:] + edges[:-1]) + flight.zero_s
     names, share, rejected = [], [], []

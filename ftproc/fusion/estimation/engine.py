@@ -17,22 +17,19 @@ import numpy as np
 from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.biases import Biased, Directions, smooth_biased
 from ftproc.core.filtering.forward import filter_log
-from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
-from ftproc.core.filtering.smoother import SmootherRun, score_log, smooth_log
-from ftproc.core.identification import optimizer
-from ftproc.core.identification.likelihood import VERTICAL_PRECISION, jerk_bounds, shaped
-from ftproc.core.identification.profile import fit_profile, knot_length, median_level, with_allowance
+from ftproc.core.filtering.records import Model, Observations, Start
+from ftproc.core.filtering.smoother import SmootherRun, smooth_log
+from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import isotropic
-from ftproc.fusion import alternatives, first_track, places, screening
-from ftproc.fusion import constants as posterior
-from ftproc.fusion.constants import Constants
-from ftproc.fusion.events import Events, Seen, merge, moved_to
+from ftproc.fusion.estimation import alternatives, first_track, places, process_noise, screening
+from ftproc.fusion.estimation import constants as posterior
+from ftproc.fusion.estimation.constants import Constants, Said
+from ftproc.fusion.estimation.events import Events, Seen, merge, moved_to
 from ftproc.records import FloatArray
 
 FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 18, 8
-OTHER_KNOTS = 1.5  # times the distance of the knots of the jerk profile, before they are laid out again
-LEVEL_STEPS, PROFILE_STEPS, LAST_STEPS = 4, 3, 8
+PROFILE_STEPS, LAST_STEPS = 3, 8
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after the first rounds
 STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that may still change
 NOISE_STEP = 4.0  # times its variance that the noise of a component moves in a round
@@ -43,10 +40,10 @@ SHARES = (1.0, 0.25, 0.06, 0.0)  # of what is unknown of the readings, which is 
 FEWEST_KEPT = 0.5  # of what screening trusts, in each component of a station
 
 
-class Fused(NamedTuple):
-    """events, weight (rows, 3) of each station; sigma (m, 3) noise; constants; model; start; found: the smoother's run
-    that the rest belongs to; own (m, 3): the noise that each component shows alone; rounds, settled: of the
-    decisions; unexamined: places where no work was left to look for other hypotheses."""
+class Current(NamedTuple):
+    """What is believed now. events, weight (rows, 3) of each station; sigma (m, 3) noise; constants; model; start;
+    found: the smoother's run that the rest belongs to; own (m, 3): the noise that each component shows alone;
+    rounds, settled: of the decisions; unexamined: places where no work was left to look for other hypotheses."""
 
     stations: list[Seen]
     events: Events
@@ -74,9 +71,10 @@ class Alone(Exception):
 
 
 def fuse(
-    stations: list[Seen], gate: float, jerk_psd: float | None, progress: Callable[[str], None] | None = None
-) -> Fused:
-    """The fused flight of two or more stations. Raises Alone."""
+    stations: list[Seen], gate: float, jerk_psd: float | None, known: Said, progress: Callable[[int], None]
+) -> Current:  # fmt: skip
+    """The fused flight of the stations, or a stretch of it. known: what other stretches have said of the biases.
+    progress is called with the number of each round. Raises Alone."""
     screened = [screening.screen(station) for station in stations]
     sigma = np.stack([each.sigma for each in screened])
     track = first_track.find(stations, [each.trusted for each in screened], sigma)
@@ -84,11 +82,10 @@ def fuse(
         raise Alone
     trusted = [screening.agreeing(s, each, track) for s, each in zip(stations, screened, strict=True)]
     prior = np.stack([station.prior for station in stations])
-    current = _begin(stations, screened, trusted, track, Constants.unknown(prior), gate, jerk_psd)
-    say = progress or (lambda text: None)
+    current = _begin(stations, screened, trusted, track, Constants.before(prior, known), gate, jerk_psd)
     looks, search = 0, places.Search(sum(len(s.time_s) for s in stations))
     for number in range(MOST_ROUNDS):
-        say(f"round {number + 1}")
+        progress(number)
         level = number if number < FIRST_ROUNDS else None
         current = _round(current, trusted, gate, jerk_psd, level)
         if number >= FIRST_ROUNDS - 1 and looks < LOOKS and (current.settled or number % 2):
@@ -102,7 +99,7 @@ def fuse(
 def _begin(
     stations: list[Seen], screened: list[screening.Screened], weight: list[FloatArray], track: first_track.Track,
     constants: Constants, gate: float, jerk_psd: float | None,
-) -> Fused:  # fmt: skip
+) -> Current:  # fmt: skip
     """The first smoother run, along the first track."""
     sigma = np.stack([each.sigma for each in screened])
     range_m = np.array([np.median(np.linalg.norm(track.state[:, :3] - s.place, axis=1)) for s in stations])
@@ -125,7 +122,7 @@ def _begin(
     weight = [events.of(s, decided) for s in range(len(stations))]
     found = smooth_biased(log._replace(weight=decided), model, start, _directions(events, state, constants))
     rates = np.tile(np.array(outlier_chain.START_RATES), (len(stations), 3, 1))
-    current = Fused(stations, events, weight, possible, sigma, constants, model, start, found, rates, sigma)
+    current = Current(stations, events, weight, possible, sigma, constants, model, start, found, rates, sigma)
     for share in SHARES:
         noise = np.maximum(sigma, share * wide) ** 2
         current = _smoothed(current._replace(model=model._replace(noise_variance=noise)))
@@ -136,14 +133,18 @@ def _directions(events: Events, state: FloatArray, constants: Constants) -> Dire
     return Directions(screening.design(events, state), constants.columns())
 
 
-def _round(current: Fused, trusted: list[FloatArray], gate: float, jerk_psd: float | None, first: int | None) -> Fused:
+def _round(
+    current: Current, trusted: list[FloatArray], gate: float, jerk_psd: float | None, first: int | None
+) -> Current:
     """Decide, tune, move the biases, and smooth again."""
     now = _decided(current, trusted, gate, first)
     now = _tuned(now, jerk_psd, first)
     return _smoothed(now)
 
 
-def _reassessed(current: Fused, trusted: list[FloatArray], gate: float, search: places.Search) -> tuple[Fused, bool]:
+def _reassessed(
+    current: Current, trusted: list[FloatArray], gate: float, search: places.Search
+) -> tuple[Current, bool]:
     """The decisions replaced by likelier ones where another hypothesis explains a place better; whether any was."""
     events, log = current.events, current.log
     possible, believed, weight = events.gathered(current.possible), events.gathered(trusted), log.weight.copy()
@@ -179,7 +180,7 @@ def _reassessed(current: Fused, trusted: list[FloatArray], gate: float, search: 
     return _smoothed(current._replace(weight=by_station, model=calm, settled=False)), True
 
 
-def _decided(current: Fused, trusted: list[FloatArray], gate: float, first: int | None) -> Fused:
+def _decided(current: Current, trusted: list[FloatArray], gate: float, first: int | None) -> Current:
     """Which readings are outliers; settled if few of those from the start on are decided otherwise."""
     run, weight, changed, total = current.found.run, [], 0, 0
     started = (np.arange(len(current.events.time_s)) >= current.start.sample).astype(float)
@@ -198,7 +199,7 @@ def _decided(current: Fused, trusted: list[FloatArray], gate: float, first: int 
     return current._replace(weight=weight, rounds=current.rounds + 1, settled=settled)
 
 
-def _tuned(current: Fused, jerk_psd: float | None, first: int | None) -> Fused:
+def _tuned(current: Current, jerk_psd: float | None, first: int | None) -> Current:
     """Noise by one step, the process noise by a few."""
     run, sigma = current.found.run, current.sigma.copy()
     used = current.events.gathered(current.weight) > 0
@@ -216,49 +217,29 @@ def _tuned(current: Fused, jerk_psd: float | None, first: int | None) -> Fused:
     if jerk_psd is None:
         log = current.log
         if first is not None:
-            model = _level(log, starts, model)
+            model = process_noise.level(log, starts, model)
         else:
-            model = fit_profile(log, starts, _on_knots(log, model), PROFILE_STEPS)
+            model = fit_profile(log, starts, process_noise.on_knots(log, model), PROFILE_STEPS)
     return current._replace(sigma=sigma, model=model)
 
 
-def _on_knots(log: Observations, model: Model) -> Model:
-    """The model with as many knots as its profile needs over the events, whose span the clocks move; farther apart or
-    closer together where the jerk has become another than the one that they were laid out for."""
-    if not math.isfinite(model.knot_s):
-        return model
-    scales = scales_of(log, model.noise_variance)
-    knot_s = knot_length(scales, float(np.median(model.jerk[:, 0])))
-    if model.knot_s / OTHER_KNOTS < knot_s < model.knot_s * OTHER_KNOTS:
-        knot_s = model.knot_s
-    middle_s = (np.arange(max(math.ceil(scales.span_s / knot_s), 1)) + 0.5) * knot_s
-    before = np.minimum((middle_s / model.knot_s).astype(int), len(model.jerk) - 1)
-    return model._replace(jerk=model.jerk[before], knot_s=knot_s)
-
-
-def _level(log: Observations, starts: list[Start], model: Model) -> Model:
-    """The likeliest single jerk level, from the model's."""
-    scales = scales_of(log, model.noise_variance)
-    lower, upper = jerk_bounds(scales)
-
-    def cost(theta: FloatArray) -> tuple[float, FloatArray]:
-        tried = model._replace(jerk=shaped(theta[:1], theta[1]))
-        found = score_log(log, tried, starts)
-        by_axis = found.jerk[0] * tried.jerk[0]
-        pull = VERTICAL_PRECISION * theta[1]
-        return -found.log_likelihood + 0.5 * pull * theta[1], -np.r_[by_axis.sum(), by_axis[5] - pull]
-
-    jerk = np.median(model.jerk, 0)
-    theta = np.clip(np.array([math.log(jerk[0]), math.log(jerk[5] / jerk[0])]), lower, upper)
-    curvature = np.array([len(log.time_s) / 20, len(log.time_s) / 60])
-    theta = optimizer.minimise(cost, theta, curvature, lower, upper, LEVEL_STEPS, tolerance=0.1)
-    return model._replace(jerk=shaped(theta[:1], theta[1]), knot_s=math.inf)
-
-
-def _smoothed(current: Fused) -> Fused:
+def _smoothed(current: Current) -> Current:
     """Smooth at the biases' posterior of the run before, with the weights and the model of now."""
+    return at(current, posterior.update(current.constants, current.found, _directions_of(current)))
+
+
+def said(current: Current) -> Said:
+    """What the readings say of the biases."""
+    return posterior.said(current.constants, current.found, _directions_of(current))
+
+
+def _directions_of(current: Current) -> Directions:
+    return _directions(current.events, current.found.run.state, current.constants)
+
+
+def at(current: Current, constants: Constants) -> Current:
+    """The same smoothed with these biases."""
     old, state = current.events, current.found.run.state
-    constants = posterior.update(current.constants, current.found, _directions(old, state, current.constants))
     events = merge(current.stations, constants.estimate, old.sites.range_m)
     state = moved_to(old.time_s, state, events.time_s)
     head = current.found.run.heads[0]
@@ -283,17 +264,26 @@ def _lead_in(log: Observations, model: Model, run: SmootherRun) -> None:
         filled[: head.sample] = values[:0:-1]
 
 
-def _last(current: Fused) -> Fused:
+def _last(current: Current) -> Current:
     """The run to publish: with a little more process noise than is likeliest."""
     if math.isfinite(current.model.knot_s):
         log = current.log
-        polished = fit_profile(log, [current.start], _on_knots(log, current.model), LAST_STEPS)
+        polished = fit_profile(log, [current.start], process_noise.on_knots(log, current.model), LAST_STEPS)
         current = current._replace(model=with_allowance(log, polished))
     return _smoothed(_smoothed(current))
 
 
-def filtered(fused: Fused) -> FilterRun:
-    """The causal filter with the decisions and the biases of the whole flight; its sigmas include theirs."""
-    run = filter_log(fused.log, fused.model, [fused.start])
-    sigma = np.sqrt(run.sigma**2 + fused.found.spread)
-    return run._replace(sigma=sigma)
+def without_run(current: Current) -> Current:
+    """The same, of whose smoother run nothing is kept but what `at` needs."""
+    run = current.found.run
+    slim = SmootherRun._make([run.state.copy(), *(each[:0].copy() for each in run[1:6]), *run[6:]])
+    return current._replace(found=current.found._replace(run=slim, spread=run.state[:0].copy()))
+
+
+def published(current: Current, smooth: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """State and sigma (n, 9) and NIS (n,) of the events: smoothed, or by the causal filter with the decisions and the
+    biases of the whole flight. Sigmas include those of the biases."""
+    if smooth:
+        return current.found.run.state, current.found.run.sigma, current.found.run.nis
+    run = filter_log(current.log, current.model, [current.start])
+    return run.state, np.sqrt(run.sigma**2 + current.found.spread), run.nis

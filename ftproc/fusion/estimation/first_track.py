@@ -10,7 +10,7 @@ import numpy as np
 
 from ftproc.core.model import stations as model
 from ftproc.core.model.frames import from_cartesian, to_cartesian, unwrap, wrap
-from ftproc.fusion.events import Seen
+from ftproc.fusion.estimation.events import Seen
 from ftproc.records import FloatArray, IntArray
 
 MOST_POINTS, SHORTEST_S = 3000, 0.5  # of the track, and between two

@@ -11,9 +11,9 @@ import numpy as np
 from ftproc.core.editing import two_pass
 from ftproc.core.filtering.records import Model
 from ftproc.core.model import stations as geometry
-from ftproc.fusion import alternatives, places
-from ftproc.fusion.events import CLOCK, Events, Seen
-from ftproc.fusion.first_track import Track
+from ftproc.fusion.estimation import alternatives, places
+from ftproc.fusion.estimation.events import CLOCK, Events, Seen
+from ftproc.fusion.estimation.first_track import Track
 from ftproc.records import FloatArray
 
 LEAST_NOISE = (1e-4, 1e-8, 1e-8)  # m, rad, rad

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ftproc.core.editing import outlier_chain, patch_likelihood
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import smooth_log
-from ftproc.fusion.places import Channel, Search
+from ftproc.fusion.estimation.places import Channel, Search
 from ftproc.records import FloatArray, IntArray
 
 TENSION, TENSION_S = 3.5, 2.0  # standard deviations of the sum of squares of so long a stretch, that are explained

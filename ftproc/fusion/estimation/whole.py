@@ -1,0 +1,189 @@
+"""A fused flight of any length: in one piece, or stretch by stretch where it has many rows.
+
+What a stretch says of the biases is known to those after it. When all have been decided on, each is smoothed once more,
+with the biases as all together have shown them. Stretches overlap, so that each sees what lies beside it.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ftproc.core.model.stations import levelled
+from ftproc.fusion.estimation import engine
+from ftproc.fusion.estimation.constants import FARTHEST, Constants, Said, parameters
+from ftproc.fusion.estimation.engine import Current
+from ftproc.fusion.estimation.events import CLOCK, Seen
+from ftproc.records import FloatArray, IntArray
+
+MOST = 200_000  # rows of a stretch
+BESIDE = 10_000  # rows on either side that are smoothed with it
+
+
+class Track(NamedTuple):
+    """What is published: time_s (n,) true time, distinct; state (n, 9) and sigma (n, 9); nis (n,) of all readings of a
+    time, NaN where none was used."""
+
+    time_s: FloatArray
+    state: FloatArray
+    sigma: FloatArray
+    nis: FloatArray
+
+
+class Fused(NamedTuple):
+    """By station, row for row with its log: weight and possible (rows, 3), leave-one-out residual and residual_variance
+    (rows, 3), position (rows, 3) of the track in m. noise (m, 3) 1-sigma, own (m, 3) the noise that each component
+    shows alone; axes (m, 3, 3) with the tilts; jerk (k, 6) each for knot_s seconds; rounds, settled: of the decisions;
+    unexamined: places where no work was left to look for other hypotheses."""
+
+    stations: list[Seen]
+    weight: list[FloatArray]
+    possible: list[FloatArray]
+    residual: list[FloatArray]
+    residual_variance: list[FloatArray]
+    position: list[FloatArray]
+    track: Track
+    noise: FloatArray
+    own: FloatArray
+    constants: Constants
+    axes: FloatArray
+    jerk: FloatArray
+    knot_s: float
+    rounds: int
+    settled: bool
+    unexamined: int
+
+
+class Stretch(NamedTuple):
+    """A part of the flight as it has been decided on. rows: of each station, with those beside. seen: the stations that
+    have any. said: what the part, without those beside, says of the biases of all."""
+
+    first_s: float
+    stop_s: float
+    rows: list[slice]
+    seen: list[int]
+    current: Current
+    said: Said
+
+
+def fuse(
+    stations: list[Seen], gate: float, jerk_psd: float | None, smooth: bool, progress: Callable[[int, int], None]
+) -> Fused:
+    """The fused flight of two or more stations. smooth: whether the track is smoothed, or filtered with the decisions
+    and the biases of the whole flight. progress is called with the rounds that are done, and the most there may be.
+    Raises engine.Alone."""
+    prior = np.stack([station.prior for station in stations])
+    times = np.sort(np.concatenate([station.time_s for station in stations]))
+    pieces = -(-len(times) // MOST)
+    edges = [-np.inf, *times[len(times) * np.arange(1, pieces) // pieces], np.inf]
+    found: list[Stretch] = []
+    while len(found) < len(edges) - 1:
+        k = len(found)
+        rows = _rows(stations, times, edges[k], edges[k + 1])
+        seen = [s for s, part in enumerate(rows) if part.stop > part.start]
+        there = [_part(stations[s], rows[s]) for s in seen]
+        known = _said(found, prior.size)
+        say = functools.partial(_say, progress, k * engine.MOST_ROUNDS, (len(edges) - 1) * engine.MOST_ROUNDS)
+        try:
+            current = engine.fuse(there, gate, jerk_psd, known.of(parameters(seen)), say)
+        except engine.Alone:
+            if len(edges) == 2:
+                raise
+            del found[len(edges) - 3 :]  # the last joins the one before it, others the next
+            del edges[min(k + 1, len(edges) - 2)]
+            continue
+        inside = np.diff(np.searchsorted(current.events.time_s, edges[k : k + 2]))[0] / len(current.events.time_s)
+        said = engine.said(current).share(float(inside)).among(parameters(seen), prior.size)
+        kept = current if len(edges) == 2 else engine.without_run(current)
+        found.append(Stretch(edges[k], edges[k + 1], rows, seen, kept, said))
+    constants = Constants.before(prior, _said(found, prior.size)) if len(found) > 1 else found[0].current.constants
+    return _joined(stations, found, constants, smooth)
+
+
+def _rows(stations: list[Seen], times: FloatArray, first_s: float, stop_s: float) -> list[slice]:
+    """Of each station from one time until another, and those beside them."""
+    aside = FARTHEST * max(float(station.prior[CLOCK]) for station in stations)
+    low, high = np.searchsorted(times, [first_s, stop_s]) + np.array([-BESIDE, BESIDE])
+    low_s, high_s = times[max(low, 0)] - aside, times[min(high, len(times)) - 1] + aside
+    return [
+        slice(int(np.searchsorted(s.time_s, low_s)), int(np.searchsorted(s.time_s, high_s, side="right")))
+        for s in stations
+    ]
+
+
+def _part(station: Seen, rows: slice) -> Seen:
+    return station._replace(time_s=station.time_s[rows], measurement=station.measurement[rows])
+
+
+def _said(found: list[Stretch], k: int) -> Said:
+    return functools.reduce(Said.with_, (each.said for each in found), Said.nothing(k))
+
+
+def _say(progress: Callable[[int, int], None], before: int, most: int, number: int) -> None:
+    progress(before + number, most)
+
+
+def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, smooth: bool) -> Fused:
+    """The stretches one after the other; smoothed with these biases if they are several."""
+    sizes = [len(station.time_s) for station in stations]
+    weight, possible, residual, variance, position = ([np.full((n, 3), np.nan) for n in sizes] for _ in range(5))
+    tracks, noise, own = [], np.zeros((len(stations), 3)), np.full((len(stations), 3), np.inf)
+    for each in found:
+        current = each.current
+        if len(found) > 1:
+            current = engine.at(current, constants.of(each.seen))
+        events, run = current.events, current.found.run
+        state, sigma, nis = engine.published(current, smooth)
+        here = slice(*np.searchsorted(events.time_s, [each.first_s, each.stop_s]))
+        for k, s in enumerate(each.seen):
+            at = here.start + np.flatnonzero(events.station[here] == k)
+            near, rows = events.row[at], events.row[at] + each.rows[s].start
+            weight[s][rows], possible[s][rows] = current.weight[k][near], current.possible[k][near]
+            residual[s][rows], variance[s][rows] = run.residual[at], run.residual_variance[at]
+            position[s][rows] = state[at, :3]
+            noise[s] += len(rows) / sizes[s] * current.sigma[k] ** 2
+            own[s] = np.minimum(own[s], current.own[k])
+        last = here.start + distinct(events.time_s[here])
+        tracks.append(Track(events.time_s[last], state[last], sigma[last], _together(nis[here], last - here.start)))
+    track = Track(*map(np.concatenate, zip(*tracks, strict=True)))
+    jerk, knot_s = _profile(found, track.time_s)
+    return Fused(
+        stations, weight, possible, residual, variance, position, track, np.sqrt(noise), own, constants,
+        levelled(np.stack([each.axes for each in stations]), constants.estimate[:, 3:CLOCK]), jerk, knot_s,
+        max(each.current.rounds for each in found), all(each.current.settled for each in found),
+        sum(each.current.unexamined for each in found),
+    )  # fmt: skip
+
+
+def _profile(found: list[Stretch], time_s: FloatArray) -> tuple[FloatArray, float]:
+    """The jerk (k, 6) of all stretches, and for how many seconds each of them holds."""
+    if len(found) == 1:
+        return found[0].current.model.jerk, found[0].current.model.knot_s
+    span_s = float(time_s[-1] - time_s[0])
+    knot_s = min(span_s / len(found), *(each.current.model.knot_s for each in found))
+    middle_s = time_s[0] + (np.arange(max(math.ceil(span_s / knot_s), 1)) + 0.5) * knot_s
+    jerk = []
+    for each in found:
+        model, here = each.current.model, middle_s[(middle_s >= each.first_s) & (middle_s < each.stop_s)]
+        knot = ((here - each.current.events.time_s[0]) / model.knot_s).astype(int)
+        jerk.append(model.jerk[np.clip(knot, 0, len(model.jerk) - 1)])
+    return np.concatenate(jerk), knot_s
+
+
+def distinct(time_s: FloatArray) -> IntArray:
+    """The last of the events of each time, (m,) places."""
+    found: IntArray = np.flatnonzero(np.r_[time_s[1:] > time_s[:-1], True])
+    return found
+
+
+def _together(nis: FloatArray, last: IntArray) -> FloatArray:
+    """(m,) NIS of all events of one time together; NaN where none was used."""
+    first = np.r_[0, last[:-1] + 1]
+    total = np.add.reduceat(np.nan_to_num(nis), first)
+    known = np.add.reduceat(np.isfinite(nis).astype(float), first)
+    found: FloatArray = np.where(known > 0, total, np.nan)
+    return found
