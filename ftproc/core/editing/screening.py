@@ -55,6 +55,28 @@ def median(values: FloatArray, n: int) -> float:
 
 
 @part
+def _failing(
+    t: FloatArray, z: FloatArray, n: int, a: int, v: float, q: float, angular: bool, best: float, work: FloatArray
+) -> int:
+    """Distances of n samples from the parabola through sample a, into work; how many are not below the best median. A
+    loop without branches, which becomes vector instructions."""
+    origin, base = t[a], z[a]
+    failing = turned = 0
+    for i in range(n):
+        d = t[i] - origin
+        off = abs(z[i] - base - d * (v + q * d))
+        work[i] = off
+        failing += off >= best
+        turned += off > math.pi
+    if angular and turned > 0:
+        failing = 0
+        for i in range(n):
+            work[i] = abs(wrapped(work[i], True))
+            failing += work[i] >= best
+    return failing
+
+
+@part
 def _best_parabola(
     t: FloatArray, z: FloatArray, n: int, angular: bool, seed: int, residual: FloatArray, work: FloatArray
 ) -> float:
@@ -80,14 +102,8 @@ def _best_parabola(
         tb, tc = t[b] - t[a], t[c] - t[a]
         q = (zc / tc - zb / tb) / (tc - tb)
         v = zb / tb - q * tb
-        # A median below the best needs more than half of the residuals below it: most trials end early.
-        failing, i = 0, 0
-        while i < n and failing < n - n // 2:
-            d = t[i] - t[a]
-            work[i] = abs(wrapped(z[i] - z[a] - d * (v + q * d), angular))
-            failing += work[i] >= best
-            i += 1
-        if failing < n - n // 2:
+        # A median below the best needs more than half of the residuals below it: most trials end here.
+        if _failing(t, z, n, a, v, q, angular, best, work) < n - n // 2:
             best = median(work, n)
             slope, bend, origin, base = v, q, t[a], z[a]
     if best == math.inf:  # readings of one or two instants: a constant
