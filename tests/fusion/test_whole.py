@@ -95,6 +95,21 @@ def test_a_stretch_without_a_first_track_joins_its_neighbour(stations, monkeypat
         fused(stations)
 
 
+def test_what_other_stretches_have_said_narrows_the_biases(stations):
+    def half(known, *ends):
+        part = [each._replace(time_s=each.time_s[slice(*np.searchsorted(each.time_s, ends))],
+                              measurement=each.measurement[slice(*np.searchsorted(each.time_s, ends))])
+                for each in stations]  # fmt: skip
+        return engine.fuse(part, FilterSettings().gate, None, known, lambda number: None)
+
+    nothing = Said.nothing(6 * len(stations))
+    first, alone = half(nothing, 0.0, 60.0), half(nothing, 60.0, 121.0)
+    second = half(engine.said(first), 60.0, 121.0)
+    ratio = second.constants.sigma / np.maximum(alone.constants.sigma, SILENT)
+    assert ratio.max() < 1.02
+    assert np.median(ratio[np.stack([each.prior for each in stations]) > 0]) < 0.9
+
+
 def fails_always(*given):
     raise engine.Alone
 

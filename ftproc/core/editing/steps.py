@@ -62,6 +62,10 @@ class Stretch(NamedTuple):
     rates: FloatArray
     margin: float
 
+    def beliefs(self) -> list[FloatArray]:
+        """The weights without steps, and with the runs taken in if there are any."""
+        return [self.taken_in, self.decided] if (self.taken_in != self.decided).any() else [self.decided]
+
 
 def find(record: Record, decision: Decision) -> list[Step]:
     """The steps in a log whose outliers were decided as if it had none; some are not sure."""
@@ -188,7 +192,7 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
             key=lambda tried: tried[0].likelihood,
         )
         with_it, bridge, step = max(
-            (_sized(stretch, step, weight, model) for weight in (stretch.taken_in, stretch.decided)),
+            (_sized(stretch, step, weight, model) for weight in stretch.beliefs()),
             key=lambda tried: tried[0].likelihood,
         )
         weight = with_it.weight
@@ -196,7 +200,7 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
             return None
         if _size(stretch, bridge, step) < SMALLEST:
             return None
-        least = max(_likelihood(stretch, weight) for weight in (stretch.decided, stretch.taken_in))
+        least = max(_likelihood(stretch, weight) for weight in stretch.beliefs())
         most = _likelihood(bridge, weight) - stretch.margin
         sure = all(_likelihood(stretch, patch) < most for patch in _patches(stretch, step))
         return step._replace(sure=sure) if most > least else None
