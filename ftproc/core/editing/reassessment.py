@@ -23,9 +23,13 @@ from ftproc.core.identification.profile import fit_profile, median_level, roughn
 from ftproc.core.identification.scales import scales_of
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 ROUNDS = 6
 TURN, EDGE = 6, 3  # readings in a row that a turn may have, and on each side of its ends that do not jump
+SHORTEST, ENDS = 4, 5  # readings in a run that may be motion, and at its ends, of which the second nearest must be ...
+JOINED, FAR = 12.0, 25.0  # ... so many sigmas off the track at most; and of one that is an outlier in any case
+SELDOM = 8.0  # ln of how much more often such runs are motion than patches
 LEAST_KEPT = 0.8  # of the readings of a component that were good before the first round
 MARGIN = 5.0  # in log-probability, by which the decisions made again may be less likely than those before
 FEW_MORE = 0.01  # of the readings: those that another hypothesis may reject beyond the first, to be believed
@@ -143,6 +147,48 @@ def with_turns(record: Record, decision: Decision, weight: FloatArray, doubtful:
             other = _until_settled(part, other, None)
             found[span] = believed((part, one), (part, other))[1].weight
     return decision._replace(weight=found, starts=_starts(record, found, calm))
+
+
+def with_motion(record: Record, decision: Decision) -> Decision:
+    """The decisions on a log with those long rejected runs taken in that leave the track and join it again without a
+    jump, where a jerk profile of their own makes that likelier: no patch, but a take-off or a turn."""
+    found, calm = decision.weight.copy(), median_level(decision.model)
+    for c, inside, near in list(_may_be_motion(record, decision)):
+        part, weight = _short(record, near), found[near].copy()
+        weight[inside - near.start, c] = 1.0
+        try:
+            one, other = (Decision(w, calm, _starts(part, w, calm), decision.rates) for w in (found[near], weight))
+            one, other = (each._replace(model=_profile(part, each, COMPARED_STEPS)) for each in (one, other))
+            whole = alternatives.Neighbourhood(
+                part.time_s, part.measurement, part.possible, other.model, decision.rates, part.gate, part.uneven
+            )
+            weight = alternatives.decisions(whole, weight, 2)[-1].weight
+            other = other._replace(weight=weight, starts=_starts(part, weight, calm))
+        except ValueError:  # a component has too few readings there
+            continue
+        if log_probability(part, other) > log_probability(part, one) - SELDOM:
+            found[near] = weight
+    if (found == decision.weight).all():
+        return decision
+    return decision._replace(weight=found, starts=_starts(record, found, calm))
+
+
+def _may_be_motion(record: Record, decision: Decision) -> Iterator[tuple[int, IntArray, slice]]:
+    """The component of each run that may be motion, its readings but for those that are far off themselves, and the
+    samples around it."""
+    smoothed = None
+    for c in range(3):
+        seen = np.flatnonzero(record.possible[:, c])
+        for begin, end in runs_of(decision.weight[seen, c] <= 0):
+            if end - begin < SHORTEST:
+                continue
+            if smoothed is None:
+                log = record.weighted(decision.weight)
+                smoothed = smooth_log(log, decision.model, decision.starts, residuals_only=True)
+            inside = seen[begin:end]
+            off = np.abs(smoothed.residual[inside, c]) / np.sqrt(smoothed.residual_variance[inside, c])
+            if max(np.sort(edge)[1] for edge in (off[:ENDS], off[-ENDS:])) < JOINED:  # so some are not far off
+                yield c, inside[off < FAR], slice(max(inside[0] - AROUND, 0), inside[-1] + 1 + AROUND)
 
 
 def likelier(one: tuple[Record, Decision], other: tuple[Record, Decision]) -> tuple[Record, Decision]:

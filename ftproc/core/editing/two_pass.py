@@ -35,6 +35,7 @@ from ftproc.core.editing.reassessment import (
     log_probability,
     may_be_turns,
     reassess,
+    with_motion,
     with_turns,
 )
 from ftproc.core.filtering.bridging import Step, bridged, refined
@@ -244,12 +245,12 @@ def _decided(
     doubtful = may_be_turns(found[1], turns)
     if jerk_psd is None and found[1].stamp_s == 0 and doubtful.any():
         if found[1].settled and few(doubtful):
-            return found[0], with_turns(*found, turns, doubtful)
+            return found[0], with_motion(found[0], with_turns(*found, turns, doubtful))
         other = begin(turns)
         takes_in = (other[1].weight > found[1].weight)[doubtful].any()
         if takes_in and log_probability(*other) > log_probability(*found) - HOPELESS:
             found = believed(found, _examined(*other, known))
-    return found
+    return found if jerk_psd is not None else (found[0], with_motion(*found))
 
 
 def _first(

@@ -27,7 +27,8 @@ FloatArray = NDArray[np.float64]
 KNOT_SAMPLES = 10  # samples to a knot of the jerk profile ...
 KNOT_MEMORIES = 2.0  # ... but never less than so many memories of the filter,
 MAX_KNOTS = 4000  # nor more than so many knots
-WALK_PRECISION = 1.0  # of the random walk of ln(jerk) from knot to knot
+WALK_PRECISION = 1.0  # of the random walk of ln(jerk) from knot to knot ...
+ABRUPT = 1.0  # ... whose steps beyond this are as rare as their size, not its square: flights turn and take off at once
 ALLOWANCE = 1.4  # on the likeliest jerk: too little makes sigmas dishonest, a little too much costs almost nothing
 LONGEST_MEMORY = 1.0  # knots: less jerk than gives the filter such a memory shows in no knot, so none has less
 
@@ -59,13 +60,13 @@ def fit_profile(
         found = score_log(log, model, starts)
         by_axis = found.jerk * model.jerk
         walk, ratio = theta[1:knots] - theta[: knots - 1], theta[knots]
-        bend = np.zeros(knots)
-        bend[1:] += walk
-        bend[:-1] -= walk
+        bend, slope = np.zeros(knots), walk / np.sqrt(1 + (walk / ABRUPT) ** 2)
+        bend[1:] += slope
+        bend[:-1] -= slope
         pull = np.append(WALK_PRECISION * bend, VERTICAL_PRECISION * ratio)
-        penalty = WALK_PRECISION * float(walk @ walk) + VERTICAL_PRECISION * ratio**2
+        penalty = WALK_PRECISION * _roughness(walk) + 0.5 * VERTICAL_PRECISION * ratio**2
         score = np.append(by_axis.sum(1), by_axis[:, 5].sum())
-        return -found.log_likelihood + 0.5 * penalty, pull - score
+        return -found.log_likelihood + penalty, pull - score
 
     ratio = math.log(level.jerk[0, 5] / level.jerk[0, 0])
     theta = np.append(np.broadcast_to(np.log(level.jerk[:, 0]), knots), ratio)
@@ -76,8 +77,12 @@ def fit_profile(
 
 def roughness(model: Model) -> float:
     """What a jerk profile takes from the log-likelihood: it is a random walk from knot to knot."""
-    walk = np.diff(np.log(model.jerk[:, 0]))
-    return 0.5 * WALK_PRECISION * float(walk @ walk)
+    return WALK_PRECISION * _roughness(np.diff(np.log(model.jerk[:, 0])))
+
+
+def _roughness(walk: FloatArray) -> float:
+    """Half the squares of small steps, and the sizes of large ones."""
+    return ABRUPT**2 * float((np.sqrt(1 + (walk / ABRUPT) ** 2) - 1).sum())
 
 
 def knot_length(scales: Scales, jerk_psd: float) -> float:
