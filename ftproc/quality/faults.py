@@ -22,14 +22,14 @@ class FaultStatistics:
     """The faults of a log, to which those of its parts are added in their order."""
 
     def __init__(self) -> None:
-        self.copies = np.zeros((len(COMPONENTS), 3), int)
+        self.copies = np.zeros((len(COMPONENTS), 4), int)
         self.steps: list[dict[str, Any]] = []
         self.doubtful: list[dict[str, Any]] = []
         self.one_sided: dict[str, dict[str, Any]] = {}
 
     def add(self, time_s: FloatArray, faults: Faults) -> None:
         """Add those of a part: time_s (n,)."""
-        self.copies += [np.bincount(kind, minlength=3) for kind in faults.copied.T]
+        self.copies += [np.bincount(kind, minlength=4) for kind in faults.copied.T]
         for step in faults.steps:
             sizes = {"size": step.size, "sigma": step.sigma}
             found = {"component": NAMES[step.component], "time_s": float(time_s[step.sample])}
@@ -48,7 +48,8 @@ class FaultStatistics:
 
     def of_component(self, c: int) -> dict[str, int]:
         """How many readings of a component were not measured."""
-        return {"held": int(self.copies[c, 1]), "interpolated": int(self.copies[c, 2])}
+        held, interpolated, computed = (int(count) for count in self.copies[c, 1:])
+        return {"held": held, "interpolated": interpolated, "computed": computed}
 
 
 def clock_set_back(log: MeasurementLog) -> dict[str, float] | None:
@@ -100,6 +101,8 @@ def allowed_for(s: Mapping[str, Any]) -> Iterator[str]:
             yield f"{name} repeats the reading before in {part['held']} rows: {rate}"
         if part["interpolated"]:
             yield f"{name} is interpolated between other readings in {part['interpolated']} rows: {rate}"
+        if part["computed"]:
+            yield f"{name} has no noise in {part['computed']} rows, as if a tracker coasts: {rate}"
 
 
 def step_in_words(step: Mapping[str, Any]) -> str:

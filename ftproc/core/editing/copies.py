@@ -1,10 +1,12 @@
-"""Readings that were not measured: held from the sample before, or drawn on a line between two others.
+"""Readings that were not measured: held from the sample before, drawn on a line between two others, or computed.
 
 An instrument that is slower than its log, or that has nothing new to say, leaves the reading before in its place; a
 program that brings several instruments to one clock interpolates. Used as readings, such copies make the noise
 seem correlated, and what they say is counted several times. They are told from chance by exact agreement: the readings
 of a moving target change by many steps of their rounding, and hardly ever by none. A coarse instrument that sees a slow
 target repeats its readings too, but then goes on by single steps.
+
+A tracker that has lost its target coasts: it computes where the target should be, and the noise is gone.
 """
 
 from __future__ import annotations
@@ -14,12 +16,12 @@ from numpy.typing import NDArray
 
 from ftproc.core.editing.runs import runs_of
 from ftproc.core.editing.screening import MOSTLY_ON_GRID, ON_GRID, rounding_step, stuck
-from ftproc.core.model.frames import wrap
+from ftproc.core.model.frames import unwrap, wrap
 
 FloatArray = NDArray[np.float64]
 KindArray = NDArray[np.uint8]
 
-MEASURED, HELD, INTERPOLATED = 0, 1, 2
+MEASURED, HELD, INTERPOLATED, COMPUTED = 0, 1, 2, 3
 FEWEST = 20  # readings that must be left
 MANY = 6.0  # steps of rounding by which a reading changes typically, or else it is coarse
 NEAR = 4.0  # steps within which changes are counted, to know how many are none by chance
@@ -28,16 +30,23 @@ LEAST_ON_LINES = 0.15  # share of a component's readings
 NEARLY = 0.2  # of the median that the nearest twentieth of those off the lines are off: more shows rounding that is
 # coarse, whatever its step
 ROUNDING = 1e-12  # of a number
+QUIET, IN_A_ROW = 0.05, 14  # of the noise, third differences that have none, and so many of them
+CALM, OF_NORMAL = 0.2, 0.2533  # share of third differences that tell the noise, and their limit in its 1-sigma
+BEYOND, ALTERNATE = 5.0, -0.3  # times the noise that count, and correlation of third differences that noise has at most
+TELLS = 0.2  # of the noise: coarser rounding hides whether there is any
+MOVED = 10.0  # times the noise that readings of a target that moves change meanwhile
 PRECISION, COARSER, DIFFERENCES = 1e-11, 10.0, 24  # of the largest reading, from which two differ; times that, for a
 # step to be one; and differences between neighbouring values, the smallest, from which it is found
 
 
 def without_copies(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, KindArray]:
-    """The readings (n, 3), missing where they were not measured, and (n, 3) HELD or INTERPOLATED there, else MEASURED.
+    """The readings (n, 3), missing where they were not measured, and (n, 3) HELD, INTERPOLATED or COMPUTED there, else
+    MEASURED.
 
     time_s (n,), measurement (n, 3). Repeats of a component that is stuck now and then are outliers, not copies.
     """
     z, kind = measurement.copy(), np.zeros(measurement.shape, np.uint8)
+    quiet, moving = np.zeros(z.shape, bool), np.zeros(len(z), bool)
     for c in range(3):
         channel = measurement[:, c]
         there = np.isfinite(channel)
@@ -48,6 +57,10 @@ def without_copies(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatAr
         seen = seen[~held]
         on_lines, values = _on_lines(time_s[seen], channel[seen], step, c == 1)
         kind[seen[on_lines], c], z[seen, c] = INTERPOLATED, values
+        seen = seen[~on_lines]
+        quiet[seen, c], moves = _without_noise(time_s[seen], unwrap(channel[seen]) if c == 1 else channel[seen], step)
+        moving[seen] |= moves
+    kind[quiet & moving[:, None]] = COMPUTED  # a target that rests may be seen without any noise
     z[kind > 0] = np.nan
     return z, kind
 
@@ -134,3 +147,23 @@ def _on_lines(
         on[kept:end:2] = False
     on[[0, -1]] = False
     return on, values
+
+
+def _without_noise(time_s: FloatArray, values: FloatArray, step: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """(m,) readings of a stretch without noise, by their third divided differences, and those that move meanwhile."""
+    found, moving = np.zeros(len(values), bool), np.zeros(len(values), bool)
+    if len(values) < FEWEST + IN_A_ROW or not (np.diff(time_s) > 0).all():
+        return found, moving
+    t, z = (np.lib.stride_tricks.sliding_window_view(each, 4) for each in (time_s, values))
+    apart = t[:, :, None] - t[:, None, :] + np.eye(4)
+    share = 1 / apart.prod(2)
+    third = (share * (z - z[:, :1])).sum(1) / np.sqrt((share**2).sum(1))
+    off = np.abs(third)
+    noise = float(np.quantile(off, CALM)) / OF_NORMAL
+    third, limit = np.clip(third, -BEYOND * noise, BEYOND * noise), max(QUIET * noise, step)
+    if limit < TELLS * noise and third[1:] @ third[:-1] < ALTERNATE * (third @ third):
+        for begin, end in runs_of(off <= limit):
+            if end - begin >= IN_A_ROW:
+                found[begin : end + 3] = True
+                moving[begin : end + 3] = np.ptp(values[begin : end + 3]) > MOVED * noise
+    return found, moving

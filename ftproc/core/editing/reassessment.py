@@ -26,16 +26,16 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 ROUNDS = 6
-TURN, EDGE = 6, 3  # readings in a row that a turn may have, and on each side of its ends that do not jump
 SHORTEST, ENDS = 4, 5  # readings in a run that may be motion, and at its ends, of which the second nearest must be ...
 JOINED, FAR = 12.0, 25.0  # ... so many sigmas off the track at most; and of one that is an outlier in any case
+ONE_SIDED = 0.6  # more of them on one side of the track than on the other: noise is on both
 SELDOM = 8.0  # ln of how much more often such runs are motion than patches
 LEAST_KEPT = 0.8  # of the readings of a component that were good before the first round
 MARGIN = 5.0  # in log-probability, by which the decisions made again may be less likely than those before
 FEW_MORE = 0.01  # of the readings: those that another hypothesis may reject beyond the first, to be believed
 OTHER_LEVEL = 2.5  # times the jerk level at which an alternative was tried, before it is tried again
 PROFILE_STEPS, COMPARED_STEPS = 3, 12  # of the search for the jerk profile; where two are compared
-STANDS_OUT = 8.0  # times the median of the jerk profile
+STANDS_OUT = 16.0  # times the median of the jerk profile
 AROUND = 200  # samples on each side of what stands out that are decided with it
 LONGEST_SPAN = 3000  # samples that are decided together
 SHORT_LOG, MOST = 8000, 0.5  # samples, and share that stands out: then all of it is decided again, and noise as well
@@ -111,44 +111,6 @@ def _until_settled(record: Record, decision: Decision, profile: Model | None) ->
     return found
 
 
-def may_be_turns(decision: Decision, jumps_only: FloatArray) -> NDArray[np.bool_]:
-    """(n, 3) rejected readings where the target may have turned: where the decisions do not stand still all of them,
-    else those of long runs at whose ends nothing jumps."""
-    found = np.asarray(decision.weight == 0, np.bool_)
-    if not decision.settled:
-        return found
-    for c in range(3):
-        jumps = np.cumsum(np.pad(jumps_only[:, c] == 0, (1, 0)))
-        for begin, end in runs_of(found[:, c]):
-            edges = [(max(edge - EDGE, 0), min(edge + EDGE, len(jumps) - 1)) for edge in (begin, end)]
-            found[begin:end, c] = end - begin >= TURN and all(jumps[high] == jumps[low] for low, high in edges)
-    return found
-
-
-def few(doubtful: NDArray[np.bool_]) -> bool:
-    """Whether most of the log is far from doubtful readings (n, 3)."""
-    return bool(_widened(np.asarray(doubtful.any(1), np.bool_)).mean() < MOST)
-
-
-def with_turns(record: Record, decision: Decision, weight: FloatArray, doubtful: NDArray[np.bool_]) -> Decision:
-    """The decisions on a long log, made again from these weights (n, 3) on around each doubtful reading (n, 3), where
-    that takes some of these in and is likelier."""
-    calm, found = median_level(decision.model), decision.weight.copy()
-    for span in _spans(_widened(np.asarray(doubtful.any(1), np.bool_))):
-        part = _short(record, span)
-        try:
-            one, other = (
-                Decision(each[span], calm, _starts(part, each[span], calm), decision.rates) for each in (found, weight)
-            )
-        except ValueError:  # a component has too few readings there
-            continue
-        other = decide(part, other, tune_first=True)
-        if (other.weight > one.weight)[doubtful[span]].any():
-            other = _until_settled(part, other, None)
-            found[span] = believed((part, one), (part, other))[1].weight
-    return decision._replace(weight=found, starts=_starts(record, found, calm))
-
-
 def with_motion(record: Record, decision: Decision) -> Decision:
     """The decisions on a log with those long rejected runs taken in that leave the track and join it again without a
     jump, where a jerk profile of their own makes that likelier: no patch, but a take-off or a turn."""
@@ -166,7 +128,8 @@ def with_motion(record: Record, decision: Decision) -> Decision:
             other = other._replace(weight=weight, starts=_starts(part, weight, calm))
         except ValueError:  # a component has too few readings there
             continue
-        if log_probability(part, other) > log_probability(part, one) - SELDOM:
+        taken_in = weight[inside - near.start, c].mean() > 0.5
+        if taken_in and log_probability(part, other) > log_probability(part, one) - SELDOM:
             found[near] = weight
     if (found == decision.weight).all():
         return decision
@@ -186,9 +149,11 @@ def _may_be_motion(record: Record, decision: Decision) -> Iterator[tuple[int, In
                 log = record.weighted(decision.weight)
                 smoothed = smooth_log(log, decision.model, decision.starts, residuals_only=True)
             inside = seen[begin:end]
-            off = np.abs(smoothed.residual[inside, c]) / np.sqrt(smoothed.residual_variance[inside, c])
-            if max(np.sort(edge)[1] for edge in (off[:ENDS], off[-ENDS:])) < JOINED:  # so some are not far off
-                yield c, inside[off < FAR], slice(max(inside[0] - AROUND, 0), inside[-1] + 1 + AROUND)
+            away = smoothed.residual[inside, c] / np.sqrt(smoothed.residual_variance[inside, c])
+            joined = max(np.sort(np.abs(edge))[1] for edge in (away[:ENDS], away[-ENDS:])) < JOINED
+            near = np.abs(away) < FAR
+            if joined and abs(np.sign(away[near]).sum()) >= ONE_SIDED * near.sum():
+                yield c, inside[near], slice(max(inside[0] - AROUND, 0), inside[-1] + 1 + AROUND)
 
 
 def likelier(one: tuple[Record, Decision], other: tuple[Record, Decision]) -> tuple[Record, Decision]:

@@ -56,11 +56,12 @@ def median(values: FloatArray, n: int) -> float:
 
 @part
 def _failing(
-    t: FloatArray, z: FloatArray, n: int, a: int, v: float, q: float, angular: bool, best: float, work: FloatArray
-) -> int:
-    """Distances of n samples from the parabola through sample a, into work; how many are not below the best median. A
-    loop without branches, which becomes vector instructions."""
-    origin, base = t[a], z[a]
+    t: FloatArray, z: FloatArray, n: int, parabola: tuple[float, float, float, float], angular: bool, best: float,
+    work: FloatArray,
+) -> int:  # fmt: skip
+    """Distances of n samples from a parabola, into work; how many are not below the best median. A loop without
+    branches, which becomes vector instructions."""
+    origin, base, v, q = parabola
     failing = turned = 0
     for i in range(n):
         d = t[i] - origin
@@ -103,7 +104,7 @@ def _best_parabola(
         q = (zc / tc - zb / tb) / (tc - tb)
         v = zb / tb - q * tb
         # A median below the best needs more than half of the residuals below it: most trials end here.
-        if _failing(t, z, n, a, v, q, angular, best, work) < n - n // 2:
+        if _failing(t, z, n, (t[a], z[a], v, q), angular, best, work) < n - n // 2:
             best = median(work, n)
             slope, bend, origin, base = v, q, t[a], z[a]
     if best == math.inf:  # readings of one or two instants: a constant

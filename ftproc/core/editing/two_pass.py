@@ -30,13 +30,10 @@ from ftproc.core.editing.decisions import (
 )
 from ftproc.core.editing.reassessment import (
     believed,
-    few,
     likelier,
     log_probability,
-    may_be_turns,
     reassess,
     with_motion,
-    with_turns,
 )
 from ftproc.core.filtering.bridging import Step, bridged, refined
 from ftproc.core.filtering.initialization import find_starts
@@ -200,6 +197,7 @@ def edit(
         if _may_be_late_stamps((record, decision), other):
             break
         (record, decision), found = other, sorted([*found, *new], key=lambda s: s.sample)
+    decision = decision if record.fixed.jerk else with_motion(record, decision)
     if segment_of is None and not short:
         decision = allow_for_colour(record, decision)
     log = record.weighted(decision.weight)
@@ -241,16 +239,12 @@ def _decided(
     noise = np.where(np.isfinite(known.sigma), known.sigma, sigma) ** 2
     begin = partial(_first, record, segment_of=segment_of, noise=noise, jerk_psd=jerk_psd)
     found = _examined(*begin(record.screened), known)
-    turns = jumps_only * possible
-    doubtful = may_be_turns(found[1], turns)
-    if jerk_psd is None and found[1].stamp_s == 0 and doubtful.any():
-        if found[1].settled and few(doubtful):
-            return found[0], with_motion(found[0], with_turns(*found, turns, doubtful))
-        other = begin(turns)
-        takes_in = (other[1].weight > found[1].weight)[doubtful].any()
+    if jerk_psd is None and found[1].stamp_s == 0 and not found[1].settled:  # turns may have been taken for patches
+        other = begin(jumps_only * possible)
+        takes_in = (other[1].weight > found[1].weight).any()
         if takes_in and log_probability(*other) > log_probability(*found) - HOPELESS:
             found = believed(found, _examined(*other, known))
-    return found if jerk_psd is not None else (found[0], with_motion(*found))
+    return found
 
 
 def _first(

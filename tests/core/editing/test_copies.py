@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core.editing.copies import HELD, INTERPOLATED, MEASURED, without_copies
+from ftproc.core.editing.copies import COMPUTED, HELD, INTERPOLATED, MEASURED, without_copies
 
 N, DT = 600, 0.1
 TIME = DT * np.arange(N)
@@ -125,3 +125,35 @@ def test_copies_of_rows_at_the_same_time_are_held():
     z, time = np.repeat(readings()[:300], 2, 0), np.repeat(TIME[:300], 2)
     assert (without_copies(time, z)[1][1::2] == HELD).all()
     assert INTERPOLATED not in without_copies(time, z)[1]
+
+
+def coasting(z, begin, end, curved=0.0):
+    """The readings of a tracker that goes on by itself there, with the rates of the second before."""
+    z, k = z.copy(), np.arange(begin, end)
+    rate = (z[begin - 1] - z[begin - 11]) / (TIME[begin - 1] - TIME[begin - 11])
+    late = (TIME[k] - TIME[begin - 1])[:, None]
+    z[k] = z[begin - 1] + rate * late + curved * np.array([1.0, 1e-4, 1e-4]) * late**2
+    return z
+
+
+@pytest.mark.parametrize("to", [lambda z: z, rounded])
+@pytest.mark.parametrize("curved", [0.0, 0.5])
+@pytest.mark.parametrize(("begin", "end"), [(540, 600), (200, 240), (300, 320)])
+def test_a_tracker_that_coasts_has_no_noise(begin, end, curved, to):
+    """Also a component that hardly changes meanwhile, as long as another one does."""
+    found, kind = without_copies(TIME, to(coasting(readings(1), begin, end, curved)))
+    inside = np.zeros(N, bool)
+    inside[begin:end] = True
+    assert (kind[inside] == COMPUTED).mean() > 0.95
+    assert (kind[~inside] != MEASURED).sum() <= 6
+    assert np.isnan(found[kind > 0]).all()
+
+
+@pytest.mark.parametrize("noise", [1e-3, 1.0])
+def test_a_target_that_rests_a_while_is_measured(noise):
+    """However little noise there is then, and however little there is at all."""
+    z = readings(2, noise)
+    z[250:350] = z[250] + 1e-2 * (z - readings(2, 0.0))[250:350]
+    assert (without_copies(TIME, z)[1] == MEASURED).all()
+    slow = 0.98 ** np.abs(np.arange(N)[:, None] - np.arange(N)) @ np.random.default_rng(3).standard_normal((N, 3))
+    assert (without_copies(TIME, readings(4, 0.0) + slow * np.array([2.0, 3e-4, 3e-4]))[1] == MEASURED).all()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.editing import two_pass
+from ftproc.core.identification import profile
 from ftproc.core.model.frames import from_cartesian
 
 pytestmark = pytest.mark.compiled
@@ -54,7 +55,8 @@ def test_turns_are_not_patches(monkeypatch):
     assert np.median(largest) < 20
     assert largest.max() < 200
     assert rejected.max() < 0.03
-    monkeypatch.setattr(two_pass, "may_be_turns", lambda decision, jumps_only: np.zeros(jumps_only.shape, bool))
+    monkeypatch.setattr(profile, "ABRUPT", 1e6)
+    monkeypatch.setattr(two_pass, "with_motion", lambda record, decision: decision)
     assert np.median(edited(flights[:2])[0]) > 50
 
 
@@ -65,9 +67,46 @@ def test_noise_that_grows_with_nearness_is_noise():
     assert rejected.max() < 0.05
 
 
-def test_turns_are_looked_for_where_they_may_be(monkeypatch):
-    flights = [arrival(0, TURNS[0])]
-    monkeypatch.setattr(two_pass, "few", lambda doubtful: True)
-    assert edited(flights)[0][0] < 20
-    monkeypatch.setattr(two_pass, "with_turns", lambda record, decision, weight, doubtful: decision)
-    assert edited(flights)[0][0] > 50
+def take_off(seed, n=160, rotates=60):
+    """A minute and more at one hertz: a run along the ground from rest at 3 m/s2, and a climb that begins within three
+    seconds. Readings, positions."""
+    rng, fine = np.random.default_rng(seed), 20
+    time = np.arange(n * fine) / fine
+    speed = np.clip(3.0 * (time - 32), 0, 75)
+    climb = np.clip((time - rotates) / 3.0, 0, 1) * 0.12
+    heading = rng.uniform(0, 2 * np.pi)
+    along = np.stack([np.cos(heading) * np.cos(climb), np.sin(heading) * np.cos(climb), np.sin(climb)], 1)
+    bearing = heading + rng.uniform(1, 2)
+    position = np.cumsum(speed[:, None] * along / fine, 0)[::fine]
+    position += [900 * np.cos(bearing), 900 * np.sin(bearing), 2.0]
+    noise = np.array([3.0, 3e-4, 2e-4]) * rng.standard_normal((n, 3))
+    return np.arange(float(n)), from_cartesian(position) + noise, position
+
+
+def worst_of(flights):
+    """The largest share of rejected readings, and the largest error in sigmas."""
+    rejected, off = [], []
+    for time, readings, position in flights:
+        found = two_pass.edit(time, readings, UNKNOWN)
+        rejected.append((found.weight == 0).mean())
+        off.append((np.abs(found.smoothed.state[:, :3] - position) / found.smoothed.sigma[:, :3]).max())
+    return max(rejected), max(off)
+
+
+def test_a_take_off_is_no_patch(monkeypatch):
+    flights = [take_off(seed) for seed in range(6)]
+    rejected, off = worst_of(flights)
+    assert rejected < 0.01
+    assert off < 5
+    monkeypatch.setattr(two_pass, "with_motion", lambda record, decision: decision)
+    rejected, off = worst_of(flights)
+    assert rejected > 0.04
+    assert off > 7
+
+
+def test_a_patch_that_begins_and_ends_with_a_jump_is_one():
+    for seed in range(3):
+        time, readings, _ = take_off(seed)
+        readings[100:110, 2] += 6e-3
+        found = two_pass.edit(time, readings, UNKNOWN)
+        assert (found.weight[100:110, 2] == 0).all()
