@@ -33,17 +33,18 @@ from ftproc.core.model.frames import wrap
 
 FloatArray = NDArray[np.float64]
 
-LEAST = 5.0  # sigmas of a step's estimate that make it worth weighing
+LEAST = 6.0  # sigmas of a step's estimate that make it worth weighing
 FEWEST, EVEN = 3, 5.0  # readings in a rejected run, and second differences in sigmas, that may be a track
 AROUND, MEMORIES = (100, 400), 6.0  # samples on each side that decide between step and manoeuvre, and memories
 MARGIN = 8.0  # by which the log-probability of a stretch with a step must be better, and ln of the places for it
 MOST = 8  # steps that are weighed at a time
-SMALLEST = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
+SMALLEST, SURE = 4.5, 7.0  # sigmas of the noise: a smaller step than this may be an end of a weak patch
 SMALL = 0.7  # times that, before its size is found with the outliers beside it
 PATCHES = 12, 24, 48  # readings in a patch, of which a step may be an end
 STAYS = 0.75  # share of the readings on either side of a step that must be good
 AGREE, BESIDE = 0.75, 7  # share of a rejected run on either side of the track, and readings that tell how far they jump
 JOINS = 0.3  # times as far off the track at one end of a run as at the other
+HOPELESS = 200.0  # by which the log-probability is worse before a size is found again, for a step that is none
 SIZES = 2  # times that the size of a step is found again, as the decisions beside it change
 PROFILE_STEPS = 3  # of the search for the jerk profile of a stretch
 END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step cannot be told from a patch
@@ -192,7 +193,7 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
             key=lambda tried: tried[0].likelihood,
         )
         with_it, bridge, step = max(
-            (_sized(stretch, step, weight, model) for weight in stretch.beliefs()),
+            (_sized(stretch, step, weight, model, without.likelihood - HOPELESS) for weight in stretch.beliefs()),
             key=lambda tried: tried[0].likelihood,
         )
         weight = with_it.weight
@@ -202,17 +203,26 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
             return None
         least = max(_likelihood(stretch, weight) for weight in stretch.beliefs())
         most = _likelihood(bridge, weight) - stretch.margin
-        sure = all(_likelihood(stretch, patch) < most for patch in _patches(stretch, step))
-        return step._replace(sure=sure) if most > least else None
+        if not most > least:
+            return None
+        large = _size(stretch, bridge, step) >= SURE
+        return step._replace(
+            sure=large and all(_likelihood(stretch, patch) < most for patch in _patches(stretch, step))
+        )
     except ValueError:  # a component has too few readings there
         return None
 
 
-def _sized(stretch: Stretch, step: Step, weight: FloatArray, model: Model) -> tuple[alternatives.Step, Stretch, Step]:
-    """The decisions with a step bridged, from these weights (n, 3) on, the stretch without it, and its size."""
+def _sized(
+    stretch: Stretch, step: Step, weight: FloatArray, model: Model, least: float
+) -> tuple[alternatives.Step, Stretch, Step]:
+    """The decisions with a step bridged, from these weights (n, 3) on, the stretch without it, and its size. least:
+    log-probability below which there is no hope for it."""
     bridge = _without(stretch, [step])
     for _ in range(SIZES):
         with_it = _decided(bridge, weight, model)
+        if with_it.likelihood < least:
+            break
         weight = with_it.weight
         log, (step,) = refined(bridge.record.weighted(weight), model, [step])
         bridge = bridge._replace(record=bridge.record._replace(measurement=log.measurement))

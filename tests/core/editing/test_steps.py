@@ -45,6 +45,18 @@ def test_a_step_is_found_with_its_place_and_size_and_the_longer_side_is_kept(c, 
     assert found.weight.mean() > 0.98
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_readings_that_are_a_little_off_for_long_are_named_and_left_as_they_are(seed):
+    """Six sigmas, for ten seconds at ten hertz: too little to be sure which side is right, too much for noise."""
+    a = matched(seed, 600, dt=0.1, q=0.02, distance=7000.0)
+    z = a.z.copy()
+    z[250:350, seed] += 6 * SIGMA[seed]
+    found = edit(a, z)
+    assert {step.component for step in found.faults.steps} == {seed}
+    assert not any(step.sure for step in found.faults.steps)
+    assert min(abs(step.sample - k) for step in found.faults.steps for k in (250, 350)) <= 2
+
+
 @pytest.mark.parametrize(("c", "k"), [(0, 100), (1, 350), (2, 300)])
 def test_a_step_in_noise_that_grows(c, k):
     a = flight(c)
