@@ -29,6 +29,7 @@ TAILS, RARE = 0.5, 0.005  # share of what lies outside the gate that lies just o
 MOST_IN_TAILS = 0.05  # share of all readings: of more, nobody knows whether they are tails or outliers
 NORMALLY, FADING = 3.0, 1.0  # times as many as a normal distribution has there, and as farther out
 GATE_STEP, WIDEST_GATE = 1.1, 2.5  # by which a gate is widened, and times itself at most
+ROUNDED = 0.5  # of a component's noise that rounding makes
 FEWEST_KEPT = 0.5  # share of what screening trusts that must survive the decisions, in each component
 
 
@@ -200,6 +201,8 @@ def _has_tails(off: FloatArray, gate: float, count: int) -> bool:
 
 def allow_for_drift(record: Record, decision: Decision) -> tuple[Record, Decision]:
     """The record with noise whose variance drifts, and the decisions made again, if it does."""
+    if _repeats(record, decision):
+        return record, decision
     drifting = uneven_noise.drift(record.weighted(decision.weight), _residuals(record, decision))
     if drifting is None:
         return record, decision
@@ -209,9 +212,18 @@ def allow_for_drift(record: Record, decision: Decision) -> tuple[Record, Decisio
     return record, again
 
 
+def _repeats(record: Record, decision: Decision) -> bool:
+    """Whether readings repeat because they are rounded. Their errors last as long as they do, and are as large as the
+    target is slow, but that is known."""
+    rounded = record.rounding > ROUNDED * np.sqrt(decision.model.noise_variance)
+    return record.uneven is not None and bool(rounded.any())
+
+
 def allow_for_colour(record: Record, decision: Decision) -> Decision:
     """The decisions made again with correlated noise, if the noise is correlated; where such a model is only a little
     better than that of white noise, or cannot be separated from motion, it is an alternative."""
+    if _repeats(record, decision):
+        return decision
     log, starts = record.weighted(decision.weight), decision.starts
     smoothed = smooth_log(log, decision.model, starts, residuals_only=True)
     if not coloured_noise.may_be(log, smoothed, decision.model):

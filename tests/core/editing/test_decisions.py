@@ -67,7 +67,7 @@ def test_decisions_under_correlated_noise_are_taken_only_if_they_stand_still(mon
     monkeypatch.setattr(decisions, "decide", lambda record, decision, tune_first: after)
     monkeypatch.setattr(decisions.coloured_noise, "may_be", lambda *args: True)
     monkeypatch.setattr(decisions.coloured_noise, "fit_coloured", lambda *args: found)
-    record = SimpleNamespace(weighted=lambda weight: None, fixed=None)
+    record = SimpleNamespace(weighted=lambda weight: None, fixed=None, uneven=None, rounding=np.zeros(3))
     decided = decisions.allow_for_colour(record, before)
     assert decided.model is faster
     assert decided.slowest is slower

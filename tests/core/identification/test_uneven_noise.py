@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from ftproc.core.editing import screening, two_pass
+from ftproc.core.editing import decisions, screening, two_pass
 from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification import uneven_noise
@@ -244,3 +244,36 @@ def test_windows_are_those_of_numpy(n, count):
     for what in (np.median, np.mean):
         expected = [what(window) for window in np.array_split(values, count)]
         np.testing.assert_allclose(uneven_noise._of_windows(values, count, what), expected, rtol=1e-14)
+
+
+def hovering(seed, step):
+    """A helicopter that comes, hovers and leaves, 80 s at 10 Hz, in readings rounded to steps of 20 sigma of the noise:
+    times, readings, positions."""
+    rng, fine = np.random.default_rng(seed), 20
+    time = np.arange(800 * fine) / (10 * fine)
+    speed = 40 / (1 + np.exp((time - 24) / 2)) + 40 / (1 + np.exp((60 - time) / 2))
+    course = rng.uniform(0, 2 * np.pi) + 0.6 * np.sin(2 * np.pi * time / 80)
+    velocity = np.stack([speed * np.cos(course), speed * np.sin(course), 0.3 * np.sin(time / 5)], 1)
+    position = np.cumsum(velocity, 0)[::fine] / (10 * fine)
+    away = rng.uniform(0, 2 * np.pi)
+    position += np.array([1000 * np.cos(away), 1000 * np.sin(away), 150]) - position[400] * [1, 1, 0]
+    z = from_cartesian(position) + step / 20 * rng.standard_normal((800, 3))
+    return time[::fine].copy(), np.round(z / step) * step, position
+
+
+def share_off(step):
+    """The mean share of samples that are off by more than five sigmas."""
+    shares = []
+    for seed in range(3):
+        time, z, position = hovering(seed, step)
+        found = two_pass.edit(time, z, KNOWN).smoothed
+        shares.append((np.abs(found.state[:, :3] - position) > 5 * found.sigma[:, :3]).any(1).mean())
+    return np.mean(shares)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("step", [(1.0, 1.7e-4, 1.7e-4), (5.0, 9e-4, 9e-4)])
+def test_coarse_rounding_of_a_slow_target_is_neither_drift_nor_correlated_noise(step, monkeypatch):
+    assert share_off(np.array(step)) < 0.005
+    monkeypatch.setattr(decisions, "_repeats", lambda record, decision: False)
+    assert share_off(np.array(step)) > 0.01
