@@ -78,6 +78,13 @@ def test_options_that_do_nothing_are_refused(run, here, rows, options, sentence)
     assert not list(here.iterdir())
 
 
+def test_what_a_station_file_asks_for_in_vain_is_said(run, here, rows):
+    Path("a.toml").write_text("[filter]\nkeep_columns = true\nediting = 'two-pass'\n")
+    result = run("filter", "-", "--follow", "--config", "a.toml", "--summary", "none", stdin=text(HEADER, *rows))
+    assert result.code == 0
+    assert result.err.startswith("ftproc: --follow copies no other columns of the log;")
+
+
 def test_other_kinds_of_output_are_refused_before_the_log_is_read(run, here):
     result = run("filter", "-", "--follow", "-o", "a.xyz", stdin="")
     assert result.code == 1
