@@ -160,8 +160,10 @@ def command(list_methods: str | None, write_config: bool, explain: bool, follow:
         from ftproc.cli import filtering
         from ftproc.live.publishing import follow_log
 
-        said = follow_log(options["logs"], options["output"], filtering.recipe(ctx, live=True), follow)
-        click.echo(f"ftproc: {said}", err=True)
+        recipe = filtering.followed_recipe(ctx)
+        said = follow_log(options["logs"], options["output"], recipe, follow, filtering.notify)
+        if options["summary"] != "none":
+            filtering.notify(said)
     else:
         start_quickly()
         from ftproc.cli import filtering

@@ -27,7 +27,22 @@ from ftproc.methods.registry import EVERY
 from ftproc.quality.summary import line
 from ftproc.settings import NO_MODEL, PACKAGED
 
-_ASK_FOR_NOTHING = (("model", PACKAGED), ("model", NO_MODEL))
+_ASK_FOR_NOTHING = (("model", PACKAGED), ("model", NO_MODEL), ("target", ABSENT), ("summary", "none"))
+
+_WHOLE = "Leave it out, or filter the log without --follow when it is complete."
+_PIPE = "Let only the rows that count through a program such as awk, and follow -."
+#: Options that --follow does not honour -> what it does instead, and what to do.
+_NOT_FOLLOWED = {
+    "where": f"reads every row. {_PIPE}",
+    "target": f"takes every row for the same target. {_PIPE}",
+    "keep_columns": f"copies no other columns. {_WHOLE}",
+    "smooth": f"knows no later rows. {_WHOLE}",
+    "report": f"writes rows only. {_WHOLE}",
+    "model": "corrects nothing with a network. Leave it out.",
+    "jobs": "runs in one process. Leave it out.",
+    "scheduler": "runs in one process. Leave it out.",
+    "summary": "has no summary but the number of rows. Leave it out, or say --summary none.",
+}
 
 
 class Request(NamedTuple):
@@ -40,6 +55,23 @@ class Request(NamedTuple):
     scheduler: str | None
     summary: str
     report: str | None
+
+
+def followed_recipe(ctx: click.Context) -> Recipe:
+    """How a log that grows is filtered: as `recipe`, with live editing where nothing else is stated. Raises UsageError
+    for options on the command line that --follow does not honour, too."""
+    given = stated(ctx)
+    for name, cure in _NOT_FOLLOWED.items():
+        if given.get(name) and (name, given[name]) not in _ASK_FOR_NOTHING:
+            raise UsageError(f"--{name.replace('_', '-')} is not for --follow, which {cure}")
+    if given.get("editing", "live") not in ("live", "forward"):
+        raise UsageError(
+            f"--editing {given['editing']} is not for --follow, which decides on each row as it comes. Say --editing "
+            "live or forward, or leave it out."
+        )
+    found = recipe(ctx, live=True)
+    registry.check_parameters(found.settings)
+    return found
 
 
 def recipe(ctx: click.Context, live: bool = False) -> Recipe:
@@ -97,13 +129,13 @@ def filter_logs(request: Request, recipe: Recipe, debug: bool) -> int:
     pages, index = plan.pages([task.output for task in tasks], request.report, [*request.logs, *inputs])
     tasks = [replace(task, report=page) for task, page in zip(tasks, pages, strict=True)]
     if readings := conventions.in_words(recipe.station):
-        _notify(f"readings: {', '.join(readings)}")
+        notify(f"readings: {', '.join(readings)}")
     if recipe.settings.site is not None:
-        _notify(f"positions on the earth: {geodesy.axes(conventions.FRAMES[recipe.station.azimuth_from])}, z is up")
+        notify(f"positions on the earth: {geodesy.axes(conventions.FRAMES[recipe.station.azimuth_from])}, z is up")
     done: list[Outcome] = []
     unsaid: OSError | None = None
     with Progress() as progress:
-        for outcome in run.run(tasks, recipe, request.jobs, _notify, request.scheduler):
+        for outcome in run.run(tasks, recipe, request.jobs, notify, request.scheduler):
             done.append(outcome)
             progress.clear()
             try:
@@ -151,11 +183,12 @@ def _applicable(recipe: Recipe) -> list[str]:
         if why is None:
             found.append(method.name)
         else:
-            _notify(f"left out: {why}")
+            notify(f"left out: {why}")
     return found
 
 
-def _notify(text: str) -> None:
+def notify(text: str) -> None:
+    """Print a sentence for the user on standard error."""
     click.echo(f"ftproc: {text}", err=True)
 
 
@@ -165,7 +198,7 @@ def _show(outcome: Outcome, summary: str, debug: bool) -> None:
     if outcome.failure is not None:
         if debug:
             click.echo(outcome.failure.trace, err=True)
-        _notify(outcome.failure.message)
+        notify(outcome.failure.message)
     elif summary == "text":
         on_stdout = outcome.task.output == "-"
         places = [place for place in (outcome.task.output, outcome.task.report) if place not in (None, "-")]

@@ -1,2 +1,3 @@
-"""Readings as they come: `live` takes them one by one and gives what is published, `following` reads a log that still
-grows. Calls the methods and the files, like the pipeline."""
+"""Readings as they come: `live` takes them one by one and gives what is published. A log that still grows: `growing`
+gives its lines, `columns` their readings, `following` what is published of them, `publishing` writes it. Calls the
+methods and the files, like the pipeline."""

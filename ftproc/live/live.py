@@ -53,11 +53,17 @@ class Live:
         return len(self._row)
 
     def push(
-        self, time_s: ArrayLike, range_m: ArrayLike, azimuth_rad: ArrayLike, elevation_rad: ArrayLike
+        self,
+        time_s: ArrayLike,
+        range_m: ArrayLike,
+        azimuth_rad: ArrayLike,
+        elevation_rad: ArrayLike,
+        row: ArrayLike | None = None,
     ) -> Trajectory:
         """Take one reading, or several: numbers or arrays (n,), s, m, rad, rad; NaN where a component is missing. A row
-        may come out of time order by less than the lag. Returns the rows published now, of which there may be none.
-        Raises InputError for a time that is not a number or not that of a flight.
+        may come out of time order by less than the lag. row: their numbers, by which they are published; without,
+        they are counted from 0. Returns the rows published now, of which there may be none. Raises InputError for a
+        time that is not a number or not that of a flight.
         """
         components = (range_m, azimuth_rad, elevation_rad)
         readings = np.broadcast_arrays(*(np.atleast_1d(np.asarray(each, float)) for each in components))
@@ -65,12 +71,16 @@ class Live:
         measurement = np.clip(np.stack(readings, 1), -FARTHEST, FARTHEST)
         if times.shape != measurement.shape[:1]:
             raise InputError(f"there are {len(times)} times for {len(measurement)} readings; give as many of each.")
+        rows = self._taken + np.arange(len(times)) if row is None else np.atleast_1d(np.asarray(row, np.int64))
+        if rows.shape != times.shape:
+            raise InputError(f"there are {len(rows)} row numbers for {len(times)} readings; give as many of each.")
         if not (np.abs(times) <= sanity.LATEST_S).all():
             worst = int(np.flatnonzero(~(np.abs(times) <= sanity.LATEST_S))[0])
-            raise InputError(f"row {self._taken + worst}: the time {times[worst]:g} s is not that of a flight.")
+            raise InputError(f"row {rows[worst]}: the time {times[worst]:g} s is not that of a flight.")
+        self._taken += len(times)
         found = []
         for low, high in self._ordered(times):
-            found += self._push(times[low:high], measurement[low:high])
+            found += self._push(times[low:high], measurement[low:high], rows[low:high].tolist())
         return self._published(found)
 
     def finish(self) -> Trajectory:
@@ -88,9 +98,7 @@ class Live:
     def _newest_s(self) -> float:
         return self._time_s[-1] if self._time_s else self._left_s
 
-    def _push(self, times: FloatArray, measurement: FloatArray) -> list[Published]:
-        rows = range(self._taken, self._taken + len(times))
-        self._taken += len(times)
+    def _push(self, times: FloatArray, measurement: FloatArray, rows: list[int]) -> list[Published]:
         if self._begins_s is None:
             self._begins_s = float(times[0])
         if times[0] < self._newest_s:

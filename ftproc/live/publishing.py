@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from ftproc import __version__
 from ftproc.config.recipe import Recipe
 from ftproc.errors import UsageError
+from ftproc.files import layout
 from ftproc.files.conventions import FRAMES
-from ftproc.files.writing import atomic, csvtext, trajectories
-from ftproc.live.following import Stop, follow
+from ftproc.files.writing import atomic, csvtext, geodesy, maps, tables, trajectories
+from ftproc.live.following import follow
+from ftproc.live.growing import Say, Stop
 from ftproc.live.live import Live
 from ftproc.methods import registry
 from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, Trajectory
@@ -19,21 +22,46 @@ from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, Trajector
 _LABELS = {"good": GOOD, "isolated": ISOLATED, "patch": PATCH, "missing": MISSING}
 
 
-def follow_log(logs: Sequence[str], output: str | None, recipe: Recipe, form: str) -> str:
+def follow_log(logs: Sequence[str], output: str | None, recipe: Recipe, form: str, say: Say) -> str:
     """Follow one log to its end, or until it is interrupted; what was published, in words. output: a file, or `-` or
-    None for standard output in this form, csv or jsonl. Raises FtprocError."""
+    None for standard output in this form, csv or jsonl. say: takes a sentence for the user, at once. An error in the
+    log is raised when what came before it has been written. Raises FtprocError."""
     if len(logs) != 1:
         raise UsageError("--follow reads one log; name a file that grows, or - for standard input.")
-    track, counts = Live(recipe.settings), _Counts()
+    settings = recipe.settings
+    geodesy.check(settings)
+    if recipe.keep_columns:
+        say("--follow copies no other columns of the log; column `row` says which row of the log each one is.")
+    track, counts, faults = Live(settings), _Counts(), list[Exception]()
+    frame = {"frame": FRAMES[recipe.station.azimuth_from]}
     with Stop() as stop:
-        rows = counts.counted(follow(logs[0], recipe, track, stop))
+        rows = counts.counted(_until_fault(follow(logs[0], recipe, track, stop, say), faults))
+        placed = (geodesy.located(replace(part, metadata=frame), settings) for part in rows)
         if output is None or output == "-":
-            _print(rows, form)
+            _print(placed, form)
         else:
             atomic.refuse_overwriting(output, logs)
             atomic.check_target(output)
-            trajectories.write_parts(rows, lambda: _metadata(logs[0], recipe, track, counts), output)
+            maps.check(output, settings.site)
+            if layout.map_kind(output) is None:
+                tables.kind_of(output)
+            trajectories.write_parts(placed, lambda: _metadata(logs[0], recipe, track, counts), output)
+        if faults:
+            raise faults[0]
     return f"{logs[0]}: {counts.said(track)}"
+
+
+def _until_fault(parts: Iterator[Trajectory], faults: list[Exception]) -> Iterator[Trajectory]:
+    """The parts, up to an error, which is put by; before the first part it is raised."""
+    published = False
+    try:
+        for part in parts:
+            yield part
+            published = True
+    except Exception as error:
+        if not published:
+            raise
+        faults.append(error)
 
 
 def _print(rows: Iterable[Trajectory], form: str) -> None:
@@ -84,7 +112,6 @@ def _metadata(log: str, recipe: Recipe, track: Live, counts: _Counts) -> Mapping
         "method": method.name,
         "sees": method.sees(settings),
         "log": log,
-        "frame": FRAMES[recipe.station.azimuth_from],
         "settings": {"editing": settings.editing, "lag_s": settings.lag_s, "smooth": False, "gate": settings.gate},
         "model_sha256": None,
         "summary": {

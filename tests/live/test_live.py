@@ -52,6 +52,16 @@ def test_late_rows_take_their_place_and_too_late_ones_are_counted(log):
     assert len(found["row"]) == len(log) - 1
 
 
+def test_rows_keep_the_numbers_that_they_are_given(log):
+    track, n = ftproc.Live(), 5
+    found = track.push(log.time_s[:n], *log.measurement[:n].T, row=[3, 4, 7, 8, 20])
+    assert found.row.tolist() == [3, 4, 7, 8, 20]
+    with pytest.raises(InputError, match="there are 2 row numbers for 1 readings"):
+        track.push(9.0, 1.0, 0.0, 0.0, row=[1, 2])
+    with pytest.raises(InputError, match="row 30: the time nan s is not that of a flight"):
+        track.push(np.nan, 1.0, 0.0, 0.0, row=30)
+
+
 def test_wrong_use_is_refused(log):
     with pytest.raises(UsageError, match="not smoothed"):
         ftproc.Live(FilterSettings(method="ukf"))

@@ -138,7 +138,7 @@ def _in_blocks(plan: _Plan) -> MeasurementLog | None:
         clocks[:] = clocks or [clock._replace(time_s=clock.time_s[:0])]
         return converted.quantities, clock.epoch
 
-    station = _with_zenith(plan.station, plan.found)
+    station = with_zenith(plan.station, plan.found)
     spooled = large.read(header.source, blocks, convert, station)
     if spooled is None:
         return None
@@ -205,7 +205,7 @@ def _kept(plan: _Plan, table: pa.Table, chosen: list[int]) -> tuple[IntArray | N
     return kept.astype(np.int64), (f"{left_out} of {len(mask)} rows are left out, which do not meet {said}",)
 
 
-def _with_zenith(station: Station, found: Found) -> Station:
+def with_zenith(station: Station, found: Found) -> Station:
     """The station with what the name of the elevation's column says."""
     if station.elevation_from is not None:
         return station
@@ -218,7 +218,7 @@ def _explained(
     sample: FloatArray | None = None,
 ) -> MeasurementLog:  # fmt: skip
     """The log with its station, and with remarks on how it was understood."""
-    station = _with_zenith(plan.station, plan.found)
+    station = with_zenith(plan.station, plan.found)
     values = log.measurement if sample is None else sample
     remarks = schema.remarks(plan.header.names, plan.found, bool(clock.epoch))
     doubtful = (*doubts, *plausibility.doubts(values, station))

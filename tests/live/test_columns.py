@@ -1,0 +1,116 @@
+"""What the lines of a log that is followed mean: as a complete log of the same lines is understood."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.config.recipe import Recipe
+from ftproc.errors import InputError
+from ftproc.files.reading import logs
+from ftproc.live.columns import Reader
+from ftproc.live.growing import Block
+from ftproc.settings import Station
+from tests.simulated import simulate
+
+ROWS = "0,1000,0.1,0.2\n1,1010,0.1,0.2\n2,1020,0.1,0.2\n"
+LATER = "3,1030,0.1,0.2\n4,1040,0.1,0.2\n"
+HEADER = "time_s,range_m,azimuth_rad,elevation_rad\n"
+
+
+def followed(text, recipe=None, at_once=3):
+    """The readings (n, 4), the error of the row after them, and what is said; so many lines come at once."""
+    said = []
+    reader = Reader("a.csv", recipe or Recipe(), said.append)
+    texts = text.splitlines()
+    parts, fault = [], None
+    for low in range(0, len(texts), at_once):
+        readings, fault = reader.read(Block(low + 1, texts[low : low + at_once]))
+        parts.append(readings)
+        if fault is not None:
+            break
+    if fault is None:
+        reader.finish()
+    return np.vstack(parts), fault, said
+
+
+@pytest.mark.parametrize("at_once", [1, 2, 100])
+@pytest.mark.parametrize(
+    ("text", "options", "words"),
+    [
+        ("time_s,range_km,azimuth_gon,zenith_deg\n0,1,100,50\n1,1,100,51\n", {}, "elevation from zenith angles"),
+        ("time_s;range_m;az_mils;depression (mrad)\n0;1000;1600;50\n1;1000;1600;51\n", {}, "counts downwards"),
+        ("t\tR\tA\tE\n0\t1\t40\t50\n", {"units": "time=ms,range=km,azimuth=deg,elevation=deg"}, ""),
+        ("0,1,40,50\n", {"columns": "time=1,range=2,azimuth=3,elevation=4", "units": "azimuth=deg,elevation=deg"}, ""),
+        (f"# note\nFlight 12\n{HEADER}s,m,rad,rad\n{ROWS}", {}, ""),
+        (f"# {HEADER}{ROWS}# note\n{LATER}", {}, ""),
+        (HEADER + ROWS + HEADER + LATER, {}, ""),
+        (HEADER + ',1000,0.1,0.2\n3,"1000",NaN,\n\n4,NULL,0.1,0.2\n', {}, ""),
+        ("time_s   range_m  azimuth_rad\n0.5   1000   0.1\n", {}, ""),
+        ("0.500100010\n", {"widths": "5,4,2", "columns": "time=1,range=2,azimuth=3"}, ""),
+        (HEADER + ROWS, {"station": Station("north", "anticlockwise", 0.3, None, (5.0, 0.1, 0.2), 7.0)}, "reversed"),
+    ],
+)
+def test_the_readings_are_those_of_the_complete_log(tmp_path, text, options, words, at_once):
+    (tmp_path / "a.csv").write_text(text)
+    recipe = Recipe(**options)
+    readings, fault, said = followed(text, recipe, at_once)
+    whole = logs.read(tmp_path / "a.csv", **recipe.reading())
+    timed = np.flatnonzero(np.isfinite(readings[:, 0]))
+    np.testing.assert_array_equal(timed, whole.row)
+    np.testing.assert_array_equal(readings[timed], np.column_stack([whole.time_s, whole.measurement]))
+    assert fault is None
+    assert words in " ".join(said)
+
+
+@pytest.mark.parametrize(
+    ("row", "sentence"),
+    [
+        ("3,1000", "a.csv: line 6 has 2 cells where the header has 4. Complete the row, or delete it."),
+        ("3,1000,1,1,1", "a.csv: line 6 has 5 cells where the header has 4."),
+        ("3,far,0.1,0.2", 'a.csv: line 6: the range is "far", which is no number; expected a number of m.'),
+        ("1717156785000,1,1,1", "a.csv: line 6: the time 1717156785000 s is not that of a flight; state another unit"),
+        ("inf,1,1,1", "a.csv: line 6: the time inf s is not that of a flight"),
+        ("elevation_rad,time_s,range_m,azimuth_rad", 'a.csv: line 6: the time is "elevation_rad", which is no number'),
+    ],
+)
+def test_a_bad_row_is_named_and_the_rows_before_it_count(row, sentence):
+    readings, fault, _ = followed(f"{HEADER}{ROWS}# note\n{row}\n{LATER}", at_once=100)
+    assert readings[:, 0].tolist() == [0, 1, 2]
+    assert sentence in str(fault)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("JD,range_m\n2460462.5,1000\n2460462.6,1000\n", 'the times in column "JD" look like Julian date'),
+        ("time,range_m\n1717156785.5e3,1\n", "not that of a flight; state another unit, such as --units time=ms"),
+        ("tod,range_m\n43200000,1\n", 'the times in column "tod" look like numbers in ms, by their size'),
+        ("Date,Time,R\n2024-05-31,12:00:00,1\n", 'one column of numbers in one unit for each quantity, not "Date + T'),
+        ("time_s,range_m,az_dms\n0,1000,12.3045\n", "Name another with --columns azimuth=NAME, or filter the log"),
+        ("when,dist\n0,1000\n1,1001\n", "a.csv: no time column"),
+        ("0,1000,0.1,0.2\n", "there is no line of column names. Say which column is which by their numbers"),
+        (HEADER, "no row came after the line of names, so nothing is written."),
+        ("", "a.csv: there is no line; expected a line of names and rows."),
+        ("hello\n" * 30, "none of its first 20 lines looks like a row of a log; expected a line of names"),
+    ],
+)
+def test_a_table_that_is_not_understood_is_refused(text, sentence):
+    with pytest.raises(InputError) as error:
+        raise followed(text, at_once=1)[1] or AssertionError("it was understood")
+    assert sentence in str(error.value)
+
+
+def test_units_that_nobody_stated_are_said_once_and_judged_by_the_first_rows():
+    log = simulate("manoeuvre", seed=5, duration_s=15.0, dt_s=0.1).log
+    columns = np.column_stack([log.time_s * 1e3, log.measurement[:, 0], np.degrees(log.measurement[:, 1:])])
+    text = "t,R,A,E\n" + "".join(",".join(map(repr, row)) + "\n" for row in columns.tolist())
+    _, fault, said = followed(text)
+    assumed, judged = said
+    assert fault is None
+    assert 'are taken to be: "t" in s, "R" in m, "A" in rad, "E" in rad; state others with --units' in assumed
+    assert "such as --units time=ms,range=km,azimuth=deg,elevation=deg." in assumed
+    assert "the first 100 rows look like other units than those assumed: if so, say --units time=ms," in judged
+    assert "azimuth=deg,elevation=deg." in judged
+    stated = Recipe(units="time=ms,range=m,azimuth=deg,elevation=deg")
+    assert followed(text, stated)[2] == []
