@@ -67,7 +67,7 @@ def find(lines: Sequence[str], widths: Sequence[int] = ()) -> Layout | None:
     tables = {}
     for separator in ("",) if widths else _SEPARATORS:
         rows = {number: split(lines[number], separator, widths) for number in filled}
-        start, length = _longest(filled, rows)
+        start, length = _longest(filled, rows, _between([lines[number] for number in filled]))
         if length:
             tables[separator] = (start, length, rows)
     if not tables:
@@ -97,10 +97,22 @@ def is_data(cells: Sequence[str], strictly: bool = False) -> bool:
     return bool(numbers) and (numbers == len(present) if strictly else 2 * numbers >= len(present))
 
 
-def _longest(filled: Sequence[int], rows: dict[int, list[str]]) -> tuple[int, int]:
-    """Index in `filled` of the first of the most consecutive rows with as many cells, and their number."""
+def _between(lines: Sequence[str]) -> list[bool]:
+    """Whether each line may stand between rows and is none of them: a comment, or names that stand above them too."""
+    return [
+        is_comment(line)
+        or (line in lines[:index] and not any(is_data(split(line, separator)) for separator in _SEPARATORS))
+        for index, line in enumerate(lines)
+    ]
+
+
+def _longest(filled: Sequence[int], rows: dict[int, list[str]], between: Sequence[bool]) -> tuple[int, int]:
+    """Index in `filled` of the first of the most consecutive rows with as many cells, and their number; some lines may
+    stand between them."""
     best, start, length, width = (0, 0), 0, 0, 0
     for index, number in enumerate(filled):
+        if between[index]:
+            continue
         cells = rows[number]
         fits = len(cells) > 1 and is_data(cells) and not is_comment(cells[0])
         if fits and len(cells) == width and length:

@@ -128,3 +128,12 @@ def test_a_drawn_table_that_is_large_is_read_whole(tmp_path: Path, monkeypatch: 
     log = logs.read(path)
     assert log.time_s.tolist() == list(range(200))
     assert log.measurement[:, 0].tolist() == [1000.0 + k for k in range(200)]
+
+
+@pytest.mark.parametrize("stands", [HEADER, "# the wind has turned\n", "# a, b, c, d\n"])
+@pytest.mark.parametrize("place", [1, 3, 9, 15, 30])
+def test_names_that_come_again_and_comments_cost_no_row(make: Make, place: int, stands: str) -> None:
+    """Among the first lines, by which the table is found, as well as later."""
+    rows = [f"{k},{1000 + k},0.5,0.25\n" for k in range(40)]
+    log = logs.read(make(HEADER + "".join([*rows[:place], stands, *rows[place:]])))
+    assert log.time_s.tolist() == list(range(40))
