@@ -197,7 +197,8 @@ def edit(
         if _may_be_late_stamps((record, decision), other):
             break
         (record, decision), found = other, sorted([*found, *new], key=lambda s: s.sample)
-    decision = decision if record.fixed.jerk else with_motion(record, decision)
+    if not record.fixed.jerk and not live:  # at the end of a window a patch may look like motion
+        decision = with_motion(record, decision)
     if segment_of is None and not short:
         decision = allow_for_colour(record, decision)
     log = record.weighted(decision.weight)
