@@ -11,7 +11,7 @@ from ftproc.errors import InputError, nearest, row_named
 from ftproc.files.layout import OUTLIER
 from ftproc.files.reading.clocks.times import seconds
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.meaning.numbers import Origin, numbers
+from ftproc.files.reading.meaning.numbers import Origin, numbers, without_thousands
 from ftproc.files.reading.meaning.questions import listed
 from ftproc.records import FlagArray, FloatArray
 
@@ -33,7 +33,9 @@ def load(
     table = header.load([position(name) for name in names], [position(name) for name in others])
     if table.num_rows == 0:
         raise InputError(f"{header.source}: there are column names but no rows.")
-    found = {name: _numbers(table.column(index), name, header) for index, name in enumerate(names)}
+    origins = [_origin(header, name) for name in names]
+    columns, _ = without_thousands(table.columns[: len(names)], origins)
+    found = {name: _numbers(*each) for name, *each in zip(names, columns, origins, strict=True)}
     return found, table.select(list(range(len(names), table.num_columns)))
 
 
@@ -69,10 +71,13 @@ def _flags(header: TableHeader, column: FloatArray, name: str, highest: int) -> 
     return flags
 
 
-def _numbers(column: pa.ChunkedArray, name: str, header: TableHeader) -> FloatArray:
+def _origin(header: TableHeader, name: str) -> Origin:
     expected = "seconds or an ISO-8601 timestamp" if name == "time_s" else "a number"
-    origin = Origin(header.source, name, expected, header.decimal_comma, cure="Correct the cell.")
-    if name == "time_s":
+    return Origin(header.source, name, expected, header.decimal_comma, cure="Correct the cell.")
+
+
+def _numbers(column: pa.ChunkedArray, origin: Origin) -> FloatArray:
+    if origin.column == "time_s":
         return seconds(column, origin, lambda time: time)[0]
     return numbers(column, origin)
 
