@@ -42,7 +42,8 @@ def text_file(name: str, path: Path, widths: Sequence[int] = ()) -> TableHeader:
     large = path.stat().st_size > content.LARGE and not widths
     if large:
         head = content.read(name, path, limit=_HEAD)
-        if not trimming.is_boxed(head) and _tagged(name, head[: head.rfind(b"\n") + 1], cut=True) is None:
+        lines = head[: head.rfind(b"\n") + 1 or len(head)]
+        if not trimming.is_boxed(head) and _tagged(name, lines, cut=True) is None:
             return _large_file(name, path)
     return text_bytes(name, content.read(name, path), widths)
 
