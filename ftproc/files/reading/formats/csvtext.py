@@ -260,7 +260,7 @@ def _searched(source: str, data: bytes, widths: Sequence[int]) -> tuple[CsvText,
     names = [name.strip() for name in found.names]
     parts = [] if found.named else ["no column names"]
     parts += [f"{found.above} lines above the table"] if found.above else []
-    parts += ["a row of units"] if found.units else []
+    parts += ["a row of units" if found.row_of_units else "units stated above the table"] if found.units else []
     text = CsvText(source, names, found.separator, memoryview(b""), False, widths=widths, units=found.units)
     return text._replace(form=", ".join(parts)), start
 
