@@ -9,7 +9,7 @@ from pathlib import Path
 from ftproc.batch.tasks import Task
 from ftproc.errors import OutputError, UsageError
 from ftproc.files import layout, remote
-from ftproc.files.writing import atomic
+from ftproc.files.writing import atomic, trajectories
 
 INDEX = "index.html"
 _REPORT = "--report"
@@ -50,7 +50,7 @@ def tasks(
     if directory is not None and not remote.is_uri(directory):
         _make(Path(directory))
     for task in planned:
-        atomic.check_target(task.output)
+        trajectories.check(task.output)
     return planned
 
 

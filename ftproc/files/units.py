@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
+from fractions import Fraction
 from typing import NamedTuple
 
 from ftproc.files.words import QUANTITIES
@@ -98,10 +100,39 @@ SPELLINGS: Mapping[str, tuple[str, ...]] = {
 _BY_SPELLING = {word: name for name, words in SPELLINGS.items() for word in words}
 
 
+_NUMBER = r"(?:\d{1,9}(?:\.\d{0,9})?|\.\d{1,9})(?:e[+-]?\d{1,2})?"
+_FACTOR = re.compile(
+    rf"[x×*·]?\s*(?:10(?:\^|\*\*)\(?(?P<power>[+-]?\d{{1,2}})\)?|(?P<of>{_NUMBER})(?:\s*/\s*(?P<by>{_NUMBER}))?)"
+    r"\s*[x×*·]?\s*(?P<unit>[^\W\d].*|[°º].*)",
+    re.IGNORECASE,
+)
+
+
 def unit_named(quantity: str, word: str) -> Unit | None:
-    """The unit of `quantity` that is written so, in any case, such as `km` or `Kilometres`; None if none."""
+    """The unit of `quantity` that is written so, in any case, such as `km` or `Kilometres`, perhaps behind a factor:
+    `100 ns`, `x1000 ft`, `1/128 s`, `10^-3 deg`. None if none."""
+    return _plainly_named(quantity, word) or _scaled(quantity, word.strip())
+
+
+def _plainly_named(quantity: str, word: str) -> Unit | None:
     plain = word.lower().replace(" ", "").replace(".", "").replace("_", "").replace("º", "°").replace("µ", "μ")
+    if word.strip() == "Mm":  # megametres
+        return None
     return UNITS[quantity].get(plain) or UNITS[quantity].get(_BY_SPELLING.get(plain, ""))
+
+
+def _scaled(quantity: str, word: str) -> Unit | None:
+    found = _FACTOR.fullmatch(word)
+    unit = _plainly_named(quantity, found["unit"]) if found else None
+    if found is None or unit is None:
+        return None
+    if found["power"]:
+        factor = Fraction(10) ** int(found["power"])
+    else:
+        by = Fraction(found["by"] or 1)
+        factor = Fraction(found["of"]) / by if by else Fraction(0)
+    name = f"{word[: found.start('unit')].strip()} {unit.name}"
+    return Unit(name, unit.multiply * factor.numerator, unit.divide * factor.denominator) if factor else None
 
 
 def si_unit(quantity: str) -> Unit:

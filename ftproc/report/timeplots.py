@@ -105,7 +105,7 @@ def correction(view: View) -> Drawn:
 
 def errors(view: View) -> Drawn:
     """Errors against the truth, and 3 published sigmas each way."""
-    if view.error is None or view.score is None:
+    if view.error is None:
         return Drawn(None, "There is no truth to compare with.")
     if not np.isfinite(view.error).any():
         return Drawn(None, "The truth's times do not overlap those of the trajectory.")

@@ -89,16 +89,17 @@ def view(trajectory: Trajectory, truth: Truth | None = None) -> View:
         turned = cleaned[:, 1] + wrap(reading[:, 1] - cleaned[:, 1])
         reading[:, 1] = np.where(np.isfinite(turned), turned, reading[:, 1])
         reading *= factor
-    error = None
+    error = scored = None
     if truth is not None:
         known = match(trajectory.time_s, truth)
         error = np.full((len(trajectory), 6), np.nan)
         error[:, :3] = trajectory.state[:, :3] - known.position_m
         if known.velocity_mps is not None:
             error[:, 3:] = trajectory.state[:, 3:6] - known.velocity_mps
+        scored = score(trajectory, truth) if np.isfinite(known.position_m).any() else None
     return View(
         trajectory, Timeline.of(trajectory.time_s), cleaned * factor, reading,
-        (trajectory.outlier == 0).sum(1).astype(float), error, None if truth is None else score(trajectory, truth),
+        (trajectory.outlier == 0).sum(1).astype(float), error, scored,
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.model.frames import from_cartesian, wrap
+from ftproc.errors import InputError
 from ftproc.records import COMPONENTS, ISOLATED, PATCH, FlagArray, FloatArray, Trajectory, Truth
 from ftproc.scoring.matching import match
 
@@ -102,7 +103,7 @@ def score(trajectory: Trajectory, truth: Truth | None = None) -> Score:
     """Figures of merit of a trajectory: its average gradient, and against a truth its errors and flags.
 
     The truth is matched by time (see `matching.match`), never extrapolated. Its own average gradient is
-    taken at the matched samples, so that the two are comparable.
+    taken at the matched samples, so that the two are comparable. Raises InputError if their times do not overlap.
     """
     method, sees = trajectory.metadata.get("method"), trajectory.metadata.get("sees")
     settings = trajectory.metadata.get("settings")
@@ -138,6 +139,13 @@ def changes(measurement: FloatArray) -> FloatArray:
 def _against(trajectory: Trajectory, truth: Truth) -> dict[str, Any]:
     found = match(trajectory.time_s, truth)
     there = np.isfinite(found.position_m).all(axis=1)
+    known_s = truth.time_s[np.isfinite(truth.position_m).all(axis=1)]
+    if len(trajectory) and len(known_s) and not there.any():
+        ours, theirs = (f"{t.min():.10g} s to {t.max():.10g} s" for t in (trajectory.time_s, known_s))
+        raise InputError(
+            f"{truth.name}: its times, {theirs}, do not overlap those of {trajectory.name}, {ours}. "
+            "Name the truth of this flight, or bring both to the same clock."
+        )
     error = trajectory.state[:, :3] - found.position_m
     usable = np.isfinite(error).all(axis=1)
     known: dict[str, Any] = {

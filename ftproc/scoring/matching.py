@@ -12,6 +12,9 @@ from ftproc.records import FlagArray, FloatArray, IntArray, Trajectory, Truth
 
 FAR_BETTER = 0.1  # share of the error that remains, at most, when x and y are exchanged
 
+LONGEST = 5.0  # intervals between the truth's times, over which it is interpolated
+_NEAR = 5  # intervals on both sides by which the usual one is judged
+
 
 class MatchedTruth(NamedTuple):
     """The truth row for row with a trajectory of n samples.
@@ -31,8 +34,8 @@ def match(time_s: FloatArray, truth: Truth) -> MatchedTruth:
     """The truth at (n,) non-decreasing times in s.
 
     The k-th sample at a time gets the truth's k-th row at that time; times are equal when they differ by no more than
-    the rounding of printed numbers. Other samples are interpolated: cubic Hermite where the truth has
-    velocities, else linear. Outlier flags belong to single readings and are not interpolated.
+    the rounding of printed numbers. Other samples are interpolated, but not over gaps: cubic Hermite where the truth
+    has velocities, else linear. Outlier flags belong to single readings and are not interpolated.
     """
     rows = _same_sample(time_s, truth.time_s)
     exact = rows >= 0
@@ -91,7 +94,7 @@ def _occurrence(key: FloatArray) -> IntArray:
 
 
 def _interpolate(time_s: FloatArray, truth: Truth) -> tuple[FloatArray, FloatArray | None]:
-    """Position and, where the truth has it, velocity at (n,) times; NaN outside the truth's own times."""
+    """Position and, where the truth has it, velocity at (n,) times; NaN outside the truth's own times and in gaps."""
     position = np.full((len(time_s), 3), np.nan)
     velocity = None if truth.velocity_mps is None else position.copy()
     usable = np.isfinite(truth.position_m).all(axis=1)
@@ -101,8 +104,10 @@ def _interpolate(time_s: FloatArray, truth: Truth) -> tuple[FloatArray, FloatArr
     p = truth.position_m[usable][first]
     if not len(knots):
         return position, velocity
+    cell = np.clip(np.searchsorted(knots, time_s, side="right") - 1, 0, max(0, len(knots) - 2))
     inside = (time_s >= knots[0]) & (time_s <= knots[-1])
-    cell = np.clip(np.searchsorted(knots, time_s[inside], side="right") - 1, 0, max(0, len(knots) - 2))
+    inside &= ~_gaps(knots)[cell] | np.isin(time_s, knots)
+    cell = cell[inside]
     following = np.minimum(cell + 1, len(knots) - 1)
     width = np.where(following > cell, knots[following] - knots[cell], 1.0)[:, None]
     s = (time_s[inside] - knots[cell])[:, None] / width
@@ -112,6 +117,16 @@ def _interpolate(time_s: FloatArray, truth: Truth) -> tuple[FloatArray, FloatArr
     v = truth.velocity_mps[usable][first]
     position[inside], velocity[inside] = _hermite(s, width, p[cell], p[following], v[cell], v[following])
     return position, velocity
+
+
+def _gaps(knots: FloatArray) -> NDArray[np.bool_]:
+    """(m,) whether the time from each knot to the next is far longer than is usual there."""
+    step = np.diff(knots)
+    gap = np.zeros(len(knots), bool)
+    long = np.flatnonzero(step / LONGEST > step.min(initial=np.inf))
+    around = np.clip(long[:, None] + np.arange(-_NEAR, _NEAR + 1), 0, max(0, len(step) - 1))
+    gap[long] = step[long] / LONGEST > np.median(step[around], axis=1)
+    return gap
 
 
 def _hermite(

@@ -153,3 +153,16 @@ def test_feather_in_feather_out(run, here):
     assert run("simulate", "--scenario", "zuo2021", "-o", "a.feather", "--truth", "a.truth.feather").code == 0
     assert run("filter", "a.feather").out.endswith("\n  -> a.trajectory.feather\n")
     assert "position RMSE" in run("score", "a.trajectory.feather", "--truth", "a.truth.feather").out
+
+
+def test_a_sidecar_replaces_only_a_sidecar(here: Path) -> None:
+    (here / "flight.json").write_text('[{"time_s": 0, "range_m": 1}]')
+    with pytest.raises(OutputError, match=r"flight.json: this file, which ftproc has not written, would be replaced"):
+        plan.tasks(["a.csv"], "flight.csv")
+    plan.tasks(["a.csv"], "flight.parquet")
+    (here / "flight.json").write_text('{\n  "frame": "local",\n  "program": "ftproc",\n  "version": "0.1.0"\n}\n')
+    plan.tasks(["a.csv"], "flight.csv")
+    (here / "flight.json").unlink()
+    (here / "flight.json").mkdir()
+    with pytest.raises(OutputError, match=r"flight.json"):
+        plan.tasks(["a.csv"], "flight.csv")

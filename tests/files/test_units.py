@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ftproc.files.units import UNITS, si_unit
+from ftproc.files.units import UNITS, si_unit, unit_named
 from ftproc.files.words import QUANTITIES
 
 ONE_IN_SI = [
@@ -52,3 +52,29 @@ def test_a_turn_is_a_turn_in_every_unit() -> None:
     turns = {"deg": 360.0, "mil": 6400.0, "grad": 400.0, "gon": 400.0, "arcsec": 1_296_000.0, "mrad": 2000 * math.pi}
     for unit, turn in turns.items():
         assert UNITS["azimuth"][unit].to_si(np.array([turn]))[0] == pytest.approx(2 * math.pi, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "word", "one"),
+    [
+        ("time", "1/128 s", 1 / 128),
+        ("time", "100ns", 1e-7),
+        ("range", "x1000 ft", 304.8),
+        ("range", "*10 m", 10.0),
+        ("range", "0.1 m", 0.1),
+        ("azimuth", "10^-3 rad", 1e-3),
+        ("azimuth", "1e-3 rad", 1e-3),
+        ("azimuth", "360/65536 deg", 2 * math.pi / 65536),
+        ("azimuth", "6400 mil", 2 * math.pi / 6400),
+    ],
+)
+def test_a_factor_before_a_unit_counts(quantity: str, word: str, one: float) -> None:
+    unit = unit_named(quantity, word)
+    assert unit is not None
+    assert unit.to_si(np.array([1.0]))[0] == pytest.approx(one, rel=1e-14)
+    assert unit_named(quantity, unit.name) == unit
+
+
+def test_what_is_no_plain_factor_is_no_unit() -> None:
+    for word in ("0 m", "1/0 m", "x m", "1000's of ft", "5", "1e999 m", "Mm"):
+        assert unit_named("range", word) is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ftproc.errors import InputError
 from ftproc.records import Truth
 from ftproc.scoring import score
 from ftproc.scoring.matching import match
@@ -61,6 +63,17 @@ def test_kth_of_equal_times_matches_the_kth() -> None:
     np.testing.assert_array_equal(found.outlier[:, 0], [1, 2, 0, 0])
 
 
+def naive_gap(t: float, theirs: list[int]) -> bool:
+    """Whether a time lies in a gap that is far longer than the intervals around it."""
+    knots = sorted(set(theirs))
+    steps = [b - a for a, b in itertools.pairwise(knots)]
+    for k, (low, high) in enumerate(itertools.pairwise(knots)):
+        if low < t < high:
+            around = [steps[min(max(j, 0), len(steps) - 1)] for j in range(k - 5, k + 6)]
+            return steps[k] > 5 * sorted(around)[5]
+    return False
+
+
 @given(
     st.lists(st.integers(0, 12), max_size=25).map(sorted),
     st.lists(st.integers(0, 12), max_size=25).map(sorted),
@@ -78,9 +91,9 @@ def test_matching_equals_the_naive_one(ours: list[int], theirs: list[int]) -> No
             assert found.outlier[i, 0] == rows[before] % 7
         else:
             assert not found.exact[i]
-            covered = bool(theirs) and theirs[0] <= t <= theirs[-1]
+            covered = bool(theirs) and theirs[0] <= t <= theirs[-1] and not naive_gap(t, theirs)
             assert found.interpolated[i] == covered
-        if theirs and theirs[0] <= t <= theirs[-1]:
+        if theirs and theirs[0] <= t <= theirs[-1] and not naive_gap(t, theirs):
             assert found.position_m[i, 1] == pytest.approx(t)
         else:
             assert np.isnan(found.position_m[i]).all()
@@ -124,3 +137,24 @@ def test_truths_own_gradient_is_taken_at_the_matched_samples() -> None:
     assert found is not None
     r = [math.hypot(x**3, x, 5.0) for x in (0.0, 2.0)]
     assert found.range_m == pytest.approx(r[1] - r[0])
+
+
+@pytest.mark.parametrize("velocity", [False, True])
+def test_a_gap_in_the_truth_is_not_bridged(velocity: bool) -> None:
+    times = [k / 10 for k in range(101) if not 40 < k < 60]
+    found = match(np.linspace(0, 10, 101), line(times, velocity))
+    without = np.isnan(found.position_m).any(axis=1)
+    assert np.flatnonzero(without).tolist() == list(range(41, 60))
+    assert not found.interpolated[without].any()
+    assert found.exact[[40, 60]].all()
+
+
+def test_a_truth_of_two_rates_and_a_lost_row_or_two_are_bridged() -> None:
+    times = [k / 10 for k in range(50) if k not in (20, 21)] + [5.0 + k for k in range(20)]
+    assert np.isfinite(match(np.linspace(0, 24, 500), line(times)).position_m).all()
+
+
+def test_a_truth_of_another_time_is_refused() -> None:
+    trajectory = trajectory_for(line([0.0, 1.0, 2.0]), measurement=np.zeros((3, 3)))
+    with pytest.raises(InputError, match=r"line: its times, 2000 s to 2001 s, do not overlap .*, 0 s to 2 s\."):
+        score(trajectory, line([2000.0, 2001.0]))

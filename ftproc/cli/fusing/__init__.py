@@ -100,7 +100,7 @@ def _check(range_: Range, output: str, settings: FilterSettings) -> None:
         if layout.table_kind(output) is None and layout.map_kind(output) is None:
             raise UsageError(f"-o {output}: end the name in {', '.join((*layout.TABLES, *layout.MAPS))}.")
         atomic.refuse_overwriting(output, inputs)
-        atomic.check_target(output)
+        trajectories.check(output)
     maps.check(output, range_.origin)
     if settings.ecef and range_.origin is None:
         raise UsageError("--ecef needs the origin on the earth: write lat_deg, lon_deg and height_m in [origin].")

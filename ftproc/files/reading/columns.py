@@ -8,15 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ftproc.errors import InputError, nearest, row_named
-from ftproc.files.layout import OUTLIER
+from ftproc.files.layout import OUTLIER, POSITION, TRAJECTORY
 from ftproc.files.reading.clocks.times import seconds
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.meaning.numbers import Origin, numbers
+from ftproc.files.reading.meaning.names import Name, taken_apart
+from ftproc.files.reading.meaning.numbers import Origin, numbers, without_thousands
 from ftproc.files.reading.meaning.questions import listed
+from ftproc.files.units import Unit, unit_named
 from ftproc.records import FlagArray, FloatArray
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+#: Columns that may be in other units, and their quantities in `units`; and how such columns are called.
+_IN_UNITS = {"time_s": "time", **dict.fromkeys(POSITION, "range")}
+_SUCH = {"time_s": ("time_ms", "time_us"), **{name: (f"{name[0]}_km", f"{name[0]}_ft") for name in POSITION}}
 
 
 def load(
@@ -24,16 +30,21 @@ def load(
 ) -> tuple[dict[str, FloatArray], pa.Table]:
     """Columns `names` as float64 (n,), NaN where missing, and a table of `others`.
 
-    A timestamp `time_s` becomes seconds as in a log. Raises InputError for a column that is absent or there twice, for
-    a cell that is no finite number, and for a table without rows.
+    A time or a position may be in another unit: `time_ms`, `x_km`. A timestamp becomes seconds as in a log. Raises
+    InputError for a column that is absent or there twice, for a cell that is no finite number, and for a table without
+    rows.
     """
-    for name in (*names, *others):
-        _require_once(header, name, names)
+    called = {name: _called(header, name) for name in names}
+    for name in others:
+        _require_once(header, name)
     position = header.names.index
-    table = header.load([position(name) for name in names], [position(name) for name in others])
+    table = header.load([position(called[name].text) for name in names], [position(name) for name in others])
     if table.num_rows == 0:
         raise InputError(f"{header.source}: there are column names but no rows.")
-    found = {name: _numbers(table.column(index), name, header) for index, name in enumerate(names)}
+    origins = [_origin(header, name, called[name]) for name in names]
+    columns, _ = without_thousands(table.columns[: len(names)], origins)
+    units = [_unit(name, called[name]) for name in names]
+    found = {name: _numbers(name, *each) for name, *each in zip(names, columns, origins, units, strict=True)}
     return found, table.select(list(range(len(names), table.num_columns)))
 
 
@@ -69,20 +80,41 @@ def _flags(header: TableHeader, column: FloatArray, name: str, highest: int) -> 
     return flags
 
 
-def _numbers(column: pa.ChunkedArray, name: str, header: TableHeader) -> FloatArray:
-    expected = "seconds or an ISO-8601 timestamp" if name == "time_s" else "a number"
-    origin = Origin(header.source, name, expected, header.decimal_comma, cure="Correct the cell.")
-    if name == "time_s":
-        return seconds(column, origin, lambda time: time)[0]
-    return numbers(column, origin)
+def _called(header: TableHeader, wanted: str) -> Name:
+    """The column that is called so, or that is the same time or position in another unit. Raises InputError."""
+    stem = wanted.rpartition("_")[0]
+    apart = [taken_apart(name) for name in header.names] if wanted not in header.names and wanted in _IN_UNITS else []
+    fits = [name for name in apart if name.stem == stem and unit_named(_IN_UNITS[wanted], name.unit)]
+    name = fits[0].text if len(fits) == 1 else wanted
+    _require_once(header, name)
+    return taken_apart(name)
 
 
-def _require_once(header: TableHeader, name: str, wanted: Sequence[str]) -> None:
+def _unit(wanted: str, called: Name) -> Unit:
+    quantity = _IN_UNITS.get(wanted)
+    return (quantity and unit_named(quantity, called.unit)) or Unit("")
+
+
+def _origin(header: TableHeader, wanted: str, called: Name) -> Origin:
+    expected = "seconds or an ISO-8601 timestamp" if wanted == "time_s" else "a number"
+    if wanted != called.text:
+        expected = f"a number in {called.unit}"
+    return Origin(header.source, called.text, expected, header.decimal_comma, cure="Correct the cell.")
+
+
+def _numbers(wanted: str, column: pa.ChunkedArray, origin: Origin, unit: Unit) -> FloatArray:
+    if wanted == "time_s":
+        return seconds(column, origin, unit.to_si)[0]
+    return unit.to_si(numbers(column, origin))
+
+
+def _require_once(header: TableHeader, name: str) -> None:
     if name not in header.names:
-        free = [other for other in header.names if other not in wanted]
+        free = [other for other in header.names if other not in TRAJECTORY]
+        in_units = f", or to {', '.join(_SUCH[name])} if it is in such a unit" if name in _SUCH else ""
         raise InputError(
             f'{header.source}: there is no column "{name}"{nearest(name, free) or "."} '
-            f"Its columns are: {listed(header.names)}. Rename the right one to {name}."
+            f"Its columns are: {listed(header.names)}. Rename the right one to {name}{in_units}."
         )
     if header.names.count(name) > 1:
         raise InputError(f'{header.source}: column "{name}" is there twice; rename or delete all but one.')

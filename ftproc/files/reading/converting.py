@@ -11,7 +11,7 @@ from ftproc.files.reading.clocks import joint, numeric, times
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning import motion, plausibility, readings, schema
-from ftproc.files.reading.meaning.numbers import Origin
+from ftproc.files.reading.meaning.numbers import Origin, without_thousands
 from ftproc.records import FloatArray
 from ftproc.settings import Station
 
@@ -39,13 +39,13 @@ def converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray])
     notes: list[str] = []
     clock = Clock(np.empty(0), "", "")
     read_here: dict[str, readings.Readings] = {}
+    origins = {quantity: _origin(header, column) for quantity, column in found.items()}
+    each_origin = [origins[quantity] for quantity, column in found.items() for _ in column.positions]
+    columns, marks = without_thousands(columns, each_origin)
     place = 0
     for quantity, column in found.items():
-        mine = columns[place : place + len(column.positions)]
+        mine, origin = columns[place : place + len(column.positions)], origins[quantity]
         place += len(mine)
-        timestamp = " or an ISO-8601 timestamp" if quantity == "time" else ""
-        expected = f"{'an' if quantity[0] in 'ae' else 'a'} {quantity} in {column.unit.name}{timestamp}"
-        origin = Origin(header.source, column.name, expected, header.decimal_comma)
         if quantity == "time":
             if len(mine) > 1:
                 clock = joint.read(dict(zip(column.roles, mine, strict=True)), origin, column)
@@ -59,7 +59,13 @@ def converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray])
         decided[quantity] = each.column
         quantities[quantity] = each.column.unit.to_si(each.values)
         notes += each.notes
-    return Converted(quantities, decided, clock, tuple(notes), readings.undecided(read_here))
+    return Converted(quantities, decided, clock, (*marks, *notes), readings.undecided(read_here))
+
+
+def _origin(header: TableHeader, column: schema.Column) -> Origin:
+    timestamp = " or an ISO-8601 timestamp" if column.quantity == "time" else ""
+    expected = f"{'an' if column.quantity[0] in 'ae' else 'a'} {column.quantity} in {column.unit.name}{timestamp}"
+    return Origin(header.source, column.name, expected, header.decimal_comma)
 
 
 def judged(

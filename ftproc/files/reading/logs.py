@@ -147,8 +147,9 @@ def _in_blocks(plan: _Plan) -> MeasurementLog | None:
     if judged.found != plan.found:
         return _in_blocks(plan._replace(found=judged.found))
     timed = large.readings(sample)[~np.isnan(sample["time"])]
-    if several.alternate(timed) or log.duplicate_times > len(log) / 3:  # only the whole file shows what these are
-        return None
+    times = sample["time"][~np.isnan(sample["time"])]
+    if several.alternate(timed) or log.duplicate_times > len(log) / 3 or stamps.coarse(times) is not None:
+        return None  # only the whole file shows what these are
     return _explained(plan, log, clocks[0]._replace(epoch=log.epoch), (), judged.doubts, timed)
 
 

@@ -6,11 +6,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ftproc.errors import InputError, row_named
 from ftproc.files.layout import ACCELERATION, OUTLIER, POSITION, VELOCITY
 from ftproc.files.reading import columns
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.meaning import readings
 from ftproc.records import FloatArray, IntArray, Truth
+
+_FEWEST = 24  # rows by which a number is judged
 
 
 def read(source: tables.Source) -> Truth:
@@ -18,7 +22,8 @@ def read(source: tables.Source) -> Truth:
 
     source: as for `logs.read`. Rows are put in time order; other columns are ignored. An absent `outlier_*` column
     counts as 0 if another is present. Timestamps become seconds as in a log of the same day.
-    Raises InputError for a missing column, a cell that is missing or no finite number, or an unreadable file.
+    Raises InputError for a missing column, a cell that is missing (also -9999 and such) or no finite number, or an
+    unreadable file.
     """
     header = tables.read_header(source)
     flag_names = [name for name in OUTLIER if name in header.names]
@@ -26,6 +31,8 @@ def read(source: tables.Source) -> Truth:
     found, _ = columns.load(header, [*needed, *flag_names])
     for name in needed:
         columns.require_present(header, found[name], name)
+        if name != "time_s":
+            _refuse_sentinel(header, found[name], name)
     order = np.argsort(found["time_s"], kind="stable")
     return Truth(
         name=header.source,
@@ -35,6 +42,16 @@ def read(source: tables.Source) -> Truth:
         acceleration_mps2=_stacked(found, ACCELERATION, order) if ACCELERATION[0] in found else None,
         outlier=columns.outlier_flags(header, found, highest=255)[order] if flag_names else None,
     )
+
+
+def _refuse_sentinel(header: TableHeader, column: FloatArray, name: str) -> None:
+    """Raise InputError for a number such as -9999 that stands out."""
+    number = readings.sentinel(column, fewest=1) if len(column) >= _FEWEST else None
+    if number is not None:
+        raise InputError(
+            f'{header.source}: {row_named(int(np.argmax(column == number)))}, column "{name}": {number:.10g} stands '
+            "far from the values beside it and means a missing one. Delete such rows."
+        )
 
 
 def _whole_group(header: TableHeader, names: Sequence[str]) -> Sequence[str]:

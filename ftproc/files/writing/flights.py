@@ -11,7 +11,7 @@ import numpy as np
 from ftproc.files import arrow
 from ftproc.files.layout import ACCELERATION, OUTLIER, POSITION, VELOCITY, Target
 from ftproc.files.options import parse_units
-from ftproc.files.units import UNITS, si_unit
+from ftproc.files.units import si_unit, unit_named
 from ftproc.files.words import QUANTITIES
 from ftproc.files.writing import tables
 from ftproc.records import FlagArray, FloatArray, MeasurementLog, Truth
@@ -40,8 +40,9 @@ def _log_table(log: MeasurementLog, units: Mapping[str, str], azimuth_from: str)
         if quantity == "azimuth" and azimuth_from == "north":
             values = np.mod(values, 2 * math.pi)
             values = np.where(values >= 2 * math.pi, 0.0, values)  # a tiny negative angle, rounded
-        unit = UNITS[quantity][units.get(quantity, si_unit(quantity).name)]
-        arrays[f"{quantity}_{unit.name}"] = np.ascontiguousarray(values * unit.divide / unit.multiply)
+        unit = unit_named(quantity, units.get(quantity, "")) or si_unit(quantity)
+        name = f"{quantity} ({unit.name})" if " " in unit.name else f"{quantity}_{unit.name}"  # with a factor
+        arrays[name] = np.ascontiguousarray(values * unit.divide / unit.multiply)
     return arrow.table(arrays)
 
 

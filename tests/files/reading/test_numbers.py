@@ -4,6 +4,7 @@ import pandas as pd
 import pyarrow as pa
 import pytest
 
+from ftproc.files.reading import logs
 from tests.files.conftest import Make, refused
 
 HEADER = "time_s,range_m,azimuth_rad,elevation_rad\n"
@@ -77,3 +78,25 @@ def test_words_in_a_parquet_or_pandas_column() -> None:
     assert "is not finite" in refused(pa.table({"t": [0.0, 1.0], "R": [1.0, float("-inf")]}))
     assert "there are column names but no rows" in refused(frame.iloc[:0])
     assert "expected a path, a pandas DataFrame or a pyarrow Table, not int." in refused(5)
+
+
+@pytest.mark.parametrize("other", [(".", ","), (",", ".")])
+def test_marks_between_thousands_are_known_by_the_decimals_of_other_columns(make: Make, other: tuple[str, str]) -> None:
+    thousand, decimal = other
+    rows = [f"0.{k};{8200 + k:,};0.50{k}1;0.30{k}1" for k in range(9)]
+    text = "\n".join(rows).replace(".", "!").replace(",", thousand).replace("!", decimal)
+    log = logs.read(make(HEADER.replace(",", ";") + text))
+    assert log.measurement[:, 0].tolist() == [8200 + k for k in range(9)]
+    assert log.time_s[1] == 0.1
+    assert f'"range_m" has marks between thousands ("8{thousand}200")' in " ".join(log.remarks)
+
+
+def test_marks_that_both_stand_for_decimals_elsewhere_are_asked_about(make: Make) -> None:
+    rows = "\n".join(f"0.{k};8.20{k};0,50{k}1;0,30{k}1" for k in range(9))
+    assert "Write all decimals with the same mark" in refused(make(HEADER.replace(",", ";") + rows))
+
+
+def test_points_that_surely_stand_for_decimals_stay(make: Make) -> None:
+    rows = "\n".join(f"0,{k};820{k}.5;0,50{k}1;0,30{k}1" for k in range(9))
+    log = logs.read(make(HEADER.replace(",", ";") + rows))
+    assert log.measurement[0, 0] == 8200.5

@@ -230,3 +230,38 @@ def test_what_is_of_another_kind_is_no_component(other: str) -> None:
     assert set(resolve("a.csv", ["time_s", "range_m", "elevation_rad", other], {}, {})) == {
         "time", "range", "elevation",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("Range (x1000 ft)", "x1000 ft"),
+        ("Range [100 m]", "100 m"),
+        ("Range in 0.1 m", "0.1 m"),
+        ("Range (10⁻³ km)", "10^-3 km"),
+        ("Range (m, 0-5000)", "m"),
+        ("Range (mm)", "mm"),
+        ("Range (MM)", "mm"),
+    ],
+)
+def test_a_factor_in_the_brackets_of_a_unit_is_applied(name: str, unit: str) -> None:
+    assert found(["t", name])["range"] == (name, unit)
+
+
+@pytest.mark.parametrize("inside", ["1000's of ft", "LSB 100 m", "m x 100", "hundreds of m", "Mm", "m / 10"])
+def test_what_stands_beside_a_unit_and_is_no_plain_factor_is_asked_about(inside: str) -> None:
+    for stem in ("Range", "R"):
+        sentence = refused(["t", f"{stem} ({inside})", "az_deg"]) if (stem, inside) != ("R", "Mm") else "--units range="
+        assert "--units range=" in sentence
+    assert found(["t", f"Range ({inside})"], {"range": "100 m"}, {"range": "2"})["range"][1] == "100 m"
+
+
+def test_angles_in_hours_are_refused_unless_the_user_says_degrees() -> None:
+    names = ["t", "Range (m)", "Az (hms)", "El (deg)"]
+    assert "Convert it to degrees (15 to the hour)" in refused(names)
+    assert found(names, {"azimuth": "deg"})["azimuth"] == ("Az (hms)", "deg")
+
+
+def test_the_limits_of_an_angle_beside_its_unit_are_no_factor() -> None:
+    for inside in ("0-360 deg", "0 to 360 deg", "±180 deg", "deg, 0..360", "deg true"):
+        assert found(["t", f"Azimuth ({inside})"])["azimuth"][1] == "deg"

@@ -84,8 +84,8 @@ def test_timestamps_count_as_in_a_log_of_the_same_day(make: Make) -> None:
     ("text", "expected"),
     [
         (
-            "time_s,x_m,y_m,Z_M\n0,1,2,3\n",
-            'no column "z_m"; did you mean "Z_M"? Its columns are: time_s, x_m, y_m, Z_M. Rename the right',
+            "time_s,x_m,y_m,Zm\n0,1,2,3\n",
+            'no column "z_m"; did you mean "Zm"? Its columns are: time_s, x_m, y_m, Zm. Rename the right',
         ),
         ("time,x_m,y_m,z_m\n0,1,2,3\n", 'there is no column "time_s"; did you mean "time"?'),
         ("time_s,x_m,y_m,z_m,vx_mps\n0,1,2,3,4\n", 'there is no column "vy_mps"'),
@@ -113,3 +113,35 @@ def test_the_fault_of_a_truth_is_named(make: Make, text: str, expected: str) -> 
         truth.read(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert expected in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("head", "factors"),
+    [
+        ("time_ms,x_km,y_km,z_km", (1e3, 1e-3)),
+        ("Time (s),X (ft),Y (ft),Z (ft)", (1.0, 1 / 0.3048)),
+        ("time_s,x_m,y_m,z_m", (1.0, 1.0)),
+    ],
+)
+def test_a_truth_in_other_units_comes_in_si_units(make: Make, head: str, factors: tuple[float, float]) -> None:
+    rows = "".join(f"{k * factors[0]!r},{','.join(repr(1000.0 * c * factors[1]) for c in (1, 2, 3))}\n" for k in (0, 1))
+    found = truth.read(make(f"{head}\n{rows}"))
+    np.testing.assert_allclose(found.time_s, [0.0, 1.0])
+    np.testing.assert_allclose(found.position_m, [[1000.0, 2000.0, 3000.0]] * 2)
+
+
+def test_two_columns_that_may_be_the_position_are_not_chosen_between(make: Make) -> None:
+    with pytest.raises(InputError, match=r"Rename the right one to x_m, or to x_km, x_ft if it is in such a unit\."):
+        truth.read(make("time_s,x_km,x_ft,y_m,z_m\n0,1,2,3,4\n"))
+
+
+@pytest.mark.parametrize("rows", [(7,), (7, 20, 30)])
+def test_a_number_that_means_a_missing_value_is_refused(make: Make, rows: tuple[int, ...]) -> None:
+    lines = [f"{k},{-9999 if k in rows else 5000 + 15 * k},0,100" for k in range(40)]
+    with pytest.raises(InputError, match=r'row 7 .*, column "x_m": -9999 stands far .* Delete such rows\.'):
+        truth.read(make("time_s,x_m,y_m,z_m\n" + "\n".join(lines)))
+
+
+def test_a_flight_through_such_a_number_is_a_flight(make: Make) -> None:
+    lines = [f"{k},{-9999 + 15 * (k - 20)},0,100" for k in range(40)]
+    assert -9999 in truth.read(make("time_s,x_m,y_m,z_m\n" + "\n".join(lines))).position_m

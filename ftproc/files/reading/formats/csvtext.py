@@ -42,7 +42,8 @@ def text_file(name: str, path: Path, widths: Sequence[int] = ()) -> TableHeader:
     large = path.stat().st_size > content.LARGE and not widths
     if large:
         head = content.read(name, path, limit=_HEAD)
-        if not trimming.is_boxed(head) and _tagged(name, head[: head.rfind(b"\n") + 1], cut=True) is None:
+        lines = head[: head.rfind(b"\n") + 1 or len(head)]
+        if not trimming.is_boxed(head) and _tagged(name, lines, cut=True) is None:
             return _large_file(name, path)
     return text_bytes(name, content.read(name, path), widths)
 
@@ -259,7 +260,7 @@ def _searched(source: str, data: bytes, widths: Sequence[int]) -> tuple[CsvText,
     names = [name.strip() for name in found.names]
     parts = [] if found.named else ["no column names"]
     parts += [f"{found.above} lines above the table"] if found.above else []
-    parts += ["a row of units"] if found.units else []
+    parts += ["a row of units" if found.row_of_units else "units stated above the table"] if found.units else []
     text = CsvText(source, names, found.separator, memoryview(b""), False, widths=widths, units=found.units)
     return text._replace(form=", ".join(parts)), start
 

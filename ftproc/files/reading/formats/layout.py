@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from ftproc.errors import InputError
 from ftproc.files.reading.meaning.names import taken_apart
+from ftproc.files.reading.meaning.preamble import units_stated
 from ftproc.files.units import unit_named
 from ftproc.files.words import QUANTITIES
 
@@ -50,7 +51,8 @@ _NOTHING = re.compile(r"\s*[\"']?(nan|null|none|n/?a|nil|[-*?.]+|)[\"']?\s*", re
 class Layout(NamedTuple):
     """names: of the columns, numbers from 1 where the file has none. first: number of the first line of data, among
     the lines as `lines` numbers them. separator: one character, or BLANKS. units: cells of a row of units. above:
-    lines that are neither. named: there is a line of names. cells: in a row."""
+    lines that are neither. named: there is a line of names. cells: in a row. row_of_units: else lines above state
+    the units."""
 
     names: list[str]
     first: int
@@ -59,6 +61,7 @@ class Layout(NamedTuple):
     above: int
     named: bool
     cells: int
+    row_of_units: bool
 
 
 def find(lines: Sequence[str], widths: Sequence[int] = ()) -> Layout | None:
@@ -176,8 +179,11 @@ def _with_names(
     found = numbers if names is None else names
     if len(units) != len(found):
         units = []
-    first = filled[top]
-    return Layout(found, first, separator, units, max(place, 0) if names is not None else top, names is not None, width)
+    first, row_of_units = filled[top], bool(units)
+    if names is not None and not units:
+        units = units_stated([lines[number] for number in filled[: max(place, 0)]], names)
+    return Layout(found, first, separator, units, max(place, 0) if names is not None else top, names is not None, width,
+                  row_of_units)  # fmt: skip
 
 
 def _enumerated(above: Sequence[str], width: int) -> list[str] | None:

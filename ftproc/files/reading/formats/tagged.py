@@ -3,6 +3,7 @@ NMEA instruments send, and words with an index, as total stations store."""
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -24,6 +25,7 @@ _PAIR = re.compile(rf"(?<![\w.]){_NAME}\s*[=:]\s*{_VALUE}")
 _LEADING = re.compile(rf"\W*({_STAMP}|\d+\.\d+)(?=[\s,;|\])])")
 _RECORD = re.compile(r"\n-{3,}\s*\n")  # between records of one pair to a line
 _FEWEST = 2  # pairs in a row
+_WHOLE = 0.7  # of the records on one line hold each reading
 _SENTENCE = re.compile(r"[$!](?P<type>[A-Z][A-Z0-9]{2,7}),(?P<body>[^*]*?),?(?:\*[0-9A-Fa-f]{2})?\s*")
 #: The fields of the sentences that a standard describes, without the talker.
 _STANDARD = {
@@ -55,13 +57,17 @@ def pairs(name: str, text: str) -> TableHeader | None:
         return None
     rows, others = [], 0
     for line in _rows(text):
-        found = _pairs(line)
-        if _has_reading(found):
-            stamp = _LEADING.match(line)
-            rows.append(found if stamp is None else {**found, "Timestamp": stamp[1].replace(",", ".")})
-        else:
-            others += bool(line.strip())
+        for record in _records(line):
+            found = _pairs(record)
+            if _has_reading(found):
+                stamp = _LEADING.match(record)
+                rows.append(found if stamp is None else {**found, "Timestamp": stamp[1].replace(",", ".")})
+            else:
+                others += bool(record.strip())
     names = list(dict.fromkeys(key for row in rows for key in row))
+    again = {key.partition(":")[2] for key in names if key.startswith("2:")}
+    rows = [{f"1:{key}" if key in again else key: value for key, value in row.items()} for row in rows]
+    names = [f"1:{key}" if key in again else key for key in names]
     form = "text, names and values in each line" + (f", {others} other lines left out" if others else "")
     return _table(name, names, [[row.get(key) for key in names] for row in rows], form)
 
@@ -129,7 +135,33 @@ def _is_tagged(lines: Sequence[str]) -> bool:
 
 
 def _pairs(line: str) -> dict[str, str]:
-    return {pair["name"].strip(): pair["value"].strip("\"'") for pair in _PAIR.finditer(line)}
+    """Names and values; a name that comes again with another value gets its number: `2:range`."""
+    found: dict[str, str] = {}
+    for pair in _PAIR.finditer(line):
+        name, value = pair["name"].strip(), pair["value"].strip("\"'")
+        number = 1
+        while (key := name if number == 1 else f"{number}:{name}") in found and found[key] != value:
+            number += 1
+        found[key] = value
+    return found
+
+
+def _records(line: str) -> list[str]:
+    """The line, or its parts if the same readings with their time stand in it again and again."""
+    pairs = list(_PAIR.finditer(line))
+    counts = Counter(pair["name"] for pair in pairs)
+    most = max(counts.values(), default=0)
+    if most < 2:
+        return [line]
+    quantities = [name for name in counts if any(map(taken_apart(name).means, QUANTITIES))]
+    if any(counts[name] < _WHOLE * most for name in quantities):
+        return [line]
+    first = next(name for name in counts if counts[name] == most)
+    ends = [0, *(before.end() for before, pair in itertools.pairwise(pairs) if pair["name"] == first)]
+    ends = ends if pairs[0]["name"] == first else ends[:1] + ends[2:]  # what stands before the first one is its own
+    parts = [line[low:high] for low, high in itertools.pairwise([*ends, len(line)])]
+    stamped = {_LEADING.match(part) is not None for part in parts}
+    return parts if len(stamped) == 1 else [line]
 
 
 def _has_reading(found: dict[str, str]) -> bool:

@@ -21,6 +21,15 @@ from ftproc.files.words import (
 
 _BRACKETS = re.compile(r"(.*?)[\s_.,:/-]*[(\[{<]\s*(.*?)\s*[)\]}>]\s*")
 _LAST = re.compile(r"(.*\S)(?:\s*/\s*|\s+in\s+|\s*,\s*|[\s_.-]+)(\S+)", re.IGNORECASE)
+_OVER_ALL = re.compile(r"(.*\S)(?:\s*/\s*|\s+in\s+|\s*,\s*)([x*·]?\s*\.?\d.*)", re.IGNORECASE)  # Range in 100 m
+_SUPERSCRIPT = re.compile(r"(?<=10)[⁻⁺]?[⁰¹²³⁴-⁹]+")
+_LIMITS_OF_VALUES = re.compile(r"(?:±|\+/?-)\s*\d[\d.]*|[-+]?\d[\d.]*\s*(?:-|–|to|\.\.+|…)\s*[-+]?\d[\d.]*")  # 0-360
+#: A factor, or words of one, beside the unit in brackets.
+_COUNTS = re.compile(
+    r"^\W*[x×*]?\s*\.?\d|[x×*/·]\s*\.?\d|\b(?:lsbs?|counts?|ticks?|scaled?|factor|times"
+    r"|(?:ten|hundred|thousand|million)(?:th)?s?)\b",
+    re.IGNORECASE,
+)
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 _NOT_WORDS = re.compile(r"(?:[^\w°]|_)+")
 _NUMBERED = re.compile(r"^\d+\s*[:=)]\s*(?=[^\W\d])")  # the number of a column before its name
@@ -83,13 +92,13 @@ class Name(NamedTuple):
 
 def taken_apart(text: str, unit: str = "") -> Name:
     """A name, and the cell under it in a row of units (which wins)."""
-    plain = unicodedata.normalize("NFKC", text.replace("º", "°")).strip().strip("\"'#%;!:").strip()
+    plain = _compatible(text).strip().strip("\"'#%;!:").strip()
     plain = _VALUE.sub("", _NUMBERED.sub("", plain))
     found, notation, foreign = "", "", False
     bracketed = _BRACKETS.fullmatch(plain)
     if bracketed:
         inside = bracketed[2]
-        known = next((part for part in (inside, *re.split(r"[\s,;]+", inside)) if _is_unit(part)), "")
+        known = _unit_inside(inside)
         squeezed = _squeezed(inside)
         if known:
             plain, found = bracketed[1], known
@@ -104,7 +113,7 @@ def taken_apart(text: str, unit: str = "") -> Name:
         if found in NOTATIONS:
             found, notation = "", found
     if unit:
-        inside = unit.strip().strip("()[]{}<>").strip()
+        inside = _compatible(unit).strip().strip("()[]{}<>").strip()
         foreign = inside.lower() in _FOREIGN
         squeezed = _squeezed(inside)
         if _is_unit(inside):
@@ -117,6 +126,19 @@ def taken_apart(text: str, unit: str = "") -> Name:
     if not found and not foreign:
         found = _asterix_unit(words[-1] if words else "", context)
     return Name(text, stem, words, found, notation, foreign)
+
+
+def _compatible(text: str) -> str:
+    """Letters and digits without their forms; exponents of ten stay exponents."""
+    with_powers = _SUPERSCRIPT.sub(lambda power: f"^{power[0]}", text.replace("º", "°"))
+    return unicodedata.normalize("NFKC", with_powers).replace("\u2212", "-")
+
+
+def _unit_inside(text: str) -> str:
+    """The unit in brackets, perhaps among other words; a factor that is not plain makes it none."""
+    if _is_unit(text) or _COUNTS.search(_LIMITS_OF_VALUES.sub("", text)):
+        return text if _is_unit(text) else ""
+    return next((part for part in re.split(r"[\s,;]+", text) if _is_unit(part)), "")
 
 
 def _squeezed(text: str) -> str:
@@ -138,6 +160,9 @@ def _suffix(text: str) -> tuple[str, str, bool]:
     """Name, unit and whether it is foreign, of a name that may end in its unit: `az_deg`, `elDeg`, `Az°`."""
     if text.endswith(("°", "º")):
         return text[:-1], "deg", False
+    scaled = _OVER_ALL.fullmatch(text)
+    if scaled and _is_unit(scaled[2]):
+        return scaled[1], scaled[2], False
     found = _LAST.fullmatch(text)
     if found and found[2].lower() in _FOREIGN and found[2].lower() not in ("raw", "v", "c", "k", "g", "w", "hz"):
         return found[1], "", True

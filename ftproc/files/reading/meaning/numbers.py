@@ -6,7 +6,7 @@ Work is done on whole columns; single cells are looked at only to name the wrong
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 _EVENT = re.compile(r"[A-Za-z][A-Za-z ]{3,20}")
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
-_THOUSANDS = r"^[+-]?\d{1,3}(,\d{3})+$"
+#: Whole cells, perhaps with a unit; with a mark that may be that of thousands, or is surely that of decimals.
+_IN_THREES = r"^([+-]?([1-9]\d{0,2}(\%s\d{3})+|\d{1,3})\s*[A-Za-z°]*|-?9+|\D*)$"
+_DECIMAL = r"^([+-]?(\d+\%s?\d*|\%s\d+)([eE][+-]?\d+)?\s*[A-Za-z°]*|\D*)$"
 _GROUPED = "^[+-]?\\d{1,3}([\u00a0\u202f\u2009 '’]\\d{3})+([.,]\\d*)?$"  # by blanks or apostrophes
 _PLAIN_OR_GROUPED = "^[+-]?(\\d{1,3}([\u00a0\u202f\u2009 '’]\\d{3})+|\\d+)([.,]\\d*)?$"
 _FORTRAN = r"^([+-]?\d*\.?\d*)[DdQ]([+-]?\d{1,3})$"
@@ -107,13 +109,70 @@ def parsed(text: pa.ChunkedArray, decimal_comma: bool) -> FloatArray | None:
     import pyarrow.compute as pc
 
     text = _plainly_written(text, decimal_comma)
-    if decimal_comma and _has_comma(text):
+    if decimal_comma and _has(text, ","):
         # A point in such a column would separate thousands; "?" makes it no number.
         text = pc.replace_substring(pc.replace_substring(text, ".", "?"), ",", ".")
     try:
         return arrow.to_numpy(text.cast(pa.float64()))
     except pa.ArrowInvalid:
         return None
+
+
+def without_thousands(
+    columns: Sequence[pa.ChunkedArray], origins: Sequence[Origin]
+) -> tuple[list[pa.ChunkedArray], tuple[str, ...]]:
+    """The columns of one file without the marks between thousands that look like marks of decimals, where other columns
+    show that decimals have the other mark (8.201 beside 0,5); and a note on each. origins: of the first columns, which
+    are numbers.
+
+    Raises InputError where both marks stand for decimals elsewhere.
+    """
+    written = [k for k, origin in enumerate(origins) if origin.decimal_comma and without_text(columns[k]) is None]
+    texts = {k: as_text(columns[k]) for k in written}
+    marks = {k: [mark for mark in ".," if _has(text, mark)] for k, text in texts.items()}
+    one_mark = {k: mine[0] for k, mine in marks.items() if len(mine) == 1}
+    if set(one_mark.values()) != {".", ","}:
+        return list(columns), ()
+    open_ones = {k: mark for k, mark in one_mark.items() if _all(texts[k], _IN_THREES % mark)}
+    sure = {m for k, m in one_mark.items() if k not in open_ones and _all(texts[k], _DECIMAL % (m, m))}
+    found, notes = list(columns), []
+    for k, mark in open_ones.items():
+        other = "," if mark == "." else "."
+        if {mark, other} <= sure:
+            raise InputError(
+                f'{origins[k].source}: column "{origins[k].column}" may have marks of thousands or of decimals '
+                f'("{_first_with(texts[k], mark)}"), and other columns have points as well as commas for decimals. '
+                "Write all decimals with the same mark."
+            )
+        if other in sure:
+            found[k] = _without(texts[k], mark)
+            name, first = origins[k].column, _first_with(texts[k], mark)
+            notes.append(f'"{name}" has marks between thousands ("{first}"), as the decimals of others show')
+    return found, tuple(notes)
+
+
+def _has(text: pa.ChunkedArray, mark: str) -> bool:
+    import pyarrow.compute as pc
+
+    return bool(pc.any(pc.match_substring(text, mark)).as_py())
+
+
+def _all(text: pa.ChunkedArray, pattern: str) -> bool:
+    import pyarrow.compute as pc
+
+    return bool(pc.all(pc.match_substring_regex(text, pattern)).as_py())
+
+
+def _first_with(text: pa.ChunkedArray, mark: str) -> str:
+    import pyarrow.compute as pc
+
+    return str(text[int(pc.index(pc.match_substring(text, mark), True).as_py())])
+
+
+def _without(text: pa.ChunkedArray, mark: str) -> pa.ChunkedArray:
+    import pyarrow.compute as pc
+
+    return pc.replace_substring(text, mark, "")
 
 
 def _plainly_written(text: pa.ChunkedArray, decimal_comma: bool) -> pa.ChunkedArray:
@@ -130,7 +189,7 @@ def _plainly_written(text: pa.ChunkedArray, decimal_comma: bool) -> pa.ChunkedAr
     for mark, point in ((",", "."), (".", ","))[: 1 + decimal_comma]:
         grouped = rf"^[+-]?(\d{{1,3}}(\{mark}\d{{3}})+|\d+)(\{point}\d*)?$"
         if share(rf"^[+-]?\d{{1,3}}(\{mark}\d{{3}})+\{point}\d*$") and share(grouped) == 1.0:
-            return pc.replace_substring(text, mark, "")
+            return _without(text, mark)
     return text
 
 
@@ -167,7 +226,7 @@ def _in_python(column: pa.ChunkedArray) -> list[object]:
 
 def not_a_number(text: pa.ChunkedArray, decimal_comma: bool) -> Check:
     """The check for the cells of `text`. decimal_comma: whether the file may have them."""
-    commas = decimal_comma and _has_comma(text)
+    commas = decimal_comma and _has(text, ",")
 
     def check(cell: str) -> tuple[str, str] | None:
         if (_COMMA if commas else _POINT).fullmatch(cell) or cell.lower().lstrip("+-") in ("inf", "infinity"):
@@ -181,9 +240,3 @@ def not_a_number(text: pa.ChunkedArray, decimal_comma: bool) -> Check:
         return "a number", ""
 
     return check
-
-
-def _has_comma(text: pa.ChunkedArray) -> bool:
-    import pyarrow.compute as pc
-
-    return bool(pc.any(pc.match_substring(text, ",")).as_py())

@@ -158,7 +158,7 @@ def _check(source: str, quantity: str, sizes: _Angles, found: Mapping[str, Colum
         f'{source}: half of column "{column.name}" lies beyond {sizes.half:.4g} {assumed.name}, which is no '
         f"{what}: it looks like {other[1]}; use {say}{other[0]}"
         f"{_and_the_other_angle(quantity, found, other[0])}. "
-        f"If {assumed.name} is right, say {say}{assumed.name}."
+        f"If {assumed.name} is right, say {say}{quoted(assumed.name)}."
     )
 
 

@@ -8,7 +8,7 @@ from ftproc.errors import InputError, nearest, quoted
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
 from ftproc.files.reading.meaning.names import Name
-from ftproc.files.units import UNITS
+from ftproc.files.units import UNITS, unit_named
 from ftproc.files.words import ALIASES, EITHER_ANGLE, NOT_UNITS, QUANTITIES
 
 #: Words of NOT_UNITS with which a column may still be the quantity.
@@ -50,7 +50,18 @@ def refuse_unknown_unit(source: str, apart: Sequence[Name], free: Sequence[int],
         raise InputError(
             f'{source}: "{unit}" in column "{names[place]}" is not a unit of {quantity}; understood are '
             f"{', '.join(UNITS[quantity])}. Convert the column and rename it, "
-            f"or say {answer(names, {quantity: place})} --units {quantity}=UNIT{_or_absent(quantity)}."
+            f"or say {answer(names, {quantity: place})} --units {quantity}=UNIT (with a factor: '{quantity}=100 "
+            f"{next(iter(UNITS[quantity]))}'){_or_absent(quantity)}."
+        )
+
+
+def refuse_hours(source: str, name: Name, quantity: str) -> None:
+    """Angles whose name says that they are hours, minutes and seconds."""
+    if quantity != "time" and name.notation.startswith("h"):
+        raise InputError(
+            f'{source}: column "{name.text}" is in hours ({name.notation}), which are read as times only. '
+            "Convert it to degrees (15 to the hour) and rename it; "
+            f"if it is in degrees, minutes and seconds, say --units {quantity}=deg."
         )
 
 
@@ -89,7 +100,8 @@ def _units_unknown(apart: Sequence[Name], free: Sequence[int], quantity: str) ->
         name = apart[place]
         if name.foreign or NOT_UNITS & {*name.words, name.unit.lower()}:
             continue
-        if name.unit and name.stem in ALIASES[quantity] and len(name.stem) > 1:
+        known = any(unit_named(quantity, word) for word in name.unit.split())
+        if name.unit and name.stem in ALIASES[quantity] and (len(name.stem) > 1 or known):
             yield place, name.unit
         elif not name.unit and len(name.words) == 2 and name.words[0] in ALIASES[quantity] and len(name.words[0]) > 1:
             yield place, name.words[1]

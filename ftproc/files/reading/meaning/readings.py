@@ -130,7 +130,7 @@ def without_sentinels(found: Mapping[str, Readings]) -> dict[str, Readings]:
     notes = {quantity: list(each.notes) for quantity, each in found.items()}
     gone: dict[tuple[str, float], np.ndarray] = {}
     for quantity in found:
-        while (number := _sentinel(values[quantity], quantity)) is not None:
+        while (number := sentinel(values[quantity], quantity)) is not None:
             places = values[quantity] == number
             for other in found:
                 mine = places & (values[other] == number)
@@ -159,24 +159,24 @@ def _candidates(values: FloatArray, quantity: str) -> list[float]:
     return [number for number in sought if (values == number).any()]
 
 
-def _sentinel(values: FloatArray, quantity: str) -> float | None:
-    """The first of NUMBERS that stands out, or None."""
-    impossible = quantity == "range"
+def sentinel(values: FloatArray, quantity: str = "", fewest: int = 2) -> float | None:
+    """The first of NUMBERS that stands out, at least so many times, or None."""
     for number in _candidates(values, quantity):
-        if _stands_out(values, values == number, number, impossible and number < -1):
+        found = values == number
+        impossible = quantity == "range" and number < -1
+        if (impossible or np.count_nonzero(found) >= fewest) and _stands_out(values, found, number, impossible):
             return number
     return None
 
 
 def _stands_out(values: FloatArray, found: np.ndarray, number: float, impossible: bool) -> bool:
-    """Whether a number is far from the other values, or at least from those beside it each time."""
+    """Whether a number is far from the other values, or at least from those beside it each time. impossible: unless
+    others are negative too."""
     rest = values[~found & np.isfinite(values)]
     if not rest.size:
         return False
     if impossible and not (rest < 0).any():
         return True
-    if np.count_nonzero(found) < 2:
-        return False
     low, high = np.quantile(rest, [0.01, 0.99])
     gap = max(number - high, low - number)
     if gap > max(2 * (high - low), 1e-3 * abs(number)):

@@ -22,7 +22,7 @@ from ftproc.files.options import ABSENT
 from ftproc.files.reading.meaning import parts, questions
 from ftproc.files.reading.meaning.names import Name, of_radar, taken_apart
 from ftproc.files.reading.meaning.questions import Propose, answer, listed
-from ftproc.files.units import UNITS, Unit, si_unit, unit_named
+from ftproc.files.units import Unit, si_unit, unit_named
 from ftproc.files.words import GERMAN, QUANTITIES
 
 _OF_A_TRAJECTORY = ("row", "x_m", "vx_mps", "sigma_x_m", "outlier_range", "nis")
@@ -130,7 +130,9 @@ class _Table(NamedTuple):
         questions.refuse_twice(self.source, self.names, self.names[position])
         name, unit = self.apart[position], self.units.get(quantity)
         stated = unit_named(quantity, name.unit) if name.unit else None
-        chosen = UNITS[quantity][unit] if unit else stated or si_unit(quantity)
+        chosen = (unit_named(quantity, unit) if unit else stated) or si_unit(quantity)
+        if unit is None:
+            questions.refuse_hours(self.source, name, quantity)
         return Column(
             quantity, (position,), self.names[position], chosen, unit is not None, stated is not None,
             key=name.stem if name.means(quantity) != 2 else name.core(),
@@ -140,7 +142,7 @@ class _Table(NamedTuple):
     def joint(self, quantity: str, roles: Mapping[str, int], why: str) -> Column:
         places = tuple(roles.values())
         unit = self.units.get(quantity)
-        chosen = UNITS[quantity][unit] if unit else si_unit(quantity)
+        chosen = (unit and unit_named(quantity, unit)) or si_unit(quantity)
         name = " + ".join(self.names[place] for place in places)
         written = tuple(self.apart[place].unit for place in places)
         time = self.apart[roles["time"]] if "time" in roles else self.apart[places[0]]

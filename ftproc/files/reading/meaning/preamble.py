@@ -1,0 +1,53 @@
+"""Units that lines above a table state: `Range unit: ft`, `# Units: time=s, range=ft`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+from ftproc.files.reading.meaning.names import Name, taken_apart
+from ftproc.files.units import unit_named
+from ftproc.files.words import QUANTITIES
+
+_UNIT = re.compile(r"\b(?:units?|einheit(?:en)?|unité?s?|unidad(?:es)?)\b(?:\s+(?:of|for|von|de))?", re.IGNORECASE)
+_NAME, _STATED = r"(?P<name>[^\W\d_][\w &/]*?)", r"(?P<unit>[^\s=:;,|()\[\]]+)"
+_PAIRS = (  # the first that finds any
+    re.compile(rf"{_NAME}\s*(?:[=:;,|\t(\[]+|\b(?:in|is|are)\b)\s*{_STATED}"),
+    re.compile(rf"{_NAME}\s+{_STATED}"),
+)
+_GROUPS = {
+    **dict.fromkeys(("angle", "angles", "winkel"), QUANTITIES[2:]),
+    **dict.fromkeys(("distance", "distances", "length", "lengths", "ranges"), QUANTITIES[1:2]),
+    "times": QUANTITIES[:1],
+}
+
+
+def units_stated(above: Sequence[str], names: Sequence[str]) -> list[str]:
+    """The unit of each column that the lines above the table state, "" where none; nothing if they state none."""
+    apart = [taken_apart(name) for name in names]
+    stated = {quantity: unit for line in above if _UNIT.search(line) for quantity, unit in _pairs(line).items()}
+    units = ["" if name.unit or name.notation else _of(name, stated) for name in apart]
+    return units if any(units) else []
+
+
+def _pairs(line: str) -> dict[str, str]:
+    """The quantities of a line and their units as written."""
+    for pattern in _PAIRS:
+        found = {
+            quantity: pair["unit"]
+            for pair in pattern.finditer(_UNIT.sub(" ", line))
+            for word in re.split(r"\s+and\s+|\s*[&/]\s*", pair["name"])
+            for quantity in _meant(taken_apart(word))
+            if unit_named(quantity, pair["unit"])
+        }
+        if found:
+            return found
+    return {}
+
+
+def _meant(name: Name) -> Sequence[str]:
+    return _GROUPS.get(name.stem, [quantity for quantity in QUANTITIES if name.means(quantity)])
+
+
+def _of(name: Name, stated: Mapping[str, str]) -> str:
+    return next((unit for quantity, unit in stated.items() if name.means(quantity)), "")
