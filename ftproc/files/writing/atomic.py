@@ -165,5 +165,7 @@ def _output_error(path: Path, error: OSError) -> OutputError:
         errno.ENAMETOOLONG: "the name is too long for the file system; give a shorter one.",
         errno.EFBIG: "the file is larger than the system allows; nothing was written. Choose another place.",
     }
+    if error.errno == errno.ENOENT and directory.is_dir():  # such as /proc
+        reasons[errno.ENOENT] = f"no file can be made in {directory}; choose another place."
     reason = reasons.get(error.errno or 0, f"cannot be written ({error.strerror or error}).")
     return OutputError(f"{path}: {reason}")

@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -163,3 +164,19 @@ def test_kept_columns_must_have_different_names(make: Make) -> None:
     sentence = refused(make("t,R,n,n\n0,1,2,3\n"), keep_columns=True)
     assert 'column "n" is there twice, so both cannot be kept' in sentence
     assert "leave --keep-columns out" in sentence
+
+
+def test_a_counter_is_not_proposed_as_the_time(make: Make) -> None:
+    for name, proposed in (("n", "time=NAME"), ("when", "time=when")):
+        rows = "".join(f"{k},{1000 + k},0.1,0.2\n" for k in range(30))
+        assert f"--columns {proposed}." in refused(make(f"{name},range_m,azimuth_rad,elevation_rad\n{rows}"))
+
+
+def test_a_workbook_of_several_logs_is_asked_about(tmp_path: Path) -> None:
+    path = tmp_path / "two.xlsx"
+    frame = pd.DataFrame({"time_s": [0.0, 1.0], "range_m": [1.0, 2.0]})
+    with pd.ExcelWriter(path) as book:
+        for title in ("one", "the other"):
+            frame.to_excel(book, sheet_name=title, index=False)
+    assert f"several logs, in the sheets one, the other. Name one behind #, such as '{path}#one'." in refused(path)
+    assert len(logs.read(f"{path}#the other")) == 2

@@ -17,7 +17,10 @@ from tests.files.conftest import Make, refused
             '"A" lies beyond 380, which is no azimuth in rad. Say --units azimuth=grad.',
         ),
         ("t,Hz,V\n0,180,15\n", "Say --units azimuth=deg,elevation=deg or --units azimuth=grad,elevation=grad"),
-        ("t,A\n0,3200\n", "Say --units azimuth=mil6000 or --units azimuth=mil6300 or --units azimuth=mil."),
+        (
+            "t,A\n0,3200\n",
+            "Say --units azimuth=mil6000 or --units azimuth=mrad or --units azimuth=mil6300 or --units azimuth=mil.",
+        ),
         ("t,el_deg\n0,800\n", "lies beyond 800 deg, which is no elevation: it looks like mils"),
         ("t,el_deg\n0,95\n", "it looks like a zenith angle; say --elevation-from zenith."),
         ("t,el_deg\n0,80\n", "as zenith angles do. Say --elevation-from zenith if they are zenith angles, or"),
@@ -79,3 +82,35 @@ def test_a_turn_of_400_degrees_is_suspected() -> None:
     assert logs.read(log).remarks == ("the azimuth runs from 0 to 400 deg: if they are gon, say --units azimuth=gon",)
     assert logs.read(log.rename_columns(["time_s", "azimuth_gon"])).remarks == ()
     assert logs.read(log.set_column(1, "azimuth_deg", pa.array(gon + 300))).remarks == ()  # counts on after a turn
+
+
+TURNS = {"mrad": 2e3 * np.pi, "mil6300": 6300.0, "mil": 6400.0, "deg": 360.0}
+
+
+@pytest.mark.parametrize(("unit", "turn"), TURNS.items())
+def test_the_unit_of_an_azimuth_that_turns_is_known_by_the_turn(make: Make, unit: str, turn: float) -> None:
+    for first, step in ((0.9 * turn, turn / 300), (-0.4 * turn, -turn / 200)):
+        azimuth = (first + step * np.arange(60)) % turn
+        if first < 0:
+            azimuth = np.where(azimuth > turn / 2, azimuth - turn, azimuth)
+        log = logs.read(make("t,A\n" + "".join(f"{k},{a!r}\n" for k, a in enumerate(azimuth.tolist()))))
+        assert log.understood["columns"]["azimuth"]["unit"] == unit
+
+
+def packed(degrees: float) -> str:
+    whole, rest = divmod(round(degrees * 3600), 3600)
+    return f"{whole}.{rest // 60:02d}{rest % 60:02d}"
+
+
+def test_degrees_whose_decimals_may_be_minutes_and_seconds_are_asked_about(make: Make) -> None:
+    degrees = [(60 + 0.137 * k, 10 + 0.031 * k) for k in range(60)]
+    rows = "".join(f"{k},{packed(a)},{packed(e)}\n" for k, (a, e) in enumerate(degrees))
+    path = make("t,A,E\n" + rows)
+    said = refused(path)
+    assert "rename to azimuth_dms and elevation_dms" in said
+    assert said.endswith("say --units azimuth=deg,elevation=deg.")
+    assert logs.read(path, units="azimuth=deg,elevation=deg").measurement[0, 1] == pytest.approx(np.pi / 3)
+    log = logs.read(make("t,azimuth_dms,elevation_dms\n" + rows))
+    np.testing.assert_allclose(np.degrees(log.measurement[:, 1:]), degrees, atol=2e-4)
+    decimals = "".join(f"{k},{a:.4f},{e:.4f}\n" for k, (a, e) in enumerate(degrees))
+    assert len(logs.read(make("t,A,E\n" + decimals))) == 60

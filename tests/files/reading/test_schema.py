@@ -265,3 +265,15 @@ def test_angles_in_hours_are_refused_unless_the_user_says_degrees() -> None:
 def test_the_limits_of_an_angle_beside_its_unit_are_no_factor() -> None:
     for inside in ("0-360 deg", "0 to 360 deg", "±180 deg", "deg, 0..360", "deg true"):
         assert found(["t", f"Azimuth ({inside})"])["azimuth"][1] == "deg"
+
+
+def test_t_s_is_a_time_in_s_and_ts_a_time_stamp() -> None:
+    names = ["t_s", "range_m"]
+    assert remarks(names, resolve("a", names, {}, {}), False) == ()
+    assert found(["TS", "range_m"])["time"] == ("TS", "s")
+
+
+def test_a_truth_is_not_explained_as_a_log() -> None:
+    sentence = refused(["time_s", "x_m", "y_m", "z_m"])
+    assert "ftproc score TRAJECTORY --truth log.csv" in sentence
+    assert "--columns" not in sentence

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from ftproc.errors import InputError, first_line
+from ftproc.errors import InputError, first_line, quoted
 from ftproc.files.reading.formats import content, layout, trimming
 from ftproc.files.reading.formats.header import TableHeader, of_arrow
 from ftproc.files.reading.meaning.names import taken_apart
@@ -20,9 +20,16 @@ def workbook(name: str, path: Path, sheet: str = "") -> TableHeader:
     """An .xlsx file. sheet: its name, else the first with rows. Raises InputError."""
     content.read(name, path, limit=1)  # for its messages
     _refuse_bomb(name, path)
-    tables = [table for title, cells in _sheets(name, path, sheet) if (table := _table(name, title, cells)) is not None]
+    read = {title: _table(name, title, cells) for title, cells in _sheets(name, path, sheet)}
+    tables = {title: table for title, table in read.items() if table is not None}
+    logs = [title for title, table in tables.items() if _is_log(table)]
+    if len(logs) > 1:
+        raise InputError(
+            f"{name}: it holds several logs, in the sheets {', '.join(logs)}. Name one behind #, such as "
+            f"{quoted(f'{name}#{logs[0]}')}."
+        )
     if tables:
-        return next(filter(_is_log, tables), tables[0])
+        return tables[logs[0]] if logs else next(iter(tables.values()))
     which = f'sheet "{sheet}" holds' if sheet else "no sheet holds"
     raise InputError(f"{name}: {which} {'no ' if sheet else 'a '}table of numbers under a line of names.")
 

@@ -153,6 +153,8 @@ def _is_unit(word: str) -> bool:
 def _is_name(text: str) -> bool:
     """Whether the whole text is a name without a unit: `sec`, `gps_sec`, `epoch`."""
     key = _NOT_WORDS.sub("", re.split(r"[./]", text.lower())[-1])
+    if key == "ts" and text.lower() != key:  # t_s is a time in s, TS a time stamp
+        return False
     return any(key in table[quantity] for table in (ALIASES, WEAK_ALIASES) for quantity in QUANTITIES)
 
 

@@ -21,7 +21,8 @@ _MAX_MEDIAN = {"azimuth": 4 * math.pi, "elevation": math.pi / 2, "zenith angle":
 _STEEP_DEG = 60  # few records have a median elevation above this
 _MAX_ANGLE = 1e6  # rad; larger ones are clipped
 _SURVEYORS = ("hz", "horizontalangle", "horizontaldirection", "hzangle", "v", "verticalangle", "vertangle", "ha", "va")
-_TURNS = {"deg": 360.0, "grad": 400.0, "mil6000": 6000.0, "mil6300": 6300.0, "mil": 6400.0}
+_TURNS = {"deg": 360.0, "grad": 400.0, "mil6000": 6000.0, "mrad": 2e3 * math.pi, "mil6300": 6300.0, "mil": 6400.0}
+_FEWEST, _FEWEST_MINUTES = 24, 3  # rows, and different minutes in them, by which packed angles are known
 
 
 class Judged(NamedTuple):
@@ -66,6 +67,7 @@ def judged(source: str, quantities: Mapping[str, FloatArray], found: Mapping[str
     for quantity, sizes in known.items():
         if quantity not in bare:
             _check(source, quantity, sizes, found, zenith)
+    _ask_about_packed(source, quantities, found, decided)
     _ask_about_zenith(source, known, decided, station)
     return Judged(decided, tuple(doubts))
 
@@ -78,9 +80,10 @@ def _angles(values: FloatArray, unit: Unit) -> _Angles | None:
         known = known * unit.divide / unit.multiply
         half, most = np.quantile(np.abs(known), [0.5, 0.99]).tolist()
         jumps = np.abs(np.diff(known))
+        step = float(np.median(jumps)) if jumps.size else 0.0
     turn = 0.0
     for size in _TURNS.values():
-        near = (jumps > 0.97 * size) & (jumps <= 1.0001 * size)
+        near = (jumps > 0.97 * size) & (jumps + step <= 1.0005 * size)
         if near.any() and most <= 1.0001 * size:
             turn = size
             break
@@ -177,6 +180,32 @@ def _and_the_other_angle(quantity: str, found: Mapping[str, Column], unit: str) 
     if other is None or other.unit_stated_by_user or other.unit != found[quantity].unit:
         return ""
     return f" (and {other.quantity}={unit} if that is so too)"
+
+
+def _ask_about_packed(
+    source: str, quantities: Mapping[str, FloatArray], found: Mapping[str, Column], decided: Mapping[str, Column]
+) -> None:
+    """Raise InputError, a question, for degrees whose decimals may be minutes and seconds: 60.1608 as 60°16′08″."""
+    degrees = [q for q, column in decided.items() if column.unit.name == "deg" and not column.unit_stated_by_user]
+    packed = [q for q in degrees if not decided[q].notation and _is_packed(quantities[q], found[q].unit)]
+    if packed:
+        names = " and ".join(f'"{decided[quantity].name}"' for quantity in packed)
+        named_so = " and ".join(f"{quantity}_dms" for quantity in packed)
+        raise InputError(
+            f"{source}: no minutes and seconds in the digits of {names} reach 60, as if they were packed (D.MMSS). "
+            f"If they are, rename to {named_so}; if they are degrees with decimals, "
+            f"say --units {','.join(f'{quantity}=deg' for quantity in packed)}."
+        )
+
+
+def _is_packed(values: FloatArray, unit: Unit) -> bool:
+    """Whether the decimals are possible minutes and seconds, of all sizes."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        digits = np.floor(np.abs(values[np.isfinite(values)]) * unit.divide / unit.multiply * 1e4 + 1e-5)
+        minute, second = np.floor(digits / 100) % 100, digits % 100
+    if len(digits) < _FEWEST or len(np.unique(minute)) < _FEWEST_MINUTES:
+        return False
+    return bool(minute.max() < 60 and second.max() < 60 and second.min() < 10 and second.max() >= 50)
 
 
 def _ask_about_zenith(

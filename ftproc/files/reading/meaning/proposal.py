@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _UNNAMED = ("", "index", "__index_level_0__", "Unnamed: 0")
+_COUNTERS = ("", *"nik", *("no", "nr", "num", "number", "row", "index", "idx", "id", "sample", "count", "seq", "frame"))
 _ROWS = 2000
 _MOST_COLUMNS = 60
 _RISES = 0.98  # of the steps of a time are forward
@@ -54,10 +55,11 @@ def _proposed(header: TableHeader, free: Sequence[int], sought: Sequence[str]) -
     varied = {place: values for place, values in read.items() if len(values) > 1 and values.max() > values.min()}
     forward = [place for place, values in varied.items() if np.mean(values[1:] > values[:-1]) > _RISES]
     spare = len(varied) > len(sought) and len(forward) > 1
-    counters = [place for place in forward if spare and (varied[place][1:] == varied[place][:-1] + 1).all()]
+    steady = [place for place in forward if (varied[place][1:] == varied[place][:-1] + 1).all()]
+    counters = [place for place in steady if spare or header.names[place].lower().strip("#. ") in _COUNTERS]
     found: dict[str, int] = {}
     if "time" in sought:
-        if not forward:
+        if not forward or set(forward) == set(counters):
             return {}
         found["time"] = next((place for place in forward if place not in counters), forward[0])
     rest = [place for place in varied if place not in (*found.values(), *counters)]

@@ -127,8 +127,10 @@ def check_complete(source: str, names: Sequence[str], found: Mapping[str, tuple[
     wanted = "time" if "time" not in found else "range"
     what = "no time column" if wanted == "time" else "neither range nor azimuth nor elevation"
     if {"x_m", "y_m", "z_m"} <= set(names):
-        command = f"ftproc score TRAJECTORY --truth {source}"
-        what = f"x_m, y_m, z_m are columns of a truth, for `{command}`, not of a log: it has {what}"
+        raise InputError(
+            f"{source}: x_m, y_m, z_m are columns of a truth, for `ftproc score TRAJECTORY --truth {source}`, not of a "
+            f"log: it has {what}. Its columns are: {listed(names)}."
+        )
     hint = nearest(CANONICAL[wanted], [names[place] for place in free])
     similar = next(({wanted: place} for place in free if hint and f'"{names[place]}"' in hint), {})
     proposed = proposed if set(proposed) == set(sought) else similar or proposed
