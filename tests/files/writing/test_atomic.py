@@ -211,3 +211,9 @@ def test_two_writers_at_once_leave_one_whole_file(tmp_path: Path) -> None:
         other.write(b"other")
     assert target.read_bytes() == b"one"
     assert entries(tmp_path) == ["out.csv"]
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs /proc")
+def test_a_directory_in_which_no_file_can_be_made_is_there() -> None:
+    with pytest.raises(OutputError, match=r"no file can be made in /proc; choose"), replacing("/proc/x.csv"):
+        pass
