@@ -41,7 +41,7 @@ def follow_log(logs: Sequence[str], output: str | None, recipe: Recipe, form: st
             _print(placed, form)
         else:
             atomic.refuse_overwriting(output, logs)
-            atomic.check_target(output)
+            trajectories.check(output)
             maps.check(output, settings.site)
             if layout.map_kind(output) is None:
                 tables.kind_of(output)

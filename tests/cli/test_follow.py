@@ -165,3 +165,12 @@ def test_a_log_without_rows_is_said_to_have_none(run, here, ends, output, conten
 def test_a_log_that_is_not_there_is_named(run, here):
     result = run("filter", "none.csv", "--follow")
     assert (result.code, result.err) == (1, "ftproc: none.csv: there is no such file.\n")
+
+
+def test_a_sidecar_never_replaces_a_file_of_somebody_else(run, here, rows):
+    Path("out.json").write_text("[1, 2]")
+    result = run("filter", "-", "--follow", "-o", "out.csv", stdin=text(HEADER, *rows))
+    assert result.code == 1
+    assert "out.json" in result.err
+    assert Path("out.json").read_text() == "[1, 2]"
+    assert not Path("out.csv").exists()
