@@ -1,4 +1,4 @@
-"""The lines of a log that still grows: standard input, or a file, which may be replaced or written anew."""
+"""The lines of a log that still grows: standard input, or a file, which may be replaced or overwritten."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Block(NamedTuple):
 
 def blocks(source: str, stop: Stop, say: Say) -> Iterator[Block]:
     """The lines of a file, which has no end, or of `-`, in the order in which they come. A file that was replaced or
-    written anew goes on at the beginning of its new content, and a line that it left incomplete is dropped. say: takes
+    overwritten goes on at the beginning of its new content, and a line that it left incomplete is dropped. say: takes
     a sentence for the user. Raises InputError for what cannot be read, or is no text."""
     rest, number = b"", 0
     with _opened(source) as log:
@@ -142,7 +142,7 @@ class _Input:
 
 class _File:
     """A file under a name, which may come to name another one. Each look also reads the end of what is known: where it
-    stands no more, the file was written anew, whatever its length."""
+    stands no more, the file was overwritten, whatever its length."""
 
     def __init__(self, source: str, path: Path) -> None:
         self.news = ""
@@ -168,7 +168,7 @@ class _File:
             self._stream.seek(self._place - len(self._end))
         data = self._stream.read(MOST) or b""
         if not data.startswith(self._end):
-            self._place, self._end, self.news = 0, b"", "became shorter or was written anew"
+            self._place, self._end, self.news = 0, b"", "became shorter or was overwritten"
             return None
         if new := data[len(self._end) :]:
             if self._stream.seekable():

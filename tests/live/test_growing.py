@@ -1,4 +1,4 @@
-"""The lines of a log that grows: a file that is replaced or written anew, and what ends the reading."""
+"""The lines of a log that grows: a file that is replaced or overwritten, and what ends the reading."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_a_file_that_is_written_anew_is_read_from_its_beginning(tmp_path, monkey
     assert found[:3] == [(1, "t,R"), (2, "0,1000"), (3, "1,1001")]
     assert [text for _, text in found[3:]] == ["t,R", "3,1003", *more.split()]
     assert len(said) == 1
-    assert "became shorter or was written anew" in said[0]
+    assert "became shorter or was overwritten" in said[0]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
