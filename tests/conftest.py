@@ -15,7 +15,7 @@ settings.load_profile("suite")
 
 @pytest.fixture(scope="session", autouse=True)
 def _hears_interruptions() -> Iterator[None]:
-    """A shell makes its background jobs deaf to Ctrl-C, and nohup to a closed terminal; and so would be the programs that
+    """A shell makes its background jobs deaf to Ctrl-C, nohup to a closed terminal, and so would be the programs that
     the tests start and stop."""
     heard = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL}
     before = {number: signal.signal(number, handler) for number, handler in heard.items()}
