@@ -134,11 +134,11 @@ class CsvText(NamedTuple):
         keys = [str(position) for position in range(len(self.names))]
         chosen = [*numeric, *others]
         body, delimiter = self._delimited()
+        large = len(body) > _HEAD  # a process that ends as soon as threads have begun would be aborted by them
+        size = max(_PARSED, _PARSED_OF_A_COLUMN * len(keys))
         table = pyarrow.csv.read_csv(
             pa.BufferReader(pa.py_buffer(body)),
-            read_options=pyarrow.csv.ReadOptions(
-                column_names=keys, block_size=max(_PARSED, _PARSED_OF_A_COLUMN * len(keys))
-            ),
+            read_options=pyarrow.csv.ReadOptions(use_threads=large, column_names=keys, block_size=size),
             parse_options=pyarrow.csv.ParseOptions(delimiter=delimiter),
             convert_options=pyarrow.csv.ConvertOptions(
                 include_columns=[keys[position] for position in chosen],
