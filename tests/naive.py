@@ -1,7 +1,7 @@
 """Slow references in plain numpy, one matrix at a time and as the textbooks write them: the kernels must agree.
 
-States are (9,) x y z vx vy vz ax ay az; measurements (3,) range, azimuth, elevation; jerk tensors (6,) xx xy xz yy
-yz zz. A weight m > 0 uses a reading at the noise variance R / m, zero or NaN leaves it out.
+States are (9,) x y z vx vy vz ax ay az; measurements (3,) range, azimuth, elevation; jerk densities (3,) along x,
+y and z. A weight m > 0 uses a reading at the noise variance R / m, zero or NaN leaves it out.
 """
 
 from __future__ import annotations
@@ -21,11 +21,6 @@ def wrapped(angle):
 # --- motion -----------------------------------------------------------------------------------------------------
 
 
-def tensor(jerk):
-    xx, xy, xz, yy, yz, zz = jerk
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
 def transition(t):
     return np.kron([[1, t, t * t / 2], [0, 1, t], [0, 0, 1]], np.eye(3))
 
@@ -37,14 +32,14 @@ def process_noise(t, jerk):
         return s * s / 2, np.copysign(s, t), 1.0
 
     q = [[quad(lambda s, i=i, j=j: along(s)[i] * along(s)[j], 0, abs(t))[0] for j in range(3)] for i in range(3)]
-    return np.kron(q, tensor(jerk))
+    return np.kron(q, np.diag(jerk))
 
 
 def van_loan(t, jerk):
     """Q from one matrix exponential (Van Loan 1978), for t >= 0."""
     a = np.kron(np.eye(3, k=1), np.eye(3))
     g = np.vstack([np.zeros((6, 3)), np.eye(3)])
-    power = expm(np.block([[-a, g @ tensor(jerk) @ g.T], [np.zeros((9, 9)), a.T]]) * t)
+    power = expm(np.block([[-a, g @ np.diag(jerk) @ g.T], [np.zeros((9, 9)), a.T]]) * t)
     return power[9:, 9:].T @ power[:9, 9:]
 
 

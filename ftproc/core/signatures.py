@@ -23,6 +23,7 @@ class Layout(NamedTuple):
 
 Vector = Annotated[NDArray[np.float64], Layout(np.dtype(np.float64), 1)]
 Matrix = Annotated[NDArray[np.float64], Layout(np.dtype(np.float64), 2)]
+Cube = Annotated[NDArray[np.float64], Layout(np.dtype(np.float64), 3)]
 Flags = Annotated[NDArray[np.bool_], Layout(np.dtype(np.bool_), 1)]
 Indices = Annotated[NDArray[np.int64], Layout(np.dtype(np.int64), 1)]
 

@@ -151,7 +151,7 @@ def _from_origin(found: Trajectory, instrument: Instrument, frame: str) -> Traje
 
 def summarize(fused: Fused, zero_s: float) -> dict[str, Any]:
     """The figures of a fused flight, JSON-serialisable; times as in the logs."""
-    time_s, jerk = fused.track.time_s, fused.jerk[:, [0, 3, 5]].mean(1)
+    time_s, jerk = fused.track.time_s, fused.jerk.mean(1)
     said = findings.remarks(fused, zero_s)
     trust = verdict.verdict(said)
     if trust["verdict"] == verdict.CONSISTENT:
@@ -215,7 +215,7 @@ def _metadata(range_: Range, settings: FilterSettings, summary: dict[str, Any], 
             "site": range_.origin,
             "jerk_specified": settings.jerk_psd_m2ps5 is not None,
             "jerk_psd_m2ps5": [float(q) for q in fused.jerk[:, 0]],
-            "jerk_vertical_ratio": float(fused.jerk[0, 5] / fused.jerk[0, 0]),
+            "jerk_vertical_ratio": float(fused.jerk[0, 2] / fused.jerk[0, 0]),
             "jerk_knot_s": float(fused.knot_s) if len(fused.jerk) > 1 else None,
         },
         "sees": "the whole record",

@@ -22,7 +22,6 @@ from ftproc.core.editing import two_pass
 from ftproc.core.filtering import bridging, forward
 from ftproc.core.filtering.records import FilterRun, Model
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
-from ftproc.core.identification.likelihood import HORIZONTAL, VERTICAL
 from ftproc.core.identification.profile import median_level
 from ftproc.methods import live, preparing
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
@@ -114,9 +113,8 @@ def usual_of(record: Recording, settings: FilterSettings) -> Model | None:
     )
     fade = np.exp(np.median([np.log(edited.model.fade_s) for edited in found], 0))
     levels = np.array([median_level(edited.model).jerk for edited in found])
-    jerk = np.exp(np.median(np.log(levels[:, 0, [0, 5]]), 0))
-    tensor = jerk[0] * HORIZONTAL[None] + jerk[1] * VERTICAL[None]
-    return Model(variance, tensor, wander_variance=wander, fade_s=fade)
+    jerk = np.exp(np.median(np.log(levels), 0))
+    return Model(variance, jerk, wander_variance=wander, fade_s=fade)
 
 
 def _span(record: Recording, settings: FilterSettings, rows: slice) -> two_pass.Edited | None:

@@ -155,7 +155,7 @@ def estimate(readings: Readings, log: Log, found: Cleaned) -> Estimate:
         nothing if found.innovation_sigma is None else found.innovation_sigma,
         found.weight, np.full(n, np.nan), los_sigma, np.arange(n), np.nan,
     )  # fmt: skip
-    model = Model(log.sigma**2, np.full((1, 6), np.nan))
+    model = Model(log.sigma**2, np.full((1, 3), np.nan))
     label = labels(found.weight, readings.measurement)
     if found.sigma is not None:
         return Estimate(run, label, model, cleaned=cleaned)

@@ -80,6 +80,6 @@ def _motion(statistics: RunStatistics) -> dict[str, Any]:
         return {"jerk_psd_m2ps5": None, "jerk_vertical_ratio": None, "jerk_knot_s": None}
     return {
         "jerk_psd_m2ps5": [float(q) for q in jerk[:, 0]],
-        "jerk_vertical_ratio": float(jerk[0, 5] / jerk[0, 0]),
+        "jerk_vertical_ratio": float(jerk[0, 2] / jerk[0, 0]),
         "jerk_knot_s": float(statistics.model.knot_s) if len(jerk) > 1 else None,
     }

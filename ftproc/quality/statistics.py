@@ -69,7 +69,7 @@ class RunStatistics:
         self.used += int(used.sum())
         self.rows_used += int(used.any(1).sum())
         self._add_sigmas(time_s, best_sigma[:, :3])
-        self.jerk.append(estimate.model.jerk[:, [0, 3, 5]].mean(1))
+        self.jerk.append(estimate.model.jerk.mean(1))
         self.model = estimate.model
         self.reacquired += len(estimate.reacquired)
         if estimate.settled is not None:

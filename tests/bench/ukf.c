@@ -21,7 +21,6 @@ static double wrap(double a) {
 }
 
 static void predict(double *x, M9 p, double t, const double *jerk) {
-    static const int tensor[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
     double h = 0.5 * t * t, t2 = t * t, t3 = t2 * t;
     double c00 = t3 * t2 / 20, c01 = t2 * t2 / 8, c02 = t3 / 6, c11 = t3 / 3, c12 = t2 / 2, c22 = t;
     for (int i = 0; i < 3; i++) {
@@ -30,7 +29,7 @@ static void predict(double *x, M9 p, double t, const double *jerk) {
     }
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
-            double q = jerk[tensor[i][j]];
+            double q = i == j ? jerk[i] : 0;
             double pa = p[i][6 + j] + t * p[3 + i][6 + j] + h * p[6 + i][6 + j];
             double pv = p[i][3 + j] + t * p[3 + i][3 + j] + h * p[6 + i][3 + j];
             double pp = p[i][j] + t * p[3 + i][j] + h * p[6 + i][j];

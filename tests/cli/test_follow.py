@@ -19,7 +19,7 @@ HEADER = "time_s,range_m,azimuth_rad,elevation_rad"
 
 @pytest.fixture(scope="module")
 def rows() -> list[str]:
-    log = simulate("manoeuvre", seed=5, duration_s=8.0, dt_s=0.1).log
+    log = simulate("manoeuvre", seed=1, duration_s=10.0, dt_s=0.1).log
     return [",".join(map(repr, (t, *z))) for t, z in zip(log.time_s.tolist(), log.measurement.tolist(), strict=True)]
 
 

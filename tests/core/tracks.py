@@ -9,6 +9,7 @@ import numpy as np
 
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.model.frames import from_cartesian, wrap
+from ftproc.core.model.motion import isotropic
 from tests import naive
 
 PATTERNS = [(r, a, e) for r in (0, 1) for a in (0, 1) for e in (0, 1)]
@@ -43,12 +44,8 @@ def covariance(rng, sigmas):
 
 
 def random_jerk(rng, pieces=1, level=1.0):
-    """(pieces, 6) positive definite tensors."""
-    rows = []
-    for _ in range(pieces):
-        root = rng.standard_normal((3, 5))
-        rows.append(level * (root @ root.T / 5)[np.triu_indices(3)])
-    return np.array(rows)
+    """(pieces, 3) densities along the axes."""
+    return level * rng.chisquare(5, (pieces, 3)) / 5
 
 
 def matched(seed, n, dt=0.1, q=1.0, sigma=SIGMA, distance=5000.0, irregular=False, missing=0.0, pieces=1):
@@ -56,7 +53,7 @@ def matched(seed, n, dt=0.1, q=1.0, sigma=SIGMA, distance=5000.0, irregular=Fals
     rng = np.random.default_rng(seed)
     step = dt * (rng.choice([0.3, 1.0, 2.5], n) if irregular else np.ones(n))
     time = np.cumsum(step) - step[0]
-    jerk = random_jerk(rng, pieces, q) if pieces > 1 else q * np.array([[1.0, 0, 0, 1, 0, 1]])
+    jerk = random_jerk(rng, pieces, q) if pieces > 1 else isotropic(q)
     model = Model(sigma**2, jerk, time[-1] / pieces * 1.01 if pieces > 1 else np.inf)
     mean = np.r_[distance * np.array([0.6, -0.5, 0.3]), rng.normal(0, 80, 3), rng.normal(0, 3, 3)]
     p = covariance(rng, np.repeat([4.0, 5.0, 2.0], 3))

@@ -33,11 +33,9 @@ class Motion(NamedTuple):
 
     @classmethod
     def of(cls, model: Model) -> Motion:
-        """Of the jerk tensors of a model."""
-        xx, xy, xz, yy, yz, zz = model.jerk.T
-        tensors = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], -1).reshape(-1, 3, 3)
+        """Of a model's jerk profile."""
         unit = np.linalg.cholesky(UNIT_NOISE)
-        return cls(np.array([np.kron(unit, ensemble.root(tensor)) for tensor in tensors]), model.knot_s)
+        return cls(np.array([np.kron(unit, np.diag(np.sqrt(jerk))) for jerk in model.jerk]), model.knot_s)
 
     def move(self, members: FloatArray, since_first_s: float, interval_s: float, rng: Generator) -> FloatArray:
         """Members (n, 9) one interval later, each with its own draw of the jerk."""

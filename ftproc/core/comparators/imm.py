@@ -22,10 +22,10 @@ FloatArray = NDArray[np.float64]
 
 
 class Mode(Protocol):
-    """The record of one model of the target's motion: its jerk tensor, its probability after the last reading, that
-    expected before the next one, its state after mixing, and what its filter made of the reading."""
+    """The record of one model of the target's motion: its jerk along each axis, its probability after the last
+    reading, that expected before the next one, its state after mixing, and what its filter made of the reading."""
 
-    jerk: Annotated[FloatArray, 6]
+    jerk: Annotated[FloatArray, 3]
     probability: float
     expected: float
     x: Annotated[FloatArray, 9]
@@ -148,7 +148,7 @@ def _store_innovation(filters: Any, modes: Any, any_used: bool, row: Row) -> Non
 
 
 class Jumps(NamedTuple):
-    """How the target manoeuvres: a jerk tensor for each model (m, 6), and how long one holds on average."""
+    """How the target manoeuvres: the jerk along each axis for each model (m, 3), and how long one holds on average."""
 
     jerk: FloatArray
     sojourn_s: float

@@ -13,13 +13,13 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.editing import alternatives, runs
+from ftproc.core.editing import alternatives
 from ftproc.core.editing.decisions import Decision, Record, decide
-from ftproc.core.editing.runs import runs_of
+from ftproc.core.editing.runs import confirmed, runs_of, suspicious
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Start
 from ftproc.core.filtering.smoother import smooth_log
-from ftproc.core.identification.profile import fit_profile, median_level, roughness
+from ftproc.core.identification.profile import fit_profile, from_knot, median_level, roughness
 from ftproc.core.identification.scales import scales_of
 
 FloatArray = NDArray[np.float64]
@@ -28,14 +28,14 @@ IntArray = NDArray[np.int64]
 ROUNDS = 6
 SHORTEST, ENDS = 4, 5  # readings in a run that may be motion, and at its ends, of which the second nearest must be ...
 JOINED, FAR = 12.0, 25.0  # ... so many sigmas off the track at most; and of one that is an outlier in any case
-ONE_SIDED = 0.6  # more of them on one side of the track than on the other: noise is on both
+SAME_SIDE = 0.7  # share of them that are on the side of the track where the one before is: noise changes sides
 SELDOM = 8.0  # ln of how much more often such runs are motion than patches
 LEAST_KEPT = 0.8  # of the readings of a component that were good before the first round
 MARGIN = 5.0  # in log-probability, by which the decisions made again may be less likely than those before
 FEW_MORE = 0.01  # of the readings: those that another hypothesis may reject beyond the first, to be believed
 OTHER_LEVEL = 2.5  # times the jerk level at which an alternative was tried, before it is tried again
-PROFILE_STEPS, COMPARED_STEPS = 3, 12  # of the search for the jerk profile; where two are compared
-STANDS_OUT = 16.0  # times the median of the jerk profile
+PROFILE_STEPS, COMPARED_STEPS = 2, 5  # of the search for the jerk profile; where two are compared
+STANDS_OUT = 64.0  # times the median of the jerk profile
 AROUND = 200  # samples on each side of what stands out that are decided with it
 LONGEST_SPAN = 3000  # samples that are decided together
 SHORT_LOG, MOST = 8000, 0.5  # samples, and share that stands out: then all of it is decided again, and noise as well
@@ -139,21 +139,21 @@ def with_motion(record: Record, decision: Decision) -> Decision:
 def _may_be_motion(record: Record, decision: Decision) -> Iterator[tuple[int, IntArray, slice]]:
     """The component of each run that may be motion, its readings but for those that are far off themselves, and the
     samples around it."""
-    smoothed = None
+    runs, marked = list[tuple[int, IntArray]](), np.zeros(len(record.time_s), bool)
     for c in range(3):
         seen = np.flatnonzero(record.possible[:, c])
-        for begin, end in runs_of(decision.weight[seen, c] <= 0):
-            if end - begin < SHORTEST:
-                continue
-            if smoothed is None:
-                log = record.weighted(decision.weight)
-                smoothed = smooth_log(log, decision.model, decision.starts, residuals_only=True)
-            inside = seen[begin:end]
-            away = smoothed.residual[inside, c] / np.sqrt(smoothed.residual_variance[inside, c])
-            joined = max(np.sort(np.abs(edge))[1] for edge in (away[:ENDS], away[-ENDS:])) < JOINED
-            near = np.abs(away) < FAR
-            if joined and abs(np.sign(away[near]).sum()) >= ONE_SIDED * near.sum():
-                yield c, inside[near], slice(max(inside[0] - AROUND, 0), inside[-1] + 1 + AROUND)
+        rejected = (seen[begin:end] for begin, end in runs_of(decision.weight[seen, c] <= 0))
+        runs += [(c, inside) for inside in rejected if len(inside) >= SHORTEST]
+    for _, inside in runs:
+        marked[inside] = True
+    residual, variance = _near(record, decision.weight, decision.model, marked)
+    for c, inside in runs:
+        away = residual[inside, c] / np.sqrt(variance[inside, c])
+        joined = max(np.sort(np.abs(edge))[1] for edge in (away[:ENDS], away[-ENDS:])) < JOINED
+        near = np.abs(away) < FAR
+        above = away[near] > 0
+        if joined and (above[1:] == above[:-1]).sum() >= SAME_SIDE * (len(above) - 1):
+            yield c, inside[near], slice(max(inside[0] - AROUND, 0), inside[-1] + 1 + AROUND)
 
 
 def likelier(one: tuple[Record, Decision], other: tuple[Record, Decision]) -> tuple[Record, Decision]:
@@ -223,8 +223,24 @@ def _suspects(record: Record, decision: Decision, calm: Model, profile: Model) -
     log = record.weighted(weight)
     smoothed = smooth_log(log, calm, starts, residuals_only=True)
     memory_s = scales_of(log, calm.noise_variance).memory_s(float(calm.jerk[0, 0]))
-    suspects = runs.suspicious(record.time_s, smoothed.residual, smoothed.residual_variance, weight, memory_s)
+    suspects = suspicious(record.time_s, smoothed.residual, smoothed.residual_variance, weight, memory_s)
     if suspects.any():
-        without = smooth_log(record.weighted(np.where(suspects, 0.0, weight)), profile, starts, residuals_only=True)
-        suspects = runs.confirmed(suspects, without.residual, without.residual_variance)
+        without = _near(record, np.where(suspects, 0.0, weight), profile, np.asarray(suspects.any(1)))
+        suspects = confirmed(suspects, *without)
     return suspects
+
+
+def _near(record: Record, weight: FloatArray, model: Model, marked: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
+    """Leave-one-out residuals (n, 3) and their variances of what is marked (n,), with these weights (n, 3) and a jerk
+    profile. NaN far from it: nothing is smoothed there."""
+    residual, variance = np.full(weight.shape, np.nan), np.full(weight.shape, np.nan)
+    for begin, end in runs_of(_widened(marked)):
+        span, own = from_knot(model, record.time_s, slice(int(begin), int(end)))
+        part = record.part(span)
+        try:
+            starts = _starts(part, weight[span], median_level(own))
+        except ValueError:  # a component has too few readings there
+            continue
+        smoothed = smooth_log(part.weighted(weight[span]), own, starts, residuals_only=True)
+        residual[span], variance[span] = smoothed.residual, smoothed.residual_variance
+    return residual, variance

@@ -71,16 +71,17 @@ def _scales(total: Vector, longest: int) -> Vector:
 def _scan(total: Vector, scale: Vector) -> Flags:
     """(m,) readings of suspicious runs. total: (m + 1,) sums of u up to each reading; scale: by length of run."""
     m, longest = len(total) - 1, len(scale) - 1
-    score, end = np.zeros(m), np.zeros(m, np.int64)
+    limit, score, end = SURE * scale, np.zeros(m), np.zeros(m, np.int64)
     for begin in range(m):
-        for length in range(SHORTEST, min(longest, m - begin) + 1):
+        last, suspicious = min(longest, m - begin), 0
+        for length in range(SHORTEST, last + 1):  # without branches: it becomes vector instructions
+            suspicious += abs(total[begin + length] - total[begin]) >= limit[length]
+        for length in range(SHORTEST, last + 1 if suspicious > 0 else 0):
             size = abs(total[begin + length] - total[begin]) / scale[length]
             if size > score[begin]:
                 score[begin], end[begin] = size, begin + length
-    found, near = np.zeros(m, np.bool_), np.zeros(m, np.bool_)
-    for begin in np.argsort(-score):  # the worst run first; what lies beside it may be its echo
-        if score[begin] < SURE:
-            break
+    found, near, begins = np.zeros(m, np.bool_), np.zeros(m, np.bool_), np.flatnonzero(score)
+    for begin in begins[np.argsort(-score[begins])]:  # the worst run first; what lies beside it may be its echo
         if not near[begin : end[begin]].any():
             found[begin : end[begin]] = True
             near[max(begin - longest, 0) : end[begin] + longest] = True

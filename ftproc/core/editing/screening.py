@@ -19,6 +19,7 @@ from ftproc.core.signatures import Vector
 FloatArray = NDArray[np.float64]
 
 TRIALS = 32  # triples per window: one is clean with probability 0.9996 when 40 % of the samples are bad
+FIRST_TRIALS = 16  # are enough where all of the window lies near the best parabola
 CUT = 4.5  # sigmas from the parabola
 JUMP_VOTES = 0.2  # share of short windows that must find a reading off, at a jump
 APART = 64  # numbers between scratch arrays: where they might overlap, compiled loops round otherwise
@@ -85,7 +86,12 @@ def _best_parabola(
     state = (seed * 7919 + 12345) & 0x7FFFFFFF
     best = math.inf
     slope = bend = origin = base = 0.0
-    for _ in range(TRIALS):
+    unbiased = 1.4826 * (1 + 5 / (n - 3))
+    for trial in range(TRIALS):
+        if trial == FIRST_TRIALS and best < math.inf:
+            parabola = (origin, base, slope, bend)
+            if _failing(t, z, n, parabola, angular, CUT * unbiased * best, work) == 0:
+                break
         a = b = c = 0
         for _attempt in range(8):
             state = (state * 1103515245 + 12345) & 0x7FFFFFFF
@@ -117,7 +123,7 @@ def _best_parabola(
     for i in range(n):
         d = t[i] - origin
         residual[i] = wrapped(z[i] - base - d * (slope + bend * d), angular)
-    return 1.4826 * (1 + 5 / (n - 3)) * best
+    return unbiased * best
 
 
 @kernel

@@ -27,9 +27,9 @@ from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.shifts import Shifts, shifts
 from ftproc.core.identification.likelihood import Fixed, fit_level
-from ftproc.core.identification.profile import fit_profile, median_level
+from ftproc.core.identification.profile import fit_profile, from_knot, median_level
 from ftproc.core.identification.scales import scales_of
-from ftproc.core.model.frames import wrap
+from ftproc.core.model.frames import to_cartesian, wrap
 
 FloatArray = NDArray[np.float64]
 
@@ -44,9 +44,10 @@ PATCHES = 12, 24, 48  # readings in a patch, of which a step may be an end
 STAYS = 0.75  # share of the readings on either side of a step that must be good
 AGREE, BESIDE = 0.75, 7  # share of a rejected run on either side of the track, and readings that tell how far they jump
 JOINS = 0.3  # times as far off the track at one end of a run as at the other
-HOPELESS = 200.0  # by which the log-probability is worse before a size is found again, for a step that is none
+HOPELESS = 50.0  # by which the log-probability is worse before a size is found again, for a step that is none
+HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
 SIZES = 2  # times that the size of a step is found again, as the decisions beside it change
-PROFILE_STEPS = 3  # of the search for the jerk profile of a stretch
+PROFILE_STEPS = 2  # of the search for the jerk profile of a stretch
 END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step cannot be told from a patch
 
 
@@ -86,10 +87,11 @@ def find(record: Record, decision: Decision) -> list[Step]:
         again = any(step.component == s.component and abs(step.sample - s.sample) < BESIDE for s in found)
         if again or not end < step.sample <= len(record.time_s) - end:
             continue
-        near = slice(max(step.sample - around, 0), step.sample + around)
+        span = slice(max(step.sample - around, 0), step.sample + around)
+        near, model = from_knot(decision.model, record.time_s, span)
         known, one = ([s._replace(sample=s.sample - near.start) for s in some] for some in (found, [step]))
         known = [s for s in known if s.sure and 0 < s.sample < near.stop - near.start]
-        model, part = _from(decision.model, record.time_s, near), record.part(near)
+        part = record.part(near)
         own = slice(None) if step.component == CLOCK else step.component
         taken = decision.weight[near].copy()
         taken[:, own] = weight[near, own]
@@ -169,14 +171,6 @@ def _end(samples: int) -> int:
     return 1 + min(END, int(SHARE * samples))
 
 
-def _from(model: Model, time_s: FloatArray, near: slice) -> Model:
-    """The model of a stretch of the log: its jerk profile, to the nearest knot."""
-    if not math.isfinite(model.knot_s):
-        return model
-    first = round((float(time_s[near.start]) - float(time_s[0])) / model.knot_s)
-    return model._replace(jerk=model.jerk[min(first, len(model.jerk) - 1) :])
-
-
 def _without(stretch: Stretch, steps: Sequence[Step]) -> Stretch:
     """The stretch with some steps bridged."""
     log = stretch.record.weighted(stretch.taken_in)
@@ -205,7 +199,7 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
         most = _likelihood(bridge, weight) - stretch.margin
         if not most > least:
             return None
-        large = _size(stretch, bridge, step) >= SURE
+        large = _size(stretch, bridge, step) >= SURE and not _may_be_a_halt(stretch, bridge, step)
         return step._replace(
             sure=large and all(_likelihood(stretch, patch) < most for patch in _patches(stretch, step))
         )
@@ -246,6 +240,18 @@ def _size(stretch: Stretch, bridge: Stretch, step: Step) -> float:
     away[:, 1] = wrap(away[:, 1])
     seen = np.where(np.isfinite(away), np.abs(away), 0.0) / np.sqrt(stretch.calm.noise_variance)
     return float(np.median(seen, 0).max())
+
+
+def _may_be_a_halt(stretch: Stretch, bridge: Stretch, step: Step) -> bool:
+    """Whether the target may have stood still, or hurried, where its clock seems to jump: the way that is missing asks
+    for no more acceleration than things that stand and go have."""
+    if step.component != CLOCK:
+        return False
+    rows, _ = step.moved(len(stretch.decided))
+    z, moved = stretch.record.measurement[rows], bridge.record.measurement[rows]
+    away = np.linalg.norm(to_cartesian(z) - to_cartesian(moved), axis=1)
+    seen = away[np.isfinite(away)]
+    return len(seen) > 0 and 4 * float(np.median(seen)) < HALTS_MPS2 * step.size**2
 
 
 def _stays(record: Record, weight: FloatArray, step: Step) -> bool:

@@ -23,8 +23,8 @@ class Backward(Protocol):
 
     v, w, nu: v, W, U N of the smoother's head. state, cov: of the smoothed estimate (of the covariance only the blocks
     of position and velocity, and the diagonal). pn: P N. q: coefficients of Q. residual, variance: leave-one-out.
-    noise_score, wander_score, fade_score: sums so far, of the white noise, and of the offsets' variances and
-    correlation times. n_first: N+ of the first sample.
+    noise, wander: the two sums of the score so far, see `smoother`, of the white noise and of the offsets' variances;
+    fade_score: of their correlation times. n_first: N+ of the first sample.
     """
 
     r: Annotated[FloatArray, 9]
@@ -38,8 +38,8 @@ class Backward(Protocol):
     q: Annotated[FloatArray, 3, 3]
     residual: Annotated[FloatArray, 3]
     variance: Annotated[FloatArray, 3]
-    noise_score: Annotated[FloatArray, 3]
-    wander_score: Annotated[FloatArray, 3]
+    noise: Annotated[FloatArray, 2, 3]
+    wander: Annotated[FloatArray, 2, 3]
     fade_score: Annotated[FloatArray, 3]
     n_first: Annotated[FloatArray, 9, 9]
 
@@ -217,7 +217,9 @@ def _leave_out(back: Backward, f: Update, residuals: bool) -> None:
                 m += root[j, i] * (w[j, 0] * root[0, i] + w[j, 1] * root[1, i] + w[j, 2] * root[2, i])
             back.residual[i] = pull / m
             back.variance[i] = 1 / m + f.noise[i] * (1 - 1 / f.used[i])
-            back.noise_score[i] += 0.5 * (pull * pull - m) * f.noise[i] / f.used[i]
+            half = 0.5 * f.noise[i] / f.used[i]
+            back.noise[0, i] += half * pull * pull
+            back.noise[1, i] += half * m
         elif residuals:  # not used: what all the rest predicts is the smoothed estimate itself
             _predict_reading(back, f, i)
 
@@ -246,19 +248,17 @@ def _predict_reading(back: Backward, f: Update, i: int) -> None:
 
 
 @part
-def score_jerk(back: Backward, interval: float, score: FloatArray) -> None:
-    """Add 1/2 c(T) : (r r' - N) to the score of each element of the jerk tensor (off-diagonal ones count twice)."""
+def score_jerk(back: Backward, interval: float, sums: FloatArray) -> None:
+    """Add 1/2 c(T) : r r' and 1/2 c(T) : N of each axis, whose difference is the score of its jerk density, to the sums
+    (2, 3)."""
     r, n, c = back.r, back.n, back.q
     motion.noise_coefficients(interval, c)
-    k = 0
+    c00, c01, c02, c11, c12, c22 = 0.5 * c[0, 0], c[0, 1], c[0, 2], 0.5 * c[1, 1], c[1, 2], 0.5 * c[2, 2]
     for i in range(3):
-        for j in range(i, 3):
-            total = 0.0
-            for a in range(3):
-                for b in range(3):
-                    total += c[a, b] * (r[3 * a + i] * r[3 * b + j] - n[3 * a + i, 3 * b + j])
-            score[k] += 0.5 * total if i == j else total
-            k += 1
+        p, v, a = r[i], r[3 + i], r[6 + i]
+        sums[0, i] += p * (c00 * p + c01 * v + c02 * a) + v * (c11 * v + c12 * a) + c22 * a * a
+        of_p = c00 * n[i, i] + c01 * n[i, 3 + i] + c02 * n[i, 6 + i]
+        sums[1, i] += of_p + c11 * n[3 + i, 3 + i] + c12 * n[3 + i, 6 + i] + c22 * n[6 + i, 6 + i]
 
 
 @part
@@ -267,8 +267,9 @@ def score_wander(back: Backward, f: Filter, interval: float) -> None:
     (infinite)."""
     for i in range(OFFSETS, len(back.r)):
         fade = math.exp(-interval / f.fade_s[i - OFFSETS])
-        added = (1 - fade * fade) * f.wander[i - OFFSETS]
-        back.wander_score[i - OFFSETS] += 0.5 * added * (back.r[i] * back.r[i] - back.n[i, i])
+        half = 0.5 * (1 - fade * fade) * f.wander[i - OFFSETS]
+        back.wander[0, i - OFFSETS] += half * back.r[i] * back.r[i]
+        back.wander[1, i - OFFSETS] += half * back.n[i, i]
 
 
 @part

@@ -17,7 +17,7 @@ its row of L^-T V.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +29,9 @@ from ftproc.core.filtering.forward import ESTIMATED, LEFT, Estimates, Residuals,
 from ftproc.core.filtering.memory import scratch
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SCORES, STATES, SmootherRun, smoothed_covariance
-from ftproc.core.signatures import Indices, Layout, Matrix, Vector
+from ftproc.core.signatures import Cube, Indices, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
-Cube = Annotated[NDArray[np.float64], Layout(np.dtype(np.float64), 3)]
 
 PARAMETERS = 6  # of a station: range, azimuth, elevation, tilt about its x and about its y, clock
 BLOCK = 1024  # samples of which S and C are kept
@@ -219,7 +218,7 @@ def smooth_biased(log: Observations, model: Model, start: Start, directions: Dir
         np.zeros((9, m)), np.zeros((9, m)), np.zeros((blocks, 9, m)), np.zeros((rows, 9, m)),
         np.zeros((rows, 3, m)), np.zeros(m), np.zeros((m, m)), np.zeros((n, 9)),
     )  # fmt: skip
-    jerk = np.zeros_like(model.jerk)
+    jerk = np.zeros((len(model.jerk), 2, 3))
     samples, profile = log.samples(model.noise_variance), model.profile(log.time_s)
     likelihood = _sweep_biased(Span(first, n, first), samples, profile, memory, jerk, STATES)
     covariance = smoothed_covariance(memory.block["p"][0], memory.back["n_first"][0])[:9, :9]
@@ -228,8 +227,6 @@ def smooth_biased(log: Observations, model: Model, start: Start, directions: Dir
     estimates[:first], residuals[:first] = extrapolated(log, model, head)
     fields = {name: estimates[name] for name in ESTIMATED.names or ()}
     fields |= {name: np.ascontiguousarray(residuals[name]) for name in LEFT.names or ()}
-    run = SmootherRun(
-        **fields, log_likelihood=likelihood, noise_score=memory.back["noise_score"][0], jerk_score=jerk, heads=(head,)
-    )
+    run = SmootherRun(**fields, log_likelihood=likelihood, heads=(head,))
     info = memory.info + np.tril(memory.info, -1).T
     return Biased(run, memory.spread, memory.score, info)

@@ -9,10 +9,11 @@ from typing import Annotated, Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import kernel, part, record, variant, zeros
+from ftproc.core.compiled import empty, kernel, part, record, variant, zeros
 from ftproc.core.filtering import sites, ukf
 from ftproc.core.filtering.filters import ColouredFilters, Filter, Filters
 from ftproc.core.filtering.records import (
+    ROW,
     FilterRun,
     Model,
     Observations,
@@ -22,7 +23,6 @@ from ftproc.core.filtering.records import (
     Samples,
     Start,
     between,
-    empty_rows,
 )
 from ftproc.core.model import jacobian, motion
 from ftproc.core.model.measurement import line_of_sight_sigma
@@ -204,7 +204,7 @@ def filter_log(log: Observations, model: Model, starts: list[Start], extended: b
 def run_log(run: Recursion, log: Observations, model: Model, starts: list[Start], extra: Any) -> FilterRun:
     """A run over the whole log by a recursion that is re-initialized at each start; extra: see `recursion`."""
     samples, profile = log.samples(model.noise_variance), model.profile(log.time_s)
-    rows = empty_rows(len(log.time_s))
+    rows = empty(ROW, len(log.time_s))
     likelihood = 0.0
     for start, stop in between(starts, len(log.time_s)):
         likelihood += run(Span(start.sample, stop, start.sample), samples, profile, model.filter(start), extra, rows)[1]
@@ -219,4 +219,4 @@ def lead_in(log: Observations, model: Model, start: Start, rows: Any) -> None:
         before[name] = found[name]
     before["predicted"], before["innovation"] = found["state"], left["residual"]
     before["innovation_sigma"] = np.sqrt(left["residual_variance"])
-    before["nis"] = np.nan
+    before["nis"], before["weight"], before["since_start"] = np.nan, 0.0, 0.0

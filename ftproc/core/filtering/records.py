@@ -134,9 +134,9 @@ def between(starts: list[Start], samples: int) -> Iterator[tuple[Start, int]]:
 class Model(NamedTuple):
     """The noise of the measurements, and of the motion.
 
-    noise_variance: (3,) of white noise, m^2, rad^2, rad^2, or (stations, 3). jerk: (m, 6) tensor of the jerk density,
-    m^2/s^5, each row holding for `knot_s` seconds from the first sample on. wander_variance, fade_s: (3,) of the noise
-    that is correlated in time (first-order Gauss-Markov), which adds to the white; zero for none.
+    noise_variance: (3,) of white noise, m^2, rad^2, rad^2, or (stations, 3). jerk: (m, 3) density of the jerk along x,
+    y and z, m^2/s^5, each row holding for `knot_s` seconds from the first sample on. wander_variance, fade_s: (3,) of
+    the noise that is correlated in time (first-order Gauss-Markov), which adds to the white; zero for none.
     """
 
     noise_variance: FloatArray

@@ -61,7 +61,7 @@ def shifts(log: Observations, model: Model, starts: list[Start]) -> Shifts:
         memory = ShiftMemory(*memory_of(stop - start.sample, first, found, residuals))
         memory = memory._replace(back=zeros(backward.COLOURED))
         span = Span(start.sample, stop, start.sample)
-        _sweep(span, samples, profile, memory, np.zeros_like(model.jerk), smoother.STATES)
+        _sweep(span, samples, profile, memory, np.zeros((len(model.jerk), 2, 3)), smoother.STATES)
     return Shifts(
         *(np.ascontiguousarray(each) for each in (found["score"], found["information"], residuals["residual"]))
     )

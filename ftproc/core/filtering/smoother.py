@@ -12,8 +12,8 @@ Shephard 1992):
 
 * with u = L^-T v and M = L^-T W L^-1, the leave-one-out residual of each used component, u_i / M_ii with variance
   1 / M_ii (what the rest of the record predicts for it), exact to rounding;
-* the score of the likelihood by each noise variance, 1/2 sum(u_i^2 - M_ii), and by each element of each piece of
-  the jerk tensor, 1/2 sum of c(T) contracted with (r r' - N).
+* the score of the likelihood by each noise variance, 1/2 sum(u_i^2 - M_ii), and by the jerk density of each axis in
+  each piece of the profile, 1/2 sum of c(T) contracted with (r r' - N). The two sums are kept apart, see `Slope`.
 
 A forward sweep keeps what each update leaves for the way back, of `memory.BLOCK` samples at most; of a longer log it
 keeps the state before each block as well, and the way back filters all blocks but the last again.
@@ -28,14 +28,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core import pacing
-from ftproc.core.compiled import kernel, part, variant, zeros
+from ftproc.core.compiled import empty, kernel, part, variant
 from ftproc.core.filtering import backward, sites, ukf
 from ftproc.core.filtering.filters import OFFSETS, Filter, Update, retain
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Span, advance, extrapolated
 from ftproc.core.filtering.memory import ColouredMemory, Memory, memory_of
 from ftproc.core.filtering.records import Model, Observations, Sample, Samples, Start, between
 from ftproc.core.model import motion
-from ftproc.core.signatures import Matrix
+from ftproc.core.signatures import Cube
 
 FloatArray = NDArray[np.float64]
 
@@ -45,9 +45,8 @@ class SmootherRun(NamedTuple):
 
     state: (n, 9), SI units. sigma: (n, 9) 1-sigma. los_sigma: (n, 6) as in FilterRun.
     residual: (n, 3) leave-one-out residual m, rad, rad; NaN where missing. residual_variance: (n, 3) its variance at
-    full weight. nis: (n,) of the innovations used in the forward sweep. log_likelihood: of those innovations.
-    noise_score: (3,) d log-likelihood / d ln(variance). jerk_score: (m, 6) d log-likelihood / d jerk element.
-    heads: smoothed state and covariance at each start.
+    full weight. nis: (n,) of the innovations used in the forward sweep. log_likelihood: of those innovations. heads:
+    smoothed state and covariance at each start.
     """
 
     state: FloatArray
@@ -57,14 +56,14 @@ class SmootherRun(NamedTuple):
     residual_variance: FloatArray
     nis: FloatArray
     log_likelihood: float
-    noise_score: FloatArray
-    jerk_score: FloatArray
     heads: tuple[Start, ...]
 
     def rows(self, low: int, high: int) -> SmootherRun:
-        """Of the samples [low, high) alone; likelihood, scores and heads stay those of the whole run."""
+        """Of the samples [low, high) alone; likelihood and heads stay those of the whole run."""
         return SmootherRun._make([*(each[low:high] for each in self[:6]), *self[6:]])
 
+
+LEAST_SHARE = 3e-8  # of a variance: less cannot be told from what a sweep rounds off
 
 #: What is wanted of a sweep: the likelihood, its scores too, the residuals of each sample too, the states too.
 LIKELIHOOD, SCORES, RESIDUALS, STATES = range(4)
@@ -121,10 +120,10 @@ def _carry_back(memory: Any, update: Update, k: int, interval: float, place: int
 
 
 def _swept_through(
-    span: Span, samples: Samples, profile: motion.Profile, memory: Memory, jerk_score: Matrix, wanted: int
+    span: Span, samples: Samples, profile: motion.Profile, memory: Memory, jerk: Cube, wanted: int
 ) -> float:
-    """The sweeps over a span; the log-likelihood. Adds to the jerk score (m, 6); fills what is wanted. At the end
-    `back` holds the state of the first sample, if more than scores are wanted."""
+    """The sweeps over a span; the log-likelihood. Adds to the sums (m, 2, 3) of the jerk's score; fills what is wanted.
+    At the end `back` holds the state of the first sample, if more than scores are wanted."""
     f, before, block, back = memory.filters[0], memory.before, memory.block, memory.back[0]
     estimates, residuals = memory.estimates, memory.residuals
     likelihood, last = 0.0, len(before) - 1
@@ -168,7 +167,7 @@ def _swept_through(
                     residuals[k].residual_variance[i] = back.variance[i]
             _carry_back(memory, update, k, interval, k - low, wanted)
             if k > span.first:
-                backward.score_jerk(back, interval, jerk_score[motion.knot_index(samples[k].time_s, profile)])
+                backward.score_jerk(back, interval, jerk[motion.knot_index(samples[k].time_s, profile)])
                 backward.score_wander(back, f, interval)
                 if k > low:
                     backward.score_fade(back, block[k - 1 - low], f, interval)
@@ -197,20 +196,43 @@ def smoothed_covariance(p: FloatArray, n: FloatArray) -> FloatArray:
     scale = np.sqrt(np.where(np.diag(p) > 0, np.diag(p), 1.0))
     factor = scale[:, None] * np.linalg.cholesky(p / np.outer(scale, scale) + 1e-12 * np.eye(len(p)))
     share, turn = np.linalg.eigh(np.eye(len(p)) - factor.T @ n @ factor)
-    half = factor @ turn * np.sqrt(np.maximum(share, 1e-12))
+    half = factor @ turn * np.sqrt(np.maximum(share, LEAST_SHARE))
     result: FloatArray = half @ half.T
     return result
 
 
+class Slope(NamedTuple):
+    """How the log-likelihood depends on the logarithms of some variances: the sums of what the record says of each,
+    and of what it would say on average if the variance were right. Their difference is the score."""
+
+    found: FloatArray
+    expected: FloatArray
+
+    @property
+    def score(self) -> FloatArray:
+        """d log-likelihood / d ln(variance)."""
+        return self.found - self.expected
+
+    @property
+    def curvature(self) -> FloatArray:
+        """Of the log-likelihood, downward, from here to where the two sums are equal, if the second stays as it is and
+        the first falls as the variance grows: with it a Newton step goes ln(found / expected) at once."""
+        found, expected = np.maximum(self.found, 1e-300), np.maximum(self.expected, 1e-300)
+        ratio = np.log(found / expected)
+        near = np.abs(ratio) < 1e-3
+        mean: FloatArray = np.where(near, 0.5 * (found + expected), (found - expected) / np.where(near, 1.0, ratio))
+        return mean
+
+
 class Scores(NamedTuple):
-    """The likelihood of a model and its slope: noise and wander (3,) by ln(variance), fade (3,) by ln(correlation time)
-    of the offsets, jerk (m, 6) by each element."""
+    """The likelihood of a model and its slope: by ln(variance) of the noise and of the offsets (3,), by
+    ln(correlation time) of these (3,), and by ln(jerk density) of each axis in each piece of the profile (m, 3)."""
 
     log_likelihood: float
-    noise: FloatArray
-    wander: FloatArray
+    noise: Slope
+    wander: Slope
     fade: FloatArray
-    jerk: FloatArray
+    jerk: Slope
 
 
 class _Swept(NamedTuple):
@@ -227,19 +249,20 @@ def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) ->
     pacing.swept(n)
     samples, profile = log.samples(model.noise_variance), model.profile(log.time_s)
     sweep = _sweep_coloured if model.coloured else _sweep
-    estimates, residuals = zeros(ESTIMATED, n if wanted == STATES else 0), zeros(LEFT, n if wanted >= RESIDUALS else 0)
-    (noise, wander, fade), jerk = np.zeros((3, 3)), np.zeros_like(model.jerk)
+    estimates, residuals = empty(ESTIMATED, n if wanted == STATES else 0), empty(LEFT, n if wanted >= RESIDUALS else 0)
+    (noise, wander), fade, jerk = np.zeros((2, 2, 3)), np.zeros(3), np.zeros((len(model.jerk), 2, 3))
     likelihood, heads = 0.0, list[Start]()
     for start, stop in between(starts, n):
         memory = memory_of(stop - start.sample, model.filter(start), estimates, residuals)
         likelihood += sweep(Span(start.sample, stop, start.sample), samples, profile, memory, jerk, wanted)
-        noise += memory.back["noise_score"][0]
-        wander += memory.back["wander_score"][0]
+        noise += memory.back["noise"][0]
+        wander += memory.back["wander"][0]
         fade += memory.back["fade_score"][0]
         if wanted == STATES or (wanted == RESIDUALS and 0 < start.sample == starts[0].sample):
             covariance = smoothed_covariance(memory.block["p"][0], memory.back["n_first"][0])[:9, :9]
             heads.append(Start(start.sample, memory.back["state"][0, :9].copy(), covariance))
-    return _Swept(Scores(likelihood, noise, wander, fade, jerk), estimates, residuals, tuple(heads))
+    slopes = (Slope(*noise), Slope(*wander), fade, Slope(jerk[:, 0] * model.jerk, jerk[:, 1] * model.jerk))
+    return _Swept(Scores(likelihood, *slopes), estimates, residuals, tuple(heads))
 
 
 def likelihood_of(log: Observations, model: Model, starts: list[Start]) -> float:
@@ -266,6 +289,4 @@ def smooth_log(log: Observations, model: Model, starts: list[Start], residuals_o
         estimates[:first] = before[: len(estimates)]
     fields = {name: estimates[name] for name in ESTIMATED.names or ()}
     fields |= {name: np.ascontiguousarray(residuals[name]) for name in LEFT.names or ()}
-    return SmootherRun(
-        **fields, log_likelihood=scores.log_likelihood, noise_score=scores.noise, jerk_score=scores.jerk, heads=heads
-    )
+    return SmootherRun(**fields, log_likelihood=scores.log_likelihood, heads=heads)

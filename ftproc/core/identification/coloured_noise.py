@@ -17,14 +17,7 @@ from numpy.typing import NDArray
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun, likelihood_of, score_log
 from ftproc.core.identification import optimizer
-from ftproc.core.identification.likelihood import (
-    VERTICAL_PRECISION,
-    Fixed,
-    fit_level,
-    jerk_bounds,
-    representative,
-    shaped,
-)
+from ftproc.core.identification.likelihood import Fixed, fit_level, jerk_bounds, of_level, representative, shaped
 from ftproc.core.identification.profile import fit_profile
 from ftproc.core.identification.scales import Scales, scales_of
 
@@ -39,7 +32,7 @@ SHORT_MEMORY = (
 )
 FIRST_FADES = (1.5, 6.0, 25.0)  # intervals: correlation times with which the search begins,
 FIRST_CALMS = (1.0, 1e-3)  # and shares of the jerk that white noise leads to
-FIRST_STEPS, STEPS, PROFILE_STEPS = 5, 15, 4
+FIRST_STEPS, STEPS, PROFILE_STEPS = 5, 15, 3
 SHORTEST_FADE, LONGEST_FADE = 0.3, 0.5  # intervals, and spans of the log
 LARGEST = 1e4  # times the variance that white noise would have
 NEGLIGIBLE = 0.02  # share of a component's variance, and correlation of neighbours
@@ -93,7 +86,7 @@ def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fi
     scales = scales_of(part, white.noise_variance)
     search = _Search(part, starts, white, fixed, scales)
     tries = [search.run(search.first(fade, calm), FIRST_STEPS) for fade in FIRST_FADES for calm in FIRST_CALMS]
-    theta = search.run(min(tries, key=lambda theta: search.cost(theta)[0]), STEPS)
+    theta = search.run(min(tries, key=lambda theta: search.cost(theta).value), STEPS)
     found = [search.model(theta), *(search.model(search.along(theta, factor)) for factor in (0.5, 2.0))]
     model = found[0]
     neighbours = np.exp(-scales.interval_s / model.fade_s) * model.wander_variance / model.reading_variance
@@ -121,7 +114,7 @@ class _Search:
         self.log, self.starts, self.white, self.scales = log, starts, white, scales
         given = np.log(white.noise_variance)
         low, high = jerk_bounds(scales)
-        level = np.array([math.log(white.jerk[0, 0]), math.log(white.jerk[0, 5] / white.jerk[0, 0])])
+        level = np.array([math.log(white.jerk[0, 0]), math.log(white.jerk[0, 2] / white.jerk[0, 0])])
         if fixed.jerk:
             low = high = level
         fades = np.log(np.array([SHORTEST_FADE * scales.interval_s, LONGEST_FADE * scales.span_s]))
@@ -130,13 +123,12 @@ class _Search:
         none = np.where(fixed.noise, math.log(NEGLIGIBLE) - 1.0, 0.0)  # noise that is specified is white
         self.lower = np.r_[given + fewest, given + fewest + none, np.full(3, fades[0]), low]
         self.upper = np.r_[given + np.minimum(most, 1.0), given + most + none, np.full(3, max(fades)), high]
-        used = float((log.weight > 0).sum(0).mean())
-        self.curvature = used * np.r_[np.full(3, 0.3), np.full(3, 0.1), np.full(3, 0.05), 0.05, 0.02]
+        self.of_fades = np.full(3, 0.05 * float((log.weight > 0).sum(0).mean()))  # curvature
 
     def first(self, fade: float, calm: float) -> FloatArray:
         """Where a search begins: with half of the noise correlated over `fade` intervals, and so much of the jerk."""
         given, jerk = np.log(0.5 * self.white.noise_variance), self.white.jerk[0]
-        motion = [math.log(calm * jerk[0]), math.log(jerk[5] / jerk[0])]
+        motion = [math.log(calm * jerk[0]), math.log(jerk[2] / jerk[0])]
         theta = np.r_[given, given, np.full(3, math.log(fade * self.scales.interval_s)), motion]
         return np.asarray(np.clip(theta, self.lower, self.upper), np.float64)
 
@@ -145,13 +137,13 @@ class _Search:
         white, wander, fade = np.exp(theta[:9]).reshape(3, 3)
         return Model(white, shaped(theta[9:10], theta[10]), wander_variance=wander, fade_s=fade)
 
-    def cost(self, theta: FloatArray) -> tuple[float, FloatArray]:
-        """Minus the log-likelihood, and its slope."""
-        model = self.model(theta)
-        found = score_log(self.log, model, self.starts)
-        by_axis, pull = found.jerk[0] * model.jerk[0], VERTICAL_PRECISION * theta[10]
-        slope = -np.r_[found.noise, found.wander, found.fade, by_axis.sum(), by_axis[5] - pull]
-        return -found.log_likelihood + 0.5 * pull * theta[10], slope
+    def cost(self, theta: FloatArray) -> optimizer.Point:
+        """Minus the log-likelihood."""
+        found = score_log(self.log, self.model(theta), self.starts)
+        level, variances = of_level(found, theta[10]), (found.noise, found.wander)
+        slope = np.r_[*(-each.score for each in variances), -found.fade, level.gradient]
+        curvature = np.r_[*(each.curvature for each in variances), self.of_fades, level.curvature]
+        return optimizer.Point(level.value, slope, curvature)
 
     def along(self, theta: FloatArray, factor: float) -> FloatArray:
         """The parameters with offsets as much slower and larger, or faster and smaller, as the log does not refute.
@@ -170,4 +162,4 @@ class _Search:
 
     def run(self, theta: FloatArray, steps: int) -> FloatArray:
         """The likeliest parameters, after so many steps at most."""
-        return optimizer.minimise(self.cost, theta, self.curvature, self.lower, self.upper, steps, tolerance=0.05)
+        return optimizer.minimise(self.cost, theta, self.lower, self.upper, steps, tolerance=0.05)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import likelihood_of, score_log
+from ftproc.core.filtering.smoother import Scores, likelihood_of, score_log
 from ftproc.core.identification import optimizer
 from ftproc.core.identification.scales import EXACT, Scales, scales_of
 from ftproc.core.model.motion import isotropic
@@ -32,9 +32,6 @@ MEMORIES = (0.1, 3.0)  # intervals and spans of the log: the shortest and the lo
 FIRST_MEMORIES = (2.0, 5.0, 12.0, 30.0)  # intervals, of which the likeliest is where the search for the jerk begins
 RATIO_BOUND = 6.0  # on |ln(vertical / horizontal jerk)|
 VERTICAL_PRECISION = 0.5  # with which ln(vertical / horizontal jerk) is drawn to zero
-HORIZONTAL = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.0])
-VERTICAL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-ISOTROPIC = (HORIZONTAL + VERTICAL)[None, :]
 
 
 class Fixed(NamedTuple):
@@ -111,23 +108,19 @@ def fit_level(
     floor = 2 * np.log(np.maximum(smallest, expected / NOISE_SHRINKS if expected_sigma is not None else 0.0))
     allowed = NOISE_ALLOWED * np.array([scales.range_m, 1.0, 1.0])
     ceiling = 2 * np.log(np.maximum(NOISE_GROWTH * expected, allowed))
-    log_jerk = np.array([math.log(guess.jerk[0, 0]), math.log(guess.jerk[0, 5] / guess.jerk[0, 0])])
+    log_jerk = np.array([math.log(guess.jerk[0, 0]), math.log(guess.jerk[0, 2] / guess.jerk[0, 0])])
     lowest, highest = jerk_bounds(scales)
     lower = np.r_[np.where(fixed.noise, log_noise, floor), log_jerk if fixed.jerk else lowest]
     upper = np.r_[np.where(fixed.noise, log_noise, ceiling), log_jerk if fixed.jerk else highest]
-    used = np.maximum((part.weight > 0).sum(0), 1)
 
-    def cost(theta: FloatArray) -> tuple[float, FloatArray]:
-        model = Model(np.exp(theta[:3]), shaped(theta[3:4], theta[4]))
-        found = score_log(part, model, starts)
-        by_axis = found.jerk[0] * model.jerk[0]
-        pull = VERTICAL_PRECISION * theta[4]
-        slope = -np.r_[found.noise, by_axis.sum(), by_axis[5] - pull]
-        return -found.log_likelihood + 0.5 * pull * theta[4], slope
+    def cost(theta: FloatArray) -> optimizer.Point:
+        found = score_log(part, Model(np.exp(theta[:3]), shaped(theta[3:4], theta[4])), starts)
+        level = of_level(found, theta[4])
+        slope, curvature = np.r_[-found.noise.score, level.gradient], np.r_[found.noise.curvature, level.curvature]
+        return optimizer.Point(level.value, slope, curvature)
 
     theta = np.clip(np.r_[log_noise, log_jerk], lower, upper)
-    curvature = np.r_[used / 2, used.mean() / 20, used.mean() / 60]
-    theta = optimizer.minimise(cost, theta, curvature, lower, upper, LEVEL_STEPS, tolerance=0.05)
+    theta = optimizer.minimise(cost, theta, lower, upper, LEVEL_STEPS, tolerance=0.05)
     return Model(np.exp(theta[:3]), shaped(theta[3:4], theta[4]))
 
 
@@ -139,6 +132,17 @@ def jerk_bounds(scales: Scales) -> tuple[FloatArray, FloatArray]:
 
 
 def shaped(log_jerk: FloatArray, log_ratio: float) -> FloatArray:
-    """(m, 6) jerk tensors from ln of the horizontal density (m,) and ln of vertical over horizontal."""
-    tensors: FloatArray = np.exp(log_jerk)[:, None] * (HORIZONTAL + math.exp(log_ratio) * VERTICAL)
-    return tensors
+    """(m, 3) jerk densities from ln of the horizontal one (m,) and ln of vertical over horizontal."""
+    densities: FloatArray = np.exp(log_jerk)[:, None] * np.array([1.0, 1.0, math.exp(log_ratio)])
+    return densities
+
+
+def of_level(found: Scores, log_ratio: float) -> optimizer.Point:
+    """Minus the log-likelihood, with what is known beforehand of the ratio, by ln(jerk) of a single level and by
+    ln(vertical / horizontal)."""
+    score, curvature, pull = found.jerk.score[0], found.jerk.curvature[0], VERTICAL_PRECISION * log_ratio
+    return optimizer.Point(
+        -found.log_likelihood + 0.5 * pull * log_ratio,
+        np.array([-score.sum(), pull - score[2]]),
+        np.array([curvature.sum(), curvature[2] + VERTICAL_PRECISION]),
+    )

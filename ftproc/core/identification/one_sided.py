@@ -73,7 +73,8 @@ def find(log: Observations, smoothed: SmootherRun, rounding: FloatArray) -> list
 def _shape(residual: FloatArray) -> tuple[float, bool, bool]:
     """The skewness of residuals (n,), whether that is no chance, and whether they are flatter than normal ones."""
     count, centred = len(residual), (residual - residual.mean()) / residual.std()
-    skew, missing = float(np.mean(centred**3)), 3 - float(np.mean(centred**4))
+    square = centred * centred  # (a power is thirty times as slow)
+    skew, missing = float(np.mean(square * centred)), 3 - float(np.mean(square * square))
     return skew, abs(skew) > SKEW + IN_SIGMAS * math.sqrt(6 / count), missing > FLAT + IN_SIGMAS * math.sqrt(24 / count)
 
 
@@ -95,16 +96,16 @@ class _Fit(NamedTuple):
 def _likeliest(residual: FloatArray, both: bool) -> _Fit:
     """The fit to residuals (n,) with errors above zero, or of either sign."""
 
-    def cost(theta: FloatArray) -> tuple[float, FloatArray]:
+    def cost(theta: FloatArray) -> optimizer.Point:
         found, slope = _log_density(residual - theta[0], theta, both)
-        return -float(found.sum()), -slope.sum(1)
+        return optimizer.Point(-float(found.sum()), -slope.sum(1), curvature)
 
     curvature, bound = np.full(4, len(residual) / 4), np.full(4, LARGEST)
     tries = []
     for size in (0.7, 2.0):
         start = np.array([0.0 if both else -0.7, math.log(0.5), 0.0, math.log(size)])
-        theta = optimizer.minimise(cost, start, curvature, -bound, bound, STEPS, TOLERANCE)
-        tries.append((cost(theta)[0], theta))
+        theta = optimizer.minimise(cost, start, -bound, bound, STEPS, TOLERANCE)
+        tries.append((cost(theta).value, theta))
     least, (place, log_sigma, odds, log_error) = min(tries, key=lambda each: each[0])
     return _Fit((float(place), math.exp(log_sigma), 1 / (1 + math.exp(-odds)), math.exp(log_error)), -least)
 

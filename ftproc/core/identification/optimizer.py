@@ -1,24 +1,40 @@
-"""A small limited-memory BFGS for the smooth likelihoods of this package: a dozen to a few hundred parameters,
-bounds, and an expensive gradient that comes with the value. (Loading a general optimiser would cost more than its
-few dozen steps.) Nocedal and Wright 2006, algorithms 7.4 and 7.5, with projection onto the bounds."""
+"""A small limited-memory BFGS for the smooth likelihoods of this package: a dozen to a few thousand parameters,
+bounds, and an expensive gradient that comes with the value and a rough curvature. (Loading a general optimiser would
+cost more than its few dozen steps.) Nocedal and Wright 2006, algorithms 7.4 and 7.5, with projection onto the bounds;
+what the steps so far do not tell of the Hessian is the curvature's, a tridiagonal matrix."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ftproc.core.compiled import kernel
+from ftproc.core.signatures import Vector
 
 FloatArray = NDArray[np.float64]
 
 MEMORY = 8
 SUFFICIENT = 1e-4  # Armijo
+FARTHEST = 2.0  # that a parameter moves at once: a factor e^2
+FLATTEST = 0.01  # curvature: of what a function says less, it says nothing
+
+
+class Point(NamedTuple):
+    """A function where it was asked for: its value, its gradient (m,), and a rough Hessian: diagonal (m,), and what is
+    beside it (m - 1,), None for zero."""
+
+    value: float
+    gradient: FloatArray
+    curvature: FloatArray
+    beside: FloatArray | None = None
 
 
 def minimise(
-    value_and_gradient: Callable[[FloatArray], tuple[float, FloatArray]],
+    function: Callable[[FloatArray], Point],
     theta: FloatArray,
-    curvature: FloatArray,
     lower: FloatArray,
     upper: FloatArray,
     steps: int,
@@ -26,36 +42,48 @@ def minimise(
 ) -> FloatArray:
     """Minimiser of a smooth function between bounds, from `theta` (m,).
 
-    curvature: (m,) rough diagonal of the Hessian, which sets the first steps. Stops after `steps` steps, or when a
-    step is expected to gain less than `tolerance`.
+    Stops after `steps` steps, or when a step is expected to gain less than `tolerance`.
     """
-    value, gradient = value_and_gradient(theta)
+    here = function(theta)
     history: list[tuple[FloatArray, FloatArray, float]] = []
     for _ in range(steps):
-        free = ~(((theta <= lower) & (gradient > 0)) | ((theta >= upper) & (gradient < 0)))
-        direction = -_apply_inverse(np.where(free, gradient, 0.0), history, curvature) * free
-        slope = float(direction @ gradient)
+        free = ~(((theta <= lower) & (here.gradient > 0)) | ((theta >= upper) & (here.gradient < 0)))
+        gradient = np.where(free, here.gradient, 0.0)
+        direction, slope = _downward(gradient, here, history)
+        if slope >= 0 and history:  # of what was cut off, too much was the way down
+            history.clear()
+            direction, slope = _downward(gradient, here, history)
         if slope > -tolerance:
             break
-        step = min(1.0, 2.0 / max(float(np.abs(direction).max()), 1e-300))  # at most a factor e^2 at once
+        step = 1.0
         for _ in range(12):
             trial = np.clip(theta + step * direction, lower, upper)
-            trial_value, trial_gradient = value_and_gradient(trial)
-            if np.isfinite(trial_value) and trial_value <= value + SUFFICIENT * step * slope:
+            there = function(trial)
+            if np.isfinite(there.value) and there.value <= here.value + SUFFICIENT * step * slope:
                 break
             step *= 0.3
         else:
             break
-        moved, turned = trial - theta, trial_gradient - gradient
+        moved, turned = trial - theta, there.gradient - here.gradient
         bend = float(moved @ turned)
         if bend > 1e-12 * float(moved @ moved):
             history = [*history, (moved, turned, bend)][-MEMORY:]
-        theta, value, gradient = trial, trial_value, trial_gradient
+        theta, here = trial, there
     return theta
 
 
+def _downward(
+    gradient: FloatArray, here: Point, history: list[tuple[FloatArray, FloatArray, float]]
+) -> tuple[FloatArray, float]:
+    """The direction of a step, in which no parameter goes too far, and how fast the function falls along it. A zero in
+    the gradient (m,) is of a parameter at its bound."""
+    wanted = -_apply_inverse(gradient, here, history) * (gradient != 0)
+    direction: FloatArray = np.clip(wanted, -FARTHEST, FARTHEST)
+    return direction, float(direction @ gradient)
+
+
 def _apply_inverse(
-    gradient: FloatArray, history: list[tuple[FloatArray, FloatArray, float]], curvature: FloatArray
+    gradient: FloatArray, here: Point, history: list[tuple[FloatArray, FloatArray, float]]
 ) -> FloatArray:
     """The two-loop recursion: approximate inverse Hessian times the gradient."""
     g = gradient.copy()
@@ -64,7 +92,23 @@ def _apply_inverse(
         a = float(moved @ g) / bend
         weights.append(a)
         g -= a * turned
-    g /= curvature
+    curvature = np.maximum(here.curvature, FLATTEST)
+    g = g / curvature if here.beside is None else solve(curvature, here.beside, g)
     for (moved, turned, bend), a in zip(history, reversed(weights), strict=True):
         g += moved * (a - float(turned @ g) / bend)
     return g
+
+
+@kernel
+def solve(diagonal: Vector, beside: Vector, right: Vector) -> Vector:
+    """(m,) solution of a symmetric tridiagonal system; diagonal (m,), beside it (m - 1,), right-hand side (m,)."""
+    n = len(right)
+    pivot, x = diagonal.copy(), right.copy()
+    for k in range(1, n):
+        share = beside[k - 1] / pivot[k - 1]
+        pivot[k] -= share * beside[k - 1]
+        x[k] -= share * x[k - 1]
+    x[n - 1] /= pivot[n - 1]
+    for k in range(n - 2, -1, -1):
+        x[k] = (x[k] - beside[k] * x[k + 1]) / pivot[k]
+    return x

@@ -14,12 +14,7 @@ from numpy.typing import NDArray
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import decimation, optimizer
-from ftproc.core.identification.likelihood import (
-    ISOTROPIC,
-    VERTICAL_PRECISION,
-    jerk_bounds,
-    shaped,
-)
+from ftproc.core.identification.likelihood import VERTICAL_PRECISION, jerk_bounds, shaped
 from ftproc.core.identification.scales import Scales, scales_of
 
 FloatArray = NDArray[np.float64]
@@ -27,7 +22,7 @@ FloatArray = NDArray[np.float64]
 KNOT_SAMPLES = 10  # samples to a knot of the jerk profile ...
 KNOT_MEMORIES = 2.0  # ... but never less than so many memories of the filter,
 MAX_KNOTS = 4000  # nor more than so many knots
-WALK_PRECISION = 1.0  # of the random walk of ln(jerk) from knot to knot ...
+WALK_PRECISION = 0.7  # of the random walk of ln(jerk) from knot to knot ...
 ABRUPT = 1.0  # ... whose steps beyond this are as rare as their size, not its square: flights turn and take off at once
 ALLOWANCE = 1.4  # on the likeliest jerk: too little makes sigmas dishonest, a little too much costs almost nothing
 LONGEST_MEMORY = 1.0  # knots: less jerk than gives the filter such a memory shows in no knot, so none has less
@@ -55,24 +50,27 @@ def fit_profile(
     def unpack(theta: FloatArray) -> Model:
         return level._replace(jerk=shaped(theta[:knots], theta[knots]), knot_s=knot_s)
 
-    def cost(theta: FloatArray) -> tuple[float, FloatArray]:
-        model = unpack(theta)
-        found = score_log(log, model, starts)
-        by_axis = found.jerk * model.jerk
-        walk, ratio = theta[1:knots] - theta[: knots - 1], theta[knots]
-        bend, slope = np.zeros(knots), walk / np.sqrt(1 + (walk / ABRUPT) ** 2)
-        bend[1:] += slope
-        bend[:-1] -= slope
-        pull = np.append(WALK_PRECISION * bend, VERTICAL_PRECISION * ratio)
-        penalty = WALK_PRECISION * _roughness(walk) + 0.5 * VERTICAL_PRECISION * ratio**2
-        score = np.append(by_axis.sum(1), by_axis[:, 5].sum())
-        return -found.log_likelihood + penalty, pull - score
+    def cost(theta: FloatArray) -> optimizer.Point:
+        found = score_log(log, unpack(theta), starts)
+        walk, ratio = np.diff(theta[:knots]), theta[knots]
+        firm = WALK_PRECISION / np.sqrt(1 + (walk / ABRUPT) ** 2)  # with which a step is drawn to zero
+        score, curvature, pull = found.jerk.score, found.jerk.curvature, VERTICAL_PRECISION * ratio
+        return optimizer.Point(
+            WALK_PRECISION * _roughness(walk) + 0.5 * pull * ratio - found.log_likelihood,
+            np.append(_by_knot(-firm * walk, firm * walk) - score.sum(1), pull - score[:, 2].sum()),
+            np.append(_by_knot(firm, firm) + curvature.sum(1), VERTICAL_PRECISION + curvature[:, 2].sum()),
+            np.append(-firm, 0.0),
+        )
 
-    ratio = math.log(level.jerk[0, 5] / level.jerk[0, 0])
+    ratio = math.log(level.jerk[0, 2] / level.jerk[0, 0])
     theta = np.append(np.broadcast_to(np.log(level.jerk[:, 0]), knots), ratio)
     low, high = (np.append(np.full(knots, bound), side) for bound, side in jerk_bounds(scales))
-    curvature = np.append(np.full(knots, 2.0), 0.7 * knots)
-    return unpack(optimizer.minimise(cost, theta, curvature, low, high, steps, tolerance=0.1 * knots**0.5))
+    return unpack(optimizer.minimise(cost, theta, low, high, steps, tolerance=0.1 * knots**0.5))
+
+
+def _by_knot(before: FloatArray, after: FloatArray) -> FloatArray:
+    """(m,) what the steps between m knots (m - 1,) add up to at each: of the step after it, and of that before it."""
+    return np.append(before, 0.0) + np.insert(after, 0, 0.0)
 
 
 def roughness(model: Model) -> float:
@@ -97,10 +95,20 @@ def median_level(model: Model) -> Model:
     return model._replace(jerk=level * model.jerk[:1] / model.jerk[0, 0], knot_s=np.inf)
 
 
+def from_knot(model: Model, time_s: FloatArray, span: slice) -> tuple[slice, Model]:
+    """A stretch of a log with these times (n,), from the knot of the jerk profile on before which it begins, and the
+    model for it."""
+    if not math.isfinite(model.knot_s):
+        return span, model
+    first = min(int((time_s[span.start] - time_s[0]) / model.knot_s), len(model.jerk) - 1)
+    start = int(np.searchsorted(time_s, time_s[0] + first * model.knot_s))
+    return slice(min(start, span.start), span.stop), model._replace(jerk=model.jerk[first:])
+
+
 def with_allowance(log: Observations, model: Model, scales: Scales | None = None) -> Model:
     """The model with a little more jerk than is likeliest, and nowhere less than shows in a knot of its profile.
     scales: of the log, if they are known."""
     scales = scales or scales_of(log, model.noise_variance)
     knot_s = min(model.knot_s, scales.span_s)
     least = scales.jerk_psd(LONGEST_MEMORY * knot_s)
-    return model._replace(jerk=np.maximum(ALLOWANCE * model.jerk, least * ISOTROPIC))
+    return model._replace(jerk=np.maximum(ALLOWANCE * model.jerk, least))

@@ -63,22 +63,23 @@ def stamp_variance(log: Observations, smoothed: SmootherRun, model: Model) -> tu
     speed2 = rates(smoothed.state) ** 2
     typical = float(np.median(model.noise_variance / np.maximum(np.mean(speed2, 0), 1e-300)))
 
-    def cost(theta: FloatArray) -> tuple[float, FloatArray]:
+    def cost(theta: FloatArray) -> optimizer.Point:
         pacing.swept(len(used))
         white, stamps = np.exp(theta[:3]), math.exp(theta[3])
         variance = predicted + white + stamps * speed2
         ratio = square / (TAILS * variance)
         each = np.where(used, 0.5 * np.log(variance) + 0.5 * (TAILS + 1) * np.log1p(ratio), 0.0)
         slope = np.where(used, 0.5 - 0.5 * (TAILS + 1) * ratio / (1 + ratio), 0.0) / variance
-        return float(each.sum()), np.r_[(slope * white).sum(0), (slope * stamps * speed2).sum()]
+        slopes = np.r_[(slope * white).sum(0), (slope * stamps * speed2).sum()]
+        return optimizer.Point(float(each.sum()), slopes, curvature)
 
     first = np.log(np.r_[model.noise_variance, typical])
     reach = np.r_[np.full(3, 12.0), 12.0]
     curvature = np.r_[used.sum(0) / 4 + 1.0, used.sum() / 8 + 1.0]
 
     def likeliest(start: FloatArray, low: FloatArray) -> tuple[float, FloatArray]:
-        found = optimizer.minimise(cost, start, curvature, low, first + reach, STEPS, 0.01)
-        return cost(found)[0], found
+        found = optimizer.minimise(cost, start, low, first + reach, STEPS, 0.01)
+        return cost(found).value, found
 
     without = first - np.r_[0.0, 0.0, 0.0, 35.0]
     plain, _ = likeliest(without, np.r_[first[:3] - 12.0, without[3]])

@@ -59,7 +59,7 @@ class LiveEditor:
     @property
     def model(self) -> Model:
         """Noise and process noise of the track; of none before it is confirmed."""
-        return Model(np.full(3, np.nan), np.empty((0, 6))) if self.window is None else self.window.allowed
+        return Model(np.full(3, np.nan), np.empty((0, 3))) if self.window is None else self.window.allowed
 
     def push(self, time_s: FloatArray, measurement: FloatArray) -> list[Published]:
         """Take the next rows, time_s (n,) never decreasing, measurement (n, 3); the rows that leave."""

@@ -6,9 +6,8 @@ Per axis and interval T (Zuo et al. 2021 eq. 1, with the continuous-time noise i
     Q   = q [[T^5/20, T^4/8, T^3/6], [T^4/8, T^3/3, T^2/2], [T^3/6, T^2/2, T]]
 
 q is the spectral density of white jerk, m^2/s^5: it means the same at any rate, and Q(T1 + T2) composes exactly
-from Q(T1) and Q(T2), so gaps and jittered times need no special case. In three dimensions q becomes a symmetric
-3 x 3 tensor (an aircraft jerks across its path, far less along it). It is held piecewise constant between knots
-`knot_s` apart; each row of `jerk` is [xx, xy, xz, yy, yz, zz].
+from Q(T1) and Q(T2), so gaps and jittered times need no special case. Each axis has a q of its own (aircraft turn
+harder than they pitch), held piecewise constant between knots `knot_s` apart.
 """
 
 from __future__ import annotations
@@ -41,12 +40,13 @@ class Adjoint(Protocol):
 
 
 def isotropic(jerk_psd: float) -> FloatArray:
-    """(1, 6) jerk tensor of the same density (m^2/s^5) along every axis, for the whole log."""
-    return np.array([[jerk_psd, 0.0, 0.0, jerk_psd, 0.0, jerk_psd]])
+    """(1, 3) jerk of the same density (m^2/s^5) along every axis, for the whole log."""
+    return np.full((1, 3), float(jerk_psd))
 
 
 class Profile(NamedTuple):
-    """The process noise of a log: jerk (m, 6) tensors, each row holding for knot_s seconds from first_s on."""
+    """The process noise of a log: jerk (m, 3) densities along x, y and z, each row holding for knot_s
+    seconds from first_s on."""
 
     jerk: Matrix
     knot_s: float
@@ -95,7 +95,6 @@ def predict(f: Moving, interval: float, jerk: FloatArray) -> None:
     noise_coefficients(t, c)
     for i in range(3):
         for j in range(i, 3):
-            q = jerk[i * (5 - i) // 2 + j]
             pa = p[i, 6 + j] + t * p[3 + i, 6 + j] + h * p[6 + i, 6 + j]
             pv = p[i, 3 + j] + t * p[3 + i, 3 + j] + h * p[6 + i, 3 + j]
             pp = p[i, j] + t * p[3 + i, j] + h * p[6 + i, j]
@@ -103,16 +102,21 @@ def predict(f: Moving, interval: float, jerk: FloatArray) -> None:
             vv = p[3 + i, 3 + j] + t * p[6 + i, 3 + j]
             vp = p[3 + i, j] + t * p[6 + i, j]
             aa, av, ap = p[6 + i, 6 + j], p[6 + i, 3 + j], p[6 + i, j]
-            p[i, j] = p[j, i] = pp + t * pv + h * pa + q * c[0, 0]
-            p[i, 3 + j] = p[3 + j, i] = pv + t * pa + q * c[0, 1]
-            p[i, 6 + j] = p[6 + j, i] = pa + q * c[0, 2]
-            p[3 + i, 3 + j] = p[3 + j, 3 + i] = vv + t * va + q * c[1, 1]
-            p[3 + i, 6 + j] = p[6 + j, 3 + i] = va + q * c[1, 2]
-            p[6 + i, 6 + j] = p[6 + j, 6 + i] = aa + q * c[2, 2]
             if i != j:
-                p[3 + i, j] = p[j, 3 + i] = vp + t * vv + h * va + q * c[1, 0]
-                p[6 + i, j] = p[j, 6 + i] = ap + t * av + h * aa + q * c[2, 0]
-                p[6 + i, 3 + j] = p[3 + j, 6 + i] = av + t * aa + q * c[2, 1]
+                p[3 + i, j] = p[j, 3 + i] = vp + t * vv + h * va
+                p[6 + i, j] = p[j, 6 + i] = ap + t * av + h * aa
+                p[6 + i, 3 + j] = p[3 + j, 6 + i] = av + t * aa
+            pp, pv, vv = pp + t * pv + h * pa, pv + t * pa, vv + t * va
+            if i == j:
+                q = jerk[i]
+                pp, pv, pa = pp + q * c[0, 0], pv + q * c[0, 1], pa + q * c[0, 2]
+                vv, va, aa = vv + q * c[1, 1], va + q * c[1, 2], aa + q * c[2, 2]
+            p[i, j] = p[j, i] = pp
+            p[i, 3 + j] = p[3 + j, i] = pv
+            p[i, 6 + j] = p[6 + j, i] = pa
+            p[3 + i, 3 + j] = p[3 + j, 3 + i] = vv
+            p[3 + i, 6 + j] = p[6 + j, 3 + i] = va
+            p[6 + i, 6 + j] = p[6 + j, 6 + i] = aa
 
 
 class Wandering(Protocol):

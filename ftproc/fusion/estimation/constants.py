@@ -19,7 +19,7 @@ from ftproc.records import FloatArray, IntArray
 
 NAMES = ("range_m", "azimuth_rad", "elevation_rad", "tilt_east_rad", "tilt_north_rad", "clock_s")
 WORDS = ("range bias", "azimuth zero", "elevation zero", "tilt about east", "tilt about north", "clock offset")
-ALLOWANCE = 1.85  # on the variance that the readings leave: manoeuvres are not white jerk, noise is not quite white
+ALLOWANCE = 1.95  # on the variance that the readings leave: manoeuvres are not white jerk, noise is not quite white
 LEAST_SEEN = 0.05  # of the prior's information: less in a direction says nothing
 OBSERVED = 0.9  # of the prior's 1-sigma: a parameter that stays above it is not observable
 FARTHEST = 6.0  # prior sigmas that a bias may be off: more of it is a wrong place, clock or target

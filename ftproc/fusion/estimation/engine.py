@@ -29,7 +29,7 @@ from ftproc.fusion.estimation.events import Events, Seen, merge, moved_to
 from ftproc.records import FloatArray
 
 FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 18, 8
-PROFILE_STEPS, LAST_STEPS = 3, 8
+PROFILE_STEPS, LAST_STEPS = 2, 4
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after the first rounds
 STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that may still change
 NOISE_STEP = 4.0  # times its variance that the noise of a component moves in a round

@@ -9,7 +9,7 @@ import numpy as np
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import optimizer
-from ftproc.core.identification.likelihood import VERTICAL_PRECISION, jerk_bounds, shaped
+from ftproc.core.identification.likelihood import jerk_bounds, of_level, shaped
 from ftproc.core.identification.profile import knot_length
 from ftproc.core.identification.scales import scales_of
 from ftproc.records import FloatArray
@@ -37,15 +37,10 @@ def level(log: Observations, starts: list[Start], model: Model) -> Model:
     scales = scales_of(log, model.noise_variance)
     lower, upper = jerk_bounds(scales)
 
-    def cost(theta: FloatArray) -> tuple[float, FloatArray]:
-        tried = model._replace(jerk=shaped(theta[:1], theta[1]))
-        found = score_log(log, tried, starts)
-        by_axis = found.jerk[0] * tried.jerk[0]
-        pull = VERTICAL_PRECISION * theta[1]
-        return -found.log_likelihood + 0.5 * pull * theta[1], -np.r_[by_axis.sum(), by_axis[5] - pull]
+    def cost(theta: FloatArray) -> optimizer.Point:
+        return of_level(score_log(log, model._replace(jerk=shaped(theta[:1], theta[1])), starts), theta[1])
 
     jerk = np.median(model.jerk, 0)
-    theta = np.clip(np.array([math.log(jerk[0]), math.log(jerk[5] / jerk[0])]), lower, upper)
-    curvature = np.array([len(log.time_s) / 20, len(log.time_s) / 60])
-    theta = optimizer.minimise(cost, theta, curvature, lower, upper, LEVEL_STEPS, tolerance=0.1)
+    theta = np.clip(np.array([math.log(jerk[0]), math.log(jerk[2] / jerk[0])]), lower, upper)
+    theta = optimizer.minimise(cost, theta, lower, upper, LEVEL_STEPS, tolerance=0.1)
     return model._replace(jerk=shaped(theta[:1], theta[1]), knot_s=math.inf)

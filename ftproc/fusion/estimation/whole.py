@@ -37,7 +37,7 @@ class Track(NamedTuple):
 class Fused(NamedTuple):
     """By station, row for row with its log: weight and possible (rows, 3), leave-one-out residual and residual_variance
     (rows, 3), position (rows, 3) of the track in m. noise (m, 3) 1-sigma, own (m, 3) the noise that each component
-    shows alone; axes (m, 3, 3) with the tilts; jerk (k, 6) each for knot_s seconds; rounds, settled: of the decisions;
+    shows alone; axes (m, 3, 3) with the tilts; jerk (k, 3) each for knot_s seconds; rounds, settled: of the decisions;
     unexamined: places where no work was left to look for other hypotheses."""
 
     stations: list[Seen]
@@ -160,7 +160,7 @@ def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, sm
 
 
 def _profile(found: list[Stretch], time_s: FloatArray) -> tuple[FloatArray, float]:
-    """The jerk (k, 6) of all stretches, and for how many seconds each of them holds."""
+    """The jerk (k, 3) of all stretches, and for how many seconds each of them holds."""
     if len(found) == 1:
         return found[0].current.model.jerk, found[0].current.model.knot_s
     span_s = float(time_s[-1] - time_s[0])

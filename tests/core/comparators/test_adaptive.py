@@ -26,7 +26,7 @@ def test_without_adaptation_it_is_the_textbook_kalman_filter():
         if k:
             t = TIME[k] - TIME[k - 1]
             phi = naive.transition(t)[::3, ::3]
-            x, p = phi @ x, phi @ p @ phi.T + naive.van_loan(t, [0.5, 0, 0, 0.5, 0, 0.5])[::3, ::3]
+            x, p = phi @ x, phi @ p @ phi.T + naive.van_loan(t, np.full(3, 0.5))[::3, ::3]
         s = (h @ p @ h.T).item() + 0.01
         assert sigma[k] == pytest.approx(np.sqrt(s), rel=1e-9)
         if np.isfinite(z[k]):

@@ -57,7 +57,7 @@ def test_turns_are_not_patches(monkeypatch):
     assert rejected.max() < 0.03
     monkeypatch.setattr(profile, "ABRUPT", 1e6)
     monkeypatch.setattr(two_pass, "with_motion", lambda record, decision: decision)
-    assert np.median(edited(flights[:2])[0]) > 50
+    assert np.median(edited(flights[:2])[0]) > 30
 
 
 def test_noise_that_grows_with_nearness_is_noise():

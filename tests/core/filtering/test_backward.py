@@ -9,7 +9,7 @@ from ftproc.core.filtering import backward
 from ftproc.core.filtering.filters import FILTER
 from ftproc.core.filtering.forward import ESTIMATED
 from ftproc.core.filtering.records import Model
-from ftproc.core.filtering.smoother import score_log, smooth_log
+from ftproc.core.filtering.smoother import Slope, score_log, smooth_log
 from ftproc.core.model import motion
 from tests import naive
 from tests.core.single import one
@@ -32,8 +32,8 @@ def test_leave_one_out_is_deletion_from_the_joint_gaussian(seed):
     residual, variance = naive.leave_one_out(steps, a.z, weight, a.model.noise_variance)
     found = smooth(a, weight=weight)
     np.testing.assert_array_equal(np.isnan(found.residual), np.isnan(a.z))
-    np.testing.assert_allclose(found.residual / np.sqrt(variance), residual / np.sqrt(variance), atol=1e-8)
-    np.testing.assert_allclose(found.residual_variance, variance, rtol=1e-8)
+    np.testing.assert_allclose(found.residual / np.sqrt(variance), residual / np.sqrt(variance), atol=5e-6)
+    np.testing.assert_allclose(found.residual_variance, variance, rtol=1e-7)
 
 
 def test_leave_one_out_is_deletion_of_the_reading():
@@ -78,7 +78,7 @@ def test_noise_score_is_the_derivative_of_the_likelihood(weighted):
     a = matched(6, 300, irregular=True, missing=0.1, pieces=2, **STRAIGHT)
     if weighted:
         a = a._replace(weight=a.weight * np.random.default_rng(0).choice([0.0, 0.2, 1.0], a.weight.shape))
-    score = smooth(a).noise_score
+    score = score_log(a.log, a.model, a.starts).noise.score
     for c in range(3):
         step = np.zeros(3)
         step[c] = 1e-3
@@ -87,36 +87,54 @@ def test_noise_score_is_the_derivative_of_the_likelihood(weighted):
 
 
 def moved(model, noise=0.0, jerk=0.0):
-    return model._replace(noise_variance=model.noise_variance * np.exp(noise), jerk=model.jerk + jerk)
+    return model._replace(noise_variance=model.noise_variance * np.exp(noise), jerk=model.jerk * np.exp(jerk))
 
 
 @pytest.mark.compiled
-def test_jerk_score_is_the_derivative_by_every_element_of_every_piece():
+def test_jerk_score_is_the_derivative_by_every_axis_of_every_piece():
     a = matched(7, 200, dt=0.5, q=5.0, irregular=True, missing=0.1, pieces=3, **STRAIGHT)
-    score = smooth(a).jerk_score
-    assert score.shape == (3, 6)
+    score = score_log(a.log, a.model, a.starts).jerk.score
+    assert score.shape == (3, 3)
     for piece in range(3):
-        for element in range(6):
-            step = np.zeros((3, 6))
-            step[piece, element] = 1e-3
-            numeric = np.diff([likelihood(a, moved(a.model, jerk=sign * step)) for sign in (-1, 1)])[0] / 2e-3
-            assert score[piece, element] == pytest.approx(numeric, rel=1e-4, abs=1e-4), (piece, element)
+        for axis in range(3):
+            step = np.zeros((3, 3))
+            step[piece, axis] = 1e-4
+            numeric = np.diff([likelihood(a, moved(a.model, jerk=sign * step)) for sign in (-1, 1)])[0] / 2e-4
+            assert score[piece, axis] == pytest.approx(numeric, rel=5e-4, abs=1e-4), (piece, axis)
 
 
-def test_scores_alone_are_the_same():
-    a = matched(8, 300, irregular=True, missing=0.1, pieces=3)
+def test_of_the_two_sums_of_a_score_the_second_is_what_the_first_is_on_average():
+    found = [score_log(a.log, a.model, a.starts) for a in (matched(seed, 200, q=5.0) for seed in range(40, 80))]
+    for name in ("noise", "jerk"):
+        sums = np.array([getattr(each, name) for each in found]).mean(0)
+        np.testing.assert_allclose(sums[0], sums[1], rtol=0.1)
+
+
+def test_curvature_of_a_single_variance_leads_to_its_summit_at_once():
+    """n errors of variance v, if w is assumed: found n v / (2 w), expected n / 2."""
+    n, v = 50, 7.0
+    for w in (1e-3, 1.0, 6.999, 7.0, 1e4):
+        slope = Slope(np.array([0.5 * n * v / w]), np.array([0.5 * n]))
+        assert slope.score[0] / slope.curvature[0] == pytest.approx(np.log(v / w), rel=1e-3, abs=1e-9)
+
+
+def test_scores_of_a_log_in_two_parts_add_up():
+    a = matched(8, 300, irregular=True, missing=0.1)
     again = a.starts[0]._replace(sample=140, state=a.truth[140])
-    for starts in (a.starts, [a.starts[0], again]):
-        found, alone = smooth(a, starts=starts), score_log(a.log, a.model, starts)
-        np.testing.assert_allclose(alone.noise, found.noise_score, rtol=1e-10)
-        np.testing.assert_allclose(alone.jerk, found.jerk_score, rtol=1e-10, atol=1e-12)
-        assert alone.log_likelihood == pytest.approx(found.log_likelihood, rel=1e-12)
+    both = score_log(a.log, a.model, [a.starts[0], again])
+    first = score_log(a.log.part(slice(140)), a.model, a.starts)
+    rest = score_log(a.log.part(slice(140, None)), a.model, [again._replace(sample=0)])
+    for name in ("noise", "jerk"):
+        np.testing.assert_allclose(getattr(both, name), np.add(getattr(first, name), getattr(rest, name)), rtol=1e-10)
+    assert both.log_likelihood == pytest.approx(smooth(a, starts=[a.starts[0], again]).log_likelihood, rel=1e-12)
 
 
 @pytest.mark.compiled
 def test_scores_vanish_on_average_at_the_truth():
     """Expectation zero, and a variance that is the information: about n / 2 for ln(variance) of each component."""
-    scores = np.array([smooth(matched(seed, 200, q=5.0)).noise_score for seed in range(40, 80)])
+    scores = np.array(
+        [score_log(a.log, a.model, a.starts).noise.score for a in (matched(seed, 200, q=5.0) for seed in range(40, 80))]
+    )
     assert np.abs(scores.mean(0)).max() < 3 * np.sqrt(100 / 40)
     assert (scores.var(0) < 200).all()
     assert (scores.var(0) > 30).all()

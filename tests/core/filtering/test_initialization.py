@@ -250,7 +250,7 @@ def test_flights_with_blind_turns_do_not_run_away():
     """5 g turns seen once a second, with patches of half a minute, which are too long to coast through. What becomes of
     one such flight may hang on the last digit of a reading; what becomes of most does not."""
     middle, far = [], []
-    for seed in range(14, 17):
+    for seed in range(14, 19):
         flight = simulate("manoeuvre", seed=seed, dt_s=1.0, duration_s=600.0, outliers="patch=3:10-30:10-50")
         known = two_pass.Known(np.full(3, np.nan), None, 4.0)
         edited = two_pass.edit(flight.log.time_s, flight.log.measurement, known)

@@ -7,8 +7,9 @@ import pytest
 
 from ftproc.core.filtering.records import Observations
 from ftproc.core.filtering.smoother import score_log
-from ftproc.core.identification import decimation, likelihood
+from ftproc.core.identification import decimation
 from ftproc.core.identification.scales import Scales
+from ftproc.core.model.motion import isotropic
 from tests.core.tracks import matched
 
 
@@ -69,7 +70,7 @@ def test_score_of_the_jerk_is_that_of_single_readings():
 
     def slope(log, starts, factor):
         model = a.model._replace(jerk=factor * a.model.jerk)
-        return (score_log(log, model, starts).jerk * model.jerk).sum()
+        return score_log(log, model, starts).jerk.score.sum()
 
     log, starts = decimation.merge(a.log, a.starts, 2)
     for factor in (0.3, 3.0):
@@ -81,8 +82,8 @@ def test_score_of_the_jerk_is_that_of_single_readings():
 @pytest.mark.parametrize(("interval", "expected"), [(1.0, 1), (0.05, 1), (0.005, 13)])
 def test_only_dense_logs_are_merged(interval, expected):
     a = matched(1, 100)
-    model = a.model._replace(noise_variance=np.array([1.0, 1e-8, 1e-8]), jerk=likelihood.ISOTROPIC * 10.0)
-    scales = Scales(interval, 100 * interval, 10_000.0, np.ones(3))
+    model = a.model._replace(noise_variance=np.array([1.0, 1e-8, 1e-8]), jerk=isotropic(10.0))
+    scales = Scales(interval, 10_000 * interval, 10_000.0, np.ones(3))
     many = decimation.how_many(scales, model, 4.0)
     assert many == pytest.approx(expected, abs=3)
     assert many >= 1
@@ -95,8 +96,10 @@ def test_no_more_is_merged_than_memory_and_knots_bear(knot_s):
     model = matched(1, 10, q=1e-3).model
     memory_s = scales.memory_s(1e-3)
     count = decimation.how_many(scales, model, knot_s)
-    bound = decimation.SHARE * min(memory_s, knot_s / 10) / scales.interval_s
+    bound = min(decimation.SHARE * memory_s, knot_s / decimation.PER_KNOT) / scales.interval_s
     assert count == int(np.clip(bound + decimation.ROUNDING, 1, decimation.MOST))
+    short = scales._replace(span_s=2.5 * decimation.FEWEST * scales.interval_s)
+    assert decimation.how_many(short, model, knot_s) == min(count, 2)
     assert decimation.how_many(scales, model._replace(wander_variance=np.ones(3)), knot_s) == 1
 
 

@@ -34,8 +34,8 @@ def test_noise_within_a_tenth_and_jerk_within_a_factor_from_any_guess(seed, nois
     found = level(a, noise, jerk)
     found = likelihood.fit_level(a.log, a.starts, found, FREE)  # goes on, as editing does
     np.testing.assert_allclose(np.sqrt(found.noise_variance), SIGMA, rtol=0.1)
-    assert found.jerk.shape == (1, 6)
-    assert 5 < np.mean(found.jerk[0, [0, 3, 5]]) < 150
+    assert found.jerk.shape == (1, 3)
+    assert 5 < np.mean(found.jerk) < 150
 
 
 def test_fixed_values_stay():
@@ -110,4 +110,4 @@ def test_tiny_logs_have_a_model(n):
         assert np.isfinite(model.noise_variance).all()
         assert (model.noise_variance > 0).all()
         assert np.isfinite(model.jerk).all()
-        assert (model.jerk[:, [0, 3, 5]] > 0).all()
+        assert (model.jerk > 0).all()

@@ -20,7 +20,7 @@ def residuals(noise):
     residual = noise[:, None] * scale
     nothing = np.zeros((n, 9))
     run = SmootherRun(nothing, nothing, nothing[:, :6], residual, np.tile(scale**2 * noise.var(), (n, 1)),
-                      np.zeros(n), 0.0, np.zeros(3), np.zeros((1, 6)), ())  # fmt: skip
+                      np.zeros(n), 0.0, ())  # fmt: skip
     return Observations(np.arange(float(n)), residual, np.ones((n, 3))), run, scale
 
 

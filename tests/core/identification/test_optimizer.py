@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core.identification.optimizer import minimise
+from ftproc.core.identification.optimizer import FARTHEST, Point, minimise
+from ftproc.core.identification.optimizer import solve as tridiagonal
 
 FREE = 1e9
 
 
-def solve(function, theta, curvature=None, lower=-FREE, upper=FREE, steps=200, tolerance=1e-14):
+def solve(function, theta, curvature=None, lower=-FREE, upper=FREE, steps=200, tolerance=1e-14, beside=None):
     theta = np.array(theta, float)
     bounds = np.broadcast_to(lower, theta.shape).astype(float), np.broadcast_to(upper, theta.shape).astype(float)
-    return minimise(
-        function, theta, np.ones_like(theta) if curvature is None else curvature, *bounds, steps, tolerance
-    )  # fmt: skip
+    curvature = np.ones_like(theta) if curvature is None else curvature
+    return minimise(lambda x: Point(*function(x), curvature, beside), theta, *bounds, steps, tolerance)
 
 
 def quadratic(scale, target):
@@ -42,6 +42,42 @@ def test_quadratic_with_its_own_curvature_takes_few_steps():
     np.testing.assert_allclose(
         solve(quadratic(scale, target), np.zeros(3), curvature=scale, steps=2), target, atol=1e-12
     )  # fmt: skip
+
+
+def test_quadratic_whose_neighbours_are_coupled_takes_few_steps():
+    rng = np.random.default_rng(1)
+    beside = -rng.uniform(0.1, 1.0, 49)
+    diagonal = rng.uniform(0.5, 2.0, 50) - np.append(beside, 0) - np.insert(beside, 0, 0)
+    hessian, target = np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1), rng.normal(0, 0.3, 50)
+
+    def cost(x):
+        return float(0.5 * (x - target) @ hessian @ (x - target)), hessian @ (x - target)
+
+    found = solve(cost, np.zeros(50), curvature=diagonal, beside=beside, steps=1)
+    np.testing.assert_allclose(found, target, atol=1e-12)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 100])
+def test_tridiagonal_system(n):
+    rng = np.random.default_rng(n)
+    diagonal, beside, right = rng.uniform(2.1, 4.0, n), rng.uniform(-1, 1, n - 1), rng.normal(0, 1, n)
+    matrix = np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1)
+    given = diagonal.copy(), beside.copy(), right.copy()
+    np.testing.assert_allclose(tridiagonal(*given), np.linalg.solve(matrix, right), rtol=1e-10, atol=1e-14)
+    for left, before in zip(given, (diagonal, beside, right), strict=True):
+        np.testing.assert_array_equal(left, before)
+
+
+def test_no_parameter_goes_too_far_at_once():
+    tried = []
+
+    def cost(x):
+        tried.append(x.copy())
+        return quadratic(np.ones(3), np.array([0.5, 100.0, -100.0]))(x)
+
+    found = solve(cost, np.zeros(3), steps=1)
+    np.testing.assert_allclose(found, [0.5, FARTHEST, -FARTHEST])
+    assert len(tried) == 2
 
 
 @pytest.mark.parametrize("begin", [(-1.2, 1.0), (0.0, 0.0), (2.0, -1.0)])
