@@ -232,15 +232,14 @@ def _suspects(record: Record, decision: Decision, calm: Model, profile: Model) -
 
 def _near(record: Record, weight: FloatArray, model: Model, marked: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
     """Leave-one-out residuals (n, 3) and their variances of what is marked (n,), with these weights (n, 3) and a jerk
-    profile. NaN far from it: nothing is smoothed there."""
+    profile. NaN far from it, where nothing is smoothed, unless a component is not seen near it: then all of it is."""
     residual, variance = np.full(weight.shape, np.nan), np.full(weight.shape, np.nan)
     for begin, end in runs_of(_widened(marked)):
         span, own = from_knot(model, record.time_s, slice(int(begin), int(end)))
-        part = record.part(span)
         try:
-            starts = _starts(part, weight[span], median_level(own))
+            starts = _starts(record.part(span), weight[span], median_level(own))
         except ValueError:  # a component has too few readings there
-            continue
-        smoothed = smooth_log(part.weighted(weight[span]), own, starts, residuals_only=True)
+            span, own, starts = slice(None), model, _starts(record, weight, median_level(model))
+        smoothed = smooth_log(record.part(span).weighted(weight[span]), own, starts, residuals_only=True)
         residual[span], variance[span] = smoothed.residual, smoothed.residual_variance
     return residual, variance

@@ -19,7 +19,7 @@ from ftproc.core.signatures import Vector
 FloatArray = NDArray[np.float64]
 
 TRIALS = 32  # triples per window: one is clean with probability 0.9996 when 40 % of the samples are bad
-FIRST_TRIALS = 16  # are enough where all of the window lies near the best parabola
+FIRST_TRIALS = 20  # are enough where all of the window lies near the best parabola
 CUT = 4.5  # sigmas from the parabola
 JUMP_VOTES = 0.2  # share of short windows that must find a reading off, at a jump
 APART = 64  # numbers between scratch arrays: where they might overlap, compiled loops round otherwise

@@ -199,7 +199,8 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
         most = _likelihood(bridge, weight) - stretch.margin
         if not most > least:
             return None
-        large = _size(stretch, bridge, step) >= SURE and not _may_be_a_halt(stretch, bridge, step)
+        large = min(_size(stretch, bridge, step), abs(step.size) / step.sigma) >= SURE
+        large = large and not _may_be_a_halt(stretch, bridge, step)
         return step._replace(
             sure=large and all(_likelihood(stretch, patch) < most for patch in _patches(stretch, step))
         )

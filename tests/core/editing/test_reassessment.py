@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.editing import reassessment, two_pass
+from ftproc.core.filtering.smoother import smooth_log
 from tests.core.editing.test_two_pass import UNKNOWN, edit, flags
 from tests.simulated import simulate
 
@@ -110,3 +111,15 @@ def test_what_is_suspicious_in_one_component_is_decided_again(decided, monkeypat
     monkeypatch.setattr(reassessment, "_suspects", lambda part, *_: suspect[: len(part.time_s)])
     reassessment.reassess(record, decision)
     assert [part.time_s[0] <= record.time_s[150] <= part.time_s[-1] for part in settled] == [True]
+
+
+def test_where_a_component_is_missing_around_what_is_marked_all_of_the_log_is_smoothed(decided):
+    """The stretch around it alone says nothing of that component."""
+    record, decision = decided
+    weight, marked = decision.weight.copy(), np.zeros(len(decision.weight), bool)
+    weight[150:650, 1], marked[395:405] = 0.0, True
+    residual, variance = reassessment._near(record, weight, decision.model, marked)
+    starts = reassessment._starts(record, weight, decision.model)
+    whole = smooth_log(record.weighted(weight), decision.model, starts)
+    np.testing.assert_array_equal(residual, whole.residual)
+    np.testing.assert_array_equal(variance, whole.residual_variance)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -140,6 +142,22 @@ def test_a_clock_that_jumps(late):
     found = edit(a._replace(time=time), z).faults.steps
     assert (found[0].component, found[0].sample) == (CLOCK, pytest.approx(k, abs=1))
     assert found[0].size == pytest.approx(late, abs=5 * found[0].sigma + 0.05)
+
+
+@pytest.mark.parametrize(("speed_mps", "may_be"), [(2.0, True), (7.0, True), (8.0, False), (200.0, False)])
+@pytest.mark.parametrize(("component", "size"), [(CLOCK, 1.0), (CLOCK, -1.0), (0, 1.0)])
+def test_a_clock_that_jumps_by_a_second_may_be_a_halt_of_what_is_slow(speed_mps, may_be, component, size):
+    """Standing still for a second and catching up asks for four times the way by the second squared."""
+    along = speed_mps * (0.1 * np.arange(100))
+    seen, bridge = (
+        SimpleNamespace(
+            record=SimpleNamespace(measurement=from_cartesian(np.stack([300 + way, 400 - 0 * way, 50 + 0 * way], 1))),
+            decided=np.ones((100, 3)),
+        )
+        for way in (along, along - speed_mps * size)
+    )
+    seen.record.measurement[70] = np.nan
+    assert steps._may_be_a_halt(seen, bridge, Step(component, 60, size, 0.1)) == (may_be and component == CLOCK)
 
 
 @pytest.mark.parametrize("seed", range(6))
