@@ -13,6 +13,7 @@ from ftproc.core.comparators.channels import Predictor
 from ftproc.core.filtering.records import FilterRun, Model
 from ftproc.core.model.frames import from_cartesian, line_of_sight_axes, to_cartesian, wrap
 from ftproc.errors import UsageError
+from ftproc.medians import median
 from ftproc.methods.estimate import Estimate, Readings
 from ftproc.methods.parameters import Parameter, of_component
 from ftproc.methods.preparing import labels, trusted
@@ -85,7 +86,7 @@ def look(readings: Readings, settings: FilterSettings, blindly: bool = False) ->
     time_s, measurement, _ = readings
     weight, sigma, start = trusted(readings, settings)
     steps = np.diff(time_s)
-    interval = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    interval = median(steps[steps > 0]) if (steps > 0).any() else 1.0
     believed = np.where(weight > 0, measurement, np.nan)
     if blindly or start is None:
         return Log(time_s, measurement, 0, interval, sigma, believed)

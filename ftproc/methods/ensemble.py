@@ -10,6 +10,7 @@ import numpy as np
 from ftproc.core.comparators import ensemble_run, particles
 from ftproc.core.filtering.records import FilterRun
 from ftproc.errors import FtprocWarning
+from ftproc.medians import median
 from ftproc.methods import preparing
 from ftproc.methods.estimate import Estimate, Readings
 from ftproc.methods.parameters import Parameter
@@ -45,7 +46,7 @@ def estimate(readings: Readings, settings: FilterSettings, method: str) -> Estim
     model, starts = preparing.prepare(readings, settings)
     longest = settings.max_patch_s
     if longest is None:
-        interval = float(np.median(np.diff(readings.time_s))) if len(readings.time_s) > 1 else 0.0
+        interval = median(np.diff(readings.time_s)) if len(readings.time_s) > 1 else 0.0
         longest = LONGEST_PATCH_SAMPLES * interval
     tuned = {name: int(value) if name == "moves" else value for name, value in settings.parameters}
     how = ensemble_run.Settings(method, settings.particles, longest, np.random.default_rng(settings.seed), tuned)

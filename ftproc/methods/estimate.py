@@ -12,6 +12,7 @@ from ftproc.core.editing.two_pass import Faults
 from ftproc.core.filtering.records import FilterRun, Model, Observations
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification.coloured_noise import Coloured
+from ftproc.medians import median
 from ftproc.records import FlagArray, FloatArray, forget, thinned
 
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: stands in for a component that is missing throughout
@@ -140,4 +141,4 @@ def typical_interval(time_s: FloatArray) -> float:
     """The median time between neighbours, s; of a very long log (n,) only every so many are looked at."""
     if len(time_s) < 2:
         return 0.0
-    return float(np.median(thinned(time_s[1:], MOST_INTERVALS) - thinned(time_s[:-1], MOST_INTERVALS)))
+    return median(thinned(time_s[1:], MOST_INTERVALS) - thinned(time_s[:-1], MOST_INTERVALS))

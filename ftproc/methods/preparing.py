@@ -65,7 +65,7 @@ def trusted(readings: Readings, settings: FilterSettings) -> Trusted:
     weights are those of the screening, and serve to find noise and jerk.
     """
     time_s, measurement, _ = readings
-    weight, _, sigma, _ = two_pass.screen(time_s, measurement)
+    weight, _, sigma, _ = two_pass.screen(time_s, measurement, two_pass.rounding_sigma(measurement))
     known = what_is_known(readings, settings)
     start = None
     with contextlib.suppress(ValueError):  # too few readings in the head: the screening has to do

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ftproc.medians import median
 from ftproc.records import FloatArray
 
 NORMAL_99 = 2.576  # two-sided 99 % point
@@ -43,7 +44,7 @@ def nis_bounds(freedom: FloatArray) -> tuple[FloatArray, FloatArray]:
 def predicted_sigma_ratio(innovation_sigma: FloatArray, noise_sigma: float) -> float | None:
     """Median innovation sigma (m,) over the noise sigma: a gate of C sigmas passes outliers of C times so many noise
     sigmas."""
-    typical = float(np.median(innovation_sigma)) if len(innovation_sigma) else np.nan
+    typical = median(innovation_sigma) if len(innovation_sigma) else np.nan
     return typical / noise_sigma if np.isfinite(typical) and 0 < noise_sigma < np.inf else None
 
 
@@ -53,7 +54,7 @@ def poorly_observable(time_s: FloatArray, sigma_m: FloatArray) -> list[dict[str,
     time_s (n,), sigma_m (n, 3) of x, y, z; the longest MOST_INTERVALS of them, in time order.
     """
     size = np.sqrt((sigma_m**2).sum(1))
-    large = np.r_[False, size > POORLY_OBSERVABLE * np.median(size), False]
+    large = np.r_[False, size > POORLY_OBSERVABLE * median(size), False]
     edges = np.flatnonzero(large[1:] != large[:-1]).reshape(-1, 2)
     found = [
         {"from_s": float(time_s[a]), "to_s": float(time_s[b - 1]), "sigma_m": float(size[a:b].max())} for a, b in edges

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ftproc.errors import InputError, UsageError, row_named
+from ftproc.medians import median
 from ftproc.methods.estimate import Recording
 from ftproc.records import COMPONENTS, FloatArray, IntArray, MeasurementLog, chunks, forget, thinned
 from ftproc.settings import EDITING, FilterSettings
@@ -91,7 +92,7 @@ def _check_times(log: MeasurementLog) -> None:
 def _check_ranges(name: str, ranges: FloatArray) -> None:
     known = ranges[np.isfinite(ranges)]
     within = np.clip(known, -2 * FARTHEST_M, 2 * FARTHEST_M)  # the mean of two huge ones would overflow
-    typical = float(np.median(within)) if known.size else 1.0
+    typical = median(within) if known.size else 1.0
     if 0 < typical <= FARTHEST_M:
         return
     what = "zero" if typical == 0 else "negative" if typical < 0 else f"beyond {FARTHEST_M:g} m"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.medians import median
 from ftproc.methods.estimate import typical_interval
 from ftproc.quality import consistency, verdict
 from ftproc.quality.faults import FaultStatistics, clock_set_back
@@ -137,7 +138,7 @@ class RunStatistics:
                 **self.components[c].consistency(noise),
             }
         psd = np.concatenate(self.jerk)
-        jerk = {"lowest": float(psd.min()), "median": float(np.median(psd)), "highest": float(psd.max())}
+        jerk = {"lowest": float(psd.min()), "median": median(psd), "highest": float(psd.max())}
         time_s, sigma_m = np.concatenate(self.times), np.concatenate(self.sigmas)
         figures = {
             "rows": len(log),

@@ -21,6 +21,7 @@ from ftproc.core.editing.runs import runs_of
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
+from ftproc.medians import typical
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -137,10 +138,9 @@ def islands(time_s: FloatArray, weight: FloatArray, possible: NDArray[np.bool_])
         seen = np.flatnonzero(possible[:, c])
         if len(seen) < 2:
             continue
-        bad = runs_of(weight[seen, c] <= 0)
-        bad = bad[bad[:, 1] - bad[:, 0] >= SHORTEST_RUN]
+        bad = runs_of(weight[seen, c] <= 0, SHORTEST_RUN)
         interval = np.diff(time_s[seen])
-        gaps = np.flatnonzero(interval > GAP_INTERVALS * np.median(interval)) + 1
+        gaps = np.flatnonzero(interval > GAP_INTERVALS * typical(interval)) + 1
         walls = np.r_[0, gaps, len(seen)]
         banks = sorted({*map(tuple, bad.tolist()), *((w, w) for w in walls.tolist() if not _inside(w, bad))})
         for (low, begin), (end, high) in itertools.pairwise(banks):

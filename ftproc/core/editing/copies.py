@@ -15,13 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing.runs import runs_of
-from ftproc.core.editing.screening import MOSTLY_ON_GRID, ON_GRID, rounding_step, stuck
+from ftproc.core.editing.screening import stuck
 from ftproc.core.model.frames import unwrap, wrap
+from ftproc.medians import typical
 
 FloatArray = NDArray[np.float64]
 KindArray = NDArray[np.uint8]
 
 MEASURED, HELD, INTERPOLATED, COMPUTED = 0, 1, 2, 3
+ON_GRID, MOSTLY_ON_GRID = 0.05, 0.95  # of a rounding step that a value may be off a multiple, and share that is not
 FEWEST = 20  # readings that must be left
 MANY = 6.0  # steps of rounding by which a reading changes typically, or else it is coarse
 NEAR = 4.0  # steps within which changes are counted, to know how many are none by chance
@@ -65,6 +67,28 @@ def without_copies(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatAr
     return z, kind
 
 
+def rounding_step(channel: FloatArray) -> float:
+    """The step to which the readings (n,) of a component are rounded, NaN where missing; zero if to none that shows.
+
+    The largest of a few differences between neighbouring values of which nearly all values are whole multiples.
+    """
+    readings = channel[np.isfinite(channel)]
+    values = np.unique(readings)
+    if len(values) < 2:
+        return 0.0
+    steps = np.diff(values)
+    steps = np.sort(steps[steps > 1e-12 * np.abs(values).max()])
+    if not len(steps):
+        return 0.0
+    middle = float(np.sort(readings)[len(readings) // 2])
+    for share in (0.5, 0.2, 0.05, 0.0):
+        step = float(steps[int(share * (len(steps) - 1))])
+        multiple = (readings - middle) / step
+        if np.mean(np.abs(multiple - np.round(multiple)) < ON_GRID) >= MOSTLY_ON_GRID:
+            return step
+    return 0.0
+
+
 def _step(values: FloatArray) -> float:
     """The step to which readings (m,) are rounded; zero if to none that shows. In a short log no two of them need lie a
     single step apart, so it is the greatest common divisor of small differences."""
@@ -86,7 +110,7 @@ def _step(values: FloatArray) -> float:
 def _scatter(values: FloatArray) -> float:
     """1-sigma of the noise of readings (m,), copies left out, by their second differences; NaN if there is none."""
     fresh = values[np.r_[True, np.diff(values) != 0]] if len(values) else values
-    sigma = float(np.median(np.abs(np.diff(fresh, 2)))) / (0.6745 * np.sqrt(6)) if len(fresh) > 2 else 0.0
+    sigma = typical(np.abs(np.diff(fresh, 2))) / (0.6745 * np.sqrt(6)) if len(fresh) > 2 else 0.0
     return sigma or np.nan
 
 
@@ -95,7 +119,7 @@ def _held(values: FloatArray, step: float) -> NDArray[np.bool_]:
     none = np.zeros(len(values), bool)
     change = np.abs(np.diff(values))
     moved = change[change > 0]
-    if len(moved) < FEWEST or np.median(moved) < MANY * step:
+    if len(moved) < FEWEST or typical(moved) < MANY * step:
         return none
     begins = np.flatnonzero(np.r_[True, change > 0])
     length = np.diff(np.r_[begins, len(values)])
@@ -126,9 +150,9 @@ def _on_lines(
     limit = 1.01 * step + ROUNDING * float(np.abs(values).max())
     flat = off <= limit
     others = off[~flat]
-    if len(others) < FEWEST or np.median(others) < MANY * limit or flat.sum() < LEAST_ON_LINES * len(values):
+    if len(others) < FEWEST or typical(others) < MANY * limit or flat.sum() < LEAST_ON_LINES * len(values):
         return on, values
-    if np.quantile(others, 0.05) > NEARLY * np.median(others):
+    if np.quantile(others, 0.05) > NEARLY * typical(others):
         return on, values
     if not _are_many(int(flat.sum()), others, limit, len(values)):
         return on, values
@@ -154,16 +178,16 @@ def _without_noise(time_s: FloatArray, values: FloatArray, step: float) -> tuple
     found, moving = np.zeros(len(values), bool), np.zeros(len(values), bool)
     if len(values) < FEWEST + IN_A_ROW or not (np.diff(time_s) > 0).all():
         return found, moving
-    t, z = (np.lib.stride_tricks.sliding_window_view(each, 4) for each in (time_s, values))
-    apart = t[:, :, None] - t[:, None, :] + np.eye(4)
-    share = 1 / apart.prod(2)
-    third = (share * (z - z[:, :1])).sum(1) / np.sqrt((share**2).sum(1))
+    a, b, c = (np.diff(time_s)[k : len(time_s) - 3 + k] for k in range(3))
+    share = 1 / np.stack([a * (a + b) * (a + b + c), a * b * (b + c), (a + b) * b * c, (a + b + c) * (b + c) * c])
+    first = np.diff(values) / np.diff(time_s)
+    second = np.diff(first) / (time_s[2:] - time_s[:-2])
+    third = np.diff(second) / (time_s[3:] - time_s[:-3]) / np.sqrt((share**2).sum(0))
     off = np.abs(third)
     noise = float(np.quantile(off, CALM)) / OF_NORMAL
     third, limit = np.clip(third, -BEYOND * noise, BEYOND * noise), max(QUIET * noise, step)
-    if limit < TELLS * noise and third[1:] @ third[:-1] < ALTERNATE * (third @ third):
-        for begin, end in runs_of(off <= limit):
-            if end - begin >= IN_A_ROW:
-                found[begin : end + 3] = True
-                moving[begin : end + 3] = np.ptp(values[begin : end + 3]) > MOVED * noise
+    if limit < TELLS * noise and (third[1:] * third[:-1]).sum() < ALTERNATE * (third**2).sum():
+        for begin, end in runs_of(off <= limit, IN_A_ROW):
+            found[begin : end + 3] = True
+            moving[begin : end + 3] = np.ptp(values[begin : end + 3]) > MOVED * noise
     return found, moving

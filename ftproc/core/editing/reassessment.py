@@ -21,6 +21,7 @@ from ftproc.core.filtering.records import Model, Start
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification.profile import fit_profile, from_knot, median_level, roughness
 from ftproc.core.identification.scales import scales_of
+from ftproc.medians import median
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -36,7 +37,7 @@ FEW_MORE = 0.01  # of the readings: those that another hypothesis may reject bey
 OTHER_LEVEL = 2.5  # times the jerk level at which an alternative was tried, before it is tried again
 PROFILE_STEPS, COMPARED_STEPS = 2, 5  # of the search for the jerk profile; where two are compared
 STANDS_OUT = 64.0  # times the median of the jerk profile
-AROUND = 200  # samples on each side of what stands out that are decided with it
+AROUND, MEMORIES = (60, 200), 8.0  # samples on each side of what stands out that are decided with it, and memories
 LONGEST_SPAN = 3000  # samples that are decided together
 SHORT_LOG, MOST = 8000, 0.5  # samples, and share that stands out: then all of it is decided again, and noise as well
 
@@ -48,7 +49,7 @@ def reassess(record: Record, decision: Decision) -> Decision:
     marked = _suspects(record, decision, calm, profile).any(1) | _stands_out(record.time_s, profile)
     for island in alternatives.islands(record.time_s, decision.weight, record.possible):
         marked[island.first : island.last] = True
-    widened = _widened(marked)
+    widened = _widened(marked, _around(record, decision.weight, calm))
     if len(widened) <= SHORT_LOG and widened.mean() > MOST:
         return _until_settled(record, decision, profile)
     weight, unexamined = decision.weight.copy(), 0
@@ -142,18 +143,19 @@ def _may_be_motion(record: Record, decision: Decision) -> Iterator[tuple[int, In
     runs, marked = list[tuple[int, IntArray]](), np.zeros(len(record.time_s), bool)
     for c in range(3):
         seen = np.flatnonzero(record.possible[:, c])
-        rejected = (seen[begin:end] for begin, end in runs_of(decision.weight[seen, c] <= 0))
-        runs += [(c, inside) for inside in rejected if len(inside) >= SHORTEST]
+        rejected = runs_of(decision.weight[seen, c] <= 0, SHORTEST)
+        runs += [(c, seen[begin:end]) for begin, end in rejected]
     for _, inside in runs:
         marked[inside] = True
-    residual, variance = _near(record, decision.weight, decision.model, marked)
+    around = _around(record, decision.weight, median_level(decision.model))
+    residual, variance = _near(record, decision.weight, decision.model, marked, around)
     for c, inside in runs:
         away = residual[inside, c] / np.sqrt(variance[inside, c])
         joined = max(np.sort(np.abs(edge))[1] for edge in (away[:ENDS], away[-ENDS:])) < JOINED
         near = np.abs(away) < FAR
         above = away[near] > 0
         if joined and (above[1:] == above[:-1]).sum() >= SAME_SIDE * (len(above) - 1):
-            yield c, inside[near], slice(max(inside[0] - AROUND, 0), inside[-1] + 1 + AROUND)
+            yield c, inside[near], slice(max(inside[0] - around, 0), inside[-1] + 1 + around)
 
 
 def likelier(one: tuple[Record, Decision], other: tuple[Record, Decision]) -> tuple[Record, Decision]:
@@ -190,16 +192,22 @@ def _stands_out(time_s: FloatArray, profile: Model) -> NDArray[np.bool_]:
     piece = np.zeros(len(time_s), int)
     if np.isfinite(profile.knot_s):
         piece = np.clip(((time_s - time_s[0]) / profile.knot_s).astype(int), 0, len(jerk) - 1)
-    found: NDArray[np.bool_] = (jerk >= STANDS_OUT * np.median(jerk))[piece]
+    found: NDArray[np.bool_] = (jerk >= STANDS_OUT * median(jerk))[piece]
     return found
 
 
-def _widened(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(n,) true within AROUND samples of what is marked."""
+def _around(record: Record, weight: FloatArray, calm: Model) -> int:
+    """Samples on each side that are enough to decide on what lies between."""
+    scales = scales_of(record.weighted(weight), calm.noise_variance)
+    return int(np.clip(MEMORIES * scales.memory_s(float(calm.jerk[0, 0])) / scales.interval_s, *AROUND))
+
+
+def _widened(marked: NDArray[np.bool_], around: int) -> NDArray[np.bool_]:
+    """(n,) true within so many samples of what is marked."""
     edges = np.zeros(len(marked) + 1, int)
     for begin, end in runs_of(marked):
-        edges[max(begin - AROUND, 0)] += 1
-        edges[min(end + AROUND, len(marked))] -= 1
+        edges[max(begin - around, 0)] += 1
+        edges[min(end + around, len(marked))] -= 1
     return np.cumsum(edges)[:-1] > 0
 
 
@@ -225,16 +233,19 @@ def _suspects(record: Record, decision: Decision, calm: Model, profile: Model) -
     memory_s = scales_of(log, calm.noise_variance).memory_s(float(calm.jerk[0, 0]))
     suspects = suspicious(record.time_s, smoothed.residual, smoothed.residual_variance, weight, memory_s)
     if suspects.any():
-        without = _near(record, np.where(suspects, 0.0, weight), profile, np.asarray(suspects.any(1)))
+        around = _around(record, weight, calm)
+        without = _near(record, np.where(suspects, 0.0, weight), profile, np.asarray(suspects.any(1)), around)
         suspects = confirmed(suspects, *without)
     return suspects
 
 
-def _near(record: Record, weight: FloatArray, model: Model, marked: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
+def _near(
+    record: Record, weight: FloatArray, model: Model, marked: NDArray[np.bool_], around: int
+) -> tuple[FloatArray, FloatArray]:
     """Leave-one-out residuals (n, 3) and their variances of what is marked (n,), with these weights (n, 3) and a jerk
     profile. NaN far from it, where nothing is smoothed, unless a component is not seen near it: then all of it is."""
     residual, variance = np.full(weight.shape, np.nan), np.full(weight.shape, np.nan)
-    for begin, end in runs_of(_widened(marked)):
+    for begin, end in runs_of(_widened(marked, around)):
         span, own = from_knot(model, record.time_s, slice(int(begin), int(end)))
         try:
             starts = _starts(record.part(span), weight[span], median_level(own))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ftproc.core.compiled import kernel
 from ftproc.core.editing.screening import median
 from ftproc.core.signatures import Flags, Vector
+from ftproc.medians import typical
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -21,15 +22,18 @@ IntArray = NDArray[np.int64]
 SHORTEST, LONGEST, MEMORIES = 2, 48, 4.0  # readings in a run, and memories of the filter: what lasts longer may be a
 # manoeuvre
 SURE = 5.0  # robust sigmas of the sum that make a run suspicious
-SCALE_SAMPLES = 2000  # sums of each length from which their scale is taken
+SCALE_SAMPLES = 1000  # sums of a length from which their scale is taken
+NEXT_LENGTH = 1.3  # times a length, of those whose scales are taken; what lies between is interpolated
 FEWEST = 100  # readings, for the scale to mean anything
 EDGE, SHARP = 3, 1.5  # readings at each end of a run that must be off by so many sigmas in the mean
 
 
-def runs_of(flag: NDArray[np.bool_]) -> IntArray:
-    """(m, 2) begin and end of each run of true in (n,)."""
-    edges: IntArray = np.flatnonzero(np.diff(np.r_[0, flag.astype(np.int8), 0])).reshape(-1, 2)
-    return edges
+def runs_of(flag: NDArray[np.bool_], shortest: int = 1) -> IntArray:
+    """(m, 2) begin and end of each run of true in (n,) that is not shorter."""
+    framed = np.zeros(len(flag) + 2, bool)
+    framed[1:-1] = flag
+    edges: IntArray = np.flatnonzero(framed[1:] != framed[:-1]).reshape(-1, 2)
+    return edges[edges[:, 1] - edges[:, 0] >= shortest]
 
 
 def suspicious(
@@ -45,7 +49,7 @@ def suspicious(
         used = np.flatnonzero((weight[:, c] > 0) & np.isfinite(residual[:, c]))
         if len(used) < FEWEST:
             continue
-        interval = float(np.median(np.diff(time_s[used])))
+        interval = typical(np.diff(time_s[used]))
         longest = LONGEST if interval <= 0 else int(np.clip(MEMORIES * memory_s / interval, SHORTEST, LONGEST))
         total = np.r_[0.0, np.cumsum(residual[used, c] / variance[used, c])]
         found[used, c] = _scan(total, _scales(total, longest))
@@ -58,13 +62,19 @@ def _scales(total: Vector, longest: int) -> Vector:
     m = len(total) - 1
     every = max(m // SCALE_SAMPLES, 1)
     scale, sums = np.full(longest + 1, np.inf), np.empty(m)
-    for length in range(SHORTEST, longest + 1):
+    length = before = SHORTEST
+    while True:
         n = 0
         for begin in range(0, m + 1 - length, every):
             sums[n] = abs(total[begin + length] - total[begin])
             n += 1
         scale[length] = max(1.4826 * median(sums, n), 1e-300)
-    return scale
+        for between in range(before + 1, length):
+            share = (between - before) / (length - before)
+            scale[between] = (1 - share) * scale[before] + share * scale[length]
+        if length == longest:
+            return scale
+        before, length = length, min(max(int(NEXT_LENGTH * length), length + 1), longest)
 
 
 @kernel
@@ -98,7 +108,8 @@ def confirmed(suspects: NDArray[np.bool_], residual: FloatArray, variance: Float
         for begin, end in runs_of(suspects[:, c]):
             inside = np.flatnonzero(np.isfinite(residual[begin:end, c])) + begin
             first, last = (
-                residual[near, c].mean() / np.sqrt(variance[near, c].mean()) for near in (inside[:EDGE], inside[-EDGE:])
+                residual[near, c].sum() / np.sqrt(len(near) * variance[near, c].sum())
+                for near in (inside[:EDGE], inside[-EDGE:])
             )
             kept[begin:end, c] = min(abs(first), abs(last)) > SHARP and first * last > 0
     return kept & suspects

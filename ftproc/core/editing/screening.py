@@ -3,6 +3,9 @@
 Least median of squares (Rousseeuw 1984) in overlapping windows: parabolas through random triples of samples, the
 one with the smallest median residual wins. It needs no start value, no noise level and no motion model, and half of
 a window may be bad. Short windows follow manoeuvres; long ones see through long patches.
+
+In a long log some windows tell what scale is typical. In most others nearly all readings lie near one least-squares
+parabola, by that scale: then there is nothing to search for.
 """
 
 from __future__ import annotations
@@ -21,12 +24,14 @@ FloatArray = NDArray[np.float64]
 TRIALS = 32  # triples per window: one is clean with probability 0.9996 when 40 % of the samples are bad
 FIRST_TRIALS = 20  # are enough where all of the window lies near the best parabola
 CUT = 4.5  # sigmas from the parabola
+SEARCHED = 64  # windows, or up to twice as many, that are searched in any case
+LEAST_SCALE, WIDEST = 0.7, 1.5  # of the typical scale
+MOST = 0.75  # of a window that must lie near a parabola to know that it is the best
 JUMP_VOTES = 0.2  # share of short windows that must find a reading off, at a jump
 APART = 64  # numbers between scratch arrays: where they might overlap, compiled loops round otherwise
 SHORTEST_STUCK = 3  # equal readings in a row
 STUCK_ODDS = 1e-3  # expected number of chance runs in a log that would be called stuck
 MOST_STUCK = 0.2  # share of a component
-ON_GRID, MOSTLY_ON_GRID = 0.05, 0.95  # of a rounding step that a value may be off a multiple, and share that is not
 
 
 @part
@@ -126,6 +131,54 @@ def _best_parabola(
     return unbiased * best
 
 
+@part
+def _near_most(
+    t: FloatArray, z: FloatArray, n: int, angular: bool, scale: float, residual: FloatArray, work: FloatArray
+) -> float:
+    """Residuals of the n samples about a least-squares parabola near which most of them lie, by a scale: the farthest
+    are left out again and again. Returns its own scale, infinite if there is none.
+
+    work (2 n,): heights, and weights of one for what is left.
+    """
+    origin, base, span = t[n // 2], z[n // 2], t[n - 1] - t[0]
+    if not span > 0:
+        return math.inf
+    per_span = 1 / span
+    for i in range(n):
+        work[i], work[n + i] = wrapped(z[i] - base, angular), 1.0
+    while True:
+        s0 = s1 = s2 = s3 = s4 = y0 = y1 = y2 = 0.0
+        for i in range(n):
+            d, m = (t[i] - origin) * per_span, work[n + i]
+            d1, d2, y = d * m, d * d * m, work[i]
+            s0, s1, s2, s3, s4 = s0 + m, s1 + d1, s2 + d2, s3 + d * d2, s4 + d2 * d2
+            y0, y1, y2 = y0 + y * m, y1 + d1 * y, y2 + d2 * y
+        if s0 < MOST * n:
+            return math.inf
+        c2, c3, c4 = s2 - s1 * s1 / s0, s3 - s1 * s2 / s0, s4 - s2 * s2 / s0
+        y1, y2 = y1 - s1 * y0 / s0, y2 - s2 * y0 / s0
+        determinant = c2 * c4 - c3 * c3
+        if not determinant > 1e-6 * c2 * c4:  # of too few instants
+            return math.inf
+        bend = (c2 * y2 - c3 * y1) / determinant
+        slope = (y1 - c3 * bend) / c2
+        level = (y0 - s1 * slope - s2 * bend) / s0
+        squares = largest = 0.0
+        for i in range(n):
+            d = (t[i] - origin) * per_span
+            off = work[i] - level - d * (slope + bend * d)
+            residual[i], off = off, abs(off) * work[n + i]
+            squares, largest = squares + off * off, max(largest, off)
+        own = math.sqrt(squares / (s0 - 3))
+        if largest <= CUT * scale:
+            return own if own < WIDEST * scale else math.inf
+        if not largest > 0:
+            return math.inf
+        for i in range(n):
+            if abs(residual[i]) > 0.5 * largest:
+                work[n + i] = 0.0
+
+
 @kernel
 def screen_component(time: Vector, z: Vector, window: int, angular: bool, least_sigma: float) -> tuple[Vector, Vector]:
     """(n,) share of windows in which each sample lies off the parabola, and (windows,) scale of each window.
@@ -142,18 +195,26 @@ def screen_component(time: Vector, z: Vector, window: int, angular: bool, least_
         return votes, np.zeros(0)
     count = (m - window + stride - 1) // stride + 1
     scales = np.empty(count)
-    t, y, work = np.empty(window + APART), np.empty(window + APART), np.empty(window + APART)
+    t, y, work = np.empty(window + APART), np.empty(window + APART), np.empty(2 * window + APART)
     margin = APART // window + 1
     residuals = np.empty((margin + count + margin, window))
+    every = max(count // SEARCHED, 1)
+    typical = 0.0
+    for searched in (True, False):
+        for w in range(count):
+            if (w % every == 0) != searched:
+                continue
+            low, scales[w] = min(w * stride, m - window), math.inf
+            for i in range(window):
+                t[i], y[i] = time[seen[low + i]], z[seen[low + i]]
+            if not searched:
+                scales[w] = _near_most(t, y, window, angular, typical, residuals[margin + w], work)
+            if scales[w] == math.inf:
+                scales[w] = _best_parabola(t, y, window, angular, w + 1, residuals[margin + w], work)
+        typical = np.median(scales[::every] if searched else scales)
     for w in range(count):
         low = min(w * stride, m - window)
-        for i in range(window):
-            t[i], y[i] = time[seen[low + i]], z[seen[low + i]]
-        scales[w] = _best_parabola(t, y, window, angular, w + 1, residuals[margin + w], work)
-    typical = np.median(scales)
-    for w in range(count):
-        low = min(w * stride, m - window)
-        limit = CUT * max(scales[w], 0.7 * typical, least_sigma)
+        limit = CUT * max(scales[w], LEAST_SCALE * typical, least_sigma)
         for i in range(window):
             looks[seen[low + i]] += 1
             if abs(residuals[margin + w, i]) > limit:
@@ -220,25 +281,3 @@ def bar_runs(channel: Vector, votes: Vector, near: Vector, weight: Vector) -> No
             for k in range(begin, end):
                 weight[seen[k]] = 0.0
         begin = end
-
-
-def rounding_step(channel: FloatArray) -> float:
-    """The step to which the readings (n,) of a component are rounded, NaN where missing; zero if to none that shows.
-
-    The largest of a few differences between neighbouring values of which nearly all values are whole multiples.
-    """
-    readings = channel[np.isfinite(channel)]
-    values = np.unique(readings)
-    if len(values) < 2:
-        return 0.0
-    steps = np.diff(values)
-    steps = np.sort(steps[steps > 1e-12 * np.abs(values).max()])
-    if not len(steps):
-        return 0.0
-    middle = float(np.sort(readings)[len(readings) // 2])
-    for share in (0.5, 0.2, 0.05, 0.0):
-        step = float(steps[int(share * (len(steps) - 1))])
-        multiple = (readings - middle) / step
-        if np.mean(np.abs(multiple - np.round(multiple)) < ON_GRID) >= MOSTLY_ON_GRID:
-            return step
-    return 0.0

@@ -30,6 +30,7 @@ from ftproc.core.identification.likelihood import Fixed, fit_level
 from ftproc.core.identification.profile import fit_profile, from_knot, median_level
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.frames import to_cartesian, wrap
+from ftproc.medians import median
 
 FloatArray = NDArray[np.float64]
 
@@ -109,9 +110,9 @@ def _taken_in(record: Record, decision: Decision, calm: Model, residual: FloatAr
     sigma = np.sqrt(calm.noise_variance)
     for c in range(3):
         seen = np.flatnonzero(record.possible[:, c])
-        for begin, end in runs_of(weight[seen, c] <= 0):
+        for begin, end in runs_of(weight[seen, c] <= 0, FEWEST):
             run = seen[begin:end]
-            if len(run) >= FEWEST and np.median(np.abs(np.diff(residual[run, c], 2))) < EVEN * sigma[c]:
+            if median(np.abs(np.diff(residual[run, c], 2))) < EVEN * sigma[c]:
                 weight[run, c] = 1.0
     return weight
 
@@ -121,7 +122,7 @@ def _beside_runs(record: Record, decision: Decision, calm: Model, residual: Floa
     found: list[tuple[float, Step]] = []
     for c in range(3):
         seen, sigma = np.flatnonzero(record.possible[:, c]), math.sqrt(calm.noise_variance[c])
-        for begin, end in runs_of(decision.weight[seen, c] <= 0):
+        for begin, end in runs_of(decision.weight[seen, c] <= 0, 2 * FEWEST):
             for place, jump in _jumps(residual[seen[begin:end], c]):
                 if abs(jump) > SMALLEST * sigma and begin + place < len(seen):
                     found.append((abs(jump) / sigma, Step(c, int(seen[begin + place]), jump, sigma)))
@@ -132,13 +133,11 @@ def _jumps(off: FloatArray) -> Iterator[tuple[int, float]]:
     """Where, and by how much, the readings of a rejected run may jump for good, from their distances off the track: a
     track that is bent from before a step to after it lies between the two, or joins one of them slowly."""
     n = len(off)
-    if n < 2 * FEWEST:
-        return
     higher = np.cumsum(np.sign(off))  # readings above the track less those below, up to each
     for place, other in ((int(higher.argmin()) + 1, higher[-1]), (int(higher.argmax()) + 1, -higher[-1])):
         if min(place, n - place) >= FEWEST and 0.5 * (n + other) + abs(higher[place - 1]) >= AGREE * n:
-            yield place, float(np.median(off[place : place + BESIDE]) - np.median(off[max(place - BESIDE, 0) : place]))
-    first, last = float(np.median(off[:BESIDE])), float(np.median(off[-BESIDE:]))
+            yield place, float(median(off[place : place + BESIDE]) - median(off[max(place - BESIDE, 0) : place]))
+    first, last = median(off[:BESIDE]), median(off[-BESIDE:])
     if abs(last) < JOINS * abs(first):
         yield 0, first
     if abs(first) < JOINS * abs(last):
@@ -252,7 +251,7 @@ def _may_be_a_halt(stretch: Stretch, bridge: Stretch, step: Step) -> bool:
     z, moved = stretch.record.measurement[rows], bridge.record.measurement[rows]
     away = np.linalg.norm(to_cartesian(z) - to_cartesian(moved), axis=1)
     seen = away[np.isfinite(away)]
-    return len(seen) > 0 and 4 * float(np.median(seen)) < HALTS_MPS2 * step.size**2
+    return len(seen) > 0 and 4 * median(seen) < HALTS_MPS2 * step.size**2
 
 
 def _stays(record: Record, weight: FloatArray, step: Step) -> bool:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.editing import jump_patches, outlier_chain, screening, steps
 from ftproc.core.editing.alternatives import WORK, Work
-from ftproc.core.editing.copies import KindArray, without_copies
+from ftproc.core.editing.copies import KindArray, rounding_step, without_copies
 from ftproc.core.editing.decisions import (
     IMPRECISE,
     Decision,
@@ -35,7 +35,7 @@ from ftproc.core.editing.reassessment import (
     reassess,
     with_motion,
 )
-from ftproc.core.filtering.bridging import Step, bridged, refined
+from ftproc.core.filtering.bridging import CLOCK, Step, bridged, refined
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
@@ -46,6 +46,7 @@ from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.model.frames import unwrap
 from ftproc.core.model.measurement import NO_RANGE_M
 from ftproc.core.model.motion import isotropic
+from ftproc.medians import median
 
 FloatArray = NDArray[np.float64]
 
@@ -124,9 +125,9 @@ class Screened(NamedTuple):
     exact: NDArray[np.bool_]
 
 
-def screen(time_s: FloatArray, measurement: FloatArray) -> Screened:
-    """Screen each component alone."""
-    weight, sigma, least = np.isfinite(measurement).astype(float), np.zeros(3), rounding_sigma(measurement)
+def screen(time_s: FloatArray, measurement: FloatArray, least: FloatArray) -> Screened:
+    """Screen each component alone. least: (3,) 1-sigma that each has at least, by its rounding."""
+    weight, sigma = np.isfinite(measurement).astype(float), np.zeros(3)
     jumps_only = weight.copy()
     for c in range(3):
         channel, floor = np.ascontiguousarray(measurement[:, c]), math.sqrt(2) * float(least[c])
@@ -137,7 +138,7 @@ def screen(time_s: FloatArray, measurement: FloatArray) -> Screened:
 
 def rounding_sigma(measurement: FloatArray) -> FloatArray:
     """(3,) 1-sigma m, rad, rad that the rounding of the readings (n, 3) makes: step / sqrt(12)."""
-    steps = [screening.rounding_step(measurement[:, c]) for c in range(3)]
+    steps = [rounding_step(measurement[:, c]) for c in range(3)]
     return np.array(steps) / math.sqrt(12)
 
 
@@ -153,7 +154,7 @@ def screen_channel(
         votes, scales = screening.screen_component(time_s, channel, window, angular, least_sigma)
         screening.bar_runs(channel, votes, near, weight)
         if window == WINDOWS[0] and len(scales):
-            sigma = max(float(np.median(scales)), least_sigma)
+            sigma = max(median(scales), least_sigma)
     weight[jump_patches.find(time_s, unwrap(channel) if angular else channel, weight, sigma) > 0] = 0.0
     # A component that swings too fast for parabolas loses half of itself: then only the short window is believed.
     for alternative in (jumps_only, seen):
@@ -197,6 +198,8 @@ def edit(
         if _may_be_late_stamps((record, decision), other):
             break
         (record, decision), found = other, sorted([*found, *new], key=lambda s: s.sample)
+    if decision.stamp_s > 0:  # which explains a clock that seems to jump
+        doubtful = [step for step in doubtful if step.component != CLOCK]
     if not record.fixed.jerk and not live:  # at the end of a window a patch may look like motion
         decision = with_motion(record, decision)
     if segment_of is None and not short:
@@ -227,11 +230,11 @@ def _decided(
 ) -> tuple[Record, Decision]:
     """The decisions on a log as if it had no steps, with a jerk profile."""
     jerk_psd = known.jerk_psd
-    screened, jumps_only, sigma, exact = screen(time_s, measurement)
+    rounding = rounding_sigma(measurement)
+    screened, jumps_only, sigma, exact = screen(time_s, measurement, rounding)
     possible = np.isfinite(measurement) & ~stuck_readings(measurement, sigma)
     possible[:, 0] &= measurement[:, 0] > NO_RANGE_M  # no target is at the station, or behind it
     fixed = Fixed(np.isfinite(known.sigma) | exact | (segment_of is not None), jerk_psd is not None)
-    rounding = rounding_sigma(measurement)
     coarse = np.where(rounding > COARSE * sigma, np.sqrt(12) * rounding, 0.0)
     uneven = uneven_noise.repeated(measurement, coarse)
     record = Record(

@@ -20,6 +20,7 @@ from ftproc.core.identification import optimizer
 from ftproc.core.identification.likelihood import Fixed, fit_level, jerk_bounds, of_level, representative, shaped
 from ftproc.core.identification.profile import fit_profile
 from ftproc.core.identification.scales import Scales, scales_of
+from ftproc.medians import median
 
 FloatArray = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ def may_be(log: Observations, smoothed: SmootherRun, model: Model) -> bool:
     correlated noise, but only where it is. And where the filter's memory is so short that it would follow such noise.
     """
     scales = scales_of(log, model.noise_variance)
-    if scales.memory_s(float(np.median(model.jerk[:, 0]))) < SHORT_MEMORY * scales.interval_s:
+    if scales.memory_s(median(model.jerk[:, 0])) < SHORT_MEMORY * scales.interval_s:
         return True
     used = log.weight > 0
     share = model.noise_variance / smoothed.residual_variance  # of the reading in its own smoothed residual

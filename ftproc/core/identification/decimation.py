@@ -16,6 +16,7 @@ from ftproc.core.filtering.records import Model, Observations, Start, Uneven
 from ftproc.core.identification.scales import Scales
 from ftproc.core.model.measurement import wrapped
 from ftproc.core.signatures import Flags, Indices, Matrix, Vector
+from ftproc.medians import typical
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -47,7 +48,7 @@ def merged(log: Observations, starts: list[Start], count: int) -> tuple[Observat
 
 def merge(log: Observations, starts: list[Start], count: int) -> tuple[Observations, list[Start]]:
     """A log of one reading in place of `count`, weighing as many as were used, and its starts."""
-    interval = float(np.median(np.diff(log.time_s)))
+    interval = typical(np.diff(log.time_s))
     begins = np.zeros(len(log.time_s), bool)
     begins[[start.sample for start in starts]] = True
     time, z, number, group = _means(*log[:3], begins, count, 1.5 * count * interval)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ftproc.core.filtering.records import Observations
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification import optimizer
+from ftproc.medians import median
 
 FloatArray = NDArray[np.float64]
 
@@ -49,7 +50,7 @@ def find(log: Observations, smoothed: SmootherRun, rounding: FloatArray) -> list
         if used.sum() < FEWEST:
             continue
         residual = smoothed.residual[used, c]
-        scale = float(np.sqrt(np.median(smoothed.residual_variance[used, c])))
+        scale = float(np.sqrt(median(smoothed.residual_variance[used, c])))
         scaled = residual / scale
         if not scaled.std() > 0:  # a component that was not measured
             continue

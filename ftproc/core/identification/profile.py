@@ -16,6 +16,7 @@ from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import decimation, optimizer
 from ftproc.core.identification.likelihood import VERTICAL_PRECISION, jerk_bounds, shaped
 from ftproc.core.identification.scales import Scales, scales_of
+from ftproc.medians import median
 
 FloatArray = NDArray[np.float64]
 
@@ -91,7 +92,7 @@ def knot_length(scales: Scales, jerk_psd: float) -> float:
 
 def median_level(model: Model) -> Model:
     """The model with the median of its jerk profile for all of the flight."""
-    level = float(np.median(model.jerk[:, 0]))
+    level = median(model.jerk[:, 0])
     return model._replace(jerk=level * model.jerk[:1] / model.jerk[0, 0], knot_s=np.inf)
 
 

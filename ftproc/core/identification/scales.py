@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.filtering.initialization import median
 from ftproc.core.filtering.records import Observations
+from ftproc.medians import median, typical
 
 FloatArray = NDArray[np.float64]
 
@@ -53,10 +53,10 @@ def scales_of(log: Observations, noise_variance: FloatArray) -> Scales:
     """The scales of a log with this noise (3,) m^2, rad^2, rad^2."""
     ranges = log.measurement[:, 0][log.weight[:, 0] > 0]
     ranges = ranges[np.isfinite(ranges)]
-    range_m = median(ranges) if len(ranges) else 1.0
+    range_m = typical(ranges) if len(ranges) else 1.0
     times = log.time_s[1:] - log.time_s[:-1]
     times = times[times > 0]
-    interval = median(times) if len(times) else 1.0
+    interval = typical(times) if len(times) else 1.0
     if log.sites is not None:
         return Scales(interval, max(float(log.time_s[-1] - log.time_s[0]), interval), *_of_sites(log, noise_variance))
     if log.uneven is not None:
@@ -70,6 +70,6 @@ def _of_sites(log: Observations, noise_variance: FloatArray) -> tuple[float, Flo
     assert log.sites is not None
     station, range_m = log.sites.station, log.sites.range_m
     used = np.stack([np.bincount(station, log.weight[:, c] > 0, len(range_m)) for c in range(3)], 1) > 0
-    typical = float(np.median(range_m))
+    typical = median(range_m)
     noise = np.sqrt(noise_variance) * np.stack([np.ones_like(range_m), range_m, range_m], 1)
     return typical, np.maximum(noise[used], FINEST * typical)

@@ -19,6 +19,7 @@ from ftproc.core import pacing
 from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification import optimizer
+from ftproc.medians import median
 
 FloatArray = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ def stamp_variance(log: Observations, smoothed: SmootherRun, model: Model) -> tu
     square = np.where(used, smoothed.residual, 0.0) ** 2
     predicted = np.where(used, np.maximum(smoothed.residual_variance - noise, 0.0), 1.0)
     speed2 = rates(smoothed.state) ** 2
-    typical = float(np.median(model.noise_variance / np.maximum(np.mean(speed2, 0), 1e-300)))
+    typical = median(model.noise_variance / np.maximum(np.mean(speed2, 0), 1e-300))
 
     def cost(theta: FloatArray) -> optimizer.Point:
         pacing.swept(len(used))
@@ -86,7 +87,7 @@ def stamp_variance(log: Observations, smoothed: SmootherRun, model: Model) -> tu
     tries = [likeliest(first - np.r_[0.0, 0.0, 0.0, less], first - 35.0) for less in (0.0, 4.0)]
     best, found = min(tries, key=lambda each: each[0])
     late = plain - best > max(LEAST_GAIN, SHARE * len(used))
-    late = late and math.exp(found[3]) < float(np.median(np.diff(log.time_s))) ** 2  # else they would not be in order
+    late = late and math.exp(found[3]) < median(np.diff(log.time_s)) ** 2  # else they would not be in order
     return np.exp(found[:3]), math.exp(found[3]) if late else 0.0
 
 
@@ -145,7 +146,7 @@ def drift(log: Observations, smoothed: SmootherRun) -> FloatArray | None:
         if drifting < max(LEAST_DRIFT**2, 3 * chance * math.sqrt(2 / count)):
             continue
         even = np.convolve(np.pad(level, 1, mode="edge"), [0.25, 0.5, 0.25], "valid")
-        even = np.clip(even - np.median(even), -LARGEST_DRIFT, LARGEST_DRIFT) * drifting / (drifting + 0.375 * chance)
+        even = np.clip(even - median(even), -LARGEST_DRIFT, LARGEST_DRIFT) * drifting / (drifting + 0.375 * chance)
         middle = _of_windows(log.time_s[seen], count, np.mean)
         # It goes on as far again beyond the ends, where readings may be missing because the noise has grown.
         middle, even = (np.pad(each, 1, mode="reflect", reflect_type="odd") for each in (middle, even))

@@ -20,6 +20,7 @@ from ftproc.core.live.doubt import Doubt
 from ftproc.core.live.pieces import Sizes
 from ftproc.core.live.rows import LATELY, Published, Waiting, unknown_rows, widened
 from ftproc.core.live.window import Window
+from ftproc.medians import median
 
 FloatArray = NDArray[np.float64]
 
@@ -176,7 +177,7 @@ class LiveEditor:
     def _sizes(self, time_s: FloatArray) -> Sizes:
         """How much the window keeps, by the interval of its readings."""
         times = np.diff(time_s)
-        interval_s = float(np.median(times[times > 0])) if (times > 0).any() else 1.0
+        interval_s = median(times[times > 0]) if (times > 0).any() else 1.0
         self.longest_s = shortest_gap(interval_s)
         self.samples_a_refresh, self.samples_a_turn = (
             max(1, math.ceil(each_s / interval_s - 1e-6)) for each_s in (REFRESH_S, WORK_S)

@@ -15,6 +15,7 @@ from ftproc.core.filtering.records import Model, Observations, empty_rows
 from ftproc.core.live.pieces import Sizes
 from ftproc.core.live.readings import Columns, Labels
 from ftproc.core.live.window import Window
+from ftproc.medians import median
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -32,7 +33,7 @@ class Gating(NamedTuple):
     def window(self, time_s: FloatArray, measurement: FloatArray, known: two_pass.Known, sizes: Sizes) -> GatedWindow:
         """A window that edits with it."""
         times = np.diff(time_s)
-        interval_s = float(np.median(times[times > 0])) if (times > 0).any() else 1.0
+        interval_s = median(times[times > 0]) if (times > 0).any() else 1.0
         longest_s = self.longest_patch_s or max(PATCH_S, PATCH_SAMPLES * interval_s)
         window = GatedWindow(time_s, measurement, known, sizes)
         window.how = gate.GateSettings(self.gate, longest_s, self.gain_form)

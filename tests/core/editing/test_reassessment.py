@@ -102,7 +102,7 @@ def test_what_is_suspicious_in_one_component_is_decided_again(decided, monkeypat
     settled = []
     whole = reassessment._until_settled
     monkeypatch.setattr(reassessment, "_until_settled", lambda *each: settled.append(each[0]) or whole(*each))
-    monkeypatch.setattr(reassessment, "AROUND", 20)
+    monkeypatch.setattr(reassessment, "AROUND", (20, 20))
     suspect = np.zeros_like(decision.weight, bool)
     monkeypatch.setattr(reassessment, "_suspects", lambda *_: suspect)
     reassessment.reassess(record, decision)
@@ -118,7 +118,7 @@ def test_where_a_component_is_missing_around_what_is_marked_all_of_the_log_is_sm
     record, decision = decided
     weight, marked = decision.weight.copy(), np.zeros(len(decision.weight), bool)
     weight[150:650, 1], marked[395:405] = 0.0, True
-    residual, variance = reassessment._near(record, weight, decision.model, marked)
+    residual, variance = reassessment._near(record, weight, decision.model, marked, 200)
     starts = reassessment._starts(record, weight, decision.model)
     whole = smooth_log(record.weighted(weight), decision.model, starts)
     np.testing.assert_array_equal(residual, whole.residual)

@@ -56,10 +56,20 @@ def test_search_is_the_plain_one(seed):
     residual = np.tile(u[:, None], (1, 3))
     found = runs.suspicious(0.1 * np.arange(400), residual, np.ones((400, 3)), np.ones((400, 3)), 10.0)
     total = np.r_[0.0, np.cumsum(u)]
-    sums = [np.sort(np.abs(total[n:] - total[:-n])) for n in range(2, 49)]
-    scale = np.r_[np.inf, np.inf, [1.4826 * s[len(s) // 2] for s in sums]]
-    np.testing.assert_array_equal(found[:, 0], plain_scan(total, scale))
+    np.testing.assert_array_equal(found[:, 0], plain_scan(total, runs._scales(total, runs.LONGEST)))
     assert found[50:62, 0].mean() > 0.5
+
+
+@pytest.mark.parametrize("n", [150, 9000])
+def test_scales_are_the_medians_of_the_sums(n):
+    """Of some lengths; what lies between them follows."""
+    total = np.r_[0.0, np.cumsum(np.random.default_rng(n).standard_normal(n))]
+    sums = [np.sort(np.abs(total[length:] - total[:-length])) for length in range(2, 49)]
+    plain = np.array([1.4826 * s[len(s) // 2] for s in sums])
+    scales = runs._scales(total, 48)
+    assert np.isinf(scales[:2]).all()
+    np.testing.assert_allclose(scales[[2, 3, 4, 5, 48]], plain[[0, 1, 2, 3, 46]], rtol=1e-12 if n < 1000 else 0.15)
+    np.testing.assert_allclose(scales[2:], plain, rtol=0.15)
 
 
 def test_noise_alone_is_no_run():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ftproc.core.editing import screening
 from ftproc.core.editing.screening import bar_runs, screen_component, stuck
 from ftproc.core.model.frames import wrap
 from tests import naive
@@ -64,6 +65,41 @@ def test_planted_outliers_are_found(share, least):
         false.append(flag[~bad].mean())
     assert np.mean(found) > least
     assert np.mean(false) < 0.02
+
+
+def test_the_parabola_near_most_of_a_window_is_that_of_least_squares_through_what_is_left():
+    rng = np.random.default_rng(8)
+    t, good = np.sort(rng.uniform(0, 3, 31)), np.ones(31, bool)
+    z = 500 + 40 * t - 9 * t**2 + 2.0 * rng.standard_normal(31)
+    good[[4, 5, 17, 30]] = False
+    z[~good] += [60, -90, 500, 40]
+    residual, work = np.empty(31), np.empty(62)
+    scale = screening._near_most(t, z, 31, False, 2.0, residual, work)
+    kept = work[31:] > 0
+    through = np.polyfit(t[kept], z[kept], 2)
+    assert not (kept & ~good).any()
+    assert kept.sum() >= 26
+    np.testing.assert_allclose(residual, z - np.polyval(through, t), atol=1e-9)
+    assert scale == pytest.approx(np.sqrt((residual[kept] ** 2).sum() / (kept.sum() - 3)), rel=1e-9)
+    for worse, typical in ((z, 0.1), (z, 0.0), (np.where(t > 1.5, z + 80, z), 2.0), (np.full(31, 7.0), 1.0)):
+        assert (worse[0] == 7.0) != np.isinf(screening._near_most(t, worse, 31, False, typical, residual, work))
+    assert np.isinf(screening._near_most(np.ones(31), z, 31, False, 2.0, residual, work))
+
+
+def test_a_long_log_is_screened_as_its_stretches_are():
+    """Most of its windows are not searched."""
+    rng = np.random.default_rng(3)
+    t = 0.1 * np.arange(6000)
+    z, bad = 3000 * np.sin(0.05 * t) + 4.0 * rng.standard_normal(6000), rng.random(6000) < 0.05
+    z[bad] += rng.choice([-1, 1], bad.sum()) * rng.uniform(8, 300, bad.sum()) * 4.0
+    votes, scales = screen_component(t, z, 31, False, 0.0)
+    apart = np.concatenate(
+        [screen_component(t[k : k + 600], z[k : k + 600], 31, False, 0.0)[0] for k in range(0, 6000, 600)]
+    )
+    assert ((votes > 0.5) != (apart > 0.5)).mean() < 0.005
+    assert (votes[bad] > 0.5).mean() > 0.985
+    assert (votes[~bad] > 0.5).mean() < 0.002
+    assert np.median(scales) == pytest.approx(4.0, rel=0.05)
 
 
 def test_patch_of_a_third_of_the_long_window_is_found():

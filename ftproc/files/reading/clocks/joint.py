@@ -13,6 +13,7 @@ from ftproc.files.reading.clocks.clock import DAY_S, WEEK_S, Clock, unrolled
 from ftproc.files.reading.meaning.numbers import Origin, as_text, numbers, parsed, without_text
 from ftproc.files.reading.meaning.schema import Column
 from ftproc.files.units import UNITS, Unit, unit_named
+from ftproc.medians import median
 from ftproc.records import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -158,7 +159,7 @@ def _dates_in_cells(column: pa.ChunkedArray, origin: Origin) -> tuple[IntArray, 
             return _dates_in_text(text, origin)
     assert values is not None
     filled = _filled(values)
-    middle = float(np.median(filled))
+    middle = median(filled)
     if middle > 19e6:
         return _dates_in_text(as_text(column), origin)
     if 10_100 < middle < 320_000 and not 3e4 <= middle < 7e4:  # of six digits

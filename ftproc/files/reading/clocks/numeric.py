@@ -8,6 +8,7 @@ from ftproc.files import leap_seconds
 from ftproc.files.layout import CANONICAL
 from ftproc.files.reading.clocks.clock import DAY_S, WEEK_S, Clock, unrolled
 from ftproc.files.reading.meaning.schema import Column
+from ftproc.medians import median
 from ftproc.records import FloatArray
 
 BARE = "numbers in s"  # as is assumed
@@ -84,7 +85,7 @@ def read(values: FloatArray, column: Column) -> Clock:
 
 def _typical(known: FloatArray) -> float:
     some = known[:: 1 + len(known) // _SAMPLE]
-    return float(np.median(np.minimum(np.abs(some), _LARGEST)))
+    return median(np.minimum(np.abs(some), _LARGEST))
 
 
 def _in_seconds(time_s: FloatArray, kind: str, column: Column, words: str) -> Clock:
@@ -110,7 +111,7 @@ def _day_count(kind: str, size: float, known: FloatArray) -> str:
         return kind
     steps = np.abs(np.diff(np.clip(known[:_SAMPLE], -_LARGEST, _LARGEST)))
     steps = steps[steps > 0]
-    if kind not in ("", "day", "unix") or not steps.size or float(np.median(steps)) >= _MOST_DAYS_STEP:
+    if kind not in ("", "day", "unix") or not steps.size or median(steps) >= _MOST_DAYS_STEP:
         return ""
     if 2.4e6 <= size < 2.5e6:
         return "jd"
@@ -168,8 +169,8 @@ def _jumps(values: FloatArray) -> bool:
     """Whether the numbers jump by 40 at each full minute, as hhmmss does."""
     known = values[np.isfinite(values)]
     steps = np.diff(known)
-    jumps = np.abs(steps - np.median(steps) - 40) < 1e-3
-    return bool(jumps.any() and (known[1:][jumps] % 100 < np.median(steps) + 1e-3).all())
+    jumps = np.abs(steps - median(steps) - 40) < 1e-3
+    return bool(jumps.any() and (known[1:][jumps] % 100 < median(steps) + 1e-3).all())
 
 
 def from_hhmmss(values: FloatArray) -> FloatArray:

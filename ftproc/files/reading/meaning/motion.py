@@ -16,6 +16,7 @@ from ftproc.errors import InputError
 from ftproc.files.reading.meaning.schema import Column
 from ftproc.files.units import UNITS, Unit
 from ftproc.files.words import QUANTITIES
+from ftproc.medians import median
 from ftproc.records import FloatArray
 
 _MOST_ROWS = 1000  # that are looked at
@@ -132,12 +133,12 @@ def _likelihoods(near: _Sample, far: _Sample) -> Callable[[Mapping[str, Unit]], 
     def rate(unit: Unit) -> float:
         steps = np.diff(unit.to_si(near.time))
         steps = steps[steps > 0]
-        return _at(_STEP_S, float(np.median(steps))) if len(steps) else 1.0
+        return _at(_STEP_S, median(steps)) if len(steps) else 1.0
 
     @cache
     def placed(units: tuple[tuple[str, Unit], ...]) -> tuple[FloatArray, float]:
         si = _in_si(far, dict(units))
-        return _positions(si), _at(_RANGE_M, float(np.median(np.abs(si[:, 0]))))
+        return _positions(si), _at(_RANGE_M, median(np.abs(si[:, 0])))
 
     @cache
     def noise(k: int, unit: Unit) -> float:
@@ -176,18 +177,18 @@ def _speed(time_s: FloatArray, position: FloatArray) -> float | None:
     middle = np.median(position[: count * size].reshape(count, size, 3), axis=1)
     moment = np.median(time_s[: count * size].reshape(count, size), axis=1)
     way = float(np.linalg.norm(np.ptp(middle, axis=0)))
-    step = float(np.median(np.linalg.norm(np.diff(position, axis=0), axis=1)))
+    step = median(np.linalg.norm(np.diff(position, axis=0), axis=1))
     past = np.diff(moment) > 0
     if way < _LARGER * step or not past.any():
         return None
-    return float(np.median(np.linalg.norm(np.diff(middle, axis=0), axis=1)[past] / np.diff(moment)[past]))
+    return median(np.linalg.norm(np.diff(middle, axis=0), axis=1)[past] / np.diff(moment)[past])
 
 
 def _noise(angle: FloatArray) -> float:
     """The standard deviation of the noise, by the differences of that order in which the motion shows least."""
     found = math.inf
     for order in range(2, _HIGHEST_ORDER + 1):
-        size = float(np.median(np.abs(np.diff(angle, order)))) * 1.4826
+        size = median(np.abs(np.diff(angle, order))) * 1.4826
         found = min(found, size / math.sqrt(math.comb(2 * order, order)))
     return found
 

@@ -13,6 +13,7 @@ from ftproc.files.layout import CANONICAL
 from ftproc.files.reading.meaning.questions import named
 from ftproc.files.reading.meaning.schema import Column
 from ftproc.files.units import UNITS, Unit
+from ftproc.medians import median
 from ftproc.records import FloatArray
 from ftproc.settings import Station
 
@@ -80,7 +81,7 @@ def _angles(values: FloatArray, unit: Unit) -> _Angles | None:
         known = known * unit.divide / unit.multiply
         half, most = np.quantile(np.abs(known), [0.5, 0.99]).tolist()
         jumps = np.abs(np.diff(known))
-        step = float(np.median(jumps)) if jumps.size else 0.0
+        step = median(jumps) if jumps.size else 0.0
     turn = 0.0
     for size in _TURNS.values():
         near = (jumps > 0.97 * size) & (jumps + step <= 1.0005 * size)
@@ -238,7 +239,7 @@ def doubts(measurement: FloatArray, station: Station) -> tuple[str, ...]:
     found = []
     if azimuth.size and azimuth.min() > -1 and 370 < np.quantile(azimuth, 0.99) <= 400:
         found.append("the azimuth runs from 0 to 400 deg: if they are gon, say --units azimuth=gon")
-    if station.elevation_from != "zenith" and elevation.size and np.median(elevation) > _STEEP_DEG:
+    if station.elevation_from != "zenith" and elevation.size and median(elevation) > _STEEP_DEG:
         found.append(
             f"half of the elevations are above {_STEEP_DEG} deg: if they are zenith angles, say --elevation-from zenith"
         )

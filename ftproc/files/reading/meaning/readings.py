@@ -21,6 +21,7 @@ from ftproc.files.reading.meaning.numbers import (
 from ftproc.files.reading.meaning.schema import Column
 from ftproc.files.units import UNITS, unit_named
 from ftproc.files.words import DEPRESSIONS
+from ftproc.medians import median
 from ftproc.records import FloatArray
 
 if TYPE_CHECKING:
@@ -182,10 +183,10 @@ def _stands_out(values: FloatArray, found: np.ndarray, number: float, impossible
     if gap > max(2 * (high - low), 1e-3 * abs(number)):
         return True
     steps = np.abs(np.diff(rest))
-    typical = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    typical = median(steps[steps > 0]) if (steps > 0).any() else 0.0
     places = np.flatnonzero(~found & np.isfinite(values))
     before = places[np.maximum(np.searchsorted(places, np.flatnonzero(found)) - 1, 0)]
-    return bool(np.median(np.abs(values[before] - number)) > max(_FAR * typical, 1e-3 * abs(number)))
+    return bool(median(np.abs(values[before] - number)) > max(_FAR * typical, 1e-3 * abs(number)))
 
 
 def _without_words(text: pa.ChunkedArray, described: Column) -> tuple[pa.ChunkedArray, tuple[str, ...]]:

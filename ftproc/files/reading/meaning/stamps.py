@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.medians import median
 from ftproc.records import COMPONENTS, FloatArray
 
 _ROWS = 5000  # by which the clock is judged
@@ -79,7 +80,7 @@ def coarse(time: FloatArray) -> _Clock | None:
     least = float(gaps.min(initial=math.inf))
     if len(gaps) < _FEWEST or not _STEPS[0] < least < _STEPS[1]:
         return None
-    step = round(float(np.median(gaps[gaps < 1.5 * least])), 9)
+    step = round(median(gaps[gaps < 1.5 * least]), 9)
     near = gaps[gaps < 10 * step] / step
     period = (time[-1] - time[0]) / (len(time) - 1)
     on_grid, as_shown = np.abs(near - np.round(near)) < _TOLERANCE[0], np.abs(every / step - 1) < _TOLERANCE[0]
