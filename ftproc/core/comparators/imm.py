@@ -22,10 +22,9 @@ FloatArray = NDArray[np.float64]
 
 
 class Mode(Protocol):
-    """The record of one model of the target's motion: its jerk along each axis, its probability after the last
-    reading, that expected before the next one, its state after mixing, and what its filter made of the reading."""
+    """The record of one model of the target's motion: its probability after the last reading, that expected before the
+    next one, its state after mixing, and what its filter made of the reading."""
 
-    jerk: Annotated[FloatArray, 3]
     probability: float
     expected: float
     x: Annotated[FloatArray, 9]
@@ -86,7 +85,7 @@ def _run(
             interval = samples[k].time_s - samples[k - 1].time_s
             _mix(math.exp(-interval / sojourn_s), filters, modes, share)
             for m in range(models):
-                motion.predict(filters[m], interval, modes[m].jerk)
+                motion.predict(filters[m], interval)
         for i in range(9):
             row.predicted[i] = 0.0
             for m in range(models):
@@ -163,7 +162,8 @@ def filter_log(log: Observations, model: Model, starts: list[Start], jumps: Jump
     for start, stop in between(starts, len(log.time_s)):
         filters, modes = zeros(FILTER, models + 1), zeros(MODE, models)
         filters[:] = model.filter(start)
-        modes["jerk"], modes["probability"], modes["expected"] = jumps.jerk, 1 / models, 1 / models
+        filters["jerk"][:models] = jumps.jerk
+        modes["probability"], modes["expected"] = 1 / models, 1 / models
         span = Span(start.sample, stop, start.sample)
         likelihood += _run(span, samples, filters, modes, jumps.sojourn_s, rows, probability)
     lead_in(log, model, starts[0], rows)

@@ -248,17 +248,17 @@ def _predict_reading(back: Backward, f: Update, i: int) -> None:
 
 
 @part
-def score_jerk(back: Backward, interval: float, sums: FloatArray) -> None:
+def score_jerk(back: Backward, interval: float, sums: FloatArray, piece: int) -> None:
     """Add 1/2 c(T) : r r' and 1/2 c(T) : N of each axis, whose difference is the score of its jerk density, to the sums
-    (2, 3)."""
+    (m, 2, 3) of a piece of the profile."""
     r, n, c = back.r, back.n, back.q
     motion.noise_coefficients(interval, c)
     c00, c01, c02, c11, c12, c22 = 0.5 * c[0, 0], c[0, 1], c[0, 2], 0.5 * c[1, 1], c[1, 2], 0.5 * c[2, 2]
     for i in range(3):
         p, v, a = r[i], r[3 + i], r[6 + i]
-        sums[0, i] += p * (c00 * p + c01 * v + c02 * a) + v * (c11 * v + c12 * a) + c22 * a * a
+        sums[piece, 0, i] += p * (c00 * p + c01 * v + c02 * a) + v * (c11 * v + c12 * a) + c22 * a * a
         of_p = c00 * n[i, i] + c01 * n[i, 3 + i] + c02 * n[i, 6 + i]
-        sums[1, i] += of_p + c11 * n[3 + i, 3 + i] + c12 * n[3 + i, 6 + i] + c22 * n[6 + i, 6 + i]
+        sums[piece, 1, i] += of_p + c11 * n[3 + i, 3 + i] + c12 * n[3 + i, 6 + i] + c22 * n[6 + i, 6 + i]
 
 
 @part

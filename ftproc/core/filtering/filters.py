@@ -17,8 +17,8 @@ class Filter(Protocol):
     """The record of a filter: its state, and what one measurement update computes on its way.
 
     x, p: state and covariance, SI units. noise, late: of this sample, see `records.Sample`. wander, fade_s: variance
-    and correlation time of the offset of each component. q: coefficients of Q. z_hat: predicted measurement. e:
-    innovation. used: weight of each component, zero for none. h: H on the position. s: innovation covariance. root:
+    and correlation time of the offset of each component. jerk: density of the jerk along each axis, see `motion`. q:
+    coefficients of Q. z_hat: predicted measurement. e: innovation. used: weight of each component, zero for none. h: H on the position. s: innovation covariance. root:
     L^-1, whose rows and columns are zero for components not used. c, y, g, u: see `ukf`. pxz, gain, rest: P H', K and
     S - H P H', where they are asked for. factor: of the position block of P. d: by pair of sigma points, component and
     side. bend: its mean, h(x) to z_hat.
@@ -30,6 +30,7 @@ class Filter(Protocol):
     late: Annotated[FloatArray, 3]
     wander: Annotated[FloatArray, 3]
     fade_s: Annotated[FloatArray, 3]
+    jerk: Annotated[FloatArray, 3]
     q: Annotated[FloatArray, 3, 3]
     z_hat: Annotated[FloatArray, 3]
     e: Annotated[FloatArray, 3]

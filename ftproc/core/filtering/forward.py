@@ -51,7 +51,8 @@ def advance(f: Filter, samples: Any, k: int, profile: motion.Profile) -> None:
     """Predict from sample k - 1 to sample k."""
     time_s = samples[k].time_s
     interval = time_s - samples[k - 1].time_s
-    motion.predict(f, interval, profile.jerk[motion.knot_index(time_s, profile)])
+    motion.drive(f, profile, time_s)
+    motion.predict(f, interval)
     motion.wander(f, interval)
 
 
@@ -162,7 +163,8 @@ def _extrapolated(
     for k in range(len(estimates) - 1, -1, -1):
         row, left, time_s = estimates[k], residuals[k], samples[k].time_s
         interval = time_s - samples[k + 1].time_s
-        motion.predict(f, interval, profile.jerk[motion.knot_index(time_s, profile)])
+        motion.drive(f, profile, time_s)
+        motion.predict(f, interval)
         motion.wander(f, interval)
         sites.expect_at(samples[k], f)
         ukf.innovate(samples[k], f)

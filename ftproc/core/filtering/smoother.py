@@ -167,7 +167,7 @@ def _swept_through(
                     residuals[k].residual_variance[i] = back.variance[i]
             _carry_back(memory, update, k, interval, k - low, wanted)
             if k > span.first:
-                backward.score_jerk(back, interval, jerk[motion.knot_index(samples[k].time_s, profile)])
+                backward.score_jerk(back, interval, jerk, motion.knot_index(samples[k].time_s, profile))
                 backward.score_wander(back, f, interval)
                 if k > low:
                     backward.score_fade(back, block[k - 1 - low], f, interval)

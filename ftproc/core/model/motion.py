@@ -25,10 +25,12 @@ FloatArray = NDArray[np.float64]
 
 
 class Moving(Protocol):
-    """x (9,) and P (9, 9) of a record, and memory for Q's coefficients: q (3, 3)."""
+    """x (9,) and P (9, 9) of a record, the density of the jerk along each axis (3,), and memory for Q's coefficients:
+    q (3, 3)."""
 
     x: FloatArray
     p: FloatArray
+    jerk: FloatArray
     q: FloatArray
 
 
@@ -61,6 +63,15 @@ def knot_index(time_s: float, profile: Profile) -> int:
 
 
 @part
+def drive(f: Moving, profile: Profile, time_s: float) -> None:
+    """Take the densities that hold at a time. (A row of the profile as an array of its own would be counted in and out
+    for each sample.)"""
+    piece = knot_index(time_s, profile)
+    for i in range(3):
+        f.jerk[i] = profile.jerk[piece, i]
+
+
+@part
 def noise_coefficients(interval: float, out: FloatArray) -> None:
     """The 3 x 3 matrix of Q per unit of jerk density; a negative interval goes back in time."""
     t = interval
@@ -76,7 +87,7 @@ def noise_coefficients(interval: float, out: FloatArray) -> None:
 
 
 @part
-def predict(f: Moving, interval: float, jerk: FloatArray) -> None:
+def predict(f: Moving, interval: float) -> None:
     """x <- Phi x and P <- Phi P Phi' + Q in place.
 
     Phi mixes position, velocity and acceleration of the same axis only, so each pair of axes (i, j) is a 3 x 3
@@ -108,7 +119,7 @@ def predict(f: Moving, interval: float, jerk: FloatArray) -> None:
                 p[6 + i, 3 + j] = p[3 + j, 6 + i] = av + t * aa
             pp, pv, vv = pp + t * pv + h * pa, pv + t * pa, vv + t * va
             if i == j:
-                q = jerk[i]
+                q = f.jerk[i]
                 pp, pv, pa = pp + q * c[0, 0], pv + q * c[0, 1], pa + q * c[0, 2]
                 vv, va, aa = vv + q * c[1, 1], va + q * c[1, 2], aa + q * c[2, 2]
             p[i, j] = p[j, i] = pp
