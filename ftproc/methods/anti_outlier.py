@@ -21,7 +21,7 @@ from ftproc.core import threads
 from ftproc.core.editing import two_pass
 from ftproc.core.filtering import bridging, forward
 from ftproc.core.filtering.records import FilterRun, Model
-from ftproc.core.filtering.smoother import SmootherRun, smooth_log
+from ftproc.core.filtering.smoother import HEADS, RESIDUALS, STATES, SmootherRun, smooth_log
 from ftproc.core.identification.profile import median_level
 from ftproc.methods import live, preparing
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
@@ -57,40 +57,33 @@ def parts(record: Recording, settings: FilterSettings) -> Iterator[Part]:
 
 def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | None = None) -> Estimate:
     """Two-pass editing. usual: of a segment, what is usual in the log, see `core.editing.two_pass`."""
-    known = preparing.what_is_known(readings, settings)
-    edited = two_pass.edit(readings.time_s, readings.measurement, known, usual)
+    known, wanted = preparing.what_is_known(readings, settings), STATES if settings.smooth else HEADS
+    edited = two_pass.edit(readings.time_s, readings.measurement, known, usual, wanted=wanted)
     starts = two_pass.smoothed_starts(edited.smoothed)
-    run, smoothed = forward.filter_log(edited.log, edited.model, starts), edited.smoothed
+    run, smoothed = forward.filter_log(edited.log, edited.model, starts), edited.smoothed if settings.smooth else None
     other = edited.decision.slowest if edited.decision.alternative is None else edited.decision.alternative.slowest
     if other is not None:
-        run, smoothed = _worse_of(edited, run, other)
+        other_smoothed = smooth_log(edited.log, other, edited.starts, wanted)
+        run = _worse_of(run, forward.filter_log(edited.log, other, two_pass.smoothed_starts(other_smoothed)))
+        smoothed = smoothed and _worse_of(smoothed, other_smoothed)
     shifts = edited.faults.shifts
     if shifts:
-        run, smoothed = _widened(run, shifts), _widened(smoothed, shifts)
+        run, smoothed = _widened(run, shifts), smoothed and _widened(smoothed, shifts)
     label = preparing.labels(edited.weight, edited.log.measurement)
     again = preparing.re_initialized(starts)
     decision = edited.decision
     return Estimate(
-        run, label, edited.model, smoothed if settings.smooth else None, again, decision.settled,
+        run, label, edited.model, smoothed, again, decision.settled,
         unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts,
         alternative=decision.alternative,
         faults=edited.faults,
     )  # fmt: skip
 
 
-def _worse_of(edited: two_pass.Edited, run: FilterRun, other: Model) -> tuple[FilterRun, SmootherRun]:
-    """The filter's and the smoother's run, each sigma the larger of theirs and of those that another model gives."""
-    smoothed = smooth_log(edited.log, other, edited.starts)
-    filtered = forward.filter_log(edited.log, other, two_pass.smoothed_starts(smoothed))
-    return (
-        run._replace(
-            sigma=np.maximum(run.sigma, filtered.sigma), los_sigma=np.maximum(run.los_sigma, filtered.los_sigma)
-        ),
-        edited.smoothed._replace(
-            sigma=np.maximum(edited.smoothed.sigma, smoothed.sigma),
-            los_sigma=np.maximum(edited.smoothed.los_sigma, smoothed.los_sigma),
-        ),
-    )
+def _worse_of(run: Run, other: Run) -> Run:
+    """A run with sigmas that are the larger of its own and of another's."""
+    sigma, los_sigma = np.maximum(run.sigma, other.sigma), np.maximum(run.los_sigma, other.los_sigma)
+    return run._replace(sigma=sigma, los_sigma=los_sigma)
 
 
 def _widened(run: Run, shifts: Sequence[bridging.Step]) -> Run:
@@ -119,8 +112,9 @@ def usual_of(record: Recording, settings: FilterSettings) -> Model | None:
 
 def _span(record: Recording, settings: FilterSettings, rows: slice) -> two_pass.Edited | None:
     readings = record.part(rows)
+    known = preparing.what_is_known(readings, settings)
     try:
-        return two_pass.edit(readings.time_s, readings.measurement, preparing.what_is_known(readings, settings))
+        return two_pass.edit(readings.time_s, readings.measurement, known, wanted=RESIDUALS)
     except ValueError:  # a component has too few readings in this span
         return None
 

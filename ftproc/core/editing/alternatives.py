@@ -20,7 +20,7 @@ from ftproc.core.editing.patch_likelihood import SHORTEST_RUN
 from ftproc.core.editing.runs import runs_of
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Uneven
-from ftproc.core.filtering.smoother import SmootherRun, smooth_log
+from ftproc.core.filtering.smoother import RESIDUALS, SmootherRun, smooth_log
 from ftproc.medians import typical
 
 FloatArray = NDArray[np.float64]
@@ -229,7 +229,7 @@ def _step(log: Neighbourhood, weight: FloatArray) -> tuple[Step, SmootherRun]:
     noise = log.model.noise_variance
     weighted = log.weighted(weight)
     starts = find_starts(weighted, noise, float(log.model.jerk[0, 0]))
-    smoothed = smooth_log(weighted, log.model, starts, residuals_only=True)
+    smoothed = smooth_log(weighted, log.model, starts, RESIDUALS)
     return Step(weight, smoothed.log_likelihood + rejections(log, weight, smoothed)), smoothed
 
 

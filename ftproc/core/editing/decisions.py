@@ -13,7 +13,7 @@ from ftproc.core.editing import outlier_chain
 from ftproc.core.editing.alternatives import Work
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven
-from ftproc.core.filtering.smoother import SmootherRun, smooth_log
+from ftproc.core.filtering.smoother import RESIDUALS, SmootherRun, smooth_log
 from ftproc.core.identification import coloured_noise, uneven_noise
 from ftproc.core.identification.likelihood import Fixed, fit_level, representative
 from ftproc.core.identification.profile import median_level
@@ -97,7 +97,7 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
         log = record.weighted(weight)
         if rounds < TUNING_ROUNDS and (tune_first or rounds > 0) and not model.coloured:
             model = fit_level(log, starts, model, record.fixed, record.sigma, record.rounding)
-        smoothed = smooth_log(log, model, starts, residuals_only=True)
+        smoothed = smooth_log(log, model, starts, RESIDUALS)
         noise = model.reading_variance
         good = outlier_chain.classify(smoothed.residual, smoothed.residual_variance, noise, rates, record.gate)
         mean += (good - mean) / max(rounds - TUNING_ROUNDS + 1, 1)
@@ -169,7 +169,7 @@ def _residuals(record: Record, decision: Decision) -> SmootherRun:
     """What the readings used say of each other: the run that the decisions were made by, if they stand still."""
     if decision.settled and decision.smoothed is not None:
         return decision.smoothed
-    return smooth_log(record.weighted(decision.weight), decision.model, decision.starts, residuals_only=True)
+    return smooth_log(record.weighted(decision.weight), decision.model, decision.starts, RESIDUALS)
 
 
 def allow_for_tails(record: Record, decision: Decision) -> tuple[Record, Decision]:
@@ -225,7 +225,7 @@ def allow_for_colour(record: Record, decision: Decision) -> Decision:
     if _repeats(record, decision):
         return decision
     log, starts = record.weighted(decision.weight), decision.starts
-    smoothed = smooth_log(log, decision.model, starts, residuals_only=True)
+    smoothed = smooth_log(log, decision.model, starts, RESIDUALS)
     if not coloured_noise.may_be(log, smoothed, decision.model):
         return decision
     found = coloured_noise.fit_coloured(log, starts, median_level(decision.model), record.fixed)

@@ -25,7 +25,7 @@ START_RATES = (0.02, 0.001, 0.92)  # isolated outlier; patch begins; patch goes 
 MAX_RATES = (0.4, 0.02, 0.98)
 MIN_STAY = 0.7
 PRIOR_SAMPLES = 20.0  # weight of START_RATES' spirit against the counts of the log
-ROUNDS = 3
+ROUNDS, STILL = 3, 0.01  # of estimating the rates; share of a rate by which it may yet change, to stand still
 
 
 @part
@@ -94,14 +94,17 @@ def _chain(
 
 
 @part
-def _estimate_rates(counts: FloatArray, rates: FloatArray) -> None:
-    """Baum-Welch update of the rates, drawn towards rare outliers where the log says little."""
+def _estimate_rates(counts: FloatArray, rates: FloatArray) -> bool:
+    """Baum-Welch update of the rates, towards rare outliers where the log says little; whether they stand still."""
     isolated = (counts[0] + 0.005 * PRIOR_SAMPLES) / (counts[2] + PRIOR_SAMPLES)
     begins = (counts[1] + 0.0005 * PRIOR_SAMPLES) / (counts[2] + PRIOR_SAMPLES)
     stays = (counts[3] + START_RATES[2] * PRIOR_SAMPLES) / (counts[4] + PRIOR_SAMPLES)
-    rates[0] = min(isolated, MAX_RATES[0])
-    rates[1] = min(begins, MAX_RATES[1])
-    rates[2] = min(max(stays, MIN_STAY), MAX_RATES[2])
+    still = True
+    found = (min(isolated, MAX_RATES[0]), min(begins, MAX_RATES[1]), min(max(stays, MIN_STAY), MAX_RATES[2]))
+    for i in range(3):
+        still = still and abs(found[i] - rates[i]) < STILL * rates[i]
+        rates[i] = found[i]
+    return bool(still)
 
 
 @kernel
@@ -117,7 +120,8 @@ def classify(residual: Matrix, variance: Matrix, noise_variance: Vector, rates: 
         _likely(residual, variance, c, noise_variance[c], stretch, likely)
         for _ in range(ROUNDS):
             _chain(likely, filtered, rates[c], good, c, counts)
-            _estimate_rates(counts, rates[c])
+            if _estimate_rates(counts, rates[c]):
+                break
     return good
 
 

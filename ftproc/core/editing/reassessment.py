@@ -18,7 +18,7 @@ from ftproc.core.editing.decisions import Decision, Record, decide
 from ftproc.core.editing.runs import confirmed, runs_of, suspicious
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Start
-from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification.profile import fit_profile, from_knot, median_level, roughness
 from ftproc.core.identification.scales import scales_of
 from ftproc.medians import median
@@ -54,13 +54,14 @@ def reassess(record: Record, decision: Decision) -> Decision:
         return _until_settled(record, decision, profile)
     weight, unexamined = decision.weight.copy(), 0
     for span in _spans(widened):
+        span, own = from_knot(profile, record.time_s, span)
         part = _short(record, span)
         try:
             starts = _starts(part, weight[span], calm)
         except ValueError:  # a component has too few readings there
             continue
         initial = Decision(weight[span], calm, starts, decision.rates)
-        decided = _until_settled(part, initial, None)
+        decided = _until_settled(part, initial, own)
         weight[span] = decided.weight
         unexamined += decided.unexamined
     return decision._replace(weight=weight, starts=_starts(record, weight, calm), model=profile, unexamined=unexamined)
@@ -75,19 +76,17 @@ def _starts(record: Record, weight: FloatArray, calm: Model) -> list[Start]:
     return find_starts(record.weighted(weight), calm.noise_variance, float(calm.jerk[0, 0]))
 
 
-def _until_settled(record: Record, decision: Decision, profile: Model | None) -> Decision:
+def _until_settled(record: Record, decision: Decision, profile: Model) -> Decision:
     """Decide again from the calm level until nothing changes, or ROUNDS times.
 
     A round that rejects much of what was good is not believed: where the smallest noise that explains the readings
     left is taken for theirs, ever fewer are left. Nor is the outcome, if it makes all readings together less likely
     than the decisions before did, each with a jerk profile of its own: then turns are taken for patches.
     """
-    first = decision._replace(model=profile or _profile(record, decision))
-    profile = first.model
+    first = decision._replace(model=profile)
     search = alternatives.Search(record.work)
     tried_at = np.inf
     for _ in range(ROUNDS):
-        profile = profile or _profile(record, decision)
         calm = median_level(profile)
         level = float(calm.jerk[0, 0])
         if not tried_at / OTHER_LEVEL < level < tried_at * OTHER_LEVEL:
@@ -103,10 +102,8 @@ def _until_settled(record: Record, decision: Decision, profile: Model | None) ->
         again = decide(record, decision._replace(weight=weight, model=calm), tune_first=False)
         if (again.weight == decision.weight).all() or (again.weight.sum(0) < LEAST_KEPT * first.weight.sum(0)).any():
             break
-        decision, profile = again, None
-    found = decision._replace(
-        model=profile or _profile(record, decision), unexamined=len(search.unexamined - search.tried)
-    )
+        decision, profile = again, _profile(record, again)
+    found = decision._replace(model=profile, unexamined=len(search.unexamined - search.tried))
     if (found.weight != first.weight).any() and _likelihood(record, found) < _likelihood(record, first) - MARGIN:
         return first._replace(rounds=found.rounds, unexamined=found.unexamined)
     return found
@@ -178,7 +175,7 @@ def _likelihood(record: Record, decision: Decision) -> float:
     """Log-probability of all readings, of the decisions on them, of late time stamps and of the jerk profile."""
     model, calm = decision.model, median_level(decision.model)
     log = record.weighted(decision.weight)
-    smoothed = smooth_log(log, model, _starts(record, decision.weight, calm), residuals_only=True)
+    smoothed = smooth_log(log, model, _starts(record, decision.weight, calm), RESIDUALS)
     whole = alternatives.Neighbourhood(
         record.time_s, record.measurement, record.possible, model, decision.rates, record.gate, record.uneven
     )
@@ -229,7 +226,7 @@ def _suspects(record: Record, decision: Decision, calm: Model, profile: Model) -
     both ends even if it is not."""
     weight, starts = decision.weight, decision.starts
     log = record.weighted(weight)
-    smoothed = smooth_log(log, calm, starts, residuals_only=True)
+    smoothed = smooth_log(log, calm, starts, RESIDUALS)
     memory_s = scales_of(log, calm.noise_variance).memory_s(float(calm.jerk[0, 0]))
     suspects = suspicious(record.time_s, smoothed.residual, smoothed.residual_variance, weight, memory_s)
     if suspects.any():
@@ -251,6 +248,6 @@ def _near(
             starts = _starts(record.part(span), weight[span], median_level(own))
         except ValueError:  # a component has too few readings there
             span, own, starts = slice(None), model, _starts(record, weight, median_level(model))
-        smoothed = smooth_log(record.part(span).weighted(weight[span]), own, starts, residuals_only=True)
+        smoothed = smooth_log(record.part(span).weighted(weight[span]), own, starts, RESIDUALS)
         residual[span], variance[span] = smoothed.residual, smoothed.residual_variance
     return residual, variance

@@ -38,7 +38,7 @@ from ftproc.core.editing.reassessment import (
 from ftproc.core.filtering.bridging import CLOCK, Step, bridged, refined
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import SmootherRun, smooth_log
+from ftproc.core.filtering.smoother import STATES, SmootherRun, smooth_log
 from ftproc.core.identification import one_sided, uneven_noise
 from ftproc.core.identification.likelihood import Fixed, first_jerk, without_noise
 from ftproc.core.identification.one_sided import OneSided
@@ -175,13 +175,14 @@ def edit(
     segment_of: Model | None = None,
     live: bool = False,
     short: bool = False,
+    wanted: int = STATES,
 ) -> Edited:
     """Edit a whole log, or a segment of a long one. time_s (n,), measurement (n, 3).
 
     segment_of: of a segment, the noise of the whole log, which is taken as it is, and its typical jerk, with which the
     search starts. live: of a window that moves on, in which faults that stay are not looked for. short: too short to
-    tell whether the noise is uneven or correlated: it is taken for white. Raises ValueError when a component has no
-    reading that agrees with its neighbours.
+    tell whether the noise is uneven or correlated: it is taken for white. wanted: of the smoother, see `smooth_log`.
+    Raises ValueError when a component has no reading that agrees with its neighbours.
     """
     measurement, copied = without_copies(time_s, measurement)
     work = Work(len(time_s), 0 if live else WORK)  # a window that moves on is soon looked at again
@@ -209,11 +210,11 @@ def edit(
         profile = fit_profile(log, decision.starts, decision.model, PROFILE_STEPS)
         decision = decision._replace(model=with_allowance(log, profile))
     log, found = refined(log, decision.model, found)
-    smoothed = smooth_log(log, decision.model, decision.starts)
+    smoothed = smooth_log(log, decision.model, decision.starts, wanted)
     leaning = [] if live else one_sided.find(log, smoothed, record.rounding)
     if leaning:
         log = one_sided.without(log, leaning)
-        smoothed = smooth_log(log, decision.model, decision.starts)
+        smoothed = smooth_log(log, decision.model, decision.starts, wanted)
     faults = Faults(copied, (*found, *doubtful), tuple(leaning))
     return Edited(log, decision.model, decision.starts, smoothed, decision, faults)
 

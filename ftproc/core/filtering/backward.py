@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import part, record
-from ftproc.core.filtering.filters import OFFSETS, Filter, Update
+from ftproc.core.filtering.filters import OFFSETS, Filter, Posterior, Update
 from ftproc.core.filtering.forward import Estimated
+from ftproc.core.filtering.records import Sample
 from ftproc.core.model import motion
 from ftproc.core.model.measurement import line_of_sight_sigma
 from ftproc.core.signatures import Layout
@@ -72,9 +73,9 @@ ColouredBackwards = Annotated[Any, Layout(COLOURED)]
 
 
 @part
-def estimate(back: Backward, f: Update) -> None:
+def estimate(back: Backward, after: Posterior) -> None:
     """The smoothed state x+ + P+ r and its covariance P+ - P+ N P+."""
-    x, p, r, n, pn, state, cov = f.x, f.p, back.r, back.n, back.pn, back.state, back.cov
+    x, p, r, n, pn, state, cov = after.x, after.p, back.r, back.n, back.pn, back.state, back.cov
     for i in range(9):
         p0, p1, p2, p3, p4, p5, p6, p7, p8 = (
             p[i, 0], p[i, 1], p[i, 2], p[i, 3], p[i, 4], p[i, 5], p[i, 6], p[i, 7], p[i, 8]
@@ -97,20 +98,25 @@ def estimate(back: Backward, f: Update) -> None:
 
 
 @part
-def store(back: Backward, f: Update, row: Estimated) -> None:
+def store(back: Backward, after: Posterior, row: Estimated) -> None:
     """Keep the smoothed state of a sample and its sigmas."""
+    estimate(back, after)
     for i in range(9):
         row.state[i] = back.state[i]
         # Rounding may eat a variance that the record has all but determined; it cannot be below that rounding.
-        row.sigma[i] = math.sqrt(max(back.cov[i, i], 1e-14 * abs(f.p[i, i])))
+        row.sigma[i] = math.sqrt(max(back.cov[i, i], 1e-14 * abs(after.p[i, i])))
     line_of_sight_sigma(back.state, back.cov, row.los_sigma)
 
 
 @part
-def store_shift(back: Backward, f: Update, row: Shift) -> None:
+def store_shift(back: Backward, after: Posterior, row: Shift) -> None:
     """Keep the score and the information of a step that begins after a sample: of the offsets, r and N themselves, of
     the clock, those along the way that the state goes in a second."""
     r, n, state = back.r, back.n, back.state
+    for i in range(3, OFFSETS):
+        state[i] = after.x[i]
+        for j in range(OFFSETS):
+            state[i] += after.p[i, j] * r[j]
     for i in range(3):
         row.score[i] = r[OFFSETS + i]
         row.information[i] = n[OFFSETS + i, OFFSETS + i]
@@ -122,11 +128,11 @@ def store_shift(back: Backward, f: Update, row: Shift) -> None:
 
 
 @part
-def absorb(back: Backward, f: Update, residuals: bool) -> None:
+def absorb(back: Backward, update: Update, after: Posterior, sample: Sample, residuals: bool) -> None:
     """Take r and N back over the measurement of a sample, and add to the score of the noise; leave the leave-one-out
-    residuals and their variances behind, if they are wanted."""
+    residuals and their variances behind, if they are wanted. after: needed where a reading is left out."""
     r, n, v, w, nu = back.r, back.n, back.v, back.w, back.nu
-    y, g, u = f.y, f.g, f.u
+    y, g, u = update.y, update.g, update.u
     for i in range(3):
         u0, u1, u2, u3, u4, u5, u6, u7, u8 = (
             u[i, 0], u[i, 1], u[i, 2], u[i, 3], u[i, 4], u[i, 5], u[i, 6], u[i, 7], u[i, 8]
@@ -157,7 +163,7 @@ def absorb(back: Backward, f: Update, residuals: bool) -> None:
             n[b, a] = t
             n[a, b] = t
     if len(r) > OFFSETS:
-        _absorb_offsets(back, f)
+        _absorb_offsets(back, update)
     for a in range(3):
         for b in range(a + 1):
             t = n[a, b]
@@ -167,14 +173,14 @@ def absorb(back: Backward, f: Update, residuals: bool) -> None:
                     t += g[i, a] * w[i, j] * g[j, b]
             n[a, b] = t
             n[b, a] = t
-    _leave_out(back, f, residuals)
+    _leave_out(back, update, after, sample, residuals)
 
 
 @part
-def _absorb_offsets(back: Backward, f: Update) -> None:
+def _absorb_offsets(back: Backward, update: Update) -> None:
     """What the offsets, which H sees by a unit matrix, add to `absorb`: their rows and columns of r and N, against all
     of the state. (nu is still that of before; N's position block is yet to be changed.)"""
-    r, n, v, w, nu, g, root = back.r, back.n, back.v, back.w, back.nu, f.g, f.root
+    r, n, v, w, nu, g, root = back.r, back.n, back.v, back.w, back.nu, update.g, update.root
     for b in range(3):
         at = OFFSETS + b
         r[at] += root[0, b] * v[0] + root[1, b] * v[1] + root[2, b] * v[2]
@@ -203,48 +209,48 @@ def _absorb_offsets(back: Backward, f: Update) -> None:
 
 
 @part
-def _leave_out(back: Backward, f: Update, residuals: bool) -> None:
+def _leave_out(back: Backward, update: Update, after: Posterior, sample: Sample, residuals: bool) -> None:
     """Residual and variance of each component without itself, and the score of the noise, from v and W, and from r and
     N before the measurement."""
-    v, w, root = back.v, back.w, f.root
+    v, w, root, used, noise = back.v, back.w, update.root, update.used, sample.noise
     for i in range(3):
-        if not math.isfinite(f.e[i]):
+        if not math.isfinite(sample.measurement[i]):
             back.residual[i] = back.variance[i] = math.nan
-        elif f.used[i] > 0:
+        elif used[i] > 0:
             pull = root[0, i] * v[0] + root[1, i] * v[1] + root[2, i] * v[2]
             m = 0.0
             for j in range(3):
                 m += root[j, i] * (w[j, 0] * root[0, i] + w[j, 1] * root[1, i] + w[j, 2] * root[2, i])
             back.residual[i] = pull / m
-            back.variance[i] = 1 / m + f.noise[i] * (1 - 1 / f.used[i])
-            half = 0.5 * f.noise[i] / f.used[i]
+            back.variance[i] = 1 / m + noise[i] * (1 - 1 / used[i])
+            half = 0.5 * noise[i] / used[i]
             back.noise[0, i] += half * pull * pull
             back.noise[1, i] += half * m
         elif residuals:  # not used: what all the rest predicts is the smoothed estimate itself
-            _predict_reading(back, f, i)
+            _predict_reading(back, update, after, sample, i)
 
 
 @part
-def _predict_reading(back: Backward, f: Update, i: int) -> None:
+def _predict_reading(back: Backward, update: Update, after: Posterior, sample: Sample, i: int) -> None:
     """The same of a component that is not used; P H' before the measurement is P+ H' + U'U H'."""
-    p, h, u, column = f.p, f.h, f.u, back.pn
+    p, h, u, column = after.p, after.h, update.u, back.pn
     u0 = u[0, 0] * h[i, 0] + u[0, 1] * h[i, 1] + u[0, 2] * h[i, 2]
     u1 = u[1, 0] * h[i, 0] + u[1, 1] * h[i, 1] + u[1, 2] * h[i, 2]
     u2 = u[2, 0] * h[i, 0] + u[2, 1] * h[i, 1] + u[2, 2] * h[i, 2]
     if len(p) > OFFSETS:
         u0, u1, u2 = u0 + u[0, OFFSETS + i], u1 + u[1, OFFSETS + i], u2 + u[2, OFFSETS + i]
     for a in range(len(p)):
-        after = p[a, 0] * h[i, 0] + p[a, 1] * h[i, 1] + p[a, 2] * h[i, 2]
+        shared = p[a, 0] * h[i, 0] + p[a, 1] * h[i, 1] + p[a, 2] * h[i, 2]
         if len(p) > OFFSETS:
-            after += p[a, OFFSETS + i]
-        column[a] = after + u[0, a] * u0 + u[1, a] * u1 + u[2, a] * u2
-    predicted, spread = 0.0, f.c[i, i]
+            shared += p[a, OFFSETS + i]
+        column[a] = shared + u[0, a] * u0 + u[1, a] * u1 + u[2, a] * u2
+    predicted, spread = 0.0, after.c[i, i]
     for a in range(len(p)):
         predicted += column[a] * back.r[a]
         for b in range(len(p)):
             spread -= column[a] * back.n[a, b] * column[b]
-    back.residual[i] = f.e[i] - predicted
-    back.variance[i] = max(spread, 0.0) + f.noise[i] + f.late[i] * f.late[i]
+    back.residual[i] = after.e[i] - predicted
+    back.variance[i] = max(spread, 0.0) + sample.noise[i] + sample.late[i] * sample.late[i]
 
 
 @part
@@ -266,6 +272,8 @@ def score_wander(back: Backward, f: Filter, interval: float) -> None:
     """Add to the score of the offsets' variances, by their logarithms: over an interval, or of the first state
     (infinite)."""
     for i in range(OFFSETS, len(back.r)):
+        if f.fade_s[i - OFFSETS] >= motion.FOREVER_S:
+            continue
         fade = math.exp(-interval / f.fade_s[i - OFFSETS])
         half = 0.5 * (1 - fade * fade) * f.wander[i - OFFSETS]
         back.wander[0, i - OFFSETS] += half * back.r[i] * back.r[i]

@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import empty, kernel, part, variant, zeros
 from ftproc.core.filtering import backward, smoother
-from ftproc.core.filtering.filters import FILTER, UPDATE, Filter, Filters, Update, Updates
+from ftproc.core.filtering.filters import FILTER, POSTERIOR, UPDATE, Filter, Filters, Posteriors, Update, Updates
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Estimates, Residuals, Span, extrapolated
 from ftproc.core.filtering.memory import scratch
-from ftproc.core.filtering.records import Model, Observations, Start
+from ftproc.core.filtering.records import Model, Observations, Sample, Start
 from ftproc.core.filtering.smoother import SCORES, STATES, SmootherRun, smoothed_covariance
 from ftproc.core.signatures import Cube, Indices, Matrix, Vector
 
@@ -56,6 +56,7 @@ class Memory(NamedTuple):
     filters: Filters
     before: Filters
     block: Updates
+    after: Posteriors
     back: backward.Backwards
     estimates: Estimates
     residuals: Residuals
@@ -141,12 +142,13 @@ def _carry(memory: Any, f: Filter, k: int, interval: float, place: int) -> None:
 
 
 @part
-def _carry_back(memory: Any, update: Update, k: int, interval: float, place: int, wanted: int) -> None:
+def _carry_back(memory: Any, update: Update, sample: Sample, k: int, interval: float, place: int, wanted: int) -> None:
     if wanted == SCORES:
         return
     a, white, s = memory.adjoint, memory.white[place], memory.in_block[place]
     smoothed, row, left = memory.state, memory.estimates[k], memory.residuals[k]
-    g, u, p, root, m, h = update.g, update.u, update.p, update.root, len(memory.score), 0.5 * interval * interval
+    g, u, root, m, h = update.g, update.u, update.root, len(memory.score), 0.5 * interval * interval
+    p, seen = memory.after[place].p, memory.after[place].h
     for i in range(9):
         for c in range(m):
             smoothed[i, c] = s[i, c]
@@ -170,16 +172,16 @@ def _carry_back(memory: Any, update: Update, k: int, interval: float, place: int
             if update.used[i] > 0:
                 share = root[0, i] * white[0, c] + root[1, i] * white[1, c] + root[2, i] * white[2, c]
             else:
-                share = _derivative(memory, k, i, c) + update.h[i, 0] * smoothed[0, c]
-                share += update.h[i, 1] * smoothed[1, c] + update.h[i, 2] * smoothed[2, c]
+                share = _derivative(memory, k, i, c) + seen[i, 0] * smoothed[0, c]
+                share += seen[i, 1] * smoothed[1, c] + seen[i, 2] * smoothed[2, c]
             lost += share * share
         if not update.used[i] > 0:
             left.residual_variance[i] += lost
         else:
-            known = 1 / (left.residual_variance[i] - update.noise[i] * (1 - 1 / update.used[i]))
+            known = 1 / (left.residual_variance[i] - sample.noise[i] * (1 - 1 / update.used[i]))
             rest = max(known - lost, LEAST_LEFT * known)
             left.residual[i] *= known / rest
-            left.residual_variance[i] = 1 / rest + update.noise[i] * (1 - 1 / update.used[i])
+            left.residual_variance[i] = 1 / rest + sample.noise[i] * (1 - 1 / update.used[i])
     for i in range(3):
         g0, g1, g2 = g[0, i], g[1, i], g[2, i]
         for c in range(m):
@@ -211,8 +213,8 @@ def smooth_biased(log: Observations, model: Model, start: Start, directions: Dir
     blocks, rows = -(-(n - first) // BLOCK), min(n - first, BLOCK)
     estimates, residuals = zeros(ESTIMATED, n), zeros(LEFT, n)
     memory = Memory(
-        model.filter(start), empty(FILTER, blocks), scratch(UPDATE, rows), zeros(backward.BACKWARD), estimates,
-        residuals,
+        model.filter(start), empty(FILTER, blocks), scratch(UPDATE, rows), scratch(POSTERIOR, rows),
+        zeros(backward.BACKWARD), estimates, residuals,
         np.ascontiguousarray(log.sites.station), np.ascontiguousarray(directions.design),
         np.ascontiguousarray(directions.columns),
         np.zeros((9, m)), np.zeros((9, m)), np.zeros((blocks, 9, m)), np.zeros((rows, 9, m)),
@@ -221,7 +223,7 @@ def smooth_biased(log: Observations, model: Model, start: Start, directions: Dir
     jerk = np.zeros((len(model.jerk), 2, 3))
     samples, profile = log.samples(model.noise_variance), model.profile(log.time_s)
     likelihood = _sweep_biased(Span(first, n, first), samples, profile, memory, jerk, STATES)
-    covariance = smoothed_covariance(memory.block["p"][0], memory.back["n_first"][0])[:9, :9]
+    covariance = smoothed_covariance(memory.after["p"][0], memory.back["n_first"][0])[:9, :9]
     covariance += memory.state @ memory.state.T
     head = Start(first, memory.back["state"][0, :9].copy(), covariance)
     estimates[:first], residuals[:first] = extrapolated(log, model, head)

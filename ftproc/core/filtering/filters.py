@@ -18,10 +18,10 @@ class Filter(Protocol):
 
     x, p: state and covariance, SI units. noise, late: of this sample, see `records.Sample`. wander, fade_s: variance
     and correlation time of the offset of each component. jerk: density of the jerk along each axis, see `motion`. q:
-    coefficients of Q. z_hat: predicted measurement. e: innovation. used: weight of each component, zero for none. h: H on the position. s: innovation covariance. root:
-    L^-1, whose rows and columns are zero for components not used. c, y, g, u: see `ukf`. pxz, gain, rest: P H', K and
-    S - H P H', where they are asked for. factor: of the position block of P. d: by pair of sigma points, component and
-    side. bend: its mean, h(x) to z_hat.
+    coefficients of Q. z_hat: predicted measurement. e: innovation. used: weight of each component, zero for none. h: H
+    on the position. s: innovation covariance. root: L^-1, whose rows and columns are zero for components not used. c,
+    y, g, u: see `ukf`. pxz, gain, rest: P H', K and S - H P H', where they are asked for. factor: of the position block
+    of P. d: by pair of sigma points, component and side. bend: its mean, h(x) to z_hat.
     """
 
     x: Annotated[FloatArray, 9]
@@ -61,56 +61,70 @@ class Coloured(Filter, Protocol):
 
 
 class Update(Protocol):
-    """What one measurement update leaves for the way back, under its names in `Filter`; those from x on only where they
-    are asked for."""
+    """What one measurement update leaves for the way back, under its names in `Filter`."""
 
     y: Annotated[FloatArray, 3]
-    e: Annotated[FloatArray, 3]
     used: Annotated[FloatArray, 3]
-    noise: Annotated[FloatArray, 3]
-    late: Annotated[FloatArray, 3]
     root: Annotated[FloatArray, 3, 3]
     g: Annotated[FloatArray, 3, 3]
     u: Annotated[FloatArray, 3, 9]
-    x: Annotated[FloatArray, 9]
-    p: Annotated[FloatArray, 9, 9]
-    h: Annotated[FloatArray, 3, 3]
-    c: Annotated[FloatArray, 3, 3]
 
 
 class ColouredUpdate(Update, Protocol):
     """The same of a state that ends with the offsets of range, azimuth and elevation."""
 
     u: Annotated[FloatArray, 3, 12]
+
+
+class Posterior(Protocol):
+    """The state after an update, and the linearisation that led to it, where the way back asks for them; under their
+    names in `Filter`."""
+
+    x: Annotated[FloatArray, 9]
+    p: Annotated[FloatArray, 9, 9]
+    e: Annotated[FloatArray, 3]
+    h: Annotated[FloatArray, 3, 3]
+    c: Annotated[FloatArray, 3, 3]
+
+
+class ColouredPosterior(Posterior, Protocol):
+    """The same of a state that ends with the offsets of range, azimuth and elevation."""
+
     x: Annotated[FloatArray, 12]
     p: Annotated[FloatArray, 12, 12]
 
 
 FILTER, COLOURED = record(Filter), record(Coloured)
 UPDATE, COLOURED_UPDATE = record(Update), record(ColouredUpdate)
+POSTERIOR, COLOURED_POSTERIOR = record(Posterior), record(ColouredPosterior)
 Filters = Annotated[Any, Layout(FILTER)]
 ColouredFilters = Annotated[Any, Layout(COLOURED)]
 Updates = Annotated[Any, Layout(UPDATE)]
 ColouredUpdates = Annotated[Any, Layout(COLOURED_UPDATE)]
+Posteriors = Annotated[Any, Layout(POSTERIOR)]
+ColouredPosteriors = Annotated[Any, Layout(COLOURED_POSTERIOR)]
 OFFSETS = 9  # where these begin
 
 
 @part
-def retain(f: Filter, update: Update, whole: bool) -> None:
-    """Keep what an update leaves for the way back; whole: with the state and its linearisation."""
+def retain(f: Filter, update: Update) -> None:
+    """Keep what an update leaves for the way back."""
     for i in range(3):
-        update.y[i], update.e[i], update.used[i] = f.y[i], f.e[i], f.used[i]
-        update.noise[i], update.late[i] = f.noise[i], f.late[i]
+        update.y[i], update.used[i] = f.y[i], f.used[i]
         for j in range(3):
             update.root[i, j], update.g[i, j] = f.root[i, j], f.g[i, j]
         for j in range(len(f.x)):
             update.u[i, j] = f.u[i, j]
-    if not whole:
-        return
+
+
+@part
+def retain_state(f: Filter, after: Posterior) -> None:
+    """Keep the state, and the linearisation that led to it."""
     for i in range(3):
+        after.e[i] = f.e[i]
         for j in range(3):
-            update.h[i, j], update.c[i, j] = f.h[i, j], f.c[i, j]
+            after.h[i, j], after.c[i, j] = f.h[i, j], f.c[i, j]
     for i in range(len(f.x)):
-        update.x[i] = f.x[i]
+        after.x[i] = f.x[i]
         for j in range(len(f.x)):
-            update.p[i, j] = f.p[i, j]
+            after.p[i, j] = f.p[i, j]

@@ -11,11 +11,15 @@ from ftproc.core.compiled import empty, zeros
 from ftproc.core.filtering import backward
 from ftproc.core.filtering.filters import (
     COLOURED,
+    COLOURED_POSTERIOR,
     COLOURED_UPDATE,
+    POSTERIOR,
     UPDATE,
     ColouredFilters,
+    ColouredPosteriors,
     ColouredUpdates,
     Filters,
+    Posteriors,
     Updates,
 )
 from ftproc.core.filtering.forward import Estimates, Residuals
@@ -25,11 +29,13 @@ BLOCK = 1 << 16  # samples whose updates are kept
 
 class Memory(NamedTuple):
     """What a sweep works on: a `filters.Filter`, the filters before each block, the `filters.Update` of each sample of
-    a block, and one `backward.Backward`; and what it fills, sample by sample of the log."""
+    a block and its `filters.Posterior`, if that is asked for, and one `backward.Backward`; and what it fills, sample by
+    sample of the log."""
 
     filters: Filters
     before: Filters
     block: Updates
+    after: Posteriors
     back: backward.Backwards
     estimates: Estimates
     residuals: Residuals
@@ -41,6 +47,7 @@ class ColouredMemory(NamedTuple):
     filters: ColouredFilters
     before: ColouredFilters
     block: ColouredUpdates
+    after: ColouredPosteriors
     back: backward.ColouredBackwards
     estimates: Estimates
     residuals: Residuals
@@ -50,9 +57,11 @@ def memory_of(samples: int, first: Any, estimates: Any, residuals: Any) -> Any:
     """For a span of so many samples that begins with a filter (an array of one record, which is changed)."""
     coloured = first.dtype == COLOURED
     before = empty(first.dtype, -(-samples // BLOCK))
-    block = scratch(COLOURED_UPDATE if coloured else UPDATE, min(samples, BLOCK))
+    rows = min(samples, BLOCK)
+    block = scratch(COLOURED_UPDATE if coloured else UPDATE, rows)
+    after = scratch(COLOURED_POSTERIOR if coloured else POSTERIOR, rows)
     back = zeros(backward.COLOURED if coloured else backward.BACKWARD)
-    return (ColouredMemory if coloured else Memory)(first, before, block, back, estimates, residuals)
+    return (ColouredMemory if coloured else Memory)(first, before, block, after, back, estimates, residuals)
 
 
 _held = threading.local()

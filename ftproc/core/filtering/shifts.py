@@ -9,14 +9,13 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, variant, zeros
 from ftproc.core.filtering import backward, smoother
-from ftproc.core.filtering.filters import FILTER, Filters, Updates
+from ftproc.core.filtering.filters import FILTER, Filters, Posteriors, Updates
 from ftproc.core.filtering.forward import LEFT, Residuals, Span
 from ftproc.core.filtering.memory import memory_of
 from ftproc.core.filtering.records import Model, Observations, Start, between
+from ftproc.core.model import motion
 
 FloatArray = NDArray[np.float64]
-
-FOREVER_S = 1e300  # correlation time of an offset that stays
 
 
 class ShiftMemory(NamedTuple):
@@ -26,6 +25,7 @@ class ShiftMemory(NamedTuple):
     filters: Filters
     before: Filters
     block: Updates
+    after: Posteriors
     back: backward.ColouredBackwards
     estimates: backward.Shifts
     residuals: Residuals
@@ -57,7 +57,7 @@ def shifts(log: Observations, model: Model, starts: list[Start]) -> Shifts:
     residuals = zeros(LEFT, n)
     for start, stop in between(starts, n):
         first = zeros(FILTER)
-        first["x"][0], first["p"][0], first["fade_s"] = start.state, start.covariance, FOREVER_S
+        first["x"][0], first["p"][0], first["fade_s"] = start.state, start.covariance, motion.FOREVER_S
         memory = ShiftMemory(*memory_of(stop - start.sample, first, found, residuals))
         memory = memory._replace(back=zeros(backward.COLOURED))
         span = Span(start.sample, stop, start.sample)

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from ftproc.core import pacing
 from ftproc.core.compiled import empty, kernel, part, variant
 from ftproc.core.filtering import backward, sites, ukf
-from ftproc.core.filtering.filters import OFFSETS, Filter, Update, retain
+from ftproc.core.filtering.filters import OFFSETS, Filter, Update, retain, retain_state
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Span, advance, extrapolated
 from ftproc.core.filtering.memory import ColouredMemory, Memory, memory_of
 from ftproc.core.filtering.records import Model, Observations, Sample, Samples, Start, between
@@ -65,8 +65,9 @@ class SmootherRun(NamedTuple):
 
 LEAST_SHARE = 3e-8  # of a variance: less cannot be told from what a sweep rounds off
 
-#: What is wanted of a sweep: the likelihood, its scores too, the residuals of each sample too, the states too.
-LIKELIHOOD, SCORES, RESIDUALS, STATES = range(4)
+#: What is wanted of a sweep: the likelihood, its scores too, the residuals of each sample too, the state at each start
+#: too, that of each sample too.
+LIKELIHOOD, SCORES, RESIDUALS, HEADS, STATES = range(5)
 
 
 @part
@@ -80,11 +81,11 @@ def _take_in(f: Filter, sample: Sample) -> tuple[float, float]:
 
 
 @part
-def _leaves_some(f: Filter) -> bool:
+def _leaves_some(f: Filter, sample: Sample) -> bool:
     """Whether a reading is there, but is not used."""
     left = False
     for i in range(3):
-        left = left or (math.isfinite(f.e[i]) and not f.used[i] > 0)
+        left = left or (math.isfinite(sample.measurement[i]) and not f.used[i] > 0)
     return left
 
 
@@ -115,7 +116,7 @@ def _carry(memory: Any, f: Filter, k: int, interval: float, place: int) -> None:
 
 
 @part
-def _carry_back(memory: Any, update: Update, k: int, interval: float, place: int, wanted: int) -> None:
+def _carry_back(memory: Any, update: Update, sample: Sample, k: int, interval: float, place: int, wanted: int) -> None:
     """and back."""
 
 
@@ -124,8 +125,8 @@ def _swept_through(
 ) -> float:
     """The sweeps over a span; the log-likelihood. Adds to the sums (m, 2, 3) of the jerk's score; fills what is wanted.
     At the end `back` holds the state of the first sample, if more than scores are wanted."""
-    f, before, block, back = memory.filters[0], memory.before, memory.block, memory.back[0]
-    estimates, residuals = memory.estimates, memory.residuals
+    f, before, block, after = memory.filters[0], memory.before, memory.block, memory.after
+    back, estimates, residuals = memory.back[0], memory.estimates, memory.residuals
     likelihood, last = 0.0, len(before) - 1
     for turn in range(2 * last + 1):  # block by block to the last one, and back
         b = last - abs(turn - last)
@@ -146,31 +147,34 @@ def _swept_through(
             if turn <= last:
                 likelihood += gained
             if turn >= last and wanted >= SCORES:
-                whole = wanted == STATES or (wanted == RESIDUALS and (k == span.first or _leaves_some(f)))
-                retain(f, block[k - low], whole or len(f.x) > OFFSETS)
+                retain(f, block[k - low])
+                asked = wanted >= RESIDUALS and (k == span.first or _leaves_some(f, sample))
+                if wanted == STATES or asked or len(f.x) > OFFSETS:
+                    retain_state(f, after[k - low])
                 if wanted >= RESIDUALS:
                     residuals[k].nis = nis
         if turn < last or wanted == LIKELIHOOD:
             continue
         for k in range(high - 1, low - 1, -1):
-            update, interval = block[k - low], samples[k].time_s - samples[max(k - 1, span.first)].time_s
-            if wanted == STATES or (wanted == RESIDUALS and k == span.first):
-                backward.estimate(back, update)
+            sample, interval = samples[k], samples[k].time_s - samples[max(k - 1, span.first)].time_s
+            update = block[k - low]
             if wanted == STATES:
-                _store(back, update, estimates[k])
+                _store(back, after[k - low], estimates[k])
+            elif wanted >= RESIDUALS and k == span.first:
+                backward.estimate(back, after[k - low])
             if k == span.first:
                 back.n_first[:] = back.n
-            backward.absorb(back, update, wanted >= RESIDUALS)
+            backward.absorb(back, update, after[k - low], sample, wanted >= RESIDUALS)
             if wanted >= RESIDUALS:
                 for i in range(3):
                     residuals[k].residual[i] = back.residual[i]
                     residuals[k].residual_variance[i] = back.variance[i]
-            _carry_back(memory, update, k, interval, k - low, wanted)
+            _carry_back(memory, update, sample, k, interval, k - low, wanted)
             if k > span.first:
                 backward.score_jerk(back, interval, jerk, motion.knot_index(samples[k].time_s, profile))
                 backward.score_wander(back, f, interval)
                 if k > low:
-                    backward.score_fade(back, block[k - 1 - low], f, interval)
+                    backward.score_fade(back, after[k - 1 - low], f, interval)
                 else:
                     backward.score_fade(back, before[b], f, interval)
                 motion.adjoint(back, interval)
@@ -258,8 +262,8 @@ def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) ->
         noise += memory.back["noise"][0]
         wander += memory.back["wander"][0]
         fade += memory.back["fade_score"][0]
-        if wanted == STATES or (wanted == RESIDUALS and 0 < start.sample == starts[0].sample):
-            covariance = smoothed_covariance(memory.block["p"][0], memory.back["n_first"][0])[:9, :9]
+        if wanted >= HEADS or (wanted == RESIDUALS and 0 < start.sample == starts[0].sample):
+            covariance = smoothed_covariance(memory.after["p"][0], memory.back["n_first"][0])[:9, :9]
             heads.append(Start(start.sample, memory.back["state"][0, :9].copy(), covariance))
     slopes = (Slope(*noise), Slope(*wander), fade, Slope(jerk[:, 0] * model.jerk, jerk[:, 1] * model.jerk))
     return _Swept(Scores(likelihood, *slopes), estimates, residuals, tuple(heads))
@@ -271,18 +275,18 @@ def likelihood_of(log: Observations, model: Model, starts: list[Start]) -> float
 
 
 def score_log(log: Observations, model: Model, starts: list[Start]) -> Scores:
-    """The likelihood and its scores alone, at two thirds of the cost of `smooth_log`."""
+    """The likelihood and its scores alone, at half the cost of `smooth_log`."""
     return _swept(log, model, starts, SCORES).scores
 
 
-def smooth_log(log: Observations, model: Model, starts: list[Start], residuals_only: bool = False) -> SmootherRun:
+def smooth_log(log: Observations, model: Model, starts: list[Start], wanted: int = STATES) -> SmootherRun:
     """Smooth the whole log; the record on each side of a start separately. Samples before the first start are
     extrapolated.
 
-    residuals_only: states and sigmas are left out (of no sample), which saves a third of the time, and all heads but
-    that of a first start after the first sample.
+    wanted: HEADS leaves out states and sigmas (of no sample), which saves half of the time, RESIDUALS also all heads
+    but that of a first start after the first sample.
     """
-    scores, estimates, residuals, heads = _swept(log, model, starts, RESIDUALS if residuals_only else STATES)
+    scores, estimates, residuals, heads = _swept(log, model, starts, wanted)
     first = starts[0].sample
     if first > 0:
         before, residuals[:first] = extrapolated(log, model, heads[0])

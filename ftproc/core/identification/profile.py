@@ -98,12 +98,13 @@ def median_level(model: Model) -> Model:
 
 def from_knot(model: Model, time_s: FloatArray, span: slice) -> tuple[slice, Model]:
     """A stretch of a log with these times (n,), from the knot of the jerk profile on before which it begins, and the
-    model for it."""
+    model for it, whose profile ends with it."""
     if not math.isfinite(model.knot_s):
         return span, model
-    first = min(int((time_s[span.start] - time_s[0]) / model.knot_s), len(model.jerk) - 1)
+    first, last = (int((time_s[span][end] - time_s[0]) / model.knot_s) for end in (0, -1))
+    first = min(first, len(model.jerk) - 1)
     start = int(np.searchsorted(time_s, time_s[0] + first * model.knot_s))
-    return slice(min(start, span.start), span.stop), model._replace(jerk=model.jerk[first:])
+    return slice(min(start, span.start), span.stop), model._replace(jerk=model.jerk[first : last + 1])
 
 
 def with_allowance(log: Observations, model: Model, scales: Scales | None = None) -> Model:

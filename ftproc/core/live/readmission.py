@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.editing import outlier_chain, patch_likelihood
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 
 FloatArray = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class Open(NamedTuple):
 def settled(case: Open, gate: float) -> Open:
     """Smooth and decide by turns until the decisions stand still; gate: in sigmas."""
     for _ in range(ROUNDS):
-        smoothed = smooth_log(case.log, case.model, [case.start], residuals_only=True)
+        smoothed = smooth_log(case.log, case.model, [case.start], RESIDUALS)
         good = outlier_chain.classify(
             smoothed.residual, smoothed.residual_variance, case.model.reading_variance, case.rates.copy(), gate
         )
@@ -82,7 +82,7 @@ def _rejected(case: Open, c: int) -> NDArray[np.int64]:
 def _log_probability(case: Open, weight: FloatArray) -> float:
     """Log-probability of all readings with these decisions."""
     log = case.log._replace(weight=weight)
-    smoothed = smooth_log(log, case.model, [case.start], residuals_only=True)
+    smoothed = smooth_log(log, case.model, [case.start], RESIDUALS)
     total, sigma = smoothed.log_likelihood, np.sqrt(case.model.reading_variance)
     for c in range(3):
         seen = np.flatnonzero(case.possible[:, c])

@@ -23,6 +23,8 @@ from ftproc.core.signatures import Matrix
 
 FloatArray = NDArray[np.float64]
 
+FOREVER_S = 1e300  # correlation time of an offset that stays as it is
+
 
 class Moving(Protocol):
     """x (9,) and P (9, 9) of a record, the density of the jerk along each axis (3,), and memory for Q's coefficients:
@@ -159,6 +161,8 @@ def wander_back(b: Adjoint, interval: float, fade_s: FloatArray) -> None:
     """The backward counterpart of `wander` for r and N."""
     n = len(b.r)
     for i in range(9, n):
+        if fade_s[i - 9] >= FOREVER_S:
+            continue
         fade = math.exp(-abs(interval) / fade_s[i - 9])
         b.r[i] *= fade
         for j in range(n):

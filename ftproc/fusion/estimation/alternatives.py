@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.editing import outlier_chain, patch_likelihood
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.fusion.estimation.places import Channel, Search
 from ftproc.records import FloatArray, IntArray
 
@@ -129,7 +129,7 @@ def likeliest(near: Neighbourhood, search: Search) -> FloatArray | None:
 
 def _tense(near: Neighbourhood, calm: Model) -> bool:
     """Whether the readings that are used now do not fit a calm flight somewhere about the place."""
-    run = smooth_log(near.log, calm, [near.start], residuals_only=True)
+    run = smooth_log(near.log, calm, [near.start], RESIDUALS)
     squares = np.where(near.log.weight > 0, run.residual**2 / run.residual_variance, 0.0).sum(1)
     count = ((near.log.weight > 0) & np.isfinite(run.residual)).sum(1)
     time_s = near.log.time_s
@@ -200,7 +200,7 @@ def _share_lost(near: Neighbourhood, channel: Channel) -> float:
 def _step(near: Neighbourhood, weight: FloatArray, model: Model) -> tuple[Outcome, FloatArray]:
     """How likely decisions are, and those that follow from them."""
     log = near.log._replace(weight=weight)
-    run = smooth_log(log, model, [near.start], residuals_only=True)
+    run = smooth_log(log, model, [near.start], RESIDUALS)
     likelihood, following = run.log_likelihood, np.zeros_like(weight)
     for s in range(len(near.sigma)):
         rows = np.flatnonzero(near.station == s)

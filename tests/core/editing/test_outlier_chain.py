@@ -12,7 +12,7 @@ NAN = np.nan
 
 
 def enumerated(residual, variance, noise, gate, rates):
-    """P(good) of one component and its rates after three rounds of learning, by the sum over all sequences."""
+    """P(good) of one component and its rates after up to three rounds of learning, by the sum over all sequences."""
     seen = np.isfinite(residual)
     r, v = residual[seen], variance[seen] * (gate / outlier_chain.NATURAL_GATE) ** 2
     wide = v + outlier_chain.WIDE**2 * noise
@@ -25,11 +25,16 @@ def enumerated(residual, variance, noise, gate, rates):
         p, counts = naive.chain(good, bad, step)
         outside, most, prior = counts[:2].sum(), outlier_chain.MAX_RATES, outlier_chain.PRIOR_SAMPLES
         stays = (counts[2, 2] + outlier_chain.START_RATES[2] * prior) / (counts[2].sum() + prior)
-        rates = (
-            min((counts[:2, 1].sum() + 0.005 * prior) / (outside + prior), most[0]),
-            min((counts[:2, 2].sum() + 0.0005 * prior) / (outside + prior), most[1]),
-            np.clip(stays, outlier_chain.MIN_STAY, most[2]),
+        before, rates = (
+            rates,
+            (
+                min((counts[:2, 1].sum() + 0.005 * prior) / (outside + prior), most[0]),
+                min((counts[:2, 2].sum() + 0.0005 * prior) / (outside + prior), most[1]),
+                np.clip(stays, outlier_chain.MIN_STAY, most[2]),
+            ),
         )
+        if np.allclose(rates, before, rtol=outlier_chain.STILL, atol=0):
+            break
     found = np.zeros(len(residual))
     found[seen] = p
     return found, np.array(rates)

@@ -156,6 +156,5 @@ def test_likelihood_is_highest_near_the_true_noise_and_jerk():
 def test_a_sigma_is_a_number_even_where_the_covariance_is_none():
     f, back, row = one(FILTER), one(backward.BACKWARD), one(ESTIMATED)
     f["x"], f["p"] = np.arange(1.0, 10.0), np.diag([-1.0, *np.ones(8)])
-    backward.estimate(back, f)
     backward.store(back, f, row)
     np.testing.assert_allclose(row["sigma"], [1e-7, *np.ones(8)])

@@ -80,7 +80,7 @@ def test_a_log_in_several_blocks_is_that_in_one(monkeypatch, n):
     a = a._replace(weight=a.weight * np.random.default_rng(2).choice([0.0, 1.0, 1.0], a.weight.shape))
     one, scores = smooth(a), smoother.score_log(a.log, a.model, a.starts)
     monkeypatch.setattr("ftproc.core.filtering.memory.BLOCK", 64)
-    found, residuals = smooth(a), smoother.smooth_log(a.log, a.model, a.starts, residuals_only=True)
+    found, residuals = smooth(a), smoother.smooth_log(a.log, a.model, a.starts, smoother.RESIDUALS)
     for name in ("state", "sigma", "los_sigma", "residual", "residual_variance", "nis"):
         np.testing.assert_array_equal(getattr(found, name), getattr(one, name), err_msg=name)
     np.testing.assert_array_equal(residuals.residual, one.residual)
@@ -101,6 +101,23 @@ def test_block_length_does_not_matter():
     np.testing.assert_allclose((shifted.state[silent:] - plain.state) / plain.sigma, 0, atol=1e-9)
     np.testing.assert_allclose(shifted.residual[silent:], plain.residual, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(shifted.state[:silent], np.tile(plain.state[0], (silent, 1)), rtol=1e-12)
+
+
+def test_heads_are_those_of_a_run_that_keeps_all_states():
+    a = matched(9, 200, dt=0.2, missing=0.1)
+    starts = [Start(12, a.truth[12], a.starts[0].covariance), Start(90, a.truth[90], a.starts[0].covariance)]
+    whole, heads, only = (
+        smoother.smooth_log(a.log, a.model, starts, wanted)
+        for wanted in (smoother.STATES, smoother.HEADS, smoother.RESIDUALS)
+    )
+    assert [head.sample for head in heads.heads] == [12, 90]
+    for one, other in zip(whole.heads, heads.heads, strict=True):
+        np.testing.assert_array_equal(one.state, other.state)
+        np.testing.assert_array_equal(one.covariance, other.covariance)
+    for run in (heads, only):
+        assert run.state.shape == run.sigma.shape == (0, 9)
+        np.testing.assert_array_equal(run.residual, whole.residual)
+        np.testing.assert_array_equal(run.residual_variance, whole.residual_variance)
 
 
 def test_segments_are_independent():

@@ -7,7 +7,7 @@ import pytest
 
 from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.smoother import smooth_log
-from ftproc.core.identification.profile import fit_profile
+from ftproc.core.identification.profile import fit_profile, from_knot
 from ftproc.core.model import motion
 from ftproc.core.model.frames import from_cartesian
 from tests import naive
@@ -43,3 +43,18 @@ def test_profile_follows_the_flight():
     found = [smooth_log(a.log, m, a.starts).log_likelihood for m in (single, profile)]
     assert found[1] > found[0] + 5
     assert smoothed_error(a, profile) < smoothed_error(a, single)
+
+
+def test_a_stretch_keeps_the_pieces_of_the_profile_that_it_lies_in():
+    time = 0.1 * np.arange(600)
+    model = Model(SIGMA**2, np.arange(1.0, 21.0)[:, None] * motion.isotropic(1.0), 3.0)
+    for low, high in ((0, 600), (95, 250), (240, 241), (570, 700)):
+        span, own = from_knot(model, time, slice(low, high))
+        whole = model.profile(time)
+        part = own.profile(time[span])
+        assert span.start <= low < span.start + 31
+        assert span.stop == high
+        for t in time[low:high]:
+            at, of = (p.jerk[motion.knot_index(t + 1e-6, p), 0] for p in (part, whole))
+            assert at == of
+        assert len(own.jerk) == len({motion.knot_index(t, whole) for t in time[span]})

@@ -10,7 +10,7 @@ from scipy import stats
 
 from ftproc.core.editing import copies, decisions, two_pass
 from ftproc.core.filtering.records import Model, Observations, Uneven
-from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification import uneven_noise
 from ftproc.core.model.frames import from_cartesian, wrap
 from tests import naive
@@ -227,14 +227,14 @@ def test_repeats_count_once_where_chance_does_not_make_them():
 
 def test_drift_of_even_noise_is_none():
     a = matched(4, 3000)
-    assert uneven_noise.drift(a.log, smooth_log(a.log, a.model, a.starts, residuals_only=True)) is None
+    assert uneven_noise.drift(a.log, smooth_log(a.log, a.model, a.starts, RESIDUALS)) is None
 
 
 @pytest.mark.parametrize("n", [600, 4000])
 def test_a_drift_is_followed_however_long_the_log(n):
     """Noise that grows and fades every 600 readings, of one component."""
     a, swell = matched(4, n), np.exp(np.sin(2 * np.pi * np.arange(n) / 600))
-    run = smooth_log(a.log, a.model, a.starts, residuals_only=True)
+    run = smooth_log(a.log, a.model, a.starts, RESIDUALS)
     residual = run.residual.copy()
     residual[:, 1] *= np.sqrt(swell)
     found = uneven_noise.drift(a.log, run._replace(residual=residual))
