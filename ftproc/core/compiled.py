@@ -2,8 +2,9 @@
 
 A `kernel` is called from Python, a `part` only by kernels, into which it is compiled. FTPROC_KERNELS says how they run:
 
-* `compiled`: from the library that was made of them when ftproc was installed (`hatch_build.py`). It bears the digest
-  of its sources in its name, so that it never runs for others.
+* `compiled`: from a library that was made of them when ftproc was installed (`hatch_build.py`): one for any processor
+  of the kind, one that is faster for those of the last ten years. It bears the digest of its sources in its name, so
+  that it never runs for others.
 * `jit`: numba compiles each when it is first called, and keeps the machine code, under the same digest.
 * `python`: as plain Python, a hundred times slower, for tests and fuzzers that follow every branch.
 
@@ -65,14 +66,24 @@ def digest(room: Path = ROOM) -> str:
 
 DIGEST = digest()
 LIBRARY = f"_kernels_{DIGEST}"  # the library's name as a module
+MODERN = f"{LIBRARY}_v3"  # that of the one for processors of the level x86-64-v3: AVX2 and FMA
+
+
+def _is_modern() -> bool:
+    """Whether this processor is of that level, as far as numpy knows."""
+    try:
+        has = importlib.import_module("numpy._core._multiarray_umath").__cpu_features__
+    except (ImportError, AttributeError):  # numpy keeps it to itself
+        return False
+    return bool(has.get("AVX2") and has.get("FMA3"))
 
 
 def _library() -> Any:
-    """The library that belongs to these sources, or None."""
-    try:
-        return importlib.import_module(f"ftproc.core.{LIBRARY}")
-    except ImportError:  # not there, or not one that can be loaded
-        return None
+    """The fastest library that belongs to these sources and runs on this processor, or None."""
+    for name in (MODERN, LIBRARY) if _is_modern() else (LIBRARY,):
+        with contextlib.suppress(ImportError):  # not there, or not one that can be loaded
+            return importlib.import_module(f"ftproc.core.{name}")
+    return None
 
 
 def _choose(wanted: str) -> tuple[str, Any]:

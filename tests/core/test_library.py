@@ -21,10 +21,11 @@ from ftproc.core import compiled, signatures
 from ftproc.core.comparators.particles import log_kernel_sum
 from ftproc.core.comparators.walks import Walk, outlier_kalman
 from ftproc.core.editing.outlier_chain import label_runs
-from ftproc.core.filtering.forward import Span, run_weighted
-from ftproc.core.filtering.records import Observations, empty_rows
+from ftproc.core.filtering.forward import Span, filter_log, run_weighted
+from ftproc.core.filtering.records import FilterRun, Observations, empty_rows
 from ftproc.core.filtering.smoother import Memory
 from ftproc.core.model.motion import Profile
+from tests.core.tracks import matched
 
 only_compiled = pytest.mark.skipif(compiled.WAY != "compiled", reason="the library is not what runs")
 needs_library = pytest.mark.skipif(not any(compiled.ROOM.glob("_kernels_*")), reason="there is no library")
@@ -109,6 +110,30 @@ def test_without_library_and_numba(copy, tmp_path):
     asked = copy(hidden + SCRIPT, FTPROC_KERNELS="jit").stderr.splitlines()[-1]
     assert "FTPROC_KERNELS is jit, and there is no numba. Install a C compiler" in asked
     assert "and there is no numba. Install a C compiler and then ftproc again" in last
+
+
+@only_compiled
+def test_any_processor_has_a_library(monkeypatch):
+    """Those that know no AVX2 or FMA take the other one."""
+    monkeypatch.setattr(compiled, "_is_modern", lambda: False)
+    assert compiled._library().__name__ == f"ftproc.core.{compiled.LIBRARY}"
+
+
+@only_compiled
+@pytest.mark.parametrize("name", [compiled.LIBRARY, compiled.MODERN])
+def test_every_library_computes_the_same(name):
+    if name == compiled.MODERN and not compiled._is_modern():
+        pytest.skip("not for this processor")
+    library = importlib.import_module(f"ftproc.core.{name}")
+    a = matched(1, 400, dt=0.2, missing=0.1, irregular=True, pieces=3)
+    rows, samples, profile = empty_rows(400), a.log.samples(a.model.noise_variance), a.model.profile(a.time)
+    run = Span(0, 400, 0), samples, profile, a.model.filter(a.starts[0]), False, rows
+    ended, likelihood = library.filtering_forward__weighted(*run)
+    found, expected = FilterRun.of(a.time, rows, likelihood), filter_log(a.log, a.model, a.starts)
+    assert ended == 400
+    assert likelihood == pytest.approx(expected.log_likelihood, rel=1e-9)
+    np.testing.assert_allclose(found.state / expected.sigma, expected.state / expected.sigma, atol=1e-6)
+    np.testing.assert_allclose(found.sigma, expected.sigma, rtol=1e-6)
 
 
 def test_plain_python(copy):
