@@ -4,8 +4,8 @@ numba compiles ahead of time what it compiles at run time otherwise, from the sa
 not for this processor, but for any of its kind. On x86-64 there is a second one for processors of the last ten years,
 which takes four fifths of the time. Where that fails, for want of a C compiler say, the wheel asks for numba.
 
-What numba.pycc leaves to be done: its functions would keep the interpreter's lock, and know no `fastmath` and no error
-model. There is no public option; the flags are set where it makes them.
+What numba.pycc leaves to be done: its functions would keep the interpreter's lock, and know no error model. There is no
+public option; the flags are set where it makes them.
 """
 
 from __future__ import annotations
@@ -77,7 +77,6 @@ def libraries() -> list[Path]:
 def compile_kernels(cpu: str, made: Path) -> None:
     """Compile all kernels for a processor into a library at this path."""
     import numba.pycc.compiler as inner
-    from numba.core.cpu_options import FastMathOptions
     from numba.core.typing import signature
     from numba.pycc import CC
 
@@ -85,7 +84,7 @@ def compile_kernels(cpu: str, made: Path) -> None:
 
     def flags() -> Any:
         made = plain()
-        made.error_model, made.fastmath = compiled.HOW["error_model"], FastMathOptions(compiled.HOW["fastmath"])
+        made.error_model = compiled.HOW["error_model"]
         made.release_gil = True
         return made
 

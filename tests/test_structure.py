@@ -16,7 +16,7 @@ MOST_FILES, MOST_LINES, MOST_PARAMETERS = 14, 300, 7
 #: The rooms from the ground up: each may call itself and those before it, no other.
 FLOORS = (
     ("errors", "settings"),
-    ("records", "medians", "__init__"),
+    ("records", "order_statistics", "__init__"),
     ("core.signatures", "core.threads", "core.processes", "core.pacing"),
     ("core.compiled",),
     ("core.model",),

@@ -10,8 +10,8 @@ A `kernel` is called from Python, a `part` only by kernels, into which it is com
 
 Without the variable it is the library where there is one, else numba.
 
-No Python errors inside; a product and a sum may become one operation, but sums keep their order, so that a kernel gives
-the same digits wherever its parts stand.
+No Python errors inside. No product and sum become one operation, and sums keep their order, so that a kernel gives the
+same digits from every library and from numba, and wherever its parts stand.
 
 A filter's state and all that its update needs lie in one record: the compiler knows where each array begins and how
 large it is, and that no two overlap. With separate arrays the passes take twice as long.
@@ -39,7 +39,7 @@ from ftproc.errors import InstallationError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-HOW: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+HOW: dict[str, Any] = {"error_model": "numpy"}
 _IMPORTED = re.compile(rb"^from ftproc\.core\.([\w.]+) import (.*)", re.MULTILINE)
 WAYS = ("compiled", "jit", "python")
 ROOM = Path(__file__).parent

@@ -13,10 +13,10 @@ from ftproc.core.comparators.channels import Predictor
 from ftproc.core.filtering.records import FilterRun, Model
 from ftproc.core.model.frames import from_cartesian, line_of_sight_axes, to_cartesian, wrap
 from ftproc.errors import UsageError
-from ftproc.medians import median
 from ftproc.methods.estimate import Estimate, Readings
 from ftproc.methods.parameters import Parameter, of_component
 from ftproc.methods.preparing import labels, trusted
+from ftproc.order_statistics import median
 from ftproc.records import FloatArray
 from ftproc.settings import FilterSettings
 

@@ -10,10 +10,10 @@ import numpy as np
 from ftproc.core.comparators import ensemble_run, particles
 from ftproc.core.filtering.records import FilterRun
 from ftproc.errors import FtprocWarning
-from ftproc.medians import median
 from ftproc.methods import preparing
 from ftproc.methods.estimate import Estimate, Readings
 from ftproc.methods.parameters import Parameter
+from ftproc.order_statistics import median
 from ftproc.records import FloatArray
 from ftproc.settings import FilterSettings
 

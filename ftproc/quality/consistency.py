@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ftproc.medians import median
+from ftproc.order_statistics import median
 from ftproc.records import FloatArray
 
 NORMAL_99 = 2.576  # two-sided 99 % point

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from ftproc.errors import InputError, UsageError, row_named
-from ftproc.medians import median
 from ftproc.methods.estimate import Recording
+from ftproc.order_statistics import median
 from ftproc.records import COMPONENTS, FloatArray, IntArray, MeasurementLog, chunks, forget, thinned
 from ftproc.settings import EDITING, FilterSettings
 

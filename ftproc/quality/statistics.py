@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.medians import median
 from ftproc.methods.estimate import typical_interval
+from ftproc.order_statistics import median
 from ftproc.quality import consistency, verdict
 from ftproc.quality.faults import FaultStatistics, clock_set_back
 from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, FlagArray, FloatArray, MeasurementLog

@@ -12,7 +12,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ftproc.errors import UsageError
-from ftproc.report.browser import printing
 from ftproc.report.style import require_plotly
 
 if TYPE_CHECKING:
@@ -29,6 +28,7 @@ def write(trajectory: Trajectory, target: Target, truth: Truth | None = None) ->
     OutputError; UsageError when plotly, or a browser for a PDF, is not installed.
     """
     check(target)
+    from ftproc.report.browser import printing
     from ftproc.report.page import page
 
     printing.write(page(trajectory, truth), target)
@@ -37,6 +37,8 @@ def write(trajectory: Trajectory, target: Target, truth: Truth | None = None) ->
 def check(target: Target) -> None:
     """Raise UsageError, before any work is done, when what the report needs is not installed: plotly, and for a PDF a
     browser."""
+    from ftproc.report.browser import printing
+
     require_plotly()
     if printing.is_pdf(target):
         printing.require_browser(target)

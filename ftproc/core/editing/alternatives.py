@@ -21,7 +21,7 @@ from ftproc.core.editing.runs import runs_of
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import RESIDUALS, SmootherRun, smooth_log
-from ftproc.medians import typical
+from ftproc.order_statistics import typical
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

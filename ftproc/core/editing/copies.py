@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ftproc.core.editing.runs import runs_of
 from ftproc.core.editing.screening import stuck
 from ftproc.core.model.frames import unwrap, wrap
-from ftproc.medians import typical
+from ftproc.order_statistics import distinct, quantile, typical
 
 FloatArray = NDArray[np.float64]
 KindArray = NDArray[np.uint8]
@@ -73,17 +73,19 @@ def rounding_step(channel: FloatArray) -> float:
     The largest of a few differences between neighbouring values of which nearly all values are whole multiples.
     """
     readings = channel[np.isfinite(channel)]
-    values = np.unique(readings)
-    if len(values) < 2:
-        return 0.0
-    steps = np.diff(values)
-    steps = np.sort(steps[steps > 1e-12 * np.abs(values).max()])
+    return _grid(readings, distinct(readings))
+
+
+def _grid(readings: FloatArray, levels: FloatArray) -> float:
+    """The same of readings (m,) that are there; levels: their values in order, each once."""
+    steps = np.diff(levels)
+    steps = steps[steps > 1e-12 * np.abs(levels).max(initial=0.0)]
     if not len(steps):
         return 0.0
-    middle = float(np.sort(readings)[len(readings) // 2])
-    for share in (0.5, 0.2, 0.05, 0.0):
-        step = float(steps[int(share * (len(steps) - 1))])
-        multiple = (readings - middle) / step
+    places = [int(share * (len(steps) - 1)) for share in (0.5, 0.2, 0.05, 0.0)]
+    shares: list[float] = np.partition(steps, places)[places].tolist()
+    for step in shares:
+        multiple = (readings - levels[len(levels) // 2]) / step
         if np.mean(np.abs(multiple - np.round(multiple)) < ON_GRID) >= MOSTLY_ON_GRID:
             return step
     return 0.0
@@ -92,12 +94,14 @@ def rounding_step(channel: FloatArray) -> float:
 def _step(values: FloatArray) -> float:
     """The step to which readings (m,) are rounded; zero if to none that shows. In a short log no two of them need lie a
     single step apart, so it is the greatest common divisor of small differences."""
-    step = rounding_step(values)
-    differences = np.diff(np.unique(values))
+    levels = distinct(values)
+    step, differences = _grid(values, levels), np.diff(levels)
     least = PRECISION * float(np.abs(values).max(initial=0.0))
-    differences = np.sort(differences[differences > least])[:DIFFERENCES]
+    differences = differences[differences > least]
     if step > 0 or not len(differences):
         return step
+    smallest = min(DIFFERENCES, len(differences))
+    differences = np.sort(np.partition(differences, smallest - 1)[:smallest])
     step = float(differences[0])
     for other in differences[1:].tolist():
         while other > least:
@@ -152,7 +156,7 @@ def _on_lines(
     others = off[~flat]
     if len(others) < FEWEST or typical(others) < MANY * limit or flat.sum() < LEAST_ON_LINES * len(values):
         return on, values
-    if np.quantile(others, 0.05) > NEARLY * typical(others):
+    if quantile(others, 0.05) > NEARLY * typical(others):
         return on, values
     if not _are_many(int(flat.sum()), others, limit, len(values)):
         return on, values
@@ -184,7 +188,7 @@ def _without_noise(time_s: FloatArray, values: FloatArray, step: float) -> tuple
     second = np.diff(first) / (time_s[2:] - time_s[:-2])
     third = np.diff(second) / (time_s[3:] - time_s[:-3]) / np.sqrt((share**2).sum(0))
     off = np.abs(third)
-    noise = float(np.quantile(off, CALM)) / OF_NORMAL
+    noise = quantile(off, CALM) / OF_NORMAL
     third, limit = np.clip(third, -BEYOND * noise, BEYOND * noise), max(QUIET * noise, step)
     if limit < TELLS * noise and (third[1:] * third[:-1]).sum() < ALTERNATE * (third**2).sum():
         for begin, end in runs_of(off <= limit, IN_A_ROW):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ftproc.core.compiled import kernel
 from ftproc.core.editing.screening import median
 from ftproc.core.signatures import Flags, Vector
-from ftproc.medians import typical
+from ftproc.order_statistics import typical
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ftproc.core.compiled import kernel, part
 from ftproc.core.model.measurement import wrapped
 from ftproc.core.signatures import Vector
+from ftproc.order_statistics import distinct
 
 FloatArray = NDArray[np.float64]
 
@@ -238,7 +239,7 @@ def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
     if len(seen) < SHORTEST_STUCK:
         return found
     values = channel[seen]
-    steps = np.diff(np.unique(values))
+    steps = np.diff(distinct(values))
     steps = steps[steps > 1e-12 * np.abs(values).max()]
     step = float(steps.min()) if len(steps) else np.inf
     chance = step / (2 * np.sqrt(np.pi) * sigma) if 0 < sigma < np.inf else np.inf

@@ -30,7 +30,7 @@ from ftproc.core.identification.likelihood import Fixed, fit_level
 from ftproc.core.identification.profile import fit_profile, from_knot, median_level
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.frames import to_cartesian, wrap
-from ftproc.medians import median
+from ftproc.order_statistics import median, medians
 
 FloatArray = NDArray[np.float64]
 
@@ -239,7 +239,7 @@ def _size(stretch: Stretch, bridge: Stretch, step: Step) -> float:
     away = stretch.record.measurement[rows] - bridge.record.measurement[rows]
     away[:, 1] = wrap(away[:, 1])
     seen = np.where(np.isfinite(away), np.abs(away), 0.0) / np.sqrt(stretch.calm.noise_variance)
-    return float(np.median(seen, 0).max())
+    return float(medians(seen).max())
 
 
 def _may_be_a_halt(stretch: Stretch, bridge: Stretch, step: Step) -> bool:

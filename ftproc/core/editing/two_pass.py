@@ -46,7 +46,7 @@ from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.model.frames import unwrap
 from ftproc.core.model.measurement import NO_RANGE_M
 from ftproc.core.model.motion import isotropic
-from ftproc.medians import median
+from ftproc.order_statistics import median
 
 FloatArray = NDArray[np.float64]
 

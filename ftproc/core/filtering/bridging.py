@@ -15,6 +15,7 @@ from ftproc.core.filtering.records import Model, Observations
 from ftproc.core.filtering.shifts import shifts
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.model.frames import from_cartesian, line_of_sight_axes, wrap
+from ftproc.order_statistics import medians
 
 FloatArray = NDArray[np.float64]
 
@@ -75,7 +76,7 @@ def _way(log: Observations, model: Model, late_s: float) -> FloatArray:
         start = first_state(log, model.noise_variance, 0, slice(0, len(log.time_s)))
     except ValueError:  # a component has no reading there, so nobody knows the way
         return np.zeros_like(log.measurement)
-    level = model._replace(jerk=np.median(model.jerk, 0, keepdims=True), knot_s=np.inf)
+    level = model._replace(jerk=medians(model.jerk)[None], knot_s=np.inf)
     state = smooth_log(log, level, [start]).state
     position, velocity, acceleration = state[:, :3], state[:, 3:6], state[:, 6:]
     further = position + late_s * (velocity + 0.5 * late_s * acceleration)

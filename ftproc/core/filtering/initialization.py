@@ -13,7 +13,7 @@ from ftproc.core.compiled import kernel, part
 from ftproc.core.filtering.records import Observations, Start
 from ftproc.core.model.measurement import NO_RANGE_M, wrapped
 from ftproc.core.signatures import Indices, Matrix, Vector
-from ftproc.medians import typical
+from ftproc.order_statistics import typical
 
 FloatArray = NDArray[np.float64]
 

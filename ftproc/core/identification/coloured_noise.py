@@ -20,7 +20,7 @@ from ftproc.core.identification import optimizer
 from ftproc.core.identification.likelihood import Fixed, fit_level, jerk_bounds, of_level, representative, shaped
 from ftproc.core.identification.profile import fit_profile
 from ftproc.core.identification.scales import Scales, scales_of
-from ftproc.medians import median
+from ftproc.order_statistics import median
 
 FloatArray = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def may_be(log: Observations, smoothed: SmootherRun, model: Model) -> bool:
         r, a = residual[:, c], lost[:, c]
         square, product = (r * r + a)[used[:, c]], (r[1:] * r[:-1] + np.sqrt(a[1:] * a[:-1]))[both]
         blocks = zip(np.array_split(product, BLOCKS), np.array_split(square, BLOCKS), strict=True)
-        typical = np.median([pairs.mean() / alone.mean() for pairs, alone in blocks])
+        typical = median(np.array([pairs.mean() / alone.mean() for pairs, alone in blocks]))
         if typical > max(LEAST, LEAST_IN_SIGMAS / math.sqrt(len(square))):
             return True
     return False

@@ -16,7 +16,7 @@ from ftproc.core.filtering.records import Model, Observations, Start, Uneven
 from ftproc.core.identification.scales import Scales
 from ftproc.core.model.measurement import wrapped
 from ftproc.core.signatures import Flags, Indices, Matrix, Vector
-from ftproc.medians import typical
+from ftproc.order_statistics import quantile, typical
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -34,7 +34,7 @@ def how_many(scales: Scales, model: Model, knot_s: float) -> int:
     if model.coloured:
         return 1
     noise = float(scales.noise_m.min()) ** 2
-    memory = (noise * scales.interval_s / float(np.quantile(model.jerk[:, 0], CALMER))) ** (1 / 6)
+    memory = (noise * scales.interval_s / quantile(model.jerk[:, 0], CALMER)) ** (1 / 6)
     wanted = min(SHARE * memory, knot_s / PER_KNOT, scales.span_s / FEWEST) / scales.interval_s
     return int(np.clip(wanted + ROUNDING, 1, MOST))
 

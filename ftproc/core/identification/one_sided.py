@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ftproc.core.filtering.records import Observations
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification import optimizer
-from ftproc.medians import median
+from ftproc.order_statistics import median
 
 FloatArray = NDArray[np.float64]
 

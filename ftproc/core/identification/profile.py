@@ -16,7 +16,7 @@ from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import decimation, optimizer
 from ftproc.core.identification.likelihood import VERTICAL_PRECISION, jerk_bounds, shaped
 from ftproc.core.identification.scales import Scales, scales_of
-from ftproc.medians import median
+from ftproc.order_statistics import median
 
 FloatArray = NDArray[np.float64]
 

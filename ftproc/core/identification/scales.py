@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import Observations
-from ftproc.medians import median, typical
+from ftproc.order_statistics import median, medians, typical
 
 FloatArray = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ def scales_of(log: Observations, noise_variance: FloatArray) -> Scales:
     if log.sites is not None:
         return Scales(interval, max(float(log.time_s[-1] - log.time_s[0]), interval), *_of_sites(log, noise_variance))
     if log.uneven is not None:
-        noise_variance = np.median(noise_variance * log.uneven.times + log.uneven.late**2, 0)
+        noise_variance = medians(noise_variance * log.uneven.times + log.uneven.late**2)
     noise = np.maximum(np.sqrt(noise_variance) * np.array([1.0, range_m, range_m]), FINEST * range_m)
     return Scales(interval, max(float(log.time_s[-1] - log.time_s[0]), interval), range_m, noise)
 

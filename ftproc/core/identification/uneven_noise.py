@@ -19,7 +19,7 @@ from ftproc.core import pacing
 from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification import optimizer
-from ftproc.medians import median
+from ftproc.order_statistics import median, medians
 
 FloatArray = NDArray[np.float64]
 
@@ -140,26 +140,26 @@ def drift(log: Observations, smoothed: SmootherRun) -> FloatArray | None:
             continue
         count = len(seen) // size
         square = smoothed.residual[seen, c] ** 2 / smoothed.residual_variance[seen, c]
-        level = np.log(np.maximum(_of_windows(square, count, np.median), SMALLEST) / CHI2_MEDIAN)
+        level = np.log(np.maximum(_of_windows(square, count, lambda rows: medians(rows.T)), SMALLEST) / CHI2_MEDIAN)
         chance = MEDIAN_SPREAD**2 / size
         drifting = float(np.var(level)) - chance
         if drifting < max(LEAST_DRIFT**2, 3 * chance * math.sqrt(2 / count)):
             continue
         even = np.convolve(np.pad(level, 1, mode="edge"), [0.25, 0.5, 0.25], "valid")
         even = np.clip(even - median(even), -LARGEST_DRIFT, LARGEST_DRIFT) * drifting / (drifting + 0.375 * chance)
-        middle = _of_windows(log.time_s[seen], count, np.mean)
+        middle = _of_windows(log.time_s[seen], count, lambda rows: rows.mean(1))
         # It goes on as far again beyond the ends, where readings may be missing because the noise has grown.
         middle, even = (np.pad(each, 1, mode="reflect", reflect_type="odd") for each in (middle, even))
         found[:, c] = np.exp(np.interp(log.time_s, middle, even))
     return found if (found != 1).any() else None
 
 
-def _of_windows(values: FloatArray, count: int, what: Callable[..., FloatArray]) -> FloatArray:
+def _of_windows(values: FloatArray, count: int, what: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """(count,) mean or median of each window of values (n,), which are about as long."""
     size, longer = divmod(len(values), count)
     edge = longer * (size + 1)
     parts = values[:edge].reshape(longer, size + 1), values[edge:].reshape(count - longer, size)
-    return np.concatenate([what(part, 1) for part in parts])
+    return np.concatenate([what(part) for part in parts])
 
 
 def repeated(measurement: FloatArray, step: FloatArray) -> Uneven | None:

@@ -20,7 +20,7 @@ from ftproc.core.live.doubt import Doubt
 from ftproc.core.live.pieces import Sizes
 from ftproc.core.live.rows import LATELY, Published, Waiting, unknown_rows, widened
 from ftproc.core.live.window import Window
-from ftproc.medians import median
+from ftproc.order_statistics import median
 
 FloatArray = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from ftproc.core.filtering.records import Model, Observations, empty_rows
 from ftproc.core.live.pieces import Sizes
 from ftproc.core.live.readings import Columns, Labels
 from ftproc.core.live.window import Window
-from ftproc.medians import median
+from ftproc.order_statistics import median
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

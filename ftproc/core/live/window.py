@@ -27,6 +27,7 @@ from ftproc.core.live.readings import LONGEST_ISOLATED, Columns, Labels, Repeats
 from ftproc.core.live.readmission import Open, readmitted, settled
 from ftproc.core.live.whole import Whole
 from ftproc.core.model.motion import Profile
+from ftproc.order_statistics import medians
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -294,4 +295,4 @@ class Window:
 
 def _typical(times: FloatArray, late: FloatArray) -> tuple[FloatArray, FloatArray]:
     """How the noise of the readings after some others differs, see `Uneven`: (3,) each."""
-    return np.median(times[-RECENT:], 0), late[-1].copy()
+    return medians(times[-RECENT:]), late[-1].copy()

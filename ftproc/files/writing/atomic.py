@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import secrets
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -95,7 +94,7 @@ def sync(stream: BinaryIO) -> None:
 
 def _beside(path: Path) -> Iterator[BinaryIO]:
     name = os.fsdecode(os.fsencode(path.name)[:_LONGEST_NAME])
-    temporary = path.with_name(f".{name}.{secrets.token_hex(4)}.tmp")
+    temporary = path.with_name(f".{name}.{os.urandom(4).hex()}.tmp")
     # O_EXCL: never through an existing link. 0o666: the user's umask decides, as for any new file.
     descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     try:

@@ -246,9 +246,9 @@ def test_a_drift_is_followed_however_long_the_log(n):
 @pytest.mark.parametrize(("n", "count"), [(120, 2), (130, 7), (7, 7), (61, 6)])
 def test_windows_are_those_of_numpy(n, count):
     values = np.random.default_rng(n).normal(size=n)
-    for what in (np.median, np.mean):
-        expected = [what(window) for window in np.array_split(values, count)]
-        np.testing.assert_allclose(uneven_noise._of_windows(values, count, what), expected, rtol=1e-14)
+    expected = [window.mean() for window in np.array_split(values, count)]
+    found = uneven_noise._of_windows(values, count, lambda rows: rows.mean(1))
+    np.testing.assert_allclose(found, expected, rtol=1e-14)
 
 
 def hovering(seed, step):

@@ -13,7 +13,7 @@ from ftproc.files.reading.clocks.clock import DAY_S, WEEK_S, Clock, unrolled
 from ftproc.files.reading.meaning.numbers import Origin, as_text, numbers, parsed, without_text
 from ftproc.files.reading.meaning.schema import Column
 from ftproc.files.units import UNITS, Unit, unit_named
-from ftproc.medians import median
+from ftproc.order_statistics import median
 from ftproc.records import FloatArray, IntArray
 
 if TYPE_CHECKING:

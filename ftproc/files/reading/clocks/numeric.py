@@ -8,7 +8,7 @@ from ftproc.files import leap_seconds
 from ftproc.files.layout import CANONICAL
 from ftproc.files.reading.clocks.clock import DAY_S, WEEK_S, Clock, unrolled
 from ftproc.files.reading.meaning.schema import Column
-from ftproc.medians import median
+from ftproc.order_statistics import median
 from ftproc.records import FloatArray
 
 BARE = "numbers in s"  # as is assumed

@@ -16,7 +16,7 @@ from ftproc.errors import InputError
 from ftproc.files.reading.meaning.schema import Column
 from ftproc.files.units import UNITS, Unit
 from ftproc.files.words import QUANTITIES
-from ftproc.medians import median
+from ftproc.order_statistics import median
 from ftproc.records import FloatArray
 
 _MOST_ROWS = 1000  # that are looked at

@@ -13,7 +13,7 @@ from ftproc.files.layout import CANONICAL
 from ftproc.files.reading.meaning.questions import named
 from ftproc.files.reading.meaning.schema import Column
 from ftproc.files.units import UNITS, Unit
-from ftproc.medians import median
+from ftproc.order_statistics import median, quantile
 from ftproc.records import FloatArray
 from ftproc.settings import Station
 
@@ -79,7 +79,7 @@ def _angles(values: FloatArray, unit: Unit) -> _Angles | None:
         return None
     with np.errstate(over="ignore", invalid="ignore"):  # an angle that overflows is beyond all limits too
         known = known * unit.divide / unit.multiply
-        half, most = np.quantile(np.abs(known), [0.5, 0.99]).tolist()
+        half, most = (quantile(np.abs(known), share) for share in (0.5, 0.99))
         jumps = np.abs(np.diff(known))
         step = median(jumps) if jumps.size else 0.0
     turn = 0.0
@@ -237,7 +237,7 @@ def doubts(measurement: FloatArray, station: Station) -> tuple[str, ...]:
     angles = np.clip(measurement.T[1:], -_MAX_ANGLE, _MAX_ANGLE)
     azimuth, elevation = (np.degrees(column[np.isfinite(column)]) for column in angles)
     found = []
-    if azimuth.size and azimuth.min() > -1 and 370 < np.quantile(azimuth, 0.99) <= 400:
+    if azimuth.size and azimuth.min() > -1 and 370 < quantile(azimuth, 0.99) <= 400:
         found.append("the azimuth runs from 0 to 400 deg: if they are gon, say --units azimuth=gon")
     if station.elevation_from != "zenith" and elevation.size and median(elevation) > _STEEP_DEG:
         found.append(

@@ -21,7 +21,7 @@ from ftproc.files.reading.meaning.numbers import (
 from ftproc.files.reading.meaning.schema import Column
 from ftproc.files.units import UNITS, unit_named
 from ftproc.files.words import DEPRESSIONS
-from ftproc.medians import median
+from ftproc.order_statistics import median, quantile
 from ftproc.records import FloatArray
 
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ def _stands_out(values: FloatArray, found: np.ndarray, number: float, impossible
         return False
     if impossible and not (rest < 0).any():
         return True
-    low, high = np.quantile(rest, [0.01, 0.99])
+    low, high = (quantile(rest, share) for share in (0.01, 0.99))
     gap = max(number - high, low - number)
     if gap > max(2 * (high - low), 1e-3 * abs(number)):
         return True

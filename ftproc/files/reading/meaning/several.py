@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ftproc.errors import InputError, quoted
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning import names, rows, schema
+from ftproc.order_statistics import medians
 from ftproc.records import COMPONENTS, FloatArray, IntArray, MeasurementLog
 
 _LAGS = 8  # rows before, among which the one before of the same target is looked for
@@ -106,7 +107,7 @@ def _jumps_in(z: FloatArray) -> NDArray[np.bool_]:
     lags = range(1, _LAGS + 1)
     z = np.clip(z, -_LARGEST, _LARGEST)
     steps = np.stack([np.abs(_turned(z[_LAGS:] - z[_LAGS - lag : len(z) - lag], azimuth)) for lag in lags])
-    scale = np.maximum(np.median(steps.min(0), axis=0), 1e-12 + 1e-9 * np.median(np.abs(z), axis=0))
+    scale = np.maximum(medians(steps.min(0)), 1e-12 + 1e-9 * medians(np.abs(z)))
     distance = (steps / scale).max(2)
     nearest = distance[1:].min(0)
     own = np.minimum(nearest, distance[0])
@@ -155,7 +156,7 @@ def _separates(z: FloatArray, code: IntArray) -> float:
     inside = np.abs(_turned(np.diff(z[order], axis=0), azimuth))[np.diff(code[order]) == 0]
     if not len(inside):
         return 0.0
-    scale = np.maximum(np.median(inside, axis=0), 1e-12 + 1e-9 * np.median(np.abs(z), axis=0))
+    scale = np.maximum(medians(inside), 1e-12 + 1e-9 * medians(np.abs(z)))
     across = np.abs(_turned(np.diff(z, axis=0)[changes], azimuth))
     return float(np.mean((across > 4 * scale).sum(1) >= min(2, z.shape[1])))
 

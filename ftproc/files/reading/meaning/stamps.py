@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.medians import median
+from ftproc.order_statistics import median
 from ftproc.records import COMPONENTS, FloatArray
 
 _ROWS = 5000  # by which the clock is judged
