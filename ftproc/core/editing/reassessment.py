@@ -54,14 +54,13 @@ def reassess(record: Record, decision: Decision) -> Decision:
         return _until_settled(record, decision, profile)
     weight, unexamined = decision.weight.copy(), 0
     for span in _spans(widened):
-        span, own = from_knot(profile, record.time_s, span)
         part = _short(record, span)
         try:
             starts = _starts(part, weight[span], calm)
         except ValueError:  # a component has too few readings there
             continue
         initial = Decision(weight[span], calm, starts, decision.rates)
-        decided = _until_settled(part, initial, own)
+        decided = _until_settled(part, initial, _profile(part, initial))
         weight[span] = decided.weight
         unexamined += decided.unexamined
     return decision._replace(weight=weight, starts=_starts(record, weight, calm), model=profile, unexamined=unexamined)
