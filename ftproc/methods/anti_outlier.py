@@ -120,9 +120,10 @@ def _span(record: Recording, settings: FilterSettings, rows: slice) -> two_pass.
 
 
 def segments(record: Recording) -> list[tuple[int, int]]:
-    """First and one past the last sample of what is kept of each segment, all about as long."""
+    """First and one past the last sample of what is kept of each segment, all about as long. Their number is even, so
+    that two threads end together."""
     kept = max(KEPT, KEPT_MARGINS * margin_of(record))
-    count = max(round(len(record) / kept), 1)
+    count = max(2 * round(len(record) / kept / 2), 1)
     edges = np.linspace(0, len(record), count + 1).astype(int)
     return [(int(low), int(high)) for low, high in itertools.pairwise(edges)]
 

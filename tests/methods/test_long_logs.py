@@ -143,7 +143,7 @@ def test_segments_are_the_same_in_any_number_of_threads(in_segments):
 def test_segment_without_a_component_looks_farther(flight, in_segments):
     """The elevation is missing throughout a segment and its margins: the neighbours' readings carry it through, and
     those behind it alone are not enough."""
-    log = start_of(flight.log, 1500)
+    log = start_of(flight.log, 1800)
     log.measurement[300:1060, 2] = np.nan
     settings = FilterSettings(**GIVEN)
     whole = pipeline.filter_log(log, settings)
@@ -178,9 +178,9 @@ def test_correlated_noise_is_found_for_all_segments(in_segments):
     assert (error < 3).mean() > 0.97
 
 
-@pytest.mark.parametrize(("length", "count"), [(1, 1), (499, 1), (740, 1), (760, 2), (5_100, 10)])
+@pytest.mark.parametrize(("length", "count"), [(1, 1), (499, 1), (740, 2), (1_400, 2), (1_510, 4), (5_100, 10)])
 def test_segments_share_a_log_evenly(in_segments, length, count):
-    """One after the other, from its first sample to its last, as near to their size as they can be; one at least."""
+    """One after the other, from first sample to last, as near to their size as an even number can be; one at least."""
     in_segments(100, 500, 50)
     log = Recording(0.1 * np.arange(length), np.zeros((length, 3)), UNKNOWN)
     found = anti_outlier.segments(log)

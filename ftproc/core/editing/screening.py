@@ -239,15 +239,18 @@ def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
     if len(seen) < SHORTEST_STUCK:
         return found
     values = channel[seen]
+    repeats = values[1:] == values[:-1]
+    if not repeats.any():
+        return found
     steps = np.diff(distinct(values))
     steps = steps[steps > 1e-12 * np.abs(values).max()]
     step = float(steps.min()) if len(steps) else np.inf
     chance = step / (2 * np.sqrt(np.pi) * sigma) if 0 < sigma < np.inf else np.inf
-    chance = max(chance, float(np.mean(values[1:] == values[:-1])))
+    chance = max(chance, float(np.mean(repeats)))
     if chance >= 1:
         return found
     repeats_needed = max(np.log(STUCK_ODDS / len(seen)) / np.log(max(chance, 1e-300)), SHORTEST_STUCK - 1)
-    begins = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
+    begins = np.flatnonzero(np.r_[True, ~repeats])
     ends = np.r_[begins[1:], len(seen)]
     for run in np.flatnonzero(ends - begins - 1 >= repeats_needed):
         found[seen[begins[run] + 1 : ends[run]]] = True

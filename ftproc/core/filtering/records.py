@@ -9,10 +9,10 @@ from typing import Annotated, Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import record, zeros
+from ftproc.core.compiled import empty, kernel, record, zeros
 from ftproc.core.filtering.filters import COLOURED, FILTER
 from ftproc.core.model.motion import Profile
-from ftproc.core.signatures import Layout
+from ftproc.core.signatures import Layout, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -104,16 +104,27 @@ class Observations(NamedTuple):
 
     def samples(self, noise_variance: FloatArray) -> Any:
         """The same as an array (n,) of `Sample` records, with noise (3,) m^2, rad^2, rad^2, or (m, 3) by station."""
-        samples = zeros(SAMPLE, len(self.time_s))
-        samples["time_s"], samples["measurement"], samples["weight"] = self.time_s, self.measurement, self.weight
+        samples, variance = empty(SAMPLE, len(self.time_s)), noise_variance if self.sites is None else np.zeros(3)
+        time, z, weight, variance = (np.ascontiguousarray(each, float) for each in (*self[:3], variance))
+        _fill(time, z, weight, variance, samples)
         if self.sites is not None:
             station, place, axes, _ = self.sites
             samples["placed"], samples["place"], samples["axes"] = 1.0, place[station], axes[station]
-            noise_variance = noise_variance[station]
-        samples["noise"] = noise_variance
+            samples["noise"] = noise_variance = noise_variance[station]
         if self.uneven is not None:
             samples["noise"], samples["late"] = noise_variance * self.uneven.times, self.uneven.late
         return samples
+
+
+@kernel
+def _fill(time: Vector, measurement: Matrix, weight: Matrix, variance: Vector, samples: Samples) -> None:
+    """Fill the samples (n,) of a station at the origin, whose place and axes nobody asks for."""
+    for k in range(len(time)):
+        sample = samples[k]
+        sample.time_s, sample.placed = time[k], 0.0
+        for c in range(3):
+            sample.measurement[c], sample.weight[c] = measurement[k, c], weight[k, c]
+            sample.noise[c], sample.late[c] = variance[c], 0.0
 
 
 class Start(NamedTuple):
