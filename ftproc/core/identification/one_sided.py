@@ -14,9 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core.compiled import kernel, part
 from ftproc.core.filtering.records import Observations
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification import optimizer
+from ftproc.core.signatures import Vector
 from ftproc.order_statistics import median
 
 FloatArray = NDArray[np.float64]
@@ -28,6 +30,9 @@ LEANS = 0.15  # skewness from which it is clear on which side the errors are
 LEAST_GAIN = 10.0  # in log-likelihood, over errors of either sign
 LEAST_SHARE = 0.15  # of the readings
 LARGEST, STEPS, TOLERANCE = 6.0, 100, 1e-4  # of a parameter of the fit; of the search for it, and its last gain
+LOG_ROOT_TWO_PI = 0.5 * math.log(2 * math.pi)
+FAR_BELOW = -20.0  # sigmas
+NOWHERE = (-math.inf, 0.0, 0.0, 0.0)  # the log-density of errors that there are not, and its slope
 CAUTION = 2.0  # times the standard error that the peak would have, if the honest readings were known
 
 
@@ -98,8 +103,8 @@ def _likeliest(residual: FloatArray, both: bool) -> _Fit:
     """The fit to residuals (n,) with errors above zero, or of either sign."""
 
     def cost(theta: FloatArray) -> optimizer.Point:
-        found, slope = _log_density(residual - theta[0], theta, both)
-        return optimizer.Point(-float(found.sum()), -slope.sum(1), curvature)
+        slope = np.empty(4)
+        return optimizer.Point(-_log_likelihood(residual, theta, both, slope), -slope, curvature)
 
     curvature, bound = np.full(4, len(residual) / 4), np.full(4, LARGEST)
     tries = []
@@ -111,32 +116,50 @@ def _likeliest(residual: FloatArray, both: bool) -> _Fit:
     return _Fit((float(place), math.exp(log_sigma), 1 / (1 + math.exp(-odds)), math.exp(log_error)), -least)
 
 
-def _log_density(x: FloatArray, theta: FloatArray, both: bool) -> tuple[FloatArray, FloatArray]:
-    """(n,) log-density of errors x, and (4, n) its derivatives by the parameters: place, ln(1-sigma) of the noise,
-    log-odds and ln(mean) of the errors that add to it."""
-    sigma, error, odds = math.exp(theta[1]), math.exp(theta[3]), theta[2]
-    rare, usual = -math.log1p(math.exp(-odds)), -math.log1p(math.exp(odds))
-    plain = usual - 0.5 * (x / sigma) ** 2 - math.log(sigma) - 0.5 * math.log(2 * math.pi)
-    sides = [_exponential(sign * x, sigma, error) for sign in ((1.0, -1.0) if both else (1.0,))]
-    wrong = [rare + density - math.log(len(sides)) for density, _ in sides]
-    total = np.logaddexp.reduce([plain, *wrong])
-    share = np.exp(plain - total)
-    slope = share * np.stack([x / sigma**2, (x / sigma) ** 2 - 1, np.full_like(x, -math.exp(rare)), 0 * x])
-    for density, (_, (by_x, by_sigma, by_error)), sign in zip(wrong, sides, (1.0, -1.0), strict=False):
-        share = np.exp(density - total)
-        slope += share * np.stack([-sign * by_x, by_sigma, np.full_like(x, math.exp(usual)), by_error])
-    return total, slope
+@kernel
+def _log_likelihood(residual: Vector, theta: Vector, both: bool, slope: Vector) -> float:
+    """Of residuals (n,); fills its slope (4,) by the parameters theta (4,): place, ln(1-sigma) of the noise, log-odds
+    and ln(mean) of the errors that add to it. both: these are of either sign."""
+    sigma, error = math.exp(theta[1]), math.exp(theta[3])
+    rare, usual = -math.log1p(math.exp(-theta[2])), -math.log1p(math.exp(theta[2]))
+    of_side, peak = rare - math.log(2.0 if both else 1.0), usual - math.log(sigma) - LOG_ROOT_TWO_PI
+    slope[:] = 0.0
+    likelihood = 0.0
+    for k in range(len(residual)):
+        x = residual[k] - theta[0]
+        plain = peak - 0.5 * (x / sigma) ** 2
+        above, above_x, above_sigma, above_error = _exponential(x, sigma, error)
+        below, below_x, below_sigma, below_error = _exponential(-x, sigma, error) if both else NOWHERE
+        above, below = above + of_side, below + of_side
+        top = max(plain, above, below)
+        total = top + math.log(math.exp(plain - top) + math.exp(above - top) + math.exp(below - top))
+        likelihood += total
+        right, over, under = math.exp(plain - total), math.exp(above - total), math.exp(below - total)
+        slope[0] += right * x / sigma**2 - over * above_x + under * below_x
+        slope[1] += right * ((x / sigma) ** 2 - 1) + over * above_sigma + under * below_sigma
+        slope[2] += (over + under) * math.exp(usual) - right * math.exp(rare)
+        slope[3] += over * above_error + under * below_error
+    return likelihood
 
 
-def _exponential(x: FloatArray, sigma: float, error: float) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-    """(n,) log-density of normal noise plus an exponential error, and its derivatives by x, ln(sigma) and ln(error)."""
-    from scipy.special import log_ndtr  # for logs with such errors only
-
+@part
+def _exponential(x: float, sigma: float, error: float) -> tuple[float, float, float, float]:
+    """Log-density of normal noise plus an exponential error, and its derivatives by x, ln(sigma) and ln(error)."""
     z = x / sigma - sigma / error
-    below = log_ndtr(z)
-    ratio = np.exp(-0.5 * z**2 - 0.5 * math.log(2 * math.pi) - below)
+    below = _log_share_below(z)
+    ratio = math.exp(-0.5 * z * z - LOG_ROOT_TWO_PI - below)
     density = 0.5 * (sigma / error) ** 2 - x / error - math.log(error) + below
-    by_x = ratio / sigma - 1 / error
     by_sigma = (sigma / error) ** 2 - ratio * (x / sigma + sigma / error)
     by_error = x / error - (sigma / error) ** 2 - 1 + ratio * sigma / error
-    return density, (by_x, by_sigma, by_error)
+    return density, ratio / sigma - 1 / error, by_sigma, by_error
+
+
+@part
+def _log_share_below(z: float) -> float:
+    """ln of the share of normal noise that lies below z sigmas; far below, where that share is no number any more, by
+    its asymptotic series."""
+    if z > FAR_BELOW:
+        return math.log(0.5 * math.erfc(-z * math.sqrt(0.5)))
+    s = 1 / (z * z)
+    series = 1 - s * (1 - s * (3 - s * (15 - s * (105 - s * 945))))
+    return -0.5 * z * z - math.log(-z) - LOG_ROOT_TWO_PI + math.log(series)

@@ -69,18 +69,30 @@ def test_flat_errors_of_coarse_rounding_are_no_fault():
     assert one_sided.find(log, run, scale / np.sqrt(3)) == []
 
 
+def plainly(residual, theta, both):
+    """The log-likelihood as scipy has it: normal noise, to which exponential errors add now and then."""
+    place, sigma, share, error = theta[0], np.exp(theta[1]), 1 / (1 + np.exp(-theta[2])), np.exp(theta[3])
+    x = residual - place
+    sides = [stats.exponnorm.logpdf(sign * x, error / sigma, scale=sigma) for sign in ((1, -1) if both else (1,))]
+    wrong = [np.log(share / len(sides)) + side for side in sides]
+    return np.logaddexp.reduce([np.log(1 - share) + stats.norm.logpdf(x, scale=sigma), *wrong]).sum()
+
+
 @pytest.mark.parametrize("both", [False, True])
-def test_density_is_the_convolution_and_its_slope_the_derivative(both):
-    theta = np.array([0.1, -0.3, 0.4, 0.2])
-    x = np.linspace(-4.0, 6.0, 23)
-    found, slope = one_sided._log_density(x - theta[0], theta, both)
-    sigma, share, error = np.exp(theta[1]), 1 / (1 + np.exp(-theta[2])), np.exp(theta[3])
-    late = np.linspace(0.0, 60.0, 200_001)
-    normal = stats.norm(scale=sigma).pdf
-    for k, off in enumerate(x - theta[0]):
-        sides = [np.trapezoid(normal(sign * off - late) * np.exp(-late / error) / error, late) for sign in (1, -1)]
-        wrong = sum(sides) / 2 if both else sides[0]
-        assert found[k] == pytest.approx(np.log((1 - share) * normal(off) + share * wrong), abs=1e-6)
-    for k, step in enumerate(1e-6 * np.eye(4)):
-        above, below = (one_sided._log_density(x - t[0], t, both)[0] for t in (theta + step, theta - step))
-        np.testing.assert_allclose(slope[k], (above - below) / 2e-6, atol=1e-6)
+@pytest.mark.parametrize("theta", [(0.1, -0.7, 0.0, -0.4), (-0.7, 0.5, 1.5, 0.7), (0.0, -2.0, -3.0, -3.0)])
+def test_likelihood_and_slope_are_those_of_plain_formulas(theta, both):
+    residual, theta = np.linspace(-6.0, 8.0, 57), np.array(theta)
+    slope = np.empty(4)
+    assert one_sided._log_likelihood(residual, theta, both, slope) == pytest.approx(
+        plainly(residual, theta, both), rel=1e-9
+    )
+    for k, step in enumerate(1e-5 * np.eye(4)):
+        numeric = (plainly(residual, theta + step, both) - plainly(residual, theta - step, both)) / 2e-5
+        assert slope[k] == pytest.approx(numeric, rel=1e-5, abs=1e-4)
+
+
+@pytest.mark.parametrize("z", [-300.0, -37.0, -20.001, -19.999, -5.0, 0.0, 3.0, 40.0])
+def test_share_below_is_right_at_any_distance(z):
+    residual, theta = np.array([z]), np.array([0.0, 0.0, 30.0, 0.0])  # all readings have errors, of one sigma
+    found = one_sided._log_likelihood(residual, theta, False, np.empty(4))
+    assert found == pytest.approx(0.5 - z + stats.norm.logcdf(z - 1), rel=1e-11)
