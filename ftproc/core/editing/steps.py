@@ -27,7 +27,7 @@ from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.shifts import Shifts, shifts
 from ftproc.core.identification.likelihood import Fixed, fit_level
-from ftproc.core.identification.profile import fit_profile, from_knot, median_level
+from ftproc.core.identification.profile import fit_profile, from_knot, median_level, roughness
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.frames import to_cartesian, wrap
 from ftproc.order_statistics import median, medians
@@ -37,7 +37,7 @@ FloatArray = NDArray[np.float64]
 LEAST = 6.0  # sigmas of a step's estimate that make it worth weighing
 FEWEST, EVEN = 3, 5.0  # readings in a rejected run, and second differences in sigmas, that may be a track
 AROUND, MEMORIES = (100, 400), 6.0  # samples on each side that decide between step and manoeuvre, and memories
-MARGIN = 8.0  # by which the log-probability of a stretch with a step must be better, and ln of the places for it
+MARGIN = 6.0  # by which the log-probability of a stretch with a step must be better, and ln of the places for it
 MOST = 8  # steps that are weighed at a time
 SMALLEST, SURE = 4.5, 7.0  # sigmas of the noise: a smaller step than this may be an end of a weak patch
 SMALL = 0.7  # times that, before its size is found with the outliers beside it
@@ -269,13 +269,15 @@ def _decided(stretch: Stretch, weight: FloatArray, model: Model) -> alternatives
 
 
 def _likelihood(stretch: Stretch, weight: FloatArray) -> float:
-    """Log-probability of the readings of a stretch with a process noise and outlier decisions of its own."""
+    """Log-probability of the readings of a stretch with a process noise and outlier decisions of its own, and of that
+    process noise: it may grow for a moment, as a step asks for, but seldom does."""
     log, model = stretch.record.weighted(weight), stretch.calm
     starts = find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
     if not stretch.record.fixed.jerk:
         level = fit_level(log, starts, model, Fixed(np.ones(3, bool), False))
         model = fit_profile(log, starts, level, PROFILE_STEPS)
-    return max(step.likelihood for step in alternatives.decisions(_ready(stretch, model), weight))
+    likeliest = max(step.likelihood for step in alternatives.decisions(_ready(stretch, model), weight))
+    return likeliest - roughness(model)
 
 
 def _ready(stretch: Stretch, model: Model) -> alternatives.Neighbourhood:
