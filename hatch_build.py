@@ -55,7 +55,7 @@ def libraries() -> list[Path]:
     """The libraries of kernels, made side by side if they are not there; those of other sources are removed."""
     from ftproc.core import compiled
 
-    names = {GENERIC: compiled.LIBRARY}
+    names = {GENERIC: compiled.GENERIC}
     if platform.machine().lower() in ("x86_64", "amd64"):
         names[MODERN] = compiled.MODERN
     wanted = {CORE / (name + sysconfig.get_config_var("EXT_SUFFIX")): cpu for cpu, name in names.items()}
@@ -69,7 +69,7 @@ def libraries() -> list[Path]:
     if any(codes):
         sys.exit(1)
     for old in CORE.glob("_kernels_*"):
-        if not old.name.startswith(compiled.LIBRARY):  # that of another Python stays
+        if not old.name.startswith(compiled.GENERIC):  # that of another Python stays
             old.unlink()
     return list(wanted)
 

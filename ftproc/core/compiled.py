@@ -65,8 +65,8 @@ def digest(room: Path = ROOM) -> str:
 
 
 DIGEST = digest()
-LIBRARY = f"_kernels_{DIGEST}"  # the library's name as a module
-MODERN = f"{LIBRARY}_v3"  # that of the one for processors of the level x86-64-v3: AVX2 and FMA
+GENERIC = f"_kernels_{DIGEST}"  # the name, as a module, of the library for any processor of the kind
+MODERN = f"{GENERIC}_v3"  # and of that for those of the level x86-64-v3, which know AVX2 and FMA
 
 
 def _is_modern() -> bool:
@@ -75,12 +75,12 @@ def _is_modern() -> bool:
         has = importlib.import_module("numpy._core._multiarray_umath").__cpu_features__
     except (ImportError, AttributeError):  # numpy keeps it to itself
         return False
-    return bool(has.get("AVX2") and has.get("FMA3"))
+    return bool(has["X86_V3"] if "X86_V3" in has else has.get("AVX2") and has.get("FMA3"))  # before numpy 2.4
 
 
-def _library() -> Any:
+def _fastest() -> Any:
     """The fastest library that belongs to these sources and runs on this processor, or None."""
-    for name in (MODERN, LIBRARY) if _is_modern() else (LIBRARY,):
+    for name in (MODERN, GENERIC) if _is_modern() else (GENERIC,):
         with contextlib.suppress(ImportError):  # not there, or not one that can be loaded
             return importlib.import_module(f"ftproc.core.{name}")
     return None
@@ -90,7 +90,7 @@ def _choose(wanted: str) -> tuple[str, Any]:
     """How the kernels run, and the library if they run from it."""
     if wanted not in ("", *WAYS):
         raise InstallationError(f'FTPROC_KERNELS is "{wanted}"; it is one of {", ".join(WAYS)}, or not set.')
-    library = _library() if wanted in ("", "compiled") else None
+    library = _fastest() if wanted in ("", "compiled") else None
     if library is not None:
         return "compiled", library
     if wanted == "compiled":

@@ -116,11 +116,11 @@ def test_without_library_and_numba(copy, tmp_path):
 def test_any_processor_has_a_library(monkeypatch):
     """Those that know no AVX2 or FMA take the other one."""
     monkeypatch.setattr(compiled, "_is_modern", lambda: False)
-    assert compiled._library().__name__ == f"ftproc.core.{compiled.LIBRARY}"
+    assert compiled._fastest().__name__ == f"ftproc.core.{compiled.GENERIC}"
 
 
 @only_compiled
-@pytest.mark.parametrize("name", [compiled.LIBRARY, compiled.MODERN])
+@pytest.mark.parametrize("name", [compiled.GENERIC, compiled.MODERN])
 def test_every_library_computes_the_same(name):
     """To the last digit: more than that nobody can ask of another processor."""
     if name == compiled.MODERN and not compiled._is_modern():

@@ -83,8 +83,8 @@ def _grid(readings: FloatArray, levels: FloatArray) -> float:
     if not len(steps):
         return 0.0
     places = [int(share * (len(steps) - 1)) for share in (0.5, 0.2, 0.05, 0.0)]
-    shares: list[float] = np.partition(steps, places)[places].tolist()
-    for step in shares:
+    tried: list[float] = np.partition(steps, places)[places].tolist()
+    for step in tried:
         multiple = (readings - levels[len(levels) // 2]) / step
         if np.mean(np.abs(multiple - np.round(multiple)) < ON_GRID) >= MOSTLY_ON_GRID:
             return step
