@@ -21,7 +21,7 @@ from ftproc.core import threads
 from ftproc.core.editing import two_pass
 from ftproc.core.filtering import bridging, forward
 from ftproc.core.filtering.records import FilterRun, Model
-from ftproc.core.filtering.smoother import HEADS, RESIDUALS, STATES, SmootherRun, smooth_log
+from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 from ftproc.core.identification.profile import median_level
 from ftproc.methods import live, preparing
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
@@ -57,15 +57,16 @@ def parts(record: Recording, settings: FilterSettings) -> Iterator[Part]:
 
 def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | None = None) -> Estimate:
     """Two-pass editing. usual: of a segment, what is usual in the log, see `core.editing.two_pass`."""
-    known, wanted = preparing.what_is_known(readings, settings), STATES if settings.smooth else HEADS
-    edited = two_pass.edit(readings.time_s, readings.measurement, known, usual, wanted=wanted)
-    starts = two_pass.smoothed_starts(edited.smoothed)
-    run, smoothed = forward.filter_log(edited.log, edited.model, starts), edited.smoothed if settings.smooth else None
+    known = preparing.what_is_known(readings, settings)
+    edited = two_pass.edit(readings.time_s, readings.measurement, known, usual)
+    starts = preparing.smoothed_starts(edited.log, edited.model, edited.starts)
+    run = forward.filter_log(edited.log, edited.model, starts)
+    smoothed = edited.smoothed() if settings.smooth else None
     other = edited.decision.slowest if edited.decision.alternative is None else edited.decision.alternative.slowest
     if other is not None:
-        other_smoothed = smooth_log(edited.log, other, edited.starts, wanted)
-        run = _worse_of(run, forward.filter_log(edited.log, other, two_pass.smoothed_starts(other_smoothed)))
-        smoothed = smoothed and _worse_of(smoothed, other_smoothed)
+        other_starts = preparing.smoothed_starts(edited.log, other, edited.starts)
+        run = _worse_of(run, forward.filter_log(edited.log, other, other_starts))
+        smoothed = smoothed and _worse_of(smoothed, smooth_log(edited.log, other, edited.starts))
     shifts = edited.faults.shifts
     if shifts:
         run, smoothed = _widened(run, shifts), smoothed and _widened(smoothed, shifts)
@@ -114,7 +115,7 @@ def _span(record: Recording, settings: FilterSettings, rows: slice) -> two_pass.
     readings = record.part(rows)
     known = preparing.what_is_known(readings, settings)
     try:
-        return two_pass.edit(readings.time_s, readings.measurement, known, wanted=RESIDUALS)
+        return two_pass.edit(readings.time_s, readings.measurement, known)
     except ValueError:  # a component has too few readings in this span
         return None
 

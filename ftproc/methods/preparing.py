@@ -10,15 +10,19 @@ import numpy as np
 from ftproc.core.editing import outlier_chain, two_pass
 from ftproc.core.filtering import forward
 from ftproc.core.filtering.initialization import find_starts
-from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
-from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.filtering.records import FilterRun, Model, Observations, Start, between
+from ftproc.core.filtering.smoother import HEADS, smooth_log
 from ftproc.core.identification.likelihood import Fixed, first_jerk, fit_level
+from ftproc.core.identification.profile import from_knot, median_level
+from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import isotropic
 from ftproc.methods.estimate import Estimate, Readings, Recording
 from ftproc.records import MISSING, FlagArray, FloatArray
 from ftproc.settings import FilterSettings
 
 HEAD = 256  # samples at the beginning of a log that are edited with two passes before a recursive filter starts
+FEWEST, TO_FORGET = 500, 30.0  # samples after a start that tell its state, and memories of the filter
+START_INFLATION = 2.0  # on the covariance of a smoothed state that starts a filter over the same record
 LONGEST_ISOLATED = 2  # readings rejected in a row; more make a patch
 
 
@@ -71,7 +75,7 @@ def trusted(readings: Readings, settings: FilterSettings) -> Trusted:
     with contextlib.suppress(ValueError):  # too few readings in the head: the screening has to do
         head = two_pass.edit(time_s[:HEAD], measurement[:HEAD], known)
         weight[:HEAD] = head.weight
-        start = two_pass.smoothed_starts(head.smoothed)[0]
+        start = smoothed_starts(head.log, head.model, head.starts)[0]
         if len(time_s) <= HEAD:
             sigma = np.sqrt(head.model.noise_variance)
     return Trusted(weight, np.where(np.isfinite(known.sigma), known.sigma, sigma), start)
@@ -90,6 +94,23 @@ def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[S
     if first is not None and first.sample <= starts[0].sample:
         starts[0] = first
     return model, starts
+
+
+def smoothed_starts(log: Observations, model: Model, starts: list[Start]) -> list[Start]:
+    """Where the recursive filter starts over a record that has been edited: at the smoothed states, which the readings
+    of many memories after each start tell.
+
+    Their covariances are inflated, because the filter will see the same readings once more.
+    """
+    scales, found = scales_of(log, model.noise_variance), list[Start]()
+    memory = scales.memory_s(float(median_level(model).jerk[0, 0])) / scales.interval_s
+    enough = max(FEWEST, int(TO_FORGET * memory))
+    for start, stop in between(starts, len(log.time_s)):
+        span, own = from_knot(model, log.time_s, slice(start.sample, min(start.sample + enough, stop)))
+        begin = start._replace(sample=start.sample - span.start)
+        (head,) = smooth_log(log.part(span), own, [begin], HEADS).heads
+        found.append(Start(start.sample, head.state, START_INFLATION * head.covariance))
+    return found
 
 
 def re_initialized(starts: list[Start]) -> tuple[int, ...]:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.methods import anti_outlier, kalman, robust
+from ftproc.core.editing import two_pass
+from ftproc.core.filtering.smoother import HEADS, smooth_log
+from ftproc.methods import anti_outlier, kalman, preparing, robust
 from ftproc.methods.estimate import Readings
 from ftproc.settings import FilterSettings
 from tests.methods.flights import PATHS, TIME, measured
+from tests.simulated import simulate
 
 UNKNOWN = np.full(3, np.nan)
 
@@ -38,3 +41,18 @@ def test_a_model_of_several_holds_for_five_seconds_or_twenty_intervals(dt_s, soj
     )
     np.testing.assert_array_equal(usual, said)
     assert (usual != other).any()
+
+
+def test_starts_are_where_all_the_record_says_with_wider_covariances():
+    """The readings of many memories after a start say all that there is to say of it."""
+    flight = simulate("manoeuvre", seed=4, duration_s=150.0, outliers="gap=2:8-9")
+    edited = two_pass.edit(flight.log.time_s, flight.log.measurement, two_pass.Known(UNKNOWN, None, 4.0))
+    starts = preparing.smoothed_starts(edited.log, edited.model, edited.starts)
+    heads = smooth_log(edited.log, edited.model, edited.starts, HEADS).heads
+    assert len(edited.log.time_s) > 4 * preparing.FEWEST
+    assert [start.sample for start in starts] == [head.sample for head in heads]
+    for start, head in zip(starts, heads, strict=True):
+        sigma = np.sqrt(np.diag(head.covariance))
+        np.testing.assert_array_less(np.abs(start.state - head.state), 0.02 * sigma)
+        wider = start.covariance - preparing.START_INFLATION * head.covariance
+        np.testing.assert_array_less(np.abs(wider), 0.02 * np.outer(sigma, sigma))

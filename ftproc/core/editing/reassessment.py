@@ -17,7 +17,7 @@ from ftproc.core.editing import alternatives
 from ftproc.core.editing.decisions import Decision, Record, decide
 from ftproc.core.editing.runs import confirmed, runs_of, suspicious
 from ftproc.core.filtering.initialization import find_starts
-from ftproc.core.filtering.records import Model, Start
+from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification.profile import fit_profile, from_knot, median_level, roughness
 from ftproc.core.identification.scales import scales_of
@@ -37,7 +37,7 @@ FEW_MORE = 0.01  # of the readings: those that another hypothesis may reject bey
 OTHER_LEVEL = 2.5  # times the jerk level at which an alternative was tried, before it is tried again
 PROFILE_STEPS, COMPARED_STEPS = 2, 5  # of the search for the jerk profile; where two are compared
 STANDS_OUT = 64.0  # times the median of the jerk profile
-AROUND, MEMORIES = (60, 200), 8.0  # samples on each side of what stands out that are decided with it, and memories
+AROUND, MEMORIES = (60, 200), 8.0  # samples on each side that tell what lies between, and memories
 LONGEST_SPAN = 3000  # samples that are decided together
 SHORT_LOG, MOST = 8000, 0.5  # samples, and share that stands out: then all of it is decided again, and noise as well
 
@@ -49,11 +49,11 @@ def reassess(record: Record, decision: Decision) -> Decision:
     marked = _suspects(record, decision, calm, profile).any(1) | _stands_out(record.time_s, profile)
     for island in alternatives.islands(record.time_s, decision.weight, record.possible):
         marked[island.first : island.last] = True
-    widened = _widened(marked, _around(record, decision.weight, calm))
-    if len(widened) <= SHORT_LOG and widened.mean() > MOST:
+    around = widened(marked, samples_around(record.weighted(decision.weight), calm))
+    if len(around) <= SHORT_LOG and around.mean() > MOST:
         return _until_settled(record, decision, profile)
     weight, unexamined = decision.weight.copy(), 0
-    for span in _spans(widened):
+    for span in _spans(around):
         part = _short(record, span)
         try:
             starts = _starts(part, weight[span], calm)
@@ -72,7 +72,7 @@ def _profile(record: Record, decision: Decision, steps: int = PROFILE_STEPS) -> 
 
 
 def _starts(record: Record, weight: FloatArray, calm: Model) -> list[Start]:
-    return find_starts(record.weighted(weight), calm.noise_variance, float(calm.jerk[0, 0]))
+    return _starts_of(record.weighted(weight), calm)
 
 
 def _until_settled(record: Record, decision: Decision, profile: Model) -> Decision:
@@ -116,13 +116,12 @@ def with_motion(record: Record, decision: Decision) -> Decision:
         part, weight = _short(record, near), found[near].copy()
         weight[inside - near.start, c] = 1.0
         try:
-            one, other = (Decision(w, calm, _starts(part, w, calm), decision.rates) for w in (found[near], weight))
-            one, other = (each._replace(model=_profile(part, each, COMPARED_STEPS)) for each in (one, other))
+            model = _profile(part, Decision(weight, calm, _starts(part, weight, calm), decision.rates), COMPARED_STEPS)
             whole = alternatives.Neighbourhood(
-                part.time_s, part.measurement, part.possible, other.model, decision.rates, part.gate, part.uneven
+                part.time_s, part.measurement, part.possible, model, decision.rates, part.gate, part.uneven
             )
             weight = alternatives.decisions(whole, weight, 2)[-1].weight
-            other = other._replace(weight=weight, starts=_starts(part, weight, calm))
+            one, other = (Decision(w, calm, _starts(part, w, calm), decision.rates) for w in (found[near], weight))
         except ValueError:  # a component has too few readings there
             continue
         taken_in = weight[inside - near.start, c].mean() > 0.5
@@ -143,8 +142,9 @@ def _may_be_motion(record: Record, decision: Decision) -> Iterator[tuple[int, In
         runs += [(c, seen[begin:end]) for begin, end in rejected]
     for _, inside in runs:
         marked[inside] = True
-    around = _around(record, decision.weight, median_level(decision.model))
-    residual, variance = _near(record, decision.weight, decision.model, marked, around)
+    log = record.weighted(decision.weight)
+    around = samples_around(log, median_level(decision.model))
+    residual, variance = residuals_near(log, decision.model, marked, around)
     for c, inside in runs:
         away = residual[inside, c] / np.sqrt(variance[inside, c])
         joined = max(np.sort(np.abs(edge))[1] for edge in (away[:ENDS], away[-ENDS:])) < JOINED
@@ -192,21 +192,6 @@ def _stands_out(time_s: FloatArray, profile: Model) -> NDArray[np.bool_]:
     return found
 
 
-def _around(record: Record, weight: FloatArray, calm: Model) -> int:
-    """Samples on each side that are enough to decide on what lies between."""
-    scales = scales_of(record.weighted(weight), calm.noise_variance)
-    return int(np.clip(MEMORIES * scales.memory_s(float(calm.jerk[0, 0])) / scales.interval_s, *AROUND))
-
-
-def _widened(marked: NDArray[np.bool_], around: int) -> NDArray[np.bool_]:
-    """(n,) true within so many samples of what is marked."""
-    edges = np.zeros(len(marked) + 1, int)
-    for begin, end in runs_of(marked):
-        edges[max(begin - around, 0)] += 1
-        edges[min(end + around, len(marked))] -= 1
-    return np.cumsum(edges)[:-1] > 0
-
-
 def _spans(marked: NDArray[np.bool_]) -> Iterator[slice]:
     """The runs of what is marked, in pieces that are not too long."""
     for begin, end in runs_of(marked):
@@ -229,24 +214,43 @@ def _suspects(record: Record, decision: Decision, calm: Model, profile: Model) -
     memory_s = scales_of(log, calm.noise_variance).memory_s(float(calm.jerk[0, 0]))
     suspects = suspicious(record.time_s, smoothed.residual, smoothed.residual_variance, weight, memory_s)
     if suspects.any():
-        around = _around(record, weight, calm)
-        without = _near(record, np.where(suspects, 0.0, weight), profile, np.asarray(suspects.any(1)), around)
-        suspects = confirmed(suspects, *without)
+        without = record.weighted(np.where(suspects, 0.0, weight))
+        near = residuals_near(without, profile, np.asarray(suspects.any(1)), samples_around(log, calm))
+        suspects = confirmed(suspects, *near)
     return suspects
 
 
-def _near(
-    record: Record, weight: FloatArray, model: Model, marked: NDArray[np.bool_], around: int
+def samples_around(log: Observations, calm: Model) -> int:
+    """Samples on each side that are enough to decide on what lies between."""
+    scales = scales_of(log, calm.noise_variance)
+    return int(np.clip(MEMORIES * scales.memory_s(float(calm.jerk[0, 0])) / scales.interval_s, *AROUND))
+
+
+def widened(marked: NDArray[np.bool_], around: int) -> NDArray[np.bool_]:
+    """(n,) true within so many samples of what is marked."""
+    edges = np.zeros(len(marked) + 1, int)
+    for begin, end in runs_of(marked):
+        edges[max(begin - around, 0)] += 1
+        edges[min(end + around, len(marked))] -= 1
+    return np.cumsum(edges)[:-1] > 0
+
+
+def residuals_near(
+    log: Observations, model: Model, marked: NDArray[np.bool_], around: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Leave-one-out residuals (n, 3) and their variances of what is marked (n,), with these weights (n, 3) and a jerk
-    profile. NaN far from it, where nothing is smoothed, unless a component is not seen near it: then all of it is."""
-    residual, variance = np.full(weight.shape, np.nan), np.full(weight.shape, np.nan)
-    for begin, end in runs_of(_widened(marked, around)):
-        span, own = from_knot(model, record.time_s, slice(int(begin), int(end)))
+    """Leave-one-out residuals (n, 3) and their variances of what is marked (n,), with a jerk profile. NaN far from it,
+    where nothing is smoothed, unless a component is not seen near it: then all of it is."""
+    residual, variance = np.full(log.weight.shape, np.nan), np.full(log.weight.shape, np.nan)
+    for begin, end in runs_of(widened(marked, around)):
+        span, own = from_knot(model, log.time_s, slice(int(begin), int(end)))
         try:
-            starts = _starts(record.part(span), weight[span], median_level(own))
+            starts = _starts_of(log.part(span), own)
         except ValueError:  # a component has too few readings there
-            span, own, starts = slice(None), model, _starts(record, weight, median_level(model))
-        smoothed = smooth_log(record.part(span).weighted(weight[span]), own, starts, RESIDUALS)
+            span, own, starts = slice(None), model, _starts_of(log, model)
+        smoothed = smooth_log(log.part(span), own, starts, RESIDUALS)
         residual[span], variance[span] = smoothed.residual, smoothed.residual_variance
     return residual, variance
+
+
+def _starts_of(log: Observations, model: Model) -> list[Start]:
+    return find_starts(log, model.noise_variance, float(median_level(model).jerk[0, 0]))

@@ -21,26 +21,25 @@ from numpy.typing import NDArray
 
 from ftproc.core.editing import alternatives
 from ftproc.core.editing.decisions import Decision, Record
+from ftproc.core.editing.reassessment import residuals_near, samples_around
 from ftproc.core.editing.runs import runs_of
 from ftproc.core.filtering.bridging import CLOCK, Step, bridged, refined
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model
-from ftproc.core.filtering.shifts import Shifts, shifts
 from ftproc.core.identification.likelihood import Fixed, fit_level
 from ftproc.core.identification.profile import fit_profile, from_knot, median_level, roughness
 from ftproc.core.identification.scales import scales_of
+from ftproc.core.identification.standing_out import MOST, SMALLEST, end_of, standing_out
 from ftproc.core.model.frames import to_cartesian, wrap
 from ftproc.order_statistics import median, medians
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
-LEAST = 6.0  # sigmas of a step's estimate that make it worth weighing
 FEWEST, EVEN = 3, 5.0  # readings in a rejected run, and second differences in sigmas, that may be a track
 AROUND, MEMORIES = (100, 400), 6.0  # samples on each side that decide between step and manoeuvre, and memories
 MARGIN = 6.0  # by which the log-probability of a stretch with a step must be better, and ln of the places for it
-MOST = 8  # steps that are weighed at a time
-SMALLEST, SURE = 4.5, 7.0  # sigmas of the noise: a smaller step than this may be an end of a weak patch
-SMALL = 0.7  # times that, before its size is found with the outliers beside it
+SURE = 7.0  # sigmas of the noise: a smaller step than this may be an end of a weak patch
 PATCHES = 12, 24, 48  # readings in a patch, of which a step may be an end
 STAYS = 0.75  # share of the readings on either side of a step that must be good
 AGREE, BESIDE = 0.75, 7  # share of a rejected run on either side of the track, and readings that tell how far they jump
@@ -49,7 +48,6 @@ HOPELESS = 50.0  # by which the log-probability is worse before a size is found 
 HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
 SIZES = 2  # times that the size of a step is found again, as the decisions beside it change
 PROFILE_STEPS = 2  # of the search for the jerk profile of a stretch
-END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step cannot be told from a patch
 
 
 class Stretch(NamedTuple):
@@ -72,18 +70,19 @@ class Stretch(NamedTuple):
 
 def find(record: Record, decision: Decision) -> list[Step]:
     """The steps in a log whose outliers were decided as if it had none; some are not sure."""
-    calm = median_level(decision.model)
-    decided = shifts(record.weighted(decision.weight), calm, decision.starts)
-    weight = _taken_in(record, decision, calm, decided.residual)
+    calm, log = median_level(decision.model), record.weighted(decision.weight)
+    rejected = np.zeros(len(record.time_s), bool)
+    for _, run in _rejected_runs(record, decision, FEWEST):
+        rejected[run] = True
+    residual, _ = residuals_near(log, calm, rejected, samples_around(log, calm))
+    weight = _taken_in(record, decision, calm, residual)
     scales = scales_of(record.weighted(weight), calm.noise_variance)
     around = int(np.clip(MEMORIES * scales.memory_s(float(calm.jerk[0, 0])) / scales.interval_s, *AROUND))
-    margin, end = MARGIN + math.log(4 * len(record.time_s)), _end(len(record.time_s))
+    margin, end = MARGIN + math.log(4 * len(record.time_s)), end_of(len(record.time_s))
     found: list[Step] = []
-    candidates = [*_beside_runs(record, decision, calm, decided.residual), *_standing_out(decided, calm, around // 2)]
+    candidates = [*_beside_runs(record, decision, calm, residual), *standing_out(log, calm, around // 2)]
     if (weight != decision.weight).any():
-        log = record.weighted(weight)
-        starts = find_starts(log, calm.noise_variance, float(calm.jerk[0, 0]))
-        candidates = [*_standing_out(shifts(log, calm, starts), calm, around // 2), *candidates]
+        candidates = [*standing_out(record.weighted(weight), calm, around // 2), *candidates]
     for step in candidates:
         again = any(step.component == s.component and abs(step.sample - s.sample) < BESIDE for s in found)
         if again or not end < step.sample <= len(record.time_s) - end:
@@ -103,29 +102,34 @@ def find(record: Record, decision: Decision) -> list[Step]:
     return found
 
 
+def _rejected_runs(record: Record, decision: Decision, shortest: int) -> Iterator[tuple[int, IntArray]]:
+    """The component and the samples of each run of rejected readings that is not shorter."""
+    for c in range(3):
+        seen = np.flatnonzero(record.possible[:, c])
+        for begin, end in runs_of(decision.weight[seen, c] <= 0, shortest):
+            yield c, seen[begin:end]
+
+
 def _taken_in(record: Record, decision: Decision, calm: Model, residual: FloatArray) -> FloatArray:
     """The decisions' weights (n, 3), but with the rejected runs whose readings lie on a track of their own. residual:
     (n, 3) leave-one-out, of these decisions."""
     weight = decision.weight.copy()
     sigma = np.sqrt(calm.noise_variance)
-    for c in range(3):
-        seen = np.flatnonzero(record.possible[:, c])
-        for begin, end in runs_of(weight[seen, c] <= 0, FEWEST):
-            run = seen[begin:end]
-            if median(np.abs(np.diff(residual[run, c], 2))) < EVEN * sigma[c]:
-                weight[run, c] = 1.0
+    for c, run in _rejected_runs(record, decision, FEWEST):
+        if median(np.abs(np.diff(residual[run, c], 2))) < EVEN * sigma[c]:
+            weight[run, c] = 1.0
     return weight
 
 
 def _beside_runs(record: Record, decision: Decision, calm: Model, residual: FloatArray) -> list[Step]:
     """The steps that rejected runs may hide, the largest first. residual: (n, 3) leave-one-out."""
     found: list[tuple[float, Step]] = []
-    for c in range(3):
-        seen, sigma = np.flatnonzero(record.possible[:, c]), math.sqrt(calm.noise_variance[c])
-        for begin, end in runs_of(decision.weight[seen, c] <= 0, 2 * FEWEST):
-            for place, jump in _jumps(residual[seen[begin:end], c]):
-                if abs(jump) > SMALLEST * sigma and begin + place < len(seen):
-                    found.append((abs(jump) / sigma, Step(c, int(seen[begin + place]), jump, sigma)))
+    for c, run in _rejected_runs(record, decision, 2 * FEWEST):
+        sigma = math.sqrt(calm.noise_variance[c])
+        after = run[-1] + 1 + np.flatnonzero(record.possible[run[-1] + 1 :, c])[:1]
+        for place, jump in _jumps(residual[run, c]):
+            if abs(jump) > SMALLEST * sigma and place < len(run) + len(after):
+                found.append((abs(jump) / sigma, Step(c, int(np.append(run, after)[place]), jump, sigma)))
     return [step for _, step in sorted(found, key=lambda each: -each[0])[:MOST]]
 
 
@@ -142,32 +146,6 @@ def _jumps(off: FloatArray) -> Iterator[tuple[int, float]]:
         yield 0, first
     if abs(first) < JOINS * abs(last):
         yield n, -last
-
-
-def _standing_out(found: Shifts, calm: Model, apart: int) -> list[Step]:
-    """The steps that stand out of a calm flight, the clearest first, and so many samples apart."""
-    score, information = found.score.copy(), found.information
-    small = SMALL * SMALLEST * np.sqrt(calm.noise_variance) * information[:, :3]
-    score[:, :3] = np.where(np.abs(score[:, :3]) > small, score[:, :3], 0.0)
-    size = np.divide(
-        np.abs(score), np.sqrt(np.maximum(information, 0)), out=np.zeros_like(score), where=information > 0
-    )
-    end = _end(len(size))
-    size[:end] = size[-end:] = 0.0
-    steps: list[Step] = []
-    while len(steps) < MOST and size.max() > LEAST:
-        k, c = (int(i) for i in np.unravel_index(int(size.argmax()), size.shape))
-        estimate, sigma = score[k, c] / information[k, c], 1 / math.sqrt(information[k, c])
-        steps.append(Step(c, k + 1, float(-estimate if c == CLOCK else estimate), sigma))
-        near = slice(max(k - apart, 0), k + apart)
-        size[near, c] = 0.0
-        size[near, CLOCK] = 0.0  # which is no jump where one component stands out more
-    return steps
-
-
-def _end(samples: int) -> int:
-    """Samples at either end of so many in which a step cannot be told from a patch."""
-    return 1 + min(END, int(SHARE * samples))
 
 
 def _without(stretch: Stretch, steps: Sequence[Step]) -> Stretch:

@@ -33,16 +33,18 @@ from ftproc.core.editing.reassessment import (
     likelier,
     log_probability,
     reassess,
+    residuals_near,
+    samples_around,
     with_motion,
 )
 from ftproc.core.filtering.bridging import CLOCK, Step, bridged, refined
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import STATES, SmootherRun, smooth_log
+from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 from ftproc.core.identification import one_sided, uneven_noise
 from ftproc.core.identification.likelihood import Fixed, first_jerk, without_noise
 from ftproc.core.identification.one_sided import OneSided
-from ftproc.core.identification.profile import fit_profile, with_allowance
+from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
 from ftproc.core.model.frames import unwrap
 from ftproc.core.model.measurement import NO_RANGE_M
 from ftproc.core.model.motion import isotropic
@@ -61,7 +63,6 @@ HOPELESS = 200.0  # in log-probability, by which another hypothesis is behind if
 PROFILE_STEPS = 3  # of the search for the jerk profile, once the decisions are made
 STEP_MARGIN = 8.0  # in log-probability, by which steps must explain a log better than late stamps do
 STEP_ROUNDS = 4  # of looking for steps: where one is bridged, another may show
-START_INFLATION = 2.0  # on the covariance of a smoothed state that starts a filter over the same record
 
 
 class Known(NamedTuple):
@@ -98,14 +99,12 @@ class Edited(NamedTuple):
     """The decisions and what they rest on.
 
     log: with weights (n, 3), 1 good, 0 rejected or missing. model: noise and jerk profile. starts: for the next pass.
-    smoothed: the smoother's run with these. decision: the last one, with the model that it was made with.
-    faults: of the instrument, of which the log is free.
+    decision: the last one, with the model that it was made with. faults: of the instrument, of which the log is free.
     """
 
     log: Observations
     model: Model
     starts: list[Start]
-    smoothed: SmootherRun
     decision: Decision
     faults: Faults
 
@@ -113,6 +112,10 @@ class Edited(NamedTuple):
     def weight(self) -> FloatArray:
         """(n, 3) 1 good, 0 rejected or missing."""
         return self.log.weight
+
+    def smoothed(self) -> SmootherRun:
+        """What the whole record says of each sample, with these decisions."""
+        return smooth_log(self.log, self.model, self.starts)
 
 
 class Screened(NamedTuple):
@@ -175,13 +178,12 @@ def edit(
     segment_of: Model | None = None,
     live: bool = False,
     short: bool = False,
-    wanted: int = STATES,
 ) -> Edited:
     """Edit a whole log, or a segment of a long one. time_s (n,), measurement (n, 3).
 
     segment_of: of a segment, the noise of the whole log, which is taken as it is, and its typical jerk, with which the
     search starts. live: of a window that moves on, in which faults that stay are not looked for. short: too short to
-    tell whether the noise is uneven or correlated: it is taken for white. wanted: of the smoother, see `smooth_log`.
+    tell whether the noise is uneven or correlated: it is taken for white.
     Raises ValueError when a component has no reading that agrees with its neighbours.
     """
     measurement, copied = without_copies(time_s, measurement)
@@ -210,13 +212,16 @@ def edit(
         profile = fit_profile(log, decision.starts, decision.model, PROFILE_STEPS)
         decision = decision._replace(model=with_allowance(log, profile))
     log, found = refined(log, decision.model, found)
-    smoothed = smooth_log(log, decision.model, decision.starts, wanted)
-    leaning = [] if live else one_sided.find(log, smoothed, record.rounding)
-    if leaning:
-        log = one_sided.without(log, leaning)
-        smoothed = smooth_log(log, decision.model, decision.starts, wanted)
+    leaning = [] if live else _one_sided(log, decision.model, record.rounding)
     faults = Faults(copied, (*found, *doubtful), tuple(leaning))
-    return Edited(log, decision.model, decision.starts, smoothed, decision, faults)
+    return Edited(one_sided.without(log, leaning), decision.model, decision.starts, decision, faults)
+
+
+def _one_sided(log: Observations, model: Model, rounding: FloatArray) -> list[OneSided]:
+    """The components with errors on one side, by readings that are spread over the log."""
+    around = samples_around(log, median_level(model))
+    residual, variance = residuals_near(log, model, one_sided.spread(len(log.time_s)), around)
+    return one_sided.find(log.weight, residual, variance, rounding)
 
 
 def _may_be_late_stamps(without: tuple[Record, Decision], bridged: tuple[Record, Decision]) -> bool:
@@ -288,11 +293,3 @@ def _with_late_stamps(record: Record, decision: Decision) -> tuple[Record, Decis
                 break
         likeliest = believed(likeliest, found)
     return likeliest
-
-
-def smoothed_starts(smoothed: SmootherRun) -> list[Start]:
-    """Where the recursive filter starts over a record that has been smoothed: at the smoothed states.
-
-    Their covariances are inflated, because the filter will see the same readings once more.
-    """
-    return [head._replace(covariance=START_INFLATION * head.covariance) for head in smoothed.heads]

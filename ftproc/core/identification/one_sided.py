@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part
 from ftproc.core.filtering.records import Observations
-from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification import optimizer
 from ftproc.core.signatures import Vector
 from ftproc.order_statistics import median
@@ -24,6 +23,7 @@ from ftproc.order_statistics import median
 FloatArray = NDArray[np.float64]
 
 FEWEST = 100  # readings of a component, for the shape of their errors to show
+SPANS, SPAN = 8, 1000  # of samples, spread over a log, that show the least skewness as clearly as all would
 SKEW, IN_SIGMAS = 0.1, 3.5  # least skewness of the residuals, and its standard errors, that make the fit worth while
 FLAT, FINE = 0.2, 0.4  # the same of what is missing to the kurtosis of 3, where rounding makes less of the 1-sigma
 LEANS = 0.15  # skewness from which it is clear on which side the errors are
@@ -47,16 +47,26 @@ class OneSided(NamedTuple):
     sigma: float
 
 
-def find(log: Observations, smoothed: SmootherRun, rounding: FloatArray) -> list[OneSided]:
-    """The components with such errors, from the residuals of the readings used. rounding: (3,) 1-sigma of it."""
+def spread(samples: int) -> NDArray[np.bool_]:
+    """(samples,) those whose residuals are asked for: SPANS spans of a long log."""
+    asked = np.ones(samples, bool)
+    if samples > SPANS * SPAN:
+        asked[:] = False
+        for first in np.linspace(0, samples - SPAN, SPANS).astype(int):
+            asked[first : first + SPAN] = True
+    return asked
+
+
+def find(weight: FloatArray, residual: FloatArray, variance: FloatArray, rounding: FloatArray) -> list[OneSided]:
+    """The components with such errors. weight (n, 3): zero for readings that are not used. residual, variance: (n, 3)
+    leave-one-out, NaN where not known. rounding: (3,) 1-sigma of it."""
     found = []
     for c in range(3):
-        used = (log.weight[:, c] > 0) & (smoothed.residual_variance[:, c] > 0)
+        used = (weight[:, c] > 0) & (variance[:, c] > 0)
         if used.sum() < FEWEST:
             continue
-        residual = smoothed.residual[used, c]
-        scale = float(np.sqrt(median(smoothed.residual_variance[used, c])))
-        scaled = residual / scale
+        scale = math.sqrt(median(variance[used, c]))
+        scaled = residual[used, c] / scale
         if not scaled.std() > 0:  # a component that was not measured
             continue
         skew, odd, flat = _shape(scaled)

@@ -42,7 +42,8 @@ def minimise(
 ) -> FloatArray:
     """Minimiser of a smooth function between bounds, from `theta` (m,).
 
-    Stops after `steps` steps, or when a step is expected to gain less than `tolerance`.
+    Stops after `steps` steps, or when a step is expected to gain less than `tolerance`, or has: a function that is
+    rough, as likelihoods of a track that is nearly lost are, promises more than it keeps.
     """
     here = function(theta)
     history: list[tuple[FloatArray, FloatArray, float]] = []
@@ -68,7 +69,9 @@ def minimise(
         bend = float(moved @ turned)
         if bend > 1e-12 * float(moved @ moved):
             history = [*history, (moved, turned, bend)][-MEMORY:]
-        theta, here = trial, there
+        gained, theta, here = here.value - there.value, trial, there
+        if gained < tolerance:
+            break
     return theta
 
 

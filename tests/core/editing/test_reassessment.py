@@ -7,6 +7,7 @@ import pytest
 
 from ftproc.core.editing import reassessment, two_pass
 from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.identification.profile import median_level
 from tests.core.editing.test_two_pass import UNKNOWN, edit, flags
 from tests.simulated import simulate
 
@@ -19,7 +20,7 @@ def test_reassessment_finds_the_patch_that_made_the_jerk_jump(monkeypatch):
     flight = simulate("manoeuvre", seed=7, duration_s=75.0, outliers=spec)
 
     def rms():
-        error = edit(flight).smoothed.state[:, :3] - flight.truth.position_m
+        error = edit(flight).smoothed().state[:, :3] - flight.truth.position_m
         return np.sqrt((error**2).sum(1).mean())
 
     reassessed = rms()
@@ -118,8 +119,8 @@ def test_where_a_component_is_missing_around_what_is_marked_all_of_the_log_is_sm
     record, decision = decided
     weight, marked = decision.weight.copy(), np.zeros(len(decision.weight), bool)
     weight[150:650, 1], marked[395:405] = 0.0, True
-    residual, variance = reassessment._near(record, weight, decision.model, marked, 200)
-    starts = reassessment._starts(record, weight, decision.model)
+    residual, variance = reassessment.residuals_near(record.weighted(weight), decision.model, marked, 200)
+    starts = reassessment._starts(record, weight, median_level(decision.model))
     whole = smooth_log(record.weighted(weight), decision.model, starts)
     np.testing.assert_array_equal(residual, whole.residual)
     np.testing.assert_array_equal(variance, whole.residual_variance)

@@ -119,6 +119,6 @@ def test_weak_patches_are_found():
         bad = codes(flight) > 0
         found.append((edited.weight[bad] == 0).mean())
         assert (edited.weight[~bad] == 0).mean() < 0.002
-        error = np.linalg.norm(edited.smoothed.state[:, :3] - flight.truth.position_m, axis=1)
+        error = np.linalg.norm(edited.smoothed().state[:, :3] - flight.truth.position_m, axis=1)
         assert np.sqrt((error**2).mean()) < 1.7
     assert np.mean(found) > 0.6

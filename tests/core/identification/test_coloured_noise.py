@@ -90,8 +90,8 @@ def edited(samples, seed, name="cruise", duration_s=150.0):
 
 def inside(flight, found):
     """Share of the samples within three published sigmas in every axis."""
-    error = found.smoothed.state[:, :3] - flight.truth.position_m
-    return (np.abs(error) < 3 * found.smoothed.sigma[:, :3]).all(1).mean()
+    error = found.smoothed().state[:, :3] - flight.truth.position_m
+    return (np.abs(error) < 3 * found.smoothed().sigma[:, :3]).all(1).mean()
 
 
 @pytest.mark.compiled

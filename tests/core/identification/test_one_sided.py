@@ -7,20 +7,17 @@ import pytest
 from scipy import stats
 
 from ftproc.core.filtering.records import Observations
-from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification import one_sided
 
 FINE = np.zeros(3)
 
 
 def residuals(noise):
-    """A log and a smoother's run that leaves these residuals (n,) in each component."""
+    """A log and what a smoother leaves of it, these residuals (n,) in each component."""
     n = len(noise)
     scale = np.array([5.0, 1e-3, 2e-4])
     residual = noise[:, None] * scale
-    nothing = np.zeros((n, 9))
-    run = SmootherRun(nothing, nothing, nothing[:, :6], residual, np.tile(scale**2 * noise.var(), (n, 1)),
-                      np.zeros(n), 0.0, ())  # fmt: skip
+    run = residual, np.tile(scale**2 * noise.var(), (n, 1))
     return Observations(np.arange(float(n)), residual, np.ones((n, 3))), run, scale
 
 
@@ -34,7 +31,7 @@ def test_the_share_and_the_place_are_found(shape, side, share):
     noise = draw.standard_normal(n) + side * (draw.random(n) < share) * error
     middle = noise.mean()
     log, run, scale = residuals(noise - middle)
-    found = one_sided.find(log, run, FINE)
+    found = one_sided.find(log.weight, *run, FINE)
     assert [one.component for one in found] == [0, 1, 2]
     for one in found:
         assert one.share == pytest.approx(share, abs=0.15)
@@ -51,13 +48,13 @@ def test_symmetric_errors_are_left_alone(shape):
     noise = draw.standard_t(4, 4000) if shape == "student" else draw.standard_normal(4000)
     noise += (draw.random(4000) < 0.1) * 8 * draw.standard_normal(4000) if shape == "spikes" else 0.0
     log, run, _ = residuals(noise)
-    assert one_sided.find(log, run, FINE) == []
+    assert one_sided.find(log.weight, *run, FINE) == []
 
 
 def test_two_equal_peaks_are_said_but_not_leant_on():
     draw = np.random.default_rng(3)
     log, run, _ = residuals(draw.standard_normal(2000) + 4.0 * draw.choice([-1, 1], 2000))
-    found = one_sided.find(log, run, FINE)
+    found = one_sided.find(log.weight, *run, FINE)
     assert [one.shift for one in found] == [0.0, 0.0, 0.0]
 
 
@@ -65,8 +62,8 @@ def test_flat_errors_of_coarse_rounding_are_no_fault():
     draw = np.random.default_rng(4)
     noise = draw.uniform(-1, 1, 4000)
     log, run, scale = residuals(noise)
-    assert one_sided.find(log, run, FINE) != []
-    assert one_sided.find(log, run, scale / np.sqrt(3)) == []
+    assert one_sided.find(log.weight, *run, FINE) != []
+    assert one_sided.find(log.weight, *run, scale / np.sqrt(3)) == []
 
 
 def plainly(residual, theta, both):
@@ -96,3 +93,12 @@ def test_share_below_is_right_at_any_distance(z):
     residual, theta = np.array([z]), np.array([0.0, 0.0, 30.0, 0.0])  # all readings have errors, of one sigma
     found = one_sided._log_likelihood(residual, theta, False, np.empty(4))
     assert found == pytest.approx(0.5 - z + stats.norm.logcdf(z - 1), rel=1e-11)
+
+
+def test_spans_of_a_long_log_are_asked_for_and_all_of_a_short_one():
+    assert one_sided.spread(8000).all()
+    asked = one_sided.spread(50_000)
+    assert asked.sum() == one_sided.SPANS * one_sided.SPAN
+    assert asked[:1000].all()
+    assert asked[-1000:].all()
+    assert asked[20_000:35_000].any()

@@ -135,3 +135,16 @@ def test_tolerance_and_steps_stop_it():
     begin = np.array([1.001, 1.002])
     np.testing.assert_array_equal(solve(cost, begin, tolerance=1e3), begin)
     assert len(calls) == 1
+
+
+def test_a_rough_function_ends_the_search():
+    """It promises more than it keeps: a value that has hardly fallen, at a place where it should have, is the last."""
+    asked = []
+
+    def rough(theta):
+        asked.append(theta.copy())
+        value = float(np.abs(theta).sum()) + 30.0 * (len(asked) % 3 == 2)
+        return Point(value, 500.0 * np.sign(theta), np.full(len(theta), 50.0))
+
+    minimise(rough, np.full(3, 2.0), np.full(3, -5.0), np.full(3, 5.0), 100, 0.5)
+    assert len(asked) < 40

@@ -94,8 +94,8 @@ def test_late_stamps_are_found_and_are_no_outliers():
     time, z, truth = circle(7, late_s=0.01)
     found = two_pass.edit(time, z, KNOWN)
     assert found.decision.stamp_s == pytest.approx(0.01, rel=0.3)
-    error = np.abs(found.smoothed.state[:, :3] - truth)
-    assert (error < 3 * found.smoothed.sigma[:, :3]).mean() > 0.9
+    error = np.abs(found.smoothed().state[:, :3] - truth)
+    assert (error < 3 * found.smoothed().sigma[:, :3]).mean() > 0.9
 
 
 @pytest.mark.compiled
@@ -105,7 +105,7 @@ def test_the_track_does_not_follow_late_stamps(seed, very_late):
     time, z, truth = circle(seed, n=900, late_s=0.01, very_late=very_late)
     found = two_pass.edit(time, z, KNOWN)
     assert (found.weight == 0).mean() < 0.03
-    assert np.linalg.norm(found.smoothed.state[:, :3] - truth, axis=1).std() < 0.03
+    assert np.linalg.norm(found.smoothed().state[:, :3] - truth, axis=1).std() < 0.03
 
 
 @pytest.mark.compiled
@@ -120,7 +120,7 @@ def test_stamps_that_are_always_late_by_chance():
         found = two_pass.edit(time, late, KNOWN)
         assert (found.weight == 0).mean() < 0.03
         assert found.faults.steps == ()
-        spread.append(np.linalg.norm(found.smoothed.state[:, :3] - truth, axis=1).std())
+        spread.append(np.linalg.norm(found.smoothed().state[:, :3] - truth, axis=1).std())
     assert sorted(spread)[-2] < 0.03
     assert max(spread) < 0.1
 
@@ -271,7 +271,7 @@ def share_off(step):
     shares = []
     for seed in range(3):
         time, z, position = hovering(seed, step)
-        found = two_pass.edit(time, z, KNOWN).smoothed
+        found = two_pass.edit(time, z, KNOWN).smoothed()
         shares.append((np.abs(found.state[:, :3] - position) > 5 * found.sigma[:, :3]).any(1).mean())
     return np.mean(shares)
 

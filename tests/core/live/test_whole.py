@@ -46,7 +46,7 @@ def test_a_little_at_a_time_it_finds_the_same(flight):
     while not whole.go_on(3.0 * (len(t) + PASS)):
         turns += 1
     np.testing.assert_array_equal(whole.found.weight, at_once.weight)
-    np.testing.assert_array_equal(whole.found.smoothed.state, at_once.smoothed.state)
+    np.testing.assert_array_equal(whole.found.smoothed().state, at_once.smoothed().state)
     assert turns > 8
     assert whole.go_on(0.0)
 
