@@ -34,7 +34,8 @@ def how_many(scales: Scales, model: Model, knot_s: float) -> int:
     if model.coloured:
         return 1
     noise = float(scales.noise_m.min()) ** 2
-    memory = (noise * scales.interval_s / quantile(model.jerk[:, 0], CALMER)) ** (1 / 6)
+    jerk_psd = max(quantile(model.jerk[:, 0], CALMER), 1e-300)
+    memory = (noise * scales.interval_s / jerk_psd) ** (1 / 6)
     wanted = min(SHARE * memory, knot_s / PER_KNOT, scales.span_s / FEWEST) / scales.interval_s
     return int(np.clip(wanted + ROUNDING, 1, MOST))
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from ftproc.core.filtering.records import Observations
 from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import decimation
-from ftproc.core.identification.scales import Scales
+from ftproc.core.identification.scales import Scales, scales_of
 from ftproc.core.model.motion import isotropic
 from tests.core.tracks import matched
 
@@ -114,3 +116,10 @@ def test_components_that_are_seen_seldom_are_not_merged_and_no_mean_stands_at_a_
     weight[4:12, 1], weight[[0, 13], 1] = 0.0, 0.0  # neither neighbour says how far azimuth has gone
     (_, z, *_), _ = decimation.merge(a.log._replace(weight=weight), a.starts, 2)
     assert np.isnan(z[6, 1])
+
+
+def test_readings_without_any_motion_or_noise_are_not_divided_by_nothing():
+    a = matched(0, 60, q=1e-2)
+    still = a.model._replace(jerk=np.zeros((1, 3)))
+    scales = scales_of(a.log, a.model.noise_variance)
+    assert decimation.how_many(scales, still, math.inf) >= 1
