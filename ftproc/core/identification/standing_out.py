@@ -38,7 +38,7 @@ def standing_out(log: Observations, calm: Model, apart: int) -> list[Step]:
         with contextlib.suppress(ValueError):  # a component has too few readings there
             each = shifts(near, calm, find_starts(near, calm.noise_variance, float(calm.jerk[0, 0])))
             for step in _largest(each, calm, 1.0, apart, 0):
-                if abs(first + step.sample - place) <= 2 * count:
+                if step.component == coarse.component and abs(first + step.sample - place) <= apart:
                     found.append(step._replace(sample=first + step.sample))
                     break
     return found
