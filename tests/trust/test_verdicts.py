@@ -9,8 +9,6 @@ from ftproc.quality.verdict import CONSISTENT
 from ftproc.settings import FilterSettings
 from tests.trust import faulty_logs
 
-pytestmark = pytest.mark.compiled
-
 
 @pytest.mark.parametrize("smooth", [False, True])
 def test_a_step_of_both_angles_after_a_short_gap_is_named(smooth: bool) -> None:

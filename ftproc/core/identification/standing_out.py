@@ -30,7 +30,7 @@ def standing_out(log: Observations, calm: Model, apart: int) -> list[Step]:
     merged, begins = decimation.merged(log, starts, count)
     if merged is log:
         return _largest(shifts(log, calm, starts), calm, 1.0, apart, end)
-    found = []
+    found: dict[tuple[int, int], Step] = {}
     for coarse in _largest(shifts(merged, calm, begins), calm, MERGED, max(apart // count, 1), end // count):
         place = int(np.searchsorted(log.time_s, merged.time_s[coarse.sample]))
         first = max(place - 2 * apart, 0)
@@ -39,9 +39,9 @@ def standing_out(log: Observations, calm: Model, apart: int) -> list[Step]:
             each = shifts(near, calm, find_starts(near, calm.noise_variance, float(calm.jerk[0, 0])))
             for step in _largest(each, calm, 1.0, apart, 0):
                 if step.component == coarse.component and abs(first + step.sample - place) <= apart:
-                    found.append(step._replace(sample=first + step.sample))
+                    found.setdefault((step.component, first + step.sample), step._replace(sample=first + step.sample))
                     break
-    return found
+    return [*found.values()]
 
 
 def _largest(found: Shifts, calm: Model, times: float, apart: int, end: int) -> list[Step]:
