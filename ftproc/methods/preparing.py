@@ -103,8 +103,7 @@ def smoothed_starts(log: Observations, model: Model, starts: list[Start]) -> lis
     Their covariances are inflated, because the filter will see the same readings once more.
     """
     scales, found = scales_of(log, model.noise_variance), list[Start]()
-    memory = scales.memory_s(float(median_level(model).jerk[0, 0])) / scales.interval_s
-    enough = max(FEWEST, int(TO_FORGET * memory))
+    enough = max(FEWEST, int(TO_FORGET * scales.memory_samples(float(median_level(model).jerk[0, 0]))))
     for start, stop in between(starts, len(log.time_s)):
         span, own = from_knot(model, log.time_s, slice(start.sample, min(start.sample + enough, stop)))
         begin = start._replace(sample=start.sample - span.start)

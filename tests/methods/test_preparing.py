@@ -56,3 +56,15 @@ def test_starts_are_where_all_the_record_says_with_wider_covariances():
         np.testing.assert_array_less(np.abs(start.state - head.state), 0.02 * sigma)
         wider = start.covariance - preparing.START_INFLATION * head.covariance
         np.testing.assert_array_less(np.abs(wider), 0.02 * np.outer(sigma, sigma))
+
+
+def test_smoothed_start_of_a_short_log_is_the_head_with_a_wider_covariance():
+    flight = simulate("cruise", seed=4, duration_s=20.0)
+    edited = two_pass.edit(flight.log.time_s, flight.log.measurement, two_pass.Known(UNKNOWN, None, 4.0))
+    (start,) = preparing.smoothed_starts(edited.log, edited.model, edited.starts)
+    (head,) = edited.smoothed().heads
+    assert len(edited.log.time_s) < preparing.FEWEST
+    assert start.sample == head.sample
+    np.testing.assert_array_equal(start.state, head.state)
+    np.testing.assert_allclose(start.covariance, preparing.START_INFLATION * head.covariance)
+    assert np.linalg.eigvalsh(start.covariance[:3, :3]).min() > 0

@@ -223,7 +223,7 @@ def _suspects(record: Record, decision: Decision, calm: Model, profile: Model) -
 def samples_around(log: Observations, calm: Model) -> int:
     """Samples on each side that are enough to decide on what lies between."""
     scales = scales_of(log, calm.noise_variance)
-    return int(np.clip(MEMORIES * scales.memory_s(float(calm.jerk[0, 0])) / scales.interval_s, *AROUND))
+    return int(np.clip(MEMORIES * scales.memory_samples(float(calm.jerk[0, 0])), *AROUND))
 
 
 def widened(marked: NDArray[np.bool_], around: int) -> NDArray[np.bool_]:

@@ -77,7 +77,7 @@ def find(record: Record, decision: Decision) -> list[Step]:
     residual, _ = residuals_near(log, calm, rejected, samples_around(log, calm))
     weight = _taken_in(record, decision, calm, residual)
     scales = scales_of(record.weighted(weight), calm.noise_variance)
-    around = int(np.clip(MEMORIES * scales.memory_s(float(calm.jerk[0, 0])) / scales.interval_s, *AROUND))
+    around = int(np.clip(MEMORIES * scales.memory_samples(float(calm.jerk[0, 0])), *AROUND))
     margin, end = MARGIN + math.log(4 * len(record.time_s)), end_of(len(record.time_s))
     found: list[Step] = []
     candidates = [*_beside_runs(record, decision, calm, residual), *standing_out(log, calm, around // 2)]

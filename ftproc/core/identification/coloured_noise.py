@@ -62,7 +62,7 @@ def may_be(log: Observations, smoothed: SmootherRun, model: Model) -> bool:
     correlated noise, but only where it is. And where the filter's memory is so short that it would follow such noise.
     """
     scales = scales_of(log, model.noise_variance)
-    if scales.memory_s(median(model.jerk[:, 0])) < SHORT_MEMORY * scales.interval_s:
+    if scales.memory_samples(median(model.jerk[:, 0])) < SHORT_MEMORY:
         return True
     used = log.weight > 0
     share = model.noise_variance / smoothed.residual_variance  # of the reading in its own smoothed residual

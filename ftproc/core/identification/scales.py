@@ -17,6 +17,7 @@ from ftproc.order_statistics import median, medians, typical
 
 FloatArray = NDArray[np.float64]
 
+SHORTEST_S = 1e-30  # of an interval: no clock is finer, and its sixth power is still a number
 FINEST = 1e-9  # of the range: no noise is smaller
 EXACT = 1e-4  # of the noisiest component's noise, in metres: one that shows less was not measured
 
@@ -44,6 +45,10 @@ class Scales(NamedTuple):
         """The memory of a filter for this jerk density, m^2/s^5."""
         return float((self.typical_noise_m**2 * self.interval_s / max(jerk_psd, 1e-300)) ** (1 / 6))
 
+    def memory_samples(self, jerk_psd: float) -> float:
+        """The same in typical intervals."""
+        return self.memory_s(jerk_psd) / self.interval_s
+
     def jerk_psd(self, memory_s: float) -> float:
         """The jerk density, m^2/s^5, that gives a filter this memory."""
         return float(self.typical_noise_m**2 * self.interval_s / memory_s**6)
@@ -56,7 +61,7 @@ def scales_of(log: Observations, noise_variance: FloatArray) -> Scales:
     range_m = typical(ranges) if len(ranges) else 1.0
     times = log.time_s[1:] - log.time_s[:-1]
     times = times[times > 0]
-    interval = typical(times) if len(times) else 1.0
+    interval = max(typical(times), SHORTEST_S) if len(times) else 1.0
     if log.sites is not None:
         return Scales(interval, max(float(log.time_s[-1] - log.time_s[0]), interval), *_of_sites(log, noise_variance))
     if log.uneven is not None:

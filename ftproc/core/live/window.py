@@ -131,7 +131,7 @@ class Window:
     def _adopt(self, found: two_pass.Edited, samples: IntArray) -> None:
         """Take over the decisions, noise and process noise of an edit, and where it leads; samples: those it knew."""
         scales = scales_of(found.log, found.model.noise_variance)
-        if len(self) < YOUNG and scales.memory_s(float(found.model.jerk[:, 0].max())) < JUMPY * scales.interval_s:
+        if len(self) < YOUNG and scales.memory_samples(float(found.model.jerk[:, 0].max())) < JUMPY:
             raise ValueError("the readings jump too much for the track of anything that flies")
         kept, self.rates = self.kept, found.decision.rates
         uneven = found.log.uneven or Uneven.none(len(samples))

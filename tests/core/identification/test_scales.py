@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.filtering.records import Observations, Sites, Uneven
-from ftproc.core.identification.scales import EXACT, FINEST, scales_of
+from ftproc.core.identification.scales import EXACT, FINEST, SHORTEST_S, scales_of
 
 NOISE = np.array([3.0, 1e-3, 2e-3]) ** 2
 
@@ -72,3 +72,12 @@ def test_memory_is_the_same_in_other_units(metres, seconds):
     assert plain.jerk_psd(plain.memory_s(jerk)) == pytest.approx(jerk)
     assert plain.memory_s(jerk) == pytest.approx((plain.typical_noise_m**2 / jerk) ** (1 / 6))
     assert other.memory_s(jerk / metres**2 * seconds**5) * seconds == pytest.approx(plain.memory_s(jerk))
+
+
+def test_times_that_are_all_but_one_still_have_an_interval():
+    found = scales_of(log([0.0, 3e-279, 1e-276, 1.0], np.full(4, 1000.0)), NOISE)
+    assert found.interval_s == SHORTEST_S
+    for memories in (0.1, 2.0, 30.0):
+        jerk_psd = found.jerk_psd(memories * found.interval_s)
+        assert np.isfinite(jerk_psd)
+        assert found.memory_samples(jerk_psd) == pytest.approx(memories)
