@@ -121,4 +121,7 @@ def main() -> None:
     """The console script."""
     process.open_streams()
     process.end_by_signals()
-    cli.main()
+    try:
+        cli.main()
+    finally:
+        process.leave_memory()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 import sys
@@ -50,3 +51,9 @@ def empty_stdout() -> None:
     except OSError:
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+
+
+def leave_memory() -> None:
+    """What is still held at the end goes back to the system anyway. Python would first look through all of it for
+    cycles, for as long as it takes to import numpy."""
+    gc.freeze()

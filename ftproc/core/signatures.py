@@ -25,6 +25,7 @@ Vector = Annotated[NDArray[np.float64], Layout(np.dtype(np.float64), 1)]
 Matrix = Annotated[NDArray[np.float64], Layout(np.dtype(np.float64), 2)]
 Cube = Annotated[NDArray[np.float64], Layout(np.dtype(np.float64), 3)]
 Flags = Annotated[NDArray[np.bool_], Layout(np.dtype(np.bool_), 1)]
+FlagMatrix = Annotated[NDArray[np.bool_], Layout(np.dtype(np.bool_), 2)]
 Indices = Annotated[NDArray[np.int64], Layout(np.dtype(np.int64), 1)]
 
 

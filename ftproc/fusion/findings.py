@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.editing.runs import runs_of
+from ftproc.core.identification.stretches import runs_of
 from ftproc.fusion.estimation import constants as posterior
 from ftproc.fusion.estimation.events import CLOCK
 from ftproc.fusion.estimation.whole import Fused

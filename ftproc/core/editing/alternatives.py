@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from ftproc.core.editing import outlier_chain, patch_likelihood
 from ftproc.core.editing.patch_likelihood import SHORTEST_RUN
-from ftproc.core.editing.runs import runs_of
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import RESIDUALS, SmootherRun, smooth_log
+from ftproc.core.identification.stretches import runs_of
 from ftproc.order_statistics import typical
 
 FloatArray = NDArray[np.float64]
@@ -139,6 +139,8 @@ def islands(time_s: FloatArray, weight: FloatArray, possible: NDArray[np.bool_])
         if len(seen) < 2:
             continue
         bad = runs_of(weight[seen, c] <= 0, SHORTEST_RUN)
+        if not len(bad):
+            continue
         interval = np.diff(time_s[seen])
         gaps = np.flatnonzero(interval > GAP_INTERVALS * typical(interval)) + 1
         walls = np.r_[0, gaps, len(seen)]

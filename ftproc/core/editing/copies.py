@@ -14,8 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.editing.runs import runs_of
 from ftproc.core.editing.screening import stuck
+from ftproc.core.identification.stretches import runs_of
 from ftproc.core.model.frames import unwrap, wrap
 from ftproc.order_statistics import distinct, quantile, typical
 

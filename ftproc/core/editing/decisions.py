@@ -13,10 +13,12 @@ from ftproc.core.editing import outlier_chain
 from ftproc.core.editing.alternatives import Work
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven
-from ftproc.core.filtering.smoother import RESIDUALS, SmootherRun, smooth_log
+from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification import coloured_noise, uneven_noise
 from ftproc.core.identification.likelihood import Fixed, fit_level, representative
+from ftproc.core.identification.nearby import samples_around, smoothed_near
 from ftproc.core.identification.profile import median_level
+from ftproc.core.identification.stretches import widened
 
 FloatArray = NDArray[np.float64]
 
@@ -30,6 +32,7 @@ MOST_IN_TAILS = 0.05  # share of all readings: of more, nobody knows whether the
 NORMALLY, FADING = 3.0, 1.0  # times as many as a normal distribution has there, and as farther out
 GATE_STEP, WIDEST_GATE = 1.1, 2.5  # by which a gate is widened, and times itself at most
 ROUNDED = 0.5  # of a component's noise that rounding makes
+FEW_PLACES, ALIKE = 0.25, 1e-9  # share of a log around what has changed, to smooth only that; of what is the same
 FEWEST_KEPT = 0.5  # share of what screening trusts that must survive the decisions, in each component
 
 
@@ -63,12 +66,19 @@ class Record(NamedTuple):
         )  # fmt: skip
 
 
+class Residuals(NamedTuple):
+    """What the readings used say of each other: leave-one-out residuals (n, 3) m, rad, rad, and their variances."""
+
+    residual: FloatArray
+    variance: FloatArray
+
+
 class Decision(NamedTuple):
     """Weights (n, 3), the model and starts they were made with, the estimated outlier rates (3, 3), how many rounds it
     took, whether they stand still, for how many places no work was left to look for alternatives, the 1-sigma of the
     time stamps, s, the log-probability of their being as late as they are, whether the noise drifts, a model with
     correlated noise that explains the log as well or better, but is not followed, that with the slowest noise of the
-    one that is followed, and the smoother's run by whose residuals `decide` made them."""
+    one that is followed, and the residuals by which `decide` made them."""
 
     weight: FloatArray
     model: Model
@@ -82,7 +92,7 @@ class Decision(NamedTuple):
     drifts: bool = False
     alternative: coloured_noise.Coloured | None = None
     slowest: Model | None = None
-    smoothed: SmootherRun | None = None
+    residuals: Residuals | None = None
 
 
 def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
@@ -92,14 +102,14 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
     stands still, it is the mean of the rounds that decides on them.
     """
     weight, model, starts, rates = initial.weight, initial.model, initial.starts, initial.rates.copy()
-    rounds, settled, mean = 0, False, np.zeros_like(weight)
+    rounds, settled, mean, swept = 0, False, np.zeros_like(weight), None
     while rounds < MAX_ROUNDS and not settled:
         log = record.weighted(weight)
         if rounds < TUNING_ROUNDS and (tune_first or rounds > 0) and not model.coloured:
             model = fit_level(log, starts, model, record.fixed, record.sigma, record.rounding)
-        smoothed = smooth_log(log, model, starts, RESIDUALS)
+        swept = _swept(log, model, starts, swept)
         noise = model.reading_variance
-        good = outlier_chain.classify(smoothed.residual, smoothed.residual_variance, noise, rates, record.gate)
+        good = outlier_chain.classify(*swept.residuals, noise, rates, record.gate)
         mean += (good - mean) / max(rounds - TUNING_ROUNDS + 1, 1)
         decided = _keep_most(((mean > 0.5) & record.possible).astype(float), record.screened)
         settled = int((decided != weight).sum()) <= STILL * weight.size and (rounds > 0 or not tune_first)
@@ -108,8 +118,48 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
         starts = find_starts(record.weighted(weight), model.noise_variance, float(model.jerk[0, 0]))
     return initial._replace(
         weight=weight, model=model, starts=starts, rates=rates, rounds=initial.rounds + rounds, settled=settled,
-        smoothed=smoothed,
+        residuals=None if swept is None else swept.residuals,
     )  # fmt: skip
+
+
+class _Swept(NamedTuple):
+    """A log as it was smoothed, with which model and starts, and the residuals."""
+
+    log: Observations
+    model: Model
+    starts: list[Start]
+    residuals: Residuals
+
+
+def _swept(log: Observations, model: Model, starts: list[Start], before: _Swept | None) -> _Swept:
+    """The log smoothed; where it was smoothed before with the same model, only around the readings that have changed
+    sides since then."""
+    if before is not None and _alike(model, starts, before):
+        changed = (log.weight != before.log.weight).any(1)
+        if not changed.any():
+            return before._replace(log=log, starts=starts)
+        around = samples_around(log, median_level(model))
+        reached = widened(changed, around // 2)
+        if widened(reached, around).mean() < FEW_PLACES:
+            samples, smoothed = smoothed_near(log, model, reached, around)
+            inside = reached[samples]
+            residual, variance = (each.copy() for each in before.residuals)
+            residual[samples[inside]] = smoothed.residual[inside]
+            variance[samples[inside]] = smoothed.residual_variance[inside]
+            return _Swept(log, model, starts, Residuals(residual, variance))
+    smoothed = smooth_log(log, model, starts, RESIDUALS)
+    return _Swept(log, model, starts, Residuals(smoothed.residual, smoothed.residual_variance))
+
+
+def _alike(model: Model, starts: list[Start], before: _Swept) -> bool:
+    """Whether model and starts are those with which the log was smoothed before, but for rounding."""
+    if [start.sample for start in starts] != [start.sample for start in before.starts]:
+        return False
+    one, other = (
+        np.concatenate([m.noise_variance, m.jerk.ravel(), m.wander_variance, m.fade_s]) for m in (model, before.model)
+    )
+    same = model.knot_s == before.model.knot_s and len(one) == len(other)
+    return same and bool((np.abs(one - other) <= ALIKE * other).all())
 
 
 class LateStamps(NamedTuple):
@@ -165,18 +215,18 @@ def _with_late(record: Record, late: FloatArray, variance: FloatArray, imprecise
     return Uneven(times + imprecise * late**2 / variance, late)
 
 
-def _residuals(record: Record, decision: Decision) -> SmootherRun:
-    """What the readings used say of each other: the run that the decisions were made by, if they stand still."""
-    if decision.settled and decision.smoothed is not None:
-        return decision.smoothed
-    return smooth_log(record.weighted(decision.weight), decision.model, decision.starts, RESIDUALS)
+def _residuals(record: Record, decision: Decision) -> Residuals:
+    """Those by which the decisions were made, if they stand still."""
+    if decision.settled and decision.residuals is not None:
+        return decision.residuals
+    return _swept(record.weighted(decision.weight), decision.model, decision.starts, None).residuals
 
 
 def allow_for_tails(record: Record, decision: Decision) -> tuple[Record, Decision]:
     """The record with a wider gate, and the decisions made again, if most of what is rejected lies just outside it:
     then the noise has tails, and it is they that are rejected."""
-    smoothed = _residuals(record, decision)
-    off = np.abs(smoothed.residual) / np.sqrt(smoothed.residual_variance)
+    residual, variance = _residuals(record, decision)
+    off = np.abs(residual) / np.sqrt(variance)
     off, gate = np.where(record.possible, off, 0.0), record.gate
     while gate < WIDEST_GATE * record.gate and _has_tails(off, gate, int(record.possible.sum())):
         gate *= GATE_STEP
@@ -203,7 +253,7 @@ def allow_for_drift(record: Record, decision: Decision) -> tuple[Record, Decisio
     """The record with noise whose variance drifts, and the decisions made again, if it does."""
     if _repeats(record, decision):
         return record, decision
-    drifting = uneven_noise.drift(record.weighted(decision.weight), _residuals(record, decision))
+    drifting = uneven_noise.drift(record.weighted(decision.weight), *_residuals(record, decision))
     if drifting is None:
         return record, decision
     uneven = record.uneven or Uneven.none(len(record.time_s))

@@ -25,6 +25,7 @@ START_RATES = (0.02, 0.001, 0.92)  # isolated outlier; patch begins; patch goes 
 MAX_RATES = (0.4, 0.02, 0.98)
 MIN_STAY = 0.7
 PRIOR_SAMPLES = 20.0  # weight of START_RATES' spirit against the counts of the log
+BLOCK, SMALL = 16, 1e-30  # readings, after which a probability that is smaller is made larger
 ROUNDS, STILL = 3, 0.01  # of estimating the rates; share of a rate by which it may yet change, to stand still
 
 
@@ -33,16 +34,14 @@ def _likely(residual: Matrix, variance: Matrix, c: int, noise: float, stretch: f
     """Fill likely (n, 2): how likely the residual of component c is of a good reading and of a bad one, against the
     likelier of the two; -1 where it is missing."""
     for k in range(len(likely)):
-        r, v = residual[k, c], variance[k, c]
+        r, narrow = residual[k, c], stretch * variance[k, c]
         if not math.isfinite(r):
             likely[k, 0] = -1.0
             continue
-        narrow = stretch * v
         wide = narrow + WIDE * WIDE * noise
-        ratio = 0.5 * r**2 * (1 / narrow - 1 / wide) - 0.5 * math.log(wide / narrow)
-        less = math.exp(-abs(ratio))
-        likely[k, 0] = less if ratio > 0 else 1.0
-        likely[k, 1] = 1.0 if ratio > 0 else less
+        good = math.exp(-0.5 * r * r * (1 / narrow - 1 / wide)) * math.sqrt(wide / narrow)  # times as likely as bad
+        likely[k, 0] = good if good < 1 else 1.0
+        likely[k, 1] = 1.0 if good < 1 else 1 / good
 
 
 @part
@@ -53,44 +52,49 @@ def _chain(
     expected number of transitions, counts (5,): to isolated outliers and to patches, and all, of readings outside
     patches; within patches, and all, of those inside. filtered: (n, 3), to work in.
 
-    What follows a good reading and what follows an isolated outlier is the same.
+    What follows a good reading and what follows an isolated outlier is the same. Only ratios count, so that neither
+    recursion has to divide; after a block, numbers that have become small are made larger.
     """
     isolated, begins, stays = rates
     fine = 1 - isolated - begins
     ends_fine, ends_isolated = (1 - stays) * (1 - isolated), (1 - stays) * isolated
+    n = len(likely)
     ahead0, ahead1, ahead2 = fine, isolated, begins
-    for k in range(len(likely)):
-        if likely[k, 0] < 0:
-            continue
-        f0, f1, f2 = ahead0 * likely[k, 0] + 1e-300, ahead1 * likely[k, 1] + 1e-300, ahead2 * likely[k, 1] + 1e-300
-        share = 1 / (f0 + f1 + f2)
-        f0, f1, f2 = f0 * share, f1 * share, f2 * share
-        filtered[k, 0], filtered[k, 1], filtered[k, 2] = f0, f1, f2
-        outside = f0 + f1
-        ahead0 = outside * fine + f2 * ends_fine
-        ahead1 = outside * isolated + f2 * ends_isolated
-        ahead2 = outside * begins + f2 * stays
+    for low in range(0, n, BLOCK):
+        for k in range(low, min(low + BLOCK, n)):
+            if likely[k, 0] < 0:
+                continue
+            f0, f1, f2 = ahead0 * likely[k, 0] + 1e-300, ahead1 * likely[k, 1] + 1e-300, ahead2 * likely[k, 1] + 1e-300
+            filtered[k, 0], filtered[k, 1], filtered[k, 2] = f0, f1, f2
+            outside = f0 + f1
+            ahead0 = outside * fine + f2 * ends_fine
+            ahead1 = outside * isolated + f2 * ends_isolated
+            ahead2 = outside * begins + f2 * stays
+        if ahead0 + ahead1 + ahead2 < SMALL:
+            ahead0, ahead1, ahead2 = ahead0 / SMALL, ahead1 / SMALL, ahead2 / SMALL
     counts[:] = 0.0
-    later0 = later1 = later2 = -1.0  # how likely each state makes the readings after it, times that of the next one
-    for k in range(len(likely) - 1, -1, -1):
-        good[k, c] = 0.0
-        if likely[k, 0] < 0:
-            continue
-        f0, f1, f2 = filtered[k, 0], filtered[k, 1], filtered[k, 2]
-        outside, inside = 1.0, 1.0
-        if later0 >= 0:
+    later0 = later1 = later2 = 1.0  # how likely each state makes the readings after it, times that of the next one
+    follows = 0.0  # readings after the first that is seen on the way back
+    for high in range(n, 0, -BLOCK):
+        for k in range(high - 1, max(high - BLOCK, 0) - 1, -1):
+            good[k, c] = 0.0
+            if likely[k, 0] < 0:
+                continue
+            f0, f1, f2 = filtered[k, 0], filtered[k, 1], filtered[k, 2]
             outside = fine * later0 + isolated * later1 + begins * later2
             inside = ends_fine * later0 + ends_isolated * later1 + stays * later2
             share = 1 / max((f0 + f1) * outside + f2 * inside, 1e-300)
+            good[k, c] = f0 * outside * share
+            share *= follows
             counts[0] += share * (f0 + f1) * isolated * later1
             counts[1] += share * (f0 + f1) * begins * later2
             counts[2] += share * (f0 + f1) * outside
             counts[3] += share * f2 * stays * later2
             counts[4] += share * f2 * inside
-            share = 1 / (outside + inside)
-            outside, inside = outside * share, inside * share
-        good[k, c] = f0 * outside / max((f0 + f1) * outside + f2 * inside, 1e-300)
-        later0, later1, later2 = likely[k, 0] * outside, likely[k, 1] * outside, likely[k, 1] * inside
+            later0, later1, later2 = likely[k, 0] * outside, likely[k, 1] * outside, likely[k, 1] * inside
+            follows = 1.0
+        if later0 + later1 + later2 < SMALL:
+            later0, later1, later2 = later0 / SMALL, later1 / SMALL, later2 / SMALL
 
 
 @part

@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from ftproc.core.editing import alternatives
 from ftproc.core.editing.decisions import Decision, Record, decide
-from ftproc.core.editing.runs import confirmed, runs_of, suspicious
+from ftproc.core.editing.runs import confirmed, suspicious
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
-from ftproc.core.identification.profile import fit_profile, from_knot, median_level, roughness
+from ftproc.core.identification.nearby import residuals_near, samples_around
+from ftproc.core.identification.profile import fit_profile, median_level, pieces, roughness
 from ftproc.core.identification.scales import scales_of
+from ftproc.core.identification.stretches import runs_of, stretches_of, widened
 from ftproc.order_statistics import median
 
 FloatArray = NDArray[np.float64]
@@ -37,7 +39,6 @@ FEW_MORE = 0.01  # of the readings: those that another hypothesis may reject bey
 OTHER_LEVEL = 2.5  # times the jerk level at which an alternative was tried, before it is tried again
 PROFILE_STEPS, COMPARED_STEPS = 2, 5  # of the search for the jerk profile; where two are compared
 STANDS_OUT = 64.0  # times the median of the jerk profile
-AROUND, MEMORIES = (60, 200), 8.0  # samples on each side that tell what lies between, and memories
 LONGEST_SPAN = 3000  # samples that are decided together
 SHORT_LOG, MOST = 8000, 0.5  # samples, and share that stands out: then all of it is decided again, and noise as well
 
@@ -53,7 +54,7 @@ def reassess(record: Record, decision: Decision) -> Decision:
     if len(around) <= SHORT_LOG and around.mean() > MOST:
         return _until_settled(record, decision, profile)
     weight, unexamined = decision.weight.copy(), 0
-    for span in _spans(around):
+    for span in _doubtful(record, decision, calm, list(_spans(around))):
         part = _short(record, span)
         try:
             starts = _starts(part, weight[span], calm)
@@ -64,6 +65,34 @@ def reassess(record: Record, decision: Decision) -> Decision:
         weight[span] = decided.weight
         unexamined += decided.unexamined
     return decision._replace(weight=weight, starts=_starts(record, weight, calm), model=profile, unexamined=unexamined)
+
+
+def _doubtful(record: Record, decision: Decision, calm: Model, spans: list[slice]) -> Iterator[slice]:
+    """Those of some spans in which a profile and a calm level of their own leave something to decide. All are fitted
+    and smoothed together; most are turns that the level of the whole log has not expected."""
+    near = stretches_of(record.weighted(decision.weight), spans, calm.noise_variance, float(calm.jerk[0, 0]))
+    if near is None:
+        return
+    profile = fit_profile(near.log, near.starts, calm, PROFILE_STEPS)
+    piece, levels = pieces(near.log.time_s, profile), profile.jerk.copy()
+    places = list[tuple[slice, slice, slice]]()  # a span, where its samples are among those near, and its pieces
+    for span in spans:
+        low, high = np.searchsorted(near.samples, (span.start, span.stop)).tolist()
+        if high > low:
+            own = slice(piece[low], piece[high - 1] + 1)
+            levels[own] = median_level(profile._replace(jerk=profile.jerk[own])).jerk
+            places.append((span, slice(low, high), own))
+    smoothed = smooth_log(near.log, profile._replace(jerk=levels), near.starts, RESIDUALS)
+    for span, inside, own in places:
+        part, possible = near.log.part(inside), record.possible[near.samples[inside]]
+        memory_s = scales_of(part, calm.noise_variance).memory_s(float(levels[own.start, 0]))
+        suspects = suspicious(
+            part.time_s, smoothed.residual[inside], smoothed.residual_variance[inside], part.weight, memory_s
+        )
+        left = np.where(suspects, 0.0, part.weight)
+        stands_out = profile.jerk[own, 0].max() >= STANDS_OUT * median(profile.jerk[own, 0])
+        if stands_out or suspects.any() or alternatives.islands(part.time_s, left, possible):
+            yield span
 
 
 def _profile(record: Record, decision: Decision, steps: int = PROFILE_STEPS) -> Model:
@@ -185,10 +214,7 @@ def _likelihood(record: Record, decision: Decision) -> float:
 def _stands_out(time_s: FloatArray, profile: Model) -> NDArray[np.bool_]:
     """(n,) samples in pieces of the profile that are far above its median."""
     jerk = profile.jerk[:, 0]
-    piece = np.zeros(len(time_s), int)
-    if np.isfinite(profile.knot_s):
-        piece = np.clip(((time_s - time_s[0]) / profile.knot_s).astype(int), 0, len(jerk) - 1)
-    found: NDArray[np.bool_] = (jerk >= STANDS_OUT * median(jerk))[piece]
+    found: NDArray[np.bool_] = (jerk >= STANDS_OUT * median(jerk))[pieces(time_s, profile)]
     return found
 
 
@@ -218,38 +244,6 @@ def _suspects(record: Record, decision: Decision, calm: Model, profile: Model) -
         near = residuals_near(without, profile, np.asarray(suspects.any(1)), samples_around(log, calm))
         suspects = confirmed(suspects, *near)
     return suspects
-
-
-def samples_around(log: Observations, calm: Model) -> int:
-    """Samples on each side that are enough to decide on what lies between."""
-    scales = scales_of(log, calm.noise_variance)
-    return int(np.clip(MEMORIES * scales.memory_samples(float(calm.jerk[0, 0])), *AROUND))
-
-
-def widened(marked: NDArray[np.bool_], around: int) -> NDArray[np.bool_]:
-    """(n,) true within so many samples of what is marked."""
-    edges = np.zeros(len(marked) + 1, int)
-    for begin, end in runs_of(marked):
-        edges[max(begin - around, 0)] += 1
-        edges[min(end + around, len(marked))] -= 1
-    return np.cumsum(edges)[:-1] > 0
-
-
-def residuals_near(
-    log: Observations, model: Model, marked: NDArray[np.bool_], around: int
-) -> tuple[FloatArray, FloatArray]:
-    """Leave-one-out residuals (n, 3) and their variances of what is marked (n,), with a jerk profile. NaN far from it,
-    where nothing is smoothed, unless a component is not seen near it: then all of it is."""
-    residual, variance = np.full(log.weight.shape, np.nan), np.full(log.weight.shape, np.nan)
-    for begin, end in runs_of(widened(marked, around)):
-        span, own = from_knot(model, log.time_s, slice(int(begin), int(end)))
-        try:
-            starts = _starts_of(log.part(span), own)
-        except ValueError:  # a component has too few readings there
-            span, own, starts = slice(None), model, _starts_of(log, model)
-        smoothed = smooth_log(log.part(span), own, starts, RESIDUALS)
-        residual[span], variance[span] = smoothed.residual, smoothed.residual_variance
-    return residual, variance
 
 
 def _starts_of(log: Observations, model: Model) -> list[Start]:

@@ -8,13 +8,15 @@ each length of run, the log itself tells.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import kernel
+from ftproc.core.compiled import kernel, part
 from ftproc.core.editing.screening import median
-from ftproc.core.signatures import Flags, Vector
-from ftproc.order_statistics import typical
+from ftproc.core.identification.stretches import runs_of
+from ftproc.core.signatures import FlagMatrix, Flags, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -24,39 +26,42 @@ SHORTEST, LONGEST, MEMORIES = 2, 48, 4.0  # readings in a run, and memories of t
 SURE = 5.0  # robust sigmas of the sum that make a run suspicious
 SCALE_SAMPLES = 1000  # sums of a length from which their scale is taken
 NEXT_LENGTH = 1.3  # times a length, of those whose scales are taken; what lies between is interpolated
-FEWEST = 100  # readings, for the scale to mean anything
+FEWEST, SOME = 100, 4000  # readings, for the scale to mean anything, and intervals that tell the typical one
 EDGE, SHARP = 3, 1.5  # readings at each end of a run that must be off by so many sigmas in the mean
 
 
-def runs_of(flag: NDArray[np.bool_], shortest: int = 1) -> IntArray:
-    """(m, 2) begin and end of each run of true in (n,) that is not shorter."""
-    framed = np.zeros(len(flag) + 2, bool)
-    framed[1:-1] = flag
-    edges: IntArray = np.flatnonzero(framed[1:] != framed[:-1]).reshape(-1, 2)
-    return edges[edges[:, 1] - edges[:, 0] >= shortest]
-
-
-def suspicious(
-    time_s: FloatArray, residual: FloatArray, variance: FloatArray, weight: FloatArray, memory_s: float
-) -> NDArray[np.bool_]:
+@kernel
+def suspicious(time_s: Vector, residual: Matrix, variance: Matrix, weight: Matrix, memory_s: float) -> FlagMatrix:
     """(n, 3) readings in runs that are off together.
 
     time_s (n,). residual, variance: (n, 3) leave-one-out, of the smoother; weight (n, 3), zero for readings not used.
     memory_s: of its filter, see `identification.scales`.
     """
-    found = np.zeros(residual.shape, bool)
+    n = len(time_s)
+    found, used, total, interval = np.zeros((n, 3), np.bool_), np.empty(n, np.int64), np.zeros(n + 1), np.empty(n)
     for c in range(3):
-        used = np.flatnonzero((weight[:, c] > 0) & np.isfinite(residual[:, c]))
-        if len(used) < FEWEST:
+        m = 0
+        for k in range(n):
+            if weight[k, c] > 0 and math.isfinite(residual[k, c]):
+                used[m] = k
+                total[m + 1] = total[m] + residual[k, c] / variance[k, c]
+                m += 1
+        if m < FEWEST:
             continue
-        interval = typical(np.diff(time_s[used]))
-        longest = LONGEST if interval <= 0 else int(np.clip(MEMORIES * memory_s / interval, SHORTEST, LONGEST))
-        total = np.r_[0.0, np.cumsum(residual[used, c] / variance[used, c])]
-        found[used, c] = _scan(total, _scales(total, longest))
+        count = 0
+        for k in range(1, m, 1 + m // SOME):
+            interval[count] = time_s[used[k]] - time_s[used[k - 1]]
+            count += 1
+        typical, longest = median(interval, count), LONGEST
+        if typical > 0:
+            longest = int(min(max(MEMORIES * memory_s / typical, SHORTEST), LONGEST))
+        off = _scan(total[: m + 1], _scales(total[: m + 1], longest))
+        for k in range(m):
+            found[used[k], c] = off[k]
     return found
 
 
-@kernel
+@part
 def _scales(total: Vector, longest: int) -> Vector:
     """(longest + 1,) robust 1-sigma of the sums over runs of each length, from SCALE_SAMPLES of them or a few more."""
     m = len(total) - 1
@@ -77,7 +82,7 @@ def _scales(total: Vector, longest: int) -> Vector:
         before, length = length, min(max(int(NEXT_LENGTH * length), length + 1), longest)
 
 
-@kernel
+@part
 def _scan(total: Vector, scale: Vector) -> Flags:
     """(m,) readings of suspicious runs. total: (m + 1,) sums of u up to each reading; scale: by length of run."""
     m, longest = len(total) - 1, len(scale) - 1

@@ -21,15 +21,15 @@ from numpy.typing import NDArray
 
 from ftproc.core.editing import alternatives
 from ftproc.core.editing.decisions import Decision, Record
-from ftproc.core.editing.reassessment import residuals_near, samples_around
-from ftproc.core.editing.runs import runs_of
 from ftproc.core.filtering.bridging import CLOCK, Step, bridged, refined
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model
 from ftproc.core.identification.likelihood import Fixed, fit_level
+from ftproc.core.identification.nearby import residuals_near, samples_around
 from ftproc.core.identification.profile import fit_profile, from_knot, median_level, roughness
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.identification.standing_out import MOST, SMALLEST, end_of, standing_out
+from ftproc.core.identification.stretches import runs_of
 from ftproc.core.model.frames import to_cartesian, wrap
 from ftproc.order_statistics import median, medians
 

@@ -28,21 +28,14 @@ from ftproc.core.editing.decisions import (
     decide,
     late_stamps,
 )
-from ftproc.core.editing.reassessment import (
-    believed,
-    likelier,
-    log_probability,
-    reassess,
-    residuals_near,
-    samples_around,
-    with_motion,
-)
+from ftproc.core.editing.reassessment import believed, likelier, log_probability, reassess, with_motion
 from ftproc.core.filtering.bridging import CLOCK, Step, bridged, refined
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 from ftproc.core.identification import one_sided, uneven_noise
 from ftproc.core.identification.likelihood import Fixed, first_jerk, without_noise
+from ftproc.core.identification.nearby import residuals_near, samples_around
 from ftproc.core.identification.one_sided import OneSided
 from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
 from ftproc.core.model.frames import unwrap

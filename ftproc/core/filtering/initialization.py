@@ -55,9 +55,11 @@ def find_starts(log: Observations, noise_variance: FloatArray, jerk_psd: float) 
     """
     time_s, measurement, weight = log[:3]
     starts = [first_start(log, noise_variance)]
-    longest_s = shortest_gap(typical(time_s[1:] - time_s[:-1]) if len(time_s) > 1 else 0.0)
-    time, z, used = (np.ascontiguousarray(each) for each in log[:3])
-    if not _has_gap(time, z, used, longest_s):
+    longest, shortest = _longest_and_shortest(*(np.ascontiguousarray(each) for each in log[:3]))
+    if longest <= shortest_gap(shortest):  # so it is by the typical interval
+        return starts
+    longest_s = shortest_gap(typical(time_s[1:] - time_s[:-1]))
+    if longest <= longest_s:
         return starts
     good = (weight > 0) & np.isfinite(measurement)
     gaps = gaps_of(time_s, good, longest_s)
@@ -104,18 +106,17 @@ def gaps_of(
 
 
 @kernel
-def _has_gap(time: Vector, z: Matrix, weight: Matrix, longest_s: float) -> bool:
-    """Whether there is a gap between samples, or between good readings of a component: see `gaps_of`."""
+def _longest_and_shortest(time: Vector, z: Matrix, weight: Matrix) -> tuple[float, float]:
+    """The longest time between samples, or between good readings of a component, and the shortest between samples."""
+    longest, shortest = 0.0, math.inf
+    for k in range(1, len(time)):
+        longest, shortest = max(longest, time[k] - time[k - 1]), min(shortest, time[k] - time[k - 1])
     for c in range(3):
         last = math.inf
         for k in range(len(time)):
             if weight[k, c] > 0 and math.isfinite(z[k, c]):
-                if time[k] - last > longest_s:
-                    return True
-                last = time[k]
-            if k > 0 and time[k] - time[k - 1] > longest_s:
-                return True
-    return False
+                longest, last = max(longest, time[k] - last), time[k]
+    return longest, shortest
 
 
 def first_state(log: Observations, noise_variance: FloatArray, sample: int, within: slice) -> Start:

@@ -17,6 +17,7 @@ from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import Scores, likelihood_of, score_log
 from ftproc.core.identification import optimizer
 from ftproc.core.identification.scales import EXACT, Scales, scales_of
+from ftproc.core.identification.stretches import stretches_of
 from ftproc.core.model.motion import isotropic
 
 FloatArray = NDArray[np.float64]
@@ -48,19 +49,9 @@ def representative(
     n = len(log.time_s)
     if n <= SPANS * SPAN:
         return log, starts
-    chosen: list[NDArray[np.int64]] = []
-    found: list[Start] = []
-    for first in np.linspace(0, n - SPAN, SPANS).astype(int):
-        span = np.arange(first, first + SPAN)
-        try:
-            inside = find_starts(log.part(span), noise_variance, jerk_psd)
-        except ValueError:  # a component has no good reading in this span
-            continue
-        skipped = inside[0].sample
-        shift = sum(len(c) for c in chosen) - skipped
-        found += [start._replace(sample=start.sample + shift) for start in inside]
-        chosen.append(span[skipped:])
-    return (log.part(np.concatenate(chosen)), found) if found else (log, starts)
+    spans = [slice(first, first + SPAN) for first in np.linspace(0, n - SPAN, SPANS).astype(int).tolist()]
+    found = stretches_of(log, spans, noise_variance, jerk_psd)
+    return (log, starts) if found is None else found[1:]
 
 
 def first_jerk(log: Observations, noise_variance: FloatArray) -> float:

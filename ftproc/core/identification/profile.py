@@ -19,6 +19,7 @@ from ftproc.core.identification.scales import Scales, scales_of
 from ftproc.order_statistics import median
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 KNOT_SAMPLES = 10  # samples to a knot of the jerk profile ...
 KNOT_MEMORIES = 2.0  # ... but never less than so many memories of the filter,
@@ -88,6 +89,14 @@ def knot_length(scales: Scales, jerk_psd: float) -> float:
     """Seconds from knot to knot of the profile of a flight with such a typical jerk density."""
     memories, samples = KNOT_MEMORIES * scales.memory_s(jerk_psd), KNOT_SAMPLES * scales.interval_s
     return max(memories, samples, scales.span_s / MAX_KNOTS)
+
+
+def pieces(time_s: FloatArray, model: Model) -> IntArray:
+    """(n,) the row of the jerk profile that holds at each time of the log of which it is."""
+    if not math.isfinite(model.knot_s):
+        return np.zeros(len(time_s), np.int64)
+    found: IntArray = np.clip(((time_s - time_s[0]) / model.knot_s).astype(np.int64), 0, len(model.jerk) - 1)
+    return found
 
 
 def median_level(model: Model) -> Model:

@@ -130,16 +130,18 @@ def _normal(square: FloatArray, variance: FloatArray) -> FloatArray:
     return -0.5 * (np.log(variance) + square / variance)
 
 
-def drift(log: Observations, smoothed: SmootherRun) -> FloatArray | None:
-    """(n, 3) how many times the variance of a component that of each reading is, where it drifts; None if in none."""
+def drift(log: Observations, residual: FloatArray, variance: FloatArray) -> FloatArray | None:
+    """(n, 3) how many times the variance of a component that of each reading is, where it drifts; None if in none.
+
+    residual, variance: (n, 3) leave-one-out, of the smoother."""
     found = np.ones_like(log.weight)
     for c in range(3):
-        seen = np.flatnonzero((log.weight[:, c] > 0) & np.isfinite(smoothed.residual_variance[:, c]))
+        seen = np.flatnonzero((log.weight[:, c] > 0) & np.isfinite(variance[:, c]))
         size = min(WINDOW, len(seen) // FEWEST_WINDOWS)
         if size < SHORTEST_WINDOW:
             continue
         count = len(seen) // size
-        square = smoothed.residual[seen, c] ** 2 / smoothed.residual_variance[seen, c]
+        square = residual[seen, c] ** 2 / variance[seen, c]
         level = np.log(np.maximum(_of_windows(square, count, lambda rows: medians(rows.T)), SMALLEST) / CHI2_MEDIAN)
         chance = MEDIAN_SPREAD**2 / size
         drifting = float(np.var(level)) - chance

@@ -9,7 +9,9 @@ import pytest
 
 from ftproc.core.editing import decisions
 from ftproc.core.filtering.records import Model
+from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification.coloured_noise import Coloured
+from tests.core.tracks import matched
 
 GATE, SAMPLES = 4.0, 2000
 
@@ -72,3 +74,29 @@ def test_decisions_under_correlated_noise_are_taken_only_if_they_stand_still(mon
     assert decided.model is faster
     assert decided.slowest is slower
     np.testing.assert_array_equal(decided.weight, after.weight if settled else before.weight)
+
+
+def test_a_log_is_smoothed_again_only_around_what_has_changed_sides(monkeypatch):
+    """With the same model; with another one, all of it."""
+    a = matched(5, 12_000, q=30.0)
+    whole = decisions._swept(a.log, a.model, a.starts, None)
+    weight = a.weight.copy()
+    weight[[700, 701, 2900], [0, 0, 2]] = 0.0
+    changed = a.log._replace(weight=weight)
+    swept = []
+    smooth = decisions.smoothed_near
+    monkeypatch.setattr(decisions, "smoothed_near", lambda *each: swept.append(1) or smooth(*each))
+    found = decisions._swept(changed, a.model, a.starts, whole)
+    exact = smooth_log(changed, a.model, a.starts, RESIDUALS)
+    assert swept
+    sigma = np.sqrt(exact.residual_variance)
+    assert (np.abs(found.residuals.residual - exact.residual) / sigma).max() < 0.02
+    np.testing.assert_allclose(np.sqrt(found.residuals.variance), sigma, rtol=0.01)
+    assert (found.residuals.residual == whole.residuals.residual).mean() > 0.9
+    other = a.model._replace(jerk=1.01 * a.model.jerk)
+    np.testing.assert_array_equal(
+        decisions._swept(changed, other, a.starts, whole).residuals.residual,
+        smooth_log(changed, other, a.starts, RESIDUALS).residual,
+    )
+    assert len(swept) == 1
+    assert decisions._swept(a.log, a.model, a.starts, whole).residuals is whole.residuals

@@ -164,3 +164,33 @@ def test_components_are_labelled_each_by_itself():
     weight[2, 1] = 0
     label = outlier_chain.label_runs(weight, np.ones((6, 3)), 2)
     np.testing.assert_array_equal(label.T, [[0, 2, 2, 2, 2, 0], [0, 0, 1, 0, 0, 0], [0] * 6])
+
+
+@pytest.mark.parametrize("bad", ["none", "one", "block", "all"])
+def test_long_chains_lose_no_digits(bad):
+    """Probabilities that are never normalised become small; against a recursion that divides at every reading."""
+    rng = np.random.default_rng(5)
+    n, sigma = 3000, 1.01
+    t = rng.standard_normal(n)
+    t[{"none": slice(0), "one": slice(77, 78), "block": slice(1000, 1400), "all": slice(n)}[bad]] *= 1e4
+    narrow, wide = sigma, sigma + outlier_chain.WIDE**2
+    log_good = -0.5 * t * t * (1 / narrow - 1 / wide) + 0.5 * np.log(wide / narrow)
+    likely = np.exp(np.stack([np.minimum(log_good, 0), np.minimum(-log_good, 0)], 1))[:, [0, 1, 1]]
+    isolated, begins, stays = outlier_chain.START_RATES
+    step = np.array([[1 - isolated - begins, isolated, begins]] * 2 + [[(1 - stays) * (1 - isolated)] * 3])
+    step[2] = (1 - stays) * (1 - isolated), (1 - stays) * isolated, stays
+    ahead, forward, later = step[0], np.zeros((n, 3)), np.ones(3)
+    for k in range(n):
+        forward[k] = ahead * likely[k] / (ahead * likely[k]).sum()
+        ahead = forward[k] @ step
+    good = np.zeros(n)
+    for k in range(n - 1, -1, -1):
+        good[k] = forward[k, 0] * later[0] / (forward[k] @ later)
+        later = step @ (likely[k] * later)
+        later /= later.sum()
+    filtered, found, counts = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(5)
+    residual, variance, ours = np.tile(t[:, None], (1, 3)), np.full((n, 3), sigma), np.zeros((n, 2))
+    outlier_chain._likely(residual, variance, 0, 1.0, 1.0, ours)
+    outlier_chain._chain(ours, filtered, np.array(outlier_chain.START_RATES), found, 0, counts)
+    np.testing.assert_allclose(found[:, 0], good, rtol=1e-9, atol=1e-12)
+    assert counts[2] + counts[4] == pytest.approx(n - 1)

@@ -7,6 +7,7 @@ import pytest
 
 from ftproc.core.editing import reassessment, two_pass
 from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.identification import nearby
 from ftproc.core.identification.profile import median_level
 from tests.core.editing.test_two_pass import UNKNOWN, edit, flags
 from tests.simulated import simulate
@@ -52,6 +53,21 @@ def test_long_log_is_reassessed_in_spans_only(monkeypatch):
     rejected, large, good = flags(flight, in_spans)
     assert rejected[large].mean() > 0.98
     assert rejected[good].mean() < 0.002
+
+
+def test_spans_that_are_passed_over_would_stay_as_they_are(monkeypatch):
+    """All spans decided one by one give the same decisions, but for a reading or two."""
+    flight = simulate("manoeuvre", seed=6, duration_s=600.0)
+    some = edit(flight).weight
+    taken, passed = [], reassessment._doubtful
+
+    def spy(record, decision, calm, spans):
+        taken.append((len(list(passed(record, decision, calm, spans))), len(spans)))
+        return spans
+
+    monkeypatch.setattr(reassessment, "_doubtful", spy)
+    assert (some != edit(flight).weight).sum() <= 3
+    assert taken[0][0] < 0.5 * taken[0][1]
 
 
 @pytest.fixture(scope="module")
@@ -103,13 +119,14 @@ def test_what_is_suspicious_in_one_component_is_decided_again(decided, monkeypat
     settled = []
     whole = reassessment._until_settled
     monkeypatch.setattr(reassessment, "_until_settled", lambda *each: settled.append(each[0]) or whole(*each))
-    monkeypatch.setattr(reassessment, "AROUND", (20, 20))
+    monkeypatch.setattr(nearby, "AROUND", (20, 20))
     suspect = np.zeros_like(decision.weight, bool)
     monkeypatch.setattr(reassessment, "_suspects", lambda *_: suspect)
     reassessment.reassess(record, decision)
     assert not settled
     suspect[150, 1] = True
     monkeypatch.setattr(reassessment, "_suspects", lambda part, *_: suspect[: len(part.time_s)])
+    monkeypatch.setattr(reassessment, "suspicious", lambda time_s, *_: suspect[130 : 130 + len(time_s)])
     reassessment.reassess(record, decision)
     assert [part.time_s[0] <= record.time_s[150] <= part.time_s[-1] for part in settled] == [True]
 
@@ -119,7 +136,7 @@ def test_where_a_component_is_missing_around_what_is_marked_all_of_the_log_is_sm
     record, decision = decided
     weight, marked = decision.weight.copy(), np.zeros(len(decision.weight), bool)
     weight[150:650, 1], marked[395:405] = 0.0, True
-    residual, variance = reassessment.residuals_near(record.weighted(weight), decision.model, marked, 200)
+    residual, variance = nearby.residuals_near(record.weighted(weight), decision.model, marked, 200)
     starts = reassessment._starts(record, weight, median_level(decision.model))
     whole = smooth_log(record.weighted(weight), decision.model, starts)
     np.testing.assert_array_equal(residual, whole.residual)

@@ -7,6 +7,7 @@ import pytest
 
 from ftproc.core.editing import runs, two_pass
 from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.identification.stretches import runs_of
 from tests.core.tracks import matched
 from tests.simulated import codes, simulate
 
@@ -88,7 +89,7 @@ def test_long_runs_are_no_patches_at_one_reading_a_second():
         runs.suspicious(dt * np.arange(400), u, np.ones((400, 3)), np.ones((400, 3)), 1.5) for dt in (0.1, 1.0)
     )
     assert fast[100:130].all()
-    assert np.diff(runs.runs_of(slow[:, 0])).max() <= 6
+    assert np.diff(runs_of(slow[:, 0])).max() <= 6
 
 
 def test_too_few_readings_say_nothing():

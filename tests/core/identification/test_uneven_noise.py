@@ -227,7 +227,8 @@ def test_repeats_count_once_where_chance_does_not_make_them():
 
 def test_drift_of_even_noise_is_none():
     a = matched(4, 3000)
-    assert uneven_noise.drift(a.log, smooth_log(a.log, a.model, a.starts, RESIDUALS)) is None
+    smoothed = smooth_log(a.log, a.model, a.starts, RESIDUALS)
+    assert uneven_noise.drift(a.log, smoothed.residual, smoothed.residual_variance) is None
 
 
 @pytest.mark.parametrize("n", [600, 4000])
@@ -237,7 +238,7 @@ def test_a_drift_is_followed_however_long_the_log(n):
     run = smooth_log(a.log, a.model, a.starts, RESIDUALS)
     residual = run.residual.copy()
     residual[:, 1] *= np.sqrt(swell)
-    found = uneven_noise.drift(a.log, run._replace(residual=residual))
+    found = uneven_noise.drift(a.log, residual, run.residual_variance)
     assert (found[:, [0, 2]] == 1).all()
     off = np.log(found[:, 1] / swell)
     assert np.std(off) < 0.4 * np.std(np.log(swell))

@@ -1,0 +1,50 @@
+"""What the record says of a few places in it: only what lies around them is smoothed, all of it in one sweep."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.filtering.initialization import find_starts
+from ftproc.core.filtering.records import Model, Observations
+from ftproc.core.filtering.smoother import RESIDUALS, SmootherRun, smooth_log
+from ftproc.core.identification.profile import from_knot, median_level
+from ftproc.core.identification.scales import scales_of
+from ftproc.core.identification.stretches import Stretches, runs_of, stretches_of, widened
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+AROUND, MEMORIES = (60, 200), 8.0  # samples on each side that tell what lies between, and memories
+
+
+def samples_around(log: Observations, calm: Model) -> int:
+    """Samples on each side that are enough to decide on what lies between."""
+    scales = scales_of(log, calm.noise_variance)
+    return int(np.clip(MEMORIES * scales.memory_samples(float(calm.jerk[0, 0])), *AROUND))
+
+
+def smoothed_near(
+    log: Observations, model: Model, marked: NDArray[np.bool_], around: int
+) -> tuple[IntArray, SmootherRun]:
+    """The samples (m,) within so many of what is marked (n,), one at least, and the smoother's residuals of them, with
+    a jerk profile. If a component is not seen near one of the places, all of the log is smoothed."""
+    runs = runs_of(widened(marked, around)).tolist()
+    begins, own = from_knot(model, log.time_s, slice(runs[0][0], len(marked)))
+    runs[0][0], level = begins.start, float(median_level(model).jerk[0, 0])
+    near = stretches_of(log, (slice(*run) for run in runs), model.noise_variance, level)
+    if near is None or len(near.samples) < sum(end - begin for begin, end in runs):
+        starts = find_starts(log, model.noise_variance, level)
+        near, own = Stretches(np.arange(len(marked)), log, starts), model
+    return near.samples, smooth_log(near.log, own, near.starts, RESIDUALS)
+
+
+def residuals_near(
+    log: Observations, model: Model, marked: NDArray[np.bool_], around: int
+) -> tuple[FloatArray, FloatArray]:
+    """Leave-one-out residuals (n, 3) and their variances around what is marked; NaN far from it."""
+    residual, variance = np.full(log.weight.shape, np.nan), np.full(log.weight.shape, np.nan)
+    if marked.any():
+        samples, smoothed = smoothed_near(log, model, marked, around)
+        residual[samples], variance[samples] = smoothed.residual, smoothed.residual_variance
+    return residual, variance
