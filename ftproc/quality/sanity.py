@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ftproc.core.components import totals
 from ftproc.errors import InputError, UsageError, row_named
 from ftproc.methods.estimate import Recording
 from ftproc.order_statistics import median
@@ -66,7 +67,7 @@ def check(log: MeasurementLog) -> IntArray:
         raise InputError(f"{log.name}: no row has a time, so there is nothing to filter; check the time column.")
     count = np.zeros(3, np.int64)
     for rows in chunks(len(log)):
-        count += np.isfinite(log.measurement[rows]).sum(0)
+        count += totals(np.isfinite(log.measurement[rows]))
         forget(log.measurement)
     if not count.any():
         raise InputError(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core.components import any_of, sums
 from ftproc.methods.estimate import typical_interval
 from ftproc.order_statistics import median
 from ftproc.quality import consistency, verdict
@@ -68,7 +69,7 @@ class RunStatistics:
         self.nis_sum += float(run.nis[finite].sum())
         self.nis_count += int(finite.sum())
         self.used += int(used.sum())
-        self.rows_used += int(used.any(1).sum())
+        self.rows_used += int(any_of(used).sum())
         self._add_sigmas(time_s, best_sigma[:, :3])
         self.jerk.append(estimate.model.jerk.mean(1))
         self.model = estimate.model
@@ -118,7 +119,7 @@ class RunStatistics:
     def _add_sigmas(self, time_s: FloatArray, sigma_m: FloatArray) -> None:
         groups = -(-len(time_s) // self.every)
         size = np.zeros(groups * self.every)
-        size[: len(time_s)] = (sigma_m**2).sum(1)
+        size[: len(time_s)] = sums(sigma_m**2)
         chosen = self.every * np.arange(groups) + size.reshape(groups, self.every).argmax(1)
         self.times.append(time_s[chosen])
         self.sigmas.append(sigma_m[chosen])

@@ -24,6 +24,7 @@ KindArray = NDArray[np.uint8]
 
 MEASURED, HELD, INTERPOLATED, COMPUTED = 0, 1, 2, 3
 ON_GRID, MOSTLY_ON_GRID = 0.05, 0.95  # of a rounding step that a value may be off a multiple, and share that is not
+SOME, SOME_ON_GRID = 1000, 0.5  # readings of which so many are, or else nearly all are not
 FEWEST = 20  # readings that must be left
 MANY = 6.0  # steps of rounding by which a reading changes typically, or else it is coarse
 NEAR = 4.0  # steps within which changes are counted, to know how many are none by chance
@@ -84,11 +85,17 @@ def _grid(readings: FloatArray, levels: FloatArray) -> float:
         return 0.0
     places = [int(share * (len(steps) - 1)) for share in (0.5, 0.2, 0.05, 0.0)]
     tried: list[float] = np.partition(steps, places)[places].tolist()
+    some, level = readings[:: 1 + len(readings) // SOME], float(levels[len(levels) // 2])
     for step in tried:
-        multiple = (readings - levels[len(levels) // 2]) / step
-        if np.mean(np.abs(multiple - np.round(multiple)) < ON_GRID) >= MOSTLY_ON_GRID:
+        if _on_grid(some, level, step) > SOME_ON_GRID and _on_grid(readings, level, step) >= MOSTLY_ON_GRID:
             return step
     return 0.0
+
+
+def _on_grid(readings: FloatArray, level: float, step: float) -> float:
+    """Share of the readings (m,) that are whole steps away from a level."""
+    multiple = (readings - level) / step
+    return float(np.mean(np.abs(multiple - np.round(multiple)) < ON_GRID))
 
 
 def _step(values: FloatArray) -> float:
@@ -106,9 +113,7 @@ def _step(values: FloatArray) -> float:
     for other in differences[1:].tolist():
         while other > least:
             step, other = other, abs(step - round(step / other) * other)
-    multiple = (values - values[0]) / step
-    on_grid = np.mean(np.abs(multiple - np.round(multiple)) < ON_GRID) >= MOSTLY_ON_GRID
-    return step if on_grid and step > COARSER * least else 0.0
+    return step if step > COARSER * least and _on_grid(values, values[0], step) >= MOSTLY_ON_GRID else 0.0
 
 
 def _scatter(values: FloatArray) -> float:

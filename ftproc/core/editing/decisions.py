@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core.components import any_of, totals
 from ftproc.core.editing import outlier_chain
 from ftproc.core.editing.alternatives import Work
 from ftproc.core.filtering.initialization import find_starts
@@ -135,7 +136,7 @@ def _swept(log: Observations, model: Model, starts: list[Start], before: _Swept 
     """The log smoothed; where it was smoothed before with the same model, only around the readings that have changed
     sides since then."""
     if before is not None and _alike(model, starts, before):
-        changed = (log.weight != before.log.weight).any(1)
+        changed = any_of(log.weight != before.log.weight)
         if not changed.any():
             return before._replace(log=log, starts=starts)
         around = samples_around(log, median_level(model))
@@ -289,5 +290,5 @@ def allow_for_colour(record: Record, decision: Decision) -> Decision:
 def _keep_most(decided: FloatArray, screened: FloatArray) -> FloatArray:
     """The decisions (n, 3), but for a component of which almost nothing would be left: a diverged filter calls
     everything bad, and screening knows better."""
-    lost = decided.sum(0) < FEWEST_KEPT * screened.sum(0)
+    lost = totals(decided) < FEWEST_KEPT * totals(screened)
     return np.where(lost, screened, decided)

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core.components import any_of
 from ftproc.core.editing import alternatives
 from ftproc.core.editing.decisions import Decision, Record, decide
 from ftproc.core.editing.runs import confirmed, suspicious
@@ -47,7 +48,7 @@ def reassess(record: Record, decision: Decision) -> Decision:
     """Give the model a jerk profile, and make the decisions again where it stands out or readings are suspicious."""
     profile = _profile(record, decision)
     calm = median_level(profile)
-    marked = _suspects(record, decision, calm, profile).any(1) | _stands_out(record.time_s, profile)
+    marked = any_of(_suspects(record, decision, calm, profile)) | _stands_out(record.time_s, profile)
     for island in alternatives.islands(record.time_s, decision.weight, record.possible):
         marked[island.first : island.last] = True
     around = widened(marked, samples_around(record.weighted(decision.weight), calm))
@@ -241,7 +242,7 @@ def _suspects(record: Record, decision: Decision, calm: Model, profile: Model) -
     suspects = suspicious(record.time_s, smoothed.residual, smoothed.residual_variance, weight, memory_s)
     if suspects.any():
         without = record.weighted(np.where(suspects, 0.0, weight))
-        near = residuals_near(without, profile, np.asarray(suspects.any(1)), samples_around(log, calm))
+        near = residuals_near(without, profile, any_of(suspects), samples_around(log, calm))
         suspects = confirmed(suspects, *near)
     return suspects
 

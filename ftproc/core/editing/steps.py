@@ -24,6 +24,7 @@ from ftproc.core.editing.decisions import Decision, Record
 from ftproc.core.filtering.bridging import CLOCK, Step, bridged, refined
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model
+from ftproc.core.filtering.shifts import shifts
 from ftproc.core.identification.likelihood import Fixed, fit_level
 from ftproc.core.identification.nearby import residuals_near, samples_around
 from ftproc.core.identification.profile import fit_profile, from_knot, median_level, roughness
@@ -44,6 +45,7 @@ PATCHES = 12, 24, 48  # readings in a patch, of which a step may be an end
 STAYS = 0.75  # share of the readings on either side of a step that must be good
 AGREE, BESIDE = 0.75, 7  # share of a rejected run on either side of the track, and readings that tell how far they jump
 JOINS = 0.3  # times as far off the track at one end of a run as at the other
+EXPLAINED = 2.5  # sigmas of a step with the flight's process noise, below which it would gain less than MARGIN
 HOPELESS = 50.0  # by which the log-probability is worse before a size is found again, for a step that is none
 HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
 SIZES = 2  # times that the size of a step is found again, as the decisions beside it change
@@ -159,6 +161,8 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
     that are known."""
     try:
         stretch = _without(stretch, known)
+        if _is_motion(stretch, step):
+            return None
         without, model = max(
             ((_decided(stretch, stretch.decided, model), model) for model in (stretch.model, stretch.calm)),
             key=lambda tried: tried[0].likelihood,
@@ -183,6 +187,19 @@ def _likelier(stretch: Stretch, known: Sequence[Step], step: Step) -> Step | Non
         )
     except ValueError:  # a component has too few readings there
         return None
+
+
+def _is_motion(stretch: Stretch, step: Step) -> bool:
+    """Whether hardly anything is left of a step with the flight's process noise, where no rejected run lies beside it:
+    then it would gain no more than that, whatever is decided."""
+    own, model = slice(None) if step.component == CLOCK else step.component, stretch.model
+    beside = slice(max(step.sample - 2 * BESIDE, 0), step.sample + 2 * BESIDE)
+    if (stretch.record.possible[beside, own] & (stretch.decided[beside, own] <= 0)).sum() >= FEWEST:
+        return False
+    log = stretch.record.weighted(stretch.decided)
+    found = shifts(log, model, find_starts(log, model.noise_variance, float(model.jerk[0, 0])))
+    near = slice(max(step.sample - BESIDE, 0), step.sample + BESIDE), step.component
+    return not (found.score[near] ** 2 > EXPLAINED**2 * found.information[near]).any()
 
 
 def _sized(

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel
+from ftproc.core.components import totals
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven
 from ftproc.core.identification.scales import Scales
 from ftproc.core.model.measurement import wrapped
@@ -43,7 +44,7 @@ def how_many(scales: Scales, model: Model, knot_s: float) -> int:
 def merged(log: Observations, starts: list[Start], count: int) -> tuple[Observations, list[Start]]:
     """The log with `count` neighbours merged, or as it is where some components are seen far less often than others;
     and its starts."""
-    seen = (log.weight > 0).sum(0)
+    seen = totals(log.weight > 0)
     return merge(log, starts, count) if count > 1 and seen.min() > OFTEN * seen.max() else (log, starts)
 
 
