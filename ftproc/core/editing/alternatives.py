@@ -237,11 +237,7 @@ def _step(log: Neighbourhood, weight: FloatArray) -> tuple[Step, SmootherRun]:
 
 def rejections(log: Neighbourhood, weight: FloatArray, smoothed: SmootherRun) -> float:
     """Log-probability of the rejected readings, and of there being such."""
-    total = 0.0
-    for c in range(3):
-        seen = np.flatnonzero(log.possible[:, c])
-        total += patch_likelihood.log_probability(
-            log.time_s[seen], smoothed.residual[seen, c], smoothed.residual_variance[seen, c], weight[seen, c],
-            float(np.sqrt(log.model.noise_variance[c])), log.rates[c],
-        )  # fmt: skip
-    return total
+    return patch_likelihood.log_probability_of_all(
+        log.time_s, smoothed.residual, smoothed.residual_variance, weight, log.possible, log.model.noise_variance,
+        log.rates,
+    )  # fmt: skip

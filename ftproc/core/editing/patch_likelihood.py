@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part
 from ftproc.core.editing.screening import median
-from ftproc.core.signatures import Vector
+from ftproc.core.signatures import FlagMatrix, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
 
@@ -36,6 +36,34 @@ def log_probability(
     residual, variance: from what the rest of the record says. weight: zero for the rejected. sigma: of the noise.
     rates (3,): an isolated outlier comes, a patch begins, a patch goes on.
     """
+    return _of_component(time, residual, variance, weight, sigma, rates)
+
+
+@kernel
+def log_probability_of_all(
+    time: Vector, residual: Matrix, variance: Matrix, weight: Matrix, possible: FlagMatrix,
+    noise_variance: Vector, rates: Matrix,
+) -> float:  # fmt: skip
+    """The same of all components (n, 3), with noise (3,) and rates (3, 3) of each; of readings that may be good at all
+    (n, 3): what is not possible is not counted."""
+    n = len(time)
+    t, r, v, w = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    total = 0.0
+    for c in range(3):
+        m = 0
+        for k in range(n):
+            if possible[k, c]:
+                t[m], r[m], v[m], w[m] = time[k], residual[k, c], variance[k, c], weight[k, c]
+                m += 1
+        total += _of_component(t[:m], r[:m], v[:m], w[:m], math.sqrt(noise_variance[c]), rates[c])
+    return total
+
+
+@part
+def _of_component(
+    time: FloatArray, residual: FloatArray, variance: FloatArray, weight: FloatArray, sigma: float, rates: FloatArray
+) -> float:
+    """Of one component, see `log_probability`."""
     n = len(residual)
     lone, begins, stays = math.log(rates[0]), math.log(rates[1]), math.log(rates[2])
     total, begin = 0.0, 0

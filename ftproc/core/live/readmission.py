@@ -83,11 +83,7 @@ def _log_probability(case: Open, weight: FloatArray) -> float:
     """Log-probability of all readings with these decisions."""
     log = case.log._replace(weight=weight)
     smoothed = smooth_log(log, case.model, [case.start], RESIDUALS)
-    total, sigma = smoothed.log_likelihood, np.sqrt(case.model.reading_variance)
-    for c in range(3):
-        seen = np.flatnonzero(case.possible[:, c])
-        total += patch_likelihood.log_probability(
-            log.time_s[seen], smoothed.residual[seen, c], smoothed.residual_variance[seen, c], weight[seen, c],
-            float(sigma[c]), case.rates[c],
-        )  # fmt: skip
-    return total
+    return smoothed.log_likelihood + patch_likelihood.log_probability_of_all(
+        log.time_s, smoothed.residual, smoothed.residual_variance, weight, case.possible, case.model.reading_variance,
+        case.rates,
+    )  # fmt: skip

@@ -95,3 +95,21 @@ def test_readings_of_one_instant_make_a_constant(n):
 
 def test_huge_numbers_do_no_harm():
     assert np.isfinite(said(np.array([1e12, -1e12, 1e12, 3.0, 1e-300])))
+
+
+def test_of_all_components_is_the_sum_of_each():
+    """Of readings that may be good at all, each with noise and rates of its own."""
+    rng = np.random.default_rng(3)
+    n, noise, rates = 60, np.array([9.0, 1e-8, 4e-8]), np.stack([RATES, 0.5 * RATES, 0.9 * RATES])
+    time = np.cumsum(rng.uniform(0.02, 0.2, n))
+    residual, variance = 6 * np.sqrt(noise) * rng.standard_normal((n, 3)), noise * rng.uniform(1, 2, (n, 3))
+    weight, possible = (rng.random((n, 3)) > 0.4).astype(float), rng.random((n, 3)) > 0.2
+    weight[20:35, 1] = 0.0
+    of_all = patch_likelihood.log_probability_of_all(time, residual, variance, weight, possible, noise, rates)
+    each = [
+        patch_likelihood.log_probability(
+            time[seen], residual[seen, c], variance[seen, c], weight[seen, c], np.sqrt(noise[c]), rates[c]
+        )
+        for c, seen in enumerate(possible.T)
+    ]
+    assert of_all == pytest.approx(sum(each), rel=1e-12)
