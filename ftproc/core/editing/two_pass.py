@@ -278,8 +278,11 @@ def _with_late_stamps(record: Record, decision: Decision) -> tuple[Record, Decis
     stamps, likeliest = late_stamps(record, decision), (record, decision)
     if stamps is None:
         return likeliest
+    least = log_probability(record, decision) - HOPELESS
     for imprecise in IMPRECISE:
         found = allow_for_late_stamps(record, decision, stamps, imprecise)
+        if not log_probability(*found) > least:
+            continue
         for _ in range(STAMP_ROUNDS):
             before, found = found, believed(found, allow_for_very_late_stamps(*found, imprecise, record))
             if found is before:

@@ -159,7 +159,7 @@ class Model(NamedTuple):
     @property
     def coloured(self) -> bool:
         """Whether some of the noise is correlated in time."""
-        return bool(self.wander_variance.any())
+        return any(self.wander_variance.tolist())
 
     @property
     def reading_variance(self) -> FloatArray:
