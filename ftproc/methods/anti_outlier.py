@@ -30,7 +30,7 @@ from ftproc.settings import FilterSettings
 Run = TypeVar("Run", FilterRun, SmootherRun)
 
 LONGEST_WHOLE = 60_000  # samples of a log that is edited as a whole
-KEPT = 40_000  # samples of a segment, without its margins,
+KEPT = 60_000  # samples of a segment, without its margins,
 KEPT_MARGINS = 12  # or so many times its margin
 MARGIN_S, LEAST_MARGIN, MOST_MARGIN = 60.0, 1_000, 10_000  # s and samples on each side of a segment
 

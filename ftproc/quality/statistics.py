@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.components import any_of, sums
+from ftproc.core.components import any_of, sums, totals
 from ftproc.methods.estimate import typical_interval
 from ftproc.order_statistics import median
 from ftproc.quality import consistency, verdict
@@ -89,10 +89,11 @@ class RunStatistics:
             self.overlooked += int((estimate.screened_out & (estimate.label == GOOD)).sum())
         if estimate.faults is not None:
             self.faults.add(time_s, estimate.faults)
-        self.largest_m = max(self.largest_m, float(np.linalg.norm(correction[:, :3], axis=1).max(initial=0.0)))
-        changed, sigma = np.abs(correction), best_sigma[:, : correction.shape[1]]
-        ratio = np.divide(changed, sigma, out=np.zeros_like(changed), where=changed > 0)
-        self.largest_sigma = max(self.largest_sigma, float(np.nanmax(ratio, initial=0.0)))
+        if correction.any():
+            self.largest_m = max(self.largest_m, float(np.sqrt(sums(correction[:, :3] ** 2).max())))
+            changed, sigma = np.abs(correction), best_sigma[:, : correction.shape[1]]
+            ratio = np.divide(changed, sigma, out=np.zeros_like(changed), where=changed > 0)
+            self.largest_sigma = max(self.largest_sigma, float(np.nanmax(ratio)))
         self.outside += outside * len(time_s)
         self.rows += len(time_s)
         self.parts += 1
@@ -107,8 +108,9 @@ class RunStatistics:
 
     def _add_changes(self, cleaned: FloatArray) -> None:
         change = changes(np.concatenate([self.last_cleaned, cleaned]))
-        self.changed += np.nansum(change, axis=0)
-        self.changes += np.isfinite(change).sum(axis=0)
+        known = np.isfinite(change)
+        self.changed += totals(np.where(known, change, 0.0))
+        self.changes += totals(known)
         self.last_cleaned = cleaned[-1:].copy()
 
     def _average_gradient(self) -> dict[str, float | None]:

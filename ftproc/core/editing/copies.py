@@ -24,7 +24,7 @@ KindArray = NDArray[np.uint8]
 
 MEASURED, HELD, INTERPOLATED, COMPUTED = 0, 1, 2, 3
 ON_GRID, MOSTLY_ON_GRID = 0.05, 0.95  # of a rounding step that a value may be off a multiple, and share that is not
-SOME, SOME_ON_GRID = 1000, 0.5  # readings of which so many are, or else nearly all are not
+SOME, SOME_ON_GRID = 4000, 0.5  # readings, or steps, that stand for many more; share that is on a grid, or else few are
 FEWEST = 20  # readings that must be left
 MANY = 6.0  # steps of rounding by which a reading changes typically, or else it is coarse
 NEAR = 4.0  # steps within which changes are counted, to know how many are none by chance
@@ -83,10 +83,10 @@ def _grid(readings: FloatArray, levels: FloatArray) -> float:
     steps = steps[steps > 1e-12 * np.abs(levels).max(initial=0.0)]
     if not len(steps):
         return 0.0
-    places = [int(share * (len(steps) - 1)) for share in (0.5, 0.2, 0.05, 0.0)]
-    tried: list[float] = np.partition(steps, places)[places].tolist()
-    some, level = readings[:: 1 + len(readings) // SOME], float(levels[len(levels) // 2])
-    for step in tried:
+    chosen, level = steps[:: 1 + len(steps) // SOME], float(levels[len(levels) // 2])
+    places = [int(share * (len(chosen) - 1)) for share in (0.5, 0.2, 0.05)]
+    some = readings[:: 1 + len(readings) // SOME]
+    for step in [*map(float, np.partition(chosen, places)[places]), float(steps.min())]:
         if _on_grid(some, level, step) > SOME_ON_GRID and _on_grid(readings, level, step) >= MOSTLY_ON_GRID:
             return step
     return 0.0

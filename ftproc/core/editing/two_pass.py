@@ -51,6 +51,7 @@ COARSE = 0.5  # of a component's noise: rounding that makes so much of it decide
 OUTVOTED = 0.5  # share of a window's parabolas that a reading is off
 FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
 STAMP_ROUNDS = 3  # of estimating how late each time stamp is
+MOST_LATE = 0.08  # share of the readings, rejected, that stamps which are later by far may explain
 DRIFT_ROUNDS = 3  # of following the noise: where it grows, each finds readings that the next can follow
 HOPELESS = 200.0  # in log-probability, by which another hypothesis is behind if it is not followed up
 PROFILE_STEPS = 3  # of the search for the jerk profile, once the decisions are made
@@ -278,11 +279,11 @@ def _with_late_stamps(record: Record, decision: Decision) -> tuple[Record, Decis
     stamps, likeliest = late_stamps(record, decision), (record, decision)
     if stamps is None:
         return likeliest
-    least = log_probability(record, decision) - HOPELESS
+    many = record.possible.sum() - decision.weight.sum() > MOST_LATE * record.possible.sum()
     for imprecise in IMPRECISE:
         found = allow_for_late_stamps(record, decision, stamps, imprecise)
-        if not log_probability(*found) > least:
-            continue
+        if many and log_probability(*found) < log_probability(record, decision) - HOPELESS:
+            continue  # they are patches of outliers
         for _ in range(STAMP_ROUNDS):
             before, found = found, believed(found, allow_for_very_late_stamps(*found, imprecise, record))
             if found is before:

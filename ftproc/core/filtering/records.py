@@ -102,9 +102,11 @@ class Observations(NamedTuple):
         sites = None if self.sites is None else self.sites.part(rows)
         return Observations(self.time_s[rows], self.measurement[rows], self.weight[rows], uneven, sites)
 
-    def samples(self, noise_variance: FloatArray) -> Any:
-        """The same as an array (n,) of `Sample` records, with noise (3,) m^2, rad^2, rad^2, or (m, 3) by station."""
-        samples, variance = empty(SAMPLE, len(self.time_s)), noise_variance if self.sites is None else np.zeros(3)
+    def samples(self, noise_variance: FloatArray, made: Any = None) -> Any:
+        """The same as an array (n,) of `Sample` records, with noise (3,) m^2, rad^2, rad^2, or (m, 3) by station. made:
+        memory for them, if there is some."""
+        samples = empty(SAMPLE, len(self.time_s)) if made is None else made
+        variance = noise_variance if self.sites is None else np.zeros(3)
         time, z, weight, variance = (np.ascontiguousarray(each, float) for each in (*self[:3], variance))
         _fill(time, z, weight, variance, samples)
         if self.sites is not None:

@@ -11,8 +11,8 @@ from ftproc.core.compiled import kernel, variant, zeros
 from ftproc.core.filtering import backward, smoother
 from ftproc.core.filtering.filters import FILTER, Filters, Posteriors, Updates
 from ftproc.core.filtering.forward import LEFT, Residuals, Span
-from ftproc.core.filtering.memory import memory_of
-from ftproc.core.filtering.records import Model, Observations, Start, between
+from ftproc.core.filtering.memory import memory_of, scratch
+from ftproc.core.filtering.records import SAMPLE, Model, Observations, Start, between
 from ftproc.core.model import motion
 
 FloatArray = NDArray[np.float64]
@@ -52,7 +52,7 @@ def shifts(log: Observations, model: Model, starts: list[Start]) -> Shifts:
     further on its way, as when the clock jumps. Noise that is correlated is taken for white.
     """
     n = len(log.time_s)
-    samples, profile = log.samples(model.reading_variance), model.profile(log.time_s)
+    samples, profile = log.samples(model.reading_variance, scratch(SAMPLE, n)), model.profile(log.time_s)
     found = zeros(backward.SHIFT, n)
     residuals = zeros(LEFT, n)
     for start, stop in between(starts, n):

@@ -32,8 +32,8 @@ from ftproc.core.compiled import empty, kernel, part, variant
 from ftproc.core.filtering import backward, sites, ukf
 from ftproc.core.filtering.filters import OFFSETS, Filter, Update, retain, retain_state
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Span, advance, extrapolated
-from ftproc.core.filtering.memory import ColouredMemory, Memory, memory_of
-from ftproc.core.filtering.records import Model, Observations, Sample, Samples, Start, between
+from ftproc.core.filtering.memory import ColouredMemory, Memory, memory_of, scratch
+from ftproc.core.filtering.records import SAMPLE, Model, Observations, Sample, Samples, Start, between
 from ftproc.core.model import motion
 from ftproc.core.signatures import Cube
 
@@ -240,7 +240,8 @@ class Scores(NamedTuple):
 
 
 class _Swept(NamedTuple):
-    """What the sweeps over a log leave behind: `Estimated` and `Left` records of its samples, where they are kept."""
+    """What the sweeps over a log leave behind: `Estimated` records of its samples, where they are kept, and `Left`
+    ones, until the next sweep."""
 
     scores: Scores
     estimates: Any
@@ -251,9 +252,12 @@ class _Swept(NamedTuple):
 def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) -> _Swept:
     n = len(log.time_s)
     pacing.swept(n)
-    samples, profile = log.samples(model.noise_variance), model.profile(log.time_s)
+    samples, profile = log.samples(model.noise_variance, scratch(SAMPLE, n)), model.profile(log.time_s)
     sweep = _sweep_coloured if model.coloured else _sweep
-    estimates, residuals = empty(ESTIMATED, n if wanted == STATES else 0), empty(LEFT, n if wanted >= RESIDUALS else 0)
+    estimates, residuals = (
+        empty(ESTIMATED, n if wanted == STATES else 0),
+        scratch(LEFT, n if wanted >= RESIDUALS else 0),
+    )
     (noise, wander), fade, jerk = np.zeros((2, 2, 3)), np.zeros(3), np.zeros((len(model.jerk), 2, 3))
     likelihood, heads = 0.0, list[Start]()
     for start, stop in between(starts, n):
@@ -292,5 +296,5 @@ def smooth_log(log: Observations, model: Model, starts: list[Start], wanted: int
         before, residuals[:first] = extrapolated(log, model, heads[0])
         estimates[:first] = before[: len(estimates)]
     fields = {name: estimates[name] for name in ESTIMATED.names or ()}
-    fields |= {name: np.ascontiguousarray(residuals[name]) for name in LEFT.names or ()}
+    fields |= {name: residuals[name].copy() for name in LEFT.names or ()}
     return SmootherRun(**fields, log_likelihood=scores.log_likelihood, heads=heads)
