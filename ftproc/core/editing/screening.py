@@ -30,6 +30,7 @@ LEAST_SCALE, WIDEST = 0.7, 2.0  # of the typical scale
 MOST = 0.75  # of a window that must lie near a parabola to know that it is the best
 JUMP_VOTES = 0.2  # share of short windows that must find a reading off, at a jump
 APART = 64  # numbers between scratch arrays: where they might overlap, compiled loops round otherwise
+SOME = 4000  # readings that tell nearly as much as many more
 SHORTEST_STUCK = 3  # equal readings in a row
 STUCK_ODDS = 1e-3  # expected number of chance runs in a log that would be called stuck
 MOST_STUCK = 0.2  # share of a component
@@ -242,11 +243,12 @@ def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
     repeats = values[1:] == values[:-1]
     if not repeats.any():
         return found
-    steps = np.diff(distinct(values))
-    steps = steps[steps > 1e-12 * np.abs(values).max()]
-    step = float(steps.min()) if len(steps) else np.inf
-    chance = step / (2 * np.sqrt(np.pi) * sigma) if 0 < sigma < np.inf else np.inf
-    chance = max(chance, float(np.mean(repeats)))
+    chance, per_sigma = float(np.mean(repeats)), 1 / (2 * np.sqrt(np.pi))
+    for some in (values[:: 1 + len(values) // SOME], values):  # few steps tell already that the smallest is too small
+        step = _smallest_step(some)
+        if not sigma > 0 or per_sigma * step <= chance * sigma:
+            break
+    chance = max(chance, per_sigma * step / sigma if 0 < sigma < np.inf else np.inf)
     if chance >= 1:
         return found
     repeats_needed = max(np.log(STUCK_ODDS / len(seen)) / np.log(max(chance, 1e-300)), SHORTEST_STUCK - 1)
@@ -257,6 +259,13 @@ def stuck(channel: FloatArray, sigma: float) -> NDArray[np.bool_]:
     if found.sum() > MOST_STUCK * len(seen):
         found[:] = False
     return found
+
+
+def _smallest_step(values: FloatArray) -> float:
+    """The smallest difference between two values (n,); infinite if there is none."""
+    steps = np.diff(distinct(values))
+    steps = steps[steps > 1e-12 * np.abs(values).max()]
+    return float(steps.min()) if len(steps) else np.inf
 
 
 @kernel

@@ -164,13 +164,13 @@ def absorb(back: Backward, update: Update, after: Posterior, sample: Sample, res
             n[a, b] = t
     if len(r) > OFFSETS:
         _absorb_offsets(back, update)
-    for a in range(3):
-        for b in range(a + 1):
-            t = n[a, b]
-            for i in range(3):
-                t -= nu[i, a] * g[i, b] + g[i, a] * nu[i, b]
-                for j in range(3):
-                    t += g[i, a] * w[i, j] * g[j, b]
+    for b in range(3):
+        d0 = w[0, 0] * g[0, b] + w[0, 1] * g[1, b] + w[0, 2] * g[2, b] - nu[0, b]
+        d1 = w[1, 0] * g[0, b] + w[1, 1] * g[1, b] + w[1, 2] * g[2, b] - nu[1, b]
+        d2 = w[2, 0] * g[0, b] + w[2, 1] * g[1, b] + w[2, 2] * g[2, b] - nu[2, b]
+        for a in range(b, 3):
+            t = n[a, b] + g[0, a] * d0 + g[1, a] * d1 + g[2, a] * d2
+            t -= nu[0, a] * g[0, b] + nu[1, a] * g[1, b] + nu[2, a] * g[2, b]
             n[a, b] = t
             n[b, a] = t
     _leave_out(back, update, after, sample, residuals)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import Observations
-from ftproc.order_statistics import median, medians, typical
+from ftproc.order_statistics import SOME, median, medians
 
 FloatArray = NDArray[np.float64]
 
@@ -56,12 +56,13 @@ class Scales(NamedTuple):
 
 def scales_of(log: Observations, noise_variance: FloatArray) -> Scales:
     """The scales of a log with this noise (3,) m^2, rad^2, rad^2."""
-    ranges = log.measurement[:, 0][log.weight[:, 0] > 0]
+    every = 1 + len(log.time_s) // SOME
+    ranges = log.measurement[::every, 0][log.weight[::every, 0] > 0]
     ranges = ranges[np.isfinite(ranges)]
-    range_m = typical(ranges) if len(ranges) else 1.0
-    times = log.time_s[1:] - log.time_s[:-1]
+    range_m = median(ranges) if len(ranges) else 1.0
+    times = log.time_s[1::every] - log.time_s[:-1:every]
     times = times[times > 0]
-    interval = max(typical(times), SHORTEST_S) if len(times) else 1.0
+    interval = max(median(times), SHORTEST_S) if len(times) else 1.0
     if log.sites is not None:
         return Scales(interval, max(float(log.time_s[-1] - log.time_s[0]), interval), *_of_sites(log, noise_variance))
     if log.uneven is not None:
