@@ -48,10 +48,11 @@ def reassess(record: Record, decision: Decision) -> Decision:
     """Give the model a jerk profile, and make the decisions again where it stands out or readings are suspicious."""
     profile = _profile(record, decision)
     calm = median_level(profile)
-    marked = any_of(_suspects(record, decision, calm, profile)) | _stands_out(record.time_s, profile)
+    marked, reach = _stands_out(record.time_s, profile), samples_around(record.weighted(decision.weight), calm)
     for island in alternatives.islands(record.time_s, decision.weight, record.possible):
         marked[island.first : island.last] = True
-    around = widened(marked, samples_around(record.weighted(decision.weight), calm))
+    marked |= any_of(_suspects(record, decision, calm, profile, widened(marked, reach)))
+    around = widened(marked, reach)
     if len(around) <= SHORT_LOG and around.mean() > MOST:
         return _until_settled(record, decision, profile)
     weight, unexamined = decision.weight.copy(), 0
@@ -232,14 +233,18 @@ def _short(record: Record, span: slice) -> Record:
     return record.part(span)._replace(fixed=record.fixed._replace(noise=np.ones(3, bool)))
 
 
-def _suspects(record: Record, decision: Decision, calm: Model, profile: Model) -> NDArray[np.bool_]:
+def _suspects(
+    record: Record, decision: Decision, calm: Model, profile: Model, marked: NDArray[np.bool_] | None = None
+) -> NDArray[np.bool_]:
     """(n, 3) readings that are good so far, in runs that are off together if the flight is calm, and off at once at
-    both ends even if it is not."""
+    both ends even if it is not. marked: (n,) samples among which none is looked for."""
     weight, starts = decision.weight, decision.starts
     log = record.weighted(weight)
     smoothed = smooth_log(log, calm, starts, RESIDUALS)
     memory_s = scales_of(log, calm.noise_variance).memory_s(float(calm.jerk[0, 0]))
     suspects = suspicious(record.time_s, smoothed.residual, smoothed.residual_variance, weight, memory_s)
+    if marked is not None:
+        suspects[marked] = False
     if suspects.any():
         without = record.weighted(np.where(suspects, 0.0, weight))
         near = residuals_near(without, profile, any_of(suspects), samples_around(log, calm))
