@@ -65,8 +65,7 @@ class Shift(Protocol):
     information: Annotated[FloatArray, 4]
 
 
-BACKWARD, COLOURED = record(Backward), record(Coloured)
-SHIFT = record(Shift)
+BACKWARD, COLOURED, SHIFT = record(Backward), record(Coloured), record(Shift)
 Shifts = Annotated[Any, Layout(SHIFT)]
 Backwards = Annotated[Any, Layout(BACKWARD)]
 ColouredBackwards = Annotated[Any, Layout(COLOURED)]
@@ -90,11 +89,12 @@ def estimate(back: Backward, after: Posterior) -> None:
             for j in range(len(x)):
                 pn[j] += p[i, k] * n[k, j]
         for j in range(i // 3 * 3 if i < 6 else i, i + 1):
-            v = p[i, j]
-            for k in range(len(x)):
-                v -= pn[k] * p[j, k]
-            cov[i, j] = v
-            cov[j, i] = v
+            v = (pn[0] * p[j, 0] + pn[1] * p[j, 1] + pn[2] * p[j, 2]) + (pn[3] * p[j, 3] + pn[4] * p[j, 4])
+            v += (pn[5] * p[j, 5] + pn[6] * p[j, 6]) + (pn[7] * p[j, 7] + pn[8] * p[j, 8])
+            for k in range(OFFSETS, len(x)):
+                v += pn[k] * p[j, k]
+            cov[i, j] = p[i, j] - v
+            cov[j, i] = cov[i, j]
 
 
 @part

@@ -24,7 +24,17 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import empty, kernel, part, variant, zeros
 from ftproc.core.filtering import backward, smoother
-from ftproc.core.filtering.filters import FILTER, POSTERIOR, UPDATE, Filter, Filters, Posteriors, Update, Updates
+from ftproc.core.filtering.filters import (
+    FILTER,
+    POSTERIOR,
+    UPDATE,
+    Filter,
+    Filters,
+    Posteriors,
+    Update,
+    Updates,
+    retain_linearised,
+)
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Estimates, Residuals, Span, extrapolated
 from ftproc.core.filtering.memory import scratch
 from ftproc.core.filtering.records import Model, Observations, Sample, Start
@@ -128,6 +138,7 @@ def _carry(memory: Any, f: Filter, k: int, interval: float, place: int) -> None:
             s[i, c] -= u0 * white[0, c] + u1 * white[1, c] + u2 * white[2, c]
     if place < 0:
         return
+    retain_linearised(f, memory.after[place])
     for c in range(m):
         w0, w1, w2 = white[0, c], white[1, c], white[2, c]
         memory.score[c] += w0 * y[0] + w1 * y[1] + w2 * y[2]

@@ -119,12 +119,17 @@ def retain(f: Filter, update: Update) -> None:
 
 @part
 def retain_state(f: Filter, after: Posterior) -> None:
-    """Keep the state, and the linearisation that led to it."""
-    for i in range(3):
-        after.e[i] = f.e[i]
-        for j in range(3):
-            after.h[i, j], after.c[i, j] = f.h[i, j], f.c[i, j]
+    """Keep the state."""
     for i in range(len(f.x)):
         after.x[i] = f.x[i]
         for j in range(len(f.x)):
             after.p[i, j] = f.p[i, j]
+
+
+@part
+def retain_linearised(f: Filter, after: Posterior) -> None:
+    """Keep the innovation, and the linearisation that led to it."""
+    for i in range(3):
+        after.e[i] = f.e[i]
+        for j in range(3):
+            after.h[i, j], after.c[i, j] = f.h[i, j], f.c[i, j]

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from ftproc.core import pacing
 from ftproc.core.compiled import empty, kernel, part, variant
 from ftproc.core.filtering import backward, sites, ukf
-from ftproc.core.filtering.filters import OFFSETS, Filter, Update, retain, retain_state
+from ftproc.core.filtering.filters import OFFSETS, Filter, Update, retain, retain_linearised, retain_state
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Span, advance, extrapolated
 from ftproc.core.filtering.memory import ColouredMemory, Memory, memory_of, scratch
 from ftproc.core.filtering.records import SAMPLE, Model, Observations, Sample, Samples, Start, between
@@ -123,7 +123,7 @@ def _carry_back(memory: Any, update: Update, sample: Sample, k: int, interval: f
 def _swept_through(
     span: Span, samples: Samples, profile: motion.Profile, memory: Memory, jerk: Cube, wanted: int
 ) -> float:
-    """The sweeps over a span; the log-likelihood. Adds to the sums (m, 2, 3) of the jerk's score; fills what is wanted.
+    """The sweeps over a span; the log-likelihood. Fills what is wanted; adds to the sums (m, 2, 3) of the jerk's score.
     At the end `back` holds the state of the first sample, if more than scores are wanted."""
     f, before, block, after = memory.filters[0], memory.before, memory.block, memory.after
     back, estimates, residuals = memory.back[0], memory.estimates, memory.residuals
@@ -148,11 +148,13 @@ def _swept_through(
                 likelihood += gained
             if turn >= last and wanted >= SCORES:
                 retain(f, block[k - low])
-                asked = wanted >= RESIDUALS and (k == span.first or _leaves_some(f, sample))
-                if wanted == STATES or asked or len(f.x) > OFFSETS:
+                if wanted == STATES or len(f.x) > OFFSETS or (wanted >= RESIDUALS and k == span.first):
                     retain_state(f, after[k - low])
                 if wanted >= RESIDUALS:
                     residuals[k].nis = nis
+                    if _leaves_some(f, sample):
+                        retain_state(f, after[k - low])
+                        retain_linearised(f, after[k - low])
         if turn < last or wanted == LIKELIHOOD:
             continue
         for k in range(high - 1, low - 1, -1):
@@ -171,7 +173,8 @@ def _swept_through(
                     residuals[k].residual_variance[i] = back.variance[i]
             _carry_back(memory, update, sample, k, interval, k - low, wanted)
             if k > span.first:
-                backward.score_jerk(back, interval, jerk, motion.knot_index(samples[k].time_s, profile))
+                if wanted == SCORES:
+                    backward.score_jerk(back, interval, jerk, motion.knot_index(samples[k].time_s, profile))
                 backward.score_wander(back, f, interval)
                 if k > low:
                     backward.score_fade(back, after[k - 1 - low], f, interval)
@@ -240,8 +243,7 @@ class Scores(NamedTuple):
 
 
 class _Swept(NamedTuple):
-    """What the sweeps over a log leave behind: `Estimated` records of its samples, where they are kept, and `Left`
-    ones, until the next sweep."""
+    """What sweeps leave behind: `Estimated` records of samples, where kept, and `Left` ones until the next sweep."""
 
     scores: Scores
     estimates: Any
@@ -254,10 +256,8 @@ def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) ->
     pacing.swept(n)
     samples, profile = log.samples(model.noise_variance, scratch(SAMPLE, n)), model.profile(log.time_s)
     sweep = _sweep_coloured if model.coloured else _sweep
-    estimates, residuals = (
-        empty(ESTIMATED, n if wanted == STATES else 0),
-        scratch(LEFT, n if wanted >= RESIDUALS else 0),
-    )
+    estimates = empty(ESTIMATED, n if wanted == STATES else 0)
+    residuals = scratch(LEFT, n if wanted >= RESIDUALS else 0)
     (noise, wander), fade, jerk = np.zeros((2, 2, 3)), np.zeros(3), np.zeros((len(model.jerk), 2, 3))
     likelihood, heads = 0.0, list[Start]()
     for start, stop in between(starts, n):

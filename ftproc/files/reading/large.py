@@ -11,6 +11,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ftproc.core import threads
 from ftproc.errors import InputError
 from ftproc.files import conventions
 from ftproc.files.reading.formats.content import Changed
@@ -54,7 +55,7 @@ def _into(spool: _Spool, source: str, blocks: Blocks, convert: Convert, station:
     sampled: list[dict[str, FloatArray]] = []
     times = _Times()
     try:
-        for table in blocks.tables:
+        for table in threads.ahead(blocks.tables):
             quantities, epoch = convert(table)
             quantities["time"] = times.continued(quantities["time"], epoch)
             spool.add(conventions.apply(_timed(source, quantities), station), len(table))
