@@ -103,14 +103,14 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
     stands still, it is the mean of the rounds that decides on them.
     """
     weight, model, starts, rates = initial.weight, initial.model, initial.starts, initial.rates.copy()
-    rounds, settled, mean, swept = 0, False, np.zeros_like(weight), None
+    rounds, settled, mean, last = 0, False, np.zeros_like(weight), None
     while rounds < MAX_ROUNDS and not settled:
         log = record.weighted(weight)
         if rounds < TUNING_ROUNDS and (tune_first or rounds > 0) and not model.coloured:
             model = fit_level(log, starts, model, record.fixed, record.sigma, record.rounding)
-        swept = _swept(log, model, starts, swept)
+        last = _smoothed(log, model, starts, last)
         noise = model.reading_variance
-        good = outlier_chain.classify(*swept.residuals, noise, rates, record.gate)
+        good = outlier_chain.classify(*last.residuals, noise, rates, record.gate)
         mean += (good - mean) / max(rounds - TUNING_ROUNDS + 1, 1)
         decided = _keep_most(((mean > 0.5) & record.possible).astype(float), record.screened)
         settled = int((decided != weight).sum()) <= STILL * weight.size and (rounds > 0 or not tune_first)
@@ -119,11 +119,11 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
         starts = find_starts(record.weighted(weight), model.noise_variance, float(model.jerk[0, 0]))
     return initial._replace(
         weight=weight, model=model, starts=starts, rates=rates, rounds=initial.rounds + rounds, settled=settled,
-        residuals=None if swept is None else swept.residuals,
+        residuals=None if last is None else last.residuals,
     )  # fmt: skip
 
 
-class _Swept(NamedTuple):
+class _Smoothed(NamedTuple):
     """A log as it was smoothed, with which model and starts, and the residuals."""
 
     log: Observations
@@ -132,7 +132,7 @@ class _Swept(NamedTuple):
     residuals: Residuals
 
 
-def _swept(log: Observations, model: Model, starts: list[Start], before: _Swept | None) -> _Swept:
+def _smoothed(log: Observations, model: Model, starts: list[Start], before: _Smoothed | None) -> _Smoothed:
     """The log smoothed; where it was smoothed before with the same model, only around the readings that have changed
     sides since then."""
     if before is not None and _alike(model, starts, before):
@@ -147,12 +147,12 @@ def _swept(log: Observations, model: Model, starts: list[Start], before: _Swept 
             residual, variance = (each.copy() for each in before.residuals)
             residual[samples[inside]] = smoothed.residual[inside]
             variance[samples[inside]] = smoothed.residual_variance[inside]
-            return _Swept(log, model, starts, Residuals(residual, variance))
+            return _Smoothed(log, model, starts, Residuals(residual, variance))
     smoothed = smooth_log(log, model, starts, RESIDUALS)
-    return _Swept(log, model, starts, Residuals(smoothed.residual, smoothed.residual_variance))
+    return _Smoothed(log, model, starts, Residuals(smoothed.residual, smoothed.residual_variance))
 
 
-def _alike(model: Model, starts: list[Start], before: _Swept) -> bool:
+def _alike(model: Model, starts: list[Start], before: _Smoothed) -> bool:
     """Whether model and starts are those with which the log was smoothed before, but for rounding."""
     if [start.sample for start in starts] != [start.sample for start in before.starts]:
         return False
@@ -220,7 +220,7 @@ def _residuals(record: Record, decision: Decision) -> Residuals:
     """Those by which the decisions were made, if they stand still."""
     if decision.settled and decision.residuals is not None:
         return decision.residuals
-    return _swept(record.weighted(decision.weight), decision.model, decision.starts, None).residuals
+    return _smoothed(record.weighted(decision.weight), decision.model, decision.starts, None).residuals
 
 
 def allow_for_tails(record: Record, decision: Decision) -> tuple[Record, Decision]:

@@ -65,8 +65,8 @@ class SmootherRun(NamedTuple):
 
 LEAST_SHARE = 3e-8  # of a variance: less cannot be told from what a sweep rounds off
 
-#: What is wanted of a sweep: the likelihood, its scores too, the residuals of each sample too, the state at each start
-#: too, that of each sample too.
+#: What is wanted of a sweep: the likelihood; its scores too; in place of the jerk's, the residuals of each sample; the
+#: state at each start too; that of each sample too.
 LIKELIHOOD, SCORES, RESIDUALS, HEADS, STATES = range(5)
 
 

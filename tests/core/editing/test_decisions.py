@@ -79,14 +79,14 @@ def test_decisions_under_correlated_noise_are_taken_only_if_they_stand_still(mon
 def test_a_log_is_smoothed_again_only_around_what_has_changed_sides(monkeypatch):
     """With the same model; with another one, all of it."""
     a = matched(5, 12_000, q=30.0)
-    whole = decisions._swept(a.log, a.model, a.starts, None)
+    whole = decisions._smoothed(a.log, a.model, a.starts, None)
     weight = a.weight.copy()
     weight[[700, 701, 2900], [0, 0, 2]] = 0.0
     changed = a.log._replace(weight=weight)
     swept = []
     smooth = decisions.smoothed_near
     monkeypatch.setattr(decisions, "smoothed_near", lambda *each: swept.append(1) or smooth(*each))
-    found = decisions._swept(changed, a.model, a.starts, whole)
+    found = decisions._smoothed(changed, a.model, a.starts, whole)
     exact = smooth_log(changed, a.model, a.starts, RESIDUALS)
     assert swept
     sigma = np.sqrt(exact.residual_variance)
@@ -95,8 +95,8 @@ def test_a_log_is_smoothed_again_only_around_what_has_changed_sides(monkeypatch)
     assert (found.residuals.residual == whole.residuals.residual).mean() > 0.9
     other = a.model._replace(jerk=1.01 * a.model.jerk)
     np.testing.assert_array_equal(
-        decisions._swept(changed, other, a.starts, whole).residuals.residual,
+        decisions._smoothed(changed, other, a.starts, whole).residuals.residual,
         smooth_log(changed, other, a.starts, RESIDUALS).residual,
     )
     assert len(swept) == 1
-    assert decisions._swept(a.log, a.model, a.starts, whole).residuals is whole.residuals
+    assert decisions._smoothed(a.log, a.model, a.starts, whole).residuals is whole.residuals
