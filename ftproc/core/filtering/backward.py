@@ -23,7 +23,8 @@ class Backward(Protocol):
     """The record of the backward recursion: r, N, and what a step computes on its way.
 
     v, w, nu: v, W, U N of the smoother's head. state, cov: of the smoothed estimate (of the covariance only the blocks
-    of position and velocity, and the diagonal). pn: P N. q: coefficients of Q. residual, variance: leave-one-out.
+    of position and velocity, and the diagonal). pn: P N. q: coefficients of Q. vague: whether the covariance before
+    comes from this one, see `heads`; later: this one, whole; inverse, gain: M and C. residual, variance: leave-one-out.
     noise, wander: the two sums of the score so far, see `smoother`, of the white noise and of the offsets' variances;
     fade_score: of their correlation times. n_first: N+ of the first sample.
     """
@@ -37,6 +38,10 @@ class Backward(Protocol):
     cov: Annotated[FloatArray, 9, 9]
     pn: Annotated[FloatArray, 9]
     q: Annotated[FloatArray, 3, 3]
+    vague: float
+    later: Annotated[FloatArray, 9, 9]
+    inverse: Annotated[FloatArray, 9, 9]
+    gain: Annotated[FloatArray, 9, 9]
     residual: Annotated[FloatArray, 3]
     variance: Annotated[FloatArray, 3]
     noise: Annotated[FloatArray, 2, 3]
@@ -54,19 +59,13 @@ class Coloured(Backward, Protocol):
     state: Annotated[FloatArray, 12]
     cov: Annotated[FloatArray, 12, 12]
     pn: Annotated[FloatArray, 12]
+    later: Annotated[FloatArray, 12, 12]
+    inverse: Annotated[FloatArray, 12, 12]
+    gain: Annotated[FloatArray, 12, 12]
     n_first: Annotated[FloatArray, 12, 12]
 
 
-class Shift(Protocol):
-    """What the readings after a sample say of a step between it and the next: of range, azimuth, elevation and the
-    clock, see `shifts`."""
-
-    score: Annotated[FloatArray, 4]
-    information: Annotated[FloatArray, 4]
-
-
-BACKWARD, COLOURED, SHIFT = record(Backward), record(Coloured), record(Shift)
-Shifts = Annotated[Any, Layout(SHIFT)]
+BACKWARD, COLOURED = record(Backward), record(Coloured)
 Backwards = Annotated[Any, Layout(BACKWARD)]
 ColouredBackwards = Annotated[Any, Layout(COLOURED)]
 
@@ -98,33 +97,12 @@ def estimate(back: Backward, after: Posterior) -> None:
 
 
 @part
-def store(back: Backward, after: Posterior, row: Estimated) -> None:
+def keep(back: Backward, row: Estimated) -> None:
     """Keep the smoothed state of a sample and its sigmas."""
-    estimate(back, after)
     for i in range(9):
         row.state[i] = back.state[i]
-        # Rounding may eat a variance that the record has all but determined; it cannot be below that rounding.
-        row.sigma[i] = math.sqrt(max(back.cov[i, i], 1e-14 * abs(after.p[i, i])))
+        row.sigma[i] = math.sqrt(max(back.cov[i, i], 0.0))
     line_of_sight_sigma(back.state, back.cov, row.los_sigma)
-
-
-@part
-def store_shift(back: Backward, after: Posterior, row: Shift) -> None:
-    """Keep the score and the information of a step that begins after a sample: of the offsets, r and N themselves, of
-    the clock, those along the way that the state goes in a second."""
-    r, n, state = back.r, back.n, back.state
-    for i in range(3, OFFSETS):
-        state[i] = after.x[i]
-        for j in range(OFFSETS):
-            state[i] += after.p[i, j] * r[j]
-    for i in range(3):
-        row.score[i] = r[OFFSETS + i]
-        row.information[i] = n[OFFSETS + i, OFFSETS + i]
-    row.score[3] = row.information[3] = 0.0
-    for i in range(6):
-        row.score[3] += r[i] * state[3 + i]
-        for j in range(6):
-            row.information[3] += state[3 + i] * n[i, j] * state[3 + j]
 
 
 @part

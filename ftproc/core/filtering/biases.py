@@ -38,7 +38,7 @@ from ftproc.core.filtering.filters import (
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Estimates, Residuals, Span, extrapolated
 from ftproc.core.filtering.memory import scratch
 from ftproc.core.filtering.records import Model, Observations, Sample, Start
-from ftproc.core.filtering.smoother import SCORES, STATES, SmootherRun, smoothed_covariance
+from ftproc.core.filtering.smoother import SCORES, STATES, SmootherRun
 from ftproc.core.signatures import Cube, Indices, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
@@ -234,8 +234,7 @@ def smooth_biased(log: Observations, model: Model, start: Start, directions: Dir
     jerk = np.zeros((len(model.jerk), 2, 3))
     samples, profile = log.samples(model.noise_variance), model.profile(log.time_s)
     likelihood = _sweep_biased(Span(first, n, first), samples, profile, memory, jerk, STATES)
-    covariance = smoothed_covariance(memory.after["p"][0], memory.back["n_first"][0])[:9, :9]
-    covariance += memory.state @ memory.state.T
+    covariance = memory.back["cov"][0] + memory.state @ memory.state.T
     head = Start(first, memory.back["state"][0, :9].copy(), covariance)
     estimates[:first], residuals[:first] = extrapolated(log, model, head)
     fields = {name: estimates[name] for name in ESTIMATED.names or ()}

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import empty, kernel, part, record, variant, zeros
-from ftproc.core.filtering import sites, ukf
+from ftproc.core.filtering import ukf
 from ftproc.core.filtering.filters import ColouredFilters, Filter, Filters
 from ftproc.core.filtering.records import (
     ROW,
@@ -80,7 +80,7 @@ def _weighted(f: Filter, sample: Sample, extended: bool, row: Row) -> tuple[floa
     if extended:
         jacobian.linearise(f)
     else:
-        sites.expect_at(sample, f)
+        ukf.expect_at(sample, f)
     ukf.innovate(sample, f)
     any_used = ukf.use(sample.weight, f)
     store_innovation(f, row)
@@ -166,7 +166,7 @@ def _extrapolated(
         motion.drive(f, profile, time_s)
         motion.predict(f, interval)
         motion.wander(f, interval)
-        sites.expect_at(samples[k], f)
+        ukf.expect_at(samples[k], f)
         ukf.innovate(samples[k], f)
         for i in range(3):
             left.residual[i] = f.e[i]

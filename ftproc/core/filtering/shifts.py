@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.compiled import kernel, variant, zeros
+from ftproc.core.compiled import kernel, part, record, variant, zeros
 from ftproc.core.filtering import backward, smoother
-from ftproc.core.filtering.filters import FILTER, Filters, Posteriors, Updates
+from ftproc.core.filtering.filters import FILTER, OFFSETS, Filter, Filters, Posteriors, Updates
 from ftproc.core.filtering.forward import LEFT, Residuals, Span
 from ftproc.core.filtering.memory import memory_of, scratch
 from ftproc.core.filtering.records import SAMPLE, Model, Observations, Start, between
 from ftproc.core.model import motion
+from ftproc.core.signatures import Layout
 
 FloatArray = NDArray[np.float64]
+
+
+class Shift(Protocol):
+    """What the readings after a sample say of a step between it and the next: of range, azimuth, elevation and the
+    clock, see `shifts`."""
+
+    score: Annotated[FloatArray, 4]
+    information: Annotated[FloatArray, 4]
+
+
+SHIFT = record(Shift)
+ShiftRecords = Annotated[Any, Layout(SHIFT)]
 
 
 class ShiftMemory(NamedTuple):
@@ -27,7 +40,7 @@ class ShiftMemory(NamedTuple):
     block: Updates
     after: Posteriors
     back: backward.ColouredBackwards
-    estimates: backward.Shifts
+    estimates: ShiftRecords
     residuals: Residuals
 
 
@@ -41,7 +54,27 @@ class Shifts(NamedTuple):
     residual: FloatArray
 
 
-_sweep = kernel(variant(smoother.swept_through, __name__, "_sweep", memory=ShiftMemory, _store=backward.store_shift))
+@part
+def _store(memory: Any, f: Filter, samples: Any, profile: motion.Profile, k: int, low: int, b: int) -> None:
+    """Keep the score and the information of a step that begins after sample k, in a block that begins with sample
+    `low`: of the offsets, r and N themselves, of the clock, those along the way that the state goes in a second."""
+    back, after, row = memory.back[0], memory.after[k - low], memory.estimates[k]
+    r, n, state = back.r, back.n, back.state
+    for i in range(3, OFFSETS):
+        state[i] = after.x[i]
+        for j in range(OFFSETS):
+            state[i] += after.p[i, j] * r[j]
+    for i in range(3):
+        row.score[i] = r[OFFSETS + i]
+        row.information[i] = n[OFFSETS + i, OFFSETS + i]
+    row.score[3] = row.information[3] = 0.0
+    for i in range(6):
+        row.score[3] += r[i] * state[3 + i]
+        for j in range(6):
+            row.information[3] += state[3 + i] * n[i, j] * state[3 + j]
+
+
+_sweep = kernel(variant(smoother.swept_through, __name__, "_sweep", memory=ShiftMemory, _store=_store))
 
 
 def shifts(log: Observations, model: Model, starts: list[Start]) -> Shifts:
@@ -53,7 +86,7 @@ def shifts(log: Observations, model: Model, starts: list[Start]) -> Shifts:
     """
     n = len(log.time_s)
     samples, profile = log.samples(model.reading_variance, scratch(SAMPLE, n)), model.profile(log.time_s)
-    found = zeros(backward.SHIFT, n)
+    found = zeros(SHIFT, n)
     residuals = zeros(LEFT, n)
     for start, stop in between(starts, n):
         first = zeros(FILTER)

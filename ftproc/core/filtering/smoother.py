@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from ftproc.core import pacing
 from ftproc.core.compiled import empty, kernel, part, variant
-from ftproc.core.filtering import backward, sites, ukf
+from ftproc.core.filtering import backward, heads, ukf
 from ftproc.core.filtering.filters import OFFSETS, Filter, Update, retain, retain_linearised, retain_state
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Span, advance, extrapolated
 from ftproc.core.filtering.memory import ColouredMemory, Memory, memory_of, scratch
@@ -63,8 +63,6 @@ class SmootherRun(NamedTuple):
         return SmootherRun._make([*(each[low:high] for each in self[:6]), *self[6:]])
 
 
-LEAST_SHARE = 3e-8  # of a variance: less cannot be told from what a sweep rounds off
-
 #: What is wanted of a sweep: the likelihood; its scores too; in place of the jerk's, the residuals of each sample; the
 #: state at each start too; that of each sample too.
 LIKELIHOOD, SCORES, RESIDUALS, HEADS, STATES = range(5)
@@ -73,7 +71,7 @@ LIKELIHOOD, SCORES, RESIDUALS, HEADS, STATES = range(5)
 @part
 def _take_in(f: Filter, sample: Sample) -> tuple[float, float]:
     """Update by a sample; NIS, NaN where nothing is used, and the log-likelihood."""
-    sites.expect_at(sample, f)
+    ukf.expect_at(sample, f)
     ukf.innovate(sample, f)
     any_used = ukf.use(sample.weight, f)
     nis, gained = ukf.update(f)
@@ -97,7 +95,7 @@ def _copy_state(source: Filter, target: Filter) -> None:
             target.p[i, j] = source.p[i, j]
 
 
-_store = backward.store  # of the sweep below; that for steps has another
+_store = heads.store  # of the sweep below; that for steps has another
 
 
 @part
@@ -126,7 +124,7 @@ def _swept_through(
     """The sweeps over a span; the log-likelihood. Fills what is wanted; adds to the sums (m, 2, 3) of the jerk's score.
     At the end `back` holds the state of the first sample, if more than scores are wanted."""
     f, before, block, after = memory.filters[0], memory.before, memory.block, memory.after
-    back, estimates, residuals = memory.back[0], memory.estimates, memory.residuals
+    back, residuals = memory.back[0], memory.residuals
     likelihood, last = 0.0, len(before) - 1
     for turn in range(2 * last + 1):  # block by block to the last one, and back
         b = last - abs(turn - last)
@@ -161,7 +159,7 @@ def _swept_through(
             sample, interval = samples[k], samples[k].time_s - samples[max(k - 1, span.first)].time_s
             update = block[k - low]
             if wanted == STATES:
-                _store(back, after[k - low], estimates[k])
+                _store(memory, f, samples, profile, k, low, b)
             elif wanted >= RESIDUALS and k == span.first:
                 backward.estimate(back, after[k - low])
             if k == span.first:
@@ -191,21 +189,6 @@ swept_through = _swept_through  # for variants with other memories
 
 _sweep = kernel(variant(_swept_through, __name__, "_sweep"))
 _sweep_coloured = kernel(variant(_swept_through, __name__, "_sweep_coloured", memory=ColouredMemory))
-
-
-def smoothed_covariance(p: FloatArray, n: FloatArray) -> FloatArray:
-    """P - P N P as L (I - L' N L) L' with P = L L' and eigenvalues kept positive whatever the rounding. (m, m).
-
-    Of a run that has diverged, P itself.
-    """
-    if not (np.isfinite(p).all() and np.isfinite(n).all()):
-        return p
-    scale = np.sqrt(np.where(np.diag(p) > 0, np.diag(p), 1.0))
-    factor = scale[:, None] * np.linalg.cholesky(p / np.outer(scale, scale) + 1e-12 * np.eye(len(p)))
-    share, turn = np.linalg.eigh(np.eye(len(p)) - factor.T @ n @ factor)
-    half = factor @ turn * np.sqrt(np.maximum(share, LEAST_SHARE))
-    result: FloatArray = half @ half.T
-    return result
 
 
 class Slope(NamedTuple):
@@ -259,7 +242,7 @@ def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) ->
     estimates = empty(ESTIMATED, n if wanted == STATES else 0)
     residuals = scratch(LEFT, n if wanted >= RESIDUALS else 0)
     (noise, wander), fade, jerk = np.zeros((2, 2, 3)), np.zeros(3), np.zeros((len(model.jerk), 2, 3))
-    likelihood, heads = 0.0, list[Start]()
+    likelihood, found = 0.0, list[Start]()
     for start, stop in between(starts, n):
         memory = memory_of(stop - start.sample, model.filter(start), estimates, residuals)
         likelihood += sweep(Span(start.sample, stop, start.sample), samples, profile, memory, jerk, wanted)
@@ -267,10 +250,11 @@ def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) ->
         wander += memory.back["wander"][0]
         fade += memory.back["fade_score"][0]
         if wanted >= HEADS or (wanted == RESIDUALS and 0 < start.sample == starts[0].sample):
-            covariance = smoothed_covariance(memory.after["p"][0], memory.back["n_first"][0])[:9, :9]
-            heads.append(Start(start.sample, memory.back["state"][0, :9].copy(), covariance))
+            back, p = memory.back[0], memory.after["p"][0]
+            covariance = back["cov"] if wanted == STATES else heads.smoothed_covariance(p, back["n_first"])
+            found.append(Start(start.sample, back["state"][:9].copy(), covariance[:9, :9].copy()))
     slopes = (Slope(*noise), Slope(*wander), fade, Slope(jerk[:, 0] * model.jerk, jerk[:, 1] * model.jerk))
-    return _Swept(Scores(likelihood, *slopes), estimates, residuals, tuple(heads))
+    return _Swept(Scores(likelihood, *slopes), estimates, residuals, tuple(found))
 
 
 def likelihood_of(log: Observations, model: Model, starts: list[Start]) -> float:
@@ -290,11 +274,11 @@ def smooth_log(log: Observations, model: Model, starts: list[Start], wanted: int
     wanted: HEADS leaves out states and sigmas (of no sample), which saves half of the time, RESIDUALS also all heads
     but that of a first start after the first sample.
     """
-    scores, estimates, residuals, heads = _swept(log, model, starts, wanted)
+    scores, estimates, residuals, starting = _swept(log, model, starts, wanted)
     first = starts[0].sample
     if first > 0:
-        before, residuals[:first] = extrapolated(log, model, heads[0])
+        before, residuals[:first] = extrapolated(log, model, starting[0])
         estimates[:first] = before[: len(estimates)]
     fields = {name: estimates[name] for name in ESTIMATED.names or ()}
     fields |= {name: residuals[name].copy() for name in LEFT.names or ()}
-    return SmootherRun(**fields, log_likelihood=scores.log_likelihood, heads=heads)
+    return SmootherRun(**fields, log_likelihood=scores.log_likelihood, heads=starting)

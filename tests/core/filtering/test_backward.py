@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from ftproc.core.filtering import backward
-from ftproc.core.filtering.filters import FILTER
 from ftproc.core.filtering.forward import ESTIMATED
 from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.smoother import Slope, score_log, smooth_log
@@ -154,7 +153,7 @@ def test_likelihood_is_highest_near_the_true_noise_and_jerk():
 
 
 def test_a_sigma_is_a_number_even_where_the_covariance_is_none():
-    f, back, row = one(FILTER), one(backward.BACKWARD), one(ESTIMATED)
-    f["x"], f["p"] = np.arange(1.0, 10.0), np.diag([-1.0, *np.ones(8)])
-    backward.store(back, f, row)
-    np.testing.assert_allclose(row["sigma"], [1e-7, *np.ones(8)])
+    back, row = one(backward.BACKWARD), one(ESTIMATED)
+    back["state"], back["cov"] = np.arange(1.0, 10.0), np.diag([-1.0, *np.ones(8)])
+    backward.keep(back, row)
+    np.testing.assert_allclose(row["sigma"], [0.0, *np.ones(8)])
