@@ -94,7 +94,7 @@ class Filtering:
         correction, estimate = correction[part.low : part.high], part.estimate.rows(part.low, part.high)
         rows = slice(part.first + part.low, part.first + part.high)
         best = estimate.run if estimate.smoothed is None else estimate.smoothed
-        state, sigma = best.state.copy(), best.sigma[:, :6].copy()
+        state, sigma = best.state.copy(), best.sigma.copy()
         state[:, :6] += correction
         known = slice(None) if estimate.known is None else estimate.known
         cleaned = from_cartesian(state[:, :3]) if estimate.cleaned is None else estimate.cleaned

@@ -116,7 +116,7 @@ class Trajectory:
     row: (n,) row number in the input log. time_s: (n,).
     measurement: (n, 3) cleaned range m, azimuth rad, elevation rad (from the estimate).
     state: (n, 9) x y z m, vx vy vz m/s, ax ay az m/s2. NaN where a method does not estimate it.
-    sigma: (n, 6) 1-sigma of position m and velocity m/s.
+    sigma: (n, 9) 1-sigma of the state, in its units.
     outlier: (n, 3) GOOD, ISOLATED, PATCH or MISSING per component.
     nis: (n,) normalised innovation squared of the components used; NaN if none was.
     correction: (n, 6) correction by the network of position m and velocity m/s.

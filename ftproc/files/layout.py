@@ -21,7 +21,7 @@ ACCELERATION = ("ax_mps2", "ay_mps2", "az_mps2")
 OUTLIER = ("outlier_range", "outlier_azimuth", "outlier_elevation")
 MEASUREMENT = tuple(CANONICAL[component] for component in COMPONENTS)
 STATE = (*POSITION, *VELOCITY, *ACCELERATION)
-SIGMA = tuple(f"sigma_{name}" for name in (*POSITION, *VELOCITY))
+SIGMA = tuple(f"sigma_{name}" for name in STATE)
 CORRECTION = tuple(f"correction_{name}" for name in (*POSITION, *VELOCITY))
 
 #: Every column a trajectory always has, in the order in which it is written.

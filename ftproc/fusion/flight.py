@@ -83,7 +83,7 @@ def _flight(
     metadata = _metadata(range_, settings, summary, fused)
     n = len(track.time_s)
     trajectory = Trajectory(
-        range_.path, np.arange(n), track.time_s + zero_s, np.full((n, 3), np.nan), track.state, track.sigma[:, :6],
+        range_.path, np.arange(n), track.time_s + zero_s, np.full((n, 3), np.nan), track.state, track.sigma,
         np.zeros((n, 3), np.uint8), track.nis, np.zeros((n, 6)), metadata,
         arrow.table({"stations": results.stations_used(fused).astype(np.int64)}),
     )  # fmt: skip
@@ -143,7 +143,7 @@ def _from_origin(found: Trajectory, instrument: Instrument, frame: str) -> Traje
         own = found.state[:, at : at + 3][:, order]
         state[:, at : at + 3] = own if level else own @ back.T
     state[:, :3] += instrument.place
-    for at in (0, 3):
+    for at in (0, 3, 6):
         own = found.sigma[:, at : at + 3][:, order]
         sigma[:, at : at + 3] = own if level else np.sqrt(own**2 @ (back.T) ** 2)
     return replace(found, state=state, sigma=sigma)

@@ -129,10 +129,10 @@ def _trajectory(row: IntArray, time_s: FloatArray, estimate: Estimate | None) ->
     n = len(row)
     if estimate is None:
         none = np.empty((0, 3))
-        nothing = (none, np.empty((0, 9)), np.empty((0, 6)), none.astype(np.uint8), np.empty(0), np.empty((0, 6)))
+        nothing = (none, np.empty((0, 9)), np.empty((0, 9)), none.astype(np.uint8), np.empty(0), np.empty((0, 6)))
         return Trajectory("live", row, time_s, *nothing)
     run, label, absent = estimate.run, estimate.label.copy(), list(estimate.absent)
-    state, sigma, cleaned = run.state.copy(), run.sigma[:, :6].copy(), from_cartesian(run.state[:, :3])
+    state, sigma, cleaned = run.state.copy(), run.sigma.copy(), from_cartesian(run.state[:, :3])
     if absent:  # the filter ran on stand-ins; what depends on them is not published
         state[:], sigma[:], cleaned[:, absent], label[:, absent] = np.nan, np.nan, np.nan, MISSING
     return Trajectory("live", row, time_s, cleaned, state, sigma, label, run.nis, np.zeros((n, 6)))

@@ -46,6 +46,9 @@ PROMISED = [
     "sigma_vx_mps",
     "sigma_vy_mps",
     "sigma_vz_mps",
+    "sigma_ax_mps2",
+    "sigma_ay_mps2",
+    "sigma_az_mps2",
     "outlier_range",
     "outlier_azimuth",
     "outlier_elevation",
@@ -71,7 +74,7 @@ def some(n: int = 50, seed: int = 0) -> Trajectory:
         time_s=np.sort(rng.uniform(0, 100, n)),
         measurement=rng.normal(size=(n, 3)),
         state=state,
-        sigma=rng.random((n, 6)),
+        sigma=rng.random((n, 9)),
         outlier=rng.integers(0, 4, (n, 3)).astype(np.uint8),
         nis=np.where(rng.random(n) < 0.2, np.nan, rng.random(n)),
         correction=rng.normal(size=(n, 6)),
@@ -108,14 +111,14 @@ def test_each_number_stands_in_the_column_of_its_name() -> None:
         some(n),
         measurement=block(3),
         state=block(9),
-        sigma=block(6),
+        sigma=block(9),
         outlier=np.tile(np.array([1, 2, 3], np.uint8), (n, 1)),
         nis=block(1)[:, 0],
         correction=block(6),
     )
     row = to_table(trajectory).slice(1, 1).to_pylist()[0]
     names = [name for name in PROMISED[2:] if not name.startswith("outlier")]
-    assert [row[name] for name in names] == list(range(1, 26))
+    assert [row[name] for name in names] == list(range(1, 29))
     assert [row[f"outlier_{name}"] for name in ("range", "azimuth", "elevation")] == [1, 2, 3]
 
 
