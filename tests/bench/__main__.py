@@ -1,5 +1,5 @@
 """`python -m tests.bench [NAME...]`: tables of the README and the guide, as Markdown on standard output and in
-out/bench.md. The names: samples, accuracy, methods, rivals, instruments, correction, speed, start, scale, live,
+out/bench.md. The names: samples, accuracy, sigmas, methods, rivals, instruments, correction, speed, start, scale, live,
 pages, training."""
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from tests.bench import (
     rivals,
     samples,
     scale,
+    sigmas,
     speed,
     start,
     training,
@@ -27,6 +28,7 @@ from tests.bench import (
 TABLES = {
     "samples": samples,
     "accuracy": accuracy,
+    "sigmas": sigmas,
     "methods": methods,
     "rivals": rivals,
     "instruments": instruments,
