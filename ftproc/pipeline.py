@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ftproc.core.model.frames import from_cartesian
+from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import registry
 from ftproc.methods.estimate import Estimate, Part
@@ -98,9 +98,10 @@ class Filtering:
         state[:, :6] += correction
         known = slice(None) if estimate.known is None else estimate.known
         cleaned = from_cartesian(state[:, :3]) if estimate.cleaned is None else estimate.cleaned
+        cleaned_sigma = measurement_sigma(cleaned, best.los_sigma[:, :3])
         if absent:  # the filter ran on a stand-in; what depends on it is not published
             state[:], sigma[:] = np.nan, np.nan
-            cleaned[:, absent] = np.nan
+            cleaned[:, absent], cleaned_sigma[:, absent] = np.nan, np.nan
             estimate.label[:, absent] = MISSING
         elif np.isinf(state).any() or (estimate.cleaned is None and np.isnan(state[known]).any()):
             name = self.method.name
@@ -108,7 +109,7 @@ class Filtering:
         log = self.log.stretch(rows)
         self.statistics.add(log.time_s, estimate, cleaned, correction, outside)
         return Trajectory(
-            log.name, log.row, log.time_s, cleaned, state, sigma, estimate.label, best.nis, correction,
+            log.name, log.row, log.time_s, cleaned, state, sigma, cleaned_sigma, estimate.label, best.nis, correction,
             metadata={"frame": log.frame}, extra=log.extra, diagnostics=_diagnostics(log.measurement, estimate),
         )  # fmt: skip
 

@@ -117,6 +117,7 @@ class Trajectory:
     measurement: (n, 3) cleaned range m, azimuth rad, elevation rad (from the estimate).
     state: (n, 9) x y z m, vx vy vz m/s, ax ay az m/s2. NaN where a method does not estimate it.
     sigma: (n, 9) 1-sigma of the state, in its units.
+    measurement_sigma: (n, 3) 1-sigma of the cleaned range m, azimuth rad, elevation rad.
     outlier: (n, 3) GOOD, ISOLATED, PATCH or MISSING per component.
     nis: (n,) normalised innovation squared of the components used; NaN if none was.
     correction: (n, 6) correction by the network of position m and velocity m/s.
@@ -130,6 +131,7 @@ class Trajectory:
     measurement: FloatArray
     state: FloatArray
     sigma: FloatArray
+    measurement_sigma: FloatArray
     outlier: FlagArray
     nis: FloatArray
     correction: FloatArray
@@ -179,7 +181,9 @@ def joined(parts: Sequence[Trajectory]) -> Trajectory:
         extra = pa.concat_tables([part.extra for part in parts])
     present = [part.diagnostics for part in parts if part.diagnostics is not None]
     whole = _concatenated(present, "reading", "residual", "residual_sigma") if len(present) == len(parts) else None
-    arrays = ("row", "time_s", "measurement", "state", "sigma", "outlier", "nis", "correction")
+    arrays = (
+        "row", "time_s", "measurement", "state", "sigma", "measurement_sigma", "outlier", "nis", "correction",
+    )  # fmt: skip
     return replace(_concatenated(parts, *arrays), diagnostics=whole, extra=extra)
 
 

@@ -66,6 +66,7 @@ def trajectory_for(truth: Truth, seed: int = 0, error_m: float = 4.0, **changes:
         measurement=from_cartesian(state[:, :3]),
         state=state,
         sigma=rng.uniform(2.0, 6.0, (n, 9)),
+        measurement_sigma=np.tile([4.0, 1e-3, 1e-3], (n, 1)),
         outlier=rng.integers(0, 4, (n, 3)).astype(np.uint8),
         nis=np.ones(n),
         correction=np.zeros((n, 6)),

@@ -49,6 +49,7 @@ def test_trajectory_has_a_row_for_every_row_of_the_log(flight, settings):
         assert array.shape == (n, width)
         assert np.isfinite(array[without:]).all()
     assert (trajectory.sigma[without:] > 0).all()
+    assert (trajectory.measurement_sigma[without:] > 0).all()
     assert np.isnan(trajectory.state[:without]).all()
     np.testing.assert_allclose(trajectory.measurement, from_cartesian(trajectory.state[:, :3]))
     np.testing.assert_array_equal(trajectory.outlier == MISSING, np.isnan(log.measurement))
@@ -190,6 +191,7 @@ def test_component_missing_throughout(flight, component, smooth):
     assert np.isnan(trajectory.state).all()
     assert np.isnan(trajectory.sigma).all()
     assert np.isnan(trajectory.measurement[:, component]).all()
+    assert np.isnan(trajectory.measurement_sigma[:, component]).all()
     others = [c for c in range(3) if c != component]
     assert np.isfinite(trajectory.measurement[:, others]).all()
     assert (trajectory.outlier[:, component] == MISSING).all()
@@ -197,6 +199,9 @@ def test_component_missing_throughout(flight, component, smooth):
     json.dumps(dict(trajectory.metadata), allow_nan=False)
     clean = from_cartesian(flight.truth.position_m)[:, others] - trajectory.measurement[:, others]
     assert np.sqrt((clean**2).mean(0) / np.array(flight.sigma)[others] ** 2).max() < 1
+    sigma = trajectory.measurement_sigma[:, others]
+    assert (np.abs(clean) <= 3 * sigma).mean(0).min() > 0.95
+    assert (np.median(sigma, 0) < np.array(flight.sigma)[others]).all()
 
 
 @pytest.mark.parametrize("editing", ["live", "forward"])

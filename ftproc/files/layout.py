@@ -22,10 +22,11 @@ OUTLIER = ("outlier_range", "outlier_azimuth", "outlier_elevation")
 MEASUREMENT = tuple(CANONICAL[component] for component in COMPONENTS)
 STATE = (*POSITION, *VELOCITY, *ACCELERATION)
 SIGMA = tuple(f"sigma_{name}" for name in STATE)
+MEASUREMENT_SIGMA = tuple(f"sigma_{name}" for name in MEASUREMENT)
 CORRECTION = tuple(f"correction_{name}" for name in (*POSITION, *VELOCITY))
 
 #: Every column a trajectory always has, in the order in which it is written.
-TRAJECTORY = ("row", "time_s", *MEASUREMENT, *STATE, *SIGMA, *OUTLIER, "nis", *CORRECTION)
+TRAJECTORY = ("row", "time_s", *MEASUREMENT, *STATE, *SIGMA, *MEASUREMENT_SIGMA, *OUTLIER, "nis", *CORRECTION)
 
 #: Key of the metadata in a Parquet file.
 METADATA_KEY = b"ftproc"

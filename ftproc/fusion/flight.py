@@ -84,7 +84,7 @@ def _flight(
     n = len(track.time_s)
     trajectory = Trajectory(
         range_.path, np.arange(n), track.time_s + zero_s, np.full((n, 3), np.nan), track.state, track.sigma,
-        np.zeros((n, 3), np.uint8), track.nis, np.zeros((n, 6)), metadata,
+        np.full((n, 3), np.nan), np.zeros((n, 3), np.uint8), track.nis, np.zeros((n, 6)), metadata,
         arrow.table({"stations": results.stations_used(fused).astype(np.int64)}),
     )  # fmt: skip
     located = _located(trajectory, range_, settings)
@@ -125,6 +125,7 @@ def _alone(range_: Range, log: MeasurementLog, settings: FilterSettings, model: 
     trajectory = replace(
         turned, name=range_.path, row=np.arange(len(last)), time_s=found.time_s[last], state=turned.state[last],
         sigma=turned.sigma[last], measurement=np.full((len(last), 3), np.nan),
+        measurement_sigma=np.full((len(last), 3), np.nan),
         outlier=np.zeros((len(last), 3), np.uint8), nis=found.nis[last], correction=np.zeros((len(last), 6)),
         metadata=metadata, extra=arrow.table({"stations": used[last]}), diagnostics=None,
     )  # fmt: skip

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 SENSE = {"x": "anticlockwise", "north": "clockwise"}  # of the azimuth
 UNSEEN_S, UNSEEN_INTERVALS = 1.0, 2.5  # since its last used reading, until a station no longer counts as used
-WITHOUT = ("row", *layout.MEASUREMENT, *layout.OUTLIER, *layout.CORRECTION)  # of a trajectory of one station
+#: Columns of a trajectory of one station that a fused one lacks.
+WITHOUT = ("row", *layout.MEASUREMENT, *layout.MEASUREMENT_SIGMA, *layout.OUTLIER, *layout.CORRECTION)
 
 
 def stations_used(fused: Fused) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ftproc.core.live.rows import Published
-from ftproc.core.model.frames import from_cartesian
+from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import live, registry
 from ftproc.methods.estimate import FARTHEST, Estimate
@@ -129,10 +129,12 @@ def _trajectory(row: IntArray, time_s: FloatArray, estimate: Estimate | None) ->
     n = len(row)
     if estimate is None:
         none = np.empty((0, 3))
-        nothing = (none, np.empty((0, 9)), np.empty((0, 9)), none.astype(np.uint8), np.empty(0), np.empty((0, 6)))
+        nothing = (none, np.empty((0, 9)), np.empty((0, 9)), none, none.astype(np.uint8), np.empty(0), np.empty((0, 6)))
         return Trajectory("live", row, time_s, *nothing)
     run, label, absent = estimate.run, estimate.label.copy(), list(estimate.absent)
     state, sigma, cleaned = run.state.copy(), run.sigma.copy(), from_cartesian(run.state[:, :3])
+    cleaned_sigma = measurement_sigma(cleaned, run.los_sigma[:, :3])
     if absent:  # the filter ran on stand-ins; what depends on them is not published
-        state[:], sigma[:], cleaned[:, absent], label[:, absent] = np.nan, np.nan, np.nan, MISSING
-    return Trajectory("live", row, time_s, cleaned, state, sigma, label, run.nis, np.zeros((n, 6)))
+        state[:], sigma[:], label[:, absent] = np.nan, np.nan, MISSING
+        cleaned[:, absent], cleaned_sigma[:, absent] = np.nan, np.nan
+    return Trajectory("live", row, time_s, cleaned, state, sigma, cleaned_sigma, label, run.nis, np.zeros((n, 6)))

@@ -42,8 +42,9 @@ class View:
         whole = self.trajectory
         trajectory = replace(
             whole, row=whole.row[rows], time_s=whole.time_s[rows], measurement=whole.measurement[rows],
-            state=whole.state[rows], sigma=whole.sigma[rows], outlier=whole.outlier[rows], nis=whole.nis[rows],
-            correction=whole.correction[rows], extra=None, diagnostics=None,
+            state=whole.state[rows], sigma=whole.sigma[rows], measurement_sigma=whole.measurement_sigma[rows],
+            outlier=whole.outlier[rows], nis=whole.nis[rows], correction=whole.correction[rows], extra=None,
+            diagnostics=None,
         )  # fmt: skip
         reading = None if self.reading is None else self.reading[rows]
         timeline = Timeline.of(trajectory.time_s)

@@ -1,6 +1,6 @@
 """Published sigmas against the errors: the share of rows with all axes inside 3 sigma (of all seeds together; 99.2 % if
-the errors are Gaussian), the largest error of any row in sigmas, and the RMS sigma over the RMS error (the median of the
-seeds; rows with a sigma far above the usual one, as before a filter has settled, are left out of it): of position,
+the errors are Gaussian), the largest error of any row in sigmas, and the RMS sigma over the RMS error (the median of
+the seeds; rows with a sigma far above the usual one, as before a filter has settled, are left out of it): of position,
 velocity and acceleration, by scenario and sampling rate."""
 
 from __future__ import annotations

@@ -21,8 +21,8 @@ def test_the_outputs_are_those_of_the_contract(run, folder, simulated):
     assert (result.code, result.err) == (0, "")
     best = pd.read_parquet("best.parquet")
     assert (np.diff(best.time_s) > 0).all()
-    assert {"x_m", "vx_mps", "ax_mps2", "sigma_x_m", "sigma_vz_mps", "nis", "stations", "lat_deg"} <= set(best)
-    assert not {"range_m", "azimuth_rad", "outlier_range", "row"} & set(best)
+    assert {"x_m", "vx_mps", "ax_mps2", "sigma_x_m", "sigma_az_mps2", "nis", "stations", "lat_deg"} <= set(best)
+    assert not {"range_m", "azimuth_rad", "sigma_range_m", "outlier_range", "row"} & set(best)
     assert best.stations.between(0, 3).all()
     truth = simulated.truth
     inside = best[best.time_s.between(truth.time_s[0], truth.time_s[-1])]

@@ -28,7 +28,8 @@ def pushed(log, order, settings=SETTINGS):
     parts = [track.push(log.time_s[k], *log.measurement[k]) for k in order] + [track.finish()]
     assert track.waiting == 0
     return track, {
-        name: np.concatenate([getattr(p, name) for p in parts]) for name in ("row", "time_s", "state", "outlier")
+        name: np.concatenate([getattr(p, name) for p in parts])
+        for name in ("row", "time_s", "state", "sigma", "measurement_sigma", "outlier")
     }
 
 
@@ -37,6 +38,8 @@ def test_one_by_one_it_is_what_the_file_gives(log):
     whole = ftproc.filter_log(log, SETTINGS)
     np.testing.assert_array_equal(found["state"], whole.state)
     np.testing.assert_array_equal(found["outlier"], whole.outlier)
+    np.testing.assert_array_equal(found["sigma"], whole.sigma)
+    np.testing.assert_array_equal(found["measurement_sigma"], whole.measurement_sigma)
 
 
 def test_late_rows_take_their_place_and_too_late_ones_are_counted(log):

@@ -59,6 +59,15 @@ def test_no_method_is_worse_than_the_readings_of_a_clean_log(name):
     assert (found.outlier == GOOD).mean() > 0.97
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_method_publishes_a_sigma_or_none(name):
+    found = undisturbed(name)
+    for sigma in (found.sigma, found.measurement_sigma):
+        assert (np.isnan(sigma) | (sigma > 0)).all()
+    position, cleaned = np.isfinite(found.sigma[:, :3]), np.isfinite(found.measurement_sigma)
+    np.testing.assert_array_equal(position.all(1), cleaned.all(1))
+
+
 def measured_position(log):
     r, a, e = log.measurement.T
     return np.stack([r * np.cos(e) * np.cos(a), r * np.cos(e) * np.sin(a), r * np.sin(e)], 1)

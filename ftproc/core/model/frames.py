@@ -7,10 +7,15 @@ clockwise from north.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+
+ANY_ANGLE_RAD = np.pi / math.sqrt(3)  # 1-sigma of an angle of which nothing is known
+_NO_DISTANCE_M = 1e-9  # stands in for zero
 
 
 def wrap(angle: FloatArray) -> FloatArray:
@@ -32,6 +37,19 @@ def from_cartesian(position: FloatArray) -> FloatArray:
     x, y, z = np.ascontiguousarray(np.moveaxis(np.asarray(position, float), -1, 0))
     ground = np.hypot(x, y)
     return np.stack([np.hypot(ground, z), np.arctan2(y, x), np.arctan2(z, ground)], -1)
+
+
+def measurement_sigma(measurement: FloatArray, along: FloatArray) -> FloatArray:
+    """(n, 3) 1-sigma of range m, azimuth rad and elevation rad of positions that are known along the radial, cross and
+    up axes to (n, 3) m. measurement: (n, 3) of these positions.
+
+    The azimuth's is a third of the angle that three sigmas of the position fill, seen from the vertical through the
+    station: far from it that is the Jacobian's. Where they reach it, the azimuth may be any.
+    """
+    slant = np.maximum(measurement[:, 0], _NO_DISTANCE_M)
+    across = 3 * along[:, 1] / np.maximum(slant * np.abs(np.cos(measurement[:, 2])), _NO_DISTANCE_M)
+    azimuth = np.where(across >= 1, ANY_ANGLE_RAD, np.arcsin(np.minimum(across, 1.0)) / 3)
+    return np.stack([along[:, 0], azimuth, np.minimum(along[:, 2] / slant, ANY_ANGLE_RAD)], -1)
 
 
 def unwrap(azimuth: FloatArray) -> FloatArray:

@@ -46,6 +46,7 @@ def read(source: tables.Source) -> Trajectory:
         measurement=group(layout.MEASUREMENT),
         state=group(layout.STATE),
         sigma=group(layout.SIGMA),
+        measurement_sigma=group(layout.MEASUREMENT_SIGMA),
         outlier=columns.outlier_flags(header, found, highest=MISSING)[order],
         nis=group(("nis",))[:, 0],
         correction=group(layout.CORRECTION),

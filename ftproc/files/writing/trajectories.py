@@ -61,6 +61,7 @@ def to_table(trajectory: Trajectory, without: Sequence[str] = ()) -> pa.Table:
         (layout.MEASUREMENT, trajectory.measurement),
         (layout.STATE, trajectory.state),
         (layout.SIGMA, trajectory.sigma),
+        (layout.MEASUREMENT_SIGMA, trajectory.measurement_sigma),
         (layout.OUTLIER, np.asarray(trajectory.outlier, np.uint8)),
         (("nis",), trajectory.nis[:, np.newaxis]),
         (layout.CORRECTION, trajectory.correction),

@@ -123,3 +123,33 @@ def test_jacobian_at_the_station_is_finite():
     h = np.full((3, 3), np.nan)
     jacobian(np.zeros(9), h)
     assert np.isfinite(h).all()
+
+
+@pytest.mark.parametrize("position", [(3e3, 4e3, 5e3), (-2e3, 1e2, -3e3), (1e4, 0, 0)])
+def test_sigma_of_a_reading_is_that_of_the_jacobian_far_from_the_vertical(position):
+    place = np.array(position, float)
+    root = np.random.default_rng(0).normal(size=(3, 3))
+    covariance = root @ root.T
+    (axes,) = frames.line_of_sight_axes(place[None])
+    h = np.empty((3, 3))
+    jacobian(place, h)
+    along = np.sqrt(np.diag(axes @ covariance @ axes.T))
+    (found,) = frames.measurement_sigma(frames.from_cartesian(place[None]), along[None])
+    np.testing.assert_allclose(found, np.sqrt(np.diag(h @ covariance @ h.T)), rtol=1e-4)
+
+
+@pytest.mark.parametrize("ground_sigmas", [0.0, 0.5, 2.0, 4.0, 10.0, 100.0])
+def test_sigma_of_an_azimuth_near_the_zenith_covers_it(ground_sigmas):
+    """The true azimuth of positions of which a 1-sigma of 1 m is known, by drawing them."""
+    around = np.array([ground_sigmas, 0.0, 1000.0]) + np.random.default_rng(1).normal(size=(20_000, 3))
+    seen = frames.from_cartesian(np.array([[ground_sigmas, 0.0, 1000.0]]))
+    ((_, azimuth, elevation),) = frames.measurement_sigma(seen, np.ones((1, 3)))
+    off = np.abs(frames.wrap(frames.from_cartesian(around)[:, 1] - seen[0, 1]))
+    assert (off <= 3 * azimuth).mean() > 0.995
+    assert azimuth <= frames.ANY_ANGLE_RAD
+    assert elevation == pytest.approx(1e-3, rel=1e-2)
+
+
+def test_no_estimate_has_no_sigma_of_a_reading():
+    nothing = np.full((2, 3), np.nan)
+    assert np.isnan(frames.measurement_sigma(nothing, nothing)).all()

@@ -25,7 +25,8 @@ def trajectory(position, frame="local", extra=None):
     flags = np.zeros((n, 3), np.uint8)
     time = np.arange(float(n))
     return Trajectory(
-        "t", np.arange(n), time, blank[:, :3], state, np.full((n, 9), np.nan), flags, time, blank, {"frame": frame}, extra
+        "t", np.arange(n), time, blank[:, :3], state, np.full((n, 9), np.nan), blank[:, :3], flags, time, blank,
+        {"frame": frame}, extra
     )  # fmt: skip
 
 

@@ -33,8 +33,8 @@ def flight(rows=slice(None), *, missing=(), site=SITE, geoid=None, epoch="", nam
     settings = {"site": site, "smooth": True, "geoid_m": geoid}
     metadata = {"frame": "north-east-up", "settings": settings, "method": "ukf", "version": "1", "epoch": epoch}
     plain = Trajectory(
-        name, np.arange(n), 100.0 + np.arange(n), blank[:, :3], state, np.zeros((n, 9)), np.zeros((n, 3), np.uint8), blank[:, 0],
-        blank, metadata,
+        name, np.arange(n), 100.0 + np.arange(n), blank[:, :3], state, np.zeros((n, 9)), blank[:, :3],
+        np.zeros((n, 3), np.uint8), blank[:, 0], blank, metadata,
     )  # fmt: skip
     return geodesy.located(plain, FilterSettings(site=site))
 

@@ -49,6 +49,9 @@ PROMISED = [
     "sigma_ax_mps2",
     "sigma_ay_mps2",
     "sigma_az_mps2",
+    "sigma_range_m",
+    "sigma_azimuth_rad",
+    "sigma_elevation_rad",
     "outlier_range",
     "outlier_azimuth",
     "outlier_elevation",
@@ -61,7 +64,7 @@ PROMISED = [
     "correction_vz_mps",
 ]
 METADATA = {"version": "0.1", "frame": "local", "counts": {"rows": 3}, "noise": [1.0, 0.001], "name": "Flüg.csv"}
-FIELDS = ("row", "time_s", "measurement", "state", "sigma", "outlier", "nis", "correction")
+FIELDS = ("row", "time_s", "measurement", "state", "sigma", "measurement_sigma", "outlier", "nis", "correction")
 
 
 def some(n: int = 50, seed: int = 0) -> Trajectory:
@@ -75,6 +78,7 @@ def some(n: int = 50, seed: int = 0) -> Trajectory:
         measurement=rng.normal(size=(n, 3)),
         state=state,
         sigma=rng.random((n, 9)),
+        measurement_sigma=rng.random((n, 3)),
         outlier=rng.integers(0, 4, (n, 3)).astype(np.uint8),
         nis=np.where(rng.random(n) < 0.2, np.nan, rng.random(n)),
         correction=rng.normal(size=(n, 6)),
@@ -112,13 +116,14 @@ def test_each_number_stands_in_the_column_of_its_name() -> None:
         measurement=block(3),
         state=block(9),
         sigma=block(9),
+        measurement_sigma=block(3),
         outlier=np.tile(np.array([1, 2, 3], np.uint8), (n, 1)),
         nis=block(1)[:, 0],
         correction=block(6),
     )
     row = to_table(trajectory).slice(1, 1).to_pylist()[0]
     names = [name for name in PROMISED[2:] if not name.startswith("outlier")]
-    assert [row[name] for name in names] == list(range(1, 29))
+    assert [row[name] for name in names] == list(range(1, 32))
     assert [row[f"outlier_{name}"] for name in ("range", "azimuth", "elevation")] == [1, 2, 3]
 
 
