@@ -15,7 +15,7 @@ from ftproc.methods import registry
 from ftproc.methods.estimate import Estimate, Part
 from ftproc.quality import provenance, sanity
 from ftproc.quality.statistics import RunStatistics
-from ftproc.records import MISSING, Diagnostics, FloatArray, MeasurementLog, Trajectory, joined
+from ftproc.records import COMPONENTS, MISSING, Diagnostics, FloatArray, MeasurementLog, Trajectory, joined
 from ftproc.settings import FilterSettings
 
 if TYPE_CHECKING:
@@ -67,6 +67,9 @@ class Filtering:
         stage = None if model is None else model.smoother if self.settings.smooth else model.filter
         summary = self.statistics.summary(
             {
+                "noise_specified": [
+                    name for name, sigma in zip(COMPONENTS, self.settings.noise or (), strict=False) if sigma
+                ],
                 "network": self._network() if self.method.corrected else None,
                 "correction_linear": None if stage is None else stage.linear,
                 "correction_lost_by_smoothing": model is not None and stage is None and model.filter.helps,

@@ -146,7 +146,7 @@ def estimate(readings: Readings, log: Log, found: Cleaned) -> Estimate:
     axes = line_of_sight_axes(state[:, :3])
     scale = np.stack([np.ones(n), cleaned[:, 0] * np.cos(cleaned[:, 2]), cleaned[:, 0]], 1)  # m per m, rad, rad
     if found.sigma is not None:
-        los_sigma[:, :3] = scale * found.sigma
+        los_sigma[:, :3] = np.abs(scale) * found.sigma
         sigma[:, :3] = np.sqrt(np.einsum("nia,ni->na", axes**2, los_sigma[:, :3] ** 2))
     if found.rate is not None:
         state[:, 3:6] = np.einsum("nia,ni->na", axes, scale * found.rate)

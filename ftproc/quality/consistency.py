@@ -13,7 +13,7 @@ from ftproc.records import FloatArray
 NORMAL_99 = 2.576  # two-sided 99 % point
 LEAST_WIDTH = 0.2  # of the bounds about 1: no model is better, however many the readings
 POORLY_PREDICTED = 8.0  # innovation sigma over noise sigma (median), from which a gate detects too little
-POORLY_OBSERVABLE = 10.0  # position sigma over its median
+POORLY_OBSERVABLE = 10.0  # sigma over its median
 MOST_INTERVALS = 20  # that are listed
 
 
@@ -48,16 +48,18 @@ def predicted_sigma_ratio(innovation_sigma: FloatArray, noise_sigma: float) -> f
     return typical / noise_sigma if np.isfinite(typical) and 0 < noise_sigma < np.inf else None
 
 
-def poorly_observable(time_s: FloatArray, sigma_m: FloatArray) -> list[dict[str, float]]:
-    """Intervals in which the position sigma is far above its median, because too few readings determine it.
+def poorly_observable(time_s: FloatArray, sigma: FloatArray, unit: str = "m") -> list[dict[str, float]]:
+    """Intervals in which a sigma is far above its median, because too few readings determine the estimate.
 
-    time_s (n,), sigma_m (n, 3) of x, y, z; the longest MOST_INTERVALS of them, in time order.
+    time_s (n,), sigma (n, 3) of x, y, z, or (n, 1) of a cleaned reading, in this unit; the longest MOST_INTERVALS of
+    them, in time order.
     """
-    size = np.sqrt((sigma_m**2).sum(1))
+    size = np.sqrt((sigma**2).sum(1))
     large = np.r_[False, size > POORLY_OBSERVABLE * median(size), False]
     edges = np.flatnonzero(large[1:] != large[:-1]).reshape(-1, 2)
     found = [
-        {"from_s": float(time_s[a]), "to_s": float(time_s[b - 1]), "sigma_m": float(size[a:b].max())} for a, b in edges
+        {"from_s": float(time_s[a]), "to_s": float(time_s[b - 1]), f"sigma_{unit}": float(size[a:b].max())}
+        for a, b in edges
     ]
     longest = sorted(found, key=lambda s: s["from_s"] - s["to_s"])[:MOST_INTERVALS]
     return sorted(longest, key=lambda s: s["from_s"])

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.components import any_of, sums, totals
-from ftproc.methods.estimate import typical_interval
+from ftproc.core.model.frames import from_cartesian, measurement_sigma
+from ftproc.methods.estimate import ASSUMED_READING, typical_interval
 from ftproc.order_statistics import median
 from ftproc.quality import consistency, verdict
 from ftproc.quality.faults import FaultStatistics, clock_set_back
@@ -55,14 +56,14 @@ class RunStatistics:
         """Add a part: time_s (n,), its estimate, cleaned range, azimuth and elevation (n, 3) as published, correction
         (n, 6), and the share outside the network's training."""
         run = estimate.run
-        best_sigma = (run if estimate.smoothed is None else estimate.smoothed).sigma
+        best = run if estimate.smoothed is None else estimate.smoothed
         used = run.weight > 0
+        used[:, list(self.absent)] = False
         with np.errstate(invalid="ignore", divide="ignore"):
             squares = np.square(run.innovation / run.innovation_sigma)
         for c, component in enumerate(self.components):
-            tested = used[:, c] & (c not in self.absent)
             component.add_labels(time_s, estimate.label[:, c])
-            component.add_innovations(squares[:, c], run.innovation_sigma[:, c], tested)
+            component.add_innovations(squares[:, c], run.innovation_sigma[:, c], used[:, c])
         self._add_gaps(time_s)
         self._add_changes(cleaned)
         finite = np.isfinite(run.nis)
@@ -70,7 +71,7 @@ class RunStatistics:
         self.nis_count += int(finite.sum())
         self.used += int(used.sum())
         self.rows_used += int(any_of(used).sum())
-        self._add_sigmas(time_s, best_sigma[:, :3])
+        self._add_sigmas(time_s, self._tested_sigmas(best.state, best.sigma, best.los_sigma))
         self.jerk.append(estimate.model.jerk.mean(1))
         self.model = estimate.model
         self.reacquired += len(estimate.reacquired)
@@ -91,7 +92,7 @@ class RunStatistics:
             self.faults.add(time_s, estimate.faults)
         if correction.any():
             self.largest_m = max(self.largest_m, float(np.sqrt(sums(correction[:, :3] ** 2).max())))
-            changed, sigma = np.abs(correction), best_sigma[:, : correction.shape[1]]
+            changed, sigma = np.abs(correction), best.sigma[:, : correction.shape[1]]
             ratio = np.divide(changed, sigma, out=np.zeros_like(changed), where=changed > 0)
             self.largest_sigma = max(self.largest_sigma, float(np.nanmax(ratio)))
         self.outside += outside * len(time_s)
@@ -118,13 +119,23 @@ class RunStatistics:
         pairs = zip(COMPONENTS, UNITS, self.changed, self.changes, strict=True)
         return {f"{name}_{unit}": float(total / count) if count else None for name, unit, total, count in pairs}
 
-    def _add_sigmas(self, time_s: FloatArray, sigma_m: FloatArray) -> None:
+    def _tested_sigmas(self, state: FloatArray, sigma: FloatArray, los_sigma: FloatArray) -> FloatArray:
+        """(n, 3) 1-sigma of the position m; where it is not observable of the readings m, rad, rad, those of absent
+        ones zero."""
+        if not self.absent:
+            return sigma[:, :3]
+        found = measurement_sigma(from_cartesian(state[:, :3]), los_sigma[:, :3])
+        found[:, list(self.absent)] = 0.0
+        return found
+
+    def _add_sigmas(self, time_s: FloatArray, sigma: FloatArray) -> None:
         groups = -(-len(time_s) // self.every)
         size = np.zeros(groups * self.every)
-        size[: len(time_s)] = sums(sigma_m**2)
+        scale = (1.0, ASSUMED_READING[0], ASSUMED_READING[0]) if self.absent else (1.0, 1.0, 1.0)
+        size[: len(time_s)] = sums((sigma * scale) ** 2)
         chosen = self.every * np.arange(groups) + size.reshape(groups, self.every).argmax(1)
         self.times.append(time_s[chosen])
-        self.sigmas.append(sigma_m[chosen])
+        self.sigmas.append(sigma[chosen])
 
     def summary(self, correction: Mapping[str, Any]) -> dict[str, Any]:
         """The figures with the verdict on them, JSON-serialisable; units are in the names. correction: what is said of
@@ -142,7 +153,7 @@ class RunStatistics:
             }
         psd = np.concatenate(self.jerk)
         jerk = {"lowest": float(psd.min()), "median": median(psd), "highest": float(psd.max())}
-        time_s, sigma_m = np.concatenate(self.times), np.concatenate(self.sigmas)
+        time_s, sigma = np.concatenate(self.times), np.concatenate(self.sigmas)
         figures = {
             "rows": len(log),
             "rows_in_file": log.rows_in_file,
@@ -162,8 +173,9 @@ class RunStatistics:
             "jerk_psd_m2ps5": jerk if np.isfinite(psd).all() else None,
             "nis_mean": self.nis_sum / self.nis_count if self.nis_count else None,
             "components_used_mean": float(self.used / max(self.rows_used, 1)),
-            "poorly_observable": [] if absent else consistency.poorly_observable(time_s, sigma_m),
-            "sigmas_published": bool(np.isfinite(sigma_m).any()),
+            "poorly_observable": [] if absent else consistency.poorly_observable(time_s, sigma),
+            "poorly_observable_readings": self._poorly_observable_readings(time_s, sigma),
+            "sigmas_published": bool(np.isfinite(sigma).all(1).any()),
             "reacquired": self.reacquired,
             "editing_converged": self.converged,
             "slow_noise_s": self.slow_noise_s,
@@ -181,7 +193,13 @@ class RunStatistics:
             "correction_outside_training": self.outside / max(self.rows, 1),
         }
         figures |= correction
-        return figures | {"trust": verdict.verdict(verdict.remarks(figures))}
+        return figures | {"trust": verdict.verdict(verdict.remarks(figures), verdict.too_wide(figures))}
+
+    def _poorly_observable_readings(self, time_s: FloatArray, sigma: FloatArray) -> dict[str, list[dict[str, float]]]:
+        """By component, of a log in which the position is not observable."""
+        seen = [c for c in range(3) if self.absent and c not in self.absent]
+        found = {COMPONENTS[c]: consistency.poorly_observable(time_s, sigma[:, [c]], UNITS[c]) for c in seen}
+        return {name: intervals for name, intervals in found.items() if intervals}
 
 
 class _Component:

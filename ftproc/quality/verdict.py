@@ -19,7 +19,10 @@ FEWEST_OVERLOOKED, OVERLOOKED = (
 MANY_REJECTED, TOO_MANY_REJECTED = 0.25, 0.5  # share of a component's readings. With a third of all readings outliers,
 # one flight in five diverges, and nearly all of these have more than a quarter rejected.
 
+TOO_WIDE = 0.5  # innovation ratio below which the sigmas are far too large
+
 _NO_FAULT = "residuals agree with the published sigmas, and no fault shows"
+_NO_FAULT_BUT = "{} residuals are smaller than the published sigmas, which are cautious, and no fault shows"
 #: Is said with every consistent run.
 NOT_SHOWN = (
     "One log cannot show constant or slow biases, an offset of the clock, or a false target followed throughout."
@@ -61,48 +64,80 @@ def remarks(s: Mapping[str, Any]) -> list[Remark]:
     return found
 
 
-def verdict(found: Sequence[Remark]) -> dict[str, Any]:
+def verdict(found: Sequence[Remark], too_wide: Sequence[str] = ()) -> dict[str, Any]:
     """The worst level among the remarks, with the remarks of that level as reasons, and of a consistent run what a
-    single log cannot show; JSON-serialisable."""
+    single log cannot show, and which components (see `too_wide`) have too large sigmas; JSON-serialisable."""
     level = max((remark.level for remark in found), key=LEVELS.index, default=CONSISTENT)
     if level == CONSISTENT:
-        return {"verdict": level, "reasons": [], "not_shown": NOT_SHOWN}
+        cautious = {"cautious": list(too_wide)} if too_wide else {}
+        return {"verdict": level, "reasons": [], **cautious, "not_shown": NOT_SHOWN}
     return {"verdict": level, "reasons": [remark.text for remark in found if remark.level == level]}
 
 
 def sentence(trust: Mapping[str, Any]) -> str:
     """The verdict with its reasons."""
-    return f"{trust['verdict']}: {'; '.join(trust['reasons']) or _NO_FAULT}"
+    cautious = trust.get("cautious")
+    nothing = _NO_FAULT_BUT.format(_listed(cautious)) if cautious else _NO_FAULT
+    return f"{trust['verdict']}: {'; '.join(trust['reasons']) or nothing}"
+
+
+def too_wide(s: Mapping[str, Any]) -> list[str]:
+    """The components whose innovations are smaller than their predicted sigmas allow."""
+    return [name for name, part in s["components"].items() if part["verdict"] == "cautious"]
 
 
 def _observability(s: Mapping[str, Any]) -> Iterator[Remark]:
-    if s["not_observable"]:
-        names = " and ".join(s["not_observable"])
-        text = f"{names} missing throughout: position and velocity are not observable and left empty"
-        yield Remark(SUSPECT, text)
-    intervals = s["poorly_observable"]
-    if intervals:
-        worst = max(intervals, key=lambda part: part["sigma_m"])
-        first, last = (f"{worst[end]:.6g}" for end in ("from_s", "to_s"))
-        when = f"at {first} s" if first == last else f"from {first} to {last} s"
-        size = f"1 sigma up to {worst['sigma_m']:.3g} m"
-        if len(intervals) == 1:
-            yield Remark(SUSPECT, f"the position is poorly observable {when}: {size}")
-        else:
-            text = f"the position is poorly observable in {len(intervals)} intervals: {size}, {when}"
-            yield Remark(SUSPECT, text)
+    absent = s["not_observable"]
+    if absent:
+        seen = _listed([name for name in s["components"] if name not in absent])
+        text = f"{_listed(absent)} missing throughout: position and velocity are not observable and left empty; the " \
+               f"verdict is about the {seen}"  # fmt: skip
+        yield Remark(CONSISTENT, text)
+    yield from _intervals("the position", s["poorly_observable"])
+    for name, intervals in s["poorly_observable_readings"].items():
+        yield from _intervals(f"the {name}", intervals)
+
+
+def _intervals(what: str, intervals: Sequence[Mapping[str, float]]) -> Iterator[Remark]:
+    """Where an estimate is poorly observable."""
+    if not intervals:
+        return
+    (name,) = set(intervals[0]) - {"from_s", "to_s"}
+    worst = max(intervals, key=lambda part: part[name])
+    first, last = (f"{worst[end]:.6g}" for end in ("from_s", "to_s"))
+    when = f"at {first} s" if first == last else f"from {first} to {last} s"
+    size = f"{worst[name]:.3g} m" if name == "sigma_m" else f"{1e3 * worst[name]:.3g} mrad"
+    if len(intervals) == 1:
+        yield Remark(SUSPECT, f"{what} is poorly observable {when}: 1 sigma up to {size}")
+    else:
+        yield Remark(
+            SUSPECT, f"{what} is poorly observable in {len(intervals)} intervals: 1 sigma up to {size}, {when}"
+        )
+
+
+def _listed(names: Sequence[str]) -> str:
+    """range; range and azimuth; range, azimuth and elevation."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def _sigmas(s: Mapping[str, Any]) -> Iterator[Remark]:
-    if not s["sigmas_published"] and not s["not_observable"]:
+    if not s["sigmas_published"]:
         yield Remark(SUSPECT, "the method publishes no sigmas, so nothing tests its estimate")
     used, all_of_them = s["screened_out_but_used"], s["screened_out"]
     if used:
         level = UNRELIABLE if used >= FEWEST_OVERLOOKED and used > OVERLOOKED * all_of_them else SUSPECT
         text = f"screening calls {all_of_them} readings outliers, of which the method uses {used}"
         yield Remark(level, text)
+    wide = too_wide(s)
+    everything = len(wide) == len(s["components"]) - len(s["not_observable"])
     for name, part in s["components"].items():
         ratio, predicted = part["innovation_ratio"], part["predicted_sigma_ratio"]
+        if name in wide:
+            specified = name in s.get("noise_specified", ())
+            why = "so is the specified noise" if specified else "noise and motion cannot be told apart at this rate"
+            text = f"{name} innovations are {ratio:.2g} times their predicted sigma: the published sigmas are too large"
+            far = not specified and (everything or ratio < TOO_WIDE)
+            yield Remark(SUSPECT if far else CONSISTENT, f"{text}; {why}")
         if ratio is not None and part["verdict"] == "overconfident":
             level = UNRELIABLE if ratio > UNRELIABLE_RATIO * part["innovation_bounds"][1] else SUSPECT
             yield Remark(level, f"{name} innovations are {ratio:.3g} times their predicted sigma: the published sigmas "
@@ -112,12 +147,13 @@ def _sigmas(s: Mapping[str, Any]) -> Iterator[Remark]:
         if predicted is not None and predicted > consistency.POORLY_PREDICTED:
             yield Remark(SUSPECT, f"{name} is poorly observable: its predicted sigma is {predicted:.0f} times the "
                                   "measurement noise, so the gate detects only much larger outliers")  # fmt: skip
-    if s["slow_noise_s"] and not s["not_observable"]:
+    if s["slow_noise_s"]:
         likelier = s["slow_noise_likelier"]
         better = "better than motion does, but cannot be separated from it" if likelier else "as well as motion does"
         text = f"noise that is correlated over {s['slow_noise_s']:.3g} s explains the log {better}: the sigmas allow " \
                "for both, the estimate follows the motion"  # fmt: skip
-        yield Remark(UNRELIABLE if likelier else CONSISTENT if s["slow_noise_separable"] else SUSPECT, text)
+        wrong = UNRELIABLE if not s["not_observable"] else SUSPECT  # what stands in for a component is no motion
+        yield Remark(wrong if likelier else CONSISTENT if s["slow_noise_separable"] else SUSPECT, text)
 
 
 def _editing(s: Mapping[str, Any]) -> Iterator[Remark]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ftproc import pipeline
 from ftproc.core.model.frames import from_cartesian
 from ftproc.methods import channels
 from ftproc.methods.estimate import Readings
+from ftproc.records import MeasurementLog
 from ftproc.settings import FilterSettings
 from tests.methods.flights import TIME, measured
 
@@ -51,3 +53,15 @@ def test_positions_and_velocities_are_those_of_the_readings_and_their_rates():
     velocity = (path(time_s + step_s) - path(time_s - step_s)) / (2 * step_s)
     np.testing.assert_allclose(state[:, 3:6], velocity, atol=1e-4)
     assert np.isnan(state[:, 6:]).all()
+
+
+def test_sigmas_are_positive_where_a_component_is_cleaned_beyond_its_bounds():
+    """A method that knows no geometry may clean an elevation to more than a right angle, and a range to below zero."""
+    time = np.arange(40.0)
+    beyond = np.column_stack([500 - 15 * time, 0.1 * time, 1.4 + 0.01 * time])
+    log = MeasurementLog("log", time, beyond + 1e-3 * np.random.default_rng(0).normal(size=(40, 3)), np.arange(40))
+    found = pipeline.filter_log(log, FilterSettings(method="outlier-kf"))
+    assert (found.measurement[:, 2] > np.pi / 2).any()
+    assert (found.measurement[:, 0] < 0).any()
+    for sigma in (found.sigma[:, :3], found.measurement_sigma):
+        assert (sigma > 0).all()

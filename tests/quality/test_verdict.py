@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -35,6 +36,7 @@ def test_the_words_of_the_contract(good):
 
 
 LARGE = [{"from_s": 3.0, "to_s": 5.0, "sigma_m": 80.0}, {"from_s": 7.0, "to_s": 8.0, "sigma_m": 90.0}]
+CAUTIOUS = {"innovation_ratio": 0.4, "innovation_bounds": [0.8, 1.2], "verdict": "cautious"}
 OFF = {"innovation_ratio": 1.5, "innovation_bounds": [0.8, 1.2], "verdict": "overconfident"}
 
 
@@ -43,7 +45,10 @@ OFF = {"innovation_ratio": 1.5, "innovation_bounds": [0.8, 1.2], "verdict": "ove
     [
         ({}, OFF, SUSPECT, "range innovations are 1.5 times their predicted sigma: the published sigmas are too small"),
         ({}, OFF | {"innovation_ratio": 2.5}, UNRELIABLE, "range innovations are 2.5 times their predicted sigma"),
-        ({}, {"verdict": "cautious", "innovation_ratio": 0.4}, CONSISTENT, None),
+        ({}, CAUTIOUS | {"innovation_ratio": 0.6}, CONSISTENT, None),
+        ({}, CAUTIOUS, SUSPECT, "range innovations are 0.4 times their predicted sigma: the published sigmas are too "
+                                "large; noise and motion cannot be told apart at this rate"),
+        ({"noise_specified": ["range"]}, CAUTIOUS, CONSISTENT, None),
         ({}, {"good": 19, "isolated": 0, "patch": 0}, SUSPECT, "too few good range readings (19) to test the sigmas"),
         ({}, {"good": 60, "patch": 40, "isolated": 0}, SUSPECT, "40 % of the range readings are rejected as outliers"),
         ({}, {"good": 60, "patch": 40, "isolated": 40}, UNRELIABLE, "57 % of the range readings are rejected"),
@@ -52,7 +57,11 @@ OFF = {"innovation_ratio": 1.5, "innovation_bounds": [0.8, 1.2], "verdict": "ove
         ({"slow_noise_s": 3.0}, {}, CONSISTENT, None),
         ({"slow_noise_s": 3.0, "slow_noise_separable": False}, {}, SUSPECT,
          "noise that is correlated over 3 s explains the log as well as motion"),
-        ({"slow_noise_s": 3.0, "not_observable": ["elevation"]}, {}, SUSPECT, "elevation missing throughout"),
+        ({"not_observable": ["elevation"]}, {}, CONSISTENT, None),
+        ({"not_observable": ["elevation"], "slow_noise_s": 3.0, "slow_noise_likelier": True}, {}, SUSPECT, "over 3 s"),
+        ({"not_observable": ["elevation"], "sigmas_published": False}, {}, SUSPECT, "publishes no sigmas"),
+        ({"poorly_observable_readings": {"azimuth": [{"from_s": 3.0, "to_s": 5.0, "sigma_rad": 0.002}]}}, {}, SUSPECT,
+         "the azimuth is poorly observable from 3 to 5 s: 1 sigma up to 2 mrad"),
         ({"poorly_observable": LARGE[:1]}, {}, SUSPECT, "the position is poorly observable from 3 to 5 s: 1 sigma up "
                                                         "to 80 m"),
         ({"poorly_observable": [{**LARGE[0], "to_s": 3.0}]}, {}, SUSPECT, "the position is poorly observable at 3 s"),
@@ -96,6 +105,45 @@ def test_several_reasons_have_a_line_each():
     at = lines.index("  verdict    unreliable:")
     assert [line.split()[1] for line in lines[at + 1 :]] == ["range", "azimuth", "elevation"]
     assert all(line.startswith("             - ") for line in lines[at + 1 :])
+
+
+def test_a_component_with_too_large_sigmas_is_named_by_a_consistent_verdict(good):
+    """The table calls it cautious; so does the verdict."""
+    figures = deepcopy(dict(good))
+    for name in ("range", "elevation"):
+        figures["components"][name] |= CAUTIOUS | {"innovation_ratio": 0.6}
+    found = verdict.verdict(verdict.remarks(figures), verdict.too_wide(figures))
+    assert verdict.sentence(found) == (
+        "consistent: range and elevation residuals are smaller than the published sigmas, which are cautious, "
+        "and no fault shows"
+    )
+    figures["components"]["azimuth"] |= CAUTIOUS | {"innovation_ratio": 0.6}
+    found = verdict.verdict(verdict.remarks(figures), verdict.too_wide(figures))
+    assert found["verdict"] == SUSPECT
+    assert len(found["reasons"]) == 3
+
+
+@pytest.mark.parametrize("missing", [[0], [1, 2]], ids=["angles only", "range only"])
+@pytest.mark.parametrize("settings", [{}, {"smooth": True}, {"editing": "none"}, {"method": "ekf"}], ids=str)
+def test_a_log_of_some_components_is_judged_by_these(missing, settings):
+    flight = simulate("manoeuvre-clean", seed=5, duration_s=60.0)
+    z = flight.log.measurement.copy()
+    z[:, missing] = np.nan
+    found = pipeline.filter_log(replace(flight.log, measurement=z), FilterSettings(**settings)).metadata
+    assert found["summary"]["trust"]["verdict"] == CONSISTENT, found["summary"]["trust"]
+    seen = "azimuth and elevation" if missing == [0] else "range"
+    assert f"are not observable and left empty; the verdict is about the {seen}" in summary.text(found)
+    assert found["summary"]["nis_mean"] == pytest.approx(found["summary"]["components_used_mean"], rel=0.15)
+
+
+def test_where_an_angle_is_hardly_known_is_said_of_a_log_of_angles():
+    flight = simulate("manoeuvre-clean", seed=4, duration_s=60.0, dt_s=0.1)
+    flight.log.measurement[:, 0] = np.nan
+    flight.log.measurement[200:500, 1] = np.nan
+    trust = pipeline.filter_log(flight.log).metadata["summary"]["trust"]
+    assert trust["verdict"] == SUSPECT
+    assert trust["reasons"][0].startswith("the azimuth is poorly observable from 2")
+    assert trust["reasons"][0].endswith(" mrad")
 
 
 @pytest.mark.parametrize("method", ["gate", "ls4", "rkf"])

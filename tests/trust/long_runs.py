@@ -76,7 +76,7 @@ def drift(whole: Trajectory, late: Trajectory) -> float:
     """By how many sigmas the states differ once the late start is forgotten, but for a thousandth of them: a decision
     on an outlier may depend on how many the whole log has."""
     state = whole.state[-len(late) :]
-    return float(np.quantile((np.abs(late.state - state)[:, :6] / late.sigma)[FORGOTTEN:], 0.999))
+    return float(np.quantile((np.abs(late.state - state)[:, :6] / late.sigma[:, :6])[FORGOTTEN:], 0.999))
 
 
 def _long(samples: int) -> MeasurementLog:

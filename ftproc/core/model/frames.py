@@ -46,7 +46,7 @@ def measurement_sigma(measurement: FloatArray, along: FloatArray) -> FloatArray:
     The azimuth's is a third of the angle that three sigmas of the position fill, seen from the vertical through the
     station: far from it that is the Jacobian's. Where they reach it, the azimuth may be any.
     """
-    slant = np.maximum(measurement[:, 0], _NO_DISTANCE_M)
+    slant = np.maximum(np.abs(measurement[:, 0]), _NO_DISTANCE_M)
     across = 3 * along[:, 1] / np.maximum(slant * np.abs(np.cos(measurement[:, 2])), _NO_DISTANCE_M)
     azimuth = np.where(across >= 1, ANY_ANGLE_RAD, np.arcsin(np.minimum(across, 1.0)) / 3)
     return np.stack([along[:, 0], azimuth, np.minimum(along[:, 2] / slant, ANY_ANGLE_RAD)], -1)
