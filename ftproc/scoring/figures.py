@@ -12,10 +12,16 @@ from numpy.typing import NDArray
 from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.errors import InputError
 from ftproc.records import COMPONENTS, ISOLATED, PATCH, FlagArray, FloatArray, Trajectory, Truth
-from ftproc.scoring.matching import match
+from ftproc.scoring.matching import MatchedTruth, match
+from ftproc.scoring.sigmas import Consistency, consistency, in_words
 
-NEES_BOUNDS = (1.0, 5.0)  # of the mean over a flight, for consistent sigmas; 3 is expected
-LEAST_IN_3SIGMA = 0.97
+#: Quantities of the state: how the whole and its axes are named in the figures, and their unit.
+_STATE = {
+    "position": ("3d", ("x", "y", "z"), "m"),
+    "velocity": ("v", ("vx", "vy", "vz"), "mps"),
+    "acceleration": ("a", ("ax", "ay", "az"), "mps2"),
+}
+UNITS = ("m", "rad", "rad")  # of the components
 
 
 @dataclass(frozen=True)
@@ -57,12 +63,12 @@ class Score:
     file does not say. samples: rows of the trajectory. matched, interpolated, unmatched: number of these with a truth
     at the same time, between two of its times, or none. without_estimate: matched or interpolated, but without a
     position. rmse_seed_m: mean over the samples of the norm of the position error (Zuo et al. 2021 eq. 20 and 21,
-    called RMSE there). rmse_3d_m, rmse_x_m ...: root mean square, in 3-D and per axis; rmse_v_mps ...: of the velocity,
-    None if the truth has none. max_error_m, p95_error_m, p99_error_m: of the norm of the position error. in_3sigma:
-    share of samples with all three axes inside 3 published sigmas (0.992 if these are consistent and independent).
-    nees_position: mean of the sum of (error / published sigma)^2 over the three axes, 3 when the sigmas are consistent;
-    correlations between the axes are not published and so not used. sigma_verdict: these two in words. NaN where
-    nothing could be counted.
+    called RMSE there). rmse_3d_m, rmse_x_m ...: root mean square, in 3-D and per axis; rmse_v_mps ..., rmse_a_mps2 ...:
+    of velocity and acceleration, None if the truth has none; rmse_range_m ...: of the cleaned readings, against range,
+    azimuth and elevation of the truth from the station. max_error_m, p95_error_m, p99_error_m: of the norm of the
+    position error. position, velocity, acceleration, cleaned: whether their published sigmas hold; None where nothing
+    is published, or the truth has none. in_3sigma, nees_position: two of the position's. sigma_verdict: all of these
+    in words. NaN where nothing could be counted.
     """
 
     trajectory: str
@@ -84,11 +90,22 @@ class Score:
     rmse_vx_mps: float | None = None
     rmse_vy_mps: float | None = None
     rmse_vz_mps: float | None = None
+    rmse_a_mps2: float | None = None
+    rmse_ax_mps2: float | None = None
+    rmse_ay_mps2: float | None = None
+    rmse_az_mps2: float | None = None
+    rmse_range_m: float | None = None
+    rmse_azimuth_rad: float | None = None
+    rmse_elevation_rad: float | None = None
     max_error_m: float | None = None
     p95_error_m: float | None = None
     p99_error_m: float | None = None
     in_3sigma: float | None = None
     nees_position: float | None = None
+    position: Consistency | None = None
+    velocity: Consistency | None = None
+    acceleration: Consistency | None = None
+    cleaned: Consistency | None = None
     sigma_verdict: str | None = None
     outliers: dict[str, Detection] | None = None
     sees: str | None = None
@@ -156,9 +173,10 @@ def _against(trajectory: Trajectory, truth: Truth) -> dict[str, Any]:
         "without_estimate": int((there & ~usable).sum()),
         "truth_average_gradient": average_gradient(from_cartesian(found.position_m)),
     }
-    known |= _position_figures(error[usable], trajectory.sigma[usable, :3])
-    if found.velocity_mps is not None:
-        known |= _velocity_figures(trajectory.state[:, 3:6] - found.velocity_mps)
+    known |= _position_figures(error[usable]) | _errors(trajectory, found)
+    position = known["position"]
+    known["in_3sigma"] = np.nan if position is None else position.share_in_3_sigma
+    known["nees_position"] = np.nan if position is None else position.nees
     if found.outlier is not None:
         known["outliers"] = {
             name: _detection(trajectory.outlier[found.exact, c], found.outlier[found.exact, c])
@@ -167,52 +185,46 @@ def _against(trajectory: Trajectory, truth: Truth) -> dict[str, Any]:
     return known
 
 
-def _position_figures(error: FloatArray, sigma: FloatArray) -> dict[str, float | str | None]:
-    """From (m, 3) errors and published sigmas in m."""
+def _position_figures(error: FloatArray) -> dict[str, float]:
+    """From (m, 3) errors in m."""
     norm = np.sqrt(np.sum(error**2, axis=1))
-    published = np.isfinite(sigma).all(axis=1) & (sigma > 0).all(axis=1)
-    ratio = error[published] / sigma[published]
-    x, y, z = (_rms(column) for column in error.T)
     return {
         "rmse_seed_m": _mean(norm),
-        "rmse_3d_m": _rms(norm),
-        "rmse_x_m": x,
-        "rmse_y_m": y,
-        "rmse_z_m": z,
         "max_error_m": float(norm.max()) if len(norm) else np.nan,
         "p95_error_m": float(np.percentile(norm, 95)) if len(norm) else np.nan,
         "p99_error_m": float(np.percentile(norm, 99)) if len(norm) else np.nan,
-        "in_3sigma": _mean(np.all(np.abs(ratio) <= 3, axis=1)),
-        "nees_position": _mean(np.sum(ratio**2, axis=1)),
-        "sigma_verdict": sigma_verdict(ratio),
     }
 
 
-def sigma_verdict(ratio: FloatArray) -> str | None:
-    """In words, from (m, 3) errors over their published sigmas: `consistent`, `cautious`, or `overconfident in x`.
+def _errors(trajectory: Trajectory, truth: MatchedTruth) -> dict[str, Any]:
+    """RMSE and consistency of position, velocity and acceleration, as far as the truth has them, and of the cleaned
+    readings, as far as the trajectory has them."""
+    known: dict[str, Any] = {}
+    kinds = (truth.position_m, truth.velocity_mps, truth.acceleration_mps2)
+    for k, (quantity, (whole, axes, unit), true) in enumerate(zip(_STATE, _STATE.values(), kinds, strict=True)):
+        if true is None:
+            continue
+        columns = slice(3 * k, 3 * k + 3)
+        error = trajectory.state[:, columns] - true
+        error[~np.isfinite(error).all(axis=1)] = np.nan
+        known[f"rmse_{whole}_{unit}"] = _rms(np.sqrt(np.sum(error**2, axis=1)))
+        known |= {f"rmse_{axis}_{unit}": _rms(column) for axis, column in zip(axes, error.T, strict=True)}
+        known[quantity] = consistency(trajectory.time_s, _in_sigmas(error, trajectory.sigma[:, columns]), axes)
+    error = trajectory.measurement - from_cartesian(truth.position_m)
+    error[:, 1] = wrap(error[:, 1])
+    cleaned = np.flatnonzero(np.isfinite(error).any(axis=0))
+    known |= {f"rmse_{COMPONENTS[c]}_{UNITS[c]}": _rms(error[:, c]) for c in cleaned}
+    ratio, names = _in_sigmas(error, trajectory.measurement_sigma)[:, cleaned], [COMPONENTS[c] for c in cleaned]
+    known["cleaned"] = consistency(trajectory.time_s, ratio, names) if names else None
+    judged = [known[quantity] for quantity in (*_STATE, "cleaned") if known.get(quantity) is not None]
+    return known | {"sigma_verdict": in_words(judged)}
 
-    Errors of neighbouring samples are correlated, so the chi-square bounds of independent ones would be far too narrow;
-    these bounds suit a flight of a few minutes.
-    """
-    if not len(ratio):
-        return None
-    by_axis = np.mean(ratio**2, axis=0)
-    if by_axis.sum() > NEES_BOUNDS[1] or np.mean(np.all(np.abs(ratio) <= 3, axis=1)) < LEAST_IN_3SIGMA:
-        named = [axis for axis, size in zip("xyz", by_axis, strict=True) if size >= 0.8 * by_axis.max()]
-        return f"overconfident in {', '.join(named)}"
-    return "cautious" if by_axis.sum() < NEES_BOUNDS[0] else "consistent"
 
-
-def _velocity_figures(error: FloatArray) -> dict[str, float]:
-    """From (n, 3) velocity errors in m/s, NaN where either is missing."""
-    error = error[np.isfinite(error).all(axis=1)]
-    x, y, z = (_rms(column) for column in error.T)
-    return {
-        "rmse_v_mps": _rms(np.sqrt(np.sum(error**2, axis=1))),
-        "rmse_vx_mps": x,
-        "rmse_vy_mps": y,
-        "rmse_vz_mps": z,
-    }
+def _in_sigmas(error: FloatArray, sigma: FloatArray) -> FloatArray:
+    """Errors over published sigmas; NaN where there is no sigma."""
+    published = np.isfinite(sigma) & (sigma > 0)
+    ratio: FloatArray = np.divide(error, sigma, out=np.full(error.shape, np.nan), where=published)
+    return ratio
 
 
 def _detection(flag: FlagArray, injected: FlagArray) -> Detection:

@@ -19,12 +19,13 @@ _NEAR = 5  # intervals on both sides by which the usual one is judged
 class MatchedTruth(NamedTuple):
     """The truth row for row with a trajectory of n samples.
 
-    position_m: (n, 3), NaN where unmatched. velocity_mps: (n, 3) or None. outlier: (n, 3) or None, zero where not
-    `exact`. exact: (n,) the truth has the same sample. interpolated: (n,) between two of its times.
+    position_m: (n, 3), NaN where unmatched. velocity_mps, acceleration_mps2: (n, 3) or None. outlier: (n, 3) or None,
+    zero where not `exact`. exact: (n,) the truth has the same sample. interpolated: (n,) between two of its times.
     """
 
     position_m: FloatArray
     velocity_mps: FloatArray | None
+    acceleration_mps2: FloatArray | None
     outlier: FlagArray | None
     exact: NDArray[np.bool_]
     interpolated: NDArray[np.bool_]
@@ -35,20 +36,22 @@ def match(time_s: FloatArray, truth: Truth) -> MatchedTruth:
 
     The k-th sample at a time gets the truth's k-th row at that time; times are equal when they differ by no more than
     the rounding of printed numbers. Other samples are interpolated, but not over gaps: cubic Hermite where the truth
-    has velocities, else linear. Outlier flags belong to single readings and are not interpolated.
+    has velocities, else linear, as are accelerations. Outlier flags belong to single readings and are not interpolated.
     """
     rows = _same_sample(time_s, truth.time_s)
     exact = rows >= 0
-    position, velocity = _interpolate(time_s, truth)
+    position, velocity, acceleration = _interpolate(time_s, truth)
     position[exact] = truth.position_m[rows[exact]]
     if velocity is not None and truth.velocity_mps is not None:
         velocity[exact] = truth.velocity_mps[rows[exact]]
+    if acceleration is not None and truth.acceleration_mps2 is not None:
+        acceleration[exact] = truth.acceleration_mps2[rows[exact]]
     outlier = None
     if truth.outlier is not None:
         outlier = np.zeros((len(time_s), 3), np.uint8)
         outlier[exact] = truth.outlier[rows[exact]]
     between = ~exact & np.isfinite(position).all(axis=1)
-    return MatchedTruth(position, velocity, outlier, exact, between)
+    return MatchedTruth(position, velocity, acceleration, outlier, exact, between)
 
 
 def exchanged_axes(trajectory: Trajectory, truth: Truth) -> str | None:
@@ -93,17 +96,19 @@ def _occurrence(key: FloatArray) -> IntArray:
     return np.asarray(index - np.maximum.accumulate(np.where(new, index, 0)))
 
 
-def _interpolate(time_s: FloatArray, truth: Truth) -> tuple[FloatArray, FloatArray | None]:
-    """Position and, where the truth has it, velocity at (n,) times; NaN outside the truth's own times and in gaps."""
+def _interpolate(time_s: FloatArray, truth: Truth) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
+    """Position and, where the truth has them, velocity and acceleration at (n,) times; NaN outside the truth's own
+    times and in gaps."""
     position = np.full((len(time_s), 3), np.nan)
     velocity = None if truth.velocity_mps is None else position.copy()
+    acceleration = None if truth.acceleration_mps2 is None else position.copy()
     usable = np.isfinite(truth.position_m).all(axis=1)
     if truth.velocity_mps is not None:
         usable &= np.isfinite(truth.velocity_mps).all(axis=1)
     knots, first = np.unique(truth.time_s[usable], return_index=True)
     p = truth.position_m[usable][first]
     if not len(knots):
-        return position, velocity
+        return position, velocity, acceleration
     cell = np.clip(np.searchsorted(knots, time_s, side="right") - 1, 0, max(0, len(knots) - 2))
     inside = (time_s >= knots[0]) & (time_s <= knots[-1])
     inside &= ~_gaps(knots)[cell] | np.isin(time_s, knots)
@@ -111,12 +116,15 @@ def _interpolate(time_s: FloatArray, truth: Truth) -> tuple[FloatArray, FloatArr
     following = np.minimum(cell + 1, len(knots) - 1)
     width = np.where(following > cell, knots[following] - knots[cell], 1.0)[:, None]
     s = (time_s[inside] - knots[cell])[:, None] / width
+    if acceleration is not None and truth.acceleration_mps2 is not None:
+        a = truth.acceleration_mps2[usable][first]
+        acceleration[inside] = a[cell] + s * (a[following] - a[cell])
     if velocity is None or truth.velocity_mps is None:
         position[inside] = p[cell] + s * (p[following] - p[cell])
-        return position, None
+        return position, None, acceleration
     v = truth.velocity_mps[usable][first]
     position[inside], velocity[inside] = _hermite(s, width, p[cell], p[following], v[cell], v[following])
-    return position, velocity
+    return position, velocity, acceleration
 
 
 def _gaps(knots: FloatArray) -> NDArray[np.bool_]:

@@ -39,13 +39,24 @@ _LABELS = {
     "rmse_vx_mps": "  vx",
     "rmse_vy_mps": "  vy",
     "rmse_vz_mps": "  vz",
+    "rmse_a_mps2": "acceleration RMSE (m/s2)",
+    "rmse_ax_mps2": "  ax",
+    "rmse_ay_mps2": "  ay",
+    "rmse_az_mps2": "  az",
+    "rmse_range_m": "cleaned range RMSE (m)",
+    "rmse_azimuth_rad": "  azimuth (rad)",
+    "rmse_elevation_rad": "  elevation (rad)",
     "max_error_m": "largest position error (m)",
     "p95_error_m": "  95 % below",
     "p99_error_m": "  99 % below",
-    "in_3sigma": "share inside 3 sigma",
-    "nees_position": "position NEES (3 expected)",
-    "sigma_verdict": "the sigmas are",
 } | {
+    f"{quantity}.{key}": label.format("cleaned readings" if quantity == "cleaned" else quantity)
+    for quantity in ("position", "velocity", "acceleration", "cleaned")
+    for key, label in (
+        ("share_in_3_sigma", "{}, share inside 3 sigma"), ("largest", "  largest error, in sigmas"),
+        ("nees_and_bounds", "  NEES, and its bounds"),
+    )
+} | {"sigma_verdict": "the sigmas are"} | {
     f"outliers.{component}.{key}": f"{component} outliers, precision" if key == "precision" else f"  {label}"
     for component in ("range", "azimuth", "elevation")
     for key, label in (
@@ -106,7 +117,7 @@ def _table(scores: Sequence[Score]) -> str:
 
 def _columns(scores: Sequence[Score]) -> str:
     """One column per score, in blocks of TABLE_WIDTH."""
-    columns = [_flat(score.as_dict()) for score in scores]
+    columns = [_with_pairs(_flat(score.as_dict())) for score in scores]
     keys = [key for key in _LABELS if any(key in column for column in columns)]
     heads = _headings([score.trajectory for score in scores])
     label_width = max(len(_LABELS[key]) for key in keys)
@@ -120,6 +131,16 @@ def _columns(scores: Sequence[Score]) -> str:
             lines.append(_LABELS[key].ljust(label_width) + values)
         blocks.append("\n".join(line.rstrip() for line in lines) + "\n")
     return "\n".join(blocks)
+
+
+def _with_pairs(column: dict[str, Any]) -> dict[str, Any]:
+    """With figures that are read together in one cell."""
+    for key in [key for key in column if key.endswith(".nees")]:
+        q = key.removesuffix(".nees")
+        at, low, high = (column[f"{q}.{name}"] for name in ("largest_sigma_time_s", "nees_low", "nees_high"))
+        column[f"{q}.largest"] = f"{_cell(column[f'{q}.largest_sigma'])} at {at:.6g} s"
+        column[f"{q}.nees_and_bounds"] = f"{_cell(column[key])} ({_cell(low)} to {_cell(high)})"
+    return column
 
 
 def _blocks(widths: list[int], room: int) -> list[list[int]]:

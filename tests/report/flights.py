@@ -47,7 +47,8 @@ def position_only() -> Trajectory:
     made, nothing = filtered(), np.full((len(filtered()), 6), np.nan)
     state = np.where(np.arange(9) < 3, made.state, np.nan)
     return replace(
-        made, state=state, sigma=nothing, correction=nothing, nis=np.full(len(made), np.nan), metadata={},
+        made, state=state, sigma=np.full(state.shape, np.nan), measurement_sigma=nothing[:, :3], correction=nothing,
+        nis=np.full(len(made), np.nan), metadata={},
         measurement=np.full((len(made), 3), np.nan), outlier=np.zeros_like(made.outlier), diagnostics=None,
     )  # fmt: skip
 
