@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ftproc.core.identification import unseen_motion
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import registry
@@ -97,11 +98,11 @@ class Filtering:
         correction, estimate = correction[part.low : part.high], part.estimate.rows(part.low, part.high)
         rows = slice(part.first + part.low, part.first + part.high)
         best = estimate.run if estimate.smoothed is None else estimate.smoothed
-        state, sigma = best.state.copy(), best.sigma.copy()
+        state, (sigma, los_sigma) = best.state.copy(), unseen_motion.widened(best.state, best.sigma, best.los_sigma)
         state[:, :6] += correction
         known = slice(None) if estimate.known is None else estimate.known
         cleaned = from_cartesian(state[:, :3]) if estimate.cleaned is None else estimate.cleaned
-        cleaned_sigma = measurement_sigma(cleaned, best.los_sigma[:, :3])
+        cleaned_sigma = measurement_sigma(cleaned, los_sigma[:, :3])
         if absent:  # the filter ran on a stand-in; what depends on it is not published
             state[:], sigma[:] = np.nan, np.nan
             cleaned[:, absent], cleaned_sigma[:, absent] = np.nan, np.nan

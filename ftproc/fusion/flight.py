@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ftproc import __version__, pipeline
+from ftproc.core.identification import unseen_motion
 from ftproc.errors import InputError
 from ftproc.files import arrow
 from ftproc.files.conventions import CONVENTION
@@ -82,8 +83,9 @@ def _flight(
     summary = summarize(fused, zero_s)
     metadata = _metadata(range_, settings, summary, fused)
     n = len(track.time_s)
+    sigma, _ = unseen_motion.widened(track.state, track.sigma, np.full((n, 6), np.nan))
     trajectory = Trajectory(
-        range_.path, np.arange(n), track.time_s + zero_s, np.full((n, 3), np.nan), track.state, track.sigma,
+        range_.path, np.arange(n), track.time_s + zero_s, np.full((n, 3), np.nan), track.state, sigma,
         np.full((n, 3), np.nan), np.zeros((n, 3), np.uint8), track.nis, np.zeros((n, 6)), metadata,
         arrow.table({"stations": results.stations_used(fused).astype(np.int64)}),
     )  # fmt: skip

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ftproc.core.identification import unseen_motion
 from ftproc.core.live.rows import Published
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.errors import InputError, UsageError
@@ -132,8 +133,9 @@ def _trajectory(row: IntArray, time_s: FloatArray, estimate: Estimate | None) ->
         nothing = (none, np.empty((0, 9)), np.empty((0, 9)), none, none.astype(np.uint8), np.empty(0), np.empty((0, 6)))
         return Trajectory("live", row, time_s, *nothing)
     run, label, absent = estimate.run, estimate.label.copy(), list(estimate.absent)
-    state, sigma, cleaned = run.state.copy(), run.sigma.copy(), from_cartesian(run.state[:, :3])
-    cleaned_sigma = measurement_sigma(cleaned, run.los_sigma[:, :3])
+    state, cleaned = run.state.copy(), from_cartesian(run.state[:, :3])
+    sigma, los_sigma = unseen_motion.widened(run.state, run.sigma, run.los_sigma)
+    cleaned_sigma = measurement_sigma(cleaned, los_sigma[:, :3])
     if absent:  # the filter ran on stand-ins; what depends on them is not published
         state[:], sigma[:], label[:, absent] = np.nan, np.nan, MISSING
         cleaned[:, absent], cleaned_sigma[:, absent] = np.nan, np.nan
