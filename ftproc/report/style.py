@@ -55,6 +55,7 @@ COMPONENT = (Quantity("R", "m"), Quantity("A", "deg", DEGREE), Quantity("E", "de
 RESIDUAL_UNIT = (Quantity("R", "m"), Quantity("A", "mrad", 1e3), Quantity("E", "mrad", 1e3))
 POSITION = tuple(Quantity(axis, "m") for axis in "xyz")
 VELOCITY = tuple(Quantity(f"v{axis}", "m/s") for axis in "xyz")
+ACCELERATION = tuple(Quantity(f"a{axis}", "m/s²") for axis in "xyz")
 TIME = "time, s"
 
 _AXIS = {

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ftproc.quality import consistency
-from ftproc.records import FloatArray
+from ftproc.records import COMPONENTS, FloatArray
 from ftproc.report import drawing, style
 from ftproc.report.drawing import DASHES, Drawn
 from ftproc.report.patches import steps
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 INTERVALS, LEAST_IN_INTERVAL = 60, 25  # number of means of NIS, and least samples in each
 TICKS = [m * 10.0**k for k in range(-6, 9) for m in (1, 3)]  # of logarithmic axes
 WITHIN = 3  # published sigmas, the limits drawn with the errors
+_STATE = ("position, m", "velocity, m/s", "acceleration, m/s²")
 
 
 def nis(view: View) -> Drawn:
@@ -57,15 +58,32 @@ def nis(view: View) -> Drawn:
 
 
 def sigmas(view: View) -> Drawn:
-    """1-sigma of position and velocity."""
+    """1-sigma of position, velocity and acceleration; of the cleaned readings where there is no position."""
     sigma = view.trajectory.sigma
     if not np.isfinite(sigma).any():
-        return Drawn(None, "The trajectory has no sigmas: its position is not observable.")
-    figure = drawing.rows(view.timeline, ["σ position, m", "σ velocity, m/s"], 440)
-    _triples(figure, view, sigma)
+        return _sigmas_of_readings(view)
+    shown = [k for k in range(len(_STATE)) if np.isfinite(sigma[:, 3 * k : 3 * k + 3]).any()]
+    figure = drawing.rows(view.timeline, [f"σ {_STATE[k]}" for k in shown], 220 * len(shown))
+    _triples(figure, view, np.hstack([sigma[:, 3 * k : 3 * k + 3] for k in shown]))
+    return _on_log_scale(figure, view, len(shown), "1 sigma of the estimate, along the axes.")
+
+
+def _sigmas_of_readings(view: View) -> Drawn:
+    sigma = view.trajectory.measurement_sigma * [quantity.factor for quantity in style.RESIDUAL_UNIT]
+    shown = [c for c in range(3) if np.isfinite(sigma[:, c]).any()]
+    if not shown:
+        return Drawn(None, "The trajectory has no sigmas.")
+    titles = [f"σ {style.RESIDUAL_UNIT[c].title}" for c in shown]
+    figure = drawing.rows(view.timeline, titles, 220 * len(shown))
+    for row, c in enumerate(shown):
+        drawing.add(figure, drawing.line(view.timeline, sigma[:, c], COMPONENTS[c], style.BLUE), row)
+    return _on_log_scale(figure, view, len(shown), "1 sigma of the cleaned readings; the position is not observable.")
+
+
+def _on_log_scale(figure: go.Figure, view: View, rows: int, note: str) -> Drawn:
     figure.update_yaxes(type="log", tickvals=TICKS, ticktext=[f"{tick:g}" for tick in TICKS])
-    _add_steps(figure, view, 2)
-    return Drawn(figure, "1 sigma of the estimate, along the axes.")
+    _add_steps(figure, view, rows)
+    return Drawn(figure, note)
 
 
 def motion(view: View) -> Drawn:
@@ -105,26 +123,40 @@ def correction(view: View) -> Drawn:
 
 def errors(view: View) -> Drawn:
     """Errors against the truth, and 3 published sigmas each way."""
-    if view.error is None:
+    if view.error is None or view.cleaned_error is None:
         return Drawn(None, "There is no truth to compare with.")
     if not np.isfinite(view.error).any():
-        return Drawn(None, "The truth's times do not overlap those of the trajectory.")
-    velocity = bool(np.isfinite(view.error[:, 3:]).any())
-    columns = 2 if velocity else 1
-    names = [style.POSITION, style.VELOCITY][:columns]
+        return _errors_of_readings(view, view.cleaned_error)
+    columns = max(k + 1 for k in range(3) if k == 0 or np.isfinite(view.error[:, 3 * k : 3 * k + 3]).any())
+    names = [style.POSITION, style.VELOCITY, style.ACCELERATION][:columns]
     figure = drawing.rows(
         view.timeline, [f"error in {pair[axis].title}" for axis in range(3) for pair in names], 640, columns
     )
-    bound = WITHIN * view.trajectory.sigma
-    for column in range(columns):
-        for axis in range(3):
-            k, first = 3 * column + axis, not (column or axis)
-            drawing.add(figure, drawing.line(view.timeline, view.error[:, k], "error", style.BLUE), axis, column, first)
-            for sign in (-1, 1):
-                limit = drawing.line(view.timeline, sign * bound[:, k], f"{WITHIN} sigmas", style.BLACK, "dash", 1)
-                drawing.add(figure, limit, axis, column, first and sign < 0)
+    for k in range(3 * columns):
+        _add_error(figure, view, view.error[:, k], view.trajectory.sigma[:, k], (k % 3, k // 3))
     _add_steps(figure, view, 3, columns)
     return Drawn(figure, "")
+
+
+def _errors_of_readings(view: View, error: FloatArray) -> Drawn:
+    """Of the cleaned readings, where there is no position."""
+    shown = [c for c in range(3) if np.isfinite(error[:, c]).any()]
+    if not shown:
+        return Drawn(None, "The truth's times do not overlap those of the trajectory.")
+    figure = drawing.rows(view.timeline, [f"error in {style.RESIDUAL_UNIT[c].title}" for c in shown], 220 * len(shown))
+    for row, c in enumerate(shown):
+        factor = style.RESIDUAL_UNIT[c].factor
+        _add_error(figure, view, factor * error[:, c], factor * view.trajectory.measurement_sigma[:, c], (row, 0))
+    _add_steps(figure, view, len(shown))
+    return Drawn(figure, "Errors of the cleaned readings; the position is not observable.")
+
+
+def _add_error(figure: go.Figure, view: View, error: FloatArray, sigma: FloatArray, place: tuple[int, int]) -> None:
+    """An error (n,) and its sigmas (n,) in a row and column."""
+    drawing.add(figure, drawing.line(view.timeline, error, "error", style.BLUE), *place, place == (0, 0))
+    for sign in (-1, 1):
+        limit = drawing.line(view.timeline, sign * WITHIN * sigma, f"{WITHIN} sigmas", style.BLACK, "dash", 1)
+        drawing.add(figure, limit, *place, place == (0, 0) and sign < 0)
 
 
 def _add_steps(figure: go.Figure, view: View, rows: int = 1, columns: int = 1) -> None:
@@ -135,8 +167,8 @@ def _add_steps(figure: go.Figure, view: View, rows: int = 1, columns: int = 1) -
 
 
 def _triples(figure: go.Figure, view: View, value: FloatArray) -> None:
-    """(n, 6): x, y, z of position in the first row, of velocity in the second."""
-    for row in range(2):
+    """(n, 3 rows): x, y, z of a quantity in each row."""
+    for row in range(value.shape[1] // 3):
         for axis, name in enumerate("xyz"):
             one = value[:, 3 * row + axis]
             if np.isfinite(one).any():

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ftproc.core.model.frames import unwrap, wrap
+from ftproc.core.model.frames import from_cartesian, unwrap, wrap
 from ftproc.quality.verdict import LEVELS
 from ftproc.records import Diagnostics, FloatArray, Trajectory, Truth
 from ftproc.report.style import COMPONENT
@@ -26,7 +26,8 @@ class View:
 
     timeline: its times. cleaned: (n, 3) m, deg, deg, the azimuth unwrapped. reading: the raw readings in these
     units, on the same turn; None when they are not known. components_used: (n,) degrees of freedom of `nis`. error:
-    (n, 6) estimate minus truth, m and m/s. error and score are None without a truth.
+    (n, 9) estimate minus truth of the state, in its units. cleaned_error: (n, 3) the same of the cleaned readings, m,
+    rad, rad. These and the score are None without a truth.
     """
 
     trajectory: Trajectory
@@ -35,6 +36,7 @@ class View:
     reading: FloatArray | None
     components_used: FloatArray
     error: FloatArray | None = None
+    cleaned_error: FloatArray | None = None
     score: Score | None = None
 
     def part(self, rows: slice) -> View:
@@ -90,17 +92,19 @@ def view(trajectory: Trajectory, truth: Truth | None = None) -> View:
         turned = cleaned[:, 1] + wrap(reading[:, 1] - cleaned[:, 1])
         reading[:, 1] = np.where(np.isfinite(turned), turned, reading[:, 1])
         reading *= factor
-    error = scored = None
+    error = cleaned_error = scored = None
     if truth is not None:
         known = match(trajectory.time_s, truth)
-        error = np.full((len(trajectory), 6), np.nan)
-        error[:, :3] = trajectory.state[:, :3] - known.position_m
-        if known.velocity_mps is not None:
-            error[:, 3:] = trajectory.state[:, 3:6] - known.velocity_mps
+        error = np.full((len(trajectory), 9), np.nan)
+        for k, true in enumerate((known.position_m, known.velocity_mps, known.acceleration_mps2)):
+            if true is not None:
+                error[:, 3 * k : 3 * k + 3] = trajectory.state[:, 3 * k : 3 * k + 3] - true
+        cleaned_error = trajectory.measurement - from_cartesian(known.position_m)
+        cleaned_error[:, 1] = wrap(cleaned_error[:, 1])
         scored = score(trajectory, truth) if np.isfinite(known.position_m).any() else None
     return View(
         trajectory, Timeline.of(trajectory.time_s), cleaned * factor, reading,
-        (trajectory.outlier == 0).sum(1).astype(float), error, scored,
+        (trajectory.outlier == 0).sum(1).astype(float), error, cleaned_error, scored,
     )  # fmt: skip
 
 

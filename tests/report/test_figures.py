@@ -41,7 +41,7 @@ def test_every_figure_of_every_kind_of_trajectory(make, what):
 
 def test_which_figures_there_are_without_range_or_readings():
     there = {what for what in FIGURES if drawn(angles_only(), what).figure is not None}
-    assert there == {"readings", "worst", "residuals", "nis"}
+    assert there == {"readings", "worst", "residuals", "nis", "sigmas"}
     axes = drawn(angles_only(), "readings").figure.layout
     assert [axes.yaxis.title.text, axes.yaxis2.title.text] == ["A, deg", "E, deg"]
     read = replace(filtered(), diagnostics=None)
@@ -157,12 +157,36 @@ def test_correction_is_drawn_where_there_is_one():
     assert drawn(replace(filtered(), correction=added), "correction").figure is not None
 
 
+def test_sigmas_of_position_velocity_and_acceleration_are_drawn():
+    made, figure = filtered(), drawn(filtered(), "sigmas").figure
+    axes = [figure.layout[f"yaxis{k}"].title.text for k in ("", "2", "3")]
+    assert axes == ["σ position, m", "σ velocity, m/s", "σ acceleration, m/s²"]
+    assert len(figure.data) == 9
+    for k, trace in enumerate(figure.data):
+        assert trace.name == "xyz"[k % 3]
+        assert np.nanmax(trace.y) == pytest.approx(np.nanmax(made.sigma[:, k]), rel=1e-6)
+
+
+def test_sigmas_of_a_log_of_angles_are_those_of_its_cleaned_readings():
+    made, found = angles_only(), drawn(angles_only(), "sigmas")
+    assert found.figure.layout.yaxis.title.text == "σ A, mrad"
+    assert [trace.name for trace in found.figure.data] == ["azimuth", "elevation"]
+    assert np.nanmax(found.figure.data[1].y) == pytest.approx(1e3 * made.measurement_sigma[:, 2].max(), rel=1e-6)
+    assert "the position is not observable" in found.note
+
+
 def test_errors_are_drawn_with_three_published_sigmas():
     found = errors(view(filtered(), flight().truth)).figure
     error, limit = traces(found, "error"), traces(found, "3 sigmas")
-    assert (len(error), len(limit)) == (6, 12)
+    assert (len(error), len(limit)) == (9, 18)
     np.testing.assert_allclose(np.asarray(limit[1].y), -np.asarray(limit[0].y))
     late = replace(flight().truth, time_s=flight().truth.time_s + 1e6)
+    of_angles = errors(view(angles_only(), flight().truth)).figure
+    assert [axis.title.text for axis in (of_angles.layout.yaxis, of_angles.layout.yaxis2)] == [
+        "error in A, mrad",
+        "error in E, mrad",
+    ]
+    assert (len(traces(of_angles, "error")), len(traces(of_angles, "3 sigmas"))) == (2, 4)
     assert "do not overlap" in errors(view(filtered(), late)).note
     assert errors(view(filtered())).figure is None
 

@@ -136,7 +136,7 @@ def test_several_reasons_are_a_list():
 
 def test_page_without_position_says_so():
     text = page(angles_only())
-    assert list(figures(text)) == ["readings", "worst", "residuals", "nis"]
+    assert list(figures(text)) == ["readings", "worst", "residuals", "nis", "sigmas"]
     assert "There is no position to draw" in text
     assert "range missing throughout: position and velocity are not observable" in text
 

@@ -54,6 +54,7 @@ def test_azimuth_is_unwrapped_and_readings_follow():
 def test_error_is_estimate_minus_truth():
     found = view(filtered(), flight().truth)
     np.testing.assert_allclose(found.error[:, :3], filtered().state[:, :3] - flight().truth.position_m)
-    np.testing.assert_allclose(found.error[:, 3:], filtered().state[:, 3:6] - flight().truth.velocity_mps)
+    np.testing.assert_allclose(found.error[:, 3:6], filtered().state[:, 3:6] - flight().truth.velocity_mps)
+    np.testing.assert_allclose(found.error[:, 6:], filtered().state[:, 6:] - flight().truth.acceleration_mps2)
     assert found.score.rmse_3d_m == pytest.approx(np.sqrt((found.error[:, :3] ** 2).sum(1).mean()))
     assert view(filtered()).error is None
