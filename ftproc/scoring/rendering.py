@@ -44,17 +44,17 @@ _LABELS = {
     "rmse_ay_mps2": "  ay",
     "rmse_az_mps2": "  az",
     "rmse_range_m": "cleaned range RMSE (m)",
-    "rmse_azimuth_rad": "  azimuth (rad)",
-    "rmse_elevation_rad": "  elevation (rad)",
+    "rmse_azimuth_rad": "cleaned azimuth RMSE (rad)",
+    "rmse_elevation_rad": "cleaned elevation RMSE (rad)",
     "max_error_m": "largest position error (m)",
     "p95_error_m": "  95 % below",
     "p99_error_m": "  99 % below",
 } | {
-    f"{quantity}.{key}": label.format("cleaned readings" if quantity == "cleaned" else quantity)
+    f"{quantity}.{key}": label.format(quantity)
     for quantity in ("position", "velocity", "acceleration", "cleaned")
     for key, label in (
-        ("share_in_3_sigma", "{}, share inside 3 sigma"), ("largest", "  largest error, in sigmas"),
-        ("nees_and_bounds", "  NEES, and its bounds"),
+        ("share_in_3_sigma", "{} inside 3 sigma"), ("largest", "  largest error / sigma"),
+        ("nees_and_bounds", "  NEES (bounds)"),
     )
 } | {"sigma_verdict": "the sigmas are"} | {
     f"outliers.{component}.{key}": f"{component} outliers, precision" if key == "precision" else f"  {label}"
@@ -118,6 +118,10 @@ def _table(scores: Sequence[Score]) -> str:
 def _columns(scores: Sequence[Score]) -> str:
     """One column per score, in blocks of TABLE_WIDTH."""
     columns = [_with_pairs(_flat(score.as_dict())) for score in scores]
+    if len(scores) > 1:  # side by side; in JSON the axes are named
+        columns = [
+            {**each, "sigma_verdict": str(each.get("sigma_verdict") or "-").split(" in ")[0]} for each in columns
+        ]
     keys = [key for key in _LABELS if any(key in column for column in columns)]
     heads = _headings([score.trajectory for score in scores])
     label_width = max(len(_LABELS[key]) for key in keys)
@@ -138,8 +142,8 @@ def _with_pairs(column: dict[str, Any]) -> dict[str, Any]:
     for key in [key for key in column if key.endswith(".nees")]:
         q = key.removesuffix(".nees")
         at, low, high = (column[f"{q}.{name}"] for name in ("largest_sigma_time_s", "nees_low", "nees_high"))
-        column[f"{q}.largest"] = f"{_cell(column[f'{q}.largest_sigma'])} at {at:.6g} s"
-        column[f"{q}.nees_and_bounds"] = f"{_cell(column[key])} ({_cell(low)} to {_cell(high)})"
+        column[f"{q}.largest"] = f"{column[f'{q}.largest_sigma']:.3g} at {at:.7g} s"
+        column[f"{q}.nees_and_bounds"] = f"{column[key]:.3g} ({low:.2g} to {high:.2g})"
     return column
 
 

@@ -136,13 +136,12 @@ def test_the_sigmas_are_consistent_only_if_all_are(columns: slice) -> None:
 def test_what_is_printed(scored: Score) -> None:
     lines = [line.split("  ") for line in render([scored]).splitlines()]
     cells = [(line[0].strip() or line[1].strip(), line[-1].strip()) for line in lines]
-    at = [label for label, _ in cells].index("velocity, share inside 3 sigma")
+    at = [label for label, _ in cells].index("velocity inside 3 sigma")
     assert scored.velocity is not None
     assert cells[at][1] == f"{scored.velocity.share_in_3_sigma:.4g}"
-    when = f"{scored.velocity.largest_sigma:.4g} at {scored.velocity.largest_sigma_time_s:.6g} s"
-    assert cells[at + 1] == ("largest error, in sigmas", when)
-    assert cells[at + 2][0] == "NEES, and its bounds"
-    assert cells[at + 2][1] == f"{scored.velocity.nees:.4g} (1 to 5)"
+    when = f"{scored.velocity.largest_sigma:.3g} at {scored.velocity.largest_sigma_time_s:.7g} s"
+    assert cells[at + 1] == ("largest error / sigma", when)
+    assert cells[at + 2] == ("NEES (bounds)", f"{scored.velocity.nees:.3g} (1 to 5)")
     known = json.loads(render([scored], "json"))
     assert known["velocity"]["share_in_3_sigma"] == scored.velocity.share_in_3_sigma
     assert "velocity.share_in_3_sigma" in render([scored], "csv").splitlines()[0].split(",")
@@ -165,7 +164,7 @@ def test_a_log_of_some_components_is_compared_with_the_truth_s_own(absent: list[
             assert rmse[c] is None
         else:
             assert 0 < rmse[c] < flight.sigma[c]  # type: ignore[operator]
-    assert "cleaned readings, share inside 3 sigma" in render([found])
+    assert "cleaned inside 3 sigma" in render([found])
 
 
 def test_a_fused_trajectory_has_no_cleaned_readings() -> None:
