@@ -1,7 +1,7 @@
 """Published sigmas against the errors: the share of rows with all axes inside 3 sigma (of all seeds together; 99.2 % if
 the errors are Gaussian), the largest error of any row in sigmas, and the RMS sigma over the RMS error (the median of
 the seeds; rows with a sigma far above the usual one, as before a filter has settled, are left out of it): of position,
-velocity and acceleration, by scenario and sampling rate."""
+velocity and acceleration, in this order, by scenario and sampling rate."""
 
 from __future__ import annotations
 
@@ -24,11 +24,8 @@ RATES_HZ = (None, 1.0, 5.0, 20.0, 50.0, 100.0)  # None: the scenario's own
 SEEDS = range(5)
 MOST_ROWS = 6_000  # of a run; at high rates the flights are shorter
 FAR_ABOVE = 3.0  # times the median sigma
-QUANTITIES = {"p": slice(0, 3), "v": slice(3, 6), "a": slice(6, 9)}
-HEADER = (
-    "scenario", "Hz", "", "p in 3 sigma %", "v %", "a %", "p largest, sigmas", "v", "a", "p sigma / error", "v", "a",
-    "verdicts",
-)  # fmt: skip
+SHOWN = ("in 3 sigma, %", "largest, sigmas", "sigma / error")
+HEADER = ("scenario", "Hz", *(f"{how}: {what}" for how in ("filter", "`--smooth`") for what in SHOWN), "verdicts")
 
 
 class Case(NamedTuple):
@@ -36,7 +33,6 @@ class Case(NamedTuple):
 
     scenario: str
     rate_hz: float | None
-    smooth: bool
 
 
 class Run(NamedTuple):
@@ -53,7 +49,7 @@ def cases() -> list[Case]:
     for name in list_scenarios():
         scenario = find_scenario(name)
         own = {1 / dt for dt in scenario.dt_s if len(scenario.dt_s) == 1 and not scenario.members}
-        found += [Case(name, rate, smooth) for rate in RATES_HZ if rate not in own for smooth in (False, True)]
+        found += [Case(name, rate) for rate in RATES_HZ if rate not in own]
     return found
 
 
@@ -61,18 +57,18 @@ def rows(chosen: list[Case] | None = None) -> Iterator[tuple[str, ...]]:
     """One row per case, as they are done; the runs go in parallel on the processors there are."""
     todo = cases() if chosen is None else chosen
     with ProcessPoolExecutor(threads.available(), get_context("spawn"), threads.use, (1,)) as pool:
-        jobs = [(case, [pool.submit(run, case, seed) for seed in SEEDS]) for case in todo]
+        jobs = [(c, [[pool.submit(run, c, s, smooth) for s in SEEDS] for smooth in (False, True)]) for c in todo]
         for case, waiting in jobs:
-            yield _row(case, [each.result() for each in waiting])
+            yield _row(case, *([each.result() for each in ways] for ways in waiting))
 
 
-def run(case: Case, seed: int) -> Run:
+def run(case: Case, seed: int, smooth: bool) -> Run:
     """Filter one draw of a scenario."""
     own = plan(case.scenario, seed)
     dt_s = own.dt_s if case.rate_hz is None else 1 / case.rate_hz
     flight = simulate(case.scenario, seed=seed, dt_s=dt_s, duration_s=min(own.duration_s, MOST_ROWS * dt_s))
     model = model_file.named("packaged")
-    found = pipeline.filter_log(flight.log, FilterSettings(smooth=case.smooth), model)
+    found = pipeline.filter_log(flight.log, FilterSettings(smooth=smooth), model)
     truth = flight.truth
     assert truth.velocity_mps is not None
     assert truth.acceleration_mps2 is not None
@@ -85,18 +81,22 @@ def plan(scenario: str, seed: int) -> Plan:
     return draw(find_scenario(scenario), np.random.default_rng(seed).spawn(1)[0])
 
 
-def _row(case: Case, runs: list[Run]) -> tuple[str, ...]:
-    inside, largest, width = [], [], []
-    for columns in QUANTITIES.values():
-        ratio = np.concatenate([np.abs(r.error[:, columns] / r.sigma[:, columns]) for r in runs])
-        inside.append(f"{100 * (ratio <= 3).all(1).mean():.1f}")
-        largest.append(f"{ratio.max():.3g}")
-        width.append(f"{np.median([_width(r.error[:, columns], r.sigma[:, columns]) for r in runs]):.2f}")
-    verdicts = [r.verdict for r in runs]
+def _row(case: Case, filtered: list[Run], smoothed: list[Run]) -> tuple[str, ...]:
+    verdicts = [each.verdict for each in (*filtered, *smoothed)]
     counts = ", ".join(f"{verdicts.count(name)} {name}" for name in sorted(set(verdicts)))
     rate = "own" if case.rate_hz is None else f"{case.rate_hz:g}"
-    how = "`--smooth`" if case.smooth else "filter"
-    return (case.scenario, rate, how, *inside, *largest, *width, counts)
+    return (case.scenario, rate, *_figures(filtered), *_figures(smoothed), counts)
+
+
+def _figures(runs: list[Run]) -> tuple[str, ...]:
+    """What is SHOWN, each of position, velocity and acceleration."""
+    found = []
+    for first in (0, 3, 6):
+        axes = slice(first, first + 3)
+        ratio = np.concatenate([np.abs(r.error[:, axes] / r.sigma[:, axes]) for r in runs])
+        width = np.median([_width(r.error[:, axes], r.sigma[:, axes]) for r in runs])
+        found.append((f"{100 * (ratio <= 3).all(1).mean():.1f}", f"{ratio.max():.3g}", f"{width:.2f}"))
+    return tuple(", ".join(cells) for cells in zip(*found, strict=True))
 
 
 def _width(error: FloatArray, sigma: FloatArray) -> float:

@@ -105,7 +105,7 @@ BLOCKS = {
     "filter": session(FILTER, before=(SIMULATE,)),
     "score": session(
         SCORE, before=(SIMULATE, FILTER),
-        only=("flight", "method", "samples", "mean position", "position", "velocity RMSE", "share", "the sigmas"),
+        only=("flight", "position", "velocity", "acceleration in", "the sigmas"),
     ),
     "fuse-score": session(RANGE, FUSE, "ftproc score best.parquet --truth range/truth.parquet"),
     "train": session(FLY, TRAIN, only=("filter:", "smoother:", "Position error")),
@@ -123,6 +123,7 @@ BLOCKS = {
     ),
     "samples": table("python -m tests.bench samples", slow=False),
     "accuracy": table("python -m tests.bench accuracy"),
+    "sigmas": table("python -m tests.bench sigmas"),
     "tracks": table('python -m tests.bench.tracks "$TRACKS"', needs="TRACKS"),
     "instruments": table("python -m tests.bench instruments"),
     "zuo2021": table("python -m tests.acceptance.zuo2021"),
