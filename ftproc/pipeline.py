@@ -68,7 +68,7 @@ class Filtering:
         stage = None if model is None else model.smoother if self.settings.smooth else model.filter
         summary = self.statistics.summary(
             {
-                "noise_specified": [
+                "specified_noise": [
                     name for name, sigma in zip(COMPONENTS, self.settings.noise or (), strict=False) if sigma
                 ],
                 "network": self._network() if self.method.corrected else None,

@@ -133,7 +133,7 @@ def _sigmas(s: Mapping[str, Any]) -> Iterator[Remark]:
     for name, part in s["components"].items():
         ratio, predicted = part["innovation_ratio"], part["predicted_sigma_ratio"]
         if name in wide:
-            specified = name in s.get("noise_specified", ())
+            specified = name in s.get("specified_noise", ())
             why = "so is the specified noise" if specified else "noise and motion cannot be told apart at this rate"
             text = f"{name} innovations are {ratio:.2g} times their predicted sigma: the published sigmas are too large"
             far = not specified and (everything or ratio < TOO_WIDE)

@@ -199,7 +199,10 @@ _READ: dict[str, Callable[[Path, dict[str, Any]], Any]] = {
 
 
 def judge_trajectory(trajectory: Trajectory) -> None:
-    """Finite states and positive, finite sigmas throughout, unless a component is not observable."""
+    """Finite states and positive, finite sigmas throughout; of a log without a component, of the cleaned others."""
+    cleaned, sigma = np.isfinite(trajectory.measurement), trajectory.measurement_sigma
+    assert (np.isfinite(sigma) == cleaned).all(), "cleaned readings without sigmas, or sigmas without these"
+    assert (sigma[cleaned] > 0).all(), "sigmas of cleaned readings that are not positive"
     if trajectory.metadata["summary"]["not_observable"]:
         assert np.isnan(trajectory.state).all(), "states without all three components"
         return
