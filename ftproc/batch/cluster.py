@@ -1,7 +1,8 @@
 """The worker pool of a Dask cluster: one log at a time each; the log of a worker that dies goes to another.
 
 Workers read the logs and write the trajectories, so both must have the same names on all of them. The model is sent
-with each task: a worker could have cached an older one of the same name.
+with each task: a worker could have cached an older one of the same name. Whoever starts a worker decides from where it
+imports: with PYTHONSAFEPATH=1 not from the directory where it is started.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from ftproc.settings import NO_MODEL
 REACHED_S = 1.0  # for the machine of a scheduler to accept a connection
 PATIENCE_S = 10.0  # for a scheduler to answer, and for a first worker
 _PROTOCOLS = ("tcp", "tls", "ws", "wss")
-_START = "Start one with `dask worker {0} --nthreads 1`, and more for more logs at a time."
+_START = "Start one with `PYTHONSAFEPATH=1 dask worker {0} --nthreads 1`, and more for more logs at a time."
 _CURE = 'install the same there: pip install "ftproc=={0}".'
 
 

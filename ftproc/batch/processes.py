@@ -12,7 +12,7 @@ from typing import Any
 from ftproc.batch.tasks import Notify, Outcome, Submit, Task, filter_one
 from ftproc.config.recipe import Recipe
 from ftproc.core.compiled import COMPILING
-from ftproc.core.processes import CONTEXT, Workers, unheard
+from ftproc.core.processes import CONTEXT, Workers, starting
 from ftproc.core.threads import available, use
 from ftproc.errors import Failure
 
@@ -22,7 +22,7 @@ _DIED = "its worker process died (out of memory, or killed). Use fewer --jobs, o
 @contextlib.contextmanager
 def pool(recipe: Recipe, jobs: int, notify: Notify | None) -> Iterator[Submit]:
     """`jobs` processes. When one dies, the tasks left are done one at a time."""
-    with unheard():
+    with starting():
         compiling = CONTEXT.Value("b", False)  # whether the user knows that kernels are being compiled
     # Together the workers use no more threads than there are processors.
     prepared = (_prepare, recipe, max(available() // jobs, 1), compiling, notify)

@@ -117,6 +117,17 @@ COMPILING = f"{'FTPROC_KERNELS is jit' if _WANTED else _missing()}: numba compil
 KERNELS: dict[str, Callable[..., Any]] = {}
 
 
+@functools.cache
+def _numba() -> Any:
+    """numba, without the settings that it reads from a file in the current directory: they would name the place of its
+    cache, which holds code. Those of the environment count."""
+    numba = importlib.import_module("numba")
+    settings: Any = importlib.import_module("numba.core.config")
+    settings._config_fname = os.devnull
+    settings.reload_config()
+    return numba
+
+
 def kernel(function: F) -> F:
     """Compile a function that Python calls, while other threads go on; to a type checker it stays what it was."""
     name = f"{function.__module__}.{function.__name__}".removeprefix("ftproc.core.").replace(".", "_")
@@ -124,10 +135,8 @@ def kernel(function: F) -> F:
     if WAY == "compiled":
         return cast(F, _checked(function, getattr(_LIBRARY, name)))
     if WAY == "jit":
-        from numba import njit
-
         function.__qualname__ += f"_{DIGEST}"  # part of the name under which numba keeps the machine code
-        return cast(F, njit(cache=True, nogil=True, **HOW)(function))
+        return cast(F, _numba().njit(cache=True, nogil=True, **HOW)(function))
     return function
 
 
@@ -148,9 +157,7 @@ def _checked(function: Callable[..., Any], compiled: Callable[..., Any]) -> Call
 def part(function: F) -> F:
     """Compile a function that kernels call."""
     if WAY == "jit":
-        from numba import njit
-
-        return cast(F, njit(**HOW)(function))
+        return cast(F, _numba().njit(**HOW)(function))
     return function
 
 

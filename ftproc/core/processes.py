@@ -1,4 +1,5 @@
-"""Worker processes that end with the process that started them, however it ends."""
+"""Worker processes that end with the process that started them, however it ends, and run no code that lies beside a
+log."""
 
 from __future__ import annotations
 
@@ -15,9 +16,12 @@ from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Any
 
+from ftproc.errors import InstallationError
+
 #: fork would copy the threads' locks but not the threads.
 CONTEXT = multiprocessing.get_context("spawn")
 
+_SAFE = "PYTHONSAFEPATH"
 GRACE_S = 5.0  # for a worker to remove its partial output
 _HELD = {getattr(signal, name) for name in ("SIGINT", "SIGHUP", "SIGQUIT", "SIGTERM") if hasattr(signal, name)}
 
@@ -30,7 +34,7 @@ class Workers:
     """
 
     def __init__(self, jobs: int, prepare: Callable[..., None] | None = None, *arguments: Any) -> None:
-        with unheard():
+        with starting():
             alive, self._held = CONTEXT.Pipe(duplex=False)
             self._pool = ProcessPoolExecutor(
                 jobs, mp_context=CONTEXT, initializer=_begin, initargs=(alive, prepare, arguments)
@@ -38,7 +42,7 @@ class Workers:
 
     def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """As of an executor; raises BrokenProcessPool after a worker has died."""
-        with unheard():
+        with starting():
             return self._pool.submit(_worked, work, *arguments)
 
     def __enter__(self) -> Workers:
@@ -54,9 +58,19 @@ class Workers:
 
 
 @contextlib.contextmanager
-def unheard() -> Iterator[None]:
-    """Processes started inside, also that with which multiprocessing follows its locks, never hear what a terminal
-    sends to all of them, and end through this process. It hears signals afterwards: a start is not cut in two."""
+def starting() -> Iterator[None]:
+    """Around everything that starts a process, also that with which multiprocessing follows its locks. Raises
+    InstallationError.
+
+    Such a process never hears what a terminal sends to all of them, and ends through this one. This one hears signals
+    afterwards: a start is not cut in two.
+    """
+    with _unheard(), _own_code():
+        yield
+
+
+@contextlib.contextmanager
+def _unheard() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -67,11 +81,32 @@ def unheard() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+@contextlib.contextmanager
+def _own_code() -> Iterator[None]:
+    """multiprocessing starts `python -c`, which looks for modules in the current directory first: a `signal.py` beside
+    the logs would run in every worker. This variable takes the directory away. Raises InstallationError where the
+    interpreter was told to ignore it."""
+    if sys.flags.ignore_environment and not sys.flags.safe_path:
+        raise InstallationError(
+            "python -E ignores PYTHONSAFEPATH, so worker processes would import modules from the current directory; "
+            "start Python with -P too, or use one process (--jobs 1)."
+        )
+    before = os.environ.get(_SAFE)
+    os.environ[_SAFE] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_SAFE]
+        else:
+            os.environ[_SAFE] = before
+
+
 def _begin(alive: Connection, prepare: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
     """In the worker, before its first task."""
 
     def begin() -> None:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # where `unheard` does nothing
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # where nothing can be held back
         signal.signal(signal.SIGTERM, _ended)
         if hasattr(signal, "pthread_sigmask"):
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})

@@ -128,7 +128,9 @@ def test_all_workers_dead(two_workers, flights, monkeypatch):
         worker.kill()
         worker.wait()
     monkeypatch.setattr(cluster, "PATIENCE_S", 3.0)
-    with pytest.raises(UsageError, match=r"it has no workers. Start one with `dask worker tcp://127.0.0.1:\d+ "):
+    with pytest.raises(
+        UsageError, match=r"it has no workers. Start one with `PYTHONSAFEPATH=1 dask worker tcp://127.0.0.1:\d+ "
+    ):
         next(run.run(_tasks(flights, "none"), Recipe(), scheduler=two_workers.address))
 
 

@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "out" / "readme"  # the output of commands that take long
 
 #: The program and the interpreter are those that run this, whatever is installed.
-_NAMES = f'ftproc() {{ "{sys.executable}" -m ftproc "$@"; }}; python() {{ "{sys.executable}" "$@"; }}; '
+_NAMES = f'ftproc() {{ "{sys.executable}" -P -m ftproc "$@"; }}; python() {{ "{sys.executable}" "$@"; }}; '
 
 
 class Shell:

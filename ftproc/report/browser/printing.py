@@ -38,13 +38,20 @@ def is_pdf(target: Target) -> bool:
 
 def require_browser(target: Target) -> str:
     """The program that prints the page `target`. Raises UsageError when none is on the PATH."""
-    found = next((path for name in BROWSERS if (path := shutil.which(name)) is not None), None)
+    found = next((path for name in BROWSERS if (path := _installed(name)) is not None), None)
     if found is None:
         raise UsageError(
             f"{target}: a PDF is printed by Chromium, Google Chrome or Microsoft Edge, and none of them is on the "
             "PATH; install one (Debian: apt-get install chromium), or end the name in .html."
         )
     return found
+
+
+def _installed(name: str) -> str | None:
+    """The program of that name on the PATH, but never one in the current directory, where logs lie: a PATH may name
+    it, and Windows looks there first."""
+    found = shutil.which(name)
+    return None if found is None or Path(found).parent.resolve() == Path.cwd() else found
 
 
 def write(text: str, target: Target) -> None:
