@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import csv
 import io
+import unicodedata
 from pathlib import Path
 
 import pyarrow as pa
@@ -72,15 +73,20 @@ def test_the_search_finds_them(source: str) -> None:
     assert offences(source)
 
 
-FORMULAS = ["=1+1", "+cmd|' /C calc'!A0", "-2+3", "@SUM(A1)", "\t=1", "\r=1", "=", "-", "+1e5x"]
-HARMLESS = ["-5", "+5", "-1.5e-3", "-.5", "a=b", "Höhe", "", "'=1", "5-3"]
+#: Of the characters that show nothing, and of what looks like a sign, as Unicode knows them.
+UNSEEN = [chr(c) for c in range(0x110000) if unicodedata.category(chr(c)) in ("Cc", "Cf", "Zs", "Zl", "Zp")]
+SIGNS = [chr(c) for c in range(0x110000) if unicodedata.normalize("NFKC", chr(c))[:1] in tuple("=+-@")]
+BEFORE = ["   ", "\xa0", "\u200b", "\ufeff", " \u200b\xa0 ", "\u2060\t", "\x00", "\u3164"]
+FORMULAS = [f"{unseen}=1+1" for unseen in [*UNSEEN, *BEFORE]]
+FORMULAS += [f"{before}{sign}cmd|'!A0" for sign in SIGNS for before in ("", " ")]
+FORMULAS += ["=1+1", "+cmd|' /C calc'!A0", "-2+3", "@SUM(A1)", "\t=1", "\r=1", "=", "-", "+1e5x"]
+HARMLESS = ["-5", "+5", "-1.5e-3", "-.5", "a=b", "Höhe", "", "'=1", "5-3", " -5", "\xa0-1e3 ", " x", "\ufefftime"]
 
 
-@pytest.mark.parametrize("kind", [pa.string(), pa.large_string()])
+@pytest.mark.parametrize("kind", [pa.string(), pa.large_string(), pa.binary(), pa.dictionary(pa.int32(), pa.string())])
 def test_text_is_no_formula_and_numbers_stay_numbers(kind: pa.DataType) -> None:
-    table = pa.table(
-        {"=name": pa.array([*FORMULAS, *HARMLESS, None], kind), "n": [-1.5] * (len(FORMULAS + HARMLESS) + 1)}
-    )
+    texts = pa.array([*FORMULAS, *HARMLESS, None])
+    table = pa.table({"=name": texts.cast(kind), "n": [-1.5] * len(texts)})
     sink = io.BytesIO()
     tables.write_stream(table, sink, ".csv")
     found = list(csv.reader(io.StringIO(sink.getvalue().decode(), newline="")))

@@ -24,6 +24,8 @@ from ftproc.records import FloatArray, Trajectory
 _DEGREES, _METRES = 9, 4  # decimals: a tenth of a millimetre
 _ASSUMED_EPOCH = "2000-01-01T00:00:00Z"  # of a log without a date; CZML needs one
 _XML = '<?xml version="1.0" encoding="UTF-8"?>'
+#: Viewers of GeoJSON and CZML put names into pages: they hold nothing that a page could take for an element or its end.
+_NO_MARKUP = str.maketrans("<>&\"'", "\u2039\u203a+\u201d\u2019")
 _NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
 
 
@@ -71,9 +73,10 @@ def _track(trajectory: Trajectory, kind: str) -> Track:
     estimated = np.isfinite(place).all(1)
     if not estimated.any():
         raise InputError(f"{trajectory.name}: no position could be estimated, so there is nothing to draw on a map.")
+    name = _NOT_XML.sub("?", encodable(Path(trajectory.name).name))
     how = "smoothed" if settings.get("smooth") else "filtered"
     return Track(
-        _NOT_XML.sub("?", encodable(Path(trajectory.name).name)),
+        name if kind == ".kml" else name.translate(_NO_MARKUP),
         f"{how} by {metadata['method']}, ftproc {metadata['version']}",
         trajectory.time_s[estimated], place[estimated], _pieces(place, estimated), (site[1], site[0], site[2]),
         settings.get("geoid_m"), str(metadata.get("epoch", "")),

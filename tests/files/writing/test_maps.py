@@ -109,8 +109,20 @@ def test_names_cannot_break_the_text():
     odd = "a<b>&\"c'.csv"
     assert kml(flight()).find(".//k:MultiGeometry/../k:name", KML).text == odd
     assert kml(flight(name="bell\x07.csv")).find("k:Document/k:name", KML).text == "bell?.csv"
-    assert json.loads(maps.as_bytes(flight(), ".geojson"))["features"][1]["properties"]["name"] == odd
-    assert json.loads(maps.as_bytes(flight(), ".czml"))[2]["name"] == odd
+    assert json.loads(maps.as_bytes(flight(), ".geojson"))["features"][1]["properties"]["name"] == "a‹b›+”c’.csv"
+
+
+@pytest.mark.parametrize("name", ["<img src=x onerror=alert(1)>.csv", "a</script>.csv", "&lt;img&gt;.csv", "\"'`.csv"])
+@pytest.mark.parametrize("kind", [".geojson", ".czml"])
+def test_a_name_is_no_element_of_a_page(name, kind):
+    """A viewer may put it there as it is."""
+    for epoch in ("", "2024-05-31T00:00:00Z"):
+        text = maps.as_bytes(flight(name=name, epoch=epoch), kind).decode()
+        assert not set("<>&'") & set(text)
+        found = json.loads(text)
+        named = found["features"][1]["properties"]["name"] if kind == ".geojson" else found[2]["name"]
+        assert named.endswith(".csv")
+        assert not set("<>&\"'") & set(named)
 
 
 def test_gaps_part_the_line_and_lone_places_make_none():
