@@ -9,15 +9,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import hashlib
 import importlib.metadata
 import logging
 import os
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -27,9 +30,12 @@ from ftproc.config.recipe import Recipe
 from ftproc.core.threads import use
 from ftproc.correction import model_file
 from ftproc.errors import Failure, UsageError, failure
+from ftproc.files import layout, remote
 from ftproc.settings import NO_MODEL
 
 REACHED_S = 1.0  # for the machine of a scheduler to accept a connection
+SEEN_S = 5.0  # for what a worker has written to be seen here
+_LOOK_S, _END = 0.2, 1 << 16  # bytes
 PATIENCE_S = 10.0  # for a scheduler to answer, and for a first worker
 _PROTOCOLS = ("tcp", "tls", "ws", "wss")
 _START = "Start one with `PYTHONSAFEPATH=1 dask worker {0} --nthreads 1`, and more for more logs at a time."
@@ -57,6 +63,7 @@ def pool(recipe: Recipe, address: str) -> Iterator[Submit]:
     with _quiet(), contextlib.closing(_connect(distributed, address)) as client:
         _check_workers(client, address)
         futures: list[Any] = []
+        unseen: list[str] = []
 
         def submit(task: Task) -> Callable[[], Outcome]:
             if "-" in (task.log, task.output):
@@ -64,7 +71,7 @@ def pool(recipe: Recipe, address: str) -> Iterator[Submit]:
             here = replace(task, place=os.getcwd())  # noqa: PTH109
             future = client.submit(_work, here, carried, ftproc.__version__, pure=False)
             futures.append(future)
-            return partial(_outcome, distributed, future, task, address)
+            return partial(_outcome, distributed, future, task, address, unseen)
 
         try:
             yield submit
@@ -143,22 +150,61 @@ def _differs(worker: str, found: str | None, wanted: str) -> str:
     return f"the worker {worker} has {has}, this is ftproc {wanted}; {_CURE.format(wanted)}"
 
 
-def _work(task: Task, recipe: Recipe, version: str) -> Outcome:
-    """On the worker, which may have joined after the versions were checked."""
+def _work(task: Task, recipe: Recipe, version: str) -> tuple[Outcome, dict[str, str]]:
+    """On the worker, which may have joined after the versions were checked. Also what it has written, see `_marks`."""
     if ftproc.__version__ != version:
         from distributed import get_worker
 
         message = f"{task.log}: {_differs(get_worker().address, ftproc.__version__, version)}"
-        return Outcome(task, failure=Failure(message, 1, ""))
+        return Outcome(task, failure=Failure(message, 1, "")), {}
     use(1)  # Dask runs one task for each thread of the machine
-    return filter_one(task, recipe)
+    outcome = filter_one(task, recipe)
+    return outcome, _marks(task) if outcome.failure is None else {}
 
 
-def _outcome(distributed: Any, future: Any, task: Task, address: str) -> Outcome:
-    """Waits for the outcome. Dask gives the task of a worker that died to another one, a few times."""
+def _marks(task: Task) -> dict[str, str]:
+    """The files of a task that are there, with what tells them from earlier ones: a digest of their size and ends. What
+    is stored elsewhere under a URI is not among them."""
+    names = (task.output, layout.sidecar(task.output), task.report)
+    found = {}
+    for name in map(str, filter(None, names)):
+        path = remote.local(task.at(name))
+        with contextlib.suppress(OSError):
+            if path is not None and path.is_file():
+                found[name] = _mark(path)
+    return found
+
+
+def _mark(path: Path) -> str:
+    with path.open("rb") as stream:
+        size = stream.seek(0, os.SEEK_END)
+        ends = []
+        for place in (0, max(size - _END, 0)):
+            stream.seek(place)
+            ends.append(stream.read(_END))
+    return hashlib.blake2b(b"".join(ends), salt=size.to_bytes(16, "little"), digest_size=16).hexdigest()
+
+
+def _arrived(outcome: Outcome, written: dict[str, str], unseen: list[str]) -> Outcome:
+    """The outcome, if this machine sees what the worker has written: a network file system may take its time, for which
+    only the first of `unseen` is waited. Else the failure that it is."""
+    until = time.monotonic() + (0 if unseen else SEEN_S)
+    while written != (here := _marks(outcome.task)):
+        if time.monotonic() > until:
+            name = next(name for name in written if written[name] != here.get(name))
+            unseen.append(name)
+            why = f"a worker has written {name}, and this machine does not find it there; give -o a directory that"
+            return _failed(outcome.task, f"{why} the workers share with it, or a URI.", FileNotFoundError(name))
+        time.sleep(_LOOK_S)
+    return outcome
+
+
+def _outcome(distributed: Any, future: Any, task: Task, address: str, unseen: list[str]) -> Outcome:
+    """Waits for the outcome. Dask gives the task of a worker that died to another one, a few times. unseen: files that
+    workers have written, but not where this machine finds them; gets another one."""
     try:
-        outcome: Outcome = future.result()
-        return replace(outcome, task=task)
+        outcome, written = future.result()
+        return _arrived(replace(outcome, task=task), written, unseen)
     except distributed.KilledWorker as error:
         return _failed(task, "every worker that took it died (out of memory, or killed). Split the log.", error)
     except CancelledError as error:

@@ -123,6 +123,24 @@ def test_the_log_of_a_worker_that_dies_is_done_by_the_other(two_workers, flights
     assert _contents("shared") == _contents("alone")
 
 
+def test_an_output_that_only_the_worker_has(two_workers, flights, monkeypatch, tmp_path):
+    """Where it has a directory of the same name that is another one: here it finds none, or an earlier file."""
+    (tmp_path / "theirs").mkdir()
+    monkeypatch.setattr(cluster, "SEEN_S", 0.3)
+    monkeypatch.setattr(cluster.os, "getcwd", lambda: str(tmp_path / "theirs"))
+    tasks = [Task(str(tmp_path / name), f"{name}.out.csv") for name in flights[:2]]
+    Path("1.csv.out.csv").write_bytes(b"earlier")
+    missing, older = run.run(tasks, Recipe(), scheduler=two_workers.address)
+    for outcome, name in ((missing, "0.csv.out.csv"), (older, "1.csv.out.csv")):
+        assert outcome.failure is not None
+        assert outcome.failure.exit_code == 1
+        assert outcome.failure.message == (
+            f"{outcome.task.log}: a worker has written {name}, and this machine does not find it there; give -o a "
+            "directory that the workers share with it, or a URI."
+        )
+        assert (tmp_path / "theirs" / name).exists()
+
+
 def test_all_workers_dead(two_workers, flights, monkeypatch):
     for worker in two_workers.workers:
         worker.kill()
@@ -171,7 +189,7 @@ def test_a_log_that_kills_every_worker_is_named():
         def release(self) -> None:
             pass
 
-    outcome = cluster._outcome(distributed, Future(), Task("a.csv", "b.csv"), "tcp://there:1")
+    outcome = cluster._outcome(distributed, Future(), Task("a.csv", "b.csv"), "tcp://there:1", [])
     assert outcome.failure is not None
     assert outcome.failure.message.startswith("a.csv: every worker that took it died (out of memory, or killed).")
     assert "KilledWorker" in outcome.failure.trace
