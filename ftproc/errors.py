@@ -142,11 +142,13 @@ def _short_of_memory(error: BaseException) -> bool:
     )
 
 
-def stdout_fault(error: OSError) -> str:
-    """The sentence for a standard output that takes nothing more."""
+def stdout_fault(error: OSError, lost: str = "the result is lost") -> str:
+    """The sentence for a standard output that takes nothing more. lost: what is, and what is not."""
+    if error.errno == errno.ETIMEDOUT:
+        return f"standard output: its reader takes nothing, so {lost}; read it, or send it to a file."
     if error.errno == errno.EBADF:
-        return "standard output is closed, so the result is lost; leave it open, or send it to a file."
-    return f"standard output: {(error.strerror or str(error)).lower()}, so the result is lost; send it elsewhere."
+        return f"standard output is closed, so {lost}; leave it open, or send it to a file."
+    return f"standard output: {(error.strerror or str(error)).lower()}, so {lost}; send it elsewhere."
 
 
 @dataclass(frozen=True)

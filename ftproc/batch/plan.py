@@ -1,4 +1,4 @@
-"""Where each trajectory and each report goes: the rules of `-o` and `--report`, and that no input is overwritten."""
+"""Where each trajectory and each report goes: the rules of `-o` and `--report`."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ftproc.batch.tasks import Task
-from ftproc.errors import OutputError, UsageError
+from ftproc.errors import UsageError
 from ftproc.files import layout, remote
-from ftproc.files.writing import atomic, trajectories
+from ftproc.files.writing import outputs
+from ftproc.files.writing.outputs import Output
 
 INDEX = "index.html"
+#: What stands at the beginning of an index page.
+INDEX_BEGINS = (b"<!DOCTYPE html>", b"<title>Reports</title>")
 _REPORT = "--report"
 _PAGES = (".html", ".htm", ".pdf")
 #: Ending of the trajectory's name by that of the log's, where it is not .csv.
@@ -23,14 +26,12 @@ def tasks(
     logs: Sequence[str],
     output: str | None,
     methods: Sequence[str] | None = None,
-    inputs: Sequence[str] = (),
     targets: Mapping[str, Sequence[str]] | None = None,
 ) -> list[Task]:
-    """One task per log, or per log, target and method, with its output; makes the directory.
+    """One task per log, or per log, target and method, with its output.
 
-    methods: names of methods, which the names of the outputs then contain. inputs: other files not to be overwritten.
-    targets: COLUMN=VALUE of the targets of each log, whose values the names of the outputs then contain.
-    Raises UsageError, OutputError.
+    methods: names of methods, which the names of the outputs then contain. targets: COLUMN=VALUE of the targets of each
+    log, whose values the names of the outputs then contain. Raises UsageError.
     """
     if "-" in logs and len(logs) > 1:
         raise UsageError("- stands for one log on standard input; it cannot be mixed with other logs.")
@@ -46,12 +47,28 @@ def tasks(
         for target in (targets or {}).get(log, ("",))
         for method in (methods or (None,))
     ]
-    _check(planned, [*logs, *inputs])
-    if directory is not None and not remote.is_uri(directory):
-        _make(Path(directory))
+    taken: dict[str, str] = {}
     for task in planned:
-        trajectories.check(task.output)
+        if task.output in taken:
+            raise UsageError(
+                f"{taken[task.output]} and {task.log} would both be written to {task.output}; "
+                "give them different names or filter them one by one."
+            )
+        taken[task.output] = task.log
     return planned
+
+
+def written(tasks: Sequence[Task], output: str | None, index: str | None) -> list[Output]:
+    """All files of these tasks, and the index page if there is one. output: the value of `-o`."""
+    made = [output is not None and task.output != output for task in tasks]
+    found = [each for task, new in zip(tasks, made, strict=True) for each in outputs.trajectory(task.output, new)]
+    return [*found, *pages_written([task.report for task in tasks], index)]
+
+
+def pages_written(pages: Sequence[str | None], index: str | None) -> list[Output]:
+    """The pages, and the index page if there is one, in whose directory they are."""
+    found = [Output(page, _REPORT, made=index is not None) for page in pages if page is not None]
+    return found if index is None else [*found, Output(index, _REPORT, made=True, ours=INDEX_BEGINS)]
 
 
 def _directory(output: str, several: bool) -> str | None:
@@ -91,41 +108,10 @@ def _stem_and_kind(name: str) -> tuple[str, str]:
     return path.stem, path.suffix.lower()
 
 
-def _check(tasks: Sequence[Task], inputs: Sequence[str]) -> None:
-    taken: dict[str, str] = {}
-    for task in tasks:
-        if task.output in taken:
-            raise UsageError(
-                f"{taken[task.output]} and {task.log} would both be written to {task.output}; "
-                "give them different names or filter them one by one."
-            )
-        taken[task.output] = task.log
-        beside = layout.sidecar(task.output)
-        for target in (task.output, *(() if beside is None else (beside,))):
-            atomic.refuse_overwriting(target, inputs)
+def pages(names: Sequence[str], report: str | None) -> tuple[list[str | None], str | None]:
+    """The page of each trajectory, and the index page if there is one.
 
-
-def _make(directory: Path, option: str = "-o") -> None:
-    """Make a directory for outputs unless it exists. Raises OutputError."""
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except FileExistsError as error:
-        if not directory.is_file():
-            cure = "end the name of a file in its kind, such as .csv; for no file, use -o - > /dev/null."
-            raise OutputError(f"{directory}: this is a device, not a directory; {cure}") from error
-        raise OutputError(f"{directory}: this is a file, not a directory; give another name with {option}.") from error
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise OutputError(
-            f"{directory}: the directory cannot be made ({reason}); give another with {option}."
-        ) from error
-
-
-def pages(names: Sequence[str], report: str | None, inputs: Sequence[str] = ()) -> tuple[list[str | None], str | None]:
-    """The page of each trajectory, and the index page if there is one; makes the directory.
-
-    names: the trajectories' files, by which the pages are named. report: the option's value. inputs: files not to be
-    overwritten, beside the trajectories. Raises UsageError, OutputError.
+    names: the trajectories' files, by which the pages are named. report: the option's value. Raises UsageError.
     """
     if report is None:
         return [None] * len(names), None
@@ -137,13 +123,6 @@ def pages(names: Sequence[str], report: str | None, inputs: Sequence[str] = ()) 
     twice = [page for page in named if named.count(page) > 1]
     if twice:
         raise UsageError(f"{_REPORT}: {twice[0]} would be the page of two trajectories; report them one by one.")
-    beside = [str(found) for name in names if (found := layout.sidecar(name)) is not None]
-    for target in [*named, *([index] if index else [])]:
-        atomic.refuse_overwriting(target, [*inputs, *names, *beside], _REPORT)
-    if directory is not None:
-        _make(directory, _REPORT)
-    for page in named:
-        atomic.check_target(page)
     return list(named), index
 
 

@@ -66,7 +66,7 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
     from ftproc.core import compiled
     from ftproc.correction import model_file
     from ftproc.files.reading import logs
-    from ftproc.files.writing import clock, geodesy, trajectories
+    from ftproc.files.writing import atomic, clock, geodesy, trajectories
     from ftproc.methods import registry
     from ftproc.quality import summary
 
@@ -83,7 +83,8 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
         else:
             model = model_for(registry.named(task.method), recipe.model)
         filtering = pipeline.Filtering(log, settings, model)
-        with compiled.announced(notify), _forwarded(task.log, notify):
+        guarded = atomic.guarding([task.at(task.log)])
+        with compiled.announced(notify), _forwarded(task.log, notify), guarded:
             parts = (clock.stamped(geodesy.located(part, settings), log) for part in filtering.parts())
             if task.report is None:
                 trajectories.write_parts(parts, lambda: filtering.metadata, task.at(task.output))

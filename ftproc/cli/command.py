@@ -9,6 +9,8 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from ftproc.cli import process
+
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 DEBUG = "--debug"
 
@@ -34,6 +36,10 @@ class Command(click.Command):
         super().__init__(*args, **attributes)
         self.examples, self.more = examples, more
         self.params.append(debug_option())
+
+    def invoke(self, ctx: click.Context) -> Any:
+        process.check_directory()
+        return super().invoke(ctx)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         if self.more is not None:

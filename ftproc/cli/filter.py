@@ -161,7 +161,8 @@ def command(list_methods: str | None, write_config: bool, explain: bool, follow:
         from ftproc.live.publishing import follow_log
 
         recipe = filtering.followed_recipe(ctx)
-        said = follow_log(options["logs"], options["output"], recipe, follow, filtering.notify)
+        config = [options["config"]] if options["config"] is not None else []
+        said = follow_log(options["logs"], options["output"], recipe, follow, filtering.notify, config)
         if options["summary"] != "none":
             filtering.notify(said)
     else:

@@ -12,7 +12,7 @@ import click
 from ftproc import report
 from ftproc.batch import plan, run
 from ftproc.batch.tasks import Outcome, model_for
-from ftproc.cli import explaining
+from ftproc.cli import explaining, process
 from ftproc.cli.command import stated
 from ftproc.cli.progress import Progress
 from ftproc.config import reading, writing
@@ -20,7 +20,7 @@ from ftproc.config.recipe import Recipe
 from ftproc.errors import InputError, UsageError, printable
 from ftproc.files import conventions
 from ftproc.files.options import ABSENT, parse_columns, parse_units, parse_where, parse_widths
-from ftproc.files.writing import geodesy, maps
+from ftproc.files.writing import geodesy, maps, outputs
 from ftproc.files.writing.trajectories import plain
 from ftproc.methods import registry
 from ftproc.methods.registry import EVERY
@@ -123,11 +123,12 @@ def filter_logs(request: Request, recipe: Recipe, debug: bool) -> int:
     named = (name for name in (recipe.model, request.config) if isinstance(name, str))
     inputs = [name for name in named if name not in (PACKAGED, NO_MODEL)]
     targets = _targets(request.logs, recipe)
-    tasks = plan.tasks(request.logs, request.output, methods, inputs, targets)
+    tasks = plan.tasks(request.logs, request.output, methods, targets)
     for task in tasks:
         maps.check(task.output, recipe.settings.site)
-    pages, index = plan.pages([task.output for task in tasks], request.report, [*request.logs, *inputs])
+    pages, index = plan.pages([task.output for task in tasks], request.report)
     tasks = [replace(task, report=page) for task, page in zip(tasks, pages, strict=True)]
+    outputs.check(plan.written(tasks, request.output, index), [*request.logs, *inputs])
     if readings := conventions.in_words(recipe.station):
         notify(f"readings: {', '.join(readings)}")
     if recipe.settings.site is not None:
@@ -140,17 +141,18 @@ def filter_logs(request: Request, recipe: Recipe, debug: bool) -> int:
             progress.clear()
             try:
                 _show(outcome, request.summary, debug)
-            except BrokenPipeError:
-                raise
             except OSError as error:  # a full or closed standard output: the other logs do not need it
                 unsaid = error
             progress("filtering", len(done), len(tasks))
     if index is not None:
         _write_index(done, index)
     if request.summary == "json":
-        _show_json(done)
+        try:
+            _show_json(done)
+        except OSError as error:
+            unsaid = error
     if unsaid is not None:
-        raise unsaid
+        raise process.unsaid(unsaid, [o.task.output for o in done if o.failure is None and o.task.output != "-"])
     failures = [outcome.failure.exit_code for outcome in done if outcome.failure is not None]
     return failures[0] if len(done) == 1 and failures else int(bool(failures))
 

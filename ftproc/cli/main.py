@@ -14,6 +14,7 @@ from ftproc import __version__
 from ftproc.cli import process
 from ftproc.cli.command import CONTEXT, DEBUG, debug_option, write_examples
 from ftproc.errors import failure, interruption, nearest, quoted
+from ftproc.files.writing import streams
 
 COMMANDS = ("simulate", "train", "filter", "score")
 
@@ -51,6 +52,12 @@ class Program(click.Group):
             ctx.fail(f'There is no command "{name}"{nearest(name, COMMANDS) or "."}')
         return super().resolve_command(ctx, args)
 
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as error:  # of which click would print something, where that may not be read
+            raise click.Abort from error
+
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         write_examples(formatter, _EXAMPLES)
 
@@ -60,14 +67,12 @@ class Program(click.Group):
         extra["standalone_mode"] = False
         try:
             code = super().main(arguments, prog_name or "ftproc", **extra)
-            if not code:
-                sys.stdout.flush()  # raises for a full disk behind a redirection
         except (Exception, KeyboardInterrupt) as error:
             stop = interruption(error)
             if isinstance(stop, SystemExit):
                 raise stop from None
-            code = _report(stop or error, DEBUG in arguments)  # not from the context: parsing may have failed
-        process.empty_stdout()
+            with streams.given_up(lambda: True):  # standard error may go where standard output stalls
+                code = _report(stop or error, DEBUG in arguments)  # not from the context: parsing may have failed
         sys.exit(code if isinstance(code, int) else 0)
 
 

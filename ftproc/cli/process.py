@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import os
 import signal
 import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from ftproc.errors import OutputError, UsageError, stdout_fault
+from ftproc.files.writing import streams
 
 #: Each ends the program through every `finally`, so that no partial output remains.
 _ENDING = ("SIGTERM", "SIGHUP", "SIGQUIT", "SIGXCPU")
@@ -26,10 +30,11 @@ def _ended(signum: int, frame: object) -> None:
 
 
 def open_streams() -> None:
-    """Occupy the descriptors of standard streams that are closed, so that no file that is opened later gets one, and
-    receives what belongs to the stream.
+    """Streams that write all that they are given, at once, or fail; messages that standard error does not take are
+    dropped. Nothing is left for Python to write at exit.
 
-    Messages to a closed standard error are dropped. Reading a closed input and writing a closed output fail with EBADF.
+    The descriptors of streams that are closed are occupied, so that no file that is opened later gets one, and receives
+    what belongs to the stream. Reading a closed input and writing a closed output fail with EBADF.
     """
     for descriptor, mode in ((0, os.O_WRONLY), (1, os.O_RDONLY), (2, os.O_WRONLY)):
         try:
@@ -42,15 +47,27 @@ def open_streams() -> None:
         sys.stdout = open(1, "w", closefd=False)  # noqa: SIM115
     if sys.stderr is None:
         sys.stderr = open(2, "w", closefd=False)  # noqa: SIM115
+    sys.stdout, sys.stderr = streams.text(sys.stdout), streams.text(sys.stderr, lost=True)
 
 
-def empty_stdout() -> None:
-    """Discard what a standard output that is full or closed did not take: Python would try again at exit, and fail."""
+def check_directory() -> None:
+    """Raise UsageError if the current directory is there no more: names that are relative to it mean nothing, and the
+    system blames whatever file is looked for."""
     try:
-        sys.stdout.flush()
-    except OSError:
-        with contextlib.suppress(OSError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        Path.cwd()
+    except OSError as error:
+        raise UsageError(
+            "the current directory is there no more (deleted, or moved away); change to another one with cd, and run "
+            "again."
+        ) from error
+
+
+def unsaid(error: OSError, whole: Sequence[str], what: str = "summary") -> Exception:
+    """The error for what could not be printed about files that are whole; that of a reader that has left stays."""
+    if isinstance(error, BrokenPipeError) or not whole:
+        return error
+    kept = f"{whole[0]} is whole" if len(whole) == 1 else f"the {len(whole)} files written before are whole"
+    return OutputError(stdout_fault(error, f"only the {what} is lost, and {kept}"))
 
 
 def leave_memory() -> None:

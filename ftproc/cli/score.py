@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ftproc.cli import options
+from ftproc.cli import options, process
 from ftproc.cli.command import Command
 
 if TYPE_CHECKING:
@@ -57,14 +57,18 @@ def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: 
     from ftproc import report as pages
     from ftproc.batch import plan
     from ftproc.errors import InputError
+    from ftproc.files import layout
     from ftproc.files.reading import trajectories as trajectory_files
+    from ftproc.files.writing import outputs
     from ftproc.report.index import Entry, write
     from ftproc.scoring import render, score
     from ftproc.scoring.matching import exchanged_axes
 
     if report is not None:
         pages.check(report)
-    places, index = plan.pages(trajectories, report, truths)
+    places, index = plan.pages(trajectories, report)
+    beside = [found for name in trajectories if (found := layout.sidecar(name)) is not None]
+    outputs.check(plan.pages_written(places, index), [*trajectories, *truths, *beside])
     scores, entries, failed = [], [], False
     known: dict[str, Truth] = {}
     for number, (name, place) in enumerate(zip(trajectories, places, strict=True)):
@@ -84,7 +88,11 @@ def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: 
     if index is not None:
         write(entries, index)
     if scores:
-        click.echo(render(scores, form), nl=False)
+        try:
+            click.echo(render(scores, form), nl=False)
+        except OSError as error:
+            written = [entry.page for entry in entries if entry.page is not None]
+            raise process.unsaid(error, written, "table of scores") from error
     return int(failed)
 
 

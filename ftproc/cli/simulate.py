@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import click
@@ -96,15 +95,11 @@ def command(
 
 def _check(output: str, truth: str | None) -> None:
     """Raises UsageError or OutputError when the two cannot both be written."""
-    from ftproc.files.writing import atomic, tables
+    from ftproc.files.writing import outputs, tables
 
-    for target in (output, truth):
-        if target is not None:
-            tables.kind_of(target)
-            atomic.check_target(target)
-    if truth is not None and (output == truth or _resolved(output) == _resolved(truth)):
-        raise UsageError(f"-o and --truth are both {output}; give the truth another name.")
-
-
-def _resolved(target: str) -> str:
-    return target if target == "-" else str(Path(target).resolve())
+    named = [(output, "-o"), *([(truth, "--truth")] if truth is not None else [])]
+    for target, _ in named:
+        tables.kind_of(target)
+    if output == truth == outputs.STREAM:
+        raise UsageError("-o and --truth are both -; give the truth another name.")
+    outputs.check([outputs.Output(*each) for each in named], [])

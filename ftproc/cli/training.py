@@ -9,6 +9,7 @@ import click
 import numpy as np
 
 from ftproc import api
+from ftproc.cli import process
 from ftproc.cli.progress import Progress
 from ftproc.core import compiled
 from ftproc.correction import model, model_file
@@ -16,7 +17,8 @@ from ftproc.correction.training import stages, study
 from ftproc.correction.training.flights import filtered_flights, train_flights
 from ftproc.errors import UsageError
 from ftproc.files.reading import truth as truth_files
-from ftproc.files.writing import atomic
+from ftproc.files.writing import outputs
+from ftproc.files.writing.outputs import Output
 from ftproc.records import MeasurementLog, Truth
 from ftproc.settings import EPOCHS, FilterSettings, Noise, TrainSettings
 from ftproc.simulation import simulate
@@ -69,10 +71,8 @@ def run(request: Request) -> None:
         raise UsageError("-o -: a model is not written to standard output; name a file.")
     if settings.features not in (choices := stages.feature_choices()):
         raise UsageError(f"there is no feature set {settings.features!r}; choose one of {', '.join(choices)}")
-    if output is not None:
-        inputs = [*request.logs, *request.truths, *([request.config] if request.config else [])]
-        atomic.refuse_overwriting(output, inputs)
-        atomic.check_target(output)
+    inputs = [*request.logs, *request.truths, *([request.config] if request.config else [])]
+    outputs.check([Output(output)] if output is not None else [], inputs)
     with Progress() as progress, compiled.announced(lambda text: click.echo(f"ftproc: {text}", err=True)):
         pairs = _read(request) if request.scenario is None else _simulated(request.scenario, settings, progress)
         if output is None:  # --compare-starts
@@ -82,7 +82,10 @@ def run(request: Request) -> None:
             trained = train_flights(pairs, settings, request.filtering, progress, request.jobs)
             model_file.save(trained, output)
             text = model.card(model_file.load(output))  # of the file, as a reader gets it
-    click.echo(text)
+    try:
+        click.echo(text)
+    except OSError as error:
+        raise process.unsaid(error, [] if output is None else [output], "model's card") from error
 
 
 def _read(request: Request) -> list[tuple[MeasurementLog, Truth]]:

@@ -26,9 +26,11 @@ def is_uri(name: object) -> bool:
 
 
 def local(name: object) -> Path | None:
-    """The path of a name on this machine (also of file:///...), or None if it is on another."""
+    """The path of a name on this machine (also of file:///... and local://...), or None if it is on another."""
     if not is_uri(name):
         return Path(cast(str, name))
+    if str(name).lower().startswith("local://"):  # as fsspec reads it: the rest is a path as it stands
+        return Path(str(name)[len("local://") :])
     parts = urlsplit(str(name))
     return Path(unquote(parts.path)) if parts.scheme.lower() == "file" else None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import count, pairwise
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +17,17 @@ from ftproc.config.kinds import number, text
 from ftproc.config.recipe import Recipe
 from ftproc.core.model.earth import Geodetic, seen_from
 from ftproc.errors import UsageError, nearest
+from ftproc.files import layout, remote
+from ftproc.files.writing import atomic
 from ftproc.records import FloatArray
 
 MAKER = "--fuse --write-config LOG..."
 FARTHEST_M = 500_000.0  # of a station from the origin
 SMALLEST = number(0.0)
+_WITHOUT_PARTS = (  # endings of files in which # names nothing
+    *(".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".prn", ".gsi", ".parquet", ".feather"),
+    *(".arrow", ".arrows", ".ipc", ".jsonl", ".ndjson", ".json", ".npy", ".npz"),
+)
 _SIGMA = "1-sigma of what is not known beforehand, 0: known"
 
 _DEGREES = {
@@ -48,6 +54,7 @@ STATION: Mapping[str, Key] = {
 class Instrument:
     """A station of the range. log: its file. recipe: how that is read. options: as in a station file. place (3,) east,
     north, up at the origin m; axes (3, 3) its own east, north, up. prior (6,): 1-sigma m, rad, rad, tilts rad, clock s.
+    config: its station file, or "".
     """
 
     name: str
@@ -58,6 +65,7 @@ class Instrument:
     axes: FloatArray
     prior: FloatArray
     site: Geodetic | None
+    config: str = ""
 
 
 @dataclass(frozen=True)
@@ -67,6 +75,12 @@ class Range:
     path: str
     origin: Geodetic | None
     instruments: tuple[Instrument, ...]
+
+    @property
+    def inputs(self) -> list[str]:
+        """All files that are read."""
+        files = (name for each in self.instruments for name in (each.log, each.config))
+        return [self.path, *filter(None, files)]
 
 
 def load(path: str) -> Range:
@@ -85,10 +99,31 @@ def load(path: str) -> Range:
             f"{path}: there is no station; write a section [station.NAME] for each, with its log and place."
         )
     found = tuple(_instrument(path, origin, name, keys) for name, keys in stations.items())
-    for one, other in pairwise(sorted(found, key=lambda each: str(Path(each.log).resolve()))):
-        if Path(one.log).resolve() == Path(other.log).resolve():
-            raise UsageError(f"{path}: {one.name} and {other.name} have the same log, {one.log}; name the log of each.")
+    _check_logs(path, found)
     return Range(path, origin, found)
+
+
+def _check_logs(path: str, stations: Sequence[Instrument]) -> None:
+    """Raise UsageError if two stations have the same log, under whatever names. Two groups of one file are two logs."""
+    known: dict[object, list[tuple[str, Instrument]]] = {}
+    for each in stations:
+        file, part = _source(each.log)
+        others = known.setdefault(file, [])
+        for other_part, other in others:
+            if part == other_part or not (part and other_part):
+                raise UsageError(
+                    f"{path}: {other.name} and {each.name} have the same log, {each.log}; name the log of each."
+                )
+        others.append((part, each))
+
+
+def _source(log: str) -> tuple[object, str]:
+    """The identity of a log's file, and the part of it that # names, where its kind has parts."""
+    path = remote.local(log)
+    whole, mark, part = log.rpartition("#")
+    if not mark or (path is not None and path.exists()):
+        return atomic.identity(log), ""
+    return atomic.identity(whole), "" if layout.ending(whole, _WITHOUT_PARTS) else part.strip("/")
 
 
 def _once(content: str, path: str) -> str:
@@ -125,7 +160,8 @@ def _instrument(path: str, origin: Geodetic | None, name: str, keys: Any) -> Ins
         raise UsageError(f'{path}: a station is called "{name}", and its edited log is a file of that name; rename it.')
     own, sections = _split(place, keys)
     values = reading.values_of(place, STATION, own)
-    options = _options(path, place, values.get("config"), sections)
+    config = str(Path(path).parent / values["config"]) if "config" in values else ""
+    options = _options(place, config, sections)
     if "log" not in values:
         raise UsageError(f'{place} names no log; write log = "{name}.csv".')
     log = str(Path(path).parent / values["log"])
@@ -138,7 +174,7 @@ def _instrument(path: str, origin: Geodetic | None, name: str, keys: Any) -> Ins
     level = values.get("level_sigma", 0.0)
     named = ("range_bias_sigma", "azimuth_bias_sigma", "elevation_bias_sigma")
     prior = [*(values.get(each, 0.0) for each in named), level, level, values.get("clock_offset_sigma", 0.0)]
-    return Instrument(name, log, options, Recipe.of(options), at, axes, np.array(prior), site)
+    return Instrument(name, log, options, Recipe.of(options), at, axes, np.array(prior), site, config)
 
 
 def _split(place: str, keys: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
@@ -160,9 +196,9 @@ def _split(place: str, keys: Mapping[str, Any]) -> tuple[dict[str, Any], dict[st
     return own, sections
 
 
-def _options(path: str, place: str, config: str | None, sections: Mapping[str, Any]) -> dict[str, Any]:
+def _options(place: str, config: str, sections: Mapping[str, Any]) -> dict[str, Any]:
     """The options of the station's own file with those of the range file, which win."""
-    kept = {} if config is None else reading.load(str(Path(path).parent / config))
+    kept = reading.load(config) if config else {}
     given = reading.options_of(sections, place) if sections else {}
     both = {**kept, **given}
     for name in ("units", "columns"):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from ftproc.config import writing
 from ftproc.core.model import stations as geometry
 from ftproc.core.model.frames import wrap
-from ftproc.files import arrow, layout
-from ftproc.files.writing import atomic
+from ftproc.errors import OutputError
+from ftproc.files import arrow, layout, remote
+from ftproc.files.writing import atomic, outputs
+from ftproc.files.writing.outputs import Output
 from ftproc.fusion.estimation import constants as posterior
 from ftproc.fusion.estimation.constants import Constants
 from ftproc.fusion.estimation.events import CLOCK
@@ -25,6 +27,7 @@ from ftproc.records import COMPONENTS, MISSING, FloatArray, MeasurementLog, Traj
 if TYPE_CHECKING:
     import pyarrow as pa
 
+_HEAD = "# Biases, reading minus truth, and the time to add, as a fused flight has shown them.\n"  # of a station file
 SENSE = {"x": "anticlockwise", "north": "clockwise"}  # of the azimuth
 UNSEEN_S, UNSEEN_INTERVALS = 1.0, 2.5  # since its last used reading, until a station no longer counts as used
 #: Columns of a trajectory of one station that a fused one lacks.
@@ -129,13 +132,51 @@ def biases(constants: Constants, names: list[str]) -> pa.Table:
     return pa.table([pa.array(c, k) for c, k in zip(columns, kinds, strict=True)], names=titles)
 
 
-def write_calibration(range_: Range, constants: Constants, folder: Path) -> None:
+class Places(NamedTuple):
+    """The files of a fused flight beside its trajectory. edited, calibration: by station; none without stations' files
+    to write. folders: their directories."""
+
+    biases: str | None
+    edited: Mapping[str, str]
+    calibration: Mapping[str, str]
+    folders: tuple[str, ...]
+
+
+def places(range_: Range, output: str, folder: str | None) -> Places:
+    """Where they go, by the name of the trajectory. folder: of the station files, if there are any. Raises
+    OutputError."""
+    names = [instrument.name for instrument in range_.instruments]
+    calibration = {} if folder is None else {name: remote.within(folder, f"{name}.toml") for name in names}
+    folders = () if folder is None else (folder,)
+    if output == outputs.STREAM:
+        return Places(None, {}, calibration, folders)
+    kind = layout.table_kind(output) or layout.map_kind(output) or ""
+    stem = output[: len(output) - len(kind)]
+    own = f"{stem}.edited"
+    if (path := remote.local(own)) is not None and path.is_symlink():
+        raise OutputError(
+            f"{own}: this is a symbolic link, and the edited logs go into a directory of that name. Delete it, or give "
+            "another name with -o."
+        )
+    return Places(f"{stem}.biases.csv", {name: f"{own}/{name}.parquet" for name in names}, calibration, (own, *folders))
+
+
+def written(found: Places) -> list[Output]:
+    """These files, for the check of all outputs."""
+    return [
+        *([Output(found.biases, ours=(b"station,parameter,",))] if found.biases is not None else []),
+        *(Output(name, made=True, ours=(b"PAR1",)) for name in found.edited.values()),
+        *(Output(name, "--write-calibration", True, (_HEAD.encode(),)) for name in found.calibration.values()),
+    ]
+
+
+def write_calibration(range_: Range, constants: Constants, files: Mapping[str, str]) -> None:
     """A station file for each station: what it had, with the observable biases added and its clock set right.
 
     A station file has no tilts; what is seen of them in the readings of other flights depends on the direction.
     """
     for s, instrument in enumerate(range_.instruments):
-        with atomic.replacing(folder / f"{instrument.name}.toml") as stream:
+        with atomic.replacing(files[instrument.name]) as stream:
             stream.write(calibration(instrument, constants, s).encode())
 
 
@@ -153,7 +194,7 @@ def calibration(instrument: Instrument, constants: Constants, s: int) -> str:
         options["time_offset_s"] = options.get("time_offset_s", 0.0) - float(estimate[CLOCK])
     if instrument.site is not None:
         options.setdefault("site", instrument.site)
-    head = "# Biases, reading minus truth, and the time to add, as a fused flight has shown them.\n"
+    head = _HEAD
     if observed[3:CLOCK].any():
         tilts = " and ".join(
             f"{1e3 * estimate[3 + j]:.4g} mrad about {axis}"

@@ -12,7 +12,7 @@ from ftproc.config.recipe import Recipe
 from ftproc.errors import UsageError
 from ftproc.files import layout
 from ftproc.files.conventions import FRAMES
-from ftproc.files.writing import atomic, csvtext, geodesy, maps, tables, trajectories
+from ftproc.files.writing import atomic, csvtext, geodesy, maps, outputs, streams, tables, trajectories
 from ftproc.live.following import follow
 from ftproc.live.growing import Say, Stop
 from ftproc.live.live import Live
@@ -22,30 +22,32 @@ from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, Trajector
 _LABELS = {"good": GOOD, "isolated": ISOLATED, "patch": PATCH, "missing": MISSING}
 
 
-def follow_log(logs: Sequence[str], output: str | None, recipe: Recipe, form: str, say: Say) -> str:
+def follow_log(
+    logs: Sequence[str], output: str | None, recipe: Recipe, form: str, say: Say, inputs: Sequence[str] = ()
+) -> str:
     """Follow one log to its end, or until it is interrupted; what was published, in words. output: a file, or `-` or
-    None for standard output in this form, csv or jsonl. say: takes a sentence for the user, at once. An error in the
-    log is raised when what came before it has been written. Raises FtprocError."""
+    None for standard output in this form, csv or jsonl. say: takes a sentence for the user, at once. inputs: other
+    files that are read. An error in the log is raised when what came before it has been written. Raises FtprocError."""
     if len(logs) != 1:
         raise UsageError("--follow reads one log; name a file that grows, or - for standard input.")
     settings = recipe.settings
     geodesy.check(settings)
     if recipe.keep_columns:
         say("--follow copies no other columns of the log; column `row` says which row of the log each one is.")
+    written = output or outputs.STREAM
+    maps.check(written, settings.site)
+    if layout.map_kind(written) is None:
+        tables.kind_of(written)
+    outputs.check(outputs.trajectory(written), [logs[0], *inputs])
     track, counts, faults = Live(settings), _Counts(), list[Exception]()
     frame = {"frame": FRAMES[recipe.station.azimuth_from]}
-    with Stop() as stop:
+    with Stop() as stop, atomic.guarding(logs), streams.given_up(lambda: stop.asked):
         rows = counts.counted(_until_fault(follow(logs[0], recipe, track, stop, say), faults))
         placed = (geodesy.located(replace(part, metadata=frame), settings) for part in rows)
-        if output is None or output == "-":
+        if written == outputs.STREAM:
             _print(placed, form)
         else:
-            atomic.refuse_overwriting(output, logs)
-            trajectories.check(output)
-            maps.check(output, settings.site)
-            if layout.map_kind(output) is None:
-                tables.kind_of(output)
-            trajectories.write_parts(placed, lambda: _metadata(logs[0], recipe, track, counts), output)
+            trajectories.write_parts(placed, lambda: _metadata(logs[0], recipe, track, counts), written)
         if faults:
             raise faults[0]
     return f"{logs[0]}: {counts.said(track)}"
@@ -65,17 +67,18 @@ def _until_fault(parts: Iterator[Trajectory], faults: list[Exception]) -> Iterat
 
 
 def _print(rows: Iterable[Trajectory], form: str) -> None:
-    """Write rows on standard output as they come."""
+    """Write rows on standard output as they come. Raises OutputError, also when a stop is asked for while its reader
+    takes nothing."""
     with_header = True
     with atomic.standard_output() as stream:
         for found in rows:
             table = trajectories.to_table(found)
             if form == "jsonl":
-                stream.writelines(json.dumps(trajectories.plain(row)).encode() + b"\n" for row in table.to_pylist())
+                lines = (json.dumps(trajectories.plain(row)).encode() + b"\n" for row in table.to_pylist())
+                stream.write(b"".join(lines))
             else:
-                stream.writelines(csvtext.pieces(table, with_header))
+                stream.write(b"".join(csvtext.pieces(table, with_header)))
                 with_header = False
-            stream.flush()
 
 
 class _Counts:

@@ -107,7 +107,7 @@ def test_a_worker_that_dies_takes_only_its_own_log_with_it(tmp_path):
 def test_a_process_started_for_work_is_deaf_to_ctrl_c_from_its_first_moment():
     code = "import signal; print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))"
     heard = [sys.executable, "-c", code]
-    with processes.unheard():
+    with processes.starting():
         inside = subprocess.run(heard, capture_output=True, text=True, check=True).stdout
     outside = subprocess.run(heard, capture_output=True, text=True, check=True).stdout
     assert (inside, outside) == ("True\n", "False\n")

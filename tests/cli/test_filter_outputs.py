@@ -9,12 +9,18 @@ import pytest
 
 from ftproc.batch import plan
 from ftproc.errors import OutputError, UsageError
+from ftproc.files.writing import outputs
 
 WRITTEN = ".trajectory"
 
 
 def where(*logs: str, output: str | None = None, methods: list[str] | None = None) -> list[str]:
     return [task.output for task in plan.tasks(logs, output, methods)]
+
+
+def prepare(log: str, output: str) -> None:
+    """As `filter` does before it reads a log."""
+    outputs.check(plan.written(plan.tasks([log], output), output, None), [log])
 
 
 @pytest.mark.parametrize(
@@ -40,6 +46,7 @@ def test_one_log(here, log, output, expected):
     (here / "there").mkdir()
     (here / "there.csv").mkdir()
     assert where(log, output=output) == [expected]
+    outputs.check(plan.written(plan.tasks([log], output), output, None), [log])
     assert Path(expected).parent.is_dir()
 
 
@@ -85,7 +92,7 @@ def test_a_place_that_cannot_be(here):
         "none/a.csv": "none/a.csv: there is no directory none; create it first",
     }.items():
         with pytest.raises(OutputError, match=sentence):
-            plan.tasks(["log.csv"], output)
+            prepare("log.csv", output)
 
 
 @pytest.mark.parametrize("output", ["flight.csv", "./flight.csv", "symbolic.csv", "hard.csv"])
@@ -157,12 +164,14 @@ def test_feather_in_feather_out(run, here):
 
 def test_a_sidecar_replaces_only_a_sidecar(here: Path) -> None:
     (here / "flight.json").write_text('[{"time_s": 0, "range_m": 1}]')
-    with pytest.raises(OutputError, match=r"flight.json: this file, which ftproc has not written, would be replaced"):
-        plan.tasks(["a.csv"], "flight.csv")
-    plan.tasks(["a.csv"], "flight.parquet")
+    with pytest.raises(
+        OutputError, match=r"flight.json: this file would be replaced, and is none that an earlier run has written"
+    ):
+        prepare("a.csv", "flight.csv")
+    prepare("a.csv", "flight.parquet")
     (here / "flight.json").write_text('{\n  "frame": "local",\n  "program": "ftproc",\n  "version": "0.1.0"\n}\n')
-    plan.tasks(["a.csv"], "flight.csv")
+    prepare("a.csv", "flight.csv")
     (here / "flight.json").unlink()
     (here / "flight.json").mkdir()
     with pytest.raises(OutputError, match=r"flight.json"):
-        plan.tasks(["a.csv"], "flight.csv")
+        prepare("a.csv", "flight.csv")

@@ -10,6 +10,7 @@ import pytest
 
 from ftproc.batch import plan
 from ftproc.errors import OutputError, UsageError
+from ftproc.files.writing import outputs
 
 
 @pytest.fixture
@@ -119,7 +120,7 @@ def test_refused(here, names, given, kind, sentence):
     (here / "log.html").write_text("")
     (here / "file").write_text("")
     with pytest.raises(kind) as caught:
-        plan.pages(names, given, ["log.html"])
+        outputs.check(plan.pages_written(*plan.pages(names, given)), ["log.html"])
     assert sentence in str(caught.value)
 
 

@@ -75,7 +75,7 @@ def test_units_and_azimuth_from_north(run, here):
         (["--scenario", "moon", "-o", "a.csv"], 'There is no scenario "moon". Choose one of zuo2021,'),
         (["--scenario", "radar", "-o", "a.xlsx"], "a.xlsx: not a kind of file that can be written"),
         (["--scenario", "radar", "-o", "no/a.csv"], "there is no directory no; create it first"),
-        (["--scenario", "radar", "-o", "a.csv", "--truth", "./a.csv"], "-o and --truth are both a.csv"),
+        (["--scenario", "radar", "-o", "a.csv", "--truth", "./a.csv"], "-o and --truth are both ./a.csv"),
         (["--scenario", "radar", "-o", "-", "--truth", "-"], "-o and --truth are both -"),
         (["--scenario", "radar", "-o", "a.csv", "--truth", "a.truth"], "a.truth: not a kind of file"),
         (["--scenario", "radar", "-o", "a.csv", "--noise", "1,2"], '"1,2" is not three numbers, R,A,E in m, rad, rad'),

@@ -62,7 +62,7 @@ def test_a_result_that_cannot_be_printed(flight: Path, monkeypatch: pytest.Monke
     refused(shell(flight.parent, f"{command} > /dev/full"), "standard output: no space left")
 
 
-@pytest.mark.parametrize("command", ["ftproc filter flight.csv -o -", "ftproc filter flight.csv", "ftproc -h"])
+@pytest.mark.parametrize("command", ["ftproc filter flight.csv -o -", "ftproc -h"])
 def test_a_result_for_a_closed_output(flight: Path, command: str) -> None:
     """The stream is looked at before any command begins, so a few stand for all."""
     refused(shell(flight.parent, f"{command} >&-"), CLOSED)
@@ -84,6 +84,72 @@ def test_a_summary_that_cannot_be_printed_costs_no_trajectory(flight: Path, plac
     assert len(list(flight.parent.glob("out/*.csv"))) == 3
 
 
+@pytest.mark.parametrize(
+    ("command", "kept", "lost"),
+    [
+        ("filter flight.csv -o out.csv", ["out.csv"], "only the summary is lost, and out.csv is whole"),
+        ("filter flight.csv -o out.parquet --summary json", ["out.parquet"], "only the summary is lost, and out.parq"),
+        ("filter flight.csv b.csv -o o/", ["o/b.trajectory.csv"], "and the 2 files written before are whole"),
+        ("filter flight.csv none.csv -o o/", ["o/flight.trajectory.csv"], "and o/flight.trajectory.csv is whole"),
+        ("filter flight.csv -o -", [], "standard output is closed, so the result is lost; leave it open, or send"),
+        ("filter flight.csv --explain", [], "standard output is closed, so the result is lost"),
+        ("train --scenario zuo2021 --flights 4 --population 2 --generations 0 --epochs 1 -o m.safetensors",
+         ["m.safetensors"], "only the model's card is lost, and m.safetensors is whole"),
+        ("score b.csv --report s.html", ["s.html"], "only the table of scores is lost, and s.html is whole"),
+    ],
+)  # fmt: skip
+def test_what_is_lost_with_standard_output(flight: Path, command: str, kept: list[str], lost: str) -> None:
+    here = flight.parent
+    (here / "b.csv").write_bytes(flight.read_bytes())
+    if command.startswith("score"):
+        shell(here, "ftproc filter flight.csv -o t.csv; mv t.csv b.csv")
+    done = shell(here, f"ftproc {command} >&-")
+    assert done.returncode == 1
+    assert lost in done.stderr.splitlines()[-1]
+    assert all((here / name).exists() for name in kept)
+    full = shell(here, f"ftproc {command} > /dev/full")
+    assert full.returncode == 1
+    assert lost.rpartition("so ")[2].partition(";")[0] in full.stderr.splitlines()[-1]
+
+
+def test_a_reader_that_leaves_costs_no_trajectory(flight: Path) -> None:
+    for name in "abcd":
+        (flight.parent / f"{name}.csv").write_bytes(flight.read_bytes())
+    done = shell(flight.parent, "ftproc filter a.csv b.csv c.csv d.csv -o out/ | true; echo ${PIPESTATUS[0]}")
+    assert done.stdout == "1\n"
+    assert len(list(flight.parent.glob("out/*.csv"))) == 4
+
+
+def test_messages_that_standard_error_does_not_take_are_dropped(flight: Path) -> None:
+    assert shell(flight.parent, "ftproc filter none.csv flight.csv -o o/ 2> /dev/full").returncode == 1
+    assert (flight.parent / "o" / "flight.trajectory.csv").exists()
+    assert shell(flight.parent, "ftproc filter --nonsense 2> /dev/full").returncode == 2
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "filter {0}/flight.csv -o {0}/out.csv",
+        "filter {0}/flight.csv",
+        "filter {0}/flight.csv {0}/b.csv -o {0}/o/ --jobs 2",
+        "filter --fuse range.toml -o best.parquet",
+        "simulate --scenario zuo2021 -o x.csv",
+        "train --scenario zuo2021 -o m.safetensors",
+        "score {0}/flight.csv",
+    ],
+)
+def test_a_current_directory_that_is_there_no_more(flight: Path, command: str) -> None:
+    here = flight.parent
+    (here / "gone").mkdir()
+    done = shell(here, f"cd gone; rmdir ../gone; ftproc {command.format(here)}")
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1] == (
+        "ftproc: the current directory is there no more (deleted, or moved away); change to another one with cd, and "
+        "run again."
+    )
+    assert [path.name for path in here.iterdir()] == ["flight.csv"]
+
+
 @pytest.mark.parametrize(("closed", "more"), [("<&-", "--jobs 2"), ("2>&-", ""), ("<&- 2>&-", "--jobs 2")])
 def test_streams_that_are_not_needed(flight: Path, closed: str, more: str) -> None:
     (flight.parent / "other.csv").write_bytes(flight.read_bytes())
@@ -96,10 +162,11 @@ def test_streams_that_are_not_needed(flight: Path, closed: str, more: str) -> No
 def test_no_file_gets_the_descriptor_of_a_closed_stream(flight: Path) -> None:
     """All three closed, and a library that writes to them as OpenBLAS does."""
     code = (
-        "import os, sys\nfrom ftproc.cli import process\nprocess.open_streams()\n"
-        "print('out', end='')\nprint('err', file=sys.stderr)\n"
+        "import errno, os, sys\nfrom ftproc.cli import process\nprocess.open_streams()\n"
+        "print('err', file=sys.stderr)\ntry:\n    print('out')\nexcept OSError as error:\n"
+        "    assert error.errno == errno.EBADF\n"
         "file = os.open('mine', os.O_WRONLY | os.O_CREAT)\nassert file > 2, file\nos.write(2, b'noise')\n"
-        "os.write(file, b'data')\nprocess.empty_stdout()\n"
+        "os.write(file, b'data')\n"
     )
     python = Path(PROGRAM).with_name("python")
     done = batches.run(flight.parent, ["bash", "-c", f'{python} -c "{code}" <&- >&- 2>&-'])

@@ -16,7 +16,8 @@ from ftproc.errors import InputError, OutputError, UsageError
 from ftproc.files import layout, remote
 from ftproc.files.reading import logs, trajectories
 from ftproc.files.reading.formats import content
-from ftproc.files.writing import atomic, flights
+from ftproc.files.writing import atomic, flights, outputs
+from ftproc.files.writing.outputs import Output
 from tests.simulated import simulate
 
 fsspec = pytest.importorskip("fsspec")
@@ -96,7 +97,7 @@ def test_file_uri_is_a_path(tmp_path, flight):
     assert run.filter_one(Task(f"file://{flight[1]}", uri), Recipe()).failure is None
     assert len(trajectories.read(tmp_path / "out.parquet")) == len(flight[0])
     with pytest.raises(OutputError, match="never overwritten"):
-        atomic.refuse_overwriting(f"file://{flight[1]}", [flight[1]])
+        outputs.check([Output(f"file://{flight[1]}")], [flight[1]])
 
 
 def test_missing_files_and_unknown_schemes_are_named(bucket, temporary):
@@ -152,7 +153,7 @@ def test_outputs_by_uri_are_planned(tmp_path, monkeypatch):
     assert [t.output for t in tasks] == ["s3://out/clean/a.trajectory.csv", "s3://out/clean/b.trajectory.parquet"]
     assert plan.tasks(["s3://in/a.csv"], None)[0].output == "a.trajectory.csv"
     with pytest.raises(OutputError, match="never overwritten"):
-        plan.tasks(["s3://in/a.csv"], "s3://in/a.csv")
+        outputs.check([Output("s3://in/a.csv")], ["s3://in/a.csv"])
     assert layout.sidecar("s3://out/a.csv") == "s3://out/a.json"
     assert list(tmp_path.iterdir()) == []
 

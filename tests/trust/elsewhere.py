@@ -8,8 +8,8 @@ import subprocess
 import sys
 from typing import NamedTuple
 
-#: What happens to a run from outside: also to the workers and the scheduler of a cluster.
-FAULTS = ("tests/faults", "tests/batch")
+#: What happens to a run from outside: also to the workers and the scheduler of a cluster, and code beside its logs.
+FAULTS = ("tests/faults", "tests/batch", "tests/files/writing", "tests/trust/test_foreign_code.py")
 
 #: Kernels against plain Python and against each other; those that take minutes without the compiler are left out there.
 PLAIN = ("tests/core",)

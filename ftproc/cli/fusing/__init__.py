@@ -12,12 +12,13 @@ from typing import Any
 import click
 
 from ftproc.batch import plan
+from ftproc.cli import process
 from ftproc.cli.command import stated
 from ftproc.cli.progress import Progress
 from ftproc.correction import model_file
-from ftproc.errors import InputError, OutputError, UsageError, failure, printable
-from ftproc.files import layout
-from ftproc.files.writing import atomic, maps, tables, trajectories
+from ftproc.errors import InputError, UsageError, failure, printable
+from ftproc.files import layout, remote
+from ftproc.files.writing import atomic, maps, outputs, tables, trajectories
 from ftproc.fusion import flight, results, summary
 from ftproc.fusion.range_file import Range, load, template
 from ftproc.quality import summary as single
@@ -58,11 +59,15 @@ def fuse_logs(ctx: click.Context, debug: bool) -> int:
         gate=given.get("gate", FilterSettings.gate),
         ecef=given.get("ecef", False),
     )
-    output = given.get("output") or f"{Path(given['fuse']).stem}.trajectory.parquet"
+    usual = f"{Path(given['fuse']).stem}.trajectory.parquet"
+    output = named = given.get("output") or usual
     if Path(output).is_dir() or output.endswith("/"):
-        output = str(Path(output) / f"{Path(given['fuse']).stem}.trajectory.parquet")
+        output = remote.within(output, usual)
     _check(range_, output, settings)
-    given["report"] = _page(range_, output, given.get("report"))
+    places = results.places(range_, output, _folder(given.get("write_calibration")))
+    page = _page(output, given.get("report"))
+    written = [*outputs.trajectory(output, made=output != named), *results.written(places)]
+    outputs.check([*written, *plan.pages_written([page], None)], range_.inputs)
     began = time.monotonic()
     try:
         with Progress() as progress:
@@ -73,8 +78,18 @@ def fuse_logs(ctx: click.Context, debug: bool) -> int:
             click.echo(failure(error).trace, err=True)
         click.echo(f"ftproc: {error}", err=True)
         return 1
-    places = _write(found, output, given, range_)
-    _show(found, places, given.get("summary", "text"), time.monotonic() - began, output == "-")
+    with atomic.guarding(range_.inputs):
+        _write(found, output, places, range_)
+        if page is not None:
+            from ftproc.report.fused import write
+
+            write(found, page)
+    own = [f"{folder.rstrip('/')}/" for folder in places.folders]
+    files = [name for name in (output, places.biases, *own, page) if name is not None]
+    try:
+        _show(found, files, given.get("summary", "text"), time.monotonic() - began, output == "-")
+    except OSError as error:
+        raise process.unsaid(error, [name for name in files if name != "-"]) from error
     return 0
 
 
@@ -94,61 +109,41 @@ def _refuse_idle(ctx: click.Context, given: Mapping[str, Any]) -> None:
 
 
 def _check(range_: Range, output: str, settings: FilterSettings) -> None:
-    """Raise UsageError or OutputError for outputs that cannot be."""
-    inputs = [range_.path, *(each.log for each in range_.instruments)]
-    if output != "-":
-        if layout.table_kind(output) is None and layout.map_kind(output) is None:
-            raise UsageError(f"-o {output}: end the name in {', '.join((*layout.TABLES, *layout.MAPS))}.")
-        atomic.refuse_overwriting(output, inputs)
-        trajectories.check(output)
+    """Raise UsageError for outputs that cannot be."""
+    if output != "-" and layout.table_kind(output) is None and layout.map_kind(output) is None:
+        raise UsageError(f"-o {output}: end the name in {', '.join((*layout.TABLES, *layout.MAPS))}.")
     maps.check(output, range_.origin)
     if settings.ecef and range_.origin is None:
         raise UsageError("--ecef needs the origin on the earth: write lat_deg, lon_deg and height_m in [origin].")
 
 
-def _page(range_: Range, output: str, report: str | None) -> str | None:
-    """The file of the page, if there is one; makes the directory. Raises UsageError or OutputError."""
+def _folder(named: str | None) -> str | None:
+    """The directory of the station files. Raises UsageError."""
+    if named is not None and remote.is_uri(named):
+        raise UsageError(f"--write-calibration {named}: station files are written on this machine; name a directory.")
+    return named
+
+
+def _page(output: str, report: str | None) -> str | None:
+    """The file of the page, if there is one. Raises UsageError."""
     if report is None:
         return None
     from ftproc import report as pages
 
     pages.check(report)
-    (page,), _ = plan.pages([output], report, [range_.path, *(each.log for each in range_.instruments)])
+    (page,), _ = plan.pages([output], report)
     return page
 
 
-def _write(found: flight.Flight, output: str, given: Mapping[str, Any], range_: Range) -> list[str]:
-    """Write all outputs; their names."""
+def _write(found: flight.Flight, output: str, places: results.Places, range_: Range) -> None:
+    """Write the trajectory, the biases, the edited logs and the station files."""
     trajectories.write(found.trajectory, output, results.WITHOUT)
-    places = [output]
-    if output != "-":
-        kind = layout.table_kind(output) or layout.map_kind(output) or ""
-        stem = Path(output).with_name(Path(output).name[: len(Path(output).name) - len(kind)])
-        tables.write_table(found.biases, str(stem) + ".biases.csv")
-        folder = Path(str(stem) + ".edited")
-        _make(folder)
-        for name, table in found.edited.items():
-            tables.write_table(table, str(folder / f"{name}.parquet"))
-        places += [f"{stem}.biases.csv", f"{folder}/"]
-    if given.get("write_calibration") is not None:
-        folder = Path(given["write_calibration"])
-        _make(folder)
-        results.write_calibration(range_, found.constants, folder)
-        places.append(f"{folder}/")
-    if given["report"] is not None:
-        from ftproc.report.fused import write
-
-        write(found, given["report"])
-        places.append(given["report"])
-    return places
-
-
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise OutputError(f"{folder}: the directory cannot be made ({reason}); give another name with -o.") from error
+    if places.biases is not None:
+        tables.write_table(found.biases, places.biases)
+    for name, file in places.edited.items():
+        tables.write_table(found.edited[name], file)
+    if places.calibration:
+        results.write_calibration(range_, found.constants, places.calibration)
 
 
 def _show(found: flight.Flight, places: list[str], form: str, elapsed_s: float, on_stdout: bool) -> None:

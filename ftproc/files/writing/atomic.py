@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import stat
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -13,20 +14,51 @@ from typing import BinaryIO
 from ftproc.errors import OutputError, stdout_fault
 from ftproc.files import remote
 from ftproc.files.layout import Target
+from ftproc.files.writing import hidden, streams
 
-_LONGEST_NAME = 200  # bytes of the target's name in that of its temporary file
+_LONGEST = 255  # bytes of a name, on any usual file system
+
+_guarded: dict[object, str] = {}
 
 
-def refuse_overwriting(target: Target, inputs: Iterable[Target], option: str = "-o") -> None:
-    """Raise OutputError if `target` is one of `inputs`, by any path, symbolic or hard link.
+@contextlib.contextmanager
+def guarding(inputs: Iterable[Target]) -> Iterator[None]:
+    """Inside, no output replaces one of these files, whatever has come to be called by its name meanwhile."""
+    global _guarded
+    before = _guarded
+    _guarded = {**before, **{identity(name): str(name) for name in inputs}}
+    try:
+        yield
+    finally:
+        _guarded = before
 
-    `-` (a standard stream) is never a file. option: the one that names the target.
-    """
-    for given in inputs:
-        if "-" not in (str(target), str(given)) and _same(target, given):
-            raise OutputError(
-                f"{target}: this is the input {given}, which is never overwritten. Give another name with {option}."
-            )
+
+def identity(name: Target) -> object:
+    """By which a file is the same under any name: its device and inode where it exists, else its resolved name; on
+    another machine its URI. Devices and pipes are never the same: they are not replaced."""
+    path = remote.local(name)
+    if path is None:
+        return str(name)
+    try:
+        found = path.stat()
+        return (found.st_dev, found.st_ino) if stat.S_ISREG(found.st_mode) else object()
+    except (OSError, ValueError):
+        with contextlib.suppress(OSError, ValueError):
+            return str(_resolved(path))
+        return str(path)
+
+
+def overwriting(target: Target, given: str, option: str = "-o") -> OutputError:
+    """The error for an output that is an input. option: the one that names the output."""
+    return OutputError(
+        f"{target}: this is the input {given}, which is never overwritten. Give another name with {option}."
+    )
+
+
+def check_name(path: Path) -> None:
+    """Raise OutputError for a name that no usual file system holds, also where its directory is not there yet."""
+    if len(os.fsencode(path.name)) > _LONGEST:
+        raise _output_error(path, OSError(errno.ENAMETOOLONG, ""))
 
 
 def check_target(target: Target) -> None:
@@ -61,12 +93,19 @@ def replacing(target: Target) -> Iterator[BinaryIO]:
         return
     try:
         check_target(near)
-        path = _resolved(near)
+        path = _place(near)
+        _refuse_guarded(path, near)
         if path.exists() and not path.is_file():
-            with path.open("wb") as stream:
+            with streams.opened(path) as stream:
                 yield stream
         else:
-            yield from _beside(path)
+            with hidden.beside(path) as (stream, temporary):
+                yield stream
+                sync(stream)
+                stream.close()
+                _refuse_guarded(path, near)
+                temporary.replace(path)
+            _sync_directory(path.parent)
     except OSError as error:
         raise _output_error(near, error) from error
 
@@ -78,8 +117,8 @@ def standard_output() -> Iterator[BinaryIO]:
     try:
         if sys.stdout is None:
             raise OSError(errno.EBADF, os.strerror(errno.EBADF))
-        yield sys.stdout.buffer
-        sys.stdout.buffer.flush()
+        sys.stdout.flush()
+        yield streams.whole(sys.stdout.buffer)
     except BrokenPipeError:
         raise
     except OSError as error:
@@ -92,21 +131,24 @@ def sync(stream: BinaryIO) -> None:
     os.fsync(stream.fileno())
 
 
-def _beside(path: Path) -> Iterator[BinaryIO]:
-    name = os.fsdecode(os.fsencode(path.name)[:_LONGEST_NAME])
-    temporary = path.with_name(f".{name}.{os.urandom(4).hex()}.tmp")
-    # O_EXCL: never through an existing link. 0o666: the user's umask decides, as for any new file.
-    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+def _guarded_as(path: Path) -> str | None:
+    """The input that this entry of a directory is (a link is none), or None."""
     try:
-        with os.fdopen(descriptor, "wb") as stream:
-            yield stream
-            sync(stream)
-        temporary.replace(path)
-    except BaseException:  # also Ctrl-C
-        with contextlib.suppress(OSError):
-            temporary.unlink()
-        raise
-    _sync_directory(path.parent)
+        found = path.lstat()
+    except OSError:
+        return None
+    return _guarded.get((found.st_dev, found.st_ino))
+
+
+def _place(near: Path) -> Path:
+    """The file that is replaced: behind a link, but the link itself where it has come to lead to an input."""
+    path = _resolved(near)
+    return near if near.is_symlink() and _guarded_as(path) is not None else path
+
+
+def _refuse_guarded(path: Path, target: Path) -> None:
+    if (given := _guarded_as(path)) is not None:
+        raise overwriting(target, given)
 
 
 def _sync_directory(directory: Path) -> None:
@@ -128,22 +170,6 @@ def _resolved(path: Path) -> Path:
     if found.is_symlink():
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
     return found
-
-
-def _same(target: Target, given: Target) -> bool:
-    one, other = remote.local(target), remote.local(given)
-    if one is None or other is None:
-        return str(target) == str(given)
-    return _same_file(one, other)
-
-
-def _same_file(one: Path, other: Path) -> bool:
-    try:
-        return one.samefile(other)
-    except OSError:  # at least one does not exist yet: compare the resolved names
-        with contextlib.suppress(OSError):
-            return _resolved(one) == _resolved(other)
-        return False
 
 
 def _output_error(path: Path, error: OSError) -> OutputError:

@@ -11,44 +11,14 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
-from ftproc.errors import OutputError, encodable
-from ftproc.files import arrow, layout, remote
+from ftproc.errors import encodable
+from ftproc.files import arrow, layout
 from ftproc.files.layout import METADATA_KEY, Target, sidecar
 from ftproc.files.writing import atomic, maps, tables
 from ftproc.records import Trajectory, joined
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-
-_OURS = (b"{", b'"program": "ftproc"')  # how a sidecar begins, and what stands near its beginning
-_HEAD = 1 << 16  # bytes
-
-
-def check(target: Target) -> None:
-    """Raise OutputError, before any work is done, as `atomic.check_target` for the file and its sidecar, and if the
-    sidecar would replace a file that ftproc has not written."""
-    atomic.check_target(target)
-    beside = sidecar(target)
-    path = None if beside is None else remote.local(beside)
-    if beside is None or path is None:
-        return
-    atomic.check_target(beside)
-    try:
-        if not path.is_file() or _is_ours(path):
-            return
-    except OSError:  # not to be read, so it is not known whose it is
-        pass
-    raise OutputError(
-        f"{beside}: this file, which ftproc has not written, would be replaced by the metadata of {target}. Move it, "
-        "or give another name with -o; a .parquet file holds its own metadata."
-    )
-
-
-def _is_ours(path: Path) -> bool:
-    with path.open("rb") as stream:
-        head = stream.read(_HEAD)
-    return head.startswith(_OURS[0]) and _OURS[1] in head
 
 
 def to_table(trajectory: Trajectory, without: Sequence[str] = ()) -> pa.Table:

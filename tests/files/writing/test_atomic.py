@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from ftproc.errors import InputError, OutputError
-from ftproc.files.writing.atomic import check_target, refuse_overwriting, replacing
+from ftproc.files.writing.atomic import check_target, replacing
+from ftproc.files.writing.outputs import Output, check
 
 
 def entries(directory: Path) -> list[str]:
@@ -191,7 +192,7 @@ def test_an_input_is_never_overwritten_by_any_name(tmp_path: Path, monkeypatch: 
     monkeypatch.chdir(tmp_path)
     for target in (log, "log.csv", "./log.csv", "sub/../log.csv", "soft.csv", "hard.csv"):
         with pytest.raises(OutputError) as caught:
-            refuse_overwriting(target, ["-", "other.csv", str(log)])
+            check([Output(target)], ["-", "other.csv", str(log)])
         assert f"this is the input {log}, which is never overwritten. Give another name with -o." in str(caught.value)
 
 
@@ -199,9 +200,7 @@ def test_other_files_and_streams_may_be_written(tmp_path: Path, monkeypatch: pyt
     monkeypatch.chdir(tmp_path)
     Path("log.csv").write_bytes(b"log")
     Path("copy.csv").write_bytes(b"log")
-    refuse_overwriting("copy.csv", ["log.csv"])
-    refuse_overwriting("out.csv", ["log.csv", "-"])
-    refuse_overwriting("-", ["-"])
+    check([Output("copy.csv"), Output("out.csv"), Output("-")], ["log.csv", "-"])
 
 
 def test_two_writers_at_once_leave_one_whole_file(tmp_path: Path) -> None:
