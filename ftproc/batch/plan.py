@@ -67,8 +67,11 @@ def written(tasks: Sequence[Task], output: str | None, index: str | None) -> lis
 
 def pages_written(pages: Sequence[str | None], index: str | None) -> list[Output]:
     """The pages, and the index page if there is one, in whose directory they are."""
-    found = [Output(page, _REPORT, made=index is not None) for page in pages if page is not None]
-    return found if index is None else [*found, Output(index, _REPORT, made=True, ours=INDEX_BEGINS)]
+    named = [page for page in pages if page is not None]
+    if index is None:
+        return [Output(page, _REPORT) for page in named]
+    own = [Output(page, _REPORT, made=True, ours=INDEX_BEGINS[:1]) for page in named]
+    return [*own, Output(index, _REPORT, made=True, ours=INDEX_BEGINS)]
 
 
 def _directory(output: str, several: bool) -> str | None:

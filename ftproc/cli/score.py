@@ -59,7 +59,7 @@ def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: 
     from ftproc.errors import InputError
     from ftproc.files import layout
     from ftproc.files.reading import trajectories as trajectory_files
-    from ftproc.files.writing import outputs
+    from ftproc.files.writing import atomic, outputs
     from ftproc.report.index import Entry, write
     from ftproc.scoring import render, score
     from ftproc.scoring.matching import exchanged_axes
@@ -79,7 +79,8 @@ def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: 
             if truth is not None and (doubt := exchanged_axes(trajectory, truth)):
                 click.echo(f"ftproc: {doubt}", err=True)
             if place is not None:
-                pages.write(trajectory, place, truth)
+                with atomic.guarding([*trajectories, *truths]):
+                    pages.write(trajectory, place, truth)
                 entries.append(Entry(name, place, _summary(trajectory)))
         except InputError as error:
             click.echo(f"ftproc: {error}", err=True)

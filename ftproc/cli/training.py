@@ -17,7 +17,7 @@ from ftproc.correction.training import stages, study
 from ftproc.correction.training.flights import filtered_flights, train_flights
 from ftproc.errors import UsageError
 from ftproc.files.reading import truth as truth_files
-from ftproc.files.writing import outputs
+from ftproc.files.writing import atomic, outputs
 from ftproc.files.writing.outputs import Output
 from ftproc.records import MeasurementLog, Truth
 from ftproc.settings import EPOCHS, FilterSettings, Noise, TrainSettings
@@ -80,7 +80,8 @@ def run(request: Request) -> None:
             text = study.compare(flights["filter"], settings, progress, request.jobs).text()
         else:
             trained = train_flights(pairs, settings, request.filtering, progress, request.jobs)
-            model_file.save(trained, output)
+            with atomic.guarding(inputs):
+                model_file.save(trained, output)
             text = model.card(model_file.load(output))  # of the file, as a reader gets it
     try:
         click.echo(text)

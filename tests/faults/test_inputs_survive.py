@@ -188,7 +188,7 @@ def test_standard_streams_are_files_too(tmp_path: Path) -> None:
     with (tmp_path / "0.csv").open("ab") as log:
         for output in ("-", "out.csv"):
             said = refused(tmp_path, "filter", "0.csv", "-o", output, stdout=log)
-            assert "standard output is the input 0.csv, which is never overwritten. Send it to another file." in said
+            assert "standard output is the input 0.csv, which is never overwritten. Send it elsewhere." in said
     before = contents(tmp_path)
     with (tmp_path / "0.csv").open("rb") as log:
         done = ran(tmp_path, "filter", "-", "-o", "0.csv", stdin=log)
@@ -224,6 +224,30 @@ def test_two_outputs_are_two_files(tmp_path: Path, truth: str) -> None:
     (tmp_path / "link.csv").symlink_to("flight.csv")
     command = ("simulate", "--scenario", "zuo2021", "-o", "flight.csv", "--truth", truth)
     assert "-o and --truth are both " in refused(tmp_path, *command)
+
+
+def test_a_simulated_range_and_its_truth_are_several_files(tmp_path: Path) -> None:
+    command = ("simulate", "--scenario", "range-radar", "-o", "flight/", "--truth", "flight/radar.csv")
+    (tmp_path / "flight").mkdir()
+    assert "-o and --truth are both flight/radar.csv" in refused(tmp_path, *command)
+
+
+def test_a_summary_is_not_sent_to_the_trajectory(tmp_path: Path) -> None:
+    batches.fill(tmp_path, 1)
+    with (tmp_path / "out.csv").open("wb") as stream:
+        said = refused(tmp_path, "filter", "0.csv", "-o", "out.csv", stdout=stream)
+    assert "-o and standard output are both out.csv; give one another name." in said
+
+
+def test_outputs_of_one_content_may_be_linked(tmp_path: Path) -> None:
+    """As programs that save room do."""
+    batches.fill(tmp_path, 2)
+    command = ("filter", "0.csv", "1.csv", "-o", "out/")
+    assert ran(tmp_path, *command).returncode == 0
+    (tmp_path / "out" / "1.trajectory.csv").unlink()
+    (tmp_path / "out" / "1.trajectory.csv").hardlink_to(tmp_path / "out" / "0.trajectory.csv")
+    assert ran(tmp_path, *command).returncode == 0
+    assert not (tmp_path / "out" / "0.trajectory.csv").samefile(tmp_path / "out" / "1.trajectory.csv")
 
 
 @pytest.mark.parametrize("name", ["out.csv", "out.json"])

@@ -43,9 +43,15 @@ def identity(name: Target) -> object:
         found = path.stat()
         return (found.st_dev, found.st_ino) if stat.S_ISREG(found.st_mode) else object()
     except (OSError, ValueError):
-        with contextlib.suppress(OSError, ValueError):
-            return str(_resolved(path))
-        return str(path)
+        return resolved_name(name)
+
+
+def resolved_name(name: Target) -> str:
+    """A name without links, where they can be followed; a URI on another machine as it is."""
+    path = remote.local(name)
+    with contextlib.suppress(OSError, ValueError):
+        return str(name if path is None else _resolved(path))
+    return str(name)
 
 
 def overwriting(target: Target, given: str, option: str = "-o") -> OutputError:

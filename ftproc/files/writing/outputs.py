@@ -15,6 +15,7 @@ from ftproc.files.layout import Target, sidecar
 from ftproc.files.writing import atomic
 
 STREAM = "-"
+_STREAMS = {1: "standard output", 2: "standard error"}
 _HEAD = 1 << 16  # bytes
 
 
@@ -44,8 +45,12 @@ def check(outputs: Sequence[Output], inputs: Iterable[Target]) -> None:
     with the part of a file after #, or URIs in URIs after ::. Raises OutputError, UsageError.
     """
     read = {found: str(name) for name in inputs for found in _identities(name)}
-    _check_standard_output(read)
-    taken: dict[object, Output] = {}
+    streams = {found: name for descriptor, name in _STREAMS.items() for found in _standard_stream(descriptor)}
+    for found in streams.keys() & read.keys():
+        raise OutputError(
+            f"{streams[found]} is the input {read[found]}, which is never overwritten. Send it elsewhere."
+        )
+    taken: dict[str, Output] = {}
     for each in outputs:
         if str(each.target) == STREAM:
             continue
@@ -54,9 +59,12 @@ def check(outputs: Sequence[Output], inputs: Iterable[Target]) -> None:
         found = atomic.identity(each.target)
         if found in read:
             raise atomic.overwriting(each.target, read[found], each.option)
-        if found in taken:
-            raise UsageError(_twice(each, taken[found]))
-        taken[found] = each
+        if found in streams:
+            raise UsageError(f"{each.option} and {streams[found]} are both {each.target}; give one another name.")
+        name = atomic.resolved_name(each.target)  # files of one content may be linked: each is replaced by itself
+        if name in taken:
+            raise UsageError(_twice(each, taken[name]))
+        taken[name] = each
     folders = {path.parent: each.option for each in outputs if each.made and (path := _path(each)) is not None}
     for folder, option in folders.items():
         make(folder, option)
@@ -109,14 +117,6 @@ def _standard_stream(descriptor: int) -> Iterator[object]:
         found = os.fstat(descriptor)
         if stat.S_ISREG(found.st_mode):
             yield found.st_dev, found.st_ino
-
-
-def _check_standard_output(read: dict[object, str]) -> None:
-    for found in _standard_stream(1):
-        if found in read:
-            raise OutputError(
-                f"standard output is the input {read[found]}, which is never overwritten. Send it to another file."
-            )
 
 
 def _twice(one: Output, other: Output) -> str:

@@ -7,7 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from ftproc.errors import OutputError
-from ftproc.files.writing import atomic, flights, tables
+from ftproc.files.writing import atomic, flights, outputs, tables
+from ftproc.files.writing.outputs import Output
 from ftproc.records import MeasurementLog, Truth
 from ftproc.simulation.ranges import SimulatedRange, SimulatedStation
 
@@ -19,17 +20,12 @@ def write(simulated: SimulatedRange, directory: str, truth: str | None) -> None:
 
     truth: file of the flight in the frame of the range. With it come, in the directory, STATION.truth.csv, the flight
     in the station's own axes with the codes of its outliers, and beside it NAME.biases.csv, what was drawn.
-    Raises OutputError."""
+    Raises OutputError, UsageError."""
     folder = Path(directory)
     if folder.suffix or directory == "-":
         raise OutputError(f"{directory}: a range file and several logs are written; name a directory with -o.")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise OutputError(f"{directory}: the directory cannot be made ({reason}); give another with -o.") from error
+    outputs.check(_written(simulated, folder, truth), [])
     if truth is not None:
-        atomic.check_target(truth)
         flights.write_truth(simulated.truth, truth)
         _write_biases(simulated, truth)
     for station in simulated.stations:
@@ -39,6 +35,18 @@ def write(simulated: SimulatedRange, directory: str, truth: str | None) -> None:
             flights.write_truth(seen, str(folder / f"{station.name}.truth.csv"))
     with atomic.replacing(folder / "range.toml") as stream:
         stream.write(range_file(simulated).encode())
+
+
+def _written(simulated: SimulatedRange, folder: Path, truth: str | None) -> list[Output]:
+    kinds = (".csv",) if truth is None else (".csv", ".truth.csv")
+    names = ["range.toml", *(f"{station.name}{kind}" for station in simulated.stations for kind in kinds)]
+    found = [Output(folder / name, made=True) for name in names]
+    return found if truth is None else [*found, *(Output(name, "--truth") for name in (truth, _biases(truth)))]
+
+
+def _biases(truth: str) -> str:
+    path = Path(truth)
+    return str(path.with_name(f"{path.name.split('.')[0]}.biases.csv"))
 
 
 def _as_counted(station: SimulatedStation) -> tuple[MeasurementLog, Truth]:
@@ -87,5 +95,4 @@ def _write_biases(simulated: SimulatedRange, truth: str) -> None:
     ]
     columns = list(zip(*rows, strict=True))
     table = pa.table([pa.array(c) for c in columns], names=["station", "parameter", "true"])
-    path = Path(truth)
-    tables.write_table(table, str(path.with_name(f"{path.name.split('.')[0]}.biases.csv")))
+    tables.write_table(table, _biases(truth))
