@@ -22,6 +22,7 @@ from ftproc.core.editing import two_pass
 from ftproc.core.filtering import bridging, forward
 from ftproc.core.filtering.records import FilterRun, Model
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
+from ftproc.core.identification import likelihood
 from ftproc.core.identification.profile import median_level
 from ftproc.methods import live, preparing
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
@@ -62,8 +63,7 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     starts = preparing.smoothed_starts(edited.log, edited.model, edited.starts)
     run = forward.filter_log(edited.log, edited.model, starts)
     smoothed = edited.smoothed() if settings.smooth else None
-    other = edited.decision.slowest if edited.decision.alternative is None else edited.decision.alternative.slowest
-    if other is not None:
+    for other in _as_likely(edited, known, run):
         other_starts = preparing.smoothed_starts(edited.log, other, edited.starts)
         run = _worse_of(run, forward.filter_log(edited.log, other, other_starts))
         smoothed = smoothed and _worse_of(smoothed, smooth_log(edited.log, other, edited.starts))
@@ -79,6 +79,14 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         alternative=decision.alternative,
         faults=edited.faults,
     )  # fmt: skip
+
+
+def _as_likely(edited: two_pass.Edited, known: two_pass.Known, run: FilterRun) -> Iterator[Model]:
+    """Other models of noise that the log does not exclude, for which the sigmas allow."""
+    decision, free = edited.decision, np.isnan(known.sigma)
+    slowest = decision.slowest if decision.alternative is None else decision.alternative.slowest
+    most = likelihood.most_noise(edited.log, edited.model, edited.starts, np.where(free, run.innovation_sigma, 0.0))
+    yield from (other for other in (slowest, most) if other is not None)
 
 
 def _worse_of(run: Run, other: Run) -> Run:

@@ -8,7 +8,7 @@ are decided again with the profile's median, which no single event can move. The
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from ftproc.core.editing.runs import confirmed, suspicious
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
+from ftproc.core.identification.likelihood import NOISE_SHRINKS
 from ftproc.core.identification.nearby import residuals_near, samples_around
 from ftproc.core.identification.profile import fit_profile, median_level, pieces, roughness
 from ftproc.core.identification.scales import scales_of
@@ -28,6 +29,7 @@ from ftproc.order_statistics import median
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+Begin = Callable[[Record, FloatArray], tuple[Record, Decision]]
 
 ROUNDS = 6
 SHORTEST, ENDS = 4, 5  # readings in a run that may be motion, and at its ends, of which the second nearest must be ...
@@ -41,6 +43,8 @@ OTHER_LEVEL = 2.5  # times the jerk level at which an alternative was tried, bef
 PROFILE_STEPS, COMPARED_STEPS = 2, 5  # of the search for the jerk profile; where two are compared
 STANDS_OUT = 64.0  # times the median of the jerk profile
 LONGEST_SPAN = 3000  # samples that are decided together
+AT_LEAST = 1.02  # times the least noise that is allowed: less of it is at its bound
+FINER, FINEST = 16.0, 3  # times less noise, and how often
 SHORT_LOG, MOST = 8000, 0.5  # samples, and share that stands out: then all of it is decided again, and noise as well
 
 
@@ -194,6 +198,21 @@ def believed(found: tuple[Record, Decision], other: tuple[Record, Decision]) -> 
     """The other hypothesis, if it is likelier and does not reject many more readings to be so."""
     least = found[1].weight.sum() - FEW_MORE * found[0].possible.sum()
     return likelier(found, other) if other[1].weight.sum() > least else found
+
+
+def with_less_noise(found: tuple[Record, Decision], begin: Begin) -> tuple[Record, Decision]:
+    """The decisions made again from far less noise, as long as the noise found is the least that screening allows: what
+    it took for noise may have been motion, where a slow instrument follows an agile target. begin: from a record and
+    weights (n, 3) on."""
+    for _ in range(FINEST):
+        record, decision = found
+        least = record.sigma / NOISE_SHRINKS
+        if record.fixed.noise.any() or (decision.model.noise_variance > AT_LEAST * least**2).any():
+            break
+        before, found = found, believed(found, begin(record._replace(sigma=record.sigma / FINER), decision.weight))
+        if found is before:
+            break
+    return found
 
 
 def log_probability(record: Record, decision: Decision) -> float:

@@ -28,7 +28,7 @@ from ftproc.core.editing.decisions import (
     decide,
     late_stamps,
 )
-from ftproc.core.editing.reassessment import believed, likelier, log_probability, reassess, with_motion
+from ftproc.core.editing.reassessment import believed, likelier, log_probability, reassess, with_less_noise, with_motion
 from ftproc.core.filtering.bridging import CLOCK, Step, bridged, refined
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
@@ -240,22 +240,21 @@ def _decided(
     record = Record(
         time_s, measurement, possible, screened * possible, sigma, fixed, known.gate, rounding, work, uneven, white
     )
-    noise = np.where(np.isfinite(known.sigma), known.sigma, sigma) ** 2
-    begin = partial(_first, record, segment_of=segment_of, noise=noise, jerk_psd=jerk_psd)
-    found = _examined(*begin(record.screened), known)
+    begin = partial(_first, segment_of=segment_of, known=known)
+    record, decision = with_less_noise(begin(record, record.screened), begin)
+    found = _examined(record, decision, known)
     if jerk_psd is None and found[1].stamp_s == 0 and not found[1].settled:  # turns may have been taken for patches
-        other = begin(jumps_only * possible)
+        other = begin(record, jumps_only * possible)
         takes_in = (other[1].weight > found[1].weight).any()
         if takes_in and log_probability(*other) > log_probability(*found) - HOPELESS:
             found = believed(found, _examined(*other, known))
     return found
 
 
-def _first(
-    record: Record, weight: FloatArray, segment_of: Model | None, noise: FloatArray, jerk_psd: float | None
-) -> tuple[Record, Decision]:
-    """The decisions that are made from these weights (n, 3) on. noise (3,): variances to begin with."""
-    log = record.weighted(weight)
+def _first(record: Record, weight: FloatArray, segment_of: Model | None, known: Known) -> tuple[Record, Decision]:
+    """The decisions that are made from these weights (n, 3) on, and from the noise of the record."""
+    log, noise = record.weighted(weight), np.where(np.isfinite(known.sigma), known.sigma, record.sigma) ** 2
+    jerk_psd = known.jerk_psd
     model = segment_of or Model(noise, isotropic(first_jerk(log, noise) if jerk_psd is None else jerk_psd))
     rates = np.tile(np.array(outlier_chain.START_RATES), (3, 1))
     starts = find_starts(log, model.noise_variance, float(model.jerk[0, 0]))

@@ -19,6 +19,7 @@ from ftproc.core.identification import optimizer
 from ftproc.core.identification.scales import EXACT, Scales, scales_of
 from ftproc.core.identification.stretches import stretches_of
 from ftproc.core.model.motion import isotropic
+from ftproc.order_statistics import median
 
 FloatArray = NDArray[np.float64]
 
@@ -30,7 +31,18 @@ NOISE_SHRINKS = 4.0  # less of it comes of readings left out until the rest fits
 NOISE_ALLOWED = 1e-4  # 1-sigma, in ranges or rad, that is never too much: a component computed from another shows no
 # noise at all to begin with
 MEMORIES = (0.1, 3.0)  # intervals and spans of the log: the shortest and the longest memory of a filter
-FIRST_MEMORIES = (2.0, 5.0, 12.0, 30.0)  # intervals, of which the likeliest is where the search for the jerk begins
+FIRST_MEMORIES = (
+    0.1,
+    0.3,
+    0.8,
+    2.0,
+    5.0,
+    12.0,
+    30.0,
+)  # intervals, of which the likeliest is where the search for the jerk begins
+UNFORESEEN = 8.0  # times the noise, of a prediction: with more, a reading says nothing of its own noise
+DOUBT = 3.0  # in log-likelihood, by which more noise may be less likely and is not excluded
+NOISE_STEP, NOISE_STEPS = 2.0, 6  # by which the noise is raised, and how often
 RATIO_BOUND = 6.0  # on |ln(vertical / horizontal jerk)|
 VERTICAL_PRECISION = 0.5  # with which ln(vertical / horizontal jerk) is drawn to zero
 
@@ -113,6 +125,27 @@ def fit_level(
     theta = np.clip(np.r_[log_noise, log_jerk], lower, upper)
     theta = optimizer.minimise(cost, theta, lower, upper, LEVEL_STEPS, tolerance=0.05)
     return Model(np.exp(theta[:3]), shaped(theta[3:4], theta[4]))
+
+
+def most_noise(log: Observations, model: Model, starts: list[Start], predicted_sigma: FloatArray) -> Model | None:
+    """The model with as much noise of each component as the log does not exclude, where motion and noise can hardly be
+    told apart; None where they can, by the 1-sigma (n, 3) of the innovations."""
+    used = log.weight > 0
+    foreseen = [median(predicted_sigma[used[:, c], c]) if used[:, c].any() else 0.0 for c in range(3)]
+    doubtful = np.flatnonzero(np.array(foreseen) > UNFORESEEN * np.sqrt(model.noise_variance))
+    if not doubtful.size:
+        return None
+    least, most = likelihood_of(log, model, starts) - DOUBT, model.noise_variance.copy()
+    for _ in range(NOISE_STEPS):
+        before = most.copy()
+        for c in doubtful:
+            more = most.copy()
+            more[c] *= NOISE_STEP**2
+            if likelihood_of(log, model._replace(noise_variance=more), starts) >= least:
+                most = more
+        if (most == before).all():
+            break
+    return model._replace(noise_variance=most)
 
 
 def jerk_bounds(scales: Scales) -> tuple[FloatArray, FloatArray]:
