@@ -11,10 +11,11 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import Any, BinaryIO, NamedTuple, cast
 from urllib.parse import unquote, urlsplit
 
 from ftproc.errors import FtprocError, InputError, OutputError, first_line
+from ftproc.files import limits
 
 _SCHEME = re.compile(r"[a-z][a-z0-9+.-]+://", re.IGNORECASE)
 _CHUNK = 16 << 20  # bytes
@@ -26,9 +27,12 @@ def is_uri(name: object) -> bool:
 
 
 def local(name: object) -> Path | None:
-    """The path of a name on this machine (also of file:///... and local://...), or None if it is on another."""
+    """The path of a name on this machine (also of file:///... and local://...), or None if it is on another, or within
+    a file."""
     if not is_uri(name):
         return Path(cast(str, name))
+    if "::" in str(name):
+        return None
     if str(name).lower().startswith("local://"):  # as fsspec reads it: the rest is a path as it stands
         return Path(str(name)[len("local://") :])
     parts = urlsplit(str(name))
@@ -40,14 +44,46 @@ def within(directory: str, name: str) -> str:
     return f"{directory.rstrip('/')}/{name}" if is_uri(directory) else str(Path(directory) / name)
 
 
-def fetch(uri: str, directory: Path) -> Path:
-    """Copy the file into a directory of this machine. Raises InputError."""
+class Copy(NamedTuple):
+    """path: of a copy on this machine. packed: bytes of the file there, or of the archive that it is in."""
+
+    path: Path
+    packed: int
+
+
+def fetch(uri: str, directory: Path) -> Copy:
+    """Copy the file into a directory of this machine. Raises InputError, also for one without an end, and for one that
+    grows beyond the limit as it comes out of an archive (zip://a.csv::s3://bucket/a.zip)."""
     with _as_error(uri, InputError):
+        archive = uri.rpartition("::")[2] if "::" in uri else ""
+        packed = (
+            _size(uri, *_files(archive if is_uri(archive) else f"local://{archive}", InputError)) if archive else None
+        )
         files, path = _files(uri, InputError)
-        copy = directory / (Path(path).name or "log")
+        size = _size(uri, files, path)
+        room = limits.Room(uri, packed or 0)
+        copy, copied = directory / limits.short_name(Path(path).name), 0
         with files.open_input_stream(path, compression=None) as source, copy.open("wb") as target:
-            shutil.copyfileobj(source, target, _CHUNK)
-        return copy
+            while data := source.read(_CHUNK):
+                copied += len(data)
+                if archive:
+                    room.check(copied)
+                elif copied > max(size or 0, limits.WITHOUT_END):
+                    raise InputError(f"{uri}: more than {limits.WITHOUT_END >> 20} MiB without an end; name a file.")
+                target.write(data)
+        return Copy(copy, packed or copied)
+
+
+def _size(uri: str, files: Any, path: str) -> int | None:
+    """Bytes of a file, None if the storage does not say. Raises InputError for what is no ordinary file."""
+    from pyarrow import fs
+
+    found = files.get_file_info(path)
+    if found.type == fs.FileType.NotFound:
+        raise FileNotFoundError(path)
+    if found.type != fs.FileType.File:
+        raise InputError(f"{uri}: not an ordinary file (a directory, a pipe or a device); name a file.")
+    return cast("int | None", found.size)
 
 
 @contextlib.contextmanager

@@ -102,8 +102,8 @@ _BY_SPELLING = {word: name for name, words in SPELLINGS.items() for word in word
 
 _NUMBER = r"(?:\d{1,9}(?:\.\d{0,9})?|\.\d{1,9})(?:e[+-]?\d{1,2})?"
 _FACTOR = re.compile(
-    rf"[x×*·]?\s*(?:10(?:\^|\*\*)\(?(?P<power>[+-]?\d{{1,2}})\)?|(?P<of>{_NUMBER})(?:\s*/\s*(?P<by>{_NUMBER}))?)"
-    r"\s*[x×*·]?\s*(?P<unit>[^\W\d].*|[°º].*)",
+    rf"(?:[x×*·]\s*)?(?:10(?:\^|\*\*)\(?(?P<power>[+-]?\d{{1,2}})\)?|(?P<of>{_NUMBER})(?:\s*/\s*(?P<by>{_NUMBER}))?)"
+    r"\s*(?:[x×*·]\s*)?(?P<unit>[^\W\d].*|[°º].*)",
     re.IGNORECASE,
 )
 

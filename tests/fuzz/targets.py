@@ -26,7 +26,8 @@ from ftproc.correction import model, model_file
 from ftproc.errors import FtprocError
 from ftproc.files import layout
 from ftproc.files.reading import logs, trajectories, truth
-from ftproc.files.reading.formats import columnar, content, csvtext
+from ftproc.files.reading.formats import blocks, content
+from ftproc.files.reading.formats.columnar import parquet as columnar
 from ftproc.files.writing import flights
 from ftproc.files.writing.trajectories import write as write_trajectory
 from ftproc.records import MeasurementLog
@@ -107,7 +108,7 @@ def _in_blocks(path: Path) -> None:
     """A log is the same, and refused in the same words, whether it is read as a whole or as a large one is."""
     whole = _read_or_refused(path)
     large, small = mock.patch.object(content, "LARGE", 0), mock.patch.object(columnar, "_BATCH_ROWS", 3)
-    with large, small, mock.patch.object(csvtext, "_BLOCK", 64):
+    with large, small, mock.patch.object(blocks, "_BLOCK", 64):
         in_blocks = _read_or_refused(path)
     if isinstance(whole, str) or isinstance(in_blocks, str):
         assert in_blocks == whole

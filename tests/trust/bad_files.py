@@ -48,7 +48,7 @@ def damaged() -> Iterator[Case]:
     yield Case("log", "Parquet, footer of 4 GB", written(whole[:-8] + b"\xff\xff\xff\x7fPAR1", NAME), ("Parquet",))
     yield Case("log", "Parquet called .csv", written(whole), ("give it the name .parquet",))
     bomb = {name: pa.array(np.broadcast_to(1.0, 40_000_000)) for name in columns()}
-    yield Case("log", "Parquet bomb", lambda d: _bomb(d, bomb), ("rows in so small a file",))
+    yield Case("log", "Parquet bomb", lambda d: _bomb(d, bomb), ("unpack to more than",))
 
 
 def _bomb(directory: Path, table: dict[str, Any]) -> Path:

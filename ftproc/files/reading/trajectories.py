@@ -14,9 +14,11 @@ from ftproc.errors import InputError, quoted
 from ftproc.files import layout, remote
 from ftproc.files.layout import POSITION, Target
 from ftproc.files.reading import columns
-from ftproc.files.reading.formats import tables
+from ftproc.files.reading.formats import content, tables
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.records import MISSING, FloatArray, Trajectory
+
+_MOST_METADATA = 16 << 20  # bytes
 
 
 def read(source: tables.Source) -> Trajectory:
@@ -63,7 +65,7 @@ def _metadata(source: tables.Source, header: TableHeader) -> dict[str, Any]:
         if beside is not None:
             text = _bytes(beside)
         found = json.loads(text)
-    except (OSError, ValueError, InputError):
+    except (OSError, ValueError, RecursionError, InputError):
         return {}
     return found if isinstance(found, dict) else {}
 
@@ -71,6 +73,7 @@ def _metadata(source: tables.Source, header: TableHeader) -> dict[str, Any]:
 def _bytes(source: Target) -> bytes:
     path = remote.local(source)
     if path is not None:
-        return path.read_bytes()
+        return content.read(str(path), path, limit=_MOST_METADATA)
     with tempfile.TemporaryDirectory() as directory:
-        return remote.fetch(str(source), Path(directory)).read_bytes()
+        copy = remote.fetch(str(source), Path(directory)).path
+        return content.read(str(source), copy, limit=_MOST_METADATA)

@@ -14,7 +14,8 @@ import pytest
 
 from ftproc.errors import InputError
 from ftproc.files.reading import large, logs
-from ftproc.files.reading.formats import columnar, content, csvtext
+from ftproc.files.reading.formats import blocks, content, csvtext
+from ftproc.files.reading.formats.columnar import parquet as columnar
 from ftproc.settings import Air, Station
 
 ROWS = 3000
@@ -26,7 +27,7 @@ def in_blocks(monkeypatch):
     monkeypatch.setattr(content, "LARGE", 100)
     monkeypatch.setattr(csvtext, "_HEAD", 2000)
     monkeypatch.setattr(columnar, "_BATCH_ROWS", 700)
-    monkeypatch.setattr(csvtext, "_BLOCK", 20_000)
+    monkeypatch.setattr(blocks, "_BLOCK", 20_000)
 
 
 def columns(rows=ROWS):
@@ -204,7 +205,7 @@ def test_ray_is_bent_by_the_distance_read_far_away(tmp_path, in_blocks, monkeypa
 
 @pytest.mark.parametrize("first", [True, False])
 def test_decimal_commas_anywhere_tell_what_a_point_means(tmp_path, in_blocks, monkeypatch, first):
-    monkeypatch.setattr(csvtext, "_BLOCK", 64)
+    monkeypatch.setattr(blocks, "_BLOCK", 64)
     lines = text(columns(40)).replace(",", ";").splitlines()
     half = [line if (k < 20) == first else line.replace(".", ",") for k, line in enumerate(lines[1:])]
     path = tmp_path / "log.csv"
@@ -280,8 +281,8 @@ def test_a_log_that_changes_while_it_is_read_is_refused(tmp_path, monkeypatch, r
 def test_a_log_that_is_replaced_or_grows(tmp_path, monkeypatch, in_blocks, how, rows):
     path = tmp_path / "log.csv"
     path.write_text(text(columns()))
-    blocks = csvtext.in_blocks
-    monkeypatch.setattr(csvtext, "in_blocks", lambda *given: (changed(path, how), *blocks(*given))[1:])
+    before = blocks.of_file
+    monkeypatch.setattr(blocks, "of_file", lambda *given: (changed(path, how), *before(*given))[1:])
     if rows is None:
         with pytest.raises(InputError, match=r"log\.csv: the file changed while it was read"):
             logs.read(path)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ftproc.files.reading import logs
-from ftproc.files.reading.formats import content, csvtext
+from ftproc.files.reading.formats import blocks, content
 from ftproc.files.reading.meaning import stamps
 from ftproc.records import FloatArray, MeasurementLog
 from tests.files.conftest import Make
@@ -26,7 +26,7 @@ def flown(make: Make, time_s: FloatArray, write: Write, head: str = "time_s", st
     )
     path = make(f"{head},range_m,azimuth_rad,elevation_rad\n{rows}")
     log = logs.read(path)
-    with mock.patch.object(content, "LARGE", 0), mock.patch.object(csvtext, "_BLOCK", 4096):
+    with mock.patch.object(content, "LARGE", 0), mock.patch.object(blocks, "_BLOCK", 4096):
         assert np.array_equal(logs.read(path).time_s, log.time_s)
     return log
 

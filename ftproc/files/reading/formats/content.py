@@ -8,22 +8,22 @@ import itertools
 import os
 import stat
 import sys
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from ftproc.errors import InputError, nearest
+from ftproc.errors import FtprocError, InputError, first_line, nearest
+from ftproc.files import limits
 
 #: Size from which a file is read in blocks: bytes of a CSV file, or of the columns read from a Parquet file.
 LARGE = 32 << 20
-#: Limit of unpacking, against files made to fill the memory: real readings shrink to a half, not to a 200th.
-MAX_GROWTH = 200
 GZIP_MAGIC = b"\x1f\x8b"
 
-_MIN_UNPACKED = 64 << 20  # bytes that any packed file may unpack to
+_OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EMFILE, errno.ENFILE, errno.EIO)
 _MOST_BESIDE = 2000  # files that are looked through for a similar name
 _ALIKE = 0.75
-MAX_STDIN = 4 << 30  # bytes
+MAX_STDIN = limits.WITHOUT_END
 
 
 def read(name: str, path: Path, limit: int = -1, known: os.stat_result | None = None) -> bytes:
@@ -77,6 +77,14 @@ def unchanged(name: str, stream: BinaryIO, known: os.stat_result | None = None) 
         raise Changed(f"{name}: the file changed while it was read; wait until it is complete, and run again.")
 
 
+def size(path: Path) -> int:
+    """Of a file, in bytes; 0 if there is none, of which `read` says why."""
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0
+
+
 def is_ordinary(path: Path) -> bool:
     """Whether reading comes to an end without waiting. True for a directory too: `open` has the message for it."""
     mode = path.stat().st_mode
@@ -97,6 +105,17 @@ def stdin() -> bytes:
     return data
 
 
-def unpacked_limit(packed: int) -> int:
-    """The most bytes that a file of `packed` bytes may unpack to."""
-    return max(_MIN_UNPACKED, MAX_GROWTH * packed)
+@contextlib.contextmanager
+def undamaged(name: str, kind: str, cure: str) -> Iterator[None]:
+    """What another library raises on a damaged file becomes an InputError, and its warnings are left out: `NAME: not a
+    zip file, or a damaged one (why); copy it again.` An error of the disk stays what it is."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except (FtprocError, MemoryError, ImportError):
+        raise
+    except Exception as error:
+        if isinstance(error, OSError) and error.errno in _OF_THE_DISK:
+            raise
+        raise InputError(f"{name}: not {kind}, or a damaged one ({first_line(error)}); {cure}.") from error

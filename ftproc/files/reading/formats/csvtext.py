@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import csv
 import io
-import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ftproc.errors import InputError, first_line, row_named
-from ftproc.files.reading.formats import content, encoding, layout, tagged, trimming
+from ftproc.files import limits
+from ftproc.files.reading.formats import blocks, content, encoding, layout, tagged, trimming
 from ftproc.files.reading.formats.header import Blocks, TableHeader
 from ftproc.files.reading.formats.layout import BLANKS
 
@@ -32,25 +32,25 @@ _QUOTED_COMMA = re.compile(rb'"[+-]?\d+,(?:\d{1,2}|\d{4,})"')  # a decimal comma
 _TAGGED = re.compile(rb"[=:]\s*[\"']?[+-]?\.?\d|^\s*[$!][A-Z]|^\*?\d\d[\d.]{4}[+-]\w{8}")
 _HEAD = 1 << 20  # bytes of a large file that contain its header line
 _PLAIN_ROWS = 20  # under the names, that are looked at before a file counts as plain
-_BLOCK = 8 << 20  # bytes of a large file that are parsed at once
 _SEPARATOR_NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks", "": "fixed widths"}
 _PARSED, _PARSED_OF_A_COLUMN = 1 << 20, 256  # bytes that pyarrow parses at once, the more the more columns there are
 
 
-def text_file(name: str, path: Path, widths: Sequence[int] = ()) -> TableHeader:
+def text_file(name: str, path: Path, room: limits.Room, widths: Sequence[int] = ()) -> TableHeader:
     """A text file. widths: of its columns, in characters. Of a large file only the head is read. Raises InputError."""
     large = path.stat().st_size > content.LARGE and not widths
     if large:
         head = content.read(name, path, limit=_HEAD)
         lines = head[: head.rfind(b"\n") + 1 or len(head)]
-        if not trimming.is_boxed(head) and _tagged(name, lines, cut=True) is None:
+        if not trimming.is_boxed(head) and _tagged(lines, room, cut=True) is None:
             return _large_file(name, path)
-    return text_bytes(name, content.read(name, path), widths)
+    return text_bytes(content.read(name, path), room, widths)
 
 
-def text_bytes(name: str, data: bytes, widths: Sequence[int] = ()) -> TableHeader:
+def text_bytes(data: bytes, room: limits.Room, widths: Sequence[int] = ()) -> TableHeader:
     """The bytes of a text file. Raises InputError."""
-    known = None if widths else _tagged(name, data)
+    name = room.name
+    known = None if widths else _tagged(data, room)
     if known is not None:
         return known
     text = split(name, data, widths)
@@ -58,13 +58,14 @@ def text_bytes(name: str, data: bytes, widths: Sequence[int] = ()) -> TableHeade
     return TableHeader(text.source, text.names, text.load, commas, units=text.units, form=text.form)
 
 
-def _tagged(name: str, data: bytes, cut: bool = False) -> TableHeader | None:
+def _tagged(data: bytes, room: limits.Room, cut: bool = False) -> TableHeader | None:
     """A text whose lines say what each value is; None if it is none. cut: `data` is only the beginning."""
     head = data[:_HEAD]
+    trimming.refuse_wide(room.name, head)
     if _plain(head) is not None or not _TAGGED.search(head):
         return None
-    text = encoding.as_utf8(name, data, cut).data.decode("utf-8", "replace")
-    return tagged.sentences(name, text) or tagged.survey(name, text) or tagged.pairs(name, text)
+    text = encoding.as_utf8(room.name, data, cut).data.decode("utf-8", "replace")
+    return tagged.sentences(text, room) or tagged.survey(text, room) or tagged.pairs(text, room)
 
 
 def _large_file(name: str, path: Path) -> TableHeader:
@@ -74,13 +75,15 @@ def _large_file(name: str, path: Path) -> TableHeader:
     def load(numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
         return split(name, content.read(name, path, known=before)).load(numeric, others)
 
-    def blocks(numeric: Sequence[int]) -> Blocks | None:
+    def in_blocks(numeric: Sequence[int]) -> Blocks | None:
         if head.encoding:  # in which the rows are elsewhere than in UTF-8
             return None
         rows = max(bytes(head.body).count(b"\n"), 1) * before.st_size // _HEAD
-        return Blocks((text.load(numeric, ()) for text in in_blocks(path, head, before)), rows)
+        return Blocks((text.load(numeric, ()) for text in blocks.of_file(path, head, before)), rows)
 
-    return TableHeader(name, head.names, load, head.delimiter != ",", blocks=blocks, units=head.units, form=head.form)
+    return TableHeader(
+        name, head.names, load, head.delimiter != ",", blocks=in_blocks, units=head.units, form=head.form
+    )
 
 
 class CsvText(NamedTuple):
@@ -160,7 +163,8 @@ class CsvText(NamedTuple):
         """The rows with one character between the cells."""
         if self.delimiter != BLANKS:
             return self.body, self.delimiter
-        return re.sub(rb"[ \t]+", b"\t", re.sub(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)", b"", self.body)), "\t"
+        ends = rb"(?m)^[ \t]++|(?<![ \t])[ \t]++(?=\r?$)"
+        return re.sub(rb"[ \t]+", b"\t", re.sub(ends, b"", self.body)), "\t"
 
     def _of_widths(self, chosen: Sequence[int]) -> pa.Table:
         import pandas as pd
@@ -233,6 +237,8 @@ def _plain(data: bytes) -> tuple[list[str], str, int] | None:
         return None
     line = found[1].decode("utf-8", "replace")
     delimiter = max(",;\t", key=line.count)
+    if line.count(delimiter) >= trimming.MOST_MARKS:
+        return None
     names = layout.split(line, delimiter)
     if len(names) < 2 or layout.is_comment(line) or any(re.match(r"[+-]?\.?\d", name) for name in names):
         return None
@@ -241,6 +247,8 @@ def _plain(data: bytes) -> tuple[list[str], str, int] | None:
         row = layout.LINE.match(data, place)
         if row is None or not row[1].strip():
             break
+        if row[1].count(delimiter.encode()) >= trimming.MOST_MARKS:
+            return None
         cells = layout.split(row[1].decode("utf-8", "replace"), delimiter)
         if len(cells) != len(names) or not (layout.is_data(cells) or layout.is_data(cells[:1])):
             return None
@@ -263,37 +271,6 @@ def _searched(source: str, data: bytes, widths: Sequence[int]) -> tuple[CsvText,
     parts += ["a row of units" if found.row_of_units else "units stated above the table"] if found.units else []
     text = CsvText(source, names, found.separator, memoryview(b""), False, widths=widths, units=found.units)
     return text._replace(form=", ".join(parts)), start
-
-
-def in_blocks(path: Path, head: CsvText, before: os.stat_result) -> Iterator[CsvText]:
-    """The rows of a file in blocks of whole lines; `head` comes from `split` of its beginning, when it was as `before`.
-
-    Raises Changed when it is not so any more; InputError where a row may span lines, or only the whole file can tell
-    what a point means.
-    """
-    with path.open("rb") as stream, content.unchanged(head.source, stream, before):
-        stream.seek(head.body_offset)
-        rest, marks = b"", set()
-        while data := stream.read(_BLOCK):
-            data = rest + data
-            end = data.rfind(b"\n") + 1
-            rest = data[end:]
-            if len(rest) > _BLOCK:
-                raise InputError(f"{head.source}: a line of more than {_BLOCK >> 20} MiB is no row of a log.")
-            if head.delimiter != ",":  # points separate thousands if there is a comma anywhere in the file
-                marks |= {mark for mark in (b",", b".") if mark in data}
-                if len(marks) > 1:
-                    raise InputError(f"{head.source}: decimal commas and points.")
-            yield from _block(head, memoryview(data)[:end])
-        yield from _block(head, memoryview(rest))
-
-
-def _block(head: CsvText, body: memoryview) -> Iterator[CsvText]:
-    if not re.search(rb"[^\r\n]", body):
-        return
-    if b'"' in bytes(body):
-        raise InputError(f"{head.source}: quotation marks, in which a line may end.")
-    yield head._replace(body=body, odd_quotes=False)
 
 
 def _spans_lines(cells: list[str]) -> bool:

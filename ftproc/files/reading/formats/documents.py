@@ -3,63 +3,54 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ftproc.errors import InputError
+from ftproc.files import limits
 from ftproc.files.reading.formats import content, encoding
-from ftproc.files.reading.formats.header import TableHeader, of_arrow
+from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.formats.sparse import Sparse
 
 _DEEPEST = 12  # objects inside each other
-_MOST_COLUMNS = 5000
+_HELD, _REFERENCE = 64, 16  # bytes that an object or list takes in memory, and one that is in it
 _VALUES = ("val", "value")  # keys under which decoders put the value of an item, beside its meaning
 
 
-def json_file(name: str, path: Path) -> TableHeader:
+def json_file(name: str, path: Path, room: limits.Room) -> TableHeader:
     """A .json, .jsonl or .ndjson file. Values inside objects get names such as `I040.RHO`. Raises InputError."""
     text = encoding.as_utf8(name, content.read(name, path)).data.decode()
-    records = _records(name, text)
-    columns: dict[str, list[Any]] = {}
-    for row, record in enumerate(records):
-        for key, value in _flat(record, "", 0):
-            if key not in columns and len(columns) >= _MOST_COLUMNS:
-                raise InputError(f"{name}: the objects have more than {_MOST_COLUMNS} values, which no log has.")
-            cells = columns.setdefault(key, [])
-            if len(cells) <= row:
-                cells += [None] * (row - len(cells))
-                cells.append(value)
-    for cells in columns.values():
-        cells += [None] * (len(records) - len(cells))
-    if not columns:
-        raise InputError(f"{name}: it holds no objects with values; expected one object for each reading.")
-    import pyarrow as pa
-
-    return of_arrow(pa.table({key: _array(cells) for key, cells in columns.items()}), name, "JSON objects")
-
-
-def _array(cells: list[Any]) -> Any:
-    import pyarrow as pa
-
+    room.check(_HELD * (text.count("{") + text.count("[")) + _REFERENCE * text.count(","))
+    columns = Sparse(room)
     try:
-        return pa.array(cells)
-    except (pa.ArrowException, OverflowError):  # numbers and words in one column
-        return pa.array([None if cell is None else str(cell) for cell in cells], pa.string())
-
-
-def _records(name: str, text: str) -> list[Mapping[str, Any]]:
-    """The objects of a document, one for each reading."""
-    try:
-        try:
-            found = json.loads(text)
-        except json.JSONDecodeError:
-            found = _by_line(name, text)
-        records = _of_rows(found) or (_of_columns(found) if _is_columns(found) else list(_deepest_list(found)))
+        for record in _records(name, text):
+            columns.add(_flat(name, record, "", 0))
     except RecursionError as error:
         raise InputError(f"{name}: this JSON nests too deeply; write one object for each reading.") from error
-    if not records:
+    if not columns.rows:
         raise InputError(f"{name}: there are no rows; expected one JSON object for each reading.")
-    return records
+    if not columns.columns:
+        raise InputError(f"{name}: it holds no objects with values; expected one object for each reading.")
+    return columns.header("JSON objects")
+
+
+def _records(name: str, text: str) -> Iterable[Mapping[str, Any]]:
+    """The objects of a document, one for each reading."""
+    try:
+        found = _loaded(text)
+    except json.JSONDecodeError:
+        found = _by_line(name, text)
+    return _of_rows(found) or (_of_columns(found) if _is_columns(found) else _deepest_list(found))
+
+
+def _loaded(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        raise
+    except ValueError:  # a whole number of thousands of digits
+        return json.loads(text, parse_int=float)
 
 
 def _by_line(name: str, text: str) -> list[Any]:
@@ -67,7 +58,7 @@ def _by_line(name: str, text: str) -> list[Any]:
     for number, line in enumerate(text.splitlines(), 1):
         if line.strip():
             try:
-                found.append(json.loads(line))
+                found.append(_loaded(line))
             except ValueError as error:
                 raise InputError(
                     f"{name}: line {number} is not JSON ({error}); expected an object on each line, such as "
@@ -85,7 +76,7 @@ def _is_columns(found: Any) -> bool:
     return len(sizes) == 1 and sizes.pop() > 1 and flat
 
 
-def _of_rows(found: Any) -> list[Mapping[str, Any]]:
+def _of_rows(found: Any) -> Iterable[Mapping[str, Any]]:
     """The records of lists of values, perhaps beside the names, or of objects by the number of the row, as pandas
     writes them; none of other documents."""
     if (
@@ -104,16 +95,17 @@ def _of_rows(found: Any) -> list[Mapping[str, Any]]:
         return []
     if not isinstance(names, list) or len(names) != width:
         names = [str(k + 1) for k in range(width)]
-    return [dict(zip(map(str, names), row, strict=True)) for row in rows]
+    called = [str(each) for each in names]
+    return (dict(zip(called, row, strict=True)) for row in rows)
 
 
 def _cells(cells: Any) -> list[Any]:
     return list(cells.values()) if isinstance(cells, Mapping) else list(cells) if isinstance(cells, list) else [cells]
 
 
-def _of_columns(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+def _of_columns(found: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
     names = list(found)
-    return [dict(zip(names, row, strict=True)) for row in zip(*map(_cells, found.values()), strict=True)]
+    return (dict(zip(names, row, strict=True)) for row in zip(*map(_cells, found.values()), strict=True))
 
 
 def _deepest_list(found: Any, above: Mapping[str, Any] | None = None, depth: int = 0) -> Iterator[Mapping[str, Any]]:
@@ -140,16 +132,18 @@ def _holds_records(value: Any, depth: int = 0) -> bool:
     return isinstance(value, Mapping) and any(_holds_records(item, depth + 1) for item in value.values())
 
 
-def _flat(value: Any, prefix: str, depth: int) -> Iterator[tuple[str, Any]]:
+def _flat(source: str, value: Any, prefix: str, depth: int) -> Iterator[tuple[str, Any]]:
     """Name and value of each plain value inside an object."""
+    if len(prefix) > limits.LONGEST_NAME:
+        raise limits.name_too_long(source, "a value")
     if isinstance(value, Mapping) and depth < _DEEPEST:
         inner = next((key for key in _VALUES if key in value), None)
         if prefix and inner is not None:
-            yield from _flat(value[inner], prefix, depth + 1)
+            yield from _flat(source, value[inner], prefix, depth + 1)
             return
         for key, item in value.items():
-            yield from _flat(item, f"{prefix}.{key}" if prefix else str(key), depth + 1)
+            yield from _flat(source, item, f"{prefix}.{key}" if prefix else str(key), depth + 1)
     elif not isinstance(value, list | Mapping):
         yield prefix, value
     elif isinstance(value, Sequence) and len(value) == 1:
-        yield from _flat(value[0], prefix, depth + 1)
+        yield from _flat(source, value[0], prefix, depth + 1)

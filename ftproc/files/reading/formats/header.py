@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+from ftproc.files.limits import check_names
+
 if TYPE_CHECKING:
     import pyarrow as pa
 
@@ -36,6 +38,9 @@ class TableHeader:
     blocks: Callable[[Sequence[int]], Blocks | None] = lambda numeric: None
     units: Sequence[str] = ()
     form: str = ""
+
+    def __post_init__(self) -> None:
+        check_names(self.source, self.names)
 
 
 def of_arrow(

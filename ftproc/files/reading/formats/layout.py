@@ -6,6 +6,7 @@ the line of names stands directly above these lines.
 
 from __future__ import annotations
 
+import bisect
 import csv
 import itertools
 import re
@@ -24,7 +25,6 @@ BLANKS = " "  # the separator of columns that are apart by blanks
 _SEPARATORS = ("\t", ";", "|", ",", BLANKS)  # the first of those that fit as well counts
 _MOST_LINES = 2000
 _ENOUGH = 0.9  # of the longest table, for a separator earlier in the list
-
 LINE = re.compile(rb"[\r\n]*([^\r\n]*)(?:\r\n|\r|\n)?")
 _CELL = re.compile(r'"?\s*[+-]?[.,]?\d\S*\s*"?')
 #: Cells with blanks inside: a date and a time of day, degrees, minutes and seconds, a date by name, a number and unit.
@@ -36,7 +36,8 @@ _WITH_BLANKS = re.compile(
     r"|\d\S*\s?[A-Za-z°%/]+"
     r')\s*"?'
 )
-_RULE = re.compile(r"[-=_+*#|,;\s]*[-=_]{2,}[-=_+*#|,;\s]*")
+_LONGEST_CELL = 200  # characters of a number or a time
+_RULE = re.compile(r"(?=[+*#|,;\s]*+(?:[-=_][+*#|,;\s]++)*+[-=_]{2})[-=_+*#|,;\s]*+")
 #: Columns without a name above them: the name that they get -> how the rows begin.
 _UNNAMED = {
     "Date": r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s+\d{1,2}:\d{2}",
@@ -44,7 +45,7 @@ _UNNAMED = {
     "row": r"\s*\"?(\d+)\"?\s",  # as R numbers them
 }
 _NUMBERED = re.compile(r"^\d+\s*[:=)]\s*(?=[^\W\d])")  # a number before a name: `1:time`
-_ENUMERATED = re.compile(r"[\s#%;*]*(?:columns?|col|fields?)?[\s.]*#?(\d+)\s*[:=.)-]\s*([^\W\d].*)", re.IGNORECASE)
+_ENUMERATED = re.compile(r"[\s#%;*]*+(?:columns?|col|fields?)?[\s.]*+#?(\d++)\s*+[:=.)-]\s*([^\W\d].*)", re.IGNORECASE)
 _NOTHING = re.compile(r"\s*[\"']?(nan|null|none|n/?a|nil|[-*?.]+|)[\"']?\s*", re.IGNORECASE)
 
 
@@ -95,9 +96,14 @@ def split(line: str, separator: str, widths: Sequence[int] = ()) -> list[str]:
 
 def is_data(cells: Sequence[str], strictly: bool = False) -> bool:
     """Whether at least half (strictly: all) of the cells that hold something are numbers or times."""
-    present = [cell for cell in cells if not _NOTHING.fullmatch(cell)]
-    numbers = sum(bool(_CELL.fullmatch(cell) or _WITH_BLANKS.fullmatch(cell)) for cell in present)
+    present = [cell for cell in cells if not _is_nothing(cell)]
+    short = (cell for cell in present if len(cell) <= _LONGEST_CELL)
+    numbers = sum(bool(_CELL.fullmatch(cell) or _WITH_BLANKS.fullmatch(cell)) for cell in short)
     return bool(numbers) and (numbers == len(present) if strictly else 2 * numbers >= len(present))
+
+
+def _is_nothing(cell: str) -> bool:
+    return len(cell) <= _LONGEST_CELL and _NOTHING.fullmatch(cell) is not None
 
 
 def _between(lines: Sequence[str]) -> list[bool]:
@@ -122,17 +128,13 @@ def _longest(filled: Sequence[int], rows: dict[int, list[str]], between: Sequenc
             length += 1
         elif fits:
             start, length, width = index, 1, len(cells)
-        elif length and len(cells) == width and (_is_empty_row(cells) or is_data(cells[:1])):
+        elif length and len(cells) == width and (all(map(_is_nothing, cells)) or is_data(cells[:1])):
             length += 1
         else:
             length = 0
         if length > best[1]:
             best = (start, length)
     return best
-
-
-def _is_empty_row(cells: Sequence[str]) -> bool:
-    return all(_NOTHING.fullmatch(cell) for cell in cells)
 
 
 def is_comment(text: str) -> bool:
@@ -150,7 +152,7 @@ def _with_names(
     top = start
     while top and not _RULE.fullmatch(lines[filled[top - 1]]):
         above = rows[filled[top - 1]]
-        if not (is_data(above, strictly=True) or (len(above) == width and _is_empty_row(above))):
+        if not (is_data(above, strictly=True) or (len(above) == width and all(map(_is_nothing, above)))):
             break
         top -= 1
     units: list[str] = []
@@ -243,7 +245,7 @@ def _begin_with(block: Sequence[str], pattern: str) -> bool:
 
 def _joined_brackets(line: str) -> list[str]:
     """The words of a line, each with the bracket that follows it."""
-    cells = re.findall(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?", line)
+    cells = re.findall(r"[^\s(\[]+(?:\s*[(\[][^)\]]{0,200}[)\]])?", line)
     return [str(cell) for cell in cells]
 
 
@@ -272,8 +274,9 @@ def _above_columns(line: str, block: Sequence[str], width: int) -> list[str]:
     middles = [sum(low + high for low, high in column) / (2 * len(spans)) for column in zip(*spans, strict=True)]
     cells: list[list[str]] = [[] for _ in range(width)]
     for word in re.finditer(r"\S+", line):
-        centre = (word.start() + word.end()) / 2
-        cells[min(range(width), key=lambda k: abs(middles[k] - centre))].append(word[0])
+        behind = bisect.bisect(middles, centre := (word.start() + word.end()) / 2)
+        beside = range(max(behind - 1, 0), min(behind + 1, width))
+        cells[min(beside, key=lambda k: abs(middles[k] - centre))].append(word[0])
     return [" ".join(words) for words in cells]
 
 

@@ -6,12 +6,12 @@ import bz2
 import gzip
 import lzma
 import zipfile
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
-from ftproc.errors import InputError, first_line
+from ftproc.errors import InputError
+from ftproc.files.limits import Room, short_name
 from ftproc.files.reading.formats import content
 
 _CHUNK = 8 << 20  # bytes
@@ -35,25 +35,21 @@ def ending(name: str, head: bytes) -> str | None:
     )
 
 
-def unpacked(name: str, path: Path, kind: str, directory: Path) -> Path:
-    """Unpack into `directory`; the file there has the name without the ending. Raises InputError, also for what grows
-    beyond the limit."""
+def unpacked(name: str, path: Path, kind: str, directory: Path, room: Room) -> Path:
+    """Unpack into `directory`; the file there ends as the name does without the ending. Raises InputError, also for
+    what grows beyond the limit."""
     what = KINDS[kind][1]
-    try:
-        if kind == ".zip":
-            return _from_zip(name, path, directory)
-        inner = path.name[: -len(kind)] if path.name.lower().endswith(kind) else path.name
-        target = directory / (Path(inner).name or "log")
-        with _OPEN[kind](path) as packed:
-            _copy(name, packed, target, path.stat().st_size)
-        return target
-    except EOFError as error:
-        raise InputError(f"{name}: the {what} file is cut short; copy it again.") from error
-    except (OSError, zlib.error, lzma.LZMAError, zipfile.BadZipFile, RuntimeError, NotImplementedError) as error:
-        if isinstance(error, OSError) and error.errno is not None:
-            raise
-        reason = first_line(error)
-        raise InputError(f"{name}: not a {what} file, or a damaged one ({reason}); copy it again.") from error
+    with content.undamaged(name, f"a {what} file", "copy it again"):
+        try:
+            if kind == ".zip":
+                return _from_zip(name, path, directory, room)
+            inner = path.name[: -len(kind)] if path.name.lower().endswith(kind) else path.name
+            target = directory / short_name(inner)
+            with _OPEN[kind](path) as packed:
+                _copy(packed, target, room)
+            return target
+        except EOFError as error:
+            raise InputError(f"{name}: the {what} file is cut short; copy it again.") from error
 
 
 def _zstd(path: Path) -> Any:
@@ -65,20 +61,16 @@ def _zstd(path: Path) -> Any:
 _OPEN: dict[str, Callable[[Path], Any]] = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open, ".zst": _zstd}
 
 
-def _copy(name: str, packed: IO[bytes], target: Path, size: int) -> None:
-    room = content.unpacked_limit(size)
+def _copy(packed: IO[bytes], target: Path, room: Room) -> None:
+    size = lines = 0
     with target.open("wb") as stream:
         while data := packed.read(_CHUNK):
-            room -= len(data)
-            if room < 0:
-                raise InputError(
-                    f"{name}: unpacks to more than {content.MAX_GROWTH} times its packed size, which no log does. "
-                    "If it is a log, unpack it first (gunzip)."
-                )
+            size, lines = size + len(data), lines + data.count(b"\n")
+            room.check(size, lines)
             stream.write(data)
 
 
-def _from_zip(name: str, path: Path, directory: Path) -> Path:
+def _from_zip(name: str, path: Path, directory: Path, room: Room) -> Path:
     with zipfile.ZipFile(path) as archive:
         members = [m for m in archive.infolist() if not m.is_dir() and not m.filename.startswith(("__MACOSX/", "."))]
         if len(members) != 1:
@@ -88,7 +80,7 @@ def _from_zip(name: str, path: Path, directory: Path) -> Path:
             )
         if members[0].flag_bits & 1:
             raise InputError(f"{name}: the zip archive needs a password; unpack it first.")
-        target = directory / (Path(members[0].filename).name or "log")
+        target = directory / short_name(members[0].filename)
         with archive.open(members[0]) as packed:
-            _copy(name, packed, target, path.stat().st_size)
+            _copy(packed, target, room)
         return target

@@ -13,7 +13,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from ftproc.errors import InputError
 from ftproc.files import layout, remote
-from ftproc.files.reading.formats import arrays, columnar, content, csvtext, documents, packing, workbook
+from ftproc.files.limits import Room
+from ftproc.files.reading.formats import content, csvtext, documents, packing, workbook
+from ftproc.files.reading.formats.arrays import hdf5, matlab, saved
+from ftproc.files.reading.formats.columnar import ipc, parquet
 from ftproc.files.reading.formats.header import TableHeader, of_arrow
 
 if TYPE_CHECKING:
@@ -23,33 +26,38 @@ if TYPE_CHECKING:
 Source: TypeAlias = "str | Path | pa.Table | pd.DataFrame"
 
 
-def _text(name: str, path: Path, how: How) -> TableHeader:
-    return csvtext.text_file(name, path, how.widths)
-
-
 class How(NamedTuple):
-    """part: the sheet, group or structure named behind #. widths: of the columns of a text, in characters."""
+    """room: how large the content may become. part: the sheet, group or structure named behind #. widths: of the
+    columns of a text, in characters."""
 
+    room: Room
     part: str = ""
     widths: Sequence[int] = ()
+
+
+def _text(name: str, path: Path, how: How) -> TableHeader:
+    return csvtext.text_file(name, path, how.room, how.widths)
 
 
 #: What a name ends in -> the reader of that kind of file, from its name (for messages) and path.
 FORMATS: Mapping[str, Callable[[str, Path, How], TableHeader]] = {
     **dict.fromkeys((".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".prn", ".gsi"), _text),
-    ".parquet": lambda name, path, how: columnar.parquet(name, path),
-    **dict.fromkeys((".feather", ".arrow", ".arrows", ".ipc"), lambda name, path, how: columnar.feather(name, path)),
-    **dict.fromkeys((".jsonl", ".ndjson", ".json"), lambda name, path, how: documents.json_file(name, path)),
-    **dict.fromkeys((".xlsx", ".xlsm"), lambda name, path, how: workbook.workbook(name, path, how.part)),
-    **dict.fromkeys((".h5", ".hdf5", ".hdf", ".nc", ".nc4"), lambda name, path, how: arrays.hdf5(name, path, how.part)),
-    ".mat": lambda name, path, how: arrays.matlab(name, path, how.part),
-    **dict.fromkeys((".npy", ".npz"), lambda name, path, how: arrays.saved_by_numpy(name, path)),
+    ".parquet": lambda name, path, how: parquet.read(name, path, how.room),
+    **dict.fromkeys((".feather", ".arrow", ".arrows", ".ipc"), lambda name, path, how: ipc.read(name, path, how.room)),
+    **dict.fromkeys((".jsonl", ".ndjson", ".json"), lambda name, path, how: documents.json_file(name, path, how.room)),
+    **dict.fromkeys((".xlsx", ".xlsm"), lambda name, path, how: workbook.workbook(name, path, how.room, how.part)),
+    **dict.fromkeys(
+        (".h5", ".hdf5", ".hdf", ".nc", ".nc4"), lambda name, path, how: hdf5.read(name, path, how.room, how.part)
+    ),
+    ".mat": lambda name, path, how: matlab.read(name, path, how.room, how.part),
+    **dict.fromkeys((".npy", ".npz"), lambda name, path, how: saved.by_numpy(name, path, how.room)),
 }
 #: How files begin whose kind the name may not say.
 _BINARY = (b"PAR1", b"ARROW1", b"PK\x03\x04", b"\x89HDF", b"MATLAB")
 _BINARY_KINDS = (".parquet", ".arrow", ".xlsx", ".h5", ".mat")
 _DEEPEST = 3  # of packed files inside each other
 
+_SMALL = 1 << 16  # bytes of a range file
 _RANGE = re.compile(rb"(?m)^\s*\[(?:origin|station\.)")  # tables of a range file
 
 #: Endings of files that are no logs -> the command line that takes them.
@@ -82,7 +90,7 @@ def read_header(source: Source, widths: Sequence[int] = ()) -> TableHeader:
         return _in_memory(source)
     scratch = _Scratch()
     try:
-        header = _opened(str(source), How("", widths), scratch)
+        header = _opened(str(source), widths, scratch)
     except BaseException:
         scratch.remove()
         raise
@@ -107,27 +115,29 @@ class _Scratch:
             shutil.rmtree(self.directory, ignore_errors=True)
 
 
-def _opened(name: str, how: How, scratch: _Scratch) -> TableHeader:
+def _opened(name: str, widths: Sequence[int], scratch: _Scratch) -> TableHeader:
     if name == "-":
         data = content.stdin()
+        how = How(Room("<stdin>", len(data)), "", widths)
         if packing.ending("", data[:8]) is None and not data.startswith(_BINARY):
-            return csvtext.text_bytes("<stdin>", data, how.widths)
+            return csvtext.text_bytes(data, how.room, widths)
         path = scratch.path() / "stdin"
         path.write_bytes(data)
         return _of_file("<stdin>", path, how, scratch)
-    here = remote.local(name)
+    here, part = remote.local(name), ""
     if here is None:
-        return _of_file(name, remote.fetch(name, scratch.path()), how, scratch)
-    whole, mark, part = name.rpartition("#")
+        copy = remote.fetch(name, scratch.path())
+        return _of_file(name, copy.path, How(Room(name, copy.packed), part, widths), scratch)
+    whole, mark, behind = name.rpartition("#")
     if mark and not here.exists() and (inner := remote.local(whole)) is not None and inner.exists():
-        return _of_file(name, inner, how._replace(part=part), scratch)
-    return _of_file(name, here, how, scratch)
+        here, part = inner, behind
+    return _of_file(name, here, How(Room(name, content.size(here)), part, widths), scratch)
 
 
 def _of_file(name: str, path: Path, how: How, scratch: _Scratch, deep: int = 0) -> TableHeader:
     lower = path.name.lower()
     other = next((cure for ending, cure in _OTHERS.items() if lower.endswith(ending)), None)
-    if lower.endswith(".toml") and path.is_file() and _RANGE.search(path.read_bytes()):
+    if lower.endswith(".toml") and path.is_file() and _RANGE.search(_beginning(path)):
         other = "this is a range file, of several stations: ftproc filter --fuse {name}"
     if other is not None:
         raise InputError(f"{name}: {other.format(name=name)}.")
@@ -136,9 +146,14 @@ def _of_file(name: str, path: Path, how: How, scratch: _Scratch, deep: int = 0) 
     if packed is not None:
         if deep > _DEEPEST:
             raise InputError(f"{name}: packed more than {_DEEPEST} times over; unpack it first.")
-        return _of_file(name, packing.unpacked(name, path, packed, scratch.path()), how, scratch, deep + 1)
+        return _of_file(name, packing.unpacked(name, path, packed, scratch.path(), how.room), how, scratch, deep + 1)
     kind = layout.ending(path, FORMATS)
     return FORMATS[kind or _kind_of(head)](name, path, how)
+
+
+def _beginning(path: Path) -> bytes:
+    with path.open("rb") as stream:
+        return stream.read(_SMALL)
 
 
 def _kind_of(head: bytes) -> str:

@@ -6,16 +6,19 @@ from __future__ import annotations
 import itertools
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-from ftproc.files.reading.formats.header import TableHeader, of_arrow
+from ftproc.files import limits
+from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.formats.sparse import Sparse
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.words import QUANTITIES
 
 _SAMPLE = 200  # lines by which a text is known
 _MOSTLY = 0.6  # of these hold several pairs
 _STAMP = r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}[T ])?\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?(?:\s?Z|\s?UTC|[+-]\d{2}:?\d{2})?"
-_NAME = r"[\"']?(?P<name>[^\W\d][\w./°-]*(?:\s?[(\[][^)\]=:]*[)\]])?)[\"']?"
+#: Parts of a name are bounded, and taken whole, so that a search takes time by the length of the text.
+_NAME = r"[\"']?(?P<name>[^\W\d][\w./°-]{0,100}+(?:\s?[(\[][^)\]=:]{0,100}+[)\]])?)[\"']?"
 _VALUE = (
     rf"(?P<value>\"[^\"]*\"|'[^']*'|{_STAMP}"
     r"|[+-]?\.?\d[^\s,;{}\]\"'|]*(?:,\d+(?=\s*;|\s*$|\s+[^\W\d]))?(?:\s[A-Za-z°]{1,4}(?=\s*(?:[,;|]|$)))?"
@@ -26,7 +29,7 @@ _LEADING = re.compile(rf"\W*({_STAMP}|\d+\.\d+)(?=[\s,;|\])])")
 _RECORD = re.compile(r"\n-{3,}\s*\n")  # between records of one pair to a line
 _FEWEST = 2  # pairs in a row
 _WHOLE = 0.7  # of the records on one line hold each reading
-_SENTENCE = re.compile(r"[$!](?P<type>[A-Z][A-Z0-9]{2,7}),(?P<body>[^*]*?),?(?:\*[0-9A-Fa-f]{2})?\s*")
+_SENTENCE = re.compile(r"[$!](?P<type>[A-Z][A-Z0-9]{2,7}),(?P<body>[^*]*?),?(?:\*[0-9A-Fa-f]{2})?")
 #: The fields of the sentences that a standard describes, without the talker.
 _STANDARD = {
     "TTM": (
@@ -51,59 +54,69 @@ _GSI_UNITS = {
 _UNITS = {"N": "nmi", "K": "km", "S": "mi"}
 
 
-def pairs(name: str, text: str) -> TableHeader | None:
+def pairs(text: str, room: limits.Room) -> TableHeader | None:
     """The columns of a text whose lines consist of names and values, each line a row; None if it is none."""
     if not _is_tagged(_rows(text[: _SAMPLE * 200])[:_SAMPLE]):
         return None
-    rows, others = [], 0
+    columns, others = Sparse(room), 0
     for line in _rows(text):
         for record in _records(line):
             found = _pairs(record)
             if _has_reading(found):
                 stamp = _LEADING.match(record)
-                rows.append(found if stamp is None else {**found, "Timestamp": stamp[1].replace(",", ".")})
+                columns.add({**found, "Timestamp": stamp[1].replace(",", ".")}.items() if stamp else found.items())
             else:
                 others += bool(record.strip())
-    names = list(dict.fromkeys(key for row in rows for key in row))
-    again = {key.partition(":")[2] for key in names if key.startswith("2:")}
-    rows = [{f"1:{key}" if key in again else key: value for key, value in row.items()} for row in rows]
-    names = [f"1:{key}" if key in again else key for key in names]
+    again = {key.partition(":")[2] for key in columns.columns if key.startswith("2:")}
     form = "text, names and values in each line" + (f", {others} other lines left out" if others else "")
-    return _table(name, names, [[row.get(key) for key in names] for row in rows], form)
+    return columns.header(form, {key: f"1:{key}" for key in again}, decimal_comma=True)
 
 
-def sentences(name: str, text: str) -> TableHeader | None:
+def sentences(text: str, room: limits.Room) -> TableHeader | None:
     """The fields of sentences such as `$PTRK,120000.05,1234.5*42`, of the type of which there are the most; None if
     the text holds others too."""
-    lines = [line for line in text.splitlines() if line.strip()]
-    found = [_SENTENCE.fullmatch(line.strip()) for line in lines]
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    found = [_SENTENCE.fullmatch(line) for line in lines]
     kinds = Counter(sentence["type"] for sentence in found if sentence)
     if not kinds or sum(kinds.values()) < _MOSTLY * len(lines):
         return None
     known = [kind for kind in kinds if kind[-3:] in _STANDARD]
     chosen = known[0] if known else kinds.most_common(1)[0][0]
-    cells = [[chosen, *sentence["body"].split(",")] for sentence in found if sentence and sentence["type"] == chosen]
-    width = max(map(len, cells))
+    bodies = [sentence["body"] for sentence in found if sentence and sentence["type"] == chosen]
+    width = 2 + max(body.count(",") for body in bodies)
+    if width > limits.MOST_COLUMNS:
+        raise limits.too_many_columns(room.name)
     names = [str(k + 1) for k in range(width)]
     if known:
         names = [*_STANDARD[chosen[-3:]], *names][:width]
-        unit = _UNITS.get(cells[0][names.index("unit")], "") if "unit" in names else ""
+        unit = _UNITS.get([chosen, *bodies[0].split(","), *names][names.index("unit")], "") if "unit" in names else ""
         names = [f"{each}_{unit}" if each == "range" and unit else each for each in names]
     left = len(lines) - kinds[chosen]
     form = f"text, sentences {chosen}" + ("" if known else ", no column names") + (f", {left} others" if left else "")
-    return _table(name, names, [[*row, *[""] * (width - len(row))] for row in cells], form)
+    columns = Sparse(room, names)
+    for body in bodies:
+        columns.add((name, cell) for name, cell in zip(names, (chosen, *body.split(",")), strict=False) if cell)
+    return columns.header(form, decimal_comma=True)
 
 
-def survey(name: str, text: str) -> TableHeader | None:
+def survey(text: str, room: limits.Room) -> TableHeader | None:
     """The words of Leica's GSI format, of 8 or 16 digits: `21.322+27912345` is a horizontal angle in gon; None of
     other texts."""
-    lines = [line.strip().lstrip("*").split() for line in text.splitlines() if line.strip()]
-    blocks = [[_WORD.fullmatch(word) for word in line] for line in lines]
-    if not blocks or not all(all(block) for block in blocks[:_SAMPLE]):
+    blocks = _blocks(text)
+    head = list(itertools.islice(blocks, _SAMPLE))
+    if not head or not all(all(block) for block in head):
         return None
-    rows = [_of_block([word for word in block if word]) for block in blocks]
-    names = list(dict.fromkeys(key for row in rows for key in row))
-    return _table(name, names, [[row.get(key) for key in names] for row in rows], "text, words of GSI")
+    columns = Sparse(room)
+    for block in itertools.chain(head, blocks):
+        columns.add(_of_block([word for word in block if word]).items())
+    return columns.header("text, words of GSI", decimal_comma=True)
+
+
+def _blocks(text: str) -> Iterator[list[re.Match[str] | None]]:
+    """The words of each line, None where one is none of GSI."""
+    for line in text.splitlines():
+        if line.strip():
+            yield [_WORD.fullmatch(word) for word in line.strip().lstrip("*").split()]
 
 
 def _of_block(words: Sequence[re.Match[str]]) -> dict[str, str]:
@@ -137,12 +150,11 @@ def _is_tagged(lines: Sequence[str]) -> bool:
 def _pairs(line: str) -> dict[str, str]:
     """Names and values; a name that comes again with another value gets its number: `2:range`."""
     found: dict[str, str] = {}
+    numbers: dict[str, dict[str, int]] = {}
     for pair in _PAIR.finditer(line):
         name, value = pair["name"].strip(), pair["value"].strip("\"'")
-        number = 1
-        while (key := name if number == 1 else f"{number}:{name}") in found and found[key] != value:
-            number += 1
-        found[key] = value
+        number = numbers.setdefault(name, {}).setdefault(value, len(numbers[name]) + 1)
+        found[name if number == 1 else f"{number}:{name}"] = value
     return found
 
 
@@ -151,7 +163,7 @@ def _records(line: str) -> list[str]:
     pairs = list(_PAIR.finditer(line))
     counts = Counter(pair["name"] for pair in pairs)
     most = max(counts.values(), default=0)
-    if most < 2:
+    if most < 2 or len(counts) > limits.MOST_COLUMNS:
         return [line]
     quantities = [name for name in counts if any(map(taken_apart(name).means, QUANTITIES))]
     if any(counts[name] < _WHOLE * most for name in quantities):
@@ -168,12 +180,5 @@ def _has_reading(found: dict[str, str]) -> bool:
     """Whether several pairs stand in a line, one of them a range or an angle."""
     if len(found) < _FEWEST:
         return False
-    names = [taken_apart(key) for key, value in found.items() if re.match(r"[+-]?\.?\d", value)]
+    names = (taken_apart(key) for key, value in found.items() if re.match(r"[+-]?\.?\d", value))
     return any(name.means(quantity) for name in names for quantity in QUANTITIES[1:])
-
-
-def _table(name: str, names: Sequence[str], rows: Sequence[Sequence[str | None]], form: str) -> TableHeader:
-    import pyarrow as pa
-
-    columns = [pa.array([row[place] for row in rows], pa.string()) for place in range(len(names))]
-    return of_arrow(pa.Table.from_arrays(columns, names=list(names)), name, form, decimal_comma=True)

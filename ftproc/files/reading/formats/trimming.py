@@ -7,8 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ftproc.files import limits
 from ftproc.files.reading.formats import layout
 
+#: Between cells; and how many may be in a line, of which some may stand at its ends.
+_MARKS, MOST_MARKS = (b",", b";", b"\t", b"|"), limits.MOST_COLUMNS + 2
 _FOOTER = 30  # lines at the end of a file, at most
 _COMMENT = re.compile(rb"(?m)^[ \t]*(?:#|%|//|!)[^\r\n]*(?:\r\n|\r|\n|\Z)")
 #: First cells of rows below the table that sum it up, in small letters.
@@ -26,6 +29,13 @@ _UNDER = 3  # lines under repeated names, at most, such as units and a rule
 _LAST = 4096  # bytes in which the last line is looked for
 
 
+def refuse_wide(source: str, head: bytes) -> None:
+    """Raise InputError for a line of too many cells, before it is split into them."""
+    for line in head.splitlines():
+        if len(line) > limits.MOST_COLUMNS and max(len(line.split()) - 1, *map(line.count, _MARKS)) >= MOST_MARKS:
+            raise limits.too_many_columns(source)
+
+
 def is_boxed(data: bytes) -> bool:
     """Whether a text begins with a bar or a rule of a drawn table."""
     return re.match(rb"\s*(?:\||\+[-=+]+\+)", data) is not None
@@ -35,7 +45,7 @@ def unboxed(data: bytes) -> bytes:
     """A table without the bars at the ends of its lines and the rules that databases and Markdown draw round it."""
     if not is_boxed(data):
         return data
-    without_rules = re.sub(rb"(?m)^[ \t]*[|+][-=+|: \t]*-[-=+|: \t]*(?:\r\n|\r|\n|\Z)", b"", data)
+    without_rules = re.sub(rb"(?m)^[ \t]*+[|+](?=[=+|: \t]*+-)[-=+|: \t]*+(?:\r\n|\r|\n|\Z)", b"", data)
     return re.sub(rb"(?m)^[ \t]*\|(.*)\|[ \t]*(?=\r?$)", rb"\1", without_rules)
 
 
@@ -130,8 +140,10 @@ def _repeated_names(whole: bytes, names: Sequence[str], separator: str, widths: 
         if _bare(line[0].decode("utf-8", "replace")) != bare:
             continue
         start, end = line.span()
+        floor = found[-1][1] if found else 0
         for _ in range(_FOOTER):
-            above = re.search(rb"(?:\A|(?<=[\r\n]))[^\r\n]*(?:\r\n|\r|\n)\Z", whole[max(start - _LAST, 0) : start])
+            tail = whole[max(start - _LAST, floor) : start]
+            above = re.search(rb"(?:\A|(?<=[\r\n]))[^\r\n]*(?:\r\n|\r|\n)\Z", tail)
             if above is None or _is_row(above[0], names, separator, widths, whole=True):
                 break
             start -= len(above[0])
@@ -140,7 +152,7 @@ def _repeated_names(whole: bytes, names: Sequence[str], separator: str, widths: 
             if below is None or below.end() == end or _is_row(below[0], names, separator, widths, whole=True):
                 break
             end = below.end()
-        found.append((max(start, found[-1][1]) if found else start, end))
+        found.append((start, end))
     return found
 
 

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import datetime as dt
-import warnings
 import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from ftproc.errors import InputError, first_line, quoted
+from ftproc.errors import InputError, quoted
+from ftproc.files import limits
 from ftproc.files.reading.formats import content, layout, trimming
 from ftproc.files.reading.formats.header import TableHeader, of_arrow
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.words import QUANTITIES
 
+_CELL, _ROW = 32, 64  # bytes of a cell and a row at least
+_XML = 4  # bytes that a byte of XML takes
+_MOST_WHOLE = 2.0**53
 
-def workbook(name: str, path: Path, sheet: str = "") -> TableHeader:
+
+def workbook(name: str, path: Path, room: limits.Room, sheet: str = "") -> TableHeader:
     """An .xlsx file. sheet: its name, else the first with rows. Raises InputError."""
     content.read(name, path, limit=1)  # for its messages
-    _refuse_bomb(name, path)
-    read = {title: _table(name, title, cells) for title, cells in _sheets(name, path, sheet)}
+    _refuse_bomb(name, path, room)
+    read = {title: _table(name, title, cells) for title, cells in _sheets(name, path, room, sheet)}
     tables = {title: table for title, table in read.items() if table is not None}
     logs = [title for title, table in tables.items() if _is_log(table)]
     if len(logs) > 1:
@@ -59,39 +63,68 @@ def _is_log(header: TableHeader) -> bool:
     return "time" in found and len(found) > 1
 
 
-def _sheets(name: str, path: Path, sheet: str) -> Iterator[tuple[str, list[tuple[Any, ...]]]]:
+def _sheets(name: str, path: Path, room: limits.Room, sheet: str) -> Iterator[tuple[str, list[tuple[Any, ...]]]]:
     """Title and cells of the sheets."""
-    import pandas as pd
-
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of openpyxl, on styles
-            with pd.ExcelFile(path, engine="openpyxl") as book:
-                titles = [str(title) for title in book.sheet_names]
-                if sheet and sheet not in titles:
-                    raise InputError(f'{name}: there is no sheet "{sheet}"; its sheets are {", ".join(titles)}.')
-                for title in [sheet] if sheet else titles:
-                    frame = book.parse(title, header=None, dtype=object, keep_default_na=False)
-                    yield title, list(frame.itertuples(index=False, name=None))
+        from openpyxl import load_workbook  # type: ignore[import-untyped, unused-ignore]
     except ImportError as error:
         raise InputError(f"{name}: reading .xlsx needs openpyxl: pip install openpyxl; or save it as CSV.") from error
-    except InputError:
-        raise
-    except Exception as error:  # openpyxl raises many kinds for damaged files
-        reason = first_line(error)
-        raise InputError(
-            f"{name}: not an Excel workbook (.xlsx), or a damaged one ({reason}); save it as CSV."
-        ) from error
+    with content.undamaged(name, "an Excel workbook (.xlsx)", "save it as CSV"):
+        book = load_workbook(path, read_only=True, data_only=True, keep_links=False)
+        try:
+            titles = [str(title) for title in book.sheetnames]
+            if sheet and sheet not in titles:
+                raise InputError(f'{name}: there is no sheet "{sheet}"; its sheets are {", ".join(titles)}.')
+            held = _Held(room)
+            for title in [sheet] if sheet else titles:
+                if hasattr(book[title], "reset_dimensions"):  # a sheet, not a chart
+                    yield title, held.cells(book[title])
+        finally:
+            book.close()
 
 
-def _refuse_bomb(name: str, path: Path) -> None:
+class _Held:
+    """The cells of sheets, as long as they are not too many or too large together: the empty ones, which a single cell
+    far out makes, and texts, of which many cells may share one, count too."""
+
+    def __init__(self, room: limits.Room) -> None:
+        self.room, self.size = room, 0
+
+    def cells(self, sheet: Any) -> list[tuple[Any, ...]]:
+        """The rows of a sheet, each as long as the longest, without empty ones at the end."""
+        sheet.reset_dimensions()  # which may claim anything
+        found: list[tuple[Any, ...]] = []
+        empty = width = texts = 0
+        for row in sheet.iter_rows():
+            values = tuple(_value(cell) for cell in row)
+            empty = 0 if any(value is not None for value in values) else empty + 1
+            width = max(width, next((k for k in range(len(values), 0, -1) if values[k - 1] is not None), 0))
+            if width > limits.MOST_COLUMNS:
+                raise limits.too_many_columns(self.room.name)
+            texts += sum(len(value) for value in values if isinstance(value, str))
+            found.append(values)
+            self.room.check(self.size + texts + _CELL * width * (len(found) - empty) + _ROW * len(found))
+        found = found[: len(found) - empty]
+        self.size += texts + _CELL * width * len(found)
+        return [(*row[:width], *(None,) * (width - len(row))) for row in found]
+
+
+def _value(cell: Any) -> Any:
+    """As pandas reads it: whole numbers without a fraction; of an error nothing."""
+    value = cell.value
+    if isinstance(value, float) and value.is_integer() and abs(value) < _MOST_WHOLE:
+        return int(value)
+    return float("nan") if cell.data_type == "e" else value
+
+
+def _refuse_bomb(name: str, path: Path, room: limits.Room) -> None:
+    """What is in the archive is text of XML, of which the objects that are made take several times the size."""
     try:
         with zipfile.ZipFile(path) as archive:
             size = sum(member.file_size for member in archive.infolist())
-    except (zipfile.BadZipFile, OSError) as error:
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
         raise InputError(f"{name}: not an Excel workbook (.xlsx), or a damaged one; save it as CSV.") from error
-    if size > content.unpacked_limit(path.stat().st_size):
-        raise InputError(f"{name}: unpacks to more than {content.MAX_GROWTH} times its packed size; save it as CSV.")
+    room.check(_XML * size)
 
 
 def _text(cell: Any) -> str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import unicodedata
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from ftproc.files.limits import LONGEST_NAME
 from ftproc.files.units import unit_named
 from ftproc.files.words import (
     ALIASES,
@@ -19,14 +21,18 @@ from ftproc.files.words import (
     plain_letters,
 )
 
-_BRACKETS = re.compile(r"(.*?)[\s_.,:/-]*[(\[{<]\s*(.*?)\s*[)\]}>]\s*")
+#: Opening and closing brackets, and what may stand before them. The patterns take time by the length of a name.
+_OPENING, _CLOSING = re.compile(r"[(\[{<]"), (")", "]", "}", ">")
+_BEFORE = " \t\n\r_.,:/-"
 _LAST = re.compile(r"(.*\S)(?:\s*/\s*|\s+in\s+|\s*,\s*|[\s_.-]+)(\S+)", re.IGNORECASE)
-_OVER_ALL = re.compile(r"(.*\S)(?:\s*/\s*|\s+in\s+|\s*,\s*)([x*·]?\s*\.?\d.*)", re.IGNORECASE)  # Range in 100 m
+_OVER_ALL = re.compile(r"(.*\S)(?:\s*/\s*|\s+in\s+|\s*,\s*)((?:[x*·]\s*)?\.?\d.*)", re.IGNORECASE)  # Range in 100 m
 _SUPERSCRIPT = re.compile(r"(?<=10)[⁻⁺]?[⁰¹²³⁴-⁹]+")
-_LIMITS_OF_VALUES = re.compile(r"(?:±|\+/?-)\s*\d[\d.]*|[-+]?\d[\d.]*\s*(?:-|–|to|\.\.+|…)\s*[-+]?\d[\d.]*")  # 0-360
+_LIMITS_OF_VALUES = re.compile(  # 0-360
+    r"(?:±|\+/?-)\s*\d[\d.]*|(?:[-+]|(?<![\d.]))\d+(?:\.\d+)*\.?\s*(?:-|–|to|\.\.+|…)\s*[-+]?\d[\d.]*"
+)
 #: A factor, or words of one, beside the unit in brackets.
 _COUNTS = re.compile(
-    r"^\W*[x×*]?\s*\.?\d|[x×*/·]\s*\.?\d|\b(?:lsbs?|counts?|ticks?|scaled?|factor|times"
+    r"^\W*(?:x\s*\.?)?\d|[x×*/·]\s*\.?\d|\b(?:lsbs?|counts?|ticks?|scaled?|factor|times"
     r"|(?:ten|hundred|thousand|million)(?:th)?s?)\b",
     re.IGNORECASE,
 )
@@ -90,24 +96,27 @@ class Name(NamedTuple):
         return not self.foreign and bool({self.stem, core} & set(ZENITH_ALIASES))
 
 
+@functools.lru_cache(maxsize=4096)
 def taken_apart(text: str, unit: str = "") -> Name:
     """A name, and the cell under it in a row of units (which wins)."""
+    if max(len(text), len(unit)) > LONGEST_NAME:
+        return Name(text, "", ())
     plain = _compatible(text).strip().strip("\"'#%;!:").strip()
     plain = _VALUE.sub("", _NUMBERED.sub("", plain))
     found, notation, foreign = "", "", False
-    bracketed = _BRACKETS.fullmatch(plain)
-    if bracketed:
-        inside = bracketed[2]
+    opening = _OPENING.search(plain) if plain.endswith(_CLOSING) else None
+    if opening:
+        before, inside = plain[: opening.start()].rstrip(_BEFORE), plain[opening.end() : -1].strip()
         known = _unit_inside(inside)
         squeezed = _squeezed(inside)
         if known:
-            plain, found = bracketed[1], known
+            plain, found = before, known
         elif squeezed in NOTATIONS or "hh" in squeezed or "dd" in squeezed or "yy" in squeezed:
-            plain, notation = bracketed[1], squeezed
+            plain, notation = before, squeezed
         elif inside.lower() in _FOREIGN:
-            plain, foreign = bracketed[1], True
+            plain, foreign = before, True
         elif inside:
-            plain, found = bracketed[1], inside
+            plain, found = before, inside
     elif not _is_name(plain):
         plain, found, foreign = _suffix(plain)
         if found in NOTATIONS:
@@ -184,7 +193,7 @@ def _suffix(text: str) -> tuple[str, str, bool]:
 
 
 def _without_in(text: str) -> str:
-    return re.sub(r"\s+in$", "", text, flags=re.IGNORECASE)
+    return re.sub(r"(?<!\s)\s+in$", "", text, flags=re.IGNORECASE)
 
 
 def _words(text: str) -> tuple[str, tuple[str, ...], str]:

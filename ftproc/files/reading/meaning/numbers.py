@@ -14,11 +14,12 @@ import numpy as np
 from ftproc.errors import InputError, quoted, row_named
 from ftproc.files import arrow
 from ftproc.files.reading.formats.csvtext import MISSING_WORDS
-from ftproc.records import FloatArray
+from ftproc.records import FloatArray, IntArray
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
+MOST_DAYS = 719_162.0  # from the year 1 to 1970
 _EVENT = re.compile(r"[A-Za-z][A-Za-z ]{3,20}")
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -51,6 +52,15 @@ class Origin(NamedTuple):
             f'{self.source}: {row_named(row)}, column "{self.column}": '
             f'"{" ".join(text[:60].split())}" is not {why}; expected {self.expected}. {cure or self.cure}'
         )
+
+    def whole_days(self, days: FloatArray) -> IntArray:
+        """(n,) days since 1970 or of a year as whole numbers, 0 where missing. Raises InputError for the first that no
+        calendar has."""
+        beyond = ~(np.abs(np.nan_to_num(days)) <= MOST_DAYS)
+        if beyond.any():
+            row = int(np.argmax(beyond))
+            raise self.bad_cell(row, f"{days[row]:g} days", "within the years 1 to 9999")
+        return np.floor(np.nan_to_num(days)).astype(np.int64)
 
     def nothing(self, what: str) -> InputError:
         """The error for a column in which every cell is missing."""
@@ -199,7 +209,11 @@ def as_text(column: pa.ChunkedArray) -> pa.ChunkedArray:
     import pyarrow.compute as pc
 
     types, kind = pa.types, column.type
-    if types.is_dictionary(kind):
+    values = kind.value_type if types.is_dictionary(kind) else kind
+    if types.is_nested(values):  # which no number is, however large
+        cells = pa.array(["" if gone else str(values) for gone in column.is_null().to_pylist()], pa.string())
+        column = pa.chunked_array([cells])
+    elif types.is_dictionary(kind):
         column = column.cast(kind.value_type)
     if types.is_binary(column.type) or types.is_large_binary(column.type):
         try:

@@ -15,6 +15,7 @@ _PAIRS = (  # the first that finds any
     re.compile(rf"{_NAME}\s*(?:[=:;,|\t(\[]+|\b(?:in|is|are)\b)\s*{_STATED}"),
     re.compile(rf"{_NAME}\s+{_STATED}"),
 )
+_MOST_LINES, _LONGEST = 200, 300  # that are searched: above the table, and characters of one
 _GROUPS = {
     **dict.fromkeys(("angle", "angles", "winkel"), QUANTITIES[2:]),
     **dict.fromkeys(("distance", "distances", "length", "lengths", "ranges"), QUANTITIES[1:2]),
@@ -25,7 +26,8 @@ _GROUPS = {
 def units_stated(above: Sequence[str], names: Sequence[str]) -> list[str]:
     """The unit of each column that the lines above the table state, "" where none; nothing if they state none."""
     apart = [taken_apart(name) for name in names]
-    stated = {quantity: unit for line in above if _UNIT.search(line) for quantity, unit in _pairs(line).items()}
+    short = [line for line in above[-_MOST_LINES:] if len(line) <= _LONGEST and _UNIT.search(line)]
+    stated = {quantity: unit for line in short for quantity, unit in _pairs(line).items()}
     units = ["" if name.unit or name.notation else _of(name, stated) for name in apart]
     return units if any(units) else []
 

@@ -1,0 +1,114 @@
+"""Matlab files: vectors of one length, a structure of such, an array of structures, or a matrix."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ftproc.errors import InputError
+from ftproc.files.limits import Room
+from ftproc.files.reading.formats import content
+from ftproc.files.reading.formats.arrays import hdf5, vectors
+from ftproc.files.reading.formats.header import TableHeader
+
+_HEADER = 128  # bytes
+_COMPRESSED, _MATRIX = 15, 14  # types of elements
+_DEEPEST = 50  # structures and cells inside each other
+_ELEMENT = 64  # bytes that an element takes; an array of any size has five
+
+
+def read(name: str, path: Path, room: Room, variable: str = "") -> TableHeader:
+    """A .mat file. variable: its name, else the top level. Raises InputError."""
+    head = content.read(name, path, limit=_HEADER)
+    if head.startswith(b"\x89HDF") or b"MATLAB 7.3" in head:
+        return hdf5.read(name, path, room, variable)
+    from scipy.io import loadmat
+
+    with content.undamaged(name, "a Matlab file", "save it as CSV"):
+        if not _is_version_4(head):
+            _survey(content.read(name, path), room)
+        found = loadmat(path, squeeze_me=True, struct_as_record=False)
+        tables = dict(_tables({key: value for key, value in found.items() if not key.startswith("__")}))
+    return vectors.chosen(room, tables, variable, "Matlab")
+
+
+def _tables(plain: dict[str, Any]) -> Iterator[tuple[str, vectors.Table]]:
+    """The top level, then each structure, array of structures and matrix."""
+    yield "", _vectors(plain)
+    for key, value in plain.items():
+        first = value.flat[0] if isinstance(value, np.ndarray) and value.dtype == object and value.size else value
+        if hasattr(value, "_fieldnames"):
+            yield key, _vectors({field: getattr(value, field) for field in value._fieldnames})
+        elif hasattr(first, "_fieldnames"):  # an array of structures, one for each row
+            yield key, _vectors({field: _cells([getattr(each, field, None) for each in value.flat])
+                                 for field in first._fieldnames})  # fmt: skip
+        elif isinstance(value, np.ndarray) and vectors.is_matrix(value):
+            yield key, vectors.in_memory(vectors.columns(value))
+
+
+def _vectors(values: dict[str, Any]) -> vectors.Table:
+    arrays = {key: each for key, each in values.items() if isinstance(each, np.ndarray)}
+    plain = {key: _cells(each.tolist()) if each.dtype.kind == "O" and each.ndim == 1 else each
+             for key, each in arrays.items()}  # fmt: skip
+    return vectors.in_memory(vectors.vectors({key: each for key, each in plain.items() if each is not None}))
+
+
+def _cells(values: list[Any]) -> Any:
+    """A column of single values: numbers (NaN where there is none) or texts; None where some are arrays."""
+    plain = [np.nan if each is None or (isinstance(each, np.ndarray) and not each.size) else each for each in values]
+    if all(isinstance(each, int | float | np.integer | np.floating) for each in plain):
+        return np.array([float(each) for each in plain])
+    if all(isinstance(each, str) or each is np.nan for each in plain):
+        return np.array([*(each if isinstance(each, str) else None for each in plain), None], object)[:-1]
+    return None
+
+
+def _is_version_4(head: bytes) -> bool:
+    """Whether a file has no header of text, but begins with a matrix, whose type has a zero byte."""
+    return 0 in head[:4]
+
+
+def _survey(data: bytes, room: Room) -> None:
+    """Raise InputError for arrays that unpack to too much, or lie too deep inside each other for a reader."""
+    order = ">" if data[126:128] == b"MI" else "<"
+    size = 0
+    for element in _unpacked(data, order, room):
+        size += len(element)
+        for count, depth in enumerate(_depths(element, order), 1):
+            room.check(size + _ELEMENT * count)
+            if depth > _DEEPEST:
+                raise InputError(f"{room.name}: its structures nest too deeply; save the log's vectors by themselves.")
+        size += _ELEMENT * count
+
+
+def _unpacked(data: bytes, order: str, room: Room) -> Iterator[bytes]:
+    """The elements of a file with their types and lengths, unpacked."""
+    place = _HEADER
+    while place + 8 <= len(data):
+        kind, length = struct.unpack_from(f"{order}II", data, place)
+        if kind == _COMPRESSED:
+            yield zlib.decompressobj().decompress(data[place + 8 : place + 8 + length], room.limit + 1)
+        else:
+            yield data[place : place + 8 + length]
+        place += 8 + length
+
+
+def _depths(data: bytes, order: str) -> Iterator[int]:
+    """How many arrays each element of an element lies in; 0 first."""
+    yield 0
+    ends: list[int] = []
+    place = 0
+    while place + 8 <= len(data):
+        while ends and place >= ends[-1]:
+            ends.pop()
+        yield len(ends)
+        kind, length = struct.unpack_from(f"{order}II", data, place)
+        if kind == _MATRIX:
+            ends.append(place + 8 + length)
+        small = kind >> 16  # a small element has its length, type and data in 8 bytes
+        place += 8 if small or kind == _MATRIX else 8 + (length + 7) // 8 * 8
