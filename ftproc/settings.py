@@ -8,6 +8,11 @@ EDITING = ("two-pass", "live", "forward", "none")
 PACKAGED, NO_MODEL = "packaged", "none"  # values of `model` that are not files
 EPOCHS = {"l-bfgs": 400, "momentum": 1000}  # most that an optimiser of `train` is given, where the user says nothing
 
+#: The smallest noise that is understood, 1 sigma of range m, azimuth rad, elevation rad: no instrument is so good, and
+#: of far smaller ones nothing is left beside the rounding of the readings. And the largest known error.
+LEAST_NOISE = (1e-6, 1e-9, 1e-9)
+MOST_ERROR = (1e9, 20.0, 20.0)
+
 Noise = tuple[float | None, float | None, float | None]
 Parameters = tuple[tuple[str, float], ...]
 

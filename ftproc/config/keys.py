@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from ftproc.config.kinds import Kind, file_name, flag, method, number, parameters, positive, text, whole, widths, words
 from ftproc.files.units import UNITS
 from ftproc.records import COMPONENTS
-from ftproc.settings import EDITING, Air, FilterSettings
+from ftproc.settings import EDITING, LEAST_NOISE, MOST_ERROR, Air, FilterSettings
 
 
 class Key(NamedTuple):
     """option: the option that it sets, by its name on the command line. part: of an option with several parts.
 
     example: shown in a comment, in example_unit; the default where there is one. quantity: of a value whose key ends in
-    its unit, such as bias_mrad.
+    its unit, such as bias_mrad. least, most: of a value with a unit, in SI units.
     """
 
     option: str
@@ -26,6 +27,8 @@ class Key(NamedTuple):
     quantity: str | None = None
     default: Any = None
     example_unit: str = ""
+    least: float = -math.inf
+    most: float = math.inf
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -55,12 +58,14 @@ def _column(quantity: str, example: str) -> dict[str, Key]:
 
 def _errors(quantity: str, sigma: float, bias: float) -> dict[str, Key]:
     index, unit = COMPONENTS.index(quantity), "m" if quantity == "range" else "mrad"
+    least, most = LEAST_NOISE[index], MOST_ERROR[index]
     return {
-        "sigma": Key("noise", positive(), sigma, _SIGMA, index, quantity, example_unit=unit),
-        "bias": Key("bias", number(), bias, _BIAS, index, quantity, default=0.0, example_unit=unit),
+        "sigma": Key("noise", positive(), sigma, _SIGMA, index, quantity, None, unit, least, most),
+        "bias": Key("bias", number(), bias, _BIAS, index, quantity, 0.0, unit, -most, most),
     }
 
 
+_MOST_S = 1e10
 _SIGMA = "noise, 1 sigma; left out: estimated from the log"
 _BIAS = "reading minus truth, subtracted from every reading"
 _FROM_X = "x: A = atan2(y, x); north: then x is north, y east"
@@ -83,14 +88,16 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
     "file": {"widths": Key("widths", widths, "10,12,12,12", _WIDTHS)},
     "time": {
         **_column("time", "UTC"),
-        "offset": Key("time_offset_s", number(), 12.0, _OFFSET, quantity="time", default=0.0, example_unit="ms"),
+        "offset": Key("time_offset_s", number(), 12.0, _OFFSET, None, "time", 0.0, "ms", -_MOST_S, _MOST_S),
     },
     "range": {**_column("range", "RNG"), **_errors("range", 3.0, 2.5)},
     "azimuth": {
         **_column("azimuth", "AZ"),
         "from": Key("azimuth_from", words("x", "north"), "x", _FROM_X, default="x"),
         "sense": Key("azimuth_sense", words("clockwise", "anticlockwise"), "clockwise", _SENSE),
-        "zero": Key("azimuth_zero_rad", number(), 14.5, _ZERO, quantity="azimuth", default=0.0, example_unit="deg"),
+        "zero": Key(
+            "azimuth_zero_rad", number(), 14.5, _ZERO, None, "azimuth", 0.0, "deg", -MOST_ERROR[1], MOST_ERROR[1]
+        ),
         **_errors("azimuth", 0.2, 0.1),
     },
     "elevation": {

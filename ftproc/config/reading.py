@@ -10,7 +10,7 @@ from typing import Any
 from ftproc.config.keys import KEYS, Key, every
 from ftproc.errors import UsageError, nearest
 from ftproc.files.reading.formats.content import is_ordinary
-from ftproc.files.units import UNITS
+from ftproc.files.units import UNITS, si_unit
 from ftproc.settings import NO_MODEL, PACKAGED
 
 #: Options that consist of three parts -> the value of a part that the file does not set.
@@ -136,6 +136,9 @@ def _spelt(name: str, key: Key) -> Iterable[str]:
 def _checked(place: str, key: Key, value: object, to_si: Callable[[Any], Any]) -> Any:
     try:
         found = to_si(key.kind(value))
+        if isinstance(found, float) and key.quantity and not key.least <= found <= key.most:
+            limit = f"at least {key.least:g}" if found < key.least else f"at most {key.most:g}"
+            raise ValueError(f"{limit} {si_unit(key.quantity).name}")
         if isinstance(found, float) and math.isinf(found):
             raise ValueError("a smaller number")
         return found

@@ -110,20 +110,21 @@ def test_every_example_can_be_used():
 
 
 numbers = st.floats(1e-6, 1e6, allow_subnormal=False)
+angles = st.floats(1e-6, 20, allow_subnormal=False)
 names = st.text(st.characters(codec="utf-8", exclude_characters="\r"), min_size=1).filter(str.strip)
 OPTIONS = st.fixed_dictionaries(
     {},
     optional={
         "site": st.tuples(st.floats(-90, 90), st.floats(-180, 360), st.floats(-1000, 1e5)),
         "geoid_m": st.floats(-150, 150),
-        "noise": st.tuples(*[st.none() | numbers] * 3).filter(any),
-        "bias": st.tuples(numbers, numbers, numbers),
+        "noise": st.tuples(st.none() | numbers, st.none() | angles, st.none() | angles).filter(any),
+        "bias": st.tuples(numbers, angles, angles),
         "columns": st.dictionaries(st.sampled_from(["time", "range", "azimuth"]), names, min_size=1),
         "units": st.just({"range": "km"}) | st.just({"time": "us", "azimuth": "mil", "elevation": "gon"}),
         "time_offset_s": numbers,
         "azimuth_from": st.just("north"),
         "azimuth_sense": st.sampled_from(["clockwise", "anticlockwise"]),
-        "azimuth_zero_rad": numbers,
+        "azimuth_zero_rad": angles,
         "elevation_from": st.sampled_from(["horizon", "zenith"]),
         "widths": st.just("10,8,12"),
         "refraction": st.just(True),

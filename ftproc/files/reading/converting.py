@@ -11,7 +11,7 @@ from ftproc.files.reading.clocks import joint, numeric, times
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning import motion, plausibility, readings, schema
-from ftproc.files.reading.meaning.numbers import Origin, without_thousands
+from ftproc.files.reading.meaning.numbers import Origin, finite, without_thousands
 from ftproc.records import FloatArray
 from ftproc.settings import Station
 
@@ -33,7 +33,16 @@ class Converted(NamedTuple):
 
 
 def converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]) -> Converted:
-    """The quantities in SI units. columns: of all quantities, in their order."""
+    """The quantities in SI units. columns: of all quantities, in their order. Raises InputError for cells that are no
+    numbers or times, or too large in SI units."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        read = _converted(header, found, columns)
+    for quantity, values in read.quantities.items():
+        finite(values, _origin(header, found[quantity]))
+    return read
+
+
+def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]) -> Converted:
     quantities: dict[str, FloatArray] = {}
     decided = dict(found)
     notes: list[str] = []

@@ -75,7 +75,7 @@ def _gps(columns: Mapping[str, pa.ChunkedArray], origin: Origin, unit: Unit | No
         second = unit.to_si(second)
     elif np.nanmedian(second) > 2 * WEEK_S:
         second = second / 1e3
-    first = int(known.min())
+    first = int(known.min()) if (origin.whole_days(7 * week) >= 0).all() else 0
     notes: tuple[str, ...] = ()
     if (known == first).all():
         second, notes = unrolled(second, WEEK_S)
@@ -136,9 +136,9 @@ def _dates(columns: Mapping[str, pa.ChunkedArray], origin: Origin) -> tuple[IntA
     roles = [role for role in ("year", "doy") if role in columns] if "doy" in columns else ["year", "month", "day"]
     parts = [_filled(numbers(columns[role], origin)) for role in roles]
     if len(roles) == 1:
-        return parts[0].astype(np.int64), False
-    cells = ["-".join(str(int(part)) for part in row) for row in zip(*parts, strict=True)]
-    pattern = r"(?P<year>\d+)-(?P<doy>\d+)" if "doy" in roles else notations.DATES["year-month-day"]
+        return origin.whole_days(parts[0]), False
+    cells = ["-".join(f"{part:.0f}" for part in row) for row in zip(*parts, strict=True)]
+    pattern = r"(?P<year>\d{1,4})-(?P<doy>\d{1,3})" if "doy" in roles else notations.DATES["year-month-day"]
     moments = notations.parsed(pa.chunked_array([pa.array(cells, pa.string())]), pattern)
     if moments is None or not moments.right.all():
         row = 0 if moments is None else int(np.argmin(moments.right))
@@ -167,13 +167,13 @@ def _dates_in_cells(column: pa.ChunkedArray, origin: Origin) -> tuple[IntArray, 
 
         return _dates_in_text(pa.chunked_array([pa.array([f"{value:06.0f}" for value in filled], pa.string())]), origin)
     if middle < 367:
-        return filled.astype(np.int64), False
+        return origin.whole_days(filled), False
     start = next(
         (start for start, low, high in ((25569, 3e4, 4.9e4), (40587, 5.5e4, 7e4)) if low <= middle < high), None
     )
     if start is None:
         raise origin.bad_cell(0, f"{values[0]:g}", "a date")
-    return np.floor(filled - start).astype(np.int64), True
+    return origin.whole_days(filled - start), True
 
 
 def _dates_in_text(text: pa.ChunkedArray, origin: Origin) -> tuple[IntArray, bool]:

@@ -7,6 +7,7 @@ import numpy as np
 from ftproc.files import leap_seconds
 from ftproc.files.layout import CANONICAL
 from ftproc.files.reading.clocks.clock import DAY_S, WEEK_S, Clock, unrolled
+from ftproc.files.reading.meaning.numbers import Origin
 from ftproc.files.reading.meaning.schema import Column
 from ftproc.order_statistics import median
 from ftproc.records import FloatArray
@@ -50,8 +51,9 @@ _LARGEST = 1e300  # two larger numbers would overflow in a mean
 _MOST_DAYS_STEP = 5e-4  # in s it would be a rate of 2 kHz, in days it is 43 s
 
 
-def read(values: FloatArray, column: Column) -> Clock:
-    """The clock of (n,) numbers as they stand in the file, NaN where missing."""
+def read(values: FloatArray, column: Column, source: str = "") -> Clock:
+    """The clock of (n,) numbers as they stand in the file, NaN where missing. Raises InputError for days that are in no
+    calendar. source: the file, for messages."""
     known = values[np.isfinite(values)]
     kind = _STEMS.get(column.key, "")
     if not known.size:
@@ -61,7 +63,7 @@ def read(values: FloatArray, column: Column) -> Clock:
     size, most = _typical(known), float(known.max())
     counted = _day_count(kind, size, known)
     if counted:
-        return _of_days(values, *_DAY_COUNTS[counted])
+        return _of_days(values, Origin(source, column.name, "a time"), *_DAY_COUNTS[counted])
     counted_from = next((entry for entry in _TICKS if entry[0] <= size < entry[1]), None)
     if counted_from and kind in ("", "unix", "day"):
         _, _, start, per_second, words = counted_from
@@ -92,7 +94,7 @@ def _in_seconds(time_s: FloatArray, kind: str, column: Column, words: str) -> Cl
     known = time_s[np.isfinite(time_s)]
     size = _typical(known)
     if kind == "gps" and _GPS_FROM <= size < _UNIX_TO:
-        days = leap_seconds.GPS_EPOCH_DAY + int(known.min() // DAY_S)
+        days = leap_seconds.GPS_EPOCH_DAY + int(np.clip(known.min(), 0, _UNIX_TO) // DAY_S)
         start = np.datetime64("1980-01-06T00:00:00") - np.timedelta64(int(leap_seconds.before(np.array(days))), "s")
         return Clock(time_s, f"{start}Z", f"{words} since the GPS epoch, 1980-01-06")
     named_unix = kind == "unix" and _UNIX_FROM <= size < _UNIX_TO
@@ -124,10 +126,10 @@ def _day_count(kind: str, size: float, known: FloatArray) -> str:
     return "mjd" if 5.5e4 <= size < 7e4 else ""
 
 
-def _of_days(values: FloatArray, of_1970: float, words: str) -> Clock:
+def _of_days(values: FloatArray, origin: Origin, of_1970: float, words: str) -> Clock:
     days = values - of_1970
-    first = float(np.floor(np.nanmin(days)))
-    epoch = f"{np.datetime64(int(first), 'D')}T00:00:00Z"
+    first = int(origin.whole_days(days)[np.isfinite(days)].min())
+    epoch = f"{np.datetime64(first, 'D')}T00:00:00Z"
     return Clock(np.round((days - first) * DAY_S, 6), epoch, f"{words}, in s since 00:00 of the first day")
 
 

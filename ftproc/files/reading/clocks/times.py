@@ -57,7 +57,7 @@ def read(column: pa.ChunkedArray, origin: Origin, described: Column) -> Clock:
             counted_up = _with_unit(text)
             return _on_gps(stamped(text, origin), described) if counted_up is None else counted_up
         column = text
-    return numeric.read(numbers(column, origin), described)
+    return numeric.read(numbers(column, origin), described, origin.source)
 
 
 def _on_gps(clock: Clock, described: Column) -> Clock:
