@@ -7,7 +7,7 @@ RANGES = $(if $(filter file,$(origin LOGS)),sample_data/range/range.toml)
 OUT = out
 FLAGS =
 MODEL_FLAGS = --scenario family --flights 60 --seed 2021
-FUZZ = csv gzip parquet feather truth trajectory station model header kernel
+FUZZ = csv gzip parquet feather mat nc npz h5 json names truth trajectory station model header kernel
 FUZZ_SECONDS = 600
 OLDEST = tests/files tests/config tests/correction tests/test_pipeline.py tests/docs/test_readme.py
 KERNELS ?= tests/core
@@ -150,7 +150,7 @@ readme: $(developer) ## write the tables and outputs in the READMEs; BLOCKS="spe
 model: $(installed) ## train the packaged model anew (MODEL_FLAGS)
 	$(ftproc) train $(MODEL_FLAGS) -o ftproc/correction/default.safetensors
 
-trust: $(developer) ## the table of reliability: bad files, faults, long runs, fuzz (some ten minutes)
+trust: $(developer) ## the table of reliability: bad files, attacks, faults, long runs, fuzz (some twenty minutes)
 	$(bin)/python -m tests.trust
 
 fuzz: $(developer) ## fuzz the readers and the filter (FUZZ) for FUZZ_SECONDS each; findings go to out/fuzz

@@ -4,6 +4,7 @@ and the cure."""
 from __future__ import annotations
 
 import errno
+import os
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -106,7 +107,8 @@ def row_named(row: int) -> str:
 
 def first_line(error: BaseException) -> str:
     """What an error of another library says, short enough for a sentence; its kind if it says nothing."""
-    return str(error).splitlines()[0][:200] if str(error) else type(error).__name__
+    lines = str(error).split("\n")
+    return next((line[:200] for line in lines if line.strip()), type(error).__name__)
 
 
 def interruption(error: BaseException) -> BaseException | None:
@@ -120,7 +122,10 @@ def interruption(error: BaseException) -> BaseException | None:
     return cause if isinstance(cause, KeyboardInterrupt | SystemExit) else None
 
 
-_NO_MEMORY = ("Cannot allocate memory", "bad_alloc", "malloc of size", "realloc of size")
+_NO_MEMORY = (
+    *("annot allocate memory", "bad_alloc", "malloc of size", "realloc of size"),
+    "failed to map segment",  # of a library that is loaded
+)
 _NUMBA_CACHE = "numba/core/caching.py"  # where numba reads and writes it, in a traceback
 _NO_PROCESS = ("Resource temporarily unavailable", "can't start new thread")
 
@@ -149,6 +154,14 @@ def stdout_fault(error: OSError, lost: str = "the result is lost") -> str:
     if error.errno == errno.EBADF:
         return f"standard output is closed, so {lost}; leave it open, or send it to a file."
     return f"standard output: {(error.strerror or str(error)).lower()}, so {lost}; send it elsewhere."
+
+
+def _has_directory() -> bool:
+    """Whether the directory that the program was started in is still there."""
+    try:
+        return bool(os.getcwd())  # noqa: PTH109
+    except FileNotFoundError:
+        return False
 
 
 @dataclass(frozen=True)
@@ -182,6 +195,8 @@ def failure(error: BaseException, source: str | None = None) -> Failure:
         return Failure(f"numba's cache of kernels is damaged, or cannot be kept ({reason}). {cure}", 1, trace)
     if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
         return Failure("too many files are open. Raise the limit (ulimit -n), or use fewer --jobs.", 1, trace)
+    if isinstance(error, FileNotFoundError) and not _has_directory():
+        return Failure("the working directory was deleted; change to one that is there.", 1, trace)
     if isinstance(error, OSError) and error.strerror:
         place = error.filename or source
         return Failure(f"{place}: {error.strerror.lower()}." if place else stdout_fault(error), 1, trace)

@@ -13,7 +13,7 @@ MAX_GROWTH = 100
 MOST_COLUMNS = 5000
 LONGEST_NAME = 1000  # characters
 WITHOUT_END = 4 << 30  # bytes of standard input, or of a storage that does not say its size
-ROW = 200  # bytes that a row takes until it is a row of a trajectory
+ROW = 400  # bytes that a row takes until it is a row of a trajectory
 
 _MIN_ROOM = 64 << 20  # bytes that any file may unpack to
 

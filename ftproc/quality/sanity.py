@@ -17,7 +17,7 @@ SHORTEST_S = 1e-6  # the shortest duration of a log of several times; less is a 
 MOST_RANGES = 250_000  # that are checked; a longer log is thinned
 LATEST_S = 1e11  # 3000 years; beyond, the unit is not seconds, and differences lose their fractions
 LONGEST_LAG_S = 3600.0
-SMALLEST = 1e-30  # of jerk PSD and gate: the square and its inverse must be finite
+SMALLEST = 1e-30  # of noise, jerk PSD and gate: the square and its inverse must be finite
 FEWEST_PARTICLES = 20
 FEWEST_READINGS = 8  # of a component, to estimate its noise
 ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of a component with fewer
@@ -43,12 +43,13 @@ def check_settings(settings: FilterSettings) -> None:
             "--smooth takes the whole record, and --editing live what is known by its lag; give a longer --lag instead"
         )
     for component, sigma, least in zip(COMPONENTS, settings.noise or (None,) * 3, LEAST_NOISE, strict=True):
-        if sigma is not None and not least <= sigma <= 1 / SMALLEST:
+        if sigma is not None and sigma < least:
             raise UsageError(
                 f"noise of the {component} must be at least {least:g}, not {sigma:g}: no instrument is so good, and "
                 "readings are rounded more coarsely; give the standard deviation, not the variance"
             )
-    numbers = [("jerk", settings.jerk_psd_m2ps5), ("gate", settings.gate), ("max-patch", settings.max_patch_s)]
+    numbers: list[tuple[str, float | None]] = [("noise", v) for v in settings.noise or ()]
+    numbers += [("jerk", settings.jerk_psd_m2ps5), ("gate", settings.gate), ("max-patch", settings.max_patch_s)]
     for name, value in numbers:
         if value is not None and not SMALLEST <= value <= 1 / SMALLEST:
             raise UsageError(f"{name} must be a positive number, from {SMALLEST:g} to {1 / SMALLEST:g}, not {value}")

@@ -137,7 +137,7 @@ OPTIONS = st.fixed_dictionaries(
         "jerk": numbers,
         "gate": st.floats(5, 50),
         "max_patch": numbers,
-        "lag": st.floats(0, 3600),
+        "lag": st.floats(1e-3, 3600),
         "weight_form": st.just("gain"),
         "ecef": st.just(True),
         "set": st.sampled_from(["window=6", "m = 0.01, F_range_m=3e2"]),
@@ -230,3 +230,20 @@ def test_files_that_cannot_be_read(tmp_path):
         with pytest.raises(UsageError) as caught:
             config.load(tmp_path / name)
         assert str(caught.value) == f"{tmp_path / name}: {sentence.format(tmp_path / name)}"
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("[azimuth]\nzero_rad = 1e308", "[azimuth] zero_rad = 1e+308: expected at most 20 rad."),
+        ("[azimuth]\nzero_deg = -1e6", "[azimuth] zero_deg = -1000000.0: expected at least -20 rad."),
+        ("[range]\nbias_km = 1e300", "[range] bias_km = 1e+300: expected at most 1e+09 m."),
+        ("[range]\nsigma_m = 1e-12", "[range] sigma_m = 1e-12: expected at least 1e-06 m."),
+        ("[elevation]\nsigma_mrad = 1e-9", "[elevation] sigma_mrad = 1e-09: expected at least 1e-09 rad."),
+        ("[time]\noffset_h = 1e100", "[time] offset_h = 1e+100: expected at most 1e+10 s."),
+    ],
+)
+def test_errors_that_no_instrument_has(line, said):
+    with pytest.raises(UsageError) as caught:
+        config.parse(line, "s.toml")
+    assert str(caught.value) == f"s.toml: {said}"

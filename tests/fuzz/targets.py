@@ -7,6 +7,7 @@ Two drivers feed them: `mutation` (plain Python, a little of it in every `make t
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import tempfile
 import warnings
@@ -204,6 +205,88 @@ def _trajectories() -> Iterator[bytes]:
         yield (line + "\n" + "\n".join(",".join("1" for _ in line.split(",")) for _ in range(3)) + "\n").encode()
 
 
+def _names(path: Path) -> None:
+    """The bytes are the line of names above the flight's rows, with or without units in a row of their own."""
+    line = path.read_bytes().replace(b"\n", b" ").replace(b"\r", b" ")
+    made = path.with_name(f"{path.stem}.csv")
+    width = line.count(b",") + 1
+    rows = [",".join((row * width)[:width]) for row in cases.rows()]
+    made.write_bytes(line + b"\n" + "\n".join(rows).encode() + b"\n")
+    try:
+        assert len(logs.read(made)) > 0
+    except FtprocError as error:
+        cases.judge_sentence(made.name, str(error))
+
+
+def _lines_of_names() -> Iterator[bytes]:
+    for line in (
+        "Time (s),Range [km],Az °,El (0.1 mrad)", "gps_week,TOW,slantRange/yd,AZ in mil,EL", "t,R,theta,phi",
+        "CAT048.I140.ToD,CAT048.I040.RHO.val,CAT048.I040.THETA.val", "1: utc,2: rng (x100 ft),3: az_deg,4: zenith",
+        "Uhrzeit,Schrägentfernung (m),Azimut (gon),Höhenwinkel (gon)", "date,time,dist in 1/128 nmi,bearing,elev",
+    ):  # fmt: skip
+        yield line.encode()
+
+
+def _arrays(kind: str) -> Callable[[], Iterator[bytes]]:
+    """Small files of arrays of one kind."""
+
+    def made() -> Iterator[bytes]:
+        few = {name: column[:5] for name, column in bad_files.columns().items()}
+        for sink, write in ((io.BytesIO(), write) for write in _WRITERS[kind]):
+            write(sink, few)
+            yield sink.getvalue()
+
+    return made
+
+
+def _hdf5(sink: Any, few: dict[str, Any], compound: bool = False) -> None:
+    import h5py
+
+    with h5py.File(sink, "w", libver="latest" if compound else None) as out:
+        if compound:
+            out["log"] = np.rec.fromarrays(list(few.values()), names=list(few))
+        for name, column in few.items() if not compound else ():
+            out.create_dataset(name, data=column, chunks=(5,), compression="gzip").attrs["units"] = "m"
+
+
+def _netcdf(sink: Any, few: dict[str, Any]) -> None:
+    from scipy.io import netcdf_file
+
+    held = io.BytesIO()  # which is closed with the file
+    out = netcdf_file(held, "w")
+    out.createDimension("n", 5)
+    for name, column in few.items():
+        made = out.createVariable(name, "f8", ("n",))
+        made[:] = column
+        made.units = name.rpartition("_")[2]
+    out.flush()
+    sink.write(held.getvalue())
+
+
+def _savemat(sink: Any, few: dict[str, Any], whole: bool, packed: bool) -> None:
+    from scipy.io import savemat
+
+    rows = np.array([dict(zip(few, row, strict=True)) for row in zip(*few.values(), strict=True)], object)
+    savemat(sink, few if whole else {"log": rows}, do_compression=packed)
+
+
+_WRITERS: dict[str, tuple[Callable[[Any, dict[str, Any]], None], ...]] = {
+    "h5": (_hdf5, lambda sink, few: _hdf5(sink, few, True)),
+    "nc": (_netcdf, _netcdf),
+    "mat": tuple(lambda sink, few, w=w, p=p: _savemat(sink, few, w, p) for w in (True, False) for p in (True, False)),
+    "npz": (lambda sink, few: np.savez(sink, **few), lambda sink, few: np.savez_compressed(sink, **few)),
+}
+
+
+def _documents() -> Iterator[bytes]:
+    few = {name: column[:5].tolist() for name, column in bad_files.columns().items()}
+    rows = [dict(zip(few, row, strict=True)) for row in zip(*few.values(), strict=True)]
+    plain = {"columns": list(few), "data": [list(row.values()) for row in rows]}
+    for document in (few, rows, {"station": "a", "polar": rows}, plain):
+        yield json.dumps(document).encode()
+    yield "\n".join(json.dumps({"t": {"value": row["time_s"]}, **row}) for row in rows).encode()
+
+
 _TEXTS = (bad_logs.all_cases, bad_times.all_cases, bad_files.all_cases)
 
 
@@ -220,5 +303,8 @@ def all_targets() -> dict[str, Target]:
         "station": Target(".toml", "station", _station, (bad_stations.all_cases,)),
         "model": Target(".safetensors", "model", _model, (bad_models.all_cases,)),
         "header": Target(".json", "header", _header, (), _headers),
+        **{kind: Target(f".{kind}", "log", _log, (), _arrays(kind)) for kind in _WRITERS},
+        "json": Target(".json", "log", _log, (), _documents),
+        "names": Target(".txt", "names", _names, (), _lines_of_names),
         "kernel": Target(".bin", "readings", kernel.check, (), kernel.seeds),
     }

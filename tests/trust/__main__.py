@@ -9,6 +9,7 @@ from pathlib import Path
 from tests.faults import batches
 from tests.fuzz import mutation
 from tests.trust import corpus, elsewhere, long_runs, verdicts
+from tests.trust.attacks import running
 
 KILLS, FLIGHTS, SAMPLES, FUZZ_S = 50, 200, 10_000_000, 60.0
 
@@ -17,6 +18,7 @@ def main() -> int:
     """Print the table; 1 when anything is wrong."""
     counts, lines = corpus.run()
     tried = counts.total()
+    attacked, taken = running.run()
     fuzzed, wrong = mutation.run(FUZZ_S)
     kills, lost = _kills()
     faults = elsewhere.run(*elsewhere.FAULTS, FTPROC_TRUST="1")
@@ -25,7 +27,9 @@ def main() -> int:
     endless = long_runs.endless(SAMPLES)
     judged = verdicts.table()
     tracebacks = counts["wrong"] + counts["known"] + len(wrong)
-    for line in filter(None, [*lines, *wrong, *lost, faults.failures, plain.failures, *verdicts.too_many(judged)]):
+    for line in filter(
+        None, [*lines, *taken, *wrong, *lost, faults.failures, plain.failures, *verdicts.too_many(judged)]
+    ):
         print(line, file=sys.stderr)
     for row in (
         ("what", "count"),
@@ -33,6 +37,8 @@ def main() -> int:
         ("bad files tried", tried),
         ("refused in a plain sentence", counts["refused"]),
         ("read correctly all the same", counts["right"]),
+        ("attacks on readers, each in a process with limits", attacked),
+        ("of these over 10 s or 1.5 GB, or not a result or a plain sentence", len(taken)),
         ("mutated files tried", fuzzed),
         ("tracebacks, warnings, hangs, wrong results", tracebacks),
         ("runs killed at a random moment", kills),
@@ -49,7 +55,7 @@ def main() -> int:
     ):
         print(f"| {row[0]} | {row[1]} |")
     right = faults.all_passed and plain.all_passed and endless == "ok" and not verdicts.too_many(judged)
-    return int(bool(counts["wrong"] or wrong or lost or diverged.unreported or not right))
+    return int(bool(counts["wrong"] or taken or wrong or lost or diverged.unreported or not right))
 
 
 def _kills() -> tuple[int, list[str]]:

@@ -41,6 +41,7 @@ class _Plan(NamedTuple):
         return [place for column in self.found.values() for place in column.positions]
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a reading may be 1e308: what overflows is beyond all limits too
 def read(
     source: tables.Source,
     *,

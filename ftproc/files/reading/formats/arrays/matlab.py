@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import zlib
 from collections.abc import Iterator
@@ -27,10 +28,12 @@ def read(name: str, path: Path, room: Room, variable: str = "") -> TableHeader:
     head = content.read(name, path, limit=_HEADER)
     if head.startswith(b"\x89HDF") or b"MATLAB 7.3" in head:
         return hdf5.read(name, path, room, variable)
-    from scipy.io import loadmat
+    from scipy.io import loadmat, whosmat
 
     with content.undamaged(name, "a Matlab file", "save it as CSV"):
-        if not _is_version_4(head):
+        if _is_version_4(head):
+            room.check(sum(8 * math.prod(shape) for _, shape, _ in whosmat(path)))
+        else:
             _survey(content.read(name, path), room)
         found = loadmat(path, squeeze_me=True, struct_as_record=False)
         tables = dict(_tables({key: value for key, value in found.items() if not key.startswith("__")}))

@@ -50,7 +50,9 @@ def chosen(room: Room, tables: Mapping[str, Table], wanted: str, kind: str) -> T
     if wanted and wanted not in tables:
         raise InputError(f'{name}: there is no "{wanted}" with arrays of one length; those that have are: {titles}.')
     if not tables:
-        raise InputError(f"{name}: it holds no two arrays of one length, which could be columns of a log.")
+        raise InputError(
+            f"{name}: it holds no two arrays of one length, which could be columns; save the vectors side by side."
+        )
     if not wanted and len(tables) > 1 and "" not in tables:
         first = next(iter(tables))
         raise InputError(f"{name}: it holds several tables: {titles}. Name one behind #, such as {name}#{first}.")
