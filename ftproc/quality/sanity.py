@@ -42,17 +42,17 @@ def check_settings(settings: FilterSettings) -> None:
         raise UsageError(
             "--smooth takes the whole record, and --editing live what is known by its lag; give a longer --lag instead"
         )
+    numbers: list[tuple[str, float | None]] = [("noise", v) for v in settings.noise or ()]
+    numbers += [("jerk", settings.jerk_psd_m2ps5), ("gate", settings.gate), ("max-patch", settings.max_patch_s)]
+    for name, value in numbers:
+        if value is not None and not SMALLEST <= value <= 1 / SMALLEST:
+            raise UsageError(f"{name} must be a positive number, from {SMALLEST:g} to {1 / SMALLEST:g}, not {value}")
     for component, sigma, least in zip(COMPONENTS, settings.noise or (None,) * 3, LEAST_NOISE, strict=True):
         if sigma is not None and sigma < least:
             raise UsageError(
                 f"noise of the {component} must be at least {least:g}, not {sigma:g}: no instrument is so good, and "
                 "readings are rounded more coarsely; give the standard deviation, not the variance"
             )
-    numbers: list[tuple[str, float | None]] = [("noise", v) for v in settings.noise or ()]
-    numbers += [("jerk", settings.jerk_psd_m2ps5), ("gate", settings.gate), ("max-patch", settings.max_patch_s)]
-    for name, value in numbers:
-        if value is not None and not SMALLEST <= value <= 1 / SMALLEST:
-            raise UsageError(f"{name} must be a positive number, from {SMALLEST:g} to {1 / SMALLEST:g}, not {value}")
 
 
 def no_start(log: MeasurementLog, cause: ValueError) -> InputError:

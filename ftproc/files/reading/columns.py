@@ -12,7 +12,7 @@ from ftproc.files.layout import OUTLIER, POSITION, TRAJECTORY
 from ftproc.files.reading.clocks.times import seconds
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning.names import Name, taken_apart
-from ftproc.files.reading.meaning.numbers import Origin, numbers, without_thousands
+from ftproc.files.reading.meaning.numbers import Origin, finite, numbers, without_thousands
 from ftproc.files.reading.meaning.questions import listed
 from ftproc.files.units import Unit, unit_named
 from ftproc.records import FlagArray, FloatArray
@@ -103,9 +103,10 @@ def _origin(header: TableHeader, wanted: str, called: Name) -> Origin:
 
 
 def _numbers(wanted: str, column: pa.ChunkedArray, origin: Origin, unit: Unit) -> FloatArray:
-    if wanted == "time_s":
-        return seconds(column, origin, unit.to_si)[0]
-    return unit.to_si(numbers(column, origin))
+    with np.errstate(over="ignore", invalid="ignore"):
+        is_time = wanted == "time_s"
+        values = seconds(column, origin, unit.to_si)[0] if is_time else unit.to_si(numbers(column, origin))
+    return finite(values, origin)
 
 
 def _require_once(header: TableHeader, name: str) -> None:

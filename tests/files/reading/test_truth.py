@@ -145,3 +145,10 @@ def test_a_number_that_means_a_missing_value_is_refused(make: Make, rows: tuple[
 def test_a_flight_through_such_a_number_is_a_flight(make: Make) -> None:
     lines = [f"{k},{-9999 + 15 * (k - 20)},0,100" for k in range(40)]
     assert -9999 in truth.read(make("time_s,x_m,y_m,z_m\n" + "\n".join(lines))).position_m
+
+
+def test_a_position_too_large_in_metres(tmp_path):
+    path = tmp_path / "truth.csv"
+    path.write_text("time_s,x_km,y_m,z_m\n0,1e308,2,3\n1,2,3,4\n")
+    with pytest.raises(InputError, match=r'truth\.csv: row 0 .*, column "x_km": "inf" is not finite'):
+        truth.read(path)
