@@ -17,6 +17,7 @@ from ftproc.errors import InputError
 from ftproc.files import limits, remote
 from ftproc.files.reading import logs, trajectories
 from ftproc.files.reading.formats import tables
+from ftproc.files.reading.formats.arrays import rehearsal
 from ftproc.files.reading.formats.columnar import sizes
 from ftproc.files.reading.formats.sparse import Sparse
 from ftproc.files.reading.meaning.names import taken_apart
@@ -224,3 +225,30 @@ def test_a_pipe_for_a_sidecar_does_not_hold(tmp_path: Path) -> None:
     path.write_text("time_s,x_m,y_m,z_m\n0,1,2,3\n1,2,3,4\n")
     os.mkfifo(tmp_path / "a.json")
     assert trajectories.read(path).metadata == {}
+
+
+def test_a_library_that_does_not_come_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reading is rehearsed in a process of its own: its end is not ours, and it is not waited for without an end."""
+    import os
+    import signal
+    import time
+
+    path = tmp_path / "a.h5"
+    path.write_bytes(b"1")
+    monkeypatch.setattr(rehearsal, "_LONGEST_S", 0.2)
+
+    def fails() -> None:
+        raise ValueError("comes again in the reader")
+
+    def rehearsed(read: Callable[[], object]) -> str:
+        with pytest.raises(InputError) as caught:
+            rehearsal.rehearse(path, "a.h5", "an HDF5 file", read)
+        return str(caught.value)
+
+    rehearsal.rehearse(path, "a.h5", "an HDF5 file", lambda: None)
+    rehearsal.rehearse(path, "a.h5", "an HDF5 file", fails)
+    sentence = "a.h5: not an HDF5 file, or a damaged one ({}); copy it again."
+    assert rehearsed(lambda: os.kill(os.getpid(), signal.SIGSEGV)) == sentence.format("signal 11")
+    assert rehearsed(lambda: time.sleep(60)) == sentence.format("it comes to no end")
+    with pytest.raises(ChildProcessError):  # none is left behind
+        os.waitpid(-1, os.WNOHANG)

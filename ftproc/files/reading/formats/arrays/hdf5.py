@@ -16,6 +16,7 @@ from ftproc.errors import InputError
 from ftproc.files.limits import Room
 from ftproc.files.reading.formats import content
 from ftproc.files.reading.formats.arrays import saved, vectors
+from ftproc.files.reading.formats.arrays.rehearsal import rehearse
 from ftproc.files.reading.formats.header import TableHeader
 
 _NAMES = ("columns", "names", "column_names", "fields")  # attributes in which those of a matrix stand
@@ -56,8 +57,14 @@ def read(name: str, path: Path, room: Room, group: str = "") -> TableHeader:
         import h5py
     except ImportError as error:
         raise InputError(f'{name}: reading HDF5 needs h5py: pip install "ftproc[hdf5]"; or save it as CSV.') from error
-    with content.undamaged(name, "an HDF5 file", "copy it again"), h5py.File(path, "r") as file:
-        groups = dict(_groups(file["/"], "", 0))
+
+    def survey() -> dict[str, Group]:
+        with h5py.File(path, "r") as file:
+            return dict(_groups(file["/"], "", 0))
+
+    rehearse(path, name, "an HDF5 file", survey)
+    with content.undamaged(name, "an HDF5 file", "copy it again"):
+        groups = survey()
     wanted = group.strip("/")
     title = wanted or ("" if groups[""].columns else next((key for key in groups if groups[key].columns), ""))
     foreign = groups[title].elsewhere if title in groups else ()
@@ -202,9 +209,15 @@ def _reader(name: str, path: Path, room: Room, columns: Mapping[str, Stored]) ->
         whole = {one.place: one for one in wanted}.values()
         room.check(sum(int(np.prod([float(side) for side in one.shape])) * one.dtype.itemsize for one in whole))
         room.check(max((one.chunk for one in whole), default=0))
-        with content.undamaged(name, "an HDF5 file", "copy it again"), h5py.File(path, "r") as file:
+
+        def values() -> list[Any]:
             matrices: dict[str, Any] = {}
-            return [_values(file, one, room, matrices) for one in wanted]
+            with h5py.File(path, "r") as file:
+                return [_values(file, one, room, matrices) for one in wanted]
+
+        rehearse(path, name, "an HDF5 file", values)
+        with content.undamaged(name, "an HDF5 file", "copy it again"):
+            return values()
 
     return load
 

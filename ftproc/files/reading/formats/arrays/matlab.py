@@ -15,6 +15,7 @@ from ftproc.errors import InputError
 from ftproc.files.limits import Room
 from ftproc.files.reading.formats import content
 from ftproc.files.reading.formats.arrays import hdf5, vectors
+from ftproc.files.reading.formats.arrays.rehearsal import rehearse
 from ftproc.files.reading.formats.header import TableHeader
 
 _HEADER = 128  # bytes
@@ -35,6 +36,7 @@ def read(name: str, path: Path, room: Room, variable: str = "") -> TableHeader:
             room.check(sum(8 * math.prod(shape) for _, shape, _ in whosmat(path)))
         else:
             _survey(content.read(name, path), room)
+        rehearse(path, name, "a Matlab file", lambda: loadmat(path, squeeze_me=True, struct_as_record=False))
         found = loadmat(path, squeeze_me=True, struct_as_record=False)
         tables = dict(_tables({key: value for key, value in found.items() if not key.startswith("__")}))
     return vectors.chosen(room, tables, variable, "Matlab")

@@ -33,8 +33,9 @@ def read(name: str, path: Path, room: Room) -> TableHeader:
         import pyarrow as pa
 
         places = sorted({*numeric, *others})
+        some = places if len(places) < len(names) else []
         with _undamaged(name):
-            wanted, batches = _opened(data, places)
+            wanted, batches = _opened(data, some)
             held = []
             for batch in batches:
                 batch.validate(full=True)  # a damaged length would be read past the end of the memory
@@ -60,7 +61,8 @@ def _undamaged(name: str) -> Iterator[None]:
 
 
 def _opened(data: bytes, places: Sequence[int] = ()) -> tuple[pa.Schema, Iterator[pa.RecordBatch]]:
-    """Schema and batches of an Arrow file, or else of an Arrow stream. places: of the columns that are read, or all."""
+    """Schema and batches of an Arrow file, or else of an Arrow stream. places: of the columns that are read; all if
+    there are none."""
     import pyarrow as pa
 
     options = pa.ipc.IpcReadOptions(included_fields=list(places))
