@@ -182,6 +182,7 @@ def _on_lines(
     return on, values
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of times 1e-300 s apart
 def _without_noise(time_s: FloatArray, values: FloatArray, step: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """(m,) readings of a stretch without noise, by their third divided differences, and those that move meanwhile."""
     found, moving = np.zeros(len(values), bool), np.zeros(len(values), bool)

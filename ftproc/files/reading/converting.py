@@ -18,8 +18,6 @@ from ftproc.settings import Station
 if TYPE_CHECKING:
     import pyarrow as pa
 
-_NO_TIME_S = 1e-15  # less is a time of zero that was computed or is damaged; steps of 1e-300 s overflow as rates
-
 Found = Mapping[str, schema.Column]
 
 
@@ -39,8 +37,6 @@ def converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray])
     numbers or times, or too large in SI units."""
     with np.errstate(over="ignore", invalid="ignore"):
         read = _converted(header, found, columns)
-    time_s = read.quantities["time"]
-    read.quantities["time"] = np.where(np.abs(time_s) < _NO_TIME_S, 0.0, time_s)
     for quantity, values in read.quantities.items():
         finite(values, _origin(header, found[quantity]))
     return read

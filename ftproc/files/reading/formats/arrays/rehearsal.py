@@ -16,6 +16,7 @@ from ftproc.errors import InputError
 from ftproc.files.reading.formats import content
 
 _LONGEST_S, _BYTES_A_SECOND = 5.0, 10 << 20  # for any file, and for a large one in addition
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL)
 _FIRST_LOOK_S, _LONGEST_LOOK_S = 2e-4, 0.002
 
 
@@ -36,15 +37,15 @@ def rehearse(path: Path, room_name: str, kind: str, read: Callable[[], object]) 
         if status is None:
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
-    if status is None or os.WIFSIGNALED(status):
-        why = "it comes to no end" if status is None else f"signal {os.WTERMSIG(status)}"
+    if status != 0:
+        why = "it comes to no end" if status is None else f"its reader ends with {os.waitstatus_to_exitcode(status)}"
         raise InputError(f"{room_name}: not {kind}, or a damaged one ({why}); copy it again.")
 
 
 def _read_and_end(read: Callable[[], object]) -> None:
     with contextlib.suppress(BaseException):
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        for number in _SIGNALS:
+            signal.signal(number, signal.SIG_DFL)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # the library's last words, and ours about them
         faulthandler.disable()
         read()
