@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ftproc.errors import InputError, first_line
 from ftproc.files.limits import Room
 from ftproc.files.reading.formats import content
+from ftproc.files.reading.formats.arrays.rehearsal import rehearse
 from ftproc.files.reading.formats.columnar import sizes
 from ftproc.files.reading.formats.header import Blocks, TableHeader
 
@@ -26,6 +27,14 @@ def read(name: str, path: Path, room: Room) -> TableHeader:
     file = _Parquet(name, path, room)
     metadata = file.schema.metadata or {}
     return TableHeader(name, file.names, file.load, metadata=metadata, blocks=file.blocks, form="Parquet")
+
+
+class _Part(NamedTuple):
+    """Of a column. size: bytes, unpacked. has_prefixes: its texts are written by what they have in common."""
+
+    size: int
+    values: int
+    has_prefixes: bool
 
 
 class _Parquet:
@@ -123,16 +132,23 @@ class _Parquet:
     def _check(self, chosen: Sequence[str]) -> int:
         """Raise InputError where the columns unpack to too much, as the footer says. Bytes of the largest part of a
         column of texts that are written by what they have in common, 0 without any."""
+        groups = [self.footer.row_group(k) for k in range(self.footer.num_row_groups)]
+        self.room.check(max(sum(group.total_byte_size for group in groups), 8 * self.rows * len(chosen)), self.rows)
+        kinds = [self.schema.field(self.names.index(name)).type for name in chosen]
+        if all(map(sizes.is_number, kinds)):
+            return 0
+        rehearse(self.path, self.name, "a Parquet file", lambda: self._parts(chosen))
+        parts = self._parts(chosen)
+        self.room.check(sum(max(part.size, 8 * part.values) for part in parts))
+        return max((part.size for part in parts if part.has_prefixes), default=0)
+
+    def _parts(self, chosen: Sequence[str]) -> list[_Part]:
+        """What the footer says of each part of the columns. pyarrow ends the process where that is damaged."""
         paths = [self.footer.schema.column(k).path for k in range(self.footer.num_columns)]
         wanted = [k for k, path in enumerate(paths) if any(path == n or path.startswith(f"{n}.") for n in set(chosen))]
-        size = longest = 0
-        for group in map(self.footer.row_group, range(self.footer.num_row_groups)):
-            for column in map(group.column, wanted):
-                size += max(column.total_uncompressed_size, 8 * column.num_values)
-                if "DELTA_BYTE_ARRAY" in column.encodings:
-                    longest = max(longest, column.total_uncompressed_size)
-        self.room.check(size, self.rows)
-        return longest
+        groups = map(self.footer.row_group, range(self.footer.num_row_groups))
+        parts = (group.column(k) for group in groups for k in wanted)
+        return [_Part(p.total_uncompressed_size, p.num_values, "DELTA_BYTE_ARRAY" in p.encodings) for p in parts]
 
     def _refuse_loss(self, rows: int) -> None:
         """A file that ends early may lack its last rows without an error from pyarrow."""

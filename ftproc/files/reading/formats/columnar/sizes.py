@@ -31,6 +31,15 @@ def is_text(kind: pa.DataType) -> bool:
     return bool(t.is_string(kind) or t.is_binary(kind) or t.is_large_string(kind) or t.is_large_binary(kind))
 
 
+def is_number(kind: pa.DataType) -> bool:
+    """Whether a value takes eight bytes at most, wherever it stands."""
+    import pyarrow as pa
+
+    t = pa.types
+    tests = (t.is_integer, t.is_floating, t.is_boolean, t.is_timestamp, t.is_date, t.is_time, t.is_duration)
+    return any(test(kind) for test in tests)
+
+
 def unpacked(column: pa.ChunkedArray) -> int:
     """Bytes of the values of a column, of which several may share their memory."""
     return sum(_of_chunk(chunk) for chunk in column.chunks)
