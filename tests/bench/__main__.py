@@ -1,6 +1,6 @@
 """`python -m tests.bench [NAME...]`: tables of the README and the guide, as Markdown on standard output and in
-out/bench.md. The names: samples, accuracy, sigmas, methods, rivals, instruments, correction, speed, start, scale, live,
-pages, training."""
+out/bench.md. The names: samples, accuracy, sigmas, ablation, methods, rivals, instruments, correction, speed, start,
+scale, live, pages, training."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from itertools import chain
 from pathlib import Path
 
 from tests.bench import (
+    ablation,
     accuracy,
     correction,
     instruments,
@@ -29,6 +30,7 @@ TABLES = {
     "samples": samples,
     "accuracy": accuracy,
     "sigmas": sigmas,
+    "ablation": ablation,
     "methods": methods,
     "rivals": rivals,
     "instruments": instruments,

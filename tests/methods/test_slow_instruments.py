@@ -3,8 +3,6 @@ goes farther than anybody can foretell, and what looks like noise is motion."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -13,29 +11,9 @@ from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations
 from ftproc.core.filtering.smoother import likelihood_of
 from ftproc.core.identification import likelihood
-from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.core.model.motion import isotropic
-from ftproc.records import MeasurementLog
 from ftproc.settings import FilterSettings
-from ftproc.simulation.aircraft import fly
-from ftproc.simulation.flights import LIGHT
-
-DRONE = replace(
-    LIGHT, speed_mps=(4, 15), turn_g=(1.05, 1.5), climb_rad=(0.05, 0.4), pull_g=(0.1, 0.4), thrust_mps2=(1, 3),
-    onset_s=(0.5, 1.2), leg_s=(2, 10), height_m=(20, 80), radius_m=80, gust_mps2=0.3,
-)  # fmt: skip
-PLACE = np.array([200.0, 60.0, 0.0])
-
-
-def seen(seed, dt_s, sigma, duration_s=240.0):
-    """A log, and the true positions."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(0.0, duration_s, dt_s)
-    position = fly(DRONE, duration_s, rng).at(time)[0] + PLACE
-    z = from_cartesian(position) + np.array(sigma) * rng.standard_normal((len(time), 3))
-    z[:, 1] = wrap(z[:, 1])
-    log = MeasurementLog(name="drone", time_s=time, measurement=z, row=np.arange(len(time)), rows_in_file=len(time))
-    return log, position
+from tests.drone import seen
 
 
 def outcome(seed, dt_s, sigma):

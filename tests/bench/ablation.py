@@ -1,0 +1,156 @@
+"""What each rule of two-pass editing is worth: smoothed position errors with the rule switched off over those with it,
+on the logs of `tests.bench.logs` that have a truth and one station (above 1 the rule helps), the runs that are
+confidently wrong, and the processor time. A rule without a log that it improves has no place."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ftproc.core import threads
+from ftproc.errors import FtprocError
+from ftproc.quality.verdict import CONSISTENT
+from ftproc.settings import FilterSettings
+from tests.bench import logs
+from tests.trust.verdicts import is_far
+
+EDITING, IDENTIFICATION = "ftproc.core.editing", "ftproc.core.identification"
+SAME = 1e-9  # of an error: less has not changed
+HEADER = ("rule off", "logs changed", "mean error ratio", "from", "to", "confidently wrong", "time")
+
+
+class Off(NamedTuple):
+    """How a rule is switched off: a name in a module, and what stands for it."""
+
+    module: str
+    name: str
+    stands: Callable[..., Any]
+
+
+class Outcome(NamedTuple):
+    """error_m: RMS of the smoothed positions; infinite where the log could not be processed."""
+
+    error_m: float
+    wrong: bool
+    seconds: float
+
+
+def _no_reading(measurement: Any, *_: Any) -> Any:
+    return np.zeros(np.shape(measurement), bool)
+
+
+def _as_read(time_s: Any, measurement: Any) -> Any:
+    return measurement.copy(), np.zeros(measurement.shape, np.uint8)
+
+
+def _same_screen(screen: Callable[..., Any], *arguments: Any) -> Any:
+    found = screen(*arguments)
+    return found._replace(jumps_only=found.weight)
+
+
+def _second(first: Any, second: Any, *_: Any) -> Any:
+    return second
+
+
+def _pair(record: Any, decision: Any, *_: Any) -> Any:
+    return record, decision
+
+
+def _first(first: Any, *_: Any, **__: Any) -> Any:
+    return first
+
+
+def _nothing(*_: Any, **__: Any) -> Any:
+    return None
+
+
+def _empty(*_: Any, **__: Any) -> Any:
+    return []
+
+
+TWO_PASS = f"{EDITING}.two_pass"
+RULES: dict[str, tuple[Off, ...]] = {
+    "correlated noise": (Off(TWO_PASS, "allow_for_colour", _second),),
+    "noise that drifts": (Off(TWO_PASS, "allow_for_drift", _pair),),
+    "tails": (Off(TWO_PASS, "allow_for_tails", _pair),),
+    "late stamps": (Off(TWO_PASS, "late_stamps", _nothing),),
+    "very late stamps": (Off(TWO_PASS, "allow_for_very_late_stamps", _pair),),
+    "motion": (Off(TWO_PASS, "with_motion", _second),),
+    "steps": (Off(f"{EDITING}.steps", "find", _empty),),
+    "one-sided errors": (Off(TWO_PASS, "_one_sided", _empty),),
+    "patches between jumps": (Off(f"{EDITING}.jump_patches", "find", lambda time_s, *_: np.zeros(len(time_s))),),
+    "readings that were not measured": (Off(TWO_PASS, "without_copies", _as_read),),
+    "stuck readings": (Off(TWO_PASS, "stuck_readings", _no_reading),),
+    "repeated coarse readings": (Off(f"{IDENTIFICATION}.uneven_noise", "repeated", _nothing),),
+    "runs that are off together": (
+        Off(f"{EDITING}.reassessment", "_suspects", lambda record, *_: _no_reading(record.measurement)),
+        Off(f"{EDITING}.reassessment", "suspicious", lambda time_s, residual, *_: _no_reading(residual)),
+    ),
+    "alternatives": (
+        Off(f"{EDITING}.alternatives", "try_alternatives", lambda log, weight, search: weight.copy()),
+        Off(f"{EDITING}.alternatives", "islands", _empty),
+    ),
+    "reassessment": (Off(TWO_PASS, "reassess", _second),),
+    "turns taken for patches": (Off(TWO_PASS, "screen", _same_screen),),
+    "less noise": (Off(TWO_PASS, "with_less_noise", _first),),
+    "allowance on the jerk": (Off(TWO_PASS, "with_allowance", _second),),
+}
+
+
+@contextlib.contextmanager
+def without(rule: str | None) -> Iterator[None]:
+    """Inside the block a rule is off. Raises AttributeError for a name that has moved."""
+    saved = []
+    try:
+        for off in RULES[rule] if rule is not None else ():
+            module = importlib.import_module(off.module)
+            was = getattr(module, off.name)
+            saved.append((module, off.name, was))
+            setattr(module, off.name, partial(_same_screen, was) if off.stands is _same_screen else off.stands)
+        yield
+    finally:
+        for module, name, was in saved:
+            setattr(module, name, was)
+
+
+def run(rule: str | None, name: str) -> Outcome:
+    """A log smoothed with a rule off, or with all."""
+    begun = time.process_time()
+    with without(rule):
+        try:
+            found, position_m = logs.trajectory(name, FilterSettings(smooth=True))
+        except FtprocError:
+            return Outcome(np.inf, False, time.process_time() - begun)
+    assert position_m is not None
+    error = np.sqrt(np.nanmean(((found.state[:, :3] - position_m) ** 2).sum(1)))
+    wrong = found.metadata["summary"]["trust"]["verdict"] == CONSISTENT and is_far(found, position_m)
+    return Outcome(float(error), wrong, time.process_time() - begun)
+
+
+def rows(chosen: list[str] | None = None) -> Iterator[tuple[str, ...]]:
+    """One row for all rules together, then one per rule."""
+    names = [name for name in logs.names() if not name.startswith(("sample", "range"))]
+    rules = list(RULES) if chosen is None else chosen
+    with ProcessPoolExecutor(threads.available(), get_context("spawn"), threads.use, (1,)) as pool:
+        jobs = {rule: [pool.submit(run, rule, name) for name in names] for rule in (None, *rules)}
+        base = [job.result() for job in jobs[None]]
+        seconds = sum(each.seconds for each in base)
+        yield "none", f"0 of {len(names)}", "1", "1", "1", str(sum(each.wrong for each in base)), "1"
+        for rule in rules:
+            off = [job.result() for job in jobs[rule]]
+            ratio = np.array([a.error_m / b.error_m for a, b in zip(off, base, strict=True)])
+            changed = np.abs(ratio - 1) > SAME
+            mean = np.exp(np.log(ratio[np.isfinite(ratio)]).mean())
+            took = sum(each.seconds for each in off) / seconds
+            yield (
+                rule, str(int(changed.sum())), f"{mean:.3f}", f"{ratio.min():.2f}", f"{ratio.max():.3g}",
+                str(sum(each.wrong for each in off)), f"{took:.2f}",
+            )  # fmt: skip
