@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ftproc.core.filtering.records import Model, Start
+from ftproc.core.identification.profile import MAX_KNOTS
 
 
 class Sizes(NamedTuple):
@@ -30,6 +31,9 @@ def piece(after_s: float, model: Model) -> int:
 
 
 def stretched(model: Model, span_s: float) -> Model:
-    """The model with as many pieces of its jerk profile as the span needs; the last one goes on."""
-    pieces = max(math.ceil(span_s / model.knot_s), 1)
-    return model._replace(jerk=model.jerk[np.minimum(np.arange(pieces), len(model.jerk) - 1)])
+    """The model with as many pieces of its jerk profile as the span needs; the last one goes on. They become longer
+    where MAX_KNOTS of them are too few: one time stamp may lie years after the others."""
+    knot_s = max(model.knot_s, span_s / MAX_KNOTS)
+    longer = knot_s / model.knot_s if knot_s > model.knot_s else 1.0
+    before = np.minimum(longer * np.arange(max(math.ceil(span_s / knot_s), 1)), len(model.jerk) - 1).astype(int)
+    return model._replace(jerk=model.jerk[before], knot_s=knot_s)
