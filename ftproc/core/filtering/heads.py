@@ -195,15 +195,15 @@ def invert(p: FloatArray, inverse: FloatArray, factor: FloatArray, scale: FloatA
 
 
 def smoothed_covariance(p: FloatArray, n: FloatArray) -> FloatArray:
-    """P - P N P as L (I - L' N L) L' with P = L L' and eigenvalues kept positive whatever the rounding. (m, m).
-
-    Of a run that has diverged, P itself.
-    """
+    """P - P N P (m, m) as L (I - L' N L) L' with P = L L' and eigenvalues kept positive whatever the rounding; of a run
+    that has diverged, P itself."""
     if not (np.isfinite(p).all() and np.isfinite(n).all()):
         return p
     scale = np.sqrt(np.where(np.diag(p) > 0, np.diag(p), 1.0))
-    factor = scale[:, None] * np.linalg.cholesky(p / np.outer(scale, scale) + 1e-12 * np.eye(len(p)))
+    try:
+        factor = scale[:, None] * np.linalg.cholesky(p / np.outer(scale, scale) + 1e-12 * np.eye(len(p)))
+    except np.linalg.LinAlgError:  # as after a gap of years
+        return p
     share, turn = np.linalg.eigh(np.eye(len(p)) - factor.T @ n @ factor)
     half = factor @ turn * np.sqrt(np.maximum(share, LEAST_SHARE))
-    result: FloatArray = half @ half.T
-    return result
+    return np.asarray(half @ half.T)

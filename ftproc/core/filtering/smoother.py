@@ -207,7 +207,7 @@ class Slope(NamedTuple):
     def curvature(self) -> FloatArray:
         """Of the log-likelihood, downward, from here to where the two sums are equal, if the second stays as it is and
         the first falls as the variance grows: with it a Newton step goes ln(found / expected) at once."""
-        found, expected = np.maximum(self.found, 1e-300), np.maximum(self.expected, 1e-300)
+        found, expected = np.maximum(self.found, 1e-300), np.maximum(self.expected, 1e-300 * np.maximum(self.found, 1))
         ratio = np.log(found / expected)
         near = np.abs(ratio) < 1e-3
         mean: FloatArray = np.where(near, 0.5 * (found + expected), (found - expected) / np.where(near, 1.0, ratio))
