@@ -1,43 +1,45 @@
 """The live editor: readings in, rows out, each as soon as its lag has passed.
 
 What a row rests on depends on the readings before it, and up to its lag after it, alone, not on how they arrive: when
-the newest part of the window is looked at again, and when all of it, follows from the counts and times of rows.
+the newest part of the window is looked at again, and when all of it, follows from the counts and times of rows. What
+a row costs is bounded, and so is what is kept, whatever the times of the rows are.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing.two_pass import Known
-from ftproc.core.filtering.initialization import FEWEST_READINGS, shortest_gap
+from ftproc.core.filtering.initialization import FEWEST_READINGS
 from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.smoother import SmootherRun
-from ftproc.core.live.doubt import Doubt
-from ftproc.core.live.pieces import Sizes
-from ftproc.core.live.rows import LATELY, Published, Waiting, unknown_rows, widened
+from ftproc.core.live.doubt import Doubt, is_track
+from ftproc.core.live.pace import WINDOW_SAMPLES, Clock, pace_of
+from ftproc.core.live.pieces import BLOCK, CROWD
+from ftproc.core.live.rows import (
+    LATELY,
+    Published,
+    Waiting,
+    widened,
+    with_stand_ins,
+    without_estimate,
+    without_what_is_lost,
+)
 from ftproc.core.live.window import Window
-from ftproc.order_statistics import median
 
 FloatArray = NDArray[np.float64]
 
 FEWEST = 16  # samples before a track may be confirmed,
 GROWTH = 1.25  # and times as many at the next attempt
-NEWEST, AGREE = 8, 0.6  # readings of a component, and share of them that must be good for a track to be confirmed
-VAGUE = 1.0  # times the noise of a single reading, as 1-sigma of the position: then there is no track
 PATIENCE = 64  # samples after which the noise of a component with few readings is assumed
-ASSUMED_READING, ASSUMED_SIGMA = (10_000.0, 0.0, 0.0), (10.0, 1e-3, 1e-3)  # m, rad, rad: of what was hardly seen
+ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of what was hardly seen
 YOUNG, SOONEST, ROUND = 0.25, 4, 128  # all of the window is looked at when it has grown by this share, but not
 # sooner and not later than after so many samples, or while the track is in doubt
-REFRESH_S = 0.1  # between refreshes of the newest part, or one sample
-WORK_S, WORK_PER_S = 0.05, 160_000  # between turns at a look at all of the window, or one sample; and how much of it
-# there is for each second that the readings last: so many samples that are filtered
-WINDOW_S, WINDOW_SAMPLES = 30.0, (300, 1500)  # of the window: the longer of the two, up to so many samples
-NEAR_S, NEAR_SAMPLES = 8.0, (120, 400)  # of its newest part, beside the lag
-BLOCK = 4096  # samples between looks at a window that has nothing to learn
+STALE = 4  # times what a window keeps, after which a look at all of it that is still under way is given up
 
 
 class LiveEditor:
@@ -52,8 +54,10 @@ class LiveEditor:
         self.absent: tuple[int, ...] = ()
         self.count = self.published = 0  # rows taken, and rows that have left
         self.next_edit, self.next_refresh, self.next_work = FEWEST, 0, 0
-        self.doubt, self.doubted = Doubt(), False  # and whether it is why all of the window is looked at
-        self.refreshed = 0  # rows that the last refresh has seen
+        self.doubt, self.doubted = Doubt(), False  # and whether it is why all of the window is looked at,
+        self.urgent = False  # at once
+        self.refreshed, self.inserted = 0, False  # rows that the last refresh has seen; and whether one came late since
+        self.pace, self.clock = pace_of(np.empty(0), lag_s), Clock()
         # The newest part, from this row on, with its labels, if there is a lag.
         self.smoothed: tuple[int, SmootherRun, FloatArray] | None = None
 
@@ -70,11 +74,14 @@ class LiveEditor:
             if self.window is None:
                 high = low + 1
                 found += self._due(float(time_s[low]))
+                self.waiting = self.waiting.without(self.published - self._first, WINDOW_SAMPLES[1])
                 self.waiting = self.waiting.with_row(time_s[low:high], measurement[low:high])
-                self.count += 1
-                if self.count >= self.next_edit:
+                self.count, self.clock = self.count + high - low, self.clock.after(time_s[low:high])
+                if self.count >= self.next_edit and not self.clock.stands:
                     self._confirm()
             else:
+                if self.inserted:
+                    self._refresh(self.window)
                 if np.isfinite(measurement[low, list(self.absent)]).any():
                     self._begin_again()
                     continue
@@ -82,8 +89,8 @@ class LiveEditor:
                 if self.lag_s > 0:
                     found += self._due(float(time_s[high - 1]))
                 self._note_gap(self.window, float(time_s[low]))
-                self.window.append(time_s[low:high], self._with_stand_ins(measurement[low:high]))
-                self.count += high - low
+                self.window.append(time_s[low:high], with_stand_ins(measurement[low:high], self.absent))
+                self.count, self.clock = self.count + high - low, self.clock.after(time_s[low:high])
                 if self.lag_s == 0:  # what a look finds out is known from the newest row on
                     found += self._leave(self.count - 1)
                 self._look(self.window)
@@ -93,11 +100,14 @@ class LiveEditor:
         return found
 
     def insert(self, time_s: float, measurement: FloatArray) -> bool:
-        """Take a row that comes late, measurement (1, 3); whether that is possible: no row as late must have left."""
-        row = np.array([time_s]), self._with_stand_ins(measurement)
+        """Take a row that comes late, measurement (1, 3); whether that is possible: no row as late must have left, and
+        not too many wait."""
+        row = np.array([time_s]), with_stand_ins(measurement, self.absent)
         kept = self.waiting.time_s if self.window is None else self.window.time_s
         place = int(np.searchsorted(kept, time_s, side="right"))
         if place < self.published - self._first or (place == 0 and self.published > 0):
+            return False
+        if self.count - self.published >= self.pace.sizes.most_waiting:
             return False
         if self.window is None:
             parts = (np.insert(old, place, new, 0) for old, new in zip(self.waiting, row, strict=True))
@@ -108,7 +118,7 @@ class LiveEditor:
             return False
         self.window.insert(place, *row)
         self.count += 1
-        self._refresh(self.window)
+        self.inserted = True
         return True
 
     def finish(self) -> list[Published]:
@@ -121,33 +131,26 @@ class LiveEditor:
 
     def _confirm(self) -> None:
         """Begin a track, if the readings so far agree on one."""
-        self.next_edit = int(self.count * GROWTH) + 1
+        self.next_edit = self.count + int(len(self.waiting.time_s) * (GROWTH - 1)) + 1
+        self.pace = pace_of(self.waiting.time_s, self.lag_s)
         seen = np.isfinite(self.waiting.measurement).sum(0)
         few = seen < FEWEST_READINGS
         if seen.sum() < 2 * FEWEST_READINGS or ((few & (seen > 0)).any() and len(self.waiting.time_s) < PATIENCE):
             return
         self.absent = tuple(np.flatnonzero(seen == 0).tolist())
         sigma = np.where(few & np.isnan(self.known.sigma), ASSUMED_SIGMA, self.known.sigma)
-        readings = self._with_stand_ins(self.waiting.measurement)
-        sizes = self._sizes(self.waiting.time_s)
-        window = self.kind(self.waiting.time_s, readings, self.known._replace(sigma=sigma), sizes)
+        readings, known = with_stand_ins(self.waiting.measurement, self.absent), self.known._replace(sigma=sigma)
+        window = self.kind(self.waiting.time_s, readings, known, self.pace.sizes)
         try:
             window.edit()
         except ValueError:  # a component has too few readings that agree
             return
-        if (window.used_lately(NEWEST) < AGREE).any() or not self._vagueness(window) < VAGUE:
+        if not is_track(window):
             return
         self.window, self.confirmed_once = window, True
         self.waiting = Waiting(np.empty(0), np.empty((0, 3)))
         self.next_edit = self.count + self._samples_between_edits(window)
         self._edited(window)
-
-    def _vagueness(self, window: Window) -> float:
-        """1-sigma of the newest position, in units of that of a single reading."""
-        ((newest,), _) = window.shown(len(window) - 1, len(window))
-        range_m = np.linalg.norm(newest["state"][:3])
-        noise_m = np.sqrt(window.model.reading_variance) * np.array([1.0, range_m, range_m])
-        return float(np.linalg.norm(newest["sigma"][:3]) / np.linalg.norm(noise_m))
 
     def _begin_again(self) -> None:
         """A component is seen for the first time: what is known without it does not tell where the target is."""
@@ -159,14 +162,6 @@ class LiveEditor:
         self.waiting = Waiting(window.time_s[low:].copy(), measurement)
         self.window, self.absent, self.next_edit = None, (), self.count + FEWEST_READINGS
 
-    def _with_stand_ins(self, measurement: FloatArray) -> FloatArray:
-        """The readings with constants for components that were never seen; they keep the filter upright, and nothing
-        that rests on them is published."""
-        readings = measurement.copy()
-        for c in self.absent:
-            readings[:, c] = ASSUMED_READING[c]
-        return readings
-
     # -- when to look -----------------------------------------------------------------------------------------------
 
     @property
@@ -174,37 +169,26 @@ class LiveEditor:
         """Number of the first row that is kept."""
         return self.count - len(self.waiting.time_s if self.window is None else self.window)
 
-    def _sizes(self, time_s: FloatArray) -> Sizes:
-        """How much the window keeps, by the interval of its readings."""
-        times = np.diff(time_s)
-        interval_s = median(times[times > 0]) if (times > 0).any() else 1.0
-        self.longest_s = shortest_gap(interval_s)
-        self.samples_a_refresh, self.samples_a_turn = (
-            max(1, math.ceil(each_s / interval_s - 1e-6)) for each_s in (REFRESH_S, WORK_S)
-        )
-        self.work_a_turn = WORK_PER_S * interval_s * self.samples_a_turn
-        near = int(np.clip(NEAR_S / interval_s, *NEAR_SAMPLES)) + int(self.lag_s / interval_s)
-        return Sizes(max(int(np.clip(WINDOW_S / interval_s, *WINDOW_SAMPLES)), 2 * near), near, self.lag_s)
-
     def _slice_end(self, time_s: FloatArray, measurement: FloatArray, low: int) -> int:
         """How far the rows can be taken at once: to the next look, the next gap, the first reading of a component that
         was absent, or where a row must leave that no refresh has seen."""
         assert self.window is not None
-        high = min(len(time_s), low + max(self._next_look(self.window) - self.count, 1))
+        due = min(max(self._next_look(self.window) - self.count, 1), len(time_s) - low)
+        high = low + self.clock.next_look(time_s[low:], due)
         if self.lag_s > 0:
             unseen = np.concatenate([self.window.time_s[self.refreshed - self._first :], time_s[low:high]])
             if time_s[low] > unseen[0] + self.lag_s:
                 self._refresh(self.window)
                 return self._slice_end(time_s, measurement, low)
             high = low + int(np.searchsorted(time_s[low:high], unseen[0] + self.lag_s, side="right"))
-        gaps = np.flatnonzero(np.diff(time_s[low:high]) > self.longest_s)
+        gaps = np.flatnonzero(np.diff(time_s[low:high]) > self.pace.longest_s)
         high = low + int(gaps[0]) + 1 if len(gaps) else high
         seen = np.flatnonzero(np.isfinite(measurement[low:high, list(self.absent)]).any(1))
         return low + int(seen[0]) if len(seen) else high
 
     def _note_gap(self, window: Window, time_s: float) -> None:
         """After a gap that may be too long to bridge, all of the window is looked at as soon as a track can begin."""
-        if time_s - window.time_s[-1] > self.longest_s:
+        if time_s - window.time_s[-1] > self.pace.longest_s:
             self.next_edit = min(self.next_edit, self.count + FEWEST_READINGS + 1)
 
     def _next_look(self, window: Window) -> int:
@@ -212,6 +196,12 @@ class LiveEditor:
         return min(self.next_refresh, self.next_edit if window.under_way is None else self.next_work)
 
     def _look(self, window: Window) -> None:
+        if len(window) > STALE * (self.pace.sizes.window + BLOCK):
+            window.under_way = None
+        if self.clock.stands:
+            if self.clock.rows % CROWD == 0:
+                self._refresh(window)
+            return
         if self.count < self._next_look(window):
             return
         in_doubt = window.in_doubt()
@@ -220,8 +210,10 @@ class LiveEditor:
         doubted = in_doubt and self.count >= self.next_refresh and self.doubt.is_due(window, self.count)
         if window.under_way is None and (doubted or self.count >= self.next_edit):
             self.doubted, self.next_work = in_doubt, self.count
+            self.urgent = in_doubt and self.doubt.is_urgent(window)
             self.next_edit = self.count + self._samples_between_edits(window)
-            window.sizes = self._sizes(window.time_s)
+            self.pace = pace_of(window.time_s, self.lag_s)
+            window.sizes = self.pace.sizes
             window.trim()
             window.begin()
             if window.under_way is None:
@@ -232,10 +224,10 @@ class LiveEditor:
             self._refresh(window)
 
     def _go_on(self, window: Window) -> None:
-        """A turn at the look at all of the window; the whole of it where the track is in doubt."""
-        self.next_work = self.count + self.samples_a_turn
+        """A turn at the look at all of the window, or the whole of it."""
+        self.next_work = self.count + self.pace.turn
         try:
-            window.go_on(math.inf if self.doubted else self.work_a_turn)
+            window.go_on(math.inf if self.urgent else self.pace.work)
         except ValueError:  # a component has too few readings that agree
             window.refresh()
         if window.under_way is None:
@@ -252,11 +244,12 @@ class LiveEditor:
 
     def _refresh(self, window: Window) -> None:
         if self.refreshed < self.count:
+            self.inserted = False
             window.refresh()
             self._seen(window)
 
     def _seen(self, window: Window) -> None:
-        every = window.refresh_every * self.samples_a_refresh if window.learns else BLOCK
+        every = window.refresh_every * self.pace.refresh if window.learns else BLOCK
         self.refreshed, self.next_refresh = self.count, self.count + every
         if self.lag_s > 0:
             _, labels = window.shown(window.near, len(window))
@@ -265,23 +258,34 @@ class LiveEditor:
     # -- what leaves ------------------------------------------------------------------------------------------------
 
     def _due(self, now_s: float) -> list[Published]:
-        """The rows whose lag has passed at a time."""
+        """The rows whose lag has passed at a time, or that are too many to wait for it."""
         kept = self.waiting.time_s if self.window is None else self.window.time_s
         due = int(np.searchsorted(kept[self.published - self._first :] + self.lag_s, now_s, side="left"))
+        crowd = self.count - self.published - self.pace.sizes.most_waiting
         most = self.count if self.window is None else self.refreshed
-        return self._leave(min(self.published + due, most))
+        found = self._leave(min(self.published + max(due, crowd), most))
+        if crowd > due and self.window is not None:
+            self.window.left = self.published - self._first
+        return found
 
     def _leave(self, stop: int) -> list[Published]:
+        """The rows before this one; those from before the track have no estimate."""
+        begins = self.count if self.window is None else 0 if self.smoothed is None else self.smoothed[0]
+        return [*self._without_estimate(min(begins, stop)), *self._with_estimate(stop)]
+
+    def _without_estimate(self, stop: int) -> Iterator[Published]:
+        low, n = self.published - self._first, stop - self.published
+        if n > 0:
+            kept = self.waiting.measurement if self.window is None else self.window.measurement
+            yield without_estimate(self.published, kept[low : low + n])
+            self.published = stop
+
+    def _with_estimate(self, stop: int) -> Iterator[Published]:
         first, n = self.published, stop - self.published
         if n <= 0:
-            return []
-        self.published = stop
-        low = first - self._first
-        if self.window is None:
-            missing = ~np.isfinite(self.waiting.measurement[low : low + n])
-            nothing = np.zeros(n, bool)
-            return [Published(first, unknown_rows(n), np.where(missing, 3.0, 0.0), nothing, nothing)]
-        window = self.window
+            return
+        assert self.window is not None
+        window, low = self.window, first - self._first
         before = min(LATELY - 1, low)
         rows, label = window.shown(low - before, low + n)
         rows, label = widened(rows, before), label[before:]
@@ -292,4 +296,5 @@ class LiveEditor:
                 rows[name] = getattr(smoothed, name)[first - begin : stop - begin]
         label[:, list(self.absent)] = 3.0
         again = np.isin(np.arange(low, low + n), window.reacquired)
-        return [Published(first, rows, label, np.ones(n, bool), again)]
+        yield Published(first, rows, label, without_what_is_lost(rows), again)
+        self.published = stop

@@ -11,6 +11,10 @@ import numpy as np
 from ftproc.core.filtering.records import Model, Start
 from ftproc.core.identification.profile import MAX_KNOTS
 
+BLOCK = 4096  # samples between looks at a window that has nothing to learn
+CROWD = 1024  # samples between looks at a window whose clock stands still
+CROWDED = 2  # times the newest part, or a CROWD, as samples that wait for their lag: more come much faster than usual
+
 
 class Sizes(NamedTuple):
     """Samples of the window, and of its newest part, where decisions are open; lag_s: for which samples wait in it."""
@@ -18,6 +22,11 @@ class Sizes(NamedTuple):
     window: int
     near: int
     lag_s: float = 0.0
+
+    @property
+    def most_waiting(self) -> int:
+        """Samples that wait for their lag; of more, the first ones leave earlier."""
+        return CROWDED * max(self.near, CROWD)
 
 
 def predicted(filters: Any) -> Start:

@@ -11,6 +11,7 @@ from ftproc.core.filtering.records import ROW, empty_rows
 
 FloatArray = NDArray[np.float64]
 
+ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: of what was never seen
 LATELY = 8  # samples whose innovations tell whether the sigmas hold
 
 
@@ -35,13 +36,43 @@ class Waiting(NamedTuple):
     def with_row(self, time_s: FloatArray, measurement: FloatArray) -> Waiting:
         return Waiting(np.concatenate([self.time_s, time_s]), np.concatenate([self.measurement, measurement]))
 
+    def without(self, left: int, kept: int) -> Waiting:
+        """Without the first of those that have left; so many in all are kept, and now and then twice as many."""
+        drop = min(left, len(self.time_s) - kept)
+        return Waiting(self.time_s[drop:], self.measurement[drop:]) if drop > kept else self
 
-def unknown_rows(n: int) -> Any:
-    """`Row` records without an estimate."""
-    rows = empty_rows(n)
+
+def with_stand_ins(measurement: FloatArray, absent: tuple[int, ...]) -> FloatArray:
+    """The readings (n, 3) with constants for components that were never seen; they keep the filter upright, and nothing
+    that rests on them is published."""
+    readings = measurement.copy()
+    for c in absent:
+        readings[:, c] = ASSUMED_READING[c]
+    return readings
+
+
+def without_estimate(first: int, measurement: FloatArray) -> Published:
+    """Rows of which nothing is known but their readings (n, 3)."""
+    rows, nothing = empty_rows(len(measurement)), np.zeros(len(measurement), bool)
+    _forget(rows)
+    return Published(first, rows, np.where(np.isfinite(measurement), 0.0, 3.0), nothing, nothing)
+
+
+def _forget(rows: Any) -> None:
     for name in ROW.names or ():
         rows[name] = 0.0 if name in ("weight", "since_start") else np.nan
-    return rows
+
+
+def without_what_is_lost(rows: Any) -> NDArray[np.bool_]:
+    """(n,) whether rows (n,) have an estimate, which is taken out of the others: after a gap of years a covariance may
+    hold no variances any more."""
+    known: NDArray[np.bool_] = ((rows["sigma"] > 0) & np.isfinite(rows["sigma"])).all(1)
+    known &= np.isfinite(rows["state"]).all(1)
+    if not known.all():
+        lost = rows[~known]
+        _forget(lost)
+        rows[~known] = lost
+    return known
 
 
 def widened(rows: Any, before: int) -> Any:

@@ -8,6 +8,7 @@ profile follow; and brings the filter to the newest sample.
 
 from __future__ import annotations
 
+import itertools
 import math
 from functools import partial
 from typing import Any
@@ -21,7 +22,7 @@ from ftproc.core.filtering.records import Model, Observations, Start, Uneven, em
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.identification.scales import Scales, scales_of
-from ftproc.core.live.pieces import Sizes, piece, predicted, stretched
+from ftproc.core.live.pieces import BLOCK, Sizes, piece, predicted, stretched
 from ftproc.core.live.predictive_chain import OPEN, chains_of, run_predictive, run_predictive_coloured
 from ftproc.core.live.readings import LONGEST_ISOLATED, Columns, Labels, Repeats
 from ftproc.core.live.readmission import Open, readmitted, settled
@@ -54,6 +55,7 @@ class Window:
         self.repeats, self.labels = Repeats(), Labels()
         self.next_times, self.next_late = np.ones(3), np.zeros(3)  # how the noise of the next readings differs
         self.reacquired: list[int] = []  # samples at which a lost track was found again
+        self.left = 0  # samples that did not wait for their lag, because too many did
         self.under_way: Whole | None = None
         nothing, ones = np.zeros((0, 3)), np.ones((0, 3))
         self.kept = Columns(
@@ -155,9 +157,8 @@ class Window:
     def _ahead(self, starts: list[Start], model: Model, sample: int) -> Start:
         """The prediction at a sample, from the last start that is not after it."""
         start = [s for s in starts if s.sample <= sample][-1]
-        log = self._observed(slice(0, sample + 1))
+        log, filters = self._observed(slice(0, sample + 1)), model.filter(start)
         log.weight[sample] = 0.0
-        filters = model.filter(start)
         self._filtered(log, Span(start.sample, sample + 1, start.sample), model, filters)
         return predicted(filters)
 
@@ -165,13 +166,13 @@ class Window:
         """Forget what is more than the window's size, but nothing that waits for its lag; how many samples."""
         drop = max(min(len(self) - self.sizes.window, self.near, self._waiting()), 0)
         self.kept.forget(drop)
-        self.near -= drop
+        self.near, self.left = self.near - drop, max(self.left - drop, 0)
         self.reacquired = [sample - drop for sample in self.reacquired if sample >= drop]
         return drop
 
     def _waiting(self) -> int:
         """The first sample that may wait for its lag to pass."""
-        return int(np.searchsorted(self.time_s, self.time_s[-1] - self.sizes.lag_s))
+        return max(int(np.searchsorted(self.time_s + self.sizes.lag_s, self.time_s[-1])), self.left)
 
     # -- sample by sample -------------------------------------------------------------------------------------------
 
@@ -207,9 +208,10 @@ class Window:
             label=np.zeros((m, 3)), times=np.tile(self.next_times, (m, 1)), late=np.tile(self.next_late, (m, 1)),
             rows=empty_rows(m),
         )  # fmt: skip
-        repeated = []
-        for k, c, run in self.repeats.stuck(measurement):
-            repeated.append((np.flatnonzero(np.isfinite(self.measurement[: n + k + 1, c]))[-run:], c))
+        repeated, stuck = [], self.repeats.stuck(measurement)
+        for (k, c, run), after in itertools.zip_longest(stuck, stuck[1:]):
+            if after is None or after[1:] != (c, run + 1):  # the run ends here, and holds those before
+                repeated.append((np.flatnonzero(np.isfinite(self.measurement[: n + k + 1, c]))[-run:], c))
             self.kept["possible"][n + k, c] = False
         self.kept["weight"][n:][self.kept["possible"][n:]] = OPEN
         return repeated
@@ -272,13 +274,13 @@ class Window:
         return self.model if self.known.jerk_psd is not None else with_allowance(log, self.model, scales)
 
     def _slide(self) -> None:
-        """Move the newest part on, by whole pieces of its jerk profile if there are such."""
+        """Move the newest part on, by whole pieces of its jerk profile, unless that leaves it far too long."""
         beyond = len(self) - self.near - self.sizes.near
         if beyond < SLIDES * self.sizes.near:
             return
         times, first_s = self.time_s, float(self.time_s[self.near])
         ahead = min(self.near + beyond, self._waiting())
-        if math.isfinite(self.model.knot_s):
+        if math.isfinite(self.model.knot_s) and beyond < BLOCK:
             pieces = piece(float(times[ahead]) - first_s, self.model)
             ahead = min(ahead, int(np.searchsorted(times, first_s + pieces * self.model.knot_s)))
         if ahead <= self.near:

@@ -120,3 +120,53 @@ def test_memory_is_constant_and_rows_stay_with_their_readings(flight):
             rows = np.concatenate([each.rows["innovation"] for each in found])
             np.testing.assert_array_equal(np.isnan(rows), missing)
     assert max(sizes) <= 2 * 4096 + 2 * editor.window.sizes.window
+
+
+def floods(flight):
+    """Times and readings with which the clock stands still, goes on by almost nothing, or by years."""
+    t, z = flight.log.time_s, flight.log.measurement
+    last_s, many = float(t[99]), np.tile(z, (6, 1))
+    few = np.repeat(last_s + 0.04 * np.arange(1.0, 7.0), 250)
+    for times in (np.full(1500, last_s), last_s + 1e-13 * np.arange(1500.0), few, last_s + 1e7 * np.arange(1.0, 9.0)):
+        yield np.concatenate([t[:100], times, times[-1] + t[1:60]]), np.vstack([z[:100], many[: len(times)], z[1:60]])
+
+
+@pytest.mark.parametrize("way", ["live", "lag", "forward"])
+@pytest.mark.parametrize("number", range(4))
+def test_floods_are_counted_out_and_do_not_depend_on_how_rows_come(flight, monkeypatch, way, number):
+    times, readings = list(floods(flight))[number]
+    runs = []
+    for step in (10_000, 173):
+        editor, found, kept = live.editor(FilterSettings(**WAYS[way])), [], 0
+        for low in range(0, len(times), step):
+            found += editor.push(times[low : low + step], readings[low : low + step])
+            kept = max(kept, editor.count - editor._first)
+        found += editor.finish()
+        assert [each.first for each in found] == np.cumsum([0, *(len(each.rows) for each in found[:-1])]).tolist()
+        assert sum(len(each.rows) for each in found) == len(times)
+        state, sigma = (np.concatenate([each.rows[name] for each in found]) for name in ("state", "sigma"))
+        known = np.isfinite(state).all(1)
+        assert (sigma[known] > 0).all()
+        assert np.isnan(state[~known]).all()
+        runs.append(state)
+    np.testing.assert_array_equal(*runs)
+
+
+@pytest.mark.parametrize("way", ["live", "lag"])
+def test_what_is_kept_is_bounded_whatever_the_times(flight, way):
+    editor, sizes = live.editor(FilterSettings(**WAYS[way])), []
+    editor.push(flight.log.time_s[:100], flight.log.measurement[:100])
+    for _ in range(30):
+        editor.push(np.full(700, flight.log.time_s[99]), np.tile(flight.log.measurement[99], (700, 1)))
+        sizes.append(editor.count - editor._first)
+    assert max(sizes) < 8 * 4096
+    assert editor.published > 15_000
+
+
+def test_rows_wait_for_a_track_in_memory_that_does_not_grow(flight):
+    editor, nonsense = live.editor(FilterSettings(editing="live", lag_s=0.5)), np.random.default_rng(1)
+    for k in range(40):
+        readings = nonsense.uniform([100, -3, -1], [1e5, 3, 1], (200, 3))
+        editor.push(20.0 * k + 0.1 * np.arange(200), readings)
+        assert len(editor.waiting.time_s) < 4000
+    assert editor.window is None or len(editor.window) < 4000

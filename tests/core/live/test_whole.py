@@ -11,7 +11,7 @@ import pytest
 
 from ftproc.core import pacing
 from ftproc.core.editing import two_pass
-from ftproc.core.live import editor as live_editor
+from ftproc.core.live import pace
 from ftproc.core.live.whole import Whole
 from ftproc.core.pacing import PASS
 from ftproc.methods import live
@@ -86,7 +86,7 @@ def test_no_turn_does_much_more_than_its_share(flight, monkeypatch):
 
 
 def test_a_late_row_may_come_while_it_lasts(flight, monkeypatch):
-    monkeypatch.setattr(live_editor, "WORK_PER_S", 2e4)  # so that it lasts
+    monkeypatch.setattr(pace, "WORK_PER_S", 2e4)  # so that it lasts
     t, z = flight.log.time_s, flight.log.measurement
     editor = live.editor(FilterSettings(editing="live", lag_s=1.0))
     found, taken, late = [], [], 0
