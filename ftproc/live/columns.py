@@ -28,7 +28,8 @@ from ftproc.quality.sanity import LATEST_S
 from ftproc.records import FloatArray, MeasurementLog
 from ftproc.settings import Station
 
-_MOST_LINES = 20  # that are no comments, among which the names and the first row must be
+_MOST_LINES = 20  # that are no comments, among which the names and the first row must be,
+_MOST_HEAD, _LARGEST_HEAD = 2000, 1 << 22  # and of all lines to the first row, as in a complete log, and characters
 _SAMPLE = 100  # rows by which assumptions are judged
 _OTHERS = {"time": "ms", "range": "km", "azimuth": "deg", "elevation": "deg"}  # units, as examples
 _MISSING = frozenset(MISSING_WORDS)
@@ -42,7 +43,7 @@ class Reader:
 
     def __init__(self, source: str, recipe: Recipe, say: Say) -> None:
         self._source, self._recipe, self._say = source, recipe, say
-        self._head: list[str] = []
+        self._head, self._size = list[str](), 0
         self._why: InputError | None = None
         self._table: _Table | None = None
         self._sample: FloatArray | None = np.empty((0, 4))
@@ -74,9 +75,12 @@ class Reader:
         """The rows, from the line on with which the table is understood. The lines are looked at one by one, so that
         it does not matter how they come."""
         if block.first == 1:
-            self._head = []
+            self._head, self._size = [], 0
         for k, line in enumerate(block.texts):
             self._head.append(line)
+            self._size += len(line)
+            if len(self._head) > _MOST_HEAD or self._size > _LARGEST_HEAD:
+                raise self._why or _no_row(self._source, self._head)
             if not line.strip() or layout.is_comment(line):
                 continue
             first = self._understood()
@@ -88,7 +92,7 @@ class Reader:
                     self._say(f"{self._source}: {remark}.")
                 return rows
             if sum(bool(each.strip()) and not layout.is_comment(each) for each in self._head) >= _MOST_LINES:
-                raise self._why or _no_table(self._source, self._head)
+                raise self._why or _no_row(self._source, self._head)
         return None
 
     def _understood(self) -> int | None:
@@ -122,6 +126,10 @@ def _no_table(source: str, head: Sequence[str]) -> InputError:
             f"{source}: no row came after the line of names, so nothing is written. Follow it again when there are "
             "rows."
         )
+    return _no_row(source, head)
+
+
+def _no_row(source: str, head: Sequence[str]) -> InputError:
     return InputError(
         f"{source}: none of its first {len(head)} lines looks like a row of a log; expected a line of names, and below "
         "it rows of numbers that commas, semicolons, tabs or blanks separate."

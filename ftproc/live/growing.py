@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 import os
 import signal
 import sys
@@ -19,6 +20,7 @@ from ftproc.files.reading.formats import content, packing
 MOST = 1 << 18  # bytes that are read at once, and of a line
 LINES = 4096  # that are taken at once, of those that are there
 NAP_S = 0.05  # between looks at a file that has not grown
+GRACE_S = 2.0  # after a stop is asked for, in which rows that have been read are still used
 _KNOWN_AGAIN = 256  # bytes before the place where reading goes on, by which the file is known to be the same
 
 Say = Callable[[str], None]
@@ -26,10 +28,11 @@ Say = Callable[[str], None]
 
 class Stop:
     """Within its context, a signal that ends the program (Ctrl-C, SIGTERM, a closed terminal) ends the reading, and not
-    what is being computed or written."""
+    what is being computed or written: that looks at `asked` and `overdue` now and then, and never waits for long."""
 
     def __init__(self) -> None:
         self.asked = self._reading = False
+        self._since_s = math.inf
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Stop:
@@ -45,9 +48,15 @@ class Stop:
             signal.signal(number, handler)
 
     def _ask(self, number: int, frame: object) -> None:
-        self.asked = True
+        if not self.asked:
+            self.asked, self._since_s = True, time.monotonic()
         if self._reading:
             raise KeyboardInterrupt
+
+    @property
+    def overdue(self) -> bool:
+        """Whether it was asked for so long ago that nothing more is begun."""
+        return time.monotonic() - self._since_s > GRACE_S
 
     def read(self, look: Callable[[], bytes | None]) -> bytes:
         """What a look finds, as soon as it is not None; empty when a stop is asked for."""
@@ -76,29 +85,34 @@ def blocks(source: str, stop: Stop, say: Say) -> Iterator[Block]:
     """The lines of a file, which has no end, or of `-`, in the order in which they come. A file that was replaced or
     overwritten goes on at the beginning of its new content, and a line that it left incomplete is dropped. say: takes
     a sentence for the user. Raises InputError for what cannot be read, or is no text."""
-    rest, number = b"", 0
+    rest, number = bytearray(), 0
     with _opened(source) as log:
         while data := _looked(source, stop, log):
             if log.news:
                 cut = " The last line of the old content was not complete, and is left out." if rest.strip() else ""
                 say(f"{source}: {log.news}, and is read on from the beginning of its new content.{cut}")
-                rest, number, log.news = b"", 0, ""
+                rest, number, log.news = bytearray(), 0, ""
             if not number and not rest:
                 _refuse_other_kinds(source, data)
-            *whole, rest = (rest + data).split(b"\n")
+            end, *begun = data.split(b"\n")
+            rest += end  # without looking through what came before: a line may come byte by byte
+            whole = [bytes(rest), *begun[:-1]] if begun else []
+            rest = bytearray(begun[-1]) if begun else rest
             if len(rest) > MOST:
                 raise InputError(
                     f"{source}: line {number + len(whole) + 1} has no end within {MOST >> 10} KiB, which is no row of "
-                    "a log; --follow reads text whose lines end in LF."
+                    "a log. Write text whose lines end in LF."
                 )
             for low in range(0, len(whole), LINES):
+                if stop.overdue:
+                    return
                 yield Block(number + low + 1, [_text(line) for line in whole[low : low + LINES]])
             number += len(whole)
     if rest.strip() and source == "-" and not stop.asked:
         yield Block(number + 1, [_text(rest)])
 
 
-def _text(line: bytes) -> str:
+def _text(line: bytes | bytearray) -> str:
     return line.decode("utf-8", "replace").strip("\r\ufeff")
 
 
@@ -154,7 +168,7 @@ class _File:
             raise
 
     def _begin(self) -> None:
-        stream = self._path.open("rb", buffering=0)
+        stream = io.FileIO(self._path, opener=_without_waiting)
         self.close()
         self._stream, self._place, self._end = stream, 0, b""
 
@@ -186,6 +200,12 @@ class _File:
             return not os.path.samestat(self._path.stat(), os.fstat(self._stream.fileno()))
         except FileNotFoundError:  # moved away, and nothing is there yet
             return False
+
+
+def _without_waiting(name: str, flags: int) -> int:
+    """A descriptor, also of a named pipe into which nobody writes yet: neither this nor a read waits for a writer, so
+    that signals are heard."""
+    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _refuse_other_kinds(source: str, data: bytes) -> None:

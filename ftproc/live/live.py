@@ -21,7 +21,8 @@ from ftproc.settings import FilterSettings
 
 
 class Live:
-    """Live editing and filtering of one track (settings.editing `live` or `forward`), in memory that does not grow.
+    """Live editing and filtering of one track (settings.editing `live` or `forward`), in memory that does not grow:
+    where so many rows come in the lag that they would fill it, they are published earlier.
 
         track = ftproc.Live(FilterSettings(editing="live", lag_s=2.0))
         for row in receiver:
@@ -90,19 +91,20 @@ class Live:
 
     def _ordered(self, times: FloatArray) -> list[tuple[int, int]]:
         """The runs of rows whose times never decrease, the newest so far included."""
-        newest = self._newest_s
+        newest = self.newest_s
         back = np.flatnonzero(times < np.maximum.accumulate(np.r_[newest, times[:-1]]))
         edges = sorted({0, len(times), *back.tolist(), *(back + 1).tolist()})
         return list(itertools.pairwise(edges))
 
     @property
-    def _newest_s(self) -> float:
+    def newest_s(self) -> float:
+        """The newest time so far."""
         return self._time_s[-1] if self._time_s else self._left_s
 
     def _push(self, times: FloatArray, measurement: FloatArray, rows: list[int]) -> list[Published]:
         if self._begins_s is None:
             self._begins_s = float(times[0])
-        if times[0] < self._newest_s:
+        if times[0] < self.newest_s:
             if not self._editor.insert(float(times[0]) - self._begins_s, measurement[:1]):
                 self.late += 1
                 return []

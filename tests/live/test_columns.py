@@ -114,3 +114,17 @@ def test_units_that_nobody_stated_are_said_once_and_judged_by_the_first_rows():
     assert "azimuth=deg,elevation=deg." in judged
     stated = Recipe(units="time=ms,range=m,azimuth=deg,elevation=deg")
     assert followed(text, stated)[2] == []
+
+
+@pytest.mark.parametrize("line", ["", "# note", "# " + "x" * 100_000])
+def test_a_head_that_does_not_end_is_refused_before_it_fills_the_memory(line):
+    reader = Reader("a.csv", Recipe(), print)
+    blocks = (Block(number + 1, [line] * 10) for number in range(0, 20_000, 10))
+    with pytest.raises(InputError, match=r"none of its first \d+ lines looks like a row of a log"):
+        list(map(reader.read, blocks))
+    assert sum(map(len, reader._head)) < 5_000_000
+
+
+def test_a_long_head_may_have_a_table_below_it():
+    readings, fault, _ = followed("# note\n" * 1900 + HEADER + ROWS, at_once=1000)
+    assert (len(readings), fault) == (3, None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 
 import pytest
@@ -109,6 +110,35 @@ def test_what_cannot_be_followed_is_named(tmp_path, monkeypatch, name, content, 
     with pytest.raises(InputError) as error:
         lines(tmp_path / name, monkeypatch)
     assert sentence in str(error.value)
+
+
+def test_a_pipe_is_followed_before_and_after_somebody_writes_into_it(tmp_path, monkeypatch):
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    found, said = lines(path, monkeypatch, lambda: None, append(path, "t,R\n0,1"), append(path, "000\n"), lambda: None)
+    assert found == [(1, "t,R"), (2, "0,1000")]
+    assert not said
+
+
+@pytest.mark.parametrize("step", [1, 2, 5, 1000])
+def test_lines_are_the_same_however_their_bytes_come(monkeypatch, step):
+    text = b"t,R\r\n\n0,1000\n\n\n" + b"1" * 5000 + b"\n\xef\xbb\xbf2,1002\n3,10"
+    pieces = [text[low : low + step] for low in range(0, len(text), step)] + [b""]
+    monkeypatch.setattr(growing._Input, "look", lambda _self: pieces.pop(0))
+    found = [text for block in blocks("-", Stop(), print) for text in block.texts]
+    assert found == ["t,R", "", "0,1000", "", "", "1" * 5000, "2,1002", "3,10"]
+
+
+def test_nothing_more_is_begun_when_a_stop_is_overdue(monkeypatch):
+    stop, pieces = Stop(), [b"1,2\n" * 10_000, b""]
+    monkeypatch.setattr(growing._Input, "look", lambda _self: pieces.pop(0))
+    found = blocks("-", stop, print)
+    assert len(next(found).texts) == growing.LINES
+    stop._ask(signal.SIGTERM, None)
+    assert len(next(found).texts) == growing.LINES  # for a while
+    monkeypatch.setattr(growing, "GRACE_S", -1.0)
+    assert stop.overdue
+    assert list(found) == []
 
 
 def test_a_uri_cannot_be_followed():

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tests.faults import batches
 from tests.fuzz import mutation
-from tests.trust import corpus, elsewhere, long_runs, verdicts
+from tests.trust import corpus, elsewhere, long_runs, streams, verdicts
 from tests.trust.attacks import running
 
 KILLS, FLIGHTS, SAMPLES, FUZZ_S = 50, 200, 10_000_000, 60.0
@@ -21,6 +21,7 @@ def main() -> int:
     attacked, taken = running.run()
     fuzzed, wrong = mutation.run(FUZZ_S)
     kills, lost = _kills()
+    streamed, astray = streams.run()
     faults = elsewhere.run(*elsewhere.FAULTS, FTPROC_TRUST="1")
     plain = elsewhere.run(*elsewhere.PLAIN, FTPROC_KERNELS="python")
     diverged = long_runs.many(FLIGHTS)
@@ -28,7 +29,7 @@ def main() -> int:
     judged = verdicts.table()
     tracebacks = counts["wrong"] + counts["known"] + len(wrong)
     for line in filter(
-        None, [*lines, *taken, *wrong, *lost, faults.failures, plain.failures, *verdicts.too_many(judged)]
+        None, [*lines, *taken, *wrong, *lost, *astray, faults.failures, plain.failures, *verdicts.too_many(judged)]
     ):
         print(line, file=sys.stderr)
     for row in (
@@ -41,6 +42,8 @@ def main() -> int:
         ("of these over 10 s or 1.5 GB, or not a result or a plain sentence", len(taken)),
         ("mutated files tried", fuzzed),
         ("tracebacks, warnings, hangs, wrong results", tracebacks),
+        ("streams followed: far and repeated times, floods, broken lines", streamed),
+        ("of these not survived", len(astray)),
         ("runs killed at a random moment", kills),
         ("outputs lost or half-written", len(lost)),
         ("other faults injected", faults.passed + faults.failed),
@@ -55,7 +58,7 @@ def main() -> int:
     ):
         print(f"| {row[0]} | {row[1]} |")
     right = faults.all_passed and plain.all_passed and endless == "ok" and not verdicts.too_many(judged)
-    return int(bool(counts["wrong"] or taken or wrong or lost or diverged.unreported or not right))
+    return int(bool(counts["wrong"] or taken or wrong or lost or astray or diverged.unreported or not right))
 
 
 def _kills() -> tuple[int, list[str]]:

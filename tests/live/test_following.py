@@ -1,0 +1,73 @@
+"""Rows of a log that grows: a stop is heard between a few of them, and what is left out is said."""
+
+from __future__ import annotations
+
+import signal
+
+import numpy as np
+import pytest
+
+from ftproc.config.recipe import Recipe
+from ftproc.live import following, growing
+from ftproc.live.following import follow
+from ftproc.live.growing import Stop
+from ftproc.live.live import Live
+from ftproc.settings import FilterSettings
+from tests.trust.streams import BAD_TIMES, flight, lines
+
+HEADER = "time_s,range_m,azimuth_rad,elevation_rad\n"
+
+
+def followed(tmp_path, monkeypatch, rows, stop=None, settings=FilterSettings(editing="live")):  # noqa: B008
+    """The numbers of the rows that are published, and what is said, of a file that does not grow."""
+    stop, said, path = stop or Stop(), [], tmp_path / "a.csv"
+    path.write_text(HEADER + "".join(f"{row}\n" for row in rows))
+    monkeypatch.setattr(growing.time, "sleep", lambda _seconds: stop._ask(signal.SIGTERM, None))
+    parts = list(follow(str(path), Recipe(), Live(settings), stop, said.append))
+    return np.concatenate([part.row for part in parts]), said
+
+
+def of_flight(count):
+    return lines(flight().log.time_s[:count], np.arange(count))
+
+
+def test_a_stop_that_is_overdue_leaves_out_what_was_read_and_says_so(tmp_path, monkeypatch):
+    stop = Stop()
+    push = Live.push
+
+    def slowly(self, *rows):
+        if self._taken > 30:
+            stop._ask(signal.SIGINT, None)
+            monkeypatch.setattr(growing, "GRACE_S", -1.0)
+        return push(self, *rows)
+
+    monkeypatch.setattr(Live, "push", slowly)
+    monkeypatch.setattr(following, "AT_ONCE_S", 0.0)  # so that rows are pushed one by one
+    rows, said = followed(tmp_path, monkeypatch, of_flight(100), stop)
+    assert rows.tolist() == list(range(32))
+    assert said[-1].endswith("a.csv: stopped before 68 rows that had been read were used.")
+
+
+def test_rows_that_have_been_read_are_used_after_a_stop(tmp_path, monkeypatch):
+    stop = Stop()
+    push = Live.push
+    monkeypatch.setattr(Live, "push", lambda self, *rows: (stop._ask(signal.SIGINT, None), push(self, *rows))[1])
+    rows, said = followed(tmp_path, monkeypatch, of_flight(100), stop)
+    assert rows.tolist() == list(range(100))
+    assert not any("stopped before" in sentence for sentence in said)
+
+
+@pytest.mark.parametrize("at_once_s", [0.0, 1e9])
+def test_what_is_published_does_not_depend_on_how_much_is_pushed_at_once(tmp_path, monkeypatch, at_once_s):
+    monkeypatch.setattr(following, "AT_ONCE_S", at_once_s)
+    rows, _ = followed(tmp_path, monkeypatch, of_flight(120))
+    assert rows.tolist() == list(range(120))
+
+
+def test_a_time_that_makes_all_others_late_is_named_while_it_lasts(tmp_path, monkeypatch):
+    good_s = flight().log.time_s
+    times = np.concatenate([good_s[:100], BAD_TIMES["a row in 30 years"](0.0), good_s[100:]])
+    rows, said = followed(tmp_path, monkeypatch, lines(times, np.arange(len(times))))
+    assert rows.tolist() == list(range(101))
+    (sentence,) = said
+    assert "a.csv: 100 rows came too late to be used: the time of a row before them is 1e+09 s. If that" in sentence

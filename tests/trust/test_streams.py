@@ -1,0 +1,46 @@
+"""Streams of the table (`make trust` tries all): in time, in little memory, no row lost, the good rows as good as
+ever."""
+
+from __future__ import annotations
+
+import itertools
+import resource
+from pathlib import Path
+
+import pytest
+
+from tests.trust import streams
+
+MANY, PARTS, TRIED = 75, 12, 4  # streams, parts of them, and how many of these are tried here
+MOST_MEMORY_KB = 3 << 19  # 1.5 GB
+
+
+@pytest.mark.parametrize("part", range(0, PARTS, PARTS // TRIED))
+def test_each_is_survived(part: int) -> None:
+    tried, wrong = streams.run(itertools.islice(streams.attacks(), part, None, PARTS))
+    assert tried > 0
+    assert not wrong, "\n".join(wrong)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < MOST_MEMORY_KB
+
+
+def test_there_are_many_and_each_has_its_name() -> None:
+    names = [attack.name for attack in streams.attacks()]
+    assert len(names) >= MANY
+    assert len(set(names)) == len(names)
+    assert list(streams.attacks()) == list(streams.attacks())
+
+
+def test_a_judge_that_sees(tmp_path: Path) -> None:
+    """Attacks that are wrong in themselves: each must be found out."""
+    (good,) = (attack for attack in streams.attacks() if attack.name == "ends in CR LF")
+    cells = good.text.split(b"\r\n")
+    off = b"\r\n".join([cells[0], *(line.replace(b",", b",1", 1) for line in cells[1:-1]), b""])
+    for wrong in (
+        good._replace(rows=good.rows + 1),
+        good._replace(says="is no number"),
+        good._replace(text=b"", rows=0),
+        good._replace(text=b"", rows=0, says="is no number"),
+        good._replace(text=off),
+    ):
+        with pytest.raises(AssertionError):
+            streams.judge(wrong, tmp_path)
