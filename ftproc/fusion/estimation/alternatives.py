@@ -25,6 +25,7 @@ from ftproc.records import FloatArray, IntArray
 
 TENSION, TENSION_S = 3.5, 2.0  # standard deviations of the sum of squares of so long a stretch, that are explained
 ROUNDS, FINALISTS, BETTER = 3, 3, 6.0  # of decisions; hypotheses that get them; in log-probability, to be taken
+IDLE = 6  # of decisions on the same readings, while a flight is continued
 RATES = np.array([0.03, 0.001, 0.93])  # isolated outlier; patch begins; goes on
 MOST_LIVE = 10  # components whose pairs and triples are tried; of more the majority decides
 LOST, FEWEST = 0.35, 12  # share rejected of a component, to be called lost; readings that a hypothesis leaves
@@ -173,14 +174,21 @@ def _live(near: Neighbourhood) -> list[Channel]:
 
 
 def _continued(near: Neighbourhood, way: Steps) -> FloatArray:
-    """Decisions (n, 3) that continue the flight into the place from both of its ends, a few seconds at a time."""
+    """Decisions (n, 3) that continue the flight into the place from both of its ends, a few seconds at a time, but not
+    through seconds in which nothing comes and nothing changes, or has not stopped to change for long."""
     time_s, inside = near.log.time_s, near.inside
     first, last = time_s[inside][0], time_s[inside][-1]
-    depth_s, weight = 0.0, np.where(inside[:, None], 0.0, near.log.weight)
+    depth_s, weight, idle = 0.0, np.where(inside[:, None], 0.0, near.log.weight), 0
+    depths_s = np.minimum(time_s - first, last - time_s)  # of the readings in the place
     while first + depth_s < last - depth_s:
+        new = inside & (depths_s >= depth_s) & (depths_s < depth_s + near.reach_s)
         depth_s += near.reach_s
         reached = inside & ((time_s < first + depth_s) | (time_s > last - depth_s))
-        weight = np.where(reached[:, None], way.of(weight)[1], weight)
+        before, weight = weight, np.where(reached[:, None], way.of(weight)[1], weight)
+        idle = 0 if new.any() else idle + 1
+        if idle > IDLE or (weight == before).all():
+            ahead_s = float(np.min(depths_s[inside & ~reached], initial=last - first)) - depth_s
+            depth_s += max(ahead_s // near.reach_s, 0.0) * near.reach_s
     return weight
 
 

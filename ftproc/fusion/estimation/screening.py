@@ -93,7 +93,15 @@ def first_decisions(whole: alternatives.Neighbourhood) -> tuple[Model, FloatArra
 
 def interval(stations: list[Seen]) -> float:
     """Of the densest station, s."""
-    return min(float(np.median(np.diff(s.time_s))) for s in stations if len(s.time_s) > 1)
+    return min(_typical(np.diff(s.time_s)) for s in stations if len(s.time_s) > 1)
+
+
+def _typical(steps: FloatArray) -> float:
+    """The median of some intervals (n,), or of those that are not zero, where most are."""
+    middle = float(np.median(steps))
+    if middle > 0:
+        return middle
+    return float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
 
 
 def design(events: Events, state: FloatArray) -> FloatArray:
