@@ -44,6 +44,8 @@ PROFILE_STEPS, COMPARED_STEPS = 2, 5  # of the search for the jerk profile; wher
 STANDS_OUT = 64.0  # times the median of the jerk profile
 LONGEST_SPAN = 3000  # samples that are decided together
 AT_LEAST = 1.02  # times the least noise that is allowed: less of it is at its bound
+MANY, FAR_LESS = 2, 0.25  # components of which that is so, and the share of their noise that must be enough: where less
+# comes of it, it is readings of a patch that were rejected
 FINER, FINEST = 16.0, 3  # times less noise, and how often
 SHORT_LOG, MOST = 8000, 0.5  # samples, and share that stands out: then all of it is decided again, and noise as well
 
@@ -206,12 +208,14 @@ def with_less_noise(found: tuple[Record, Decision], begin: Begin) -> tuple[Recor
     weights (n, 3) on."""
     for _ in range(FINEST):
         record, decision = found
-        least = record.sigma / NOISE_SHRINKS
-        if record.fixed.noise.any() or (decision.model.noise_variance > AT_LEAST * least**2).any():
+        at_least = decision.model.noise_variance <= AT_LEAST * (record.sigma / NOISE_SHRINKS) ** 2
+        if (at_least & ~record.fixed.noise).sum() < MANY:
             break
-        before, found = found, believed(found, begin(record._replace(sigma=record.sigma / FINER), decision.weight))
-        if found is before:
+        other = begin(record._replace(sigma=record.sigma / FINER), decision.weight)
+        less = other[1].model.noise_variance < FAR_LESS**2 * decision.model.noise_variance
+        if less.sum() < MANY or believed(found, other) is found:
             break
+        found = other
     return found
 
 
