@@ -224,7 +224,7 @@ _TRACKER: tuple[Callable[[Any], Any], ...] = (
     click.option(
         "--max-patch", type=number, metavar="SECONDS",
         help="The longest patch of outliers expected, such as 5; in forward editing a longer one is track loss. "
-        "[default: 4 s or 32 samples]",
+        "[default: 1.5 s or 12 samples, the longer of the two]",
     ),
     click.option(
         "--set", multiple=True, callback=_joined, metavar="NAME=VALUE",

@@ -12,6 +12,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from ftproc.core.live.recursive import PATCH_S, PATCH_SAMPLES
 from ftproc.files.reading import trajectories
 from ftproc.methods import registry
 from tests.cli.conftest import Result
@@ -313,3 +314,8 @@ def test_parameters_of_a_method(run, here):
         assert (refused.code, refused.out) == (2, "")
         assert sentence in refused.err
     assert not (here / "u.csv").exists()
+
+
+def test_the_help_tells_the_longest_patch_that_the_gate_expects(run):
+    shown = " ".join(run("filter", "-h").out.split())
+    assert f"[default: {PATCH_S:g} s or {PATCH_SAMPLES} samples, the longer of the two]" in shown
