@@ -236,6 +236,13 @@ def test_a_library_that_does_not_come_back(tmp_path: Path, monkeypatch: pytest.M
     path = tmp_path / "a.h5"
     path.write_bytes(b"1")
     monkeypatch.setattr(rehearsal, "_LONGEST_S", 0.2)
+    copies, fork = list[int](), os.fork
+
+    def counted() -> int:
+        copies.append(fork())
+        return copies[-1]
+
+    monkeypatch.setattr(os, "fork", counted)
 
     def fails() -> None:
         raise ValueError("comes again in the reader")
@@ -250,5 +257,7 @@ def test_a_library_that_does_not_come_back(tmp_path: Path, monkeypatch: pytest.M
     sentence = "a.h5: not an HDF5 file, or a damaged one ({}); copy it again."
     assert rehearsed(lambda: os.kill(os.getpid(), signal.SIGSEGV)) == sentence.format("its reader ends with -11")
     assert rehearsed(lambda: time.sleep(60)) == sentence.format("it comes to no end")
-    with pytest.raises(ChildProcessError):  # none is left behind
-        os.waitpid(-1, os.WNOHANG)
+    assert len(copies) == 4
+    for copy in copies:  # none is left behind
+        with pytest.raises(ChildProcessError):
+            os.waitpid(copy, os.WNOHANG)
