@@ -63,9 +63,9 @@ def batch(log, model, starts, truth):
 
 
 @pytest.mark.parametrize("wander", [0.0, 2.0])
-@pytest.mark.parametrize("dt", [0.5, 0.02])
-def test_first_sigmas_are_those_of_the_whole_record(dt, wander):
-    case = record(dt * np.arange(30), wander=wander)
+@pytest.mark.parametrize(("dt", "covariance"), [(0.5, VAGUE), (0.02, VAGUE), (0.02, VAGUER)])
+def test_first_sigmas_are_those_of_the_whole_record(dt, covariance, wander):
+    case = record(dt * np.arange(30), wander=wander, covariance=covariance)
     found = smoother.smooth_log(*case[:3])
     np.testing.assert_allclose(found.sigma, batch(*case), rtol=2e-3)
     np.testing.assert_allclose(np.sqrt(np.diag(found.heads[0].covariance)), found.sigma[0], rtol=1e-9)
