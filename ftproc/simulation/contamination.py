@@ -1,8 +1,8 @@
-"""Injection of outliers into readings, with a code of each."""
+"""Injection of outliers into readings, with a code of each: shapes of patches, and where they lie."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,22 +10,54 @@ from numpy.typing import NDArray
 
 from ftproc.records import FlagArray, FloatArray
 from ftproc.simulation.outlier_spec import Fault
+from ftproc.simulation.sampling import MIDDLE
 
-#: Codes of the truth's `outlier_*` columns.
-SPIKE, OFFSET, RAMP, STUCK, BURST, START, ZERO = 1, 2, 3, 4, 5, 6, 7
-
-_PATCHES = {"offset": OFFSET, "ramp": RAMP, "stuck": STUCK, "burst": BURST}
 _UNITS = {"m": 1.0, "mrad": 1e-3}
+
+Draw = np.random.Generator
+
+#: Shape of a patch -> its (n,) errors, from its size and its samples 1 to n.
+SHAPES: dict[str, Callable[[float, FloatArray, Draw], FloatArray]] = {
+    "offset": lambda size, k, rng: np.full(len(k), size),
+    "ramp": lambda size, k, rng: size * k / len(k),
+    "burst": lambda size, k, rng: size * rng.standard_normal(len(k)),
+    "walkoff": lambda size, k, rng: size * (k / len(k)) ** 2,
+    "sine": lambda size, k, rng: size * np.sin(2 * np.pi * rng.integers(1, 4) * k / len(k)),
+    "sidelobe": lambda size, k, rng: size * rng.choice([-2.0, -1.0, 1.0, 2.0], 3)[(3 * k - 3).astype(int) // len(k)],
+    "other": lambda size, k, rng: size * np.polyval([*rng.standard_normal(2), 1.0], k / len(k)),
+}
+#: Patch -> its (n,) readings from those before it, (at least 1,), and its own (n,).
+COPIES: dict[str, Callable[[FloatArray, FloatArray], FloatArray]] = {
+    "stuck": lambda before, own: np.full_like(own, before[-1]),
+    "mirror": lambda before, own: 2 * before[-1] - own,
+    "replay": lambda before, own: np.resize(before[-len(own) :], len(own)),
+    "swap": lambda before, own: np.roll(own, len(own) // 2),
+}
+#: Kinds of patch of which one is drawn.
+DRAWN = {
+    "patch": ("offset", "ramp", "stuck", "burst"),
+    "mixed": ("offset", "ramp", "walkoff", "sine", "stuck", "mirror", "sidelobe"),
+}
+#: Codes of the truth's `outlier_*` columns.
+CODES = {
+    name: code
+    for code, name in enumerate(
+        ("isolated", "offset", "ramp", "stuck", "burst", "start", "zero", "other", "step", "walkoff", "sine",
+         "sidelobe", "mirror", "replay", "swap"),
+        start=1,
+    )
+}  # fmt: skip
 
 
 @dataclass
 class _Log:
-    """(n, 3) readings and codes, which the faults change; (3,) 1-sigma; random numbers."""
+    """(n, 3) readings and codes, which the faults change; (3,) 1-sigma; s between samples; random numbers."""
 
     reading: FloatArray
     code: FlagArray
     sigma: FloatArray
-    rng: np.random.Generator
+    dt_s: float
+    rng: Draw
 
     def errors(self, fault: Fault, component: int, n: int) -> FloatArray:
         """(n,) signed sizes in m or rad, log-uniform in the fault's range."""
@@ -37,14 +69,31 @@ class _Log:
         """(n,) True where no component of the group has an outlier yet."""
         return np.asarray((self.code[:, group] == 0).all(axis=1))
 
+    def groups(self, fault: Fault) -> Iterator[tuple[int, ...]]:
+        """The components that are hit at the same samples, for each time that the fault occurs."""
+        for group in [fault.components] if fault.together else [(c,) for c in fault.components]:
+            for _ in range(fault.times):
+                drawn = self.rng.choice(group, fault.drawn, replace=False) if fault.drawn else group
+                yield tuple(int(c) for c in drawn)
+
+    def length(self, fault: Fault) -> int:
+        """Samples, uniform in the fault's range, which may be in seconds or a share of the log."""
+        scale = {"samples": 1.0, "s": 1 / self.dt_s, "%": 0.01 * len(self.code)}[fault.length_unit]
+        low, high = (max(1, round(scale * bound)) for bound in fault.length)
+        return int(self.rng.integers(low, high + 1))
+
     def window(self, fault: Fault, group: tuple[int, ...]) -> slice | None:
-        """A random run of samples without outliers, nor on either side; None if there is no room.
+        """The run of samples at the fault's place, or a random one without outliers, nor on either side; None if there
+        is no room.
 
         Never the first sample: a stuck reading repeats the one before.
         """
-        length = int(self.rng.integers(fault.length[0], fault.length[1] + 1))
+        length, n = self.length(fault), len(self.code)
+        if fault.place or (length >= n and fault.length_unit == "%"):
+            length = min(length, n)
+            return slice(n - length, n) if fault.place == "end" else slice(0, length)
         taken = np.concatenate([[0], np.cumsum(~self.uncontaminated(group))])
-        if length + 2 > len(self.code):
+        if length + 2 > n:
             return None
         free = np.flatnonzero(taken[length + 2 :] == taken[: -(length + 2)])
         if not len(free):
@@ -54,17 +103,16 @@ class _Log:
 
 
 def contaminate(
-    reading: FloatArray, faults: tuple[Fault, ...], sigma: FloatArray, rng: np.random.Generator
+    reading: FloatArray, faults: tuple[Fault, ...], sigma: FloatArray, dt_s: float, rng: Draw
 ) -> tuple[FloatArray, FlagArray]:
     """Contaminated copy of (n, 3) readings (m, rad, rad) and the (n, 3) codes of the outliers.
 
-    sigma: (3,) unit of sizes in sigmas. A patch for which the log has no room left is left out. An outlier that is then
-    made missing keeps its code; a missing reading alone has none.
+    sigma: (3,) unit of sizes in sigmas. dt_s: interval of the samples. A patch for which the log has no room left is
+    left out. An outlier that is then made missing keeps its code; a missing reading alone has none.
     """
-    log = _Log(reading.copy(), np.zeros(reading.shape, np.uint8), sigma, rng)
+    log = _Log(reading.copy(), np.zeros(reading.shape, np.uint8), sigma, dt_s, rng)
     for fault in sorted(faults, key=lambda f: list(_INJECT).index(f.kind)):
-        groups = [fault.components] if fault.together else [(c,) for c in fault.components]
-        for group in groups:
+        for group in log.groups(fault):
             _INJECT[fault.kind](log, fault, group)
     return log.reading, log.code
 
@@ -73,44 +121,48 @@ def _isolated(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
     hit = (log.rng.random(len(log.code)) < fault.rate) & log.uncontaminated(group)
     for c in group:
         log.reading[hit, c] += log.errors(fault, c, int(hit.sum()))
-        log.code[hit, c] = SPIKE
+        log.code[hit, c] = CODES["isolated"]
 
 
-def _patches(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
-    for _ in range(fault.count):
-        where = log.window(fault, group)
-        kind = fault.kind if fault.kind != "patch" else str(log.rng.choice(list(_PATCHES)))
-        if where is None:
-            continue
-        for c in group:
-            _patch(log, fault, kind, c, where)
-            log.code[where, c] = _PATCHES[kind]
-
-
-def _patch(log: _Log, fault: Fault, kind: str, component: int, where: slice) -> None:
-    length = where.stop - where.start
-    size = log.errors(fault, component, 1)
-    if kind == "stuck":
-        log.reading[where, component] = log.reading[where.start - 1, component]
-    elif kind == "ramp":
-        log.reading[where, component] += size * np.arange(1, length + 1) / length
-    elif kind == "burst":
-        log.reading[where, component] += size * log.rng.standard_normal(length)
-    else:
-        log.reading[where, component] += size
+def _patch(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
+    where = log.window(fault, group)
+    kind = str(log.rng.choice(DRAWN[fault.kind])) if fault.kind in DRAWN else fault.kind
+    if where is None:
+        return
+    for c in group:
+        size, own = float(log.errors(fault, c, 1)[0]), log.reading[where, c]
+        if kind in SHAPES:
+            log.reading[where, c] += SHAPES[kind](size, np.arange(1.0, len(own) + 1), log.rng)
+        else:
+            log.reading[where, c] = COPIES[kind](log.reading[: max(where.start, 1), c], own)
+        log.code[where, c] = CODES[kind]
 
 
 def _start(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
     for c in group:
         log.reading[: fault.count, c] += log.errors(fault, c, 1)
-        log.code[: fault.count, c] = START
+        log.code[: fault.count, c] = CODES["start"]
+
+
+def _step(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
+    first = int(log.rng.uniform(*MIDDLE) * len(log.code))
+    for c in group:
+        code = log.code[first:, c]
+        log.reading[first:, c] += np.where(code == CODES["zero"], 0.0, log.errors(fault, c, 1))
+        code[code == 0] = CODES["step"]
 
 
 def _zero(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
     hit = (log.rng.random(len(log.code)) < fault.rate) & log.uncontaminated(group)
     for c in group:
         log.reading[hit, c] = 0.0
-        log.code[hit, c] = ZERO
+        log.code[hit, c] = CODES["zero"]
+
+
+def _noise(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
+    where = log.window(fault, group)
+    if where is not None:
+        log.reading[where, group] *= log.rng.uniform(*fault.size)
 
 
 def _nan(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
@@ -120,11 +172,10 @@ def _nan(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
 
 
 def _nanrun(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
-    for _ in range(fault.count):
-        length = int(log.rng.integers(fault.length[0], fault.length[1] + 1))
-        first = int(log.rng.integers(0, max(1, len(log.code) - length + 1)))
-        for c in group:
-            log.reading[first : first + length, c] = np.nan
+    length = log.length(fault)
+    first = int(log.rng.integers(0, max(1, len(log.code) - length + 1)))
+    for c in group:
+        log.reading[first : first + length, c] = np.nan
 
 
 def _round(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
@@ -135,11 +186,13 @@ def _round(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
 
 #: In this order: isolated outliers avoid the samples of patches, and missing readings hide all others.
 _INJECT: dict[str, Callable[[_Log, Fault, tuple[int, ...]], None]] = {
+    "noise": _noise,
     "round": _round,
     "start": _start,
-    **dict.fromkeys((*_PATCHES, "patch"), _patches),
+    **dict.fromkeys((*sorted(SHAPES | COPIES, key=lambda kind: CODES[kind]), *DRAWN), _patch),
     "zero": _zero,
     "isolated": _isolated,
+    "step": _step,
     "nan": _nan,
     "nanrun": _nanrun,
 }

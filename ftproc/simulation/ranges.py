@@ -12,7 +12,7 @@ from ftproc.core.model.earth import Geodetic, place_at, seen_from
 from ftproc.core.model.frames import wrap
 from ftproc.errors import UsageError
 from ftproc.records import FlagArray, FloatArray, MeasurementLog, Truth
-from ftproc.simulation.contamination import contaminate
+from ftproc.simulation.contamination import CODES, contaminate
 from ftproc.simulation.flights import FLIGHTS
 from ftproc.simulation.instrument import readable, unit_noise
 from ftproc.simulation.kinematics import Flight
@@ -24,7 +24,6 @@ ANGLE_PRIORS = (8e-4, 6e-4, 1.5e-4)  # rad, 1-sigma: azimuth zero, elevation zer
 CLOCK_PRIOR_S = 0.08
 TRUTH_S = 0.05  # between two rows of the truth
 OTHER_TARGET_S = (12.0, 25.0)
-OTHER_TARGET = 8  # code of readings of another target, see `Simulation`
 
 
 @dataclass(frozen=True)
@@ -179,7 +178,7 @@ def _station(
     position, velocity, acceleration = flight.at(time)
     exact = model.measured(position, place, model.levelled(axes[None], biases[None, 3:5])[0])
     clean = exact + biases[:3] + sigma * unit_noise(time, spec.correlation_s, spec.tails_dof, rng)
-    reading, code = contaminate(clean, spec.faults, sigma, rng)
+    reading, code = contaminate(clean, spec.faults, sigma, float(np.median(np.diff(time))), rng)
     if rng.random() < kind.other_target:
         _follow_another(time, reading, code, rng)
     reading[:, ~measured], code[:, ~measured] = np.nan, 0
@@ -204,4 +203,4 @@ def _follow_another(time: FloatArray, reading: FloatArray, code: FlagArray, rng:
     offset = rng.choice([-1.0, 1.0], 3) * [rng.uniform(150, 600), rng.uniform(0.008, 0.03), rng.uniform(0.004, 0.02)]
     drift = rng.normal(size=3) * [8.0, 5e-4, 3e-4]
     reading[during] += offset + late * drift
-    code[during] = OTHER_TARGET
+    code[during] = CODES["other"]

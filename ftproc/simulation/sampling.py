@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.records import FloatArray, IntArray
-from ftproc.simulation.outlier_spec import OutlierSpec
+from ftproc.simulation.outlier_spec import OutlierSpec, Range
+
+MIDDLE = 0.12, 0.88  # of the log: where steps and jumps may begin
 
 
 def sample_times(duration_s: float, dt_s: float, jitter: float, rng: np.random.Generator) -> FloatArray:
@@ -24,6 +26,19 @@ def sample_times(duration_s: float, dt_s: float, jitter: float, rng: np.random.G
 def row_count(duration_s: float, dt_s: float) -> int:
     """Samples in a record of a duration, both ends included; a last interval short by rounding counts."""
     return int(np.floor(duration_s / dt_s + 1e-6)) + 1
+
+
+def jumps(time_s: FloatArray, each: tuple[tuple[int, Range], ...], rng: np.random.Generator) -> FloatArray:
+    """(n,) seconds that jump at random times and stay so, either way; away from the ends.
+
+    each: pairs of count and range of seconds.
+    """
+    found = np.zeros(len(time_s))
+    for count, seconds in each:
+        for _ in range(count):
+            first = int(rng.uniform(*MIDDLE) * len(time_s))
+            found[first:] += rng.choice([-1.0, 1.0]) * rng.uniform(*seconds)
+    return found
 
 
 def kept_rows(time_s: FloatArray, spec: OutlierSpec, rng: np.random.Generator) -> NDArray[np.bool_]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,24 +14,25 @@ from ftproc.records import FloatArray, IntArray, MeasurementLog, Truth
 from ftproc.simulation.contamination import contaminate
 from ftproc.simulation.flights import FLIGHTS
 from ftproc.simulation.instrument import InstrumentErrors, held, readable, rounded, systematic, unit_noise, wandering
+from ftproc.simulation.kinematics import Flight
 from ftproc.simulation.outlier_spec import OutlierSpec, parse_outliers
-from ftproc.simulation.sampling import kept_rows, row_count, sample_times, with_duplicates
+from ftproc.simulation.sampling import jumps, kept_rows, row_count, sample_times, with_duplicates
 from ftproc.simulation.scenarios import Plan, draw, find_scenario
 
 MAX_DURATION_S = 1e5
 MAX_ROWS = 10_000_000
 
 # One child generator each, so that flight and noise do not depend on the outlier specification.
-_STREAMS = ("plan", "flight", "times", "noise", "outliers", "gaps", "duplicates", "instrument")
+_STREAMS = ("plan", "flight", "times", "noise", "outliers", "gaps", "duplicates", "instrument", "clock")
 
 
 @dataclass(frozen=True)
 class Simulation:
     """A simulated log and its truth, row for row.
 
-    truth.outlier: code of the injected outlier: 0 none, 1 spike, 2 offset, 3 ramp, 4 stuck, 5 burst, 6 start of record,
-    7 zero reading. sigma: 1-sigma of the noise, range m, azimuth rad, elevation rad. clean: (n, 3) the readings with
-    their noise but without outliers, missing values and rounding.
+    truth.outlier: code of the injected outlier, 0 for none, see `contamination.CODES`. sigma: 1-sigma of the noise,
+    range m, azimuth rad, elevation rad. clean: (n, 3) the readings with their noise but without outliers, missing
+    values and rounding.
     """
 
     log: MeasurementLog
@@ -63,7 +65,7 @@ def simulate(
     """
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise UsageError(f"The seed must be a whole number from 0, not {seed}.")
-    streams = dict(zip(_STREAMS, np.random.default_rng(seed).spawn(len(_STREAMS)), strict=True))
+    streams = _streams(seed)
     own = draw(find_scenario(scenario), streams["plan"])
     plan = replace(
         own,
@@ -75,7 +77,8 @@ def simulate(
     )
     _check(plan)
     sigma = np.array([used or default for used, default in zip(plan.noise, own.noise, strict=True)])
-    return _measure(plan, sigma, f"simulated {scenario}, seed {seed}", streams)
+    flight = FLIGHTS[plan.flight](streams["flight"], plan.duration_s)
+    return measure(flight, plan, sigma, f"simulated {scenario}, seed {seed}", seed)
 
 
 def _check(plan: Plan) -> None:
@@ -100,32 +103,45 @@ def _check(plan: Plan) -> None:
         )
 
 
-def _measure(plan: Plan, sigma: FloatArray, name: str, streams: dict[str, np.random.Generator]) -> Simulation:
-    spec = parse_outliers(plan.outliers)
-    flight = FLIGHTS[plan.flight](streams["flight"], plan.duration_s)
-    time = sample_times(plan.duration_s, plan.dt_s, spec.jitter, streams["times"])
-    position, velocity, acceleration = flight.at(time)
-    late = plan.instrument.stamp_jitter_s * streams["instrument"].standard_normal(len(time))
-    seen = flight.at(np.clip(time + late, time[0], time[-1]))[0] if late.any() else position
-    exact = systematic(seen, plan.instrument) + wandering(time, plan.instrument, streams["instrument"])
-    clean = exact + plan.noise * unit_noise(time, spec.correlation_s, spec.tails_dof, streams["noise"])
-    reading, code = contaminate(clean, spec.faults, sigma, streams["outliers"])
+def measure(flight: Flight, plan: Plan, sigma: FloatArray, name: str, seed: int | Sequence[int]) -> Simulation:
+    """The log of a flight that an instrument at the origin takes, and its truth, row for row.
+
+    plan: its `flight` is not looked at. sigma: (3,) unit of sizes in sigmas, m, rad, rad.
+    """
+    streams = _streams(seed)
+    spec, rng = parse_outliers(plan.outliers), streams["instrument"]
+    grid = sample_times(plan.duration_s, plan.dt_s, spec.jitter, streams["times"])
+    visible, hidden = (jumps(grid, each, streams["clock"]) for each in (spec.clock, spec.late))
+    late = plan.instrument.stamp_jitter_s * rng.standard_normal(len(grid))
+    taken = (np.clip(grid + late, grid[0], grid[-1]) if late.any() else grid) - hidden
+    exact = systematic(flight.at(taken)[0], plan.instrument) + wandering(grid, plan.instrument, rng)
+    usual = np.asarray(plan.noise * unit_noise(grid, spec.correlation_s, spec.tails_dof, streams["noise"]))
+    noise, _ = contaminate(usual, spec.noise, sigma, plan.dt_s, streams["clock"])
+    clean = exact + noise
+    reading, code = contaminate(clean, spec.faults, sigma, plan.dt_s, streams["outliers"])
     reading, code = held(rounded(reading, plan.instrument), plan.instrument), held(code, plan.instrument)
-    rows, fresh = _rows(time, spec, streams)
+    rows, fresh = _rows(grid, spec, streams)
     second = exact[rows] + plan.noise * streams["duplicates"].standard_normal((len(rows), 3))
     clean = np.where(fresh[:, None], second, clean[rows])
     reading = readable(np.where(fresh[:, None], second, reading[rows]))
     code = np.where(fresh[:, None], 0, code[rows]).astype(np.uint8)
+    time = (grid + visible)[rows]
+    order = np.argsort(time, kind="stable")
     log = MeasurementLog(
         name=name,
-        time_s=time[rows],
-        measurement=reading,
-        row=np.arange(len(rows)),
+        time_s=time[order],
+        measurement=reading[order],
+        row=order,
         rows_in_file=len(rows),
-        duplicate_times=int(np.sum(np.diff(time[rows]) == 0)),
+        rows_out_of_order=int(np.sum(np.diff(time) < 0)),
+        duplicate_times=int(np.sum(np.diff(time[order]) == 0)),
     )
-    truth = Truth(name, time[rows], position[rows], velocity[rows], acceleration[rows], code)
-    return Simulation(log, truth, plan.noise, readable(clean))
+    truth = Truth(name, log.time_s, *flight.at(log.time_s), code[order])
+    return Simulation(log, truth, plan.noise, readable(clean)[order])
+
+
+def _streams(seed: int | Sequence[int]) -> dict[str, np.random.Generator]:
+    return dict(zip(_STREAMS, np.random.default_rng(seed).spawn(len(_STREAMS)), strict=True))
 
 
 def _rows(

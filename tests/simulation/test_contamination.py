@@ -88,7 +88,7 @@ def test_absolute_sizes() -> None:
 
 def test_sizes_are_log_uniform_with_either_sign() -> None:
     reading, code = contaminate(
-        np.zeros((40000, 3)), (Fault("isolated", rate=0.5, size=(10.0, 1000.0)),), np.ones(3),
+        np.zeros((40000, 3)), (Fault("isolated", rate=0.5, size=(10.0, 1000.0)),), np.ones(3), 1.0,
         np.random.default_rng(0),
     )  # fmt: skip
     size = reading[code == 1]

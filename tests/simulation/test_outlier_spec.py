@@ -99,14 +99,14 @@ def test_log_wide_items() -> None:
 
 
 def test_every_example_of_the_grammar_is_valid() -> None:
-    examples = re.findall(r"(?:^|\s|\()((?:all\.|range\.)?[a-z]+=[0-9][0-9.:m-]*)", GRAMMAR)
-    assert len(examples) == 18
+    examples = re.findall(r"(?:^|\s|\()((?:[a-z]+\.)?[a-z]+=[0-9](?:[0-9.:%@a-z-]*[0-9a-z%])?)", GRAMMAR)
+    assert len(examples) == 21
     for example in examples:
         parse_outliers(example)
 
 
 OUTLIER_ERRORS = [
-    ("spikes=3", 'unknown item "spikes=3". It takes isolated, offset'),
+    ("spikes=3", 'unknown item "spikes=3"; did you mean "sine"? It takes isolated, offset'),
     ("", "an item is empty. It takes isolated"),
     ("isolated=0.1,", "an item is empty"),
     ("none,isolated=0.1", '"none" stands alone; drop it or the other items.'),
@@ -125,7 +125,7 @@ OUTLIER_ERRORS = [
     ("isolated=0.1:1e999", 'the size is "1e999"; expected'),
     ("offset=1.5", 'the count is "1.5"; expected a whole number, such as 3.'),
     ("offset=1m", 'the count is "1m"; expected a whole number'),
-    ("offset=1:0-3", 'the length is "0-3"; expected a whole number of samples or a range, such as 4-30.'),
+    ("offset=1:0-3", 'the length is "0-3"; expected a whole number of samples or a range, or one of seconds'),
     ("jitter=0.5", 'the fraction is "0.5"; expected a share of the sample interval from 0 to below 0.5'),
     ("gap=1:0", 'the seconds is "0"; expected a number of seconds or a range, such as 5-15.'),
     ("tails=2", 'the dof is "2"; expected a number of degrees of freedom above 2, such as 6.'),
