@@ -9,17 +9,13 @@ outliers of more than 8 sigmas that are called good; false alarms, good readings
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from typing import NamedTuple
 
 import numpy as np
 
 from ftproc import pipeline
-from ftproc.core import threads
 from ftproc.core.model.frames import wrap
 from ftproc.errors import FtprocError
 from ftproc.quality.verdict import CONSISTENT
@@ -29,7 +25,7 @@ from ftproc.simulation.contamination import CODES
 from ftproc.simulation.instrument import PERFECT
 from ftproc.simulation.scenarios import Plan
 from ftproc.simulation.simulation import Simulation, measure
-from tests.trust import hard_flights
+from tests.trust import hard_flights, tables
 from tests.trust.hard_flights import Seen
 from tests.trust.verdicts import is_far
 
@@ -105,9 +101,9 @@ class Run(NamedTuple):
         return self.wrong and self.verdict == CONSISTENT
 
     def __str__(self) -> str:
-        mark = "CONFIDENT" if self.confident else "wrong" if self.wrong else "right"
         return (
-            f"{self.name} {self.seed} {self.way}, {self.what}: {self.verdict}, {mark}, {self.rmse_m:.4g} m, "
+            f"{self.name} {self.seed} {self.way}, {self.what}: {self.verdict}, "
+            f"{tables.mark(self.wrong, self.verdict)}, {self.rmse_m:.4g} m, "
             f"missed {self.missed} of {self.outliers}, false {self.false_alarms} of {self.good}"
         )
 
@@ -173,35 +169,6 @@ def row(name: str, runs: Iterable[Run]) -> tuple[str, ...]:
     )
 
 
-def all_runs(names: Iterable[str], seeds: Iterable[int], processes: int = 1) -> Iterator[Run]:
-    """The runs of classes, class by class and seed by seed."""
-    jobs = [(name, seed) for name in names for seed in seeds]
-    with ProcessPoolExecutor(processes, get_context("spawn"), threads.use, (1,)) as pool:
-        for found in pool.map(run, *zip(*jobs, strict=True)):
-            yield from found
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Print the table, a group's sum below it."""
-    parser = argparse.ArgumentParser(prog="python -m tests.trust.hard", description=__doc__)
-    parser.add_argument("seeds", help="FIRST-LAST")
-    parser.add_argument("names", nargs="*", metavar="CLASS", help=f"of {', '.join(CLASSES)}")
-    parser.add_argument("-j", "--processes", type=int, default=threads.available())
-    parser.add_argument("-v", "--verbose", action="store_true", help="a line for each run")
-    given = parser.parse_args(arguments)
-    first, last = (int(word) for word in given.seeds.split("-"))
-    names = given.names or list(CLASSES)
-    if unknown := set(names) - set(CLASSES):
-        parser.error(f"there is no class {', '.join(sorted(unknown))}; there are {', '.join(CLASSES)}")
-    found: list[Run] = []
-    for each in all_runs(names, range(first, last + 1), given.processes):
-        found.append(each)
-        if given.verbose:
-            print(each, flush=True)
-    for line in [HEADER, *table(found)]:
-        print(*line, sep=" | ")
-
-
 def table(found: list[Run]) -> Iterator[tuple[str, ...]]:
     """A row for each class and each group that was run."""
     for group, faults in GROUPS.items():
@@ -212,6 +179,14 @@ def table(found: list[Run]) -> Iterator[tuple[str, ...]]:
             yield row(f"all {group}", runs)
     if len({each.name for each in found}) > 1:
         yield row("all with a fault", (each for each in found if each.name not in SOUND))
+
+
+def main() -> None:
+    """Print the table."""
+    given = tables.arguments(__doc__, CLASSES)
+    jobs = [(name, seed) for name in given.names for seed in given.seeds]
+    found = list(tables.spread(run, jobs, given))
+    tables.show(HEADER, table(found))
 
 
 if __name__ == "__main__":
