@@ -10,8 +10,9 @@ import numpy as np
 from ftproc.records import FloatArray
 from ftproc.simulation.kinematics import GRAVITY_MPS2, Flight, integrate
 
-STEP_S = 0.005
+STEP_S, MOST_STEPS = 0.005, 20_000
 LEAD_S = 2.0  # before time 0, and after the end
+LOWEST_M = 3.0  # above the station's horizontal plane
 Draw = np.random.Generator
 #: (3,) acceleration m/s2 from the time s, and (3,) position m and velocity m/s.
 Force = Callable[[float, FloatArray, FloatArray], FloatArray]
@@ -20,15 +21,20 @@ _DOWN = np.array([0.0, 0.0, -GRAVITY_MPS2])
 
 
 def _flown(force: Force, duration_s: float, position: FloatArray, velocity: FloatArray) -> Flight:
-    """A point mass from (3,) m and m/s on, whose truth is the exact integral of the accelerations that it had."""
-    time = np.arange(-LEAD_S, duration_s + LEAD_S, STEP_S)
+    """A point mass from (3,) m and m/s on, whose truth is the exact integral of the accelerations that it had; lifted
+    where it would come below the station."""
+    step = max(STEP_S, duration_s / MOST_STEPS)
+    time = np.arange(-LEAD_S, duration_s + LEAD_S, step)
     acceleration = np.empty((len(time), 3))
     p, v = position.copy(), velocity.copy()
     for k, t in enumerate(time.tolist()):
         acceleration[k] = force(t, p, v)
-        p += STEP_S * (v + STEP_S / 2 * acceleration[k])
-        v += STEP_S * acceleration[k]
-    return integrate(-LEAD_S, STEP_S, acceleration, velocity, position)
+        p += step * (v + step / 2 * acceleration[k])
+        v += step * acceleration[k]
+    begun = velocity + step / 2 * acceleration[0]  # what has stopped rests in the integral of the trapezoids, too
+    flight = integrate(-LEAD_S, step, acceleration, begun, position)
+    lift = max(0.0, LOWEST_M - float(flight.position[:, 2].min()))
+    return flight.moved(np.array([0.0, 0.0, lift]))
 
 
 def _drag(velocity: FloatArray, terminal_mps: float) -> FloatArray:
@@ -81,7 +87,7 @@ def _staged(start: FloatArray, velocity: FloatArray, times: list[float], thrusts
 
     def force(t: float, p: FloatArray, v: FloatArray) -> FloatArray:
         thrust = sum(size for (first, last), size in stages if first <= t < last)
-        return _DOWN * (0.3 if t > times[0] else 1.0) + thrust * v / np.sqrt(v @ v) + _drag(v, 400.0)
+        return _DOWN * (0.3 if t > times[0] else 1.0) + thrust * v / np.sqrt(v @ v) + _drag(v, 1500.0)
 
     return _flown(force, times[-1] - LEAD_S, start, velocity)
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ftproc.core.model.frames import from_cartesian
+from ftproc.simulation.abrupt import ABRUPT
 from ftproc.simulation.aircraft import Airframe, fly, follow
 from ftproc.simulation.kinematics import GRAVITY_MPS2, Flight, constant_acceleration, gusts, integrate, smoothed
 
@@ -132,4 +133,5 @@ FLIGHTS: dict[str, Callable[[np.random.Generator, float], Flight]] = {
     "overhead": _overhead,
     "orbit": _orbit,
     "rocket": _rocket,
+    **ABRUPT,
 }

@@ -127,6 +127,15 @@ _CALIBRATION = Scenario(
     range_noise_m=(2.0, 5.0),
     angle_noise_rad=(1e-4, 3e-4),
 )
+_ABRUPT = Scenario(
+    "abrupt",
+    "theodolite at 50 Hz; a parachute, impact, ignition, separation, touch-down or catapult; no outliers",
+    flights=("parachute", "impact", "ignition", "separation", "touch-down", "catapult"),
+    duration_s=(40.0, 60.0),
+    dt_s=(0.02,),
+    range_noise_m=(0.5, 5.0),
+    angle_noise_rad=(5e-5, 3e-4),
+)
 
 _DIRT = (
     "none",
@@ -195,6 +204,7 @@ _SCENARIOS: dict[str, Scenario] = {
         _OVERHEAD,
         _CRUISE,
         _CALIBRATION,
+        _ABRUPT,
         _FAMILY,
     )
 }

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from ftproc.core.model.frames import from_cartesian, wrap
-from ftproc.simulation import Fault, OutlierSpec, simulate
+from ftproc.records import FloatArray
+from ftproc.simulation import Fault, OutlierSpec, Simulation, contamination, simulate
 from ftproc.simulation.contamination import contaminate
+from ftproc.simulation.outlier_spec import COPIED, SHAPED
 from ftproc.simulation.sampling import kept_rows, sample_times, with_duplicates
 from tests.simulated import codes, deviation, runs
 
@@ -37,6 +39,122 @@ def test_flags_match_what_was_injected(spec: str, code: int) -> None:
         assert ((flag != 0).all(axis=1) == (flag != 0).any(axis=1)).all()
     else:
         assert ((flag != 0).all(axis=1) != (flag != 0).any(axis=1)).any() or code == 6
+
+
+def test_every_kind_of_patch_has_a_shape_and_a_code() -> None:
+    assert set(SHAPED) == {*contamination.SHAPES, *contamination.DRAWN}
+    assert set(COPIED) == set(contamination.COPIES)
+    kinds = {kind for drawn in contamination.DRAWN.values() for kind in drawn}
+    assert kinds <= {*contamination.SHAPES, *contamination.COPIES} < set(contamination.CODES)
+    assert list(contamination.CODES.values()) == list(range(1, 16))
+
+
+def only_patch(spec: str) -> tuple[slice, Simulation]:
+    flight = simulate("manoeuvre", seed=5, outliers=spec)
+    (patch,) = runs(codes(flight).any(axis=1))
+    return patch, flight
+
+
+def in_sigmas(kind: str, spec: str = "1:10s:8-60") -> FloatArray:
+    patch, flight = only_patch(f"azimuth.{kind}={spec}")
+    assert patch.stop - patch.start == 200
+    assert (codes(flight)[patch, 1] == contamination.CODES[kind]).all()
+    return np.asarray(deviation(flight)[patch, 1] / flight.sigma[1])
+
+
+def test_shapes_of_long_patches() -> None:
+    k = np.arange(1, 201) / 200
+    walkoff, sine, lobes, other = (in_sigmas(kind) for kind in ("walkoff", "sine", "sidelobe", "other"))
+    assert 8 <= abs(walkoff[-1]) <= 60
+    np.testing.assert_allclose(walkoff, walkoff[-1] * k**2, atol=1e-6)
+    assert 8 <= np.abs(sine).max() <= 60
+    assert (np.diff(np.sign(sine[np.abs(sine) > 1e-6])) != 0).sum() in (1, 3, 5)
+    assert {round(abs(a / b), 6) for a in lobes for b in lobes} <= {0.5, 1.0, 2.0}
+    assert (np.diff(lobes) != 0).sum() <= 2
+    np.testing.assert_allclose(np.diff(other, 3), 0, atol=1e-6)
+    assert 7 < abs(other[0]) < 65
+
+
+def test_copies_of_readings() -> None:
+    for kind in ("mirror", "replay", "swap"):
+        patch, flight = only_patch(f"all.{kind}=1:5s")
+        clean, found = flight.clean[:, 0], flight.log.measurement[:, 0]
+        own, n = clean[patch], patch.stop - patch.start
+        made = {
+            "mirror": 2 * clean[patch.start - 1] - own,
+            "replay": clean[patch.start - n : patch.start],
+            "swap": np.concatenate([own[n - n // 2 :], own[: n - n // 2]]),
+        }
+        np.testing.assert_allclose(found[patch], made[kind], rtol=1e-12)
+
+
+def test_a_patch_at_an_end_and_one_as_long_as_a_share_of_the_log() -> None:
+    assert only_patch("range.ramp=1:5s@start")[0] == slice(0, 100)
+    assert only_patch("range.stuck=1:5s@end")[0] == slice(2301, 2401)
+    patch, _ = only_patch("all.other=1:25%")
+    assert patch.stop - patch.start == 600
+
+
+def test_components_are_drawn_each_time() -> None:
+    for prefix, hit in (("one", 1), ("two", 2), ("azimuth+elevation", 2)):
+        flight = simulate("manoeuvre", seed=5, outliers=f"{prefix}.offset=6:10-40")
+        together = (codes(flight) != 0).sum(axis=1)
+        assert set(together) == {0, hit}
+    one = codes(simulate("manoeuvre", seed=5, outliers="one.offset=6:10-40")).any(axis=0)
+    assert one.sum() > 1
+
+
+def test_a_step_stays_and_leaves_what_is_hit_already() -> None:
+    flight = simulate("manoeuvre", seed=5, outliers="elevation.step=1:20,elevation.zero=0.2,elevation.isolated=0.1")
+    code, off = codes(flight)[:, 2], deviation(flight)[:, 2] / flight.sigma[2]
+    first = int(np.argmax(code == 9))
+    assert 0.11 * len(code) < first < 0.89 * len(code)
+    assert (code[first:] != 0).all()
+    np.testing.assert_allclose(np.abs(off[code == 9]), 20, rtol=1e-6)
+    assert (flight.log.measurement[code == 7, 2] == 0).all()
+
+
+def test_noise_that_changes_has_no_code_and_is_in_the_clean_readings() -> None:
+    usual = simulate("manoeuvre", seed=5, outliers="none")
+    loud = simulate("manoeuvre", seed=5, outliers="noise=1:33%:10")
+    quiet = simulate("manoeuvre", seed=5, outliers="range.noise=1:100%:0")
+    exact = from_cartesian(usual.truth.position_m)
+    assert not codes(loud).any()
+    assert (loud.log.measurement == loud.clean).all()
+    for c in (0, 2):
+        ratio = (loud.clean - exact)[:, c] / (usual.clean - exact)[:, c]
+        (where,) = runs(np.abs(ratio - 10) < 1e-3)
+        assert where.stop - where.start == 792
+        np.testing.assert_allclose(np.delete(ratio, np.r_[where]), 1, rtol=1e-3)
+    np.testing.assert_allclose(quiet.clean[:, 0], exact[:, 0], rtol=1e-12)
+    np.testing.assert_array_equal(quiet.clean[:, 1], usual.clean[:, 1])
+
+
+def test_a_clock_that_jumps_and_readings_of_another_time() -> None:
+    usual = simulate("calibration", seed=1, noise=(0, 0, 0), outliers="none")
+    jumped = simulate("calibration", seed=2, noise=(0, 0, 0), outliers="clock=1:0.5")
+    late = simulate("calibration", seed=1, noise=(0, 0, 0), outliers="late=1:0.5")
+    step = np.diff(jumped.log.time_s[np.argsort(jumped.log.row)])
+    assert sorted({round(float(s), 6) for s in step}) in ([-0.4, 0.1], [0.1, 0.6])
+    assert jumped.log.rows_out_of_order == int((step < 0).any())
+    assert (np.diff(jumped.log.time_s) >= 0).all()
+    np.testing.assert_array_equal(late.log.time_s, usual.log.time_s)
+    off = np.abs(late.log.measurement - usual.log.measurement).max(axis=1) > 0
+    first = int(np.argmax(off))
+    assert off[first:].mean() > 0.99
+    assert not off[:first].any()
+    np.testing.assert_array_equal(late.truth.position_m, usual.truth.position_m)
+    shift = round(
+        abs(np.interp(late.log.measurement[first, 1], *by_azimuth(usual, first)) - usual.log.time_s[first]), 3
+    )
+    assert shift == 0.5
+
+
+def by_azimuth(flight: Simulation, k: int) -> tuple[FloatArray, FloatArray]:
+    """Azimuths, increasing, and times around a sample."""
+    near = slice(max(k - 20, 0), k + 20)
+    azimuth, time = np.unwrap(flight.log.measurement[near, 1]), flight.log.time_s[near]
+    return (azimuth, time) if azimuth[-1] > azimuth[0] else (azimuth[::-1], time[::-1])
 
 
 @pytest.mark.parametrize("kind", ["offset", "ramp", "stuck", "burst"])

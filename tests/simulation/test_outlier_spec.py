@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from ftproc.errors import UsageError
 from ftproc.records import COMPONENTS
-from ftproc.simulation import GRAMMAR, Fault, OutlierSpec, parse_outliers, simulate
+from ftproc.simulation import GRAMMAR, Fault, OutlierSpec, contamination, parse_outliers, simulate
 from tests.simulated import codes
 
 numbers = st.floats(0.01, 500).map(lambda x: f"{x:.3g}").filter(lambda s: "e" not in s)
@@ -31,28 +31,39 @@ def ranges(draw: st.DrawFn, whole: bool = False) -> tuple[str, tuple[float, floa
     return "-".join(texts), (float(texts[0]), float(texts[1]))
 
 
+PREFIXES: dict[str, tuple[tuple[int, ...], bool, int]] = {
+    "": ((0, 1, 2), False, 0),
+    "all.": ((0, 1, 2), True, 0),
+    "one.": ((0, 1, 2), True, 1),
+    "two.": ((0, 1, 2), True, 2),
+    "azimuth+elevation.": ((1, 2), True, 0),
+    **{f"{name}.": ((c,), False, 0) for c, name in enumerate(COMPONENTS)},
+}
+RATED, SIZED, COPIED = ("isolated", "zero", "nan"), (*contamination.SHAPES, *contamination.DRAWN), contamination.COPIES
+
+
 @st.composite
 def items(draw: st.DrawFn) -> tuple[str, Fault]:
-    prefix = draw(st.sampled_from(["", "all.", *(f"{c}." for c in COMPONENTS)]))
-    kind = draw(st.sampled_from(["isolated", "offset", "ramp", "stuck", "burst", "patch", "start", "zero", "nan"]))
-    components = (COMPONENTS.index(prefix[:-1]),) if prefix[:-1] in COMPONENTS else (0, 1, 2)
-    text = f"{prefix}{kind}="
-    fields: dict[str, Any] = {}
-    if kind in ("isolated", "zero", "nan"):
+    prefix = draw(st.sampled_from(list(PREFIXES)))
+    kind = draw(st.sampled_from([*RATED, *SIZED, *COPIED, "start", "step", "nanrun"]))
+    text, fields = f"{prefix}{kind}=", dict[str, Any]()
+    if kind in RATED:
         rate = draw(st.integers(0, 100)) / 100
         text, fields = text + f"{rate}", {"rate": rate}
     else:
         count = draw(st.integers(0, 20))
         text, fields = text + f"{count}", {"count": count}
-    if kind in ("offset", "ramp", "stuck", "burst", "patch") and draw(st.booleans()):
-        length, bounds = draw(ranges(whole=True))
-        text, fields["length"] = f"{text}:{length}", (int(bounds[0]), int(bounds[1]))
-    sized = kind in ("isolated", "start") or (kind not in ("stuck", "zero", "nan") and "length" in fields)
+    if kind in (*SIZED, *COPIED, "nanrun") and draw(st.booleans()):
+        unit, place = draw(st.sampled_from(["", "s", "%"])), draw(st.sampled_from(["", "@start", "@end"]))
+        length, bounds = draw(ranges(whole=not unit))
+        text = f"{text}:{length}{unit}{place}"
+        fields |= {"length": bounds, "length_unit": unit or "samples", "place": place[1:]}
+    sized = kind in ("isolated", "start", "step") or (kind in SIZED and "length" in fields)
     if sized and draw(st.booleans()):
         size, fields["size"] = draw(ranges())
         unit = draw(st.sampled_from({"range.": ["", "m"], "azimuth.": ["", "mrad"]}.get(prefix, [""])))
         text, fields["unit"] = f"{text}:{size}{unit}", unit or "sigma"
-    return text, Fault(kind, components, prefix == "all.", **fields)
+    return text, Fault(kind, *PREFIXES[prefix], **fields)
 
 
 @given(st.lists(items(), min_size=1, max_size=6), st.booleans())
@@ -87,7 +98,10 @@ def test_any_specification_contaminates_any_log(written: list[tuple[str, Fault]]
 
 
 def test_log_wide_items() -> None:
-    spec = parse_outliers("jitter=0.2,gap=2:5-15,gap=1:3,duplicates=10,correlation=1.5,tails=6,isolated=1e-2:5-2e1")
+    spec = parse_outliers(
+        "jitter=0.2,gap=2:5-15,gap=1:3,duplicates=10,correlation=1.5,tails=6,isolated=1e-2:5-2e1,"
+        "clock=1:0.5,late=2:1-2,two.noise=1:33%:0-3,noise=1"
+    )
     assert spec == OutlierSpec(
         faults=(Fault("isolated", rate=0.01, size=(5.0, 20.0)),),
         jitter=0.2,
@@ -95,6 +109,12 @@ def test_log_wide_items() -> None:
         duplicates=10,
         correlation_s=1.5,
         tails_dof=6.0,
+        clock=((1, (0.5, 0.5)),),
+        late=((2, (1.0, 2.0)),),
+        noise=(
+            Fault("noise", (0, 1, 2), True, 2, count=1, length=(33, 33), length_unit="%", size=(0.0, 3.0)),
+            Fault("noise", count=1, size=(10.0, 10.0)),
+        ),
     )
 
 
@@ -126,6 +146,11 @@ OUTLIER_ERRORS = [
     ("offset=1.5", 'the count is "1.5"; expected a whole number, such as 3.'),
     ("offset=1m", 'the count is "1m"; expected a whole number'),
     ("offset=1:0-3", 'the length is "0-3"; expected a whole number of samples or a range, or one of seconds'),
+    ("offset=1:2.5", 'the length is "2.5"; expected a whole number of samples'),
+    ("offset=1:5s@middle", 'the length is "5s@middle"; expected a whole number of samples'),
+    ("isolated=0.1:20@end", 'the size is "20@end"; expected a number of sigmas'),
+    ("range+height.step=1", 'unknown component "range+height" in "range+height.step=1"; it takes range, azimuth,'),
+    ("noise=1:20:-1", 'the factor is "-1"; expected a factor from 0'),
     ("jitter=0.5", 'the fraction is "0.5"; expected a share of the sample interval from 0 to below 0.5'),
     ("gap=1:0", 'the seconds is "0"; expected a number of seconds or a range, such as 5-15.'),
     ("tails=2", 'the dof is "2"; expected a number of degrees of freedom above 2, such as 6.'),

@@ -3,8 +3,8 @@
     python -m tests.trust.fused_faults 0-3 clock held       seeds 0 to 3, two faults; all of them where none is named
     python -m tests.trust.fused_faults 0-3 -v -j 2          a line for each run, by two processes
 
-Wrong and consistent are as in `hard`. Named: of the stations that reasons of the verdict name which were not there
-without the fault, one is the station at fault, or all are others.
+Wrong and consistent are as in `hard`. Named: reasons that were not there without the fault, or not of so bad a
+verdict, name the station at fault, or only others.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ def _fused(simulated: SimulatedRange) -> _Fused:
     position[~known] = found.state[~known, :3]
     error, sigma = found.state[known, :3] - position[known], found.sigma[known, :3]
     trust = found.metadata["summary"]["trust"]
-    reasons = frozenset(re.sub(r"\b[\d.e+-]+", "", each) for each in trust["reasons"])
+    reasons = frozenset(re.sub(r"[\d.]+ %", "", f"{trust['verdict']}: {each}") for each in trust["reasons"])
     return _Fused(
         float(np.sqrt((error**2).sum(1).mean())), float((np.abs(error) < 3 * sigma).all(1).mean()),
         is_far(found, position), trust["verdict"], reasons,
