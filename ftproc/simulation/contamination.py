@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ftproc.records import FlagArray, FloatArray
 from ftproc.simulation.outlier_spec import Fault
-from ftproc.simulation.sampling import MIDDLE
+from ftproc.simulation.sampling import one_side
 
 _UNITS = {"m": 1.0, "mrad": 1e-3}
 
@@ -43,7 +43,7 @@ CODES = {
     name: code
     for code, name in enumerate(
         ("isolated", "offset", "ramp", "stuck", "burst", "start", "zero", "other", "step", "walkoff", "sine",
-         "sidelobe", "mirror", "replay", "swap"),
+         "sidelobe", "mirror", "replay", "swap", "onesided", "held", "interpolated"),
         start=1,
     )
 }  # fmt: skip
@@ -145,11 +145,18 @@ def _start(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
 
 
 def _step(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
-    first = int(log.rng.uniform(*MIDDLE) * len(log.code))
+    where = one_side(len(log.code), log.rng)
     for c in group:
-        code = log.code[first:, c]
-        log.reading[first:, c] += np.where(code == CODES["zero"], 0.0, log.errors(fault, c, 1))
+        code = log.code[where, c]
+        log.reading[where, c] += np.where(code == CODES["zero"], 0.0, log.errors(fault, c, 1))
         code[code == 0] = CODES["step"]
+
+
+def _onesided(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
+    hit = (log.rng.random(len(log.code)) < fault.rate) & log.uncontaminated(group)
+    for c in group:
+        log.reading[hit, c] += log.errors(fault, c, 1) * log.rng.exponential(size=int(hit.sum()))
+        log.code[hit, c] = CODES["onesided"]
 
 
 def _zero(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
@@ -157,6 +164,25 @@ def _zero(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
     for c in group:
         log.reading[hit, c] = 0.0
         log.code[hit, c] = CODES["zero"]
+
+
+def _held(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
+    fresh = log.rng.random(len(log.code)) >= fault.rate
+    fresh[0] = True
+    source = np.maximum.accumulate(np.where(fresh, np.arange(len(fresh)), 0))
+    for c in group:
+        log.reading[:, c] = log.reading[source, c]
+        log.code[:, c] = np.where(fresh, log.code[:, c], CODES["held"])
+
+
+def _interpolated(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
+    sample = np.arange(len(log.code))
+    knots = np.arange(0.0, len(sample), fault.size[0])
+    between = np.isin(sample, knots, invert=True) & (sample < knots[-1])
+    for c in group:
+        values = np.unwrap(log.reading[:, c]) if c == 1 else log.reading[:, c]
+        found = np.interp(sample, knots, np.interp(knots, sample, values))
+        log.reading[between, c], log.code[between, c] = found[between], CODES["interpolated"]
 
 
 def _noise(log: _Log, fault: Fault, group: tuple[int, ...]) -> None:
@@ -192,7 +218,10 @@ _INJECT: dict[str, Callable[[_Log, Fault, tuple[int, ...]], None]] = {
     **dict.fromkeys((*sorted(SHAPES | COPIES, key=lambda kind: CODES[kind]), *DRAWN), _patch),
     "zero": _zero,
     "isolated": _isolated,
+    "onesided": _onesided,
     "step": _step,
+    "held": _held,
+    "interpolated": _interpolated,
     "nan": _nan,
     "nanrun": _nanrun,
 }

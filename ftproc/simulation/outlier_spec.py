@@ -17,9 +17,12 @@ it, lengths, factors and seconds uniformly.
 
   isolated=RATE[:SIZE]            each sample is hit with this probability      isolated=0.05:20-200
   KIND=COUNT[:LENGTH[:SIZE]]      a patch: consecutive samples are off          ramp=2:10-30:8-40
-  step=COUNT[:SIZE]               off from a random sample to the end           azimuth.step=1:10-50
+  step=COUNT[:SIZE]               off from a random sample to the nearer end    azimuth.step=1:10-50
   start=COUNT[:SIZE]              the first COUNT samples are off               start=6:50
+  onesided=RATE[:SIZE]            exponential errors to one side                range.onesided=0.5:4-14
   zero=RATE                       the reading is 0                              zero=0.005
+  held=RATE                       the reading before is repeated                all.held=0.5
+  interpolated=SAMPLES            linear between one reading in so many         all.interpolated=4.5
   nan=RATE                        the reading is missing                        nan=0.02
   nanrun=COUNT[:LENGTH]           missing over consecutive samples              nanrun=2:5-30
   round=SIZE                      readings rounded to multiples of SIZE         range.round=0.5m
@@ -42,8 +45,8 @@ For the whole log, without a prefix:
 
   jitter=FRACTION                 times off the grid by up to this share of dt  jitter=0.2
   gap=COUNT:SECONDS               rows removed for a RANGE of seconds           gap=2:5-15
-  clock=COUNT:SECONDS             time stamps jump either way, and stay so      clock=1:0.2-2
-  late=COUNT:SECONDS              readings of another time, stamps stay even    late=1:0.2-2
+  clock=COUNT:SECONDS             time stamps off from a sample to the end      clock=1:0.2-2
+  late=COUNT:SECONDS              the same, but the stamps stay even            late=1:0.2-2
   duplicates=COUNT                rows whose time appears twice                 duplicates=10
   correlation=SECONDS             noise correlated in time, exp(-t/SECONDS)     correlation=1.5
   tails=DOF                       Student-t noise of the same sigma             tails=6
@@ -83,6 +86,7 @@ _FIELDS = {
         lambda low, _: low > 0, True, ("m", "mrad"),
     ),
     "factor": _Field("a factor from 0 or a range", "10", lambda _, high: high <= 1e6, True),
+    "spacing": _Field("a number of samples from 1", "4.5", lambda low, high: low >= 1 and high <= 1e6),
     "fraction": _Field("a share of the sample interval from 0 to below 0.5", "0.2", lambda _, high: high < 0.5),
     "seconds": _Field("a number of seconds or a range", "5-15", lambda low, _: low > 0, True),
     "dof": _Field("a number of degrees of freedom above 2", "6", lambda low, _: low > 2),
@@ -95,7 +99,10 @@ _FORMS: dict[str, tuple[str, ...]] = {  # the first field is required
     **dict.fromkeys(COPIED, ("count", "length")),
     "step": ("count", "size"),
     "start": ("count", "size"),
+    "onesided": ("rate", "size"),
     "zero": ("rate",),
+    "held": ("rate",),
+    "interpolated": ("spacing",),
     "nan": ("rate",),
     "nanrun": ("count", "length"),
     "round": ("size",),
@@ -118,6 +125,7 @@ _PREFIXES: dict[str, tuple[tuple[int, ...], bool, int]] = {
     "one": ((0, 1, 2), True, 1),
     "two": ((0, 1, 2), True, 2),
 }
+_FACTOR = 10.0, 10.0  # of noise
 _NUMBER = r"(\d+(?:\.\d*)?(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)"
 _RANGE = re.compile(rf"{_NUMBER}(?:-{_NUMBER})?(m|mrad|s|%)?(?:@(start|end))?")
 
@@ -128,7 +136,8 @@ class Fault:
 
     drawn: of components hit together, how many are drawn each time, 0 for all. rate: share of samples. count: times,
     or samples of a start. length: from and to, in `length_unit`: samples, s, %. place: at the start or end of the log.
-    size: from and to, in `unit`: sigma, m, mrad; of noise its factor.
+    size: from and to, in `unit`: sigma, m, mrad; a factor of noise; samples from one reading to the
+    next interpolated one.
     """
 
     kind: str
@@ -250,7 +259,8 @@ def _fault(item: str, prefix: str, kind: str, values: dict[str, _Value]) -> Faul
     own = tuple(COMPONENTS.index(name) for name in prefix.split("+") if name in COMPONENTS)
     components, together, drawn = _PREFIXES.get(prefix, (own, len(own) > 1, 0))
     default = Fault(kind)
-    size = values.get("size", values.get("factor", _Value(*(default.size if kind != "noise" else (10.0, 10.0)))))
+    usual = _Value(*(_FACTOR if kind == "noise" else default.size))
+    size = next((values[field] for field in ("size", "factor", "spacing") if field in values), usual)
     _check_unit(item, kind, components, size.unit)
     length = values.get("length", _Value(*default.length))
     return Fault(

@@ -28,16 +28,21 @@ def row_count(duration_s: float, dt_s: float) -> int:
     return int(np.floor(duration_s / dt_s + 1e-6)) + 1
 
 
+def one_side(n: int, rng: np.random.Generator) -> slice:
+    """From a random sample of n, away from the ends, to the nearer end: most of a log is right."""
+    first = int(rng.uniform(*MIDDLE) * n)
+    return slice(0, first) if 2 * first < n else slice(first, n)
+
+
 def jumps(time_s: FloatArray, each: tuple[tuple[int, Range], ...], rng: np.random.Generator) -> FloatArray:
-    """(n,) seconds that jump at random times and stay so, either way; away from the ends.
+    """(n,) seconds that jump at random times, either way, and stay so to the nearer end.
 
     each: pairs of count and range of seconds.
     """
     found = np.zeros(len(time_s))
     for count, seconds in each:
         for _ in range(count):
-            first = int(rng.uniform(*MIDDLE) * len(time_s))
-            found[first:] += rng.choice([-1.0, 1.0]) * rng.uniform(*seconds)
+            found[one_side(len(time_s), rng)] += rng.choice([-1.0, 1.0]) * rng.uniform(*seconds)
     return found
 
 

@@ -20,7 +20,7 @@ from ftproc.errors import FtprocError
 from ftproc.quality.verdict import CONSISTENT
 from ftproc.settings import FilterSettings
 from tests.bench import logs
-from tests.trust.verdicts import is_far
+from tests.trust.runs import is_far
 
 EDITING, IDENTIFICATION = "ftproc.core.editing", "ftproc.core.identification"
 SAME = 1e-9  # of an error: less has not changed

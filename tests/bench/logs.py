@@ -95,8 +95,8 @@ def _effect(what: str, seed: int, room: Path) -> Seen:
 
 
 def _fault(what: str, seed: int, room: Path) -> Seen:
-    found = faulty_logs.make(what, seed)
-    return Seen(found.log, found.log.time_s, found.position_m)
+    found = faulty_logs.make(what, seed).simulated
+    return Seen(found.log, found.truth.time_s, found.truth.position_m)
 
 
 def _drone(what: str, seed: int, room: Path) -> Seen:

@@ -46,7 +46,7 @@ def test_every_kind_of_patch_has_a_shape_and_a_code() -> None:
     assert set(COPIED) == set(contamination.COPIES)
     kinds = {kind for drawn in contamination.DRAWN.values() for kind in drawn}
     assert kinds <= {*contamination.SHAPES, *contamination.COPIES} < set(contamination.CODES)
-    assert list(contamination.CODES.values()) == list(range(1, 16))
+    assert list(contamination.CODES.values()) == list(range(1, 19))
 
 
 def only_patch(spec: str) -> tuple[slice, Simulation]:
@@ -104,12 +104,15 @@ def test_components_are_drawn_each_time() -> None:
     assert one.sum() > 1
 
 
-def test_a_step_stays_and_leaves_what_is_hit_already() -> None:
-    flight = simulate("manoeuvre", seed=5, outliers="elevation.step=1:20,elevation.zero=0.2,elevation.isolated=0.1")
+@pytest.mark.parametrize("seed", range(6))
+def test_a_step_lasts_to_the_nearer_end_and_leaves_what_is_hit_already(seed: int) -> None:
+    spec = "elevation.step=1:20,elevation.zero=0.2,elevation.isolated=0.1"
+    flight = simulate("manoeuvre", seed=seed, outliers=spec)
     code, off = codes(flight)[:, 2], deviation(flight)[:, 2] / flight.sigma[2]
-    first = int(np.argmax(code == 9))
-    assert 0.11 * len(code) < first < 0.89 * len(code)
-    assert (code[first:] != 0).all()
+    first, last = np.flatnonzero(code == 9)[[0, -1]]
+    assert (code[first : last + 1] != 0).all()
+    assert 0.1 * len(code) < last - first < 0.51 * len(code)
+    assert min(first, len(code) - last) < 20
     np.testing.assert_allclose(np.abs(off[code == 9]), 20, rtol=1e-6)
     assert (flight.log.measurement[code == 7, 2] == 0).all()
 
@@ -140,9 +143,10 @@ def test_a_clock_that_jumps_and_readings_of_another_time() -> None:
     assert (np.diff(jumped.log.time_s) >= 0).all()
     np.testing.assert_array_equal(late.log.time_s, usual.log.time_s)
     off = np.abs(late.log.measurement - usual.log.measurement).max(axis=1) > 0
-    first = int(np.argmax(off))
-    assert off[first:].mean() > 0.99
-    assert not off[:first].any()
+    (side,) = runs(off)
+    first = side.start
+    assert 0.11 * len(off) < side.stop - side.start < 0.51 * len(off)
+    assert side.start == 0 or side.stop == len(off)
     np.testing.assert_array_equal(late.truth.position_m, usual.truth.position_m)
     shift = round(
         abs(np.interp(late.log.measurement[first, 1], *by_azimuth(usual, first)) - usual.log.time_s[first]), 3
@@ -155,6 +159,30 @@ def by_azimuth(flight: Simulation, k: int) -> tuple[FloatArray, FloatArray]:
     near = slice(max(k - 20, 0), k + 20)
     azimuth, time = np.unwrap(flight.log.measurement[near, 1]), flight.log.time_s[near]
     return (azimuth, time) if azimuth[-1] > azimuth[0] else (azimuth[::-1], time[::-1])
+
+
+def test_readings_that_were_not_measured() -> None:
+    held = simulate("manoeuvre", seed=5, outliers="all.held=0.6")
+    again = codes(held)[:, 0] == contamination.CODES["held"]
+    assert again.mean() == pytest.approx(0.6, abs=0.05)
+    np.testing.assert_array_equal(np.diff(held.log.measurement, axis=0)[again[1:]], 0)
+    lines = simulate("manoeuvre", seed=5, outliers="all.interpolated=4")
+    between = codes(lines)[:, 0] == contamination.CODES["interpolated"]
+    np.testing.assert_array_equal(np.flatnonzero(~between), np.arange(0, len(between), 4))
+    bend = np.abs(np.diff(np.unwrap(lines.log.measurement[:, 1]), 2))
+    assert bend[between[1:-1]].max() < 1e-12 < np.median(bend[~between[1:-1]])
+    slower = simulate("manoeuvre", seed=5, outliers="range.interpolated=4.5")
+    assert (codes(slower)[:, 0] != 0).mean() == pytest.approx(8 / 9, abs=0.01)
+    assert not codes(slower)[:, 1].any()
+
+
+def test_one_sided_errors() -> None:
+    flight = simulate("manoeuvre", seed=5, outliers="range.onesided=0.5:10")
+    off, code = deviation(flight)[:, 0] / flight.sigma[0], codes(flight)[:, 0]
+    assert len(set(np.sign(off[code != 0]))) == 1
+    assert (code != 0).mean() == pytest.approx(0.5, abs=0.05)
+    assert np.abs(off[code != 0]).mean() == pytest.approx(10, rel=0.15)
+    assert not off[code == 0].any()
 
 
 @pytest.mark.parametrize("kind", ["offset", "ramp", "stuck", "burst"])

@@ -39,7 +39,8 @@ PREFIXES: dict[str, tuple[tuple[int, ...], bool, int]] = {
     "azimuth+elevation.": ((1, 2), True, 0),
     **{f"{name}.": ((c,), False, 0) for c, name in enumerate(COMPONENTS)},
 }
-RATED, SIZED, COPIED = ("isolated", "zero", "nan"), (*contamination.SHAPES, *contamination.DRAWN), contamination.COPIES
+RATED = ("isolated", "zero", "nan", "onesided", "held")
+SIZED, COPIED = (*contamination.SHAPES, *contamination.DRAWN), contamination.COPIES
 
 
 @st.composite
@@ -58,7 +59,7 @@ def items(draw: st.DrawFn) -> tuple[str, Fault]:
         length, bounds = draw(ranges(whole=not unit))
         text = f"{text}:{length}{unit}{place}"
         fields |= {"length": bounds, "length_unit": unit or "samples", "place": place[1:]}
-    sized = kind in ("isolated", "start", "step") or (kind in SIZED and "length" in fields)
+    sized = kind in ("isolated", "onesided", "start", "step") or (kind in SIZED and "length" in fields)
     if sized and draw(st.booleans()):
         size, fields["size"] = draw(ranges())
         unit = draw(st.sampled_from({"range.": ["", "m"], "azimuth.": ["", "mrad"]}.get(prefix, [""])))
@@ -120,7 +121,7 @@ def test_log_wide_items() -> None:
 
 def test_every_example_of_the_grammar_is_valid() -> None:
     examples = re.findall(r"(?:^|\s|\()((?:[a-z]+\.)?[a-z]+=[0-9](?:[0-9.:%@a-z-]*[0-9a-z%])?)", GRAMMAR)
-    assert len(examples) == 21
+    assert len(examples) == 24
     for example in examples:
         parse_outliers(example)
 
@@ -151,6 +152,7 @@ OUTLIER_ERRORS = [
     ("isolated=0.1:20@end", 'the size is "20@end"; expected a number of sigmas'),
     ("range+height.step=1", 'unknown component "range+height" in "range+height.step=1"; it takes range, azimuth,'),
     ("noise=1:20:-1", 'the factor is "-1"; expected a factor from 0'),
+    ("interpolated=0.5", 'the spacing is "0.5"; expected a number of samples from 1, such as 4.5.'),
     ("jitter=0.5", 'the fraction is "0.5"; expected a share of the sample interval from 0 to below 0.5'),
     ("gap=1:0", 'the seconds is "0"; expected a number of seconds or a range, such as 5-15.'),
     ("tails=2", 'the dof is "2"; expected a number of degrees of freedom above 2, such as 6.'),

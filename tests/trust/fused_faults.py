@@ -3,7 +3,7 @@
     python -m tests.trust.fused_faults 0-3 clock held       seeds 0 to 3, two faults; all of them where none is named
     python -m tests.trust.fused_faults 0-3 -v -j 2          a line for each run, by two processes
 
-Wrong and consistent are as in `hard`. Named: reasons that were not there without the fault, or not of so bad a
+Wrong and consistent are as in `runs`. Named: reasons that were not there without the fault, or not of so bad a
 verdict, name the station at fault, or only others.
 """
 
@@ -30,7 +30,7 @@ from ftproc.simulation.contamination import contaminate
 from ftproc.simulation.instrument import held, readable, unit_noise
 from ftproc.simulation.ranges import SimulatedStation
 from tests.trust import tables
-from tests.trust.verdicts import is_far
+from tests.trust.runs import is_far
 
 SCENARIOS = tuple(name for name in RANGE_SCENARIOS if name != "range")
 LASTS_S = 60.0

@@ -14,8 +14,12 @@ from ftproc.records import FloatArray
 from ftproc.simulation.abrupt import ABRUPT
 from ftproc.simulation.aircraft import Airframe, fly
 from ftproc.simulation.flights import AIRLINER, FIGHTER, FLIGHTS, HELICOPTER, LIGHT
+from ftproc.simulation.instrument import PERFECT
 from ftproc.simulation.kinematics import GRAVITY_MPS2, Flight, integrate, smoothed
+from ftproc.simulation.scenarios import Plan
+from ftproc.simulation.simulation import measure
 from tests.drone import DRONE
+from tests.trust.runs import Faulty
 
 Draw = np.random.Generator
 LEAD_S = 10.0  # that a motion is known beyond the log's ends, or a tenth of the log
@@ -140,7 +144,8 @@ def circles(radius: float, speed: float, place: tuple[float, float], draw: Draw,
 
 
 def lobbed(speed: float, rise: float, terminal: float, away_m: float, draw: Draw, lasts_s: float) -> Flight:
-    """A shell under gravity and drag that fades with the height; terminal: its speed of fall m/s at the ground."""
+    """A shell under gravity and drag that fades with the height; terminal: its speed of fall m/s at the ground. Lifted
+    where it would fall below the station."""
     step = lasts_s / 4000
     begin, t = _knots(lasts_s, step)
     p, v = _away(draw, away_m, 0.002 * away_m + 5), speed * _heading(draw, rise)
@@ -149,7 +154,8 @@ def lobbed(speed: float, rise: float, terminal: float, away_m: float, draw: Draw
         thin = GRAVITY_MPS2 / terminal**2 * np.exp(-max(p[2], 0.0) / 8000)
         a[k] = [0, 0, -GRAVITY_MPS2] - thin * np.sqrt(v @ v) * v
         p, v = p + step * (v + step / 2 * a[k]), v + step * a[k]
-    return integrate(begin, step, a, velocity, start)
+    flight = integrate(begin, step, a, velocity, start)
+    return flight.moved(np.array([0.0, 0.0, max(0.0, 5.0 - flight.position[:, 2].min())]))
 
 
 def orbital(height_m: float, off: float, draw: Draw, lasts_s: float) -> Flight:
@@ -250,3 +256,10 @@ def take_abrupt(number: int, draw: Draw) -> Seen:
     name = list(ABRUPT)[number % len(ABRUPT)]
     rate_hz, lasts_s, sigma = ABRUPT_INSTRUMENTS[(number // len(ABRUPT) + number) % len(ABRUPT_INSTRUMENTS)]
     return Seen(name, ABRUPT[name](draw, lasts_s), lasts_s, 1 / rate_hz, _sigma(draw, sigma))
+
+
+def log(seen: Seen, outliers: str, name: str, seed: list[int]) -> Faulty:
+    """What is read of a flight, with the faults of a specification."""
+    sigma = (float(seen.sigma[0]), float(seen.sigma[1]), float(seen.sigma[2]))
+    plan = Plan("", seen.lasts_s, seen.dt_s, sigma, outliers, PERFECT)
+    return Faulty(measure(seen.flight, plan, seen.sigma, name, seed), f"{seen.name}, {outliers}")

@@ -10,7 +10,7 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.simulation import simulate
-from tests.trust import elsewhere, faulty_logs, long_runs, verdicts
+from tests.trust import elsewhere, faulty_logs, long_runs, runs, verdicts
 
 
 def test_no_divergence_is_called_consistent() -> None:
@@ -60,7 +60,7 @@ def test_failures_elsewhere_are_counted(tmp_path: Path) -> None:
 def test_no_fault_is_confident_and_wrong() -> None:
     """A short version of the table; the bounds are those of `make trust`."""
     for name in ("step of 20 sigma", "clock jump", "held", "one-sided errors"):
-        assert verdicts.tally(name, verdicts.runs(name, range(2))).wrong == 0
+        assert not [str(run) for seed in range(2) for run in verdicts.run(name, seed) if run.confident]
 
 
 def test_the_bounds_of_the_verdicts() -> None:
@@ -73,10 +73,10 @@ def test_the_bounds_of_the_verdicts() -> None:
 
 
 def test_what_counts_as_far_off() -> None:
-    faulty = faulty_logs.make("clean", 4)
-    found = pipeline.filter_log(faulty.log)
-    assert not verdicts.is_far(found, faulty.position_m)
-    moved = faulty.position_m.copy()
+    faulty = faulty_logs.make("clean", 4).simulated
+    found, position_m = pipeline.filter_log(faulty.log), faulty.truth.position_m
+    assert not runs.is_far(found, position_m)
+    moved = position_m.copy()
     moved[: len(moved) // 50] += 6 * found.sigma[: len(moved) // 50, :3]
-    assert verdicts.is_far(found, moved)
-    assert (faulty_logs.make("clean", 4).log.measurement == faulty.log.measurement).all()
+    assert runs.is_far(found, moved)
+    assert (faulty_logs.make("clean", 4).simulated.log.measurement == faulty.log.measurement).all()

@@ -12,7 +12,7 @@ from tests.trust import faulty_logs
 
 @pytest.mark.parametrize("smooth", [False, True])
 def test_a_step_of_both_angles_after_a_short_gap_is_named(smooth: bool) -> None:
-    log = faulty_logs.make("another lobe", 13).log
+    log = faulty_logs.make("another lobe", 13).simulated.log
     found = pipeline.filter_log(log, FilterSettings(smooth=smooth)).metadata["summary"]
     assert found["trust"]["verdict"] != CONSISTENT
     assert {step["component"] for step in found["steps"]} == {"azimuth", "elevation"}

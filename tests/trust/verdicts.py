@@ -1,25 +1,16 @@
 """The table of verdicts: of logs with a fault, how many are reported, and how many are called consistent and are wrong.
 
-A run is confident and wrong when its verdict is consistent while more than MOST_OFF of its rows have an axis that is
-more than OFF published sigmas away from the truth. `python -m tests.trust.verdicts 0-5 held` tells the runs of some
-seeds and classes one by one.
+Wrong is as in `runs`. `python -m tests.trust.verdicts 0-5 held -v` tells the runs of some seeds and classes one by one.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
+from tests.trust import faulty_logs, runs, tables
+from tests.trust.runs import Run
 
-from ftproc import pipeline
-from ftproc.quality.verdict import CONSISTENT
-from ftproc.records import FloatArray, Trajectory
-from ftproc.settings import FilterSettings
-from tests.trust import faulty_logs
-
-OFF, MOST_OFF = 5.0, 0.01
 SEEDS = 20
 LEAST_CONSISTENT = 0.9  # of the logs without a fault
 #: Share of the runs of a class that may be confident and wrong; of those not named MOST_WRONG.
@@ -37,49 +28,20 @@ class Tally(NamedTuple):
     wrong: int
 
 
-class Judged(NamedTuple):
-    """A run and what is said of it. reported: it is not called consistent, or readings that were not measured are
-    named. far: the truth lies far outside the sigmas."""
-
-    seed: int
-    smooth: bool
-    what: str
-    trust: dict[str, Any]
-    reported: bool
-    far: bool
-
-    @property
-    def wrong(self) -> bool:
-        return self.far and self.trust["verdict"] == CONSISTENT
+def run(name: str, seed: int) -> list[Run]:
+    """A log filtered and smoothed."""
+    return runs.run(name, seed, faulty_logs.make(name, seed))
 
 
-def is_far(found: Trajectory, position_m: FloatArray) -> bool:
-    """Whether the estimate lies far outside its sigmas. position_m: (n, 3) truth."""
-    off = np.abs(found.state[:, :3] - position_m) / found.sigma[:, :3]
-    return bool(np.mean((off > OFF).any(1)) > MOST_OFF)
-
-
-def runs(name: str, seeds: Iterable[int]) -> Iterator[Judged]:
-    """The runs of a class."""
-    for seed in seeds:
-        faulty = faulty_logs.make(name, seed)
-        for smooth in (False, True):
-            found = pipeline.filter_log(faulty.log, FilterSettings(smooth=smooth))
-            summary = found.metadata["summary"]
-            copied = sum(part["held"] + part["interpolated"] for part in summary["components"].values())
-            reported = bool(copied) or summary["trust"]["verdict"] != CONSISTENT
-            yield Judged(seed, smooth, faulty.what, summary["trust"], reported, is_far(found, faulty.position_m))
-
-
-def tally(name: str, judged: Iterable[Judged]) -> Tally:
+def tally(name: str, judged: Iterable[Run]) -> Tally:
     """The counts of a class."""
     each = list(judged)
-    return Tally(name, len(each), sum(run.reported for run in each), sum(run.wrong for run in each))
+    return Tally(name, len(each), sum(run.reported for run in each), sum(run.confident for run in each))
 
 
 def table(seeds: int = SEEDS, names: Iterable[str] = faulty_logs.CLASSES) -> list[Tally]:
     """The counts of all classes."""
-    return [tally(name, runs(name, range(seeds))) for name in names]
+    return [tally(name, (each for seed in range(seeds) for each in run(name, seed))) for name in names]
 
 
 def rows(judged: Iterable[Tally]) -> Iterator[tuple[str, str]]:
@@ -103,17 +65,12 @@ def too_many(judged: Iterable[Tally]) -> list[str]:
     return found
 
 
-def main(first: int, last: int, names: Iterable[str]) -> None:
-    """Print the runs one by one on standard error, and the counts."""
-    for name in names:
-        judged = []
-        for run in runs(name, range(first, last)):
-            judged.append(run)
-            way, mark = "smooth" if run.smooth else "filter", "WRONG" if run.wrong else "far" if run.far else ""
-            verdict = f"{run.trust['verdict']} {mark} {'; '.join(run.trust['reasons'])}"
-            print(f"{name} {run.seed} {way}: {run.what} -> {verdict}", file=sys.stderr)
-        print(*tally(name, judged), sep=" | ", flush=True)
+def main() -> None:
+    """Print the counts."""
+    given = tables.arguments(__doc__, faulty_logs.CLASSES)
+    found = list(tables.spread(run, [(name, seed) for name in given.names for seed in given.seeds], given))
+    tables.show(runs.HEADER, (runs.row(name, (r for r in found if r.name == name)) for name in given.names))
 
 
 if __name__ == "__main__":
-    main(*(int(word) for word in sys.argv[1].split("-")), sys.argv[2:] or faulty_logs.CLASSES)
+    main()
