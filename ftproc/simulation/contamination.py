@@ -22,7 +22,7 @@ SHAPES: dict[str, Callable[[float, FloatArray, Draw], FloatArray]] = {
     "ramp": lambda size, k, rng: size * k / len(k),
     "burst": lambda size, k, rng: size * rng.standard_normal(len(k)),
     "walkoff": lambda size, k, rng: size * (k / len(k)) ** 2,
-    "sine": lambda size, k, rng: size * np.sin(2 * np.pi * rng.integers(1, 4) * k / len(k)),
+    "sine": lambda size, k, rng: size * np.sin(2 * np.pi * rng.integers(2, 7) * k / len(k)),
     "sidelobe": lambda size, k, rng: size * rng.choice([-2.0, -1.0, 1.0, 2.0], 3)[(3 * k - 3).astype(int) // len(k)],
     "other": lambda size, k, rng: size * np.polyval([*rng.standard_normal(2), 1.0], k / len(k)),
 }

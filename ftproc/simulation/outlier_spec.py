@@ -29,7 +29,7 @@ it, lengths, factors and seconds uniformly.
   noise=COUNT[:LENGTH[:FACTOR]]   noise times FACTOR (10), without a flag       noise=1:33%:10
 
 KIND of patch: `offset` constant error, `ramp` grows linearly and snaps back, `walkoff` grows with the square of
-time, `sine` up to three periods, `burst` zero-mean noise, `sidelobe` hops between one and two SIZEs to both sides,
+time, `sine` two to six periods, `burst` zero-mean noise, `sidelobe` hops between one and two SIZEs to both sides,
 `other` another smooth track that begins SIZE away; `patch` one of offset, ramp, stuck, burst; `mixed` one of those
 with any shape. Without a SIZE: `stuck` the reading before is repeated, `mirror` readings run backward from there,
 `replay` the samples before come again, `swap` the two halves are exchanged.

@@ -8,9 +8,22 @@ from pathlib import Path
 
 from tests.faults import batches
 from tests.fuzz import mutation
-from tests.trust import corpus, elsewhere, long_runs, streams, verdicts
+from tests.trust import (
+    corpus,
+    elsewhere,
+    faulty_logs,
+    fused_faults,
+    hard,
+    long_runs,
+    runs,
+    streams,
+    tables,
+    verdicts,
+)  # fmt: skip
 from tests.trust.attacks import running
+from tests.trust.tables import Given
 
+COUNTS = "runs, reported, wrong, confident and wrong"
 KILLS, FLIGHTS, SAMPLES, FUZZ_S = 50, 200, 10_000_000, 60.0
 
 
@@ -26,11 +39,9 @@ def main() -> int:
     plain = elsewhere.run(*elsewhere.PLAIN, FTPROC_KERNELS="python")
     diverged = long_runs.many(FLIGHTS)
     endless = long_runs.endless(SAMPLES)
-    judged = verdicts.table()
+    judged, broken = _faults()
     tracebacks = counts["wrong"] + counts["known"] + len(wrong)
-    for line in filter(
-        None, [*lines, *taken, *wrong, *lost, *astray, faults.failures, plain.failures, *verdicts.too_many(judged)]
-    ):
+    for line in filter(None, [*lines, *taken, *wrong, *lost, *astray, faults.failures, plain.failures, *broken]):
         print(line, file=sys.stderr)
     for row in (
         ("what", "count"),
@@ -52,13 +63,37 @@ def main() -> int:
         ("of these diverged (20 sigma for 2 s)", diverged.diverged),
         ("divergences called consistent", diverged.unreported),
         (f"{SAMPLES:,} samples, sigmas finite and positive, as after a late start", endless),
-        *verdicts.rows(judged),
+        *judged,
         ("tests of the kernels with the compiler off", plain.passed + plain.failed),
         ("of these failed", plain.failed),
     ):
         print(f"| {row[0]} | {row[1]} |")
-    right = faults.all_passed and plain.all_passed and endless == "ok" and not verdicts.too_many(judged)
+    right = faults.all_passed and plain.all_passed and endless == "ok" and not broken
     return int(bool(counts["wrong"] or taken or wrong or lost or astray or diverged.unreported or not right))
+
+
+def _faults() -> tuple[list[tuple[str, str]], list[str]]:
+    """The rows of what becomes of faults on easy, hard and fused flights, and the bounds that are broken."""
+    given = Given(range(verdicts.SEEDS), faulty_logs.CLASSES)
+    easy = list(tables.spread(verdicts.run, given.jobs, given))
+    given = Given(range(hard.SEEDS), list(hard.CLASSES))
+    difficult = list(tables.spread(hard.run, given.jobs, given))
+    given = Given(range(fused_faults.SEEDS), list(fused_faults.FAULTS))
+    fused = fused_faults.but_drift(list(tables.spread(fused_faults.run, fused_faults.jobs(given), given)))
+    each = {
+        **{name: (runs.of(name, easy), bound) for name, bound in verdicts.BOUNDS.items()},
+        **{group: (hard.of_group(group, difficult), bound) for group, bound in hard.BOUNDS.items()},
+        "fused": (fused, fused_faults.BOUND),
+    }
+    broken = [line for name, (found, bound) in each.items() for line in tables.beyond(name, found, bound)]
+    counted = {
+        "clean and dirty logs of easy flights": [run for run in easy if run.name in faulty_logs.SOUND],
+        "logs of easy flights with a fault": [run for run in easy if run.name not in faulty_logs.SOUND],
+        "clean logs of hard flights": hard.of_group("sound", difficult),
+        "logs of hard flights with a hard fault": [run for run in difficult if run.name not in hard.SOUND],
+        "fused flights with a fault in one station": fused,
+    }
+    return [(f"{what}: {COUNTS}", tables.counts(found)) for what, found in counted.items()], broken
 
 
 def _kills() -> tuple[int, list[str]]:

@@ -45,7 +45,7 @@ class Detected(NamedTuple):
 
 
 class Run(NamedTuple):
-    """What became of a log. copied: readings were named that were not measured."""
+    """What became of a log. copied: readings were named that were not measured; that is a report, too."""
 
     name: str
     seed: int
@@ -54,14 +54,14 @@ class Run(NamedTuple):
     verdict: str
     reasons: tuple[str, ...] = ()
     copied: bool = False
-    far: bool = False
+    wrong: bool = False
     rmse_m: float = np.nan
     detected: Detected = Detected()
     seconds: float = 0.0
 
     @property
     def confident(self) -> bool:
-        return self.far and self.verdict == CONSISTENT
+        return self.wrong and self.verdict == CONSISTENT
 
     @property
     def reported(self) -> bool:
@@ -70,7 +70,7 @@ class Run(NamedTuple):
     def __str__(self) -> str:
         d = self.detected
         return (
-            f"{self.name} {self.seed} {self.way}, {self.what}: {self.verdict}, {tables.mark(self.far, self.verdict)}, "
+            f"{self.name} {self.seed} {self.way}, {self.what}: {self.verdict}, {tables.mark(self)}, "
             f"{self.rmse_m:.4g} m, missed {d.missed} of {d.outliers}, false {d.false_alarms} of {d.good}"
         )
 
@@ -116,21 +116,25 @@ def detected(found: Trajectory, simulated: Simulation) -> Detected:
     return Detected(*(int(each.sum()) for each in (bad & ~rejected, bad, good & rejected, good)))
 
 
-HEADER = ("class", "runs", "wrong", "and consistent", "consistent", "missed %", "false alarms %", "seconds")
+HEADER = ("class", "runs", "reported", "wrong", "confident and wrong", "missed %", "false alarms %", "seconds")
 
 
-def row(name: str, runs: Iterable[Run]) -> tuple[str, ...]:
+def of(name: str, found: Iterable[Run]) -> list[Run]:
+    """The runs of a class."""
+    return [run for run in found if run.name == name]
+
+
+def row(name: str, found: list[Run]) -> tuple[str, ...]:
     """The row of a class, or of several. Missed and false alarms: the mean of the shares of the runs."""
-    each = list(runs)
-    missed = [r.detected.missed / r.detected.outliers for r in each if r.detected.outliers]
-    false = [r.detected.false_alarms / r.detected.good for r in each if r.detected.good]
+    missed = [r.detected.missed / r.detected.outliers for r in found if r.detected.outliers]
+    false = [r.detected.false_alarms / r.detected.good for r in found if r.detected.good]
     return (
         name,
-        str(len(each)),
-        str(sum(r.far for r in each)),
-        str(sum(r.confident for r in each)),
-        str(sum(r.verdict == CONSISTENT for r in each)),
+        str(len(found)),
+        str(sum(r.reported for r in found)),
+        str(sum(r.wrong for r in found)),
+        str(sum(r.confident for r in found)),
         f"{100 * np.mean(missed):.1f}" if missed else "-",
         f"{100 * np.mean(false):.2f}" if false else "-",
-        f"{sum(r.seconds for r in each):.0f}",
+        f"{sum(r.seconds for r in found):.0f}",
     )

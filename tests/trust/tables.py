@@ -1,28 +1,66 @@
-"""What the tables of hard faults share: their command line, the processes, and when a run is wrong."""
+"""What the tables of faults share: their command line, the processes, and the bounds of a class."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from ftproc.core import threads
-from ftproc.quality.verdict import CONSISTENT
+
+
+class Judged(Protocol):
+    """A run. wrong: beyond its sigmas. confident: wrong and called consistent. reported: not called consistent."""
+
+    @property
+    def wrong(self) -> bool: ...
+    @property
+    def confident(self) -> bool: ...
+    @property
+    def reported(self) -> bool: ...
+
+
+class Bound(NamedTuple):
+    """The largest shares of the runs of a class."""
+
+    wrong: float = 1.0
+    confident: float = 1.0
+    reported: float = 1.0
+
+
+def beyond(name: str, found: Sequence[Judged], bound: Bound) -> Iterator[str]:
+    """The bounds that the runs of a class break."""
+    for what, share in bound._asdict().items():
+        count = sum(getattr(run, what) for run in found)
+        if count > share * len(found):
+            yield f"{name}: {count} of {len(found)} runs are {what}, at most {100 * share:g} % may be"
+
+
+def counts(found: Sequence[Judged]) -> str:
+    """Runs, reported, wrong, confident and wrong."""
+    return ", ".join(
+        str(sum(each)) for each in zip(*((1, r.reported, r.wrong, r.confident) for r in found), strict=True)
+    )
 
 
 class Given(NamedTuple):
     """Of the command line: seeds, names of classes, number of processes, and whether to print each run."""
 
     seeds: range
-    names: list[str]
-    processes: int
-    verbose: bool
+    names: Sequence[str]
+    processes: int = threads.available()
+    verbose: bool = False
+
+    @property
+    def jobs(self) -> list[tuple[str, int]]:
+        """Class and seed of each log, class by class."""
+        return [(name, seed) for name in self.names for seed in self.seeds]
 
 
 def arguments(about: str | None, names: Iterable[str]) -> Given:
-    """SEEDS [NAME...] [-j N] [-v]. No name: all of them."""
+    """FIRST-LAST [NAME...] [-j N] [-v]. No name: all of them."""
     known = list(names)
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("seeds", metavar="FIRST-LAST")
@@ -36,7 +74,7 @@ def arguments(about: str | None, names: Iterable[str]) -> Given:
     return Given(range(first, last + 1), given.names or known, given.processes, given.verbose)
 
 
-def spread(run: Callable[..., list[Any]], jobs: list[tuple[Any, ...]], given: Given) -> Iterator[Any]:
+def spread(run: Callable[..., list[Any]], jobs: Sequence[tuple[Any, ...]], given: Given) -> Iterator[Any]:
     """The runs of all jobs, in their order; each is printed where that is wished."""
     with ProcessPoolExecutor(given.processes, get_context("spawn"), threads.use, (1,)) as pool:
         for found in pool.map(run, *zip(*jobs, strict=True)):
@@ -47,11 +85,11 @@ def spread(run: Callable[..., list[Any]], jobs: list[tuple[Any, ...]], given: Gi
 
 
 def show(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> None:
-    """Print a table."""
-    for cells in (header, *rows):
-        print(*cells, sep=" | ")
+    """Print a table in Markdown."""
+    for cells in (header, ("---",) * len(header), *rows):
+        print(f"| {' | '.join(cells)} |")
 
 
-def mark(wrong: bool, verdict: str) -> str:
+def mark(run: Judged) -> str:
     """One word for a run."""
-    return "right" if not wrong else "CONFIDENT" if verdict == CONSISTENT else "wrong"
+    return "CONFIDENT" if run.confident else "wrong" if run.wrong else "right"

@@ -10,7 +10,7 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.simulation import simulate
-from tests.trust import elsewhere, faulty_logs, long_runs, runs, verdicts
+from tests.trust import elsewhere, faulty_logs, long_runs, runs, tables, verdicts
 
 
 def test_no_divergence_is_called_consistent() -> None:
@@ -63,13 +63,17 @@ def test_no_fault_is_confident_and_wrong() -> None:
         assert not [str(run) for seed in range(2) for run in verdicts.run(name, seed) if run.confident]
 
 
-def test_the_bounds_of_the_verdicts() -> None:
-    assert verdicts.too_many([verdicts.Tally("clean", 40, 4, 0), verdicts.Tally("clock jump", 40, 40, 2)]) == []
-    assert len(verdicts.too_many([verdicts.Tally("clean", 40, 5, 0), verdicts.Tally("clock jump", 40, 40, 3)])) == 2
-    assert len(verdicts.too_many([verdicts.Tally("step of 10 sigma", 40, 40, 1)])) == 1
-    assert list(verdicts.rows([verdicts.Tally("dirty", 40, 2, 0)])) == [
-        ("dirty logs: runs, called consistent", "40, 38")
-    ]
+def test_what_breaks_a_bound() -> None:
+    def run(verdict: str, wrong: bool) -> runs.Run:
+        return runs.Run("clean", 0, "filter", "", verdict, wrong=wrong)
+
+    found = [run("consistent", False)] * 7 + [run("suspect", True)] * 2 + [run("consistent", True)]
+    assert tables.counts(found) == "10, 2, 3, 1"
+    assert not list(tables.beyond("it", found, tables.Bound(wrong=0.3, confident=0.1, reported=0.2)))
+    assert list(tables.beyond("it", found, tables.Bound(wrong=0.2, confident=0.1, reported=0.1))) == [
+        "it: 3 of 10 runs are wrong, at most 20 % may be", "it: 2 of 10 runs are reported, at most 10 % may be",
+    ]  # fmt: skip
+    assert len(list(tables.beyond("it", found, tables.Bound(confident=0.09)))) == 1
 
 
 def test_what_counts_as_far_off() -> None:
