@@ -169,12 +169,17 @@ def _named(simulated: SimulatedRange, station: str, reasons: frozenset[str]) -> 
     return "" if not named else "it" if station in named else "another"
 
 
+def able(simulated: SimulatedRange, fault: str) -> list[SimulatedStation]:
+    """The stations that can have a fault: those that measure what it changes."""
+    c = FAULTS[fault].component
+    return [s for s in simulated.stations if c < 0 or np.isfinite(s.log.measurement[:, c]).any()]
+
+
 def spoilt(simulated: SimulatedRange, fault: str, seed: int) -> tuple[SimulatedRange, str]:
     """The flight with a fault in one of its stations that can have it, and that station's name."""
-    component, apply = FAULTS[fault]
-    able = [s for s in simulated.stations if component < 0 or np.isfinite(s.log.measurement[:, component]).any()]
-    station = able[seed % len(able)]
-    time_s, reading = apply(station, np.random.default_rng([seed, list(FAULTS).index(fault)]))
+    stations = able(simulated, fault)
+    station = stations[seed % len(stations)]
+    time_s, reading = FAULTS[fault].apply(station, np.random.default_rng([seed, list(FAULTS).index(fault)]))
     log = replace(station.log, time_s=np.round(time_s, 6), measurement=_readable(reading))
     others = (replace(station, log=log) if s is station else s for s in simulated.stations)
     return replace(simulated, stations=tuple(others)), station.name
@@ -188,8 +193,7 @@ def run(faults: tuple[str, ...], scenario: str, seed: int) -> list[Run]:
     """A flight without a fault, and with each one of some."""
     simulated = simulate_range(scenario, seed, LASTS_S)
     usual = _fused(simulated)
-    able = {c for s in simulated.stations for c in range(3) if np.isfinite(s.log.measurement[:, c]).any()}
-    return [_run(simulated, usual, name, (scenario, seed)) for name in faults if FAULTS[name].component in {-1, *able}]
+    return [_run(simulated, usual, name, (scenario, seed)) for name in faults if able(simulated, name)]
 
 
 def _run(simulated: SimulatedRange, usual: _Fused, name: str, which: tuple[str, int]) -> Run:

@@ -67,11 +67,11 @@ SOUND: dict[str, Fault] = {
 GROUPS = {"patches": PATCHES, "combined": COMBINED, "changes": CHANGES, "dirt": DIRT, "sound": SOUND}
 #: Of the groups, a little above what is reached.
 BOUNDS = {
-    "patches": Bound(wrong=0.7, confident=0.2),
-    "combined": Bound(wrong=0.8, confident=0.1),
-    "changes": Bound(wrong=0.4, confident=0.1),
-    "dirt": Bound(wrong=0.2, confident=0.05),
-    "sound": Bound(wrong=0.03, reported=0.05),
+    "patches": Bound(wrong=0.65, confident=0.12),
+    "combined": Bound(wrong=0.8, confident=0.18),
+    "changes": Bound(wrong=0.3, confident=0.05),
+    "dirt": Bound(wrong=0.05, confident=0.02),
+    "sound": Bound(wrong=0.02, reported=0.15),
 }
 SEEDS = 5
 SHOWN = {*PATCHES, *COMBINED, "step", "clock"}
