@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from ftproc.records import FloatArray
-from ftproc.simulation.kinematics import GRAVITY_MPS2, Flight, integrate
+from ftproc.simulation.kinematics import GRAVITY_MPS2, Flight, heading, integrate
 
 STEP_S, MOST_STEPS = 0.005, 20_000
 LEAD_S = 2.0  # before time 0, and after the end
@@ -42,14 +42,8 @@ def _drag(velocity: FloatArray, terminal_mps: float) -> FloatArray:
     return np.asarray(-GRAVITY_MPS2 / terminal_mps**2 * np.sqrt(velocity @ velocity) * velocity)
 
 
-def _heading(rng: Draw, rise: float = 0.0) -> FloatArray:
-    """(3,) unit vector at a random bearing, `rise` rad above the horizontal."""
-    turn = rng.uniform(-np.pi, np.pi)
-    return np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
-
-
 def _at(rng: Draw, near_m: float, far_m: float, height_m: float) -> FloatArray:
-    away, place = rng.uniform(near_m, far_m), _heading(rng)
+    away, place = rng.uniform(near_m, far_m), heading(rng)
     return np.array([away * place[0], away * place[1], height_m])
 
 
@@ -67,13 +61,13 @@ def _parachute(rng: Draw, duration_s: float) -> Flight:
         return _DOWN + _drag(v, 1 / np.sqrt((1 - filled) / falling**2 + filled / hanging**2))
 
     height = falling * opens + hanging * (duration_s - opens) + 100.0
-    return _flown(force, duration_s, _at(rng, 1000.0, 4000.0, height), rng.uniform(30.0, 60.0) * _heading(rng))
+    return _flown(force, duration_s, _at(rng, 1000.0, 4000.0, height), rng.uniform(30.0, 60.0) * heading(rng))
 
 
 def _impact(rng: Draw, duration_s: float) -> Flight:
     """A body falls to the ground and stays there."""
     hits, brake = _event(rng, duration_s), rng.uniform(0.02, 0.06)
-    velocity, terminal = rng.uniform(40.0, 180.0) * _heading(rng, 0.2), rng.uniform(120.0, 300.0)
+    velocity, terminal = rng.uniform(40.0, 180.0) * heading(rng, 0.2), rng.uniform(120.0, 300.0)
 
     def force(t: float, p: FloatArray, v: FloatArray) -> FloatArray:
         return _DOWN + _drag(v, terminal) if t < hits else -v / brake
@@ -97,21 +91,21 @@ def _ignition(rng: Draw, duration_s: float) -> Flight:
     lights, burns = _event(rng, duration_s), duration_s * rng.uniform(0.1, 0.2)
     times, thrusts = [lights, lights + burns, duration_s + LEAD_S], [rng.uniform(300.0, 800.0) / burns, 0.0]
     start = _at(rng, 3000.0, 9000.0, 2000.0 + GRAVITY_MPS2 / 2 * (lights + LEAD_S) ** 2)
-    return _staged(start, rng.uniform(150.0, 250.0) * _heading(rng, 0.2), times, thrusts)
+    return _staged(start, rng.uniform(150.0, 250.0) * heading(rng, 0.2), times, thrusts)
 
 
 def _separation(rng: Draw, duration_s: float) -> Flight:
     """The first stage burns out and drops, and the second ignites after a pause."""
     ends, pause = _event(rng, duration_s), rng.uniform(0.5, 3.0)
     times, (first, second) = [-LEAD_S, ends, ends + pause, duration_s + LEAD_S], rng.uniform(25.0, 60.0, 2)
-    start, velocity = _at(rng, 4000.0, 12000.0, 500.0), rng.uniform(80.0, 200.0) * _heading(rng, 1.2)
+    start, velocity = _at(rng, 4000.0, 12000.0, 500.0), rng.uniform(80.0, 200.0) * heading(rng, 1.2)
     return _staged(start, velocity, times, [first, 0.0, second])
 
 
 def _touchdown(rng: Draw, duration_s: float) -> Flight:
     """An aircraft comes down a glide path, touches down and brakes to a stop."""
     lands, speed, braking = _event(rng, duration_s), rng.uniform(50.0, 80.0), rng.uniform(2.0, 4.0)
-    along, sink = _heading(rng), rng.uniform(1.5, 4.0)
+    along, sink = heading(rng), rng.uniform(1.5, 4.0)
 
     def force(t: float, p: FloatArray, v: FloatArray) -> FloatArray:
         if t < lands:
@@ -127,7 +121,7 @@ def _touchdown(rng: Draw, duration_s: float) -> Flight:
 def _catapult(rng: Draw, duration_s: float) -> Flight:
     """An aircraft stands, is thrown off in two seconds, and climbs away."""
     shot, stroke = _event(rng, duration_s), rng.uniform(1.8, 2.6)
-    along, throw, thrust = _heading(rng), rng.uniform(25.0, 35.0), rng.uniform(2.0, 6.0)
+    along, throw, thrust = heading(rng), rng.uniform(25.0, 35.0), rng.uniform(2.0, 6.0)
     climb = np.array([0.0, 0.0, rng.uniform(0.5, 2.0)])
 
     def force(t: float, p: FloatArray, v: FloatArray) -> FloatArray:

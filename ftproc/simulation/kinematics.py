@@ -61,6 +61,12 @@ def constant_acceleration(
     return integrate(0.0, duration_s, np.vstack([acceleration, acceleration]), velocity, position)
 
 
+def heading(rng: np.random.Generator, rise: float = 0.0) -> FloatArray:
+    """(3,) unit vector at a random bearing, `rise` rad above the horizontal."""
+    turn = rng.uniform(-np.pi, np.pi)
+    return np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
+
+
 def smoothed(profile: FloatArray, width: int) -> FloatArray:
     """(n, k) command profiles with their steps smoothed over `width` knots (Hann window): roll-in takes time.
 

@@ -15,7 +15,7 @@ from ftproc.simulation.abrupt import ABRUPT
 from ftproc.simulation.aircraft import Airframe, fly
 from ftproc.simulation.flights import AIRLINER, FIGHTER, FLIGHTS, HELICOPTER, LIGHT
 from ftproc.simulation.instrument import PERFECT
-from ftproc.simulation.kinematics import GRAVITY_MPS2, Flight, integrate, smoothed
+from ftproc.simulation.kinematics import GRAVITY_MPS2, Flight, heading, integrate, smoothed
 from ftproc.simulation.scenarios import Plan
 from ftproc.simulation.simulation import measure
 from tests.drone import DRONE
@@ -54,13 +54,8 @@ def _knots(lasts_s: float, step_s: float) -> tuple[float, FloatArray]:
     return -lead, np.arange(-lead, lasts_s + lead, step_s)
 
 
-def _heading(draw: Draw, rise: float = 0.0) -> FloatArray:
-    turn = draw.uniform(-np.pi, np.pi)
-    return np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
-
-
 def _away(draw: Draw, away_m: float, height_m: float) -> FloatArray:
-    return draw.uniform(0.7, 1.4) * away_m * _heading(draw) + np.array([0.0, 0.0, draw.uniform(0.7, 1.4) * height_m])
+    return draw.uniform(0.7, 1.4) * away_m * heading(draw) + np.array([0.0, 0.0, draw.uniform(0.7, 1.4) * height_m])
 
 
 def _along(
@@ -92,13 +87,13 @@ def singer(size: float, fade_s: float, speed: float, place: tuple[float, float],
     keep = np.exp(-1 / 40)
     for k in range(1, len(t)):
         noise[k] = keep * noise[k - 1] + np.sqrt(1 - keep**2) * noise[k]
-    return _along(draw, size * _kept_near(smoothed(noise, 9), step, 2 * fade_s), t, *place, speed * _heading(draw))
+    return _along(draw, size * _kept_near(smoothed(noise, 9), step, 2 * fade_s), t, *place, speed * heading(draw))
 
 
 def weave(size: float, period_s: float, speed: float, place: tuple[float, float], draw: Draw, lasts_s: float) -> Flight:
     """Swings to the side and up and down by accelerations of a size m/s2."""
     _, t = _knots(lasts_s, period_s / 100)
-    along = _heading(draw)
+    along = heading(draw)
     side, phase = np.array([-along[1], along[0], 0.0]), draw.uniform(0, 2 * np.pi, 2)
     omega = 2 * np.pi / period_s
     up = np.array([0.0, 0.0, 1.0])
@@ -115,7 +110,7 @@ def jinks(size: float, every_s: float, speed: float, place: tuple[float, float],
     sides = draw.standard_normal((int(len(t) / 30) + 2, 3)) * [1.0, 1.0, 0.5]
     lasts = draw.integers(25, 75, len(sides))
     held = np.repeat(sides, lasts, axis=0)[: len(t)]
-    return _along(draw, size * _kept_near(smoothed(held, 5), step, 2 * every_s), t, *place, speed * _heading(draw))
+    return _along(draw, size * _kept_near(smoothed(held, 5), step, 2 * every_s), t, *place, speed * heading(draw))
 
 
 def loops(size: float, speed: float, place: tuple[float, float], draw: Draw, lasts_s: float) -> Flight:
@@ -128,7 +123,7 @@ def loops(size: float, speed: float, place: tuple[float, float], draw: Draw, las
     rate[looping] = 2 * np.pi / around
     rate = smoothed(rate, 33)[:, 0]
     pitch = np.cumsum(rate) * (t[1] - t[0])
-    along = _heading(draw)
+    along = heading(draw)
     normal = -np.outer(np.sin(pitch), along) + np.outer(np.cos(pitch), [0, 0, 1])
     return _along(draw, speed * rate[:, None] * normal, t, *place, speed * along)
 
@@ -148,7 +143,7 @@ def lobbed(speed: float, rise: float, terminal: float, away_m: float, draw: Draw
     where it would fall below the station."""
     step = lasts_s / 4000
     begin, t = _knots(lasts_s, step)
-    p, v = _away(draw, away_m, 0.002 * away_m + 5), speed * _heading(draw, rise)
+    p, v = _away(draw, away_m, 0.002 * away_m + 5), speed * heading(draw, rise)
     start, velocity, a = p.copy(), v.copy(), np.empty((len(t), 3))
     for k in range(len(t)):
         thin = GRAVITY_MPS2 / terminal**2 * np.exp(-max(p[2], 0.0) / 8000)
@@ -164,7 +159,7 @@ def orbital(height_m: float, off: float, draw: Draw, lasts_s: float) -> Flight:
     omega = np.sqrt(EARTH_M3PS2 / radius**3)
     begin, t = _knots(lasts_s, max(lasts_s / 5000, 0.01))
     across, turn = draw.choice([-1, 1]) * off, omega * (t - lasts_s / 2)
-    along = _heading(draw)
+    along = heading(draw)
     side = np.array([-along[1], along[0], 0.0])
     up = np.array([0.0, 0.0, np.cos(across)]) + np.sin(across) * side
     centre = radius * (np.outer(np.cos(turn), up) + np.outer(np.sin(turn), along))
