@@ -13,7 +13,7 @@ from ftproc.core.identification.stretches import runs_of
 from ftproc.fusion.estimation import constants as posterior
 from ftproc.fusion.estimation.events import CLOCK
 from ftproc.fusion.estimation.whole import Fused
-from ftproc.quality import consistency
+from ftproc.quality import consistency, faults
 from ftproc.quality.verdict import CONSISTENT, MANY_REJECTED, SUSPECT, TOO_MANY_REJECTED, UNRELIABLE, Remark
 from ftproc.records import COMPONENTS, FloatArray
 
@@ -108,6 +108,7 @@ def remarks(fused: Fused, zero_s: float) -> list[Remark]:
     """All remarks on a fused flight. zero_s: the logs' time of the first reading."""
     return [
         *_clocks(fused),
+        *_steps(fused, zero_s),
         *_unobserved(fused),
         *_improbable(fused),
         *_scattered(fused),
@@ -150,6 +151,14 @@ def _improbable(fused: Fused) -> Iterator[Remark]:
                     f"the {word} of {station.name} is {times:.0f} times its 1-sigma of the range file: check its "
                     "place, its clock and its conventions, or that 1-sigma",
                 )
+
+
+def _steps(fused: Fused, zero_s: float) -> Iterator[Remark]:
+    """Components and clocks that step for good, which the others have shown; they were put right."""
+    for each in fused.steps:
+        name, unit = faults.NAMES[each.component], faults.UNITS[each.component]
+        step = {"component": name, "time_s": each.time_s + zero_s, f"size_{unit}": each.size}
+        yield Remark(SUSPECT, f"{each.station}: {faults.step_in_words(step)}; the estimate allows for it")
 
 
 def _scattered(fused: Fused) -> Iterator[Remark]:

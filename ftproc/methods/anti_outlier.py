@@ -19,7 +19,8 @@ import numpy as np
 
 from ftproc.core import threads
 from ftproc.core.editing import two_pass
-from ftproc.core.filtering import bridging, forward
+from ftproc.core.editing.lasting.faults import Shift, spread
+from ftproc.core.filtering import forward
 from ftproc.core.filtering.records import FilterRun, Model
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
 from ftproc.core.identification import likelihood
@@ -95,10 +96,10 @@ def _worse_of(run: Run, other: Run) -> Run:
     return run._replace(sigma=sigma, los_sigma=los_sigma)
 
 
-def _widened(run: Run, shifts: Sequence[bridging.Step]) -> Run:
+def _widened(run: Run, shifts: Sequence[Shift]) -> Run:
     """A run with sigmas that allow for the uncertain sizes of the shifts that were taken out of its readings."""
     sigma, los_sigma = run.sigma.copy(), run.los_sigma.copy()
-    along_axes, along_lines = bridging.spread(run.state, shifts)
+    along_axes, along_lines = spread(run.state, shifts)
     sigma[:, :3] = np.sqrt(sigma[:, :3] ** 2 + along_axes)
     los_sigma[:, :3] = np.sqrt(los_sigma[:, :3] ** 2 + along_lines)
     return run._replace(sigma=sigma, los_sigma=los_sigma)

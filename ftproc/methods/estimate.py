@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.editing.two_pass import Faults
+from ftproc.core.editing.lasting.faults import Faults
 from ftproc.core.filtering.records import FilterRun, Model, Observations
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification.coloured_noise import Coloured

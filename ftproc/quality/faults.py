@@ -11,7 +11,7 @@ import numpy as np
 from ftproc.records import COMPONENTS, FloatArray, MeasurementLog
 
 if TYPE_CHECKING:
-    from ftproc.core.editing.two_pass import Faults
+    from ftproc.core.editing.lasting.faults import Faults
 
 NAMES, UNITS = (*COMPONENTS, "clock"), ("m", "rad", "rad", "s")
 MOST_STEPS = 5  # that are named

@@ -84,7 +84,7 @@ RULES: dict[str, tuple[Off, ...]] = {
     "late stamps": (Off(TWO_PASS, "late_stamps", _nothing),),
     "very late stamps": (Off(TWO_PASS, "allow_for_very_late_stamps", _pair),),
     "motion": (Off(TWO_PASS, "with_motion", _second),),
-    "steps": (Off(f"{EDITING}.steps", "find", _empty),),
+    "faults that last": (Off(TWO_PASS, "search", _empty),),
     "one-sided errors": (Off(TWO_PASS, "_one_sided", _empty),),
     "patches between jumps": (Off(f"{EDITING}.jump_patches", "find", lambda time_s, *_: np.zeros(len(time_s))),),
     "readings that were not measured": (Off(TWO_PASS, "without_copies", _as_read),),

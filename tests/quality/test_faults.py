@@ -7,8 +7,8 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.core.editing.copies import HELD
-from ftproc.core.editing.two_pass import Faults
-from ftproc.core.filtering.bridging import CLOCK, Step
+from ftproc.core.editing.lasting.curves import CLOCK
+from ftproc.core.editing.lasting.faults import Faults, Step
 from ftproc.core.identification.one_sided import OneSided
 from ftproc.quality import faults
 from ftproc.quality.verdict import CONSISTENT, SUSPECT
@@ -21,7 +21,7 @@ TIME = 0.1 * np.arange(100)
 
 def words(steps=(), one_sided=()):
     statistics = faults.FaultStatistics()
-    statistics.add(TIME, Faults(np.zeros((100, 3), np.uint8), steps, one_sided))
+    statistics.add(TIME, Faults(np.zeros((100, 3), np.uint8), steps, (), one_sided))
     return list(faults.suspicious(statistics.figures() | {"clock_set_back": None}))
 
 

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.editing import jump_patches, outlier_chain, screening, steps
+from ftproc.core.editing import jump_patches, outlier_chain, screening
 from ftproc.core.editing.alternatives import WORK, Work
-from ftproc.core.editing.copies import KindArray, rounding_step, without_copies
+from ftproc.core.editing.copies import rounding_step, without_copies
 from ftproc.core.editing.decisions import (
     IMPRECISE,
     Decision,
@@ -28,8 +28,11 @@ from ftproc.core.editing.decisions import (
     decide,
     late_stamps,
 )
+from ftproc.core.editing.lasting.curves import CLOCK
+from ftproc.core.editing.lasting.faults import Faults, Shift, Step, levelled, refined, taken_out
+from ftproc.core.editing.lasting.search import search, sorted_out
+from ftproc.core.editing.lasting.weighing import scene_of
 from ftproc.core.editing.reassessment import believed, likelier, log_probability, reassess, with_less_noise, with_motion
-from ftproc.core.filtering.bridging import CLOCK, Step, bridged, refined
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
@@ -56,7 +59,7 @@ DRIFT_ROUNDS = 3  # of following the noise: where it grows, each finds readings 
 HOPELESS = 200.0  # in log-probability, by which another hypothesis is behind if it is not followed up
 PROFILE_STEPS = 3  # of the search for the jerk profile, once the decisions are made
 STEP_MARGIN = 8.0  # in log-probability, by which steps must explain a log better than late stamps do
-STEP_ROUNDS = 4  # of looking for steps: where one is bridged, another may show
+LASTING_ROUNDS = 4  # of looking for faults that last: where one is taken out, another may show
 
 
 class Known(NamedTuple):
@@ -66,27 +69,6 @@ class Known(NamedTuple):
     sigma: FloatArray
     jerk_psd: float | None
     gate: float
-
-
-class Faults(NamedTuple):
-    """What is wrong with the readings beyond outliers, and was taken out of them. copied: (n, 3) kinds of those that
-    were not measured, see `copies`. steps: that stay; those that are not sure were left in. one_sided: components of
-    which many errors have one sign."""
-
-    copied: KindArray
-    steps: tuple[Step, ...] = ()
-    one_sided: tuple[OneSided, ...] = ()
-
-    @property
-    def shifts(self) -> tuple[Step, ...]:
-        """What was taken out of the readings, in components or the clock, and is uncertain."""
-        steps = (step for step in self.steps if step.sure)
-        return (*steps, *(Step(each.component, 0, each.shift, each.sigma) for each in self.one_sided))
-
-    def rows(self, low: int, high: int) -> Faults:
-        """Of the samples [low, high) alone."""
-        inside = tuple(s._replace(sample=s.sample - low) for s in self.steps if low <= s.sample < high)
-        return self._replace(copied=self.copied[low:high], steps=inside)
 
 
 class Edited(NamedTuple):
@@ -183,19 +165,27 @@ def edit(
     """
     measurement, copied = without_copies(time_s, measurement)
     work = Work(len(time_s), 0 if live else WORK)  # a window that moves on is soon looked at again
-    record, decision = _decided(time_s, measurement, known, segment_of, work, short)
-    found, doubtful = list[Step](), list[Step]()
-    for _ in range(0 if live else STEP_ROUNDS):
+    decided = partial(_decided, time_s, known=known, segment_of=segment_of, work=work, white=short)
+    banned = np.zeros(measurement.shape, bool)
+    record, decision = decided(measurement, banned=banned)
+    scene, found, doubtful = None, tuple[Step, ...](), list[Step]()
+    for _ in range(0 if live else LASTING_ROUNDS):
         # Noise that wanders looks like many steps, and so do patches that there was no time to understand.
-        new = [] if decision.model.coloured or decision.unexamined else steps.find(record, decision)
-        new, doubtful = ([step for step in new if step.sure == sure] for sure in (True, False))
-        if not new:
+        if decision.model.coloured or decision.unexamined:
             break
+        scene = scene_of(record, decision)
+        new = sorted_out(scene, search(scene))
+        doubtful = new.doubtful
+        if not new.steps and not new.banned.any():
+            break
+        steps = (*found, *new.steps)
         log = record.weighted(decision.weight)
-        other = _decided(time_s, bridged(log, decision.model, new), known, segment_of, work, short)
-        if _may_be_late_stamps((record, decision), other):
+        moved = levelled(log, scene.calm.noise_variance, steps)
+        read = taken_out(log._replace(measurement=measurement), scene.calm, scene.setting, moved)
+        other = decided(read.measurement, banned=banned | new.banned)
+        if new.steps and _may_be_late_stamps((record, decision), other):
             break
-        (record, decision), found = other, sorted([*found, *new], key=lambda s: s.sample)
+        (record, decision), found, banned = other, steps, banned | new.banned
     if decision.stamp_s > 0:  # which explains a clock that seems to jump
         doubtful = [step for step in doubtful if step.component != CLOCK]
     if not record.fixed.jerk and not live:  # at the end of a window a patch may look like motion
@@ -206,9 +196,13 @@ def edit(
     if known.jerk_psd is None:
         profile = fit_profile(log, decision.starts, decision.model, PROFILE_STEPS)
         decision = decision._replace(model=with_allowance(log, profile))
-    log, found = refined(log, decision.model, found)
+    shifts: tuple[Shift, ...] = ()
+    if scene is not None and found:
+        read = log._replace(measurement=measurement)
+        log, found, shifts = refined(read, decision.model, scene.setting, found)
     leaning = [] if live else _one_sided(log, decision.model, record.rounding)
-    faults = Faults(copied, (*found, *doubtful), tuple(leaning))
+    shifts += tuple(Shift(one.component, 0, len(time_s), one.sigma) for one in leaning)
+    faults = Faults(copied, (*found, *doubtful), shifts, tuple(leaning))
     return Edited(one_sided.without(log, leaning), decision.model, decision.starts, decision, faults)
 
 
@@ -227,13 +221,14 @@ def _may_be_late_stamps(without: tuple[Record, Decision], bridged: tuple[Record,
 
 
 def _decided(
-    time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: Model | None, work: Work, white: bool
-) -> tuple[Record, Decision]:
-    """The decisions on a log as if it had no steps, with a jerk profile."""
+    time_s: FloatArray, measurement: FloatArray, known: Known, segment_of: Model | None, work: Work, white: bool,
+    banned: NDArray[np.bool_],
+) -> tuple[Record, Decision]:  # fmt: skip
+    """The decisions on a log as if it had no steps, with a jerk profile. banned: (n, 3) readings of patches."""
     jerk_psd = known.jerk_psd
     rounding = rounding_sigma(measurement)
     screened, jumps_only, sigma, exact = screen(time_s, measurement, rounding)
-    possible = np.isfinite(measurement) & ~stuck_readings(measurement, sigma)
+    possible = np.isfinite(measurement) & ~banned & ~stuck_readings(measurement, sigma)
     possible[:, 0] &= measurement[:, 0] > NO_RANGE_M  # no target is at the station, or behind it
     fixed = Fixed(np.isfinite(known.sigma) | exact | (segment_of is not None), jerk_psd is not None)
     coarse = np.where(rounding > COARSE * sigma, np.sqrt(12) * rounding, 0.0)

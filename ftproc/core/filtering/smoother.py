@@ -69,7 +69,7 @@ LIKELIHOOD, SCORES, RESIDUALS, HEADS, STATES = range(5)
 
 
 @part
-def _take_in(f: Filter, sample: Sample) -> tuple[float, float]:
+def take_in(f: Filter, sample: Sample) -> tuple[float, float]:
     """Update by a sample; NIS, NaN where nothing is used, and the log-likelihood."""
     ukf.expect_at(sample, f)
     ukf.innovate(sample, f)
@@ -140,7 +140,7 @@ def _swept_through(
             sample, interval = samples[k], samples[k].time_s - samples[max(k - 1, span.first)].time_s
             if k > span.first:
                 advance(f, samples, k, profile)
-            nis, gained = _take_in(f, sample)
+            nis, gained = take_in(f, sample)
             _carry(memory, f, k, interval, k - low if turn >= last else -1)
             if turn <= last:
                 likelihood += gained

@@ -23,7 +23,7 @@ from ftproc.order_statistics import median
 
 FloatArray = NDArray[np.float64]
 
-LEVEL_STEPS = 12  # of the search for one level
+LEVEL_STEPS, JERK_STEPS = 12, 4  # of the search for one level of noise and jerk, and of the jerk alone
 SPANS, SPAN = 6, 400  # of samples: what stands for a long log when one noise and one jerk level are looked for
 ASSUMED = 0.03  # of the others' noise, in metres, that is assumed of a component that shows none: nothing moves exactly
 NOISE_GROWTH = 3.0  # times the noise that the search begins with: more of it is a diverged track, not noise
@@ -170,3 +170,16 @@ def of_level(found: Scores, log_ratio: float) -> optimizer.Point:
         np.array([-score.sum(), pull - score[2]]),
         np.array([curvature.sum(), curvature[2] + VERTICAL_PRECISION]),
     )
+
+
+def fit_jerk(log: Observations, starts: list[Start], model: Model) -> Model:
+    """The likeliest single jerk level with its vertical share, from the model's; the noise stays."""
+    lower, upper = jerk_bounds(scales_of(log, model.noise_variance))
+
+    def cost(theta: FloatArray) -> optimizer.Point:
+        return of_level(score_log(log, model._replace(jerk=shaped(theta[:1], theta[1])), starts), theta[1])
+
+    jerk = np.median(model.jerk, 0)
+    theta = np.clip(np.array([math.log(jerk[0]), math.log(jerk[2] / jerk[0])]), lower, upper)
+    theta = optimizer.minimise(cost, theta, lower, upper, JERK_STEPS, tolerance=0.1)
+    return model._replace(jerk=shaped(theta[:1], theta[1]), knot_s=math.inf)

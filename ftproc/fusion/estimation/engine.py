@@ -16,19 +16,20 @@ import numpy as np
 
 from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.biases import Biased, Directions, smooth_biased
-from ftproc.core.filtering.forward import filter_log
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
+from ftproc.core.identification.likelihood import fit_jerk
 from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import isotropic
-from ftproc.fusion.estimation import alternatives, first_track, places, process_noise, screening
+from ftproc.fusion.estimation import alternatives, first_track, lasting, places, process_noise, screening
 from ftproc.fusion.estimation import constants as posterior
 from ftproc.fusion.estimation.constants import Constants, Said
 from ftproc.fusion.estimation.events import Events, Seen, merge, moved_to
 from ftproc.records import FloatArray
 
 FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 18, 8
+LASTING_ROUNDS = 3  # of looking for faults that last: where one is taken out, another may show
 PROFILE_STEPS, LAST_STEPS = 2, 4
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after the first rounds
 STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that may still change
@@ -43,7 +44,8 @@ FEWEST_KEPT = 0.5  # of what screening trusts, in each component of a station
 class Current(NamedTuple):
     """What is believed now. events, weight (rows, 3) of each station; sigma (m, 3) noise; constants; model; start;
     found: the smoother's run that the rest belongs to; own (m, 3): the noise that each component shows alone;
-    rounds, settled: of the decisions; unexamined: places where no work was left to look for other hypotheses."""
+    rounds, settled: of the decisions; unexamined: places where no work was left to look for other hypotheses; steps:
+    that were taken out of the readings."""
 
     stations: list[Seen]
     events: Events
@@ -59,6 +61,7 @@ class Current(NamedTuple):
     rounds: int = 0
     settled: bool = False
     unexamined: int = 0
+    steps: tuple[lasting.Step, ...] = ()
 
     @property
     def log(self) -> Observations:
@@ -75,7 +78,28 @@ def fuse(
 ) -> Current:  # fmt: skip
     """The fused flight of the stations, or a stretch of it. known: what other stretches have said of the biases.
     progress is called with the number of each round. Raises Alone."""
-    screened = [screening.screen(station) for station in stations]
+    readings = lasting.Readings.of(stations)
+    current = _settled(readings, gate, jerk_psd, known, progress)
+    for _ in range(LASTING_ROUNDS):
+        log, possible = current.log, current.events.gathered(current.possible)
+        run = current.found.run
+        decided = lasting.Decided(
+            current.events, log, possible, current.model, run.state, run.residual, current.rates
+        )  # fmt: skip
+        found = lasting.find(decided, gate, jerk_psd is not None)
+        if not found:
+            break
+        readings = lasting.taken_out(readings, current.events, found)
+        current = _settled(readings, gate, jerk_psd, known, progress)._replace(steps=readings.steps)
+    return _last(current)
+
+
+def _settled(
+    readings: lasting.Readings, gate: float, jerk_psd: float | None, known: Said, progress: Callable[[int], None]
+) -> Current:
+    """The flight of readings without faults that last, when the decisions stand still. Raises Alone."""
+    stations = readings.stations
+    screened = [screening.screen(station, banned) for station, banned in zip(*readings[:2], strict=True)]
     sigma = np.stack([each.sigma for each in screened])
     track = first_track.find(stations, [each.trusted for each in screened], sigma)
     if track is None:
@@ -93,7 +117,7 @@ def fuse(
             current, changed = _reassessed(current, trusted, gate, search)
             if not changed and current.settled:
                 break
-    return _last(current)._replace(unexamined=len(search.unexamined - search.tried))
+    return current._replace(unexamined=len(search.unexamined - search.tried))
 
 
 def _begin(
@@ -217,7 +241,7 @@ def _tuned(current: Current, jerk_psd: float | None, first: int | None) -> Curre
     if jerk_psd is None:
         log = current.log
         if first is not None:
-            model = process_noise.level(log, starts, model)
+            model = fit_jerk(log, starts, model)
         else:
             model = fit_profile(log, starts, process_noise.on_knots(log, model), PROFILE_STEPS)
     return current._replace(sigma=sigma, model=model)
@@ -271,19 +295,3 @@ def _last(current: Current) -> Current:
         polished = fit_profile(log, [current.start], process_noise.on_knots(log, current.model), LAST_STEPS)
         current = current._replace(model=with_allowance(log, polished))
     return _smoothed(_smoothed(current))
-
-
-def without_run(current: Current) -> Current:
-    """The same, of whose smoother run nothing is kept but what `at` needs."""
-    run = current.found.run
-    slim = SmootherRun._make([run.state.copy(), *(each[:0].copy() for each in run[1:6]), *run[6:]])
-    return current._replace(found=current.found._replace(run=slim, spread=run.state[:0].copy()))
-
-
-def published(current: Current, smooth: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """State and sigma (n, 9) and NIS (n,) of the events: smoothed, or by the causal filter with the decisions and the
-    biases of the whole flight. Sigmas include those of the biases."""
-    if smooth:
-        return current.found.run.state, current.found.run.sigma, current.found.run.nis
-    run = filter_log(current.log, current.model, [current.start])
-    return run.state, np.sqrt(run.sigma**2 + current.found.spread), run.nis

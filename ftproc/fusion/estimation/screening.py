@@ -7,8 +7,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.core.editing import two_pass
+from ftproc.core.editing.copies import without_copies
 from ftproc.core.filtering.records import Model
 from ftproc.core.model import stations as geometry
 from ftproc.fusion.estimation import alternatives, places
@@ -31,9 +33,9 @@ class Screened(NamedTuple):
     sigma: FloatArray
 
 
-def screen(station: Seen) -> Screened:
-    """A station alone."""
-    z = station.measurement
+def screen(station: Seen, banned: NDArray[np.bool_]) -> Screened:
+    """A station alone. banned: (rows, 3) readings of patches."""
+    z, _ = without_copies(station.time_s, np.where(banned, np.nan, station.measurement))
     weight, sigma, least = np.isfinite(z).astype(float), np.ones(3), two_pass.rounding_sigma(z)
     for c in station.components:
         channel = np.ascontiguousarray(z[:, c])

@@ -13,11 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ftproc.core.filtering.forward import filter_log
+from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.model.stations import levelled
 from ftproc.fusion.estimation import engine
 from ftproc.fusion.estimation.constants import FARTHEST, Constants, Said, parameters
 from ftproc.fusion.estimation.engine import Current
 from ftproc.fusion.estimation.events import CLOCK, Seen
+from ftproc.fusion.estimation.lasting import Step
 from ftproc.records import FloatArray, IntArray
 
 MOST = 200_000  # rows of a stretch
@@ -38,7 +41,7 @@ class Fused(NamedTuple):
     """By station, row for row with its log: weight and possible (rows, 3), leave-one-out residual and residual_variance
     (rows, 3), position (rows, 3) of the track in m. noise (m, 3) 1-sigma, own (m, 3) the noise that each component
     shows alone; axes (m, 3, 3) with the tilts; jerk (k, 3) each for knot_s seconds; rounds, settled: of the decisions;
-    unexamined: places where no work was left to look for other hypotheses."""
+    unexamined: places where no work was left to look for other hypotheses; steps: that were taken out."""
 
     stations: list[Seen]
     weight: list[FloatArray]
@@ -56,6 +59,7 @@ class Fused(NamedTuple):
     rounds: int
     settled: bool
     unexamined: int
+    steps: tuple[Step, ...] = ()
 
 
 class Stretch(NamedTuple):
@@ -98,7 +102,7 @@ def fuse(
             continue
         inside = np.diff(np.searchsorted(current.events.time_s, edges[k : k + 2]))[0] / len(current.events.time_s)
         said = engine.said(current).share(float(inside)).among(parameters(seen), prior.size)
-        kept = current if len(edges) == 2 else engine.without_run(current)
+        kept = current if len(edges) == 2 else without_run(current)
         found.append(Stretch(edges[k], edges[k + 1], rows, seen, kept, said))
     constants = Constants.before(prior, _said(found, prior.size)) if len(found) > 1 else found[0].current.constants
     return _joined(stations, found, constants, smooth)
@@ -137,7 +141,7 @@ def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, sm
         if len(found) > 1:
             current = engine.at(current, constants.of(each.seen))
         events, run = current.events, current.found.run
-        state, sigma, nis = engine.published(current, smooth)
+        state, sigma, nis = published(current, smooth)
         here = slice(*np.searchsorted(events.time_s, [each.first_s, each.stop_s]))
         for k, s in enumerate(each.seen):
             at = here.start + np.flatnonzero(events.station[here] == k)
@@ -156,6 +160,7 @@ def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, sm
         levelled(np.stack([each.axes for each in stations]), constants.estimate[:, 3:CLOCK]), jerk, knot_s,
         max(each.current.rounds for each in found), all(each.current.settled for each in found),
         sum(each.current.unexamined for each in found),
+        tuple(step for each in found for step in each.current.steps),
     )  # fmt: skip
 
 
@@ -187,3 +192,19 @@ def _together(nis: FloatArray, last: IntArray) -> FloatArray:
     known = np.add.reduceat(np.isfinite(nis).astype(float), first)
     found: FloatArray = np.where(known > 0, total, np.nan)
     return found
+
+
+def without_run(current: Current) -> Current:
+    """The same, of whose smoother run nothing is kept but what `at` needs."""
+    run = current.found.run
+    slim = SmootherRun._make([run.state.copy(), *(each[:0].copy() for each in run[1:6]), *run[6:]])
+    return current._replace(found=current.found._replace(run=slim, spread=run.state[:0].copy()))
+
+
+def published(current: Current, smooth: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """State and sigma (n, 9) and NIS (n,) of the events: smoothed, or by the causal filter with the decisions and the
+    biases of the whole flight. Sigmas include those of the biases."""
+    if smooth:
+        return current.found.run.state, current.found.run.sigma, current.found.run.nis
+    run = filter_log(current.log, current.model, [current.start])
+    return run.state, np.sqrt(run.sigma**2 + current.found.spread), run.nis

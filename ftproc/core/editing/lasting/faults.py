@@ -1,0 +1,142 @@
+"""What is wrong with the readings of a log beyond outliers, and what is taken out of them for it.
+
+The levels of a component between its steps are settled together: that on which most readings lie is right, and the
+others are moved to it. One log cannot show that they are all wrong.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing.copies import KindArray
+from ftproc.core.editing.lasting.curves import CLOCK, Curve, Setting, fitted, without
+from ftproc.core.editing.lasting.weighing import late_of
+from ftproc.core.filtering.initialization import find_starts
+from ftproc.core.filtering.records import Model, Observations
+from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.identification.one_sided import OneSided
+from ftproc.core.model.frames import line_of_sight_axes
+from ftproc.order_statistics import median, medians
+
+FloatArray = NDArray[np.float64]
+
+CLOCK_ROUNDS = 2  # of taking a jump of the clock out: the way that is missing shows without it only
+SAME = 4.5  # sigmas of the noise within which two levels are one
+
+
+class Step(NamedTuple):
+    """From a sample on the readings of a component (range, azimuth, elevation) are larger by `size` m, rad, rad, or,
+    where it is CLOCK, their times by so many seconds. sigma: 1-sigma of the size. sure: that it is no patch; if not,
+    it was left in the readings."""
+
+    component: int
+    sample: int
+    size: float
+    sigma: float
+    sure: bool = True
+
+
+class Shift(NamedTuple):
+    """What was taken out of the readings [begin, end) of a component, or of the clock: a constant with this 1-sigma."""
+
+    component: int
+    begin: int
+    end: int
+    sigma: float
+
+
+class Faults(NamedTuple):
+    """copied: (n, 3) kinds of the readings that were not measured, see `copies`. steps: that stay. shifts: what was
+    moved for them. one_sided: components of which many errors have one sign."""
+
+    copied: KindArray
+    steps: tuple[Step, ...] = ()
+    shifts: tuple[Shift, ...] = ()
+    one_sided: tuple[OneSided, ...] = ()
+
+    def rows(self, low: int, high: int) -> Faults:
+        """Of the samples [low, high) alone."""
+        steps = tuple(s._replace(sample=s.sample - low) for s in self.steps if low <= s.sample < high)
+        shifts = tuple(
+            s._replace(begin=max(s.begin, low) - low, end=min(s.end, high) - low)
+            for s in self.shifts
+            if s.end > low and s.begin < high
+        )
+        return self._replace(copied=self.copied[low:high], steps=steps, shifts=shifts)
+
+
+def refined(
+    log: Observations, model: Model, setting: Setting, steps: Sequence[Step]
+) -> tuple[Observations, tuple[Step, ...], tuple[Shift, ...]]:
+    """A log without its steps, those with the sizes that all the record tells, and what was moved. log: as it was
+    read."""
+    n = len(log.time_s)
+    if not steps:
+        return log, (), ()
+    curves = [Curve(step.component, step.sample, n, (step.size,)) for step in sorted(steps, key=lambda s: s.sample)]
+    rest = log._replace(measurement=without(log.measurement, setting, curves))
+    found = fitted(log, model, find_starts(rest, model.noise_variance, median(model.jerk[:, 0])), setting, curves)
+    sigma = np.sqrt(np.diag(found.covariance))
+    known = tuple(Step(c.component, c.begin, c.size[0], float(s)) for c, s in zip(found.curves, sigma, strict=True))
+    moved = levelled(log, model.noise_variance, known)
+    shifts = tuple(Shift(c.component, c.begin, c.end, _sigma(known, c)) for c in moved)
+    return taken_out(log, model, setting, moved), known, shifts
+
+
+def taken_out(log: Observations, model: Model, setting: Setting, moved: Sequence[Curve]) -> Observations:
+    """The log without what has to be taken out of its readings."""
+    rest = log._replace(measurement=without(log.measurement, setting, moved))
+    for _ in range(CLOCK_ROUNDS if any(curve.component == CLOCK for curve in moved) else 0):
+        starts = find_starts(rest, model.noise_variance, median(model.jerk[:, 0]))
+        level = model._replace(jerk=medians(model.jerk)[None], knot_s=math.inf)
+        setting = setting._replace(late=late_of(rest, smooth_log(rest, level, starts).state))
+        rest = log._replace(measurement=without(log.measurement, setting, moved))
+    return rest
+
+
+def _sigma(steps: Sequence[Step], moved: Curve) -> float:
+    """Of a level that was moved: of the steps at its ends."""
+    return float(max(s.sigma for s in steps if s.component == moved.component and s.sample in (moved.begin, moved.end)))
+
+
+def levelled(log: Observations, noise_variance: FloatArray, steps: Sequence[Step]) -> list[Curve]:
+    """What has to be taken out of the readings between the steps, so that each component has one level: that of most
+    readings."""
+    moved: list[Curve] = []
+    for component in sorted({step.component for step in steps}):
+        own = sorted((s for s in steps if s.component == component), key=lambda s: s.sample)
+        edges = [0, *(s.sample for s in own), len(log.time_s)]
+        level = np.cumsum([0.0, *(s.size for s in own)])
+        seen = np.asarray(log.weight.any(1) if component == CLOCK else log.weight[:, component] > 0)
+        count = np.array([seen[a:b].sum() for a, b in itertools.pairwise(edges)])
+        near = max(s.sigma for s in own) if component == CLOCK else float(np.sqrt(noise_variance[component]))
+        votes = [count[np.abs(level - each) < SAME * near].sum() for each in level]
+        level = level - level[int(np.argmax(votes))]
+        moved += [
+            Curve(component, a, b, (float(size),))
+            for (a, b), size in zip(itertools.pairwise(edges), level, strict=True)
+            if size != 0.0 and b > a
+        ]
+    return moved
+
+
+def spread(state: FloatArray, shifts: Sequence[Shift]) -> tuple[FloatArray, FloatArray]:
+    """(n, 3) variances, m2, that the uncertain sizes of shifts add to the positions of the states (n, 9) that were
+    moved: along x, y, z, and along the radial, cross and up axes."""
+    axes, lines = np.zeros((len(state), 3)), np.zeros((len(state), 3))
+    for shift in shifts:
+        rows = slice(shift.begin, shift.end)
+        position, velocity = state[rows, :3], state[rows, 3:6]
+        sight = line_of_sight_axes(position)
+        slant = np.linalg.norm(position, axis=1)[:, None]
+        ground = np.hypot(position[:, 0], position[:, 1])[:, None]
+        moves = (sight[:, 0], sight[:, 1] * ground, sight[:, 2] * slant, velocity)[shift.component]
+        axes[rows] += (moves * shift.sigma) ** 2
+        lines[rows] += (np.einsum("kij,kj->ki", sight, moves) * shift.sigma) ** 2
+    return axes, lines

@@ -1,0 +1,120 @@
+"""What a jump of some channels may be: a step that stays, or one end of a patch of a few terms."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing.lasting import scan
+from ftproc.core.editing.lasting.curves import Curve
+from ftproc.core.editing.lasting.weighing import Scene
+from ftproc.core.filtering.records import Model
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Channels = Sequence[tuple[int, int]]
+
+SPANS, APART, MOST_SPANS = 2, 3, 4  # stretches on either side of a jump, cells between them, and all that are weighed
+PER_TERM = 5.0  # in log-likelihood, for a scan to prefer a stretch of more terms
+TERMS = (1, 2, 3, 5)
+LONGEST, FARTHEST = 0.5, 5000  # of the log, and samples: what is off for longer is off for good
+CELLS, SHORTEST = 200, 3  # cells of a scan, and samples that are off
+
+
+class Place(NamedTuple):
+    """A jump of channels (component, station) before a sample of a scene. marks: samples of all jumps. width: of a
+    cell, in samples. calm: a single level of jerk, of the flight beside the jump."""
+
+    channels: Channels
+    sample: int
+    marks: Sequence[int]
+    width: int
+    calm: Model
+
+
+def proposals(scene: Scene, place: Place) -> Iterator[list[Curve]]:
+    """The curves, of one for each channel, that the jump may be."""
+    n, at = len(scene.possible), place.sample
+    yield from steps(scene, place.channels, at)
+    reach = min(int(LONGEST * n), FARTHEST)
+    here = slice(max(at - reach, 0), min(at + reach, n))
+    part, length = scene.part(here), min(at + reach, n) - max(at - reach, 0)
+    near = place._replace(sample=at - here.start)
+    marks = [near.sample, *(mark - here.start for mark in place.marks if abs(mark - at) > 2 * place.width)]
+    edges = scan.spread(marks, max(place.width, length // CELLS), length)
+    for more, edge in _likeliest_spans(gains_of(part, place.channels, place.calm, edges), edges, near.sample):
+        other = edge if more else other_end(part, near, edge, place.width, more)
+        begin, end = here.start + min(near.sample, other), here.start + max(near.sample, other)
+        for terms in TERMS:
+            if (terms > 1) == more and end - begin >= SHORTEST and (terms == 1 or terms <= (end - begin) // 4):
+                yield [Curve(c, begin, end, (0.0,) * terms, s) for c, s in place.channels]
+
+
+def steps(scene: Scene, channels: Channels, sample: int) -> list[list[Curve]]:
+    """Steps that stay, before a sample; which side is right, other stations tell."""
+    n = len(scene.possible)
+    later = [Curve(c, sample, n, (0.0,), s) for c, s in channels]
+    return [later, [curve._replace(begin=0, end=sample) for curve in later]] if len(scene.rates) > 1 else [later]
+
+
+def _likeliest_spans(gain: FloatArray, edges: IntArray, sample: int) -> list[tuple[bool, int]]:
+    """Whether more than one term is needed, and the other end, of the likeliest stretches that begin or end with a
+    sample; gain: see `scan.gains`."""
+    k, found = int(np.searchsorted(edges, sample)), list[tuple[float, bool, int]]()
+    for more, side in itertools.product((False, True), (slice(1, max(k - 1, 1)), slice(k + 2, len(edges) - 1))):
+        along = _from(gain[int(more)], k) - PER_TERM * more * (scan.TERMS - 1)
+        found += [(float(along[j]), more, int(edges[j])) for j in _peaks(along, side)]
+    return [(more, edge) for _, more, edge in sorted(found, reverse=True)[:MOST_SPANS]]
+
+
+def _from(gain: FloatArray, k: int) -> FloatArray:
+    """Gains (m + 1,) of the stretches between one edge and each other one, from those of all (m + 1, m + 1)."""
+    found: FloatArray = np.where(np.arange(len(gain)) > k, gain[k], gain[:, k])
+    return found
+
+
+def _peaks(values: FloatArray, inside: slice) -> Iterator[int]:
+    """The places of the largest values of a part, well apart."""
+    left = np.zeros(len(values))
+    left[inside] = values[inside]
+    for _ in range(SPANS):
+        j = int(left.argmax())
+        if not left[j] > 0:
+            return
+        yield j
+        left[max(j - APART, 0) : j + APART + 1] = 0.0
+
+
+def gains_of(part: Scene, channels: Channels, calm: Model, edges: IntArray) -> FloatArray:
+    """The gains of `scan.gains` of several channels, as if each were off alone."""
+    whole = [Curve(c, 0, len(part.possible), (), s) for c, s in channels]
+    log = part.log._replace(weight=part.taking_in(whole))
+    starts = part.starts(log)
+    found: FloatArray = np.sum([scan.gains(log, calm, starts, part.setting, each, edges) for each in channels], 0)
+    return found
+
+
+def exactly(part: Scene, place: Place) -> int:
+    """The sample of a jump that is about there."""
+    edges = _fine(len(part.possible), place.sample, place.width)
+    gain = gains_of(part, place.channels, place.calm, edges)[0, :, -1]
+    return int(edges[1 + int(gain[1:-1].argmax())]) if len(edges) > 2 else place.sample
+
+
+def other_end(part: Scene, place: Place, about: int, within: int, more: bool) -> int:
+    """The other end of a stretch that begins or ends with a jump, to the sample, about where it is."""
+    n = len(part.possible)
+    edges = _fine(n, about, within, place.sample)
+    gain = gains_of(part, place.channels, place.calm, edges)[int(more)]
+    along = _from(gain, int(np.searchsorted(edges, place.sample)))
+    along[(edges == 0) | (edges == n) | (np.abs(edges - place.sample) < SHORTEST)] = 0.0
+    return int(edges[int(along.argmax())])
+
+
+def _fine(n: int, about: int, within: int, *others: int) -> IntArray:
+    """Edges at each sample within so many of one, at some others, and at the ends of n."""
+    return np.unique(np.clip([0, *others, *range(about - within, about + within + 1), n], 0, n)).astype(np.int64)

@@ -1,0 +1,264 @@
+"""Faults that last, weighed against motion: patches of any length, steps that stay, clocks that jump, other targets.
+
+Wherever a station jumps (`scan`), the jump is weighed on the log around it (`weighing`), first as a step of one
+component, of several, and of the clock. With the jump taken out, the process noise there is that of the flight, and a
+scan of the stretches that begin or end with it tells from where to where the components may be off (`proposals`). These
+are weighed too, the likeliest is taken, and the log is looked at again without it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing.lasting import scan
+from ftproc.core.editing.lasting.curves import CLOCK, Curve
+from ftproc.core.editing.lasting.faults import Step
+from ftproc.core.editing.lasting.proposals import CELLS, SHORTEST, Place, exactly, other_end, proposals, steps
+from ftproc.core.editing.lasting.scan import Jump
+from ftproc.core.editing.lasting.weighing import Scene, Weighed, weighed
+from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
+from ftproc.core.identification.profile import median_level
+from ftproc.core.identification.scales import scales_of
+from ftproc.order_statistics import median
+
+FloatArray = NDArray[np.float64]
+
+ROUNDS, JUMPS = 8, 5  # of looking at a log, and jumps that are looked at in one, by either set of weights
+LEAST_GAIN, TOGETHER = 18.0, 0.03  # of a jump, in log-likelihood; of the largest: components that jump with it
+LEAST_OFF = 10.0  # the same of a jump in a rejected run, by the noise alone
+CERTAIN = 4.0  # sigmas of its size from which a component takes part in a step of several
+AROUND, MEMORIES = (150, 2000), 12.0  # samples on each side of what is weighed, and memories
+SHORTEST_CELL = 2  # samples in a cell of a scan
+PRIOR, MARGIN = -6.0, 4.0  # log-odds of such a fault at a place, and by which it must be likelier
+HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
+SURE = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
+END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step cannot be told from a patch
+
+
+class Found(NamedTuple):
+    """curves: that are accepted together, with the 1-sigma of the first term of each. gain: of log-probability, with
+    their prior; second: of the best rival that stays where they do not, or the other way round."""
+
+    curves: tuple[Curve, ...]
+    sigma: tuple[float, ...]
+    gain: float
+    second: float = 0.0
+
+    def stays(self, n: int) -> bool:
+        """Whether the fault lasts until an end of the log of n samples."""
+        return self.curves[0].begin == 0 or self.curves[0].end == n
+
+
+class Look(NamedTuple):
+    """A look at a log: its scene, the samples on each side of what is weighed, and in a cell, and its jumps."""
+
+    scene: Scene
+    around: int
+    width: int
+    jumps: list[Jump]
+
+    @property
+    def samples(self) -> int:
+        return len(self.scene.possible)
+
+    def near(self, first: int, last: int) -> slice:
+        """The samples that take part in weighing what lies between two."""
+        return slice(max(first - self.around, 0), min(last + self.around, self.samples))
+
+
+def search(scene: Scene) -> list[Found]:
+    """The faults that last in the log of one or several stations whose outliers were decided as if it had none."""
+    found, rejected = list[Found](), list[Jump]()
+    for _ in range(ROUNDS):
+        best = _likeliest(look_at(scene.without([curve for each in found for curve in each.curves])), rejected)
+        if best is None:
+            break
+        found.append(best)
+    return found
+
+
+def look_at(scene: Scene) -> Look:
+    """A scene with its jumps."""
+    log = scene.log._replace(weight=scene.taken_in)
+    memory = scales_of(log, scene.calm.noise_variance).memory_samples(float(scene.calm.jerk[0, 0]))
+    width, around = max(int(memory / 2), SHORTEST_CELL), int(np.clip(MEMORIES * memory, *AROUND))
+    starts, n = scene.starts(log), len(scene.possible)
+    if len(scene.rates) > 1:
+        width = max(width, n // CELLS)
+        edges, channels = scan.spread([], width, n), list(np.ndindex(len(scene.rates), CLOCK + 1))
+        gain = [
+            scan.steps_of(
+                scene.log._replace(weight=scene.taking_in([Curve(c, 0, n, (), s)])),
+                scene.calm,
+                starts,
+                scene.setting,
+                (c, s),
+                edges,
+            )
+            for s, c in channels
+        ]
+        between = np.stack(gain).reshape(len(scene.rates), CLOCK + 1, -1)
+        return Look(scene, AROUND[1], width, scan.jumps_between(between, edges, LEAST_GAIN, TOGETHER))
+    found = list[Jump]()
+    for each in (log, scene.log) if (log.weight != scene.log.weight).any() else (log,):
+        smoothed = smooth_log(each, scene.calm, scene.starts(each), RESIDUALS)
+        sums = scan.sums(each, smoothed, scene.setting, len(scene.rates))
+        found += scan.jumps(sums, LEAST_GAIN, JUMPS, 3 * width, TOGETHER)
+    off = scene.residual / np.sqrt(scene.calm.noise_variance)
+    found += scan.beside_runs(scene.log.weight, scene.possible, off, LEAST_OFF)[:JUMPS]
+    return Look(scene, around, width, sorted(found, key=lambda jump: -jump.gain))
+
+
+def _likeliest(look: Look, rejected: list[Jump]) -> Found | None:
+    """What the largest jump is that is no motion; those that are motion are added to the rejected. Where one station
+    jumps, others seem to: the likeliest of all of them at a place counts."""
+    for jump in look.jumps:
+        if any(abs(jump.sample - old.sample) < look.width and jump.station == old.station for old in rejected):
+            continue
+        here = [each for each in look.jumps if abs(each.sample - jump.sample) <= look.width]
+        found = [each for each in (_tried(look, each) for each in here) if each is not None]
+        if found:
+            return max(found, key=lambda each: each.gain)
+        rejected += here
+    return None
+
+
+def _tried(look: Look, jump: Jump) -> Found | None:
+    """What happened at a jump; None if it is motion, or there are too few readings to tell."""
+    with contextlib.suppress(ValueError, np.linalg.LinAlgError):
+        return _at(look, jump)
+    return None
+
+
+def _at(look: Look, jump: Jump) -> Found | None:
+    """What happened at a jump; None if it is motion."""
+    n, near = look.samples, look.near(jump.sample, jump.sample)
+    null = _without_fault(look.scene.part(near))
+    gain, place, step = max((_as_step(look, jump, way, null) for way in jump.ways), key=lambda each: each[0])
+    moves = [c.component for c, s in zip(step.curves, step.sigma, strict=True) if abs(c.size[0]) > CERTAIN * s]
+    if 0 < len(moves) < len(step.curves):
+        gain, place, step = max((gain, place, step), _as_step(look, jump, moves, null), key=lambda each: each[0])
+    if gain < MARGIN or not 0 < place.sample < n:
+        return None
+    if place.channels[0][0] == CLOCK:
+        return Found(_in_whole(step, near, n), step.sigma, gain)
+    proposed = list(proposals(look.scene, place._replace(calm=median_level(step.model))))
+    ends = [edge for curves in proposed for edge in (curves[0].begin, curves[0].end) if 0 < edge < n]
+    return _best(look, proposed, look.near(min(ends), max(ends)), place)
+
+
+def _as_step(look: Look, jump: Jump, way: Sequence[int], null: float) -> tuple[float, Place, Weighed]:
+    """A jump as a step of some components, or of the clock: its gain, its place, and the log around it. null:
+    log-probability without it."""
+    n, near = look.samples, look.near(jump.sample, jump.sample)
+    part, channels = look.scene.part(near), [(c, jump.station) for c in way]
+    about = Place(channels, jump.sample - near.start, [each.sample for each in look.jumps], look.width, part.calm)
+    place = about._replace(sample=near.start + exactly(part, about))
+    sides = steps(look.scene, channels, place.sample)
+    step = max((_weighed(part, near, side) for side in sides), key=lambda each: each.log_probability)
+    return step.log_probability - null + _prior(sides[0], n), place, step
+
+
+def _best(look: Look, proposed: Sequence[Sequence[Curve]], here: slice, place: Place) -> Found | None:
+    """The likeliest of what was proposed, all weighed on the same part of the log."""
+    part, n = look.scene.part(here), look.samples
+    null = _without_fault(part)
+
+    def outcome(curves: Sequence[Curve]) -> Found:
+        found = _weighed(part, here, curves)
+        gain = found.log_probability - null + _prior(curves, n)
+        return Found(_in_whole(found, here, n), found.sigma, gain)
+
+    outcomes = [outcome(curves) for curves in proposed]
+    best = max(outcomes, key=lambda each: each.gain)
+    if best.gain < MARGIN:
+        return None
+    if len(best.curves[0].size) > 1:  # its other end is known to a cell
+        one = best.curves[0]
+        about, at = (one.begin if one.end == place.sample else one.end), place.sample - here.start
+        edge = here.start + other_end(part, place._replace(sample=at), about - here.start, 2 * look.width, True)
+        ends = {"begin": min(place.sample, edge), "end": max(place.sample, edge)}
+        if ends["end"] - ends["begin"] >= SHORTEST:
+            sharper = outcome([curve.of(len(curve.size))._replace(**ends) for curve in best.curves])
+            best = max(best, sharper, key=lambda each: each.gain)
+    return best._replace(second=max((each.gain for each in outcomes if each.stays(n) != best.stays(n)), default=0.0))
+
+
+def _weighed(part: Scene, near: slice, curves: Sequence[Curve]) -> Weighed:
+    """A part of a log with curves, whether nothing was rejected unjustly, or what they act on, or more."""
+    own = [curve.within(near) for curve in curves]
+    starts = {weight.tobytes(): weight for weight in (part.log.weight, part.taking_in(own), part.taken_in)}.values()
+    return max((weighed(part, weight, own) for weight in starts), key=lambda each: each.log_probability)
+
+
+def _without_fault(part: Scene) -> float:
+    """Log-probability of a part without a fault that lasts."""
+    return max(weighed(part, weight, ()).log_probability for weight in (part.log.weight, part.taken_in))
+
+
+def _in_whole(found: Weighed, near: slice, n: int) -> tuple[Curve, ...]:
+    """The curves of a part as those of the whole log of n samples; one that begins or ends with the part does
+    so with the log."""
+    length = near.stop - near.start
+    return tuple(
+        curve._replace(
+            begin=curve.begin and curve.begin + near.start, end=n if curve.end == length else curve.end + near.start
+        )
+        for curve in found.curves
+    )
+
+
+def _prior(curves: Sequence[Curve], n: int) -> float:
+    """Log-odds of there being such a fault, in one of n places."""
+    places = 1 if curves[0].begin == 0 or curves[0].end == n else 2
+    return PRIOR - math.log(3) - places * math.log(n)
+
+
+class SortedOut(NamedTuple):
+    """banned (n, 3): readings of patches. steps: that are sure. doubtful: that may be an end of a weak patch."""
+
+    banned: NDArray[np.bool_]
+    steps: list[Step]
+    doubtful: list[Step]
+
+
+def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
+    """What follows from the faults of a single station."""
+    n, noise_variance = len(scene.possible), scene.calm.noise_variance
+    result = SortedOut(np.zeros((n, 3), bool), [], [])
+    for each in found:
+        for curve, sigma in zip(each.curves, each.sigma, strict=True):
+            if curve.end < n or min(curve.begin, n - curve.begin) < end_of(n):
+                if curve.component != CLOCK:
+                    side = slice(0, curve.begin) if curve.end == n and 2 * curve.begin < n else curve.rows
+                    result.banned[side, curve.component] = True
+                continue
+            if curve.component == CLOCK:
+                large = not _may_be_a_halt(scene, curve)
+            else:
+                large = abs(curve.size[0]) > SURE * math.sqrt(noise_variance[curve.component])
+            sure = bool(large and each.gain - each.second > MARGIN)
+            (result.steps if sure else result.doubtful).append(
+                Step(curve.component, curve.begin, curve.size[0], sigma, sure)
+            )
+    return result
+
+
+def _may_be_a_halt(scene: Scene, clock: Curve) -> bool:
+    """Whether the target may have stood still, or hurried, where its clock seems to jump: to make up for the way that
+    is missing within the jump asks for no more acceleration than things that stand and go have."""
+    (r, _, e), late = scene.log.measurement.T, scene.setting.late
+    speed = np.sqrt(late[:, 0] ** 2 + (r * np.cos(e) * late[:, 1]) ** 2 + (r * late[:, 2]) ** 2)[clock.rows]
+    speed = speed[np.isfinite(speed)]
+    return len(speed) > 0 and 4 * median(speed) < HALTS_MPS2 * abs(clock.size[0])
+
+
+def end_of(samples: int) -> int:
+    """Samples at either end of so many in which a step cannot be told from a patch."""
+    return 1 + min(END, int(SHARE * samples))

@@ -1,0 +1,96 @@
+"""Faults that last of one station among several: found by the search for a single log, on the events of all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing.lasting.curves import CLOCK, Curve, Setting
+from ftproc.core.editing.lasting.search import Found, search
+from ftproc.core.editing.lasting.weighing import Scene, late_of, with_even_runs
+from ftproc.core.filtering.records import Model, Observations
+from ftproc.core.identification.profile import median_level
+from ftproc.fusion.estimation.events import Events, Seen
+from ftproc.records import FloatArray, IntArray
+
+
+class Step(NamedTuple):
+    """From a time of its own clock, s, on (or until then) the readings of a component of a station are larger by a size
+    m, rad, rad, or, where the component is CLOCK, its times by so many seconds; it was taken out."""
+
+    station: str
+    component: int
+    time_s: float
+    size: float
+
+
+class Readings(NamedTuple):
+    """stations: without the steps that were found. banned: (rows, 3) of each, readings of patches."""
+
+    stations: list[Seen]
+    banned: list[NDArray[np.bool_]]
+    steps: tuple[Step, ...] = ()
+
+    @classmethod
+    def of(cls, stations: list[Seen]) -> Readings:
+        """As they were read."""
+        return cls(stations, [np.zeros(station.measurement.shape, bool) for station in stations])
+
+
+class Decided(NamedTuple):
+    """Events and what was decided on them: their log, possible (n, 3), the model, state (n, 9), leave-one-out
+    residual (n, 3), and the rates of outliers (stations, 3, 3)."""
+
+    events: Events
+    log: Observations
+    possible: FloatArray
+    model: Model
+    state: FloatArray
+    residual: FloatArray
+    rates: FloatArray
+
+
+def find(decided: Decided, gate: float, jerk_known: bool) -> list[Found]:
+    """The faults that last."""
+    events, log = decided.events, decided.log
+    possible, taken_in, sigma = decided.possible > 0, log.weight.copy(), np.sqrt(decided.model.noise_variance)
+    for s in range(len(decided.rates)):
+        rows = np.flatnonzero(events.station == s)
+        taken_in[rows] = with_even_runs(log.weight[rows], possible[rows], decided.residual[rows], sigma[s])
+    setting = Setting(events.time_s, late_of(log, decided.state), events.station)
+    calm = median_level(decided.model)
+    scene = Scene(
+        log, possible, taken_in, setting, calm, jerk_known, decided.rates, gate, decided.residual, decided.state
+    )  # fmt: skip
+    return search(scene)
+
+
+def taken_out(readings: Readings, events: Events, found: Sequence[Found]) -> Readings:
+    """The readings without the faults: steps are taken out of them, patches are banned."""
+    stations, banned, steps = list(readings.stations), [each.copy() for each in readings.banned], list(readings.steps)
+    n = len(events.time_s)
+    for fault in found:
+        for curve in fault.curves:
+            station, rows = stations[curve.station], _rows(events, curve)
+            if not fault.stays(n):
+                banned[curve.station][rows, curve.component] = True
+                continue
+            time_s, z = station.time_s.copy(), station.measurement.copy()
+            if curve.component == CLOCK:
+                time_s[rows] -= curve.size[0]
+            else:
+                z[rows, curve.component] -= curve.size[0]
+            stations[curve.station] = station._replace(time_s=time_s, measurement=z)
+            edge = rows[0] if curve.end == n else rows[-1]
+            steps.append(Step(station.name, curve.component, float(station.time_s[edge]), curve.size[0]))
+    return Readings(stations, banned, tuple(steps))
+
+
+def _rows(events: Events, curve: Curve) -> IntArray:
+    """The rows of its station's log that a curve acts on."""
+    at = np.arange(curve.begin, curve.end)
+    rows: IntArray = events.row[at[events.station[at] == curve.station]]
+    return rows
