@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 T = TypeVar("T")
 
@@ -47,15 +47,27 @@ class Paced(Generic[T]):
     """Work that goes on as far as `go_on` lets it; its thread ends with it."""
 
     def __init__(self, work: Callable[[], T]) -> None:
+        self._function, self._given = work, 0.0
         self._work, self._found = _Work(), list[T]()
         self._thread = threading.Thread(target=_run, args=(self._work, work, self._found), daemon=True)
         self._started = False
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy needs: it does again what was done so far, as soon as it goes on."""
+        mine = ("_work", "_found", "_thread", "_started")
+        return {name: value for name, value in self.__dict__.items() if name not in mine}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        Paced.__init__(self, state["_function"])
+        self.__dict__.update(state)
+        self._work.credit = self._given
 
     def go_on(self, samples: float) -> bool:
         """Work for so many more samples; whether it is done. What a sweep takes too much is taken from the next time.
         Raises what the work raises."""
         work = self._work
         work.credit += samples
+        self._given += samples
         if not work.done and work.credit > 0:
             if self._started:
                 work.turn.release()

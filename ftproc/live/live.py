@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import bisect
+import copy
 import itertools
+import math
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ftproc.core.identification import unseen_motion
-from ftproc.core.live.rows import Published
+from ftproc.core.live.editor import LiveEditor
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.errors import InputError, UsageError
+from ftproc.live.order import Left, Order
 from ftproc.methods import live, registry
 from ftproc.methods.estimate import FARTHEST, Estimate
+from ftproc.order_statistics import median
 from ftproc.quality import sanity
-from ftproc.records import MISSING, FloatArray, IntArray, Trajectory
+from ftproc.records import MISSING, FloatArray, IntArray, Trajectory, joined
 from ftproc.settings import FilterSettings
+
+SLACK_S = 0.002  # by the clock, in which the last reading that a row rests on may come after it is due
+INTERVALS = 50  # of which the typical one is that of coasted rows
 
 
 class Live:
@@ -28,31 +36,45 @@ class Live:
         for row in receiver:
             published = track.push(row.time_s, row.range_m, row.azimuth_rad, row.elevation_rad)
 
-    A row is published as soon as a reading comes that is more than the lag later; with lag 0, at once. The rows are
-    those that `ftproc filter --editing live --lag S` writes of the same readings. late: readings that came too late to
-    be used, or twice the same time after it was published; they are counted, not published.
+    With lag 0 a row is published at once. With a lag, readings may come late by less than `late_s` and take their
+    place: the rows are those that `ftproc filter --editing live --lag S` writes of the same readings in order. So a row
+    waits for a reading that is more than the lag and `late_s` later, or, where the times at which readings come are
+    given, until its lag has passed by the clock: then `due` publishes it. late: readings that came too late to be used;
+    they are counted, not published.
     """
 
-    def __init__(self, settings: FilterSettings | None = None) -> None:
-        """settings: editing `live` (also where they say `two-pass`, the default) or `forward`. Raises UsageError."""
-        settings = settings or FilterSettings()
+    def __init__(self, settings: FilterSettings | None = None, late_s: float | None = None) -> None:
+        """settings: editing `live` (also where they say `two-pass`, the default) or `forward`. late_s: at most the lag;
+        None for the lag. Raises UsageError."""
+        self.resume(settings or FilterSettings())
+        self.late, editor = 0, live.editor(self.settings)
+        self._lag_s = editor.lag_s
+        self._late_s = self._lag_s if late_s is None else min(late_s, self._lag_s)
+        self._order = Order(editor, self._late_s)
+        self._time_s: list[float] = []  # of the rows that have not been published, in the order of their times,
+        self._row: list[int] = []  # their numbers,
+        self._came_s: list[float] = []  # and when each came, or the one after it
+        self._taken, self._left_s = 0, -math.inf
+
+    def resume(self, settings: FilterSettings) -> None:
+        """Go on with these settings, when all else is as it was kept."""
         if settings.editing == "two-pass":
             settings = replace(settings, editing="live")
         sanity.check_settings(settings)
         if settings.method != registry.MAIN or settings.editing == "none" or settings.smooth:
             raise UsageError(f"Live runs {registry.MAIN} with editing live or forward, not smoothed.")
-        self.settings, self.late = settings, 0
-        self._editor = live.editor(settings)
-        self._begins_s: float | None = None
-        self._time_s: list[float] = []  # of the rows that have not left, in the order of their times,
-        self._row: list[int] = []  # and their numbers
-        self._taken, self._left_s = 0, -np.inf
-        self.latest: Estimate | None = None
+        self.settings = settings
+        self._coasting: LiveEditor | None = None
 
     @property
     def waiting(self) -> int:
         """How many rows have not been published."""
         return len(self._row)
+
+    @property
+    def newest_s(self) -> float:
+        """The newest time so far."""
+        return self._time_s[-1] if self._time_s else self._left_s
 
     def push(
         self,
@@ -61,11 +83,12 @@ class Live:
         azimuth_rad: ArrayLike,
         elevation_rad: ArrayLike,
         row: ArrayLike | None = None,
+        came_s: float = math.inf,
     ) -> Trajectory:
-        """Take one reading, or several: numbers or arrays (n,), s, m, rad, rad; NaN where a component is missing. A row
-        may come out of time order by less than the lag. row: their numbers, by which they are published; without,
-        they are counted from 0. Returns the rows published now, of which there may be none. Raises InputError for a
-        time that is not a number or not that of a flight.
+        """Take one reading, or several: numbers or arrays (n,), s, m, rad, rad; NaN where a component is missing. row:
+        their numbers, by which they are published; without, they are counted from 0. came_s: when they came, by any
+        clock in seconds that goes on evenly, if `due` is called too. Returns the rows published now, of which there may
+        be none. Raises InputError for a time that is not a number or not that of a flight.
         """
         components = (range_m, azimuth_rad, elevation_rad)
         readings = np.broadcast_arrays(*(np.atleast_1d(np.asarray(each, float)) for each in components))
@@ -80,51 +103,107 @@ class Live:
             worst = int(np.flatnonzero(~(np.abs(times) <= sanity.LATEST_S))[0])
             raise InputError(f"row {rows[worst]}: the time {times[worst]:g} s is not that of a flight.")
         self._taken += len(times)
-        found = []
+        self._coasting = None
         for low, high in self._ordered(times):
-            found += self._push(times[low:high], measurement[low:high], rows[low:high].tolist())
-        return self._published(found)
+            if times[low] < self.newest_s:
+                self._insert(float(times[low]), measurement[low], int(rows[low]), came_s)
+            else:
+                self._append(times[low:high], measurement[low:high], rows[low:high].tolist(), came_s)
+        return self._published(self._passed())
+
+    def due(self, now_s: float) -> Trajectory:
+        """The rows whose lag has passed by the clock of `came_s`, when no reading has come since."""
+        self._order.settle(now_s)
+        count = bisect.bisect_right(self._came_s, now_s, key=lambda came_s: came_s + self.wait_s)
+        if count > self._order.known - self._order.taken:
+            self._order.let_leave(self._time_s[count - 1], now_s)
+        return self._published(max(count, self._passed()))
+
+    @property
+    def due_s(self) -> float:
+        """When `due` has something to do, by that clock; infinite when nothing waits."""
+        row_s = self._came_s[0] + self.wait_s if self._came_s else math.inf
+        return min(row_s, self._order.held_until_s)
 
     def finish(self) -> Trajectory:
         """The rows that wait for their lag, when no more readings come."""
-        return self._published(self._editor.finish())
+        self._order.finish()
+        return self._published(len(self._row))
+
+    @property
+    def interval_s(self) -> float:
+        """The typical interval of the newest readings; infinite before the track is confirmed."""
+        window = self._order.editor.window
+        return math.inf if window is None else median(np.diff(window.time_s[-INTERVALS:]))
+
+    def coast(self, after_s: float) -> Trajectory:
+        """A row so long after the newest reading, and after those coasted before, as far as nothing more comes: of no
+        reading (row -1), with the sigmas of that. It changes nothing that is published of readings."""
+        if self._coasting is None:
+            self._order.settle(math.inf)
+            self._coasting = copy.deepcopy(self._order.editor)
+            self._coasting.tick(math.inf)
+        time_s = self.newest_s + after_s
+        at_s, none = time_s - self._order.begins_s, np.full((1, 3), np.nan)
+        found = self._coasting.push(np.array([at_s]), none)
+        found += self._coasting.tick(math.nextafter(at_s + self._lag_s, math.inf))
+        left = [Left(each, self._coasting.absent) for each in found]
+        return self._trajectory(left, np.array([time_s]), np.array([-1]))
+
+    @property
+    def wait_s(self) -> float:
+        """How long a row waits by the clock."""
+        return self._lag_s + max(self._order.hold_s, SLACK_S) if self._lag_s > 0 else 0.0
 
     def _ordered(self, times: FloatArray) -> list[tuple[int, int]]:
         """The runs of rows whose times never decrease, the newest so far included."""
-        newest = self.newest_s
-        back = np.flatnonzero(times < np.maximum.accumulate(np.r_[newest, times[:-1]]))
+        back = np.flatnonzero(times < np.maximum.accumulate(np.r_[self.newest_s, times[:-1]]))
         edges = sorted({0, len(times), *back.tolist(), *(back + 1).tolist()})
         return list(itertools.pairwise(edges))
 
-    @property
-    def newest_s(self) -> float:
-        """The newest time so far."""
-        return self._time_s[-1] if self._time_s else self._left_s
-
-    def _push(self, times: FloatArray, measurement: FloatArray, rows: list[int]) -> list[Published]:
-        if self._begins_s is None:
-            self._begins_s = float(times[0])
-        if times[0] < self.newest_s:
-            if not self._editor.insert(float(times[0]) - self._begins_s, measurement[:1]):
-                self.late += 1
-                return []
-            place = bisect.bisect_right(self._time_s, float(times[0]))
-            self._time_s.insert(place, float(times[0]))
-            self._row.insert(place, rows[0])
-            return []
+    def _append(self, times: FloatArray, measurement: FloatArray, rows: list[int], came_s: float) -> None:
         self._time_s += times.tolist()
         self._row += rows
-        return self._editor.push(times - self._begins_s, measurement)
+        self._came_s += [came_s] * len(rows)
+        self._order.push(times, measurement, came_s)
 
-    def _published(self, found: list[Published]) -> Trajectory:
-        count = sum(len(each.rows) for each in found)
+    def _insert(self, time_s: float, reading: FloatArray, row: int, came_s: float) -> None:
+        if time_s < self._left_s or not self._order.insert(time_s, reading, came_s):
+            self.late += 1
+            return
+        place = bisect.bisect_right(self._time_s, time_s)
+        came_s = self._came_s[place] if place < len(self._came_s) else came_s
+        self._time_s.insert(place, time_s)
+        self._row.insert(place, row)
+        self._came_s.insert(place, came_s)
+
+    def _passed(self) -> int:
+        """How many rows need not wait any more, whatever comes; or are too many to wait."""
+        ready = self._order.known - self._order.taken
+        if self._lag_s == 0:
+            return ready
+        passed = bisect.bisect_left(self._time_s, self.newest_s - self._late_s - self._lag_s)
+        return min(max(passed, ready - self._order.editor.pace.sizes.most_waiting), ready)
+
+    def _published(self, count: int) -> Trajectory:
+        count = min(count, self._order.known - self._order.taken)
         time_s, row = np.array(self._time_s[:count]), np.array(self._row[:count], np.int64)
-        del self._time_s[:count], self._row[:count]
-        if not count:
-            return _trajectory(row, time_s, None)
-        self._left_s = float(time_s[-1])
-        self.latest = live.estimate(self._editor, found, time_s)
-        return _trajectory(row, time_s, self.latest)
+        for kept in (self._time_s, self._row, self._came_s):
+            del kept[:count]
+        if count:
+            self._left_s = float(time_s[-1])
+        return self._trajectory(self._order.take(count), time_s, row)
+
+    def _trajectory(self, left: Iterable[Left], time_s: FloatArray, row: IntArray) -> Trajectory:
+        """The rows that have left, with these times and numbers (n,)."""
+        parts, low = [], 0
+        for absent, some in itertools.groupby(left, lambda each: each.absent):
+            found = [each.rows for each in some]
+            high = low + sum(len(each.rows) for each in found)
+            estimate = live.estimate(self._order.editor, found, time_s[low:high])._replace(absent=absent)
+            parts.append(_trajectory(row[low:high], time_s[low:high], estimate))
+            low = high
+        return joined(parts) if parts else _trajectory(row[:0], time_s[:0], None)
 
 
 def _trajectory(row: IntArray, time_s: FloatArray, estimate: Estimate | None) -> Trajectory:

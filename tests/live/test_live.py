@@ -42,13 +42,99 @@ def test_one_by_one_it_is_what_the_file_gives(log):
     np.testing.assert_array_equal(found["measurement_sigma"], whole.measurement_sigma)
 
 
-def test_late_rows_take_their_place_and_too_late_ones_are_counted(log):
-    order = np.arange(len(log))
-    order[[80, 81, 82]] = [82, 80, 81]
-    track, found = pushed(log, order)
+@pytest.mark.parametrize("at_once", [1, 40])
+def test_late_rows_take_their_place_as_if_they_had_come_in_time(log, at_once):
+    """By less than the lag; one in ten, and the very first."""
+    rng = np.random.default_rng(4)
+    delay = np.where(rng.random(len(log)) < 0.1, rng.uniform(0, 0.99, len(log)), 0.0)
+    delay[0] = 0.5
+    order = np.argsort(log.time_s + delay, kind="stable")
+    track, whole = ftproc.Live(SETTINGS), ftproc.filter_log(log, SETTINGS)
+    parts = [track.push(log.time_s[k], *log.measurement[k].T, row=k) for k in batches(order, at_once)]
+    parts.append(track.finish())
     assert track.late == 0
-    assert (np.diff(found["time_s"]) >= 0).all()
-    assert sorted(found["row"]) == list(range(len(log)))
+    for name in ("row", "time_s", "state", "sigma", "outlier"):
+        np.testing.assert_array_equal(np.concatenate([getattr(part, name) for part in parts]), getattr(whole, name))
+
+
+def batches(order, at_once):
+    return [order[low : low + at_once] for low in range(0, len(order), at_once)]
+
+
+def clocked(log, delay_s, pause_after=None):
+    """The rows by the clock, as they come so long after their times, and so long after its lag each is published."""
+    track, parts, waited = ftproc.Live(SETTINGS), [], []
+    came_s = log.time_s + delay_s
+
+    def out(part, now_s):
+        parts.append(part)
+        waited.extend(now_s - came_s[part.row] - SETTINGS.lag_s)
+
+    for k in np.argsort(came_s, kind="stable"):
+        while track.due_s < came_s[k]:
+            now_s = track.due_s
+            out(track.due(now_s), now_s)
+        out(track.push(log.time_s[k], *log.measurement[k], row=k, came_s=came_s[k]), came_s[k])
+    while track.waiting:
+        now_s = track.due_s
+        out(track.due(now_s), now_s)
+    state = np.concatenate([part.state for part in parts])
+    return track, np.concatenate([part.row for part in parts]), state, np.array(waited)
+
+
+def test_rows_leave_by_the_clock_when_their_lag_has_passed(log):
+    """The last ones too, for which nothing comes any more; and they are those of the whole log."""
+    _, row, state, waited = clocked(log, np.zeros(len(log)))
+    assert waited.max() < 0.005
+    np.testing.assert_array_equal(row, np.arange(len(log)))
+    np.testing.assert_array_equal(state, ftproc.filter_log(log, SETTINGS).state)
+
+
+def test_rows_wait_longer_where_readings_come_late(log):
+    """The first late one changes only what had not left; from then on rows wait for as late ones."""
+    delay_s = np.zeros(len(log))
+    delay_s[60::9] = 0.35
+    track, row, state, waited = clocked(log, delay_s)
+    same = (state == ftproc.filter_log(log, SETTINGS).state[row]).all(1) | np.isnan(state[:, 0])
+    assert track.late == 0
+    assert (~same).sum() <= 4  # they had left before anybody was late
+    assert same[65:].all()
+    assert waited[:40].max() < 0.005
+    assert waited.max() <= 1.0
+
+
+def test_work_and_memory_are_bounded_when_all_rows_come_late(log):
+    track = ftproc.Live(SETTINGS)
+    for k in range(0, len(log) - 1, 2):
+        for row in (k + 1, k):
+            track.push(log.time_s[row], *log.measurement[row], row=row)
+    assert len(track._order._copies) < 5
+    assert len(track._order._fed[0]) < 1000
+
+
+def test_coasted_rows_change_nothing_that_comes_later(log):
+    track, parts, coasted = ftproc.Live(SETTINGS), [], []
+    for k in range(len(log)):
+        if k == 80:
+            parts.append(track.due(np.inf))
+            coasted = [track.coast(0.1 * n) for n in range(1, 11)]
+        parts.append(track.push(log.time_s[k], *log.measurement[k], row=k, came_s=0.0))
+    parts.append(track.finish())
+    whole = ftproc.filter_log(log, SETTINGS)
+    state = np.concatenate([part.state for part in parts])
+    np.testing.assert_array_equal(state[80:], whole.state[80:])
+    rows = np.concatenate([part.row for part in coasted])
+    sigma = np.concatenate([part.sigma for part in coasted])[:, 0]
+    np.testing.assert_array_equal(rows, -1)
+    np.testing.assert_allclose(
+        np.concatenate([part.time_s for part in coasted]), log.time_s[79] + 0.1 * np.arange(1, 11)
+    )
+    assert sigma[-1] > 2 * sigma[0]
+    off = np.linalg.norm(coasted[4].state[0, :3] - whole.state[84, :3])
+    assert off < 4 * np.linalg.norm(coasted[4].sigma[0, :3])
+
+
+def test_too_late_rows_are_counted(log):
     order = np.r_[np.arange(40), np.arange(41, len(log)), 40]
     track, found = pushed(log, order)
     assert track.late == 1

@@ -7,6 +7,7 @@ a row costs is bounded, and so is what is kept, whatever the times of the rows a
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable, Iterator
 
@@ -56,7 +57,7 @@ class LiveEditor:
         self.next_edit, self.next_refresh, self.next_work = FEWEST, 0, 0
         self.doubt, self.doubted = Doubt(), False  # and whether it is why all of the window is looked at,
         self.urgent = False  # at once
-        self.refreshed, self.inserted = 0, False  # rows that the last refresh has seen; and whether one came late since
+        self.refreshed = 0  # rows that the last refresh has seen
         self.pace, self.clock = pace_of(np.empty(0), lag_s), Clock()
         # The newest part, from this row on, with its labels, if there is a lag.
         self.smoothed: tuple[int, SmootherRun, FloatArray] | None = None
@@ -80,8 +81,6 @@ class LiveEditor:
                 if self.count >= self.next_edit and not self.clock.stands:
                     self._confirm()
             else:
-                if self.inserted:
-                    self._refresh(self.window)
                 if np.isfinite(measurement[low, list(self.absent)]).any():
                     self._begin_again()
                     continue
@@ -99,27 +98,19 @@ class LiveEditor:
             low = high
         return found
 
-    def insert(self, time_s: float, measurement: FloatArray) -> bool:
-        """Take a row that comes late, measurement (1, 3); whether that is possible: no row as late must have left, and
-        not too many wait."""
-        row = np.array([time_s]), with_stand_ins(measurement, self.absent)
+    def tick(self, now_s: float) -> list[Published]:
+        """The rows whose lag has passed at a time, of which no reading comes: they are those that leave with the next
+        reading after it. What follows is the same as without: where a refresh is needed, a copy makes it."""
         kept = self.waiting.time_s if self.window is None else self.window.time_s
-        place = int(np.searchsorted(kept, time_s, side="right"))
-        if place < self.published - self._first or (place == 0 and self.published > 0):
-            return False
-        if self.count - self.published >= self.pace.sizes.most_waiting:
-            return False
-        if self.window is None:
-            parts = (np.insert(old, place, new, 0) for old, new in zip(self.waiting, row, strict=True))
-            self.waiting = Waiting(*parts)
-            self.count += 1
-            return True
-        if self.lag_s == 0 or place <= self.window.near:
-            return False
-        self.window.insert(place, *row)
-        self.count += 1
-        self.inserted = True
-        return True
+        unseen = kept[self.refreshed - self._first :]
+        if self.window is None or self.lag_s == 0 or not len(unseen) or now_s <= unseen[0] + self.lag_s:
+            return self._due(now_s)
+        ahead = copy.deepcopy(self)
+        assert ahead.window is not None
+        ahead._refresh(ahead.window)
+        found = ahead._due(now_s)
+        self.published = ahead.published
+        return found
 
     def finish(self) -> list[Published]:
         """The rows that wait, when no more come."""
@@ -140,7 +131,7 @@ class LiveEditor:
         self.absent = tuple(np.flatnonzero(seen == 0).tolist())
         sigma = np.where(few & np.isnan(self.known.sigma), ASSUMED_SIGMA, self.known.sigma)
         readings, known = with_stand_ins(self.waiting.measurement, self.absent), self.known._replace(sigma=sigma)
-        window = self.kind(self.waiting.time_s, readings, known, self.pace.sizes)
+        window = self.kind(self.waiting.time_s, readings, known, self.pace.sizes, self.absent)
         try:
             window.edit()
         except ValueError:  # a component has too few readings that agree
@@ -244,7 +235,6 @@ class LiveEditor:
 
     def _refresh(self, window: Window) -> None:
         if self.refreshed < self.count:
-            self.inserted = False
             window.refresh()
             self._seen(window)
 

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing.screening import SHORTEST_STUCK, STUCK_ODDS
+from ftproc.order_statistics import medians
 
 FloatArray = NDArray[np.float64]
 
 LONGEST_ISOLATED = 2  # readings rejected in a row; more make a patch
+RECENT = 50  # samples whose noise the next ones are taken to have
 ROOM = 2  # times what is kept: so rarely is it copied
 
 
@@ -41,13 +43,6 @@ class Columns:
                 self._arrays[name] = array = grown
             array[self._count : count] = more
         self._count = count
-
-    def insert(self, place: int) -> None:
-        """Move the last row of each to a place."""
-        for array in self._arrays.values():
-            last = array[self._count - 1].copy()
-            array[place + 1 : self._count] = array[place : self._count - 1].copy()
-            array[place] = last
 
     def forget(self, rows: int) -> None:
         """Remove the first rows of each."""
@@ -120,3 +115,17 @@ class Repeats:
         if chance >= 1:
             return math.inf
         return max(math.log(STUCK_ODDS / self.seen[c]) / math.log(max(chance, 1e-300)), SHORTEST_STUCK - 1)
+
+
+def used_lately(measurement: FloatArray, weight: FloatArray, count: int) -> FloatArray:
+    """(3,) share of each component's last `count` readings (n, 3) that is used, by their weights (n, 3)."""
+    found = np.zeros(3)
+    for c in range(3):
+        seen = np.flatnonzero(np.isfinite(measurement[:, c]))[-count:]
+        found[c] = (weight[seen, c] > 0).mean() if len(seen) else 0.0
+    return found
+
+
+def typical(times: FloatArray, late: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """How the noise of the readings after some others differs, see `Uneven`: (3,) each."""
+    return medians(times[-RECENT:]), late[-1].copy()

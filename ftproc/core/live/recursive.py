@@ -30,12 +30,15 @@ class Gating(NamedTuple):
     longest_patch_s: float | None = None
     gain_form: bool = False
 
-    def window(self, time_s: FloatArray, measurement: FloatArray, known: two_pass.Known, sizes: Sizes) -> GatedWindow:
+    def window(
+        self, time_s: FloatArray, measurement: FloatArray, known: two_pass.Known, sizes: Sizes,
+        stand_ins: tuple[int, ...] = (),
+    ) -> GatedWindow:  # fmt: skip
         """A window that edits with it."""
         times = np.diff(time_s)
         interval_s = median(times[times > 0]) if (times > 0).any() else 1.0
         longest_s = self.longest_patch_s or max(PATCH_S, PATCH_SAMPLES * interval_s)
-        window = GatedWindow(time_s, measurement, known, sizes)
+        window = GatedWindow(time_s, measurement, known, sizes, stand_ins)
         window.how = gate.GateSettings(self.gate, longest_s, self.gain_form)
         return window
 

@@ -19,7 +19,3 @@ class Whole(Paced[Edited]):
     def __init__(self, edit: Callable[[], Edited], count: int) -> None:
         super().__init__(edit)
         self.samples: IntArray = np.arange(count)
-
-    def make_room(self, place: int) -> None:
-        """A sample has come in between, at a place of the window."""
-        self.samples[self.samples >= place] += 1

@@ -24,18 +24,16 @@ from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.identification.scales import Scales, scales_of
 from ftproc.core.live.pieces import BLOCK, Sizes, piece, predicted, stretched
 from ftproc.core.live.predictive_chain import OPEN, chains_of, run_predictive, run_predictive_coloured
-from ftproc.core.live.readings import LONGEST_ISOLATED, Columns, Labels, Repeats
+from ftproc.core.live.readings import LONGEST_ISOLATED, Columns, Labels, Repeats, typical, used_lately
 from ftproc.core.live.readmission import Open, readmitted, settled
 from ftproc.core.live.whole import Whole
 from ftproc.core.model.motion import Profile
-from ftproc.order_statistics import medians
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 SHORT = 160  # samples: with fewer, nothing is said of how the noise of single readings differs
 YOUNG, JUMPY = 40, 1.5  # samples with which a track is young, and intervals that its filter must remember
-RECENT = 50  # samples whose noise the next ones are taken to have
 DOUBTED, DOUBT = 12, 0.4  # readings, and share of them: with fewer good ones the track is in doubt
 JERK_STEPS = 2  # of the search for the jerk profile in a refresh
 SLIDES = 0.25  # of the newest part that it is longer before it is cut
@@ -45,17 +43,21 @@ class Window:
     """A track and the readings it rests on.
 
     white: whether its noise is taken for white and even, whatever it is. refresh_every: so many times less often than
-    usual.
+    usual. stand_ins: components whose readings are constants.
     """
 
     white, refresh_every = False, 1
 
-    def __init__(self, time_s: FloatArray, measurement: FloatArray, known: two_pass.Known, sizes: Sizes) -> None:
-        self.known, self.sizes, self.near = known, sizes, 0
+    def __init__(
+        self, time_s: FloatArray, measurement: FloatArray, known: two_pass.Known, sizes: Sizes,
+        stand_ins: tuple[int, ...] = (),
+    ) -> None:  # fmt: skip
+        self.known, self.sizes, self.stand_ins, self.near = known, sizes, stand_ins, 0
         self.repeats, self.labels = Repeats(), Labels()
         self.next_times, self.next_late = np.ones(3), np.zeros(3)  # how the noise of the next readings differs
         self.reacquired: list[int] = []  # samples at which a lost track was found again
         self.left = 0  # samples that did not wait for their lag, because too many did
+        self.forgotten, self.begun = 0, -1  # samples that are kept no more; and before the track's start, of all
         self.under_way: Whole | None = None
         nothing, ones = np.zeros((0, 3)), np.ones((0, 3))
         self.kept = Columns(
@@ -97,11 +99,7 @@ class Window:
 
     def used_lately(self, count: int) -> FloatArray:
         """(3,) share of each component's last `count` readings that is used."""
-        found = np.zeros(3)
-        for c in range(3):
-            seen = np.flatnonzero(np.isfinite(self.measurement[:, c]))[-count:]
-            found[c] = (self.kept["weight"][seen, c] > 0).mean() if len(seen) else 0.0
-        return found
+        return used_lately(self.measurement, self.kept["weight"], count)
 
     def in_doubt(self) -> bool:
         """Whether so few of a component's newest readings are used that it may be the track that is wrong."""
@@ -139,7 +137,7 @@ class Window:
         uneven = found.log.uneven or Uneven.none(len(samples))
         new = np.delete(np.arange(len(self)), samples)
         kept["weight"][samples] = found.weight
-        kept["weight"][new], kept["times"][new], kept["late"][new] = OPEN, *_typical(*uneven)
+        kept["weight"][new], kept["times"][new], kept["late"][new] = OPEN, *typical(*uneven)
         kept["times"][samples], kept["late"][samples] = uneven
         kept["weight"][~kept["possible"]] = 0.0
         starts = [start._replace(sample=int(samples[start.sample])) for start in found.starts]
@@ -149,10 +147,18 @@ class Window:
             kept["weight"][new] = self._filtered(log, span, found.model, found.model.filter(start))["weight"][new]
         model = found.model
         self.near = max(min(len(self) - self.sizes.near, self._waiting()), starts[0].sample, 0)
+        self._count_from(starts)
         self.anchor = self._ahead(starts, model, self.near)
         passed = piece(float(self.time_s[self.near] - self.time_s[0]), model)
         self.model = self.allowed = model._replace(jerk=model.jerk[min(passed, len(model.jerk) - 1) :])
         self.refresh()
+
+    def _count_from(self, starts: list[Start]) -> None:
+        """The age of the track counts from the last of these starts that is not after the newest part; from the first
+        one it counts on, if the track was there before."""
+        start = [s for s in starts if s.sample <= self.near][-1]
+        begun = self.forgotten + start.sample
+        self.begun = begun if self.begun < 0 or start is not starts[0] else min(self.begun, begun)
 
     def _ahead(self, starts: list[Start], model: Model, sample: int) -> Start:
         """The prediction at a sample, from the last start that is not after it."""
@@ -166,6 +172,7 @@ class Window:
         """Forget what is more than the window's size, but nothing that waits for its lag; how many samples."""
         drop = max(min(len(self) - self.sizes.window, self.near, self._waiting()), 0)
         self.kept.forget(drop)
+        self.forgotten += drop
         self.near, self.left = self.near - drop, max(self.left - drop, 0)
         self.reacquired = [sample - drop for sample in self.reacquired if sample >= drop]
         return drop
@@ -185,17 +192,10 @@ class Window:
             self._observed(slice(n - 1, len(self))), Span(1, 1 + len(time_s), 0), self.allowed, self.filters,
             self.chains, first_s,
         )  # fmt: skip
+        rows["since_start"] += self.kept["rows"]["since_start"][n - 1]
         self.kept["weight"][n:], self.kept["rows"][n:] = rows["weight"][1:], rows[1:]
         self.kept["label"][n:] = self.labels.add(rows["weight"][1:], measurement)
         self._bar(stuck)
-
-    def insert(self, place: int, time_s: FloatArray, measurement: FloatArray) -> None:
-        """Take a sample, time_s (1,), measurement (1, 3), that belongs before that at a place in the newest part."""
-        self._bar(self._take(time_s, measurement))
-        self.kept.insert(place)
-        self.reacquired = [sample + (sample >= place) for sample in self.reacquired]
-        if self.under_way is not None:
-            self.under_way.make_room(place)
 
     def _take(self, time_s: FloatArray, measurement: FloatArray) -> list[tuple[IntArray, int]]:
         """Keep the next readings, undecided where they may be good at all: no target is at the station, or behind it,
@@ -208,7 +208,9 @@ class Window:
             label=np.zeros((m, 3)), times=np.tile(self.next_times, (m, 1)), late=np.tile(self.next_late, (m, 1)),
             rows=empty_rows(m),
         )  # fmt: skip
-        repeated, stuck = [], self.repeats.stuck(measurement)
+        moving = measurement.copy()
+        moving[:, self.stand_ins] = np.nan
+        repeated, stuck = [], self.repeats.stuck(moving)
         for (k, c, run), after in itertools.zip_longest(stuck, stuck[1:]):
             if after is None or after[1:] != (c, run + 1):  # the run ends here, and holds those before
                 repeated.append((np.flatnonzero(np.isfinite(self.measurement[: n + k + 1, c]))[-run:], c))
@@ -262,10 +264,12 @@ class Window:
             self.allowed = self._with_allowance(log, scales)
         self.filters, self.chains = self.allowed.filter(self.anchor), self._chains(self.allowed)
         span = Span(0, len(log.time_s), 0)
-        self.kept["rows"][near] = self._filtered(log, span, self.allowed, self.filters, self.chains)
+        rows = self._filtered(log, span, self.allowed, self.filters, self.chains)
+        rows["since_start"] += self.forgotten + self.near - self.begun
+        self.kept["rows"][near] = rows
         self.kept["label"][near] = outlier_chain.label_runs(log.weight, log.measurement, LONGEST_ISOLATED)
         self.labels.reset(log.weight, log.measurement)
-        self.next_times, self.next_late = _typical(self.kept["times"], self.kept["late"])
+        self.next_times, self.next_late = typical(self.kept["times"], self.kept["late"])
 
     def _chains(self, model: Model) -> Any:
         return chains_of(self.rates, model.reading_variance, self.known.gate)
@@ -293,8 +297,3 @@ class Window:
         passed = piece(float(times[ahead]) - first_s, self.model)
         jerk = self.model.jerk
         self.model = self.model._replace(jerk=jerk[min(passed, len(jerk) - 1) :])
-
-
-def _typical(times: FloatArray, late: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """How the noise of the readings after some others differs, see `Uneven`: (3,) each."""
-    return medians(times[-RECENT:]), late[-1].copy()

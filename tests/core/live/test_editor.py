@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from functools import cache
 
 import numpy as np
@@ -170,3 +171,37 @@ def test_rows_wait_for_a_track_in_memory_that_does_not_grow(flight):
         editor.push(20.0 * k + 0.1 * np.arange(200), readings)
         assert len(editor.waiting.time_s) < 4000
     assert editor.window is None or len(editor.window) < 4000
+
+
+@pytest.mark.parametrize("way", ["live", "lag"])
+def test_rows_leave_by_the_clock_as_they_would_with_the_next_reading(flight, whole, way):
+    """Ticks between readings, and copies that go on: all rows are the same, and leave when their lag has passed."""
+    log, found = flight.log, []
+    editor, lag_s = live.editor(FilterSettings(**WAYS[way])), WAYS[way].get("lag_s", 0.0)
+    for k, moment in enumerate(log.time_s[:-1]):
+        found += editor.push(log.time_s[k : k + 1], log.measurement[k : k + 1])
+        found += editor.tick(moment + 0.035)
+        assert editor.count - editor.published == (log.time_s[: k + 1] + lag_s >= moment + 0.035).sum()
+        if k % 50 == 20:
+            editor = copy.deepcopy(editor)
+    state = np.concatenate([each.rows["state"] for each in found])
+    np.testing.assert_array_equal(state, whole(way)["state"][: len(state)])
+    assert len(state) > len(whole(way)["state"]) - 2
+
+
+@pytest.mark.parametrize("absent", [(0,), (2,), (1, 2)])
+@pytest.mark.parametrize("way", ["live", "lag", "forward"])
+def test_a_track_of_fewer_components_is_confirmed(flight, way, absent):
+    """Angles alone, or no elevation: what stands in for the others is not taken for stuck."""
+    measurement = flight.log.measurement[:150].copy()
+    measurement[:, list(absent)] = np.nan
+    editor = live.editor(FilterSettings(**WAYS[way]))
+    found = editor.push(flight.log.time_s[:150], measurement)
+    assert editor.absent == absent
+    label = np.concatenate([each.label for each in found])
+    known = np.concatenate([each.known for each in found])
+    assert known[40:].all()
+    assert (label[:, list(absent)] == 3).all()
+    there = [c for c in range(3) if c not in absent]
+    bad = flight.truth.outlier[: len(label), there] > 0
+    assert (label[40:, there][bad[40:]] > 0).mean() > (0.3 if way == "forward" else 0.7)

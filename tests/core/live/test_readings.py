@@ -51,7 +51,7 @@ def test_labels_go_on_from_the_decisions_that_they_are_reset_to(before, after):
     )
 
 
-@given(st.lists(st.tuples(st.sampled_from(["append", "insert", "forget"]), st.integers(0, 9)), max_size=30))
+@given(st.lists(st.tuples(st.sampled_from(["append", "forget"]), st.integers(0, 9)), max_size=30))
 def test_columns_are_lists_of_rows(steps):
     columns, rows, fresh = Columns(a=np.zeros(0), b=np.zeros((0, 2))), [], iter(range(10_000))
     for step, amount in steps:
@@ -60,13 +60,9 @@ def test_columns_are_lists_of_rows(steps):
             columns.forget(gone)
             rows = rows[gone:]
             continue
-        new = [float(next(fresh)) for _ in range(1 if step == "insert" else amount)]
+        new = [float(next(fresh)) for _ in range(amount)]
         columns.append(a=np.array(new), b=np.array([[v, -v] for v in new]).reshape(-1, 2))
         rows += new
-        if step == "insert":
-            place = min(amount, len(rows) - 1)
-            columns.insert(place)
-            rows.insert(place, rows.pop())
     assert len(columns) == len(rows)
     np.testing.assert_array_equal(columns["a"], rows)
     np.testing.assert_array_equal(columns["b"], np.array([[v, -v] for v in rows]).reshape(-1, 2))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import threading
 from functools import partial
@@ -11,7 +12,6 @@ import pytest
 
 from ftproc.core import pacing
 from ftproc.core.editing import two_pass
-from ftproc.core.live import pace
 from ftproc.core.live.whole import Whole
 from ftproc.core.pacing import PASS
 from ftproc.methods import live
@@ -59,10 +59,16 @@ def test_what_a_turn_takes_too_much_is_taken_from_the_next():
     assert whole.found == "edited"
 
 
-def test_a_row_that_comes_in_between_moves_those_after_it():
-    whole = Whole(sweeping(1, 1, 1), 5)
-    whole.make_room(3)
-    assert whole.samples.tolist() == [0, 1, 2, 4, 5]
+def test_a_copy_goes_on_where_it_was_made():
+    """Whatever its twin does meanwhile."""
+    one = 100.0 + PASS
+    whole = Whole(sweeping(*[100] * 8), 100)
+    assert not whole.go_on(3 * one)
+    copied = copy.deepcopy(whole)
+    turns = [whole.go_on(one) for _ in range(6)]
+    assert turns[3:] == [False, True, True]
+    assert [copied.go_on(one) for _ in range(6)] == turns
+    assert copied.samples.tolist() == whole.samples.tolist()
 
 
 def test_no_turn_does_much_more_than_its_share(flight, monkeypatch):
@@ -83,26 +89,6 @@ def test_no_turn_does_much_more_than_its_share(flight, monkeypatch):
     assert len(taken) > 5
     assert all(spent <= share + 4 * a_pass for spent, share, a_pass in taken)
     assert any(spent < share for spent, share, _ in taken)
-
-
-def test_a_late_row_may_come_while_it_lasts(flight, monkeypatch):
-    monkeypatch.setattr(pace, "WORK_PER_S", 2e4)  # so that it lasts
-    t, z = flight.log.time_s, flight.log.measurement
-    editor = live.editor(FilterSettings(editing="live", lag_s=1.0))
-    found, taken, late = [], [], 0
-    for k in range(0, len(t) - 2, 3):
-        found += editor.push(t[[k, k + 2]], z[[k, k + 2]])
-        taken += [k, k + 2]
-        if editor.insert(float(t[k + 1]), z[[k + 1]]):
-            taken.append(k + 1)
-            late += editor.window is not None and editor.window.under_way is not None
-    assert late > 20
-    state = np.concatenate([each.rows["state"] for each in found])
-    there = np.isfinite(state[:, 0])
-    truth = flight.truth.position_m[sorted(taken)][: len(state)]
-    off = np.linalg.norm(state[there, :3] - truth[there], axis=1)
-    assert there[40:].all()
-    assert np.median(off) < 5.0
 
 
 def test_errors_are_those_of_the_work():
