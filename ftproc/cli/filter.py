@@ -104,10 +104,30 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     "--follow",
     is_flag=False,
     flag_value="csv",
-    type=click.Choice(["csv", "jsonl"]),
-    metavar="[csv|jsonl]",
-    help="Read a log that still grows (a file, or - for standard input) with live editing, and write each row as soon "
-    "as its lag has passed: on standard output as CSV or JSON lines, or to -o. Ctrl-C ends it, with a whole file.",
+    type=options.FILE,
+    metavar="[csv|jsonl|LOG]",
+    help="Read a log that still grows with live editing: a file, - for standard input, udp://HOST:PORT or "
+    "tcp://HOST:PORT. Each row is written as soon as its lag has passed: on standard output as CSV or JSON lines, or "
+    "to -o. Ctrl-C ends it, with a whole file.",
+)
+@click.option(
+    "--state",
+    type=options.FILE,
+    metavar="FILE",
+    help="With --follow: keep in this file what lets the same command go on after a crash, with no row lost or twice.",
+)
+@click.option(
+    "--coast",
+    type=options.seconds,
+    metavar="S",
+    help="With --follow: go on for S seconds when no reading comes, with rows of no reading (row -1) and their sigmas.",
+)
+@click.option(
+    "--heartbeat",
+    type=options.number,
+    metavar="S",
+    help="With --follow: say every S seconds that all is well, in a line among the rows on standard output, else on "
+    "standard error.",
 )
 @options.report("a trajectory, its readings and residuals, and the verdict")
 @click.option(
@@ -147,6 +167,12 @@ def command(list_methods: str | None, write_config: bool, explain: bool, follow:
         from ftproc.cli import filtering
 
         click.echo(filtering.station_file(ctx), nl=False)
+    elif follow is not None and not explain:
+        from ftproc.cli import filtering
+
+        filtering.follow(ctx, follow)
+    elif any(options.pop(name) for name in ("state", "coast", "heartbeat")):
+        raise click.UsageError("--state, --coast and --heartbeat do nothing without --follow. Leave them out.", ctx)
     elif not options["logs"]:
         from ftproc.cli import explaining
 
@@ -156,15 +182,6 @@ def command(list_methods: str | None, write_config: bool, explain: bool, follow:
         from ftproc.cli import explaining, filtering
 
         ctx.exit(explaining.explain(options["logs"], filtering.recipe(ctx), options["summary"], ctx.meta[DEBUG]))
-    elif follow is not None:
-        from ftproc.cli import filtering
-        from ftproc.live.publishing import follow_log
-
-        recipe = filtering.followed_recipe(ctx)
-        config = [options["config"]] if options["config"] is not None else []
-        said = follow_log(options["logs"], options["output"], recipe, follow, filtering.notify, config)
-        if options["summary"] != "none":
-            filtering.notify(said)
     else:
         start_quickly()
         from ftproc.cli import filtering

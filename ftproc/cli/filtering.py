@@ -29,15 +29,16 @@ from ftproc.settings import NO_MODEL, PACKAGED
 
 _ASK_FOR_NOTHING = (("model", PACKAGED), ("model", NO_MODEL), ("target", ABSENT), ("summary", "none"))
 
+
+FORMS = ("csv", "jsonl")
+
 _WHOLE = "Leave it out, or filter the log without --follow when it is complete."
 _PIPE = "Let only the rows that count through a program such as awk, and follow -."
 #: Options that --follow does not honour -> what it does instead, and what to do.
 _NOT_FOLLOWED = {
     "where": f"reads every row. {_PIPE}",
-    "target": f"takes every row for the same target. {_PIPE}",
     "keep_columns": f"copies no other columns. {_WHOLE}",
     "smooth": f"knows no later rows. {_WHOLE}",
-    "report": f"writes rows only. {_WHOLE}",
     "model": "corrects nothing with a network. Leave it out.",
     "jobs": "runs in one process. Leave it out.",
     "scheduler": "runs in one process. Leave it out.",
@@ -57,9 +58,31 @@ class Request(NamedTuple):
     report: str | None
 
 
-def followed_recipe(ctx: click.Context) -> Recipe:
-    """How a log that grows is filtered: as `recipe`, with live editing where nothing else is stated. Raises UsageError
-    for options on the command line that --follow does not honour, too."""
+def follow(ctx: click.Context, what: str) -> None:
+    """Follow a log to its end. what: the value of --follow, a form of the rows on standard output, or the log. Raises
+    FtprocError."""
+    given = stated(ctx)
+    logs = [*given.get("logs", ()), *([] if what in FORMS else [what])]
+    if len(logs) != 1:
+        raise UsageError(
+            "--follow reads one log; name a file that grows, udp://HOST:PORT, tcp://HOST:PORT, or - for standard input."
+        )
+    found = _followed_recipe(ctx)
+    from ftproc.live import publishing
+
+    request = publishing.Request(
+        logs[0], given.get("output") or outputs.STREAM, what if what in FORMS else "csv", given.get("state"),
+        given.get("coast", 0.0), given.get("heartbeat", 0.0), given.get("report"),
+        [given["config"]] if "config" in given else [],
+    )  # fmt: skip
+    said = publishing.follow_log(request, found, notify)
+    if given.get("summary") != "none":
+        notify(said)
+
+
+def _followed_recipe(ctx: click.Context) -> Recipe:
+    """How a log that grows is filtered: with live editing where nothing else is stated. Raises UsageError for options
+    on the command line that --follow does not honour, too."""
     given = stated(ctx)
     for name, cure in _NOT_FOLLOWED.items():
         if given.get(name) and (name, given[name]) not in _ASK_FOR_NOTHING:
@@ -68,6 +91,10 @@ def followed_recipe(ctx: click.Context) -> Recipe:
         raise UsageError(
             f"--editing {given['editing']} is not for --follow, which decides on each row as it comes. Say --editing "
             "live or forward, or leave it out."
+        )
+    if str(given.get("report", "")).endswith(("/", ".pdf")):
+        raise UsageError(
+            f"--report {given['report']}: with --follow it is one page that opens in a browser; end its name in .html."
         )
     found = recipe(ctx, live=True)
     registry.check_parameters(found.settings)

@@ -65,6 +65,18 @@ class Reader:
                 self._judge()
         return self._table.converted(readings), fault
 
+    def cell(self, line: str, name: str) -> str | None:
+        """The cell of a row in the column of that name; None where it has none. Raises InputError when no column is
+        called so."""
+        assert self._table is not None
+        if name not in self._table.names:
+            raise InputError(
+                f'{self._source}: there is no column "{name}"; its columns are {", ".join(self._table.names)}. Name '
+                "one of them with --target."
+            )
+        cells = self._table._cells(line)
+        return None if cells is None else cells[self._table.names.index(name)].strip()
+
     def finish(self) -> None:
         """When no more lines come. Raises InputError when there was no table."""
         if self._table is None:

@@ -1,83 +1,126 @@
-"""A log that still grows: its rows are taken as they come, and what is published leaves at once."""
+"""A stream is followed: what comes is taken when it comes, rows leave when their lag has passed by the clock, and what
+a run that was killed had done is done again first."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
-import numpy as np
+from ftproc.errors import InputError
+from ftproc.live.growing import Say
+from ftproc.live.sources import File, opened
+from ftproc.live.state import Entry, Kind, StateFile
+from ftproc.live.stop import Source, Stop
+from ftproc.live.stream import Stream
+from ftproc.records import Trajectory
 
-from ftproc.config.recipe import Recipe
-from ftproc.errors import InputError, UsageError
-from ftproc.live.columns import Reader
-from ftproc.live.growing import LINES, Say, Stop, blocks
-from ftproc.live.live import Live
-from ftproc.records import FloatArray, IntArray, Trajectory, joined
-
-AT_ONCE_S = 0.1  # that a push of some rows may take, about, so that a stop is heard between two
-LATE = 100  # rows that came too late, after which it is said
-
-
-def follow(source: str, recipe: Recipe, track: Live, stop: Stop, say: Say) -> Iterator[Trajectory]:
-    """The rows that are published while a log grows: a file, which has no end, or `-` for standard input. Ends at the
-    end of the input, when a stop is asked for, or at a row that is not understood. Whatever ends it, the rows before it
-    are published first. say: takes a sentence for the user. Raises InputError for a log, or a row, that is not
-    understood, and when no row came."""
-    if recipe.station.refraction is not None:
-        raise UsageError("--follow corrects no refraction, which needs the ranges around each reading; leave it out.")
-    reader, taken, used, fault = Reader(source, recipe, say), 0, 0, None
-    pushing = _Pushing(source, track, stop, say)
-    try:
-        for block in blocks(source, stop, say):
-            readings, fault = reader.read(block)
-            timed = np.flatnonzero(np.isfinite(readings[:, 0]))
-            if parts := pushing.push(readings[timed], taken + timed):
-                yield joined(parts)
-            taken, used = taken + len(readings), used + len(timed)
-            if fault is not None:
-                break
-        else:
-            reader.finish()
-            if not used:
-                fault = InputError(f"{source}: no row has a time, so nothing is written; fill the times in.")
-            elif used < taken:
-                say(f"{source}: {taken - used} rows have no time, and are left out.")
-    except InputError as error:
-        fault = error
-    if len(found := track.finish()):
-        yield found
-    if fault is not None:
-        raise fault
+MOMENT_S = 0.5  # at the latest between two moments
 
 
-class _Pushing:
-    """Pushes rows, as few at once as keep a stop from waiting for long; what is published does not depend on it."""
+class Following:
+    """The following of one stream. delivered: rows that have gone out."""
 
-    def __init__(self, source: str, track: Live, stop: Stop, say: Say) -> None:
-        self._source, self._track, self._stop, self._say = source, track, stop, say
-        self._count, self._said = 1, False
+    def __init__(self, stream: Stream, stop: Stop, say: Say, state: StateFile | None = None) -> None:
+        self.stream, self.stop, self._say, self._state = stream, stop, say, state
+        self.delivered, self.again = 0, 0  # rows that have gone out, and that a run before had published since
+        self._ahead_s = 0.0  # of the clock, before the system's
+        self._place: tuple[int, bytes] | None = None
+        self._source: Source | None = None
 
-    def push(self, readings: FloatArray, numbers: IntArray) -> list[Trajectory]:
-        """The parts that are published, none of them empty; readings (n, 4), numbers (n,) of their rows."""
-        found, low = [], 0
-        while low < len(readings) and not self._stop.overdue:
-            began_s, high = time.monotonic(), low + self._count
-            time_s, range_m, azimuth_rad, elevation_rad = readings[low:high].T
-            part = self._track.push(time_s, range_m, azimuth_rad, elevation_rad, numbers[low:high])
-            found += [part] if len(part) else []
-            slow = time.monotonic() - began_s > AT_ONCE_S
-            self._count = max(self._count // 2, 1) if slow else min(2 * self._count, LINES)
-            low = high
-        if low < len(readings):
-            self._say(f"{self._source}: stopped before {len(readings) - low} rows that had been read were used.")
-        self._say_late()
-        return found
+    @property
+    def now_s(self) -> float:
+        """The time of the clock, which goes on from run to run."""
+        return time.monotonic() + self._ahead_s
 
-    def _say_late(self) -> None:
-        """Say it when many rows come too late: one time that is far too large makes all after it late."""
-        if self._track.late >= LATE and not self._said:
-            self._said = True
-            self._say(
-                f"{self._source}: {LATE} rows came too late to be used: the time of a row before them is "
-                f"{self._track.newest_s:g} s. If that is wrong, correct it, and follow the log again."
-            )
+    def rows(self) -> Iterator[Trajectory | None]:
+        """What is published, as it is; None between: a moment at which all that has come is done. Raises InputError for
+        a log, or a row, that is not understood, when what came before is out, and when no row came."""
+        try:
+            yield from self._again()
+            with opened(self.stream.source) as source:
+                self._source = source
+                if self._place is not None and isinstance(source, File):
+                    source.place = self._place
+                yield from self._follow(source)
+        except InputError as error:
+            self.stream.fault = self.stream.fault or error
+        yield from self.stream.finish(self.stop)
+        yield None
+
+    def kept(self, output: Mapping[str, Any] | None) -> dict[str, Any]:
+        """What a later run must know, at such a moment."""
+        place = self._source.place if isinstance(self._source, File) else self._place
+        stream = {name: value for name, value in self.stream.__dict__.items() if name not in Stream.kept_apart}
+        return {
+            "stream": stream, "output": output, "now_s": self.now_s, "place": place, "delivered": self.delivered,
+        }  # fmt: skip
+
+    def _follow(self, source: Source) -> Iterator[Trajectory | None]:
+        while self.stream.fault is None:
+            data = self._looked(source)
+            now_s = self.now_s
+            if source.news:
+                news, source.news = source.news, ""
+                self._keep(Entry(now_s, Kind.NEWS, news.encode()))
+                self.stream.begin_again(news)
+            elif data is None:
+                yield from self._done(Entry(now_s, Kind.TICK))
+            elif not data:
+                return
+            else:
+                self._keep(Entry(now_s, Kind.DATA, data))
+                yield from self._done(Entry(now_s, Kind.DATA, data))
+            yield None
+
+    def _looked(self, source: Source) -> bytes | None:
+        """What comes before something is due by the clock."""
+        moment_s = time.monotonic() + MOMENT_S
+        try:
+            return self.stop.read(source, min(self.stream.due_s - self._ahead_s, moment_s))
+        except OSError as error:
+            raise InputError(
+                f"{self.stream.source}: cannot be read any more ({error.strerror or error}); check the file."
+            ) from error
+
+    def _done(self, entry: Entry) -> Iterator[Trajectory]:
+        """What is published of something that came; a tick is kept if it publishes anything."""
+        if entry.kind == Kind.DATA:
+            yield from self.stream.take(entry.data, entry.now_s, self.stop)
+        elif self.stream.due_s <= entry.now_s:
+            self._keep(entry)
+            yield from self.stream.tick(entry.now_s)
+
+    def _keep(self, entry: Entry) -> None:
+        if self._state is not None:
+            self._state.add(entry)
+
+    def _again(self) -> Iterator[Trajectory | None]:
+        """What a run before had published since it kept all that it knew, and where that was."""
+        if self._state is None or self._state.known is None:
+            return
+        known, stream = self._state.known, self.stream
+        said, stream._say = stream._say, lambda _: None
+        for track in known["stream"]["tracks"].values():
+            track.resume(stream.recipe.settings)
+        stream.__dict__.update(known["stream"])
+        if stream._begun:
+            stream.understand_again()
+        self._place, now_s = known["place"], known["now_s"]
+        self.delivered = known["delivered"]
+        for entry in self._state.since:
+            now_s = entry.now_s
+            if entry.kind == Kind.NEWS:
+                stream.begin_again(entry.data.decode())
+                self._place = (0, b"")
+            elif entry.kind == Kind.DELIVERED:
+                continue
+            else:
+                yield from self._done(entry)
+                if self._place is not None and entry.data:
+                    place, end = self._place
+                    self._place = place + len(entry.data), (end + entry.data)[-256:]
+        stream._say = said
+        self._ahead_s = now_s - time.monotonic()
+        self._say(f"{stream.source}: goes on after {stream.taken} rows, which an earlier run had read.")
+        yield None

@@ -5,13 +5,16 @@ from __future__ import annotations
 import io
 import json
 import signal
+import time
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from ftproc.live import growing
+from ftproc.live import sources
+from ftproc.live.outputs import page
+from ftproc.live.outputs import rows as growing_rows
 from tests.simulated import simulate
 
 HEADER = "time_s,range_m,azimuth_rad,elevation_rad"
@@ -36,7 +39,7 @@ def ends(monkeypatch):
     """ends(signal) -> a file has no more lines: this signal comes when they have been read."""
 
     def by(number: int) -> None:
-        monkeypatch.setattr(growing.time, "sleep", lambda _seconds: signal.raise_signal(number))
+        monkeypatch.setattr(sources.time, "sleep", lambda _seconds: signal.raise_signal(number))
 
     return by
 
@@ -56,10 +59,9 @@ def test_zenith_angles_are_known_by_the_name_of_their_column(run, here, rows):
     ("options", "sentence"),
     [
         (["--where", "q=1"], "--where is not for --follow, which reads every row. Let only the rows that count"),
-        (["--target", "q=1"], "--target is not for --follow, which takes every row for the same target."),
         (["--keep-columns"], "--keep-columns is not for --follow, which copies no other columns. Leave it out, or"),
         (["--smooth"], "--smooth is not for --follow, which knows no later rows."),
-        (["--report", "a.html"], "--report is not for --follow, which writes rows only."),
+        (["--report", "a.pdf"], "--report a.pdf: with --follow it is one page that opens in a browser; end its name"),
         (["--model", "m.safetensors"], "--model is not for --follow, which corrects nothing with a network."),
         (["--jobs", "2"], "--jobs is not for --follow, which runs in one process."),
         (["--scheduler", "tcp://10.0.0.1:8786"], "--scheduler is not for --follow, which runs in one process."),
@@ -174,3 +176,114 @@ def test_a_sidecar_never_replaces_a_file_of_somebody_else(run, here, rows):
     assert "out.json" in result.err
     assert Path("out.json").read_text() == "[1, 2]"
     assert not Path("out.csv").exists()
+
+
+def test_the_log_may_be_the_value_of_follow(run, here, rows):
+    Path("a.csv").write_text(text(HEADER, *rows))
+    whole = run("filter", "a.csv", "--editing", "live", "-o", "-", "--summary", "none")
+    followed = run("filter", "--follow", "-", "--summary", "none", stdin=text(HEADER, *rows))
+    assert (followed.code, followed.out) == (0, whole.out)
+    result = run("filter", "a.csv", "--follow", "b.csv")
+    assert (result.code, result.out) == (2, "")
+    assert "--follow reads one log; name a file that grows, udp://HOST:PORT, tcp://HOST:PORT, or - for" in result.err
+
+
+@pytest.mark.parametrize("option", [("--state", "s"), ("--coast", "2"), ("--heartbeat", "2")])
+def test_what_only_a_followed_log_has_is_refused_for_others(run, here, rows, option):
+    Path("a.csv").write_text(text(HEADER, *rows))
+    result = run("filter", "a.csv", *option)
+    assert result.code == 2
+    assert "do nothing without --follow" in result.err
+
+
+@pytest.mark.parametrize("option", ["-o", "--state", "--report"])
+def test_no_output_is_the_log(run, here, rows, option):
+    Path("a.csv").write_text(text(HEADER, *rows))
+    Path("a.html").symlink_to("a.csv")
+    result = run("filter", "a.csv", "--follow", option, "a.html" if option == "--report" else "a.csv")
+    assert result.code in (1, 2)
+    assert "never overwritten" in result.err
+    assert Path("a.csv").read_text() == text(HEADER, *rows)
+
+
+def grown(monkeypatch, lines, between):
+    """A file that gets these lines one by one, with something between; then the program is stopped."""
+    path, left = Path("a.csv"), list(lines)
+    path.write_text("")
+
+    def nap(_seconds):
+        if not left:
+            signal.raise_signal(signal.SIGTERM)
+        else:
+            with path.open("a") as file:
+                file.write(f"{left.pop(0)}\n")
+            between(len(left))
+
+    monkeypatch.setattr(sources.time, "sleep", nap)
+
+
+@pytest.mark.parametrize("output", ["out.csv", "out.jsonl", "out.parquet", "out.csv.gz"])
+def test_a_file_is_seen_to_grow_and_is_whole_at_any_time(run, here, rows, monkeypatch, output):
+    seen = []
+    monkeypatch.setattr(growing_rows, "EVERY_S", 0.0)
+
+    def look(_left):
+        if Path(output).exists():
+            found = read(output)
+            assert found["row"].tolist() == list(range(len(found)))
+            seen.append(len(found))
+
+    grown(monkeypatch, [HEADER, *rows], look)
+    assert run("filter", "--follow", "a.csv", "-o", output).code == 0
+    assert len(set(seen)) > 50
+    assert max(seen) >= len(rows) - 2
+    assert read(output)["row"].tolist() == list(range(len(rows)))
+    metadata = Path("out.json")
+    if output != "out.parquet":
+        assert json.loads(metadata.read_text())["summary"]["rows"] == len(rows)
+
+
+def read(output):
+    kind = output.partition(".")[2]
+    return pd.read_parquet(output) if kind == "parquet" else pd.read_json(output, lines=True) if kind == "jsonl" else (
+        pd.read_csv(output)
+    )  # fmt: skip
+
+
+def test_a_page_follows_and_stands_still_at_the_end(run, here, rows, monkeypatch):
+    pytest.importorskip("plotly")
+    monkeypatch.setattr(page, "EVERY_S", 0.0)
+    pages = set()
+
+    def look(left):
+        if left == 5:
+            while not Path("live.html").exists():
+                time.sleep(0.05)
+        if Path("live.html").exists():
+            pages.add(Path("live.html").read_text("utf-8"))
+
+    time_sleep = time.sleep
+    grown(monkeypatch, [HEADER, *rows], look)
+    nap = sources.time.sleep
+    monkeypatch.setattr(sources.time, "sleep", lambda s: time_sleep(s) if s == 0.05 else nap(s))
+    assert run("filter", "--follow", "a.csv", "-o", "out.csv", "--report", "live.html").code == 0
+    assert pages
+    assert all(text.endswith("</html>\n") and 'http-equiv="refresh"' in text for text in pages)
+    last = Path("live.html").read_text("utf-8")
+    assert last.endswith("</html>\n")
+    assert 'http-equiv="refresh"' not in last
+
+
+@pytest.mark.parametrize("form", ["csv", "jsonl"])
+def test_a_heartbeat_is_a_line_that_is_no_row(run, here, rows, monkeypatch, form):
+    grown(monkeypatch, [HEADER, *rows], lambda _left: None)
+    result = run("filter", "a.csv", "--follow", form, "--heartbeat", "1e-9")
+    lines = result.out.splitlines()
+    if form == "csv":
+        assert any(line.startswith("# heartbeat: utc ") for line in lines)
+        assert len(pd.read_csv(io.StringIO(result.out), comment="#")) == len(rows)
+    else:
+        found = [json.loads(line) for line in lines]
+        beats = [each["heartbeat"] for each in found if "heartbeat" in each]
+        assert beats[-1]["rows"] > 50
+        assert len(found) - len(beats) == len(rows)

@@ -8,22 +8,25 @@ import numpy as np
 import pytest
 
 from ftproc.config.recipe import Recipe
-from ftproc.live import following, growing
-from ftproc.live.following import follow
-from ftproc.live.growing import Stop
+from ftproc.live import sources, stream
+from ftproc.live import stop as stop_module
+from ftproc.live.following import Following
 from ftproc.live.live import Live
+from ftproc.live.stop import Stop
+from ftproc.live.stream import Stream
 from ftproc.settings import FilterSettings
 from tests.trust.streams import BAD_TIMES, flight, lines
 
 HEADER = "time_s,range_m,azimuth_rad,elevation_rad\n"
 
 
-def followed(tmp_path, monkeypatch, rows, stop=None, settings=FilterSettings(editing="live")):  # noqa: B008
+def followed(tmp_path, monkeypatch, rows, stop=None):
     """The numbers of the rows that are published, and what is said, of a file that does not grow."""
     stop, said, path = stop or Stop(), [], tmp_path / "a.csv"
     path.write_text(HEADER + "".join(f"{row}\n" for row in rows))
-    monkeypatch.setattr(growing.time, "sleep", lambda _seconds: stop._ask(signal.SIGTERM, None))
-    parts = list(follow(str(path), Recipe(), Live(settings), stop, said.append))
+    monkeypatch.setattr(sources.time, "sleep", lambda _seconds: stop._ask(signal.SIGTERM, None))
+    log = Stream(str(path), Recipe(settings=FilterSettings(editing="live")), said.append)
+    parts = [part for part in Following(log, stop, said.append).rows() if part is not None]
     return np.concatenate([part.row for part in parts]), said
 
 
@@ -38,11 +41,11 @@ def test_a_stop_that_is_overdue_leaves_out_what_was_read_and_says_so(tmp_path, m
     def slowly(self, *rows):
         if self._taken > 30:
             stop._ask(signal.SIGINT, None)
-            monkeypatch.setattr(growing, "GRACE_S", -1.0)
+            monkeypatch.setattr(stop_module, "GRACE_S", -1.0)
         return push(self, *rows)
 
     monkeypatch.setattr(Live, "push", slowly)
-    monkeypatch.setattr(following, "AT_ONCE_S", 0.0)  # so that rows are pushed one by one
+    monkeypatch.setattr(stream, "AT_ONCE_S", 0.0)  # so that rows are pushed one by one
     rows, said = followed(tmp_path, monkeypatch, of_flight(100), stop)
     assert rows.tolist() == list(range(32))
     assert said[-1].endswith("a.csv: stopped before 68 rows that had been read were used.")
@@ -59,7 +62,7 @@ def test_rows_that_have_been_read_are_used_after_a_stop(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("at_once_s", [0.0, 1e9])
 def test_what_is_published_does_not_depend_on_how_much_is_pushed_at_once(tmp_path, monkeypatch, at_once_s):
-    monkeypatch.setattr(following, "AT_ONCE_S", at_once_s)
+    monkeypatch.setattr(stream, "AT_ONCE_S", at_once_s)
     rows, _ = followed(tmp_path, monkeypatch, of_flight(120))
     assert rows.tolist() == list(range(120))
 

@@ -22,7 +22,7 @@ import numpy as np
 from ftproc.config.recipe import Recipe
 from ftproc.errors import FtprocError
 from ftproc.files.reading import trajectories
-from ftproc.live.publishing import follow_log
+from ftproc.live.publishing import Request, follow_log
 from ftproc.records import FloatArray, IntArray, Trajectory
 from ftproc.settings import FilterSettings
 from ftproc.simulation import Simulation, simulate
@@ -219,7 +219,7 @@ def judge(attack: Attack, directory: Path) -> str:
         mock.patch.object(sys, "stdin", cast(io.TextIOBase, _Pieces(attack.text, attack.step))),
     ):
         try:
-            said.append(follow_log(["-"], str(output), recipe, "csv", said.append))
+            said.append(follow_log(Request("-", str(output)), recipe, said.append))
         except FtprocError as error:
             sentence = str(error)
             cases.judge_sentence("-", sentence)

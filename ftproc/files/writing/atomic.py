@@ -84,13 +84,14 @@ def check_target(target: Target) -> None:
 
 
 @contextlib.contextmanager
-def replacing(target: Target) -> Iterator[BinaryIO]:
+def replacing(target: Target, synced: bool = True) -> Iterator[BinaryIO]:
     """A binary stream whose content becomes the file `target` if the block succeeds.
 
     The bytes go to a hidden file beside the target, are flushed to the disk and renamed into place. If anything fails,
     the hidden file is removed and an earlier target stays unchanged. Of a symbolic link, the file behind it is
     replaced. A device or named pipe is written to directly. A URI on another machine is stored when it is complete.
-    Raises OutputError for every OSError.
+    synced: False for what is replaced so often that a power cut may cost the newest. Raises OutputError for every
+    OSError.
     """
     near = remote.local(target)
     if near is None:
@@ -107,11 +108,41 @@ def replacing(target: Target) -> Iterator[BinaryIO]:
         else:
             with hidden.beside(path) as (stream, temporary):
                 yield stream
-                sync(stream)
+                if synced:
+                    sync(stream)
                 stream.close()
                 _refuse_guarded(path, near)
                 temporary.replace(path)
-            _sync_directory(path.parent)
+            if synced:
+                _sync_directory(path.parent)
+    except OSError as error:
+        raise _output_error(near, error) from error
+
+
+@contextlib.contextmanager
+def growing(target: Target, kept: bool = False) -> Iterator[BinaryIO]:
+    """A binary stream at the end of a file that is seen to grow. An earlier file of that name is replaced at once by an
+    empty one, never written into; kept: it goes on instead. A device or named pipe is written to directly. Raises
+    OutputError for every OSError."""
+    near = remote.local(target)
+    if near is None:
+        raise OutputError(f"{target}: a file that grows must be on this machine; name one, or - for standard output.")
+    path = near
+    try:
+        check_target(near)
+        path = _place(near)
+        _refuse_guarded(path, near)
+        if path.exists() and not path.is_file():
+            with streams.opened(path) as stream:
+                yield stream
+            return
+        if not (kept and path.exists()):
+            with replacing(near):
+                pass
+        with path.open("r+b", buffering=0) as file:
+            file.seek(0, os.SEEK_END)
+            yield streams.whole(file)
+            os.fsync(file.fileno())
     except OSError as error:
         raise _output_error(near, error) from error
 

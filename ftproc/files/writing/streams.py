@@ -126,6 +126,12 @@ class _Whole(io.RawIOBase):
     def writable(self) -> bool:
         return True
 
+    def seek(self, place: int, whence: int = 0) -> int:
+        return int(self._raw.seek(place, whence))
+
+    def truncate(self, size: int | None = None) -> int:
+        return int(self._raw.truncate(size))
+
     def fileno(self) -> int:
         return int(self._raw.fileno())
 

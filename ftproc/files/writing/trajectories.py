@@ -41,7 +41,7 @@ def to_table(trajectory: Trajectory, without: Sequence[str] = ()) -> pa.Table:
         arrays.update(zip(names, np.ascontiguousarray(group.T), strict=True))
     arrays = {name: array for name, array in arrays.items() if name not in without}
     table = tables.with_extra(arrow.table(arrays), trajectory.extra)
-    return table.replace_schema_metadata({METADATA_KEY: _to_json(trajectory.metadata, indent=None)})
+    return table.replace_schema_metadata({METADATA_KEY: to_json(trajectory.metadata, indent=None)})
 
 
 def write(trajectory: Trajectory, target: Target, without: Sequence[str] = ()) -> None:
@@ -83,7 +83,7 @@ def write_parts(parts: Iterable[Trajectory], metadata: Callable[[], Mapping[str,
             for stretch in itertools.chain(first, stretches):
                 file.append(to_table(stretch).replace_schema_metadata(None))
             complete = {**first[0].metadata, **metadata()}
-            file.add_metadata({METADATA_KEY: _to_json(complete, indent=None)})
+            file.add_metadata({METADATA_KEY: to_json(complete, indent=None)})
         if beside is not None:
             _write_sidecar(beside, stream, complete)
 
@@ -103,10 +103,10 @@ def _write_sidecar(beside: Target, stream: BinaryIO, metadata: Mapping[str, Any]
     if stream.seekable():  # not a pipe
         atomic.sync(stream)
     with atomic.replacing(beside) as text:
-        text.write(_to_json(metadata, indent=2) + b"\n")
+        text.write(to_json(metadata, indent=2) + b"\n")
 
 
-def _to_json(metadata: Mapping[str, Any], indent: int | None) -> bytes:
+def to_json(metadata: Mapping[str, Any], indent: int | None) -> bytes:
     return json.dumps(plain(metadata), indent=indent, ensure_ascii=False, allow_nan=False).encode()
 
 

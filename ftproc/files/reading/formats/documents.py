@@ -25,7 +25,7 @@ def json_file(name: str, path: Path, room: limits.Room) -> TableHeader:
     columns = Sparse(room)
     try:
         for record in _records(name, text):
-            columns.add(_flat(name, record, "", 0))
+            columns.add(flat(name, record, "", 0))
     except RecursionError as error:
         raise InputError(f"{name}: this JSON nests too deeply; write one object for each reading.") from error
     if not columns.rows:
@@ -132,18 +132,18 @@ def _holds_records(value: Any, depth: int = 0) -> bool:
     return isinstance(value, Mapping) and any(_holds_records(item, depth + 1) for item in value.values())
 
 
-def _flat(source: str, value: Any, prefix: str, depth: int) -> Iterator[tuple[str, Any]]:
+def flat(source: str, value: Any, prefix: str, depth: int) -> Iterator[tuple[str, Any]]:
     """Name and value of each plain value inside an object."""
     if len(prefix) > limits.LONGEST_NAME:
         raise limits.name_too_long(source, "a value")
     if isinstance(value, Mapping) and depth < _DEEPEST:
         inner = next((key for key in _VALUES if key in value), None)
         if prefix and inner is not None:
-            yield from _flat(source, value[inner], prefix, depth + 1)
+            yield from flat(source, value[inner], prefix, depth + 1)
             return
         for key, item in value.items():
-            yield from _flat(source, item, f"{prefix}.{key}" if prefix else str(key), depth + 1)
+            yield from flat(source, item, f"{prefix}.{key}" if prefix else str(key), depth + 1)
     elif not isinstance(value, list | Mapping):
         yield prefix, value
     elif isinstance(value, Sequence) and len(value) == 1:
-        yield from _flat(source, value[0], prefix, depth + 1)
+        yield from flat(source, value[0], prefix, depth + 1)
