@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ftproc.core.identification import unseen_motion
+from ftproc.core.model import kinematics
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import registry
@@ -99,12 +100,13 @@ class Filtering:
         rows = slice(part.first + part.low, part.first + part.high)
         best = estimate.run if estimate.smoothed is None else estimate.smoothed
         state, (sigma, los_sigma) = best.state.copy(), unseen_motion.widened(best.state, best.sigma, best.los_sigma)
+        path_sigma = kinematics.widened(best.state, best.path_sigma, best.sigma, sigma)
         state[:, :6] += correction
         known = slice(None) if estimate.known is None else estimate.known
         cleaned = from_cartesian(state[:, :3]) if estimate.cleaned is None else estimate.cleaned
         cleaned_sigma = measurement_sigma(cleaned, los_sigma[:, :3])
         if absent:  # the filter ran on a stand-in; what depends on it is not published
-            state[:], sigma[:] = np.nan, np.nan
+            state[:], sigma[:], path_sigma[:] = np.nan, np.nan, np.nan
             cleaned[:, absent], cleaned_sigma[:, absent] = np.nan, np.nan
             estimate.label[:, absent] = MISSING
         elif np.isinf(state).any() or (estimate.cleaned is None and np.isnan(state[known]).any()):
@@ -115,6 +117,7 @@ class Filtering:
         return Trajectory(
             log.name, log.row, log.time_s, cleaned, state, sigma, cleaned_sigma, estimate.label, best.nis, correction,
             metadata={"frame": log.frame}, extra=log.extra, diagnostics=_diagnostics(log.measurement, estimate),
+            path_sigma=path_sigma,
         )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ Components are always in the order range, azimuth, elevation; axes in the order 
 from __future__ import annotations
 
 import mmap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ftproc.settings import Station
 
 if TYPE_CHECKING:
+    import pandas as pd
     import pyarrow as pa
 
 FloatArray = NDArray[np.float64]
@@ -32,7 +33,7 @@ PAST, LAGGED = "past readings", "past readings and those of the next {:g} s"
 EDITED, WHOLE = "past readings, edited with the whole record", "the whole record"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MeasurementLog:
     """One tracker's log, checked, in SI units and in time order.
 
@@ -66,6 +67,9 @@ class MeasurementLog:
     def __len__(self) -> int:
         return len(self.time_s)
 
+    def __repr__(self) -> str:
+        return f"<MeasurementLog {self.name}: {_length(self.time_s)}{_from(self.epoch)}>"
+
     def stretch(self, rows: slice) -> MeasurementLog:
         """Some of its rows, in memory; counts and remarks of the whole log stay unchanged."""
         arrays = (np.array(self.time_s[rows]), np.array(self.measurement[rows]), np.array(self.row[rows]))
@@ -74,7 +78,7 @@ class MeasurementLog:
         return replace(self, time_s=arrays[0], measurement=arrays[1], row=arrays[2], extra=extra)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Truth:
     """A reference trajectory in the station's local frame.
 
@@ -92,8 +96,11 @@ class Truth:
     def __len__(self) -> int:
         return len(self.time_s)
 
+    def __repr__(self) -> str:
+        return f"<Truth {self.name}: {_length(self.time_s)}>"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Diagnostics:
     """Readings and residuals of a trajectory, row for row with it; not part of its file.
 
@@ -108,8 +115,15 @@ class Diagnostics:
     residual_sigma: FloatArray
     residual_kind: Literal["innovation", "leave-one-out residual"]
 
+    def __repr__(self) -> str:
+        return f"<Diagnostics: {len(self.reading)} rows, {self.residual_kind}>"
 
-@dataclass(frozen=True)
+
+#: What a trajectory is for pandas, pyarrow and notebooks, by the name of its method; `ftproc.api` says it.
+VIEWS: dict[str, Callable[[Trajectory], Any]] = {}
+
+
+@dataclass(frozen=True, repr=False)
 class Trajectory:
     """The result: one row for every row of the log that has a time, in time order.
 
@@ -122,7 +136,9 @@ class Trajectory:
     nis: (n,) normalised innovation squared of the components used; NaN if none was.
     correction: (n, 6) correction by the network of position m and velocity m/s.
     metadata: everything needed to compute it again (JSON-serialisable), see the README.
-    extra: further columns, row for row. diagnostics: only of a computed trajectory, not of one read from a file.
+    extra: further columns, row for row. diagnostics, and path_sigma: only of a computed trajectory, not of one read
+    from a file. path_sigma: (n, 6) 1-sigma of ground speed m/s, track rad, climb rate m/s, flight path angle rad, turn
+    rate rad/s and load factor, see `core.model.kinematics`.
     """
 
     name: str
@@ -138,9 +154,42 @@ class Trajectory:
     metadata: Mapping[str, Any] = field(default_factory=dict)
     extra: pa.Table | None = None
     diagnostics: Diagnostics | None = None
+    path_sigma: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+    def __repr__(self) -> str:
+        settings, summary = (self.metadata.get(name) or {} for name in ("settings", "summary"))
+        way = (
+            f", {'smoothed' if settings.get('smooth') else 'filtered'} by {self.metadata['method']}" if settings else ""
+        )
+        trust = summary.get("trust", {}).get("verdict", "")
+        return f"<Trajectory {self.name}: {_length(self.time_s)}{way}{', ' if trust else ''}{trust}>"
+
+    def to_pandas(self) -> pd.DataFrame:
+        """As a pandas DataFrame, with the columns of its file."""
+        found: pd.DataFrame = VIEWS["to_pandas"](self)
+        return found
+
+    def to_table(self) -> pa.Table:
+        """As a pyarrow Table, with the columns and the metadata of its Parquet file."""
+        return VIEWS["to_table"](self)
+
+    def _repr_html_(self) -> str:
+        """For a notebook: the summary, and the track over the ground."""
+        found: str = VIEWS["_repr_html_"](self)
+        return found
+
+
+def _length(time_s: FloatArray) -> str:
+    """Rows and duration, in words."""
+    rows = f"{len(time_s)} row{'' if len(time_s) == 1 else 's'}"
+    return f"{rows}, {time_s[-1] - time_s[0]:.6g} s" if len(time_s) else rows
+
+
+def _from(epoch: str) -> str:
+    return f", time zero {epoch}" if epoch else ""
 
 
 def thinned(array: FloatArray, most: int) -> FloatArray:
@@ -181,9 +230,11 @@ def joined(parts: Sequence[Trajectory]) -> Trajectory:
         extra = pa.concat_tables([part.extra for part in parts])
     present = [part.diagnostics for part in parts if part.diagnostics is not None]
     whole = _concatenated(present, "reading", "residual", "residual_sigma") if len(present) == len(parts) else None
-    arrays = (
+    arrays: tuple[str, ...] = (
         "row", "time_s", "measurement", "state", "sigma", "measurement_sigma", "outlier", "nis", "correction",
     )  # fmt: skip
+    if all(part.path_sigma is not None for part in parts):
+        arrays += ("path_sigma",)
     return replace(_concatenated(parts, *arrays), diagnostics=whole, extra=extra)
 
 

@@ -40,23 +40,43 @@ class Station:
 
 @dataclass(frozen=True)
 class FilterSettings:
-    """Settings of `filter`; None means: estimated from the log."""
+    """Settings of `filter`; None means: estimated from the log.
+
+    method: the filter, see `ftproc filter --list-methods`.
+    editing: how outliers are found: `two-pass` (from the whole log), `live` (as a live system can), `forward`
+        (recursively) or `none`.
+    smooth: add the fixed-interval smoother: the best estimate of trajectory.
+    noise: 1-sigma of range m, azimuth rad, elevation rad; each may be None.
+    jerk_psd_m2ps5: process noise, the spectral density of white jerk in m2/s5: 1 for gentle turns, 100 for a fighter.
+    gate: in sigmas; a reading whose innovation is larger is suspected of being an outlier.
+    max_patch_s: the longest patch of outliers that is expected, in s, for the recursive gate.
+    particles, seed: members of the ensemble and particle filters, and the seed of their random numbers.
+    gain_form: forward editing scales the gain by m (the letter of Zuo et al. 2021) instead of R by 1/m.
+    site: latitude deg, longitude deg, and height m above the WGS-84 ellipsoid of the station: adds lat_deg, lon_deg and
+        height_m.
+    ecef: with a site: adds earth-centred, earth-fixed coordinates.
+    derived: adds ground speed, track, climb rate, flight path angle, turn rate and load factor, with their sigmas.
+    geoid_m: height of the geoid above the ellipsoid at the site, for KML.
+    parameters: (name, value) pairs of the method; `ftproc filter --list-methods NAME` explains them.
+    lag_s: of live editing: the estimate at t rests on readings up to t + lag_s seconds, and no later one.
+    """
 
     method: str = "ga-bpnn-ukf"
-    editing: str = "two-pass"  # two-pass | live | forward | none
+    editing: str = "two-pass"
     smooth: bool = False
-    noise: Noise | None = None  # 1-sigma of range m, azimuth rad, elevation rad; each may be None
-    jerk_psd_m2ps5: float | None = None  # spectral density of white jerk
-    gate: float = 4.0  # sigmas
-    max_patch_s: float | None = None  # longest patch of outliers expected, for the recursive gate
-    particles: int = 100  # of the ensemble and particle filters
-    seed: int = 0  # of their random numbers
-    gain_form: bool = False  # forward editing scales the gain by m (the paper's letter) instead of R by 1/m
-    site: tuple[float, float, float] | None = None  # latitude deg, longitude deg, height m above the ellipsoid
-    ecef: bool = False  # with a site: earth-centred coordinates too
-    geoid_m: float | None = None  # height of the geoid above the ellipsoid at the site
-    parameters: Parameters = ()  # of the method, by name; `ftproc filter --list-methods NAME` explains them
-    lag_s: float = 0.0  # of live editing: the estimate at t rests on readings up to t + lag_s
+    noise: Noise | None = None
+    jerk_psd_m2ps5: float | None = None
+    gate: float = 4.0
+    max_patch_s: float | None = None
+    particles: int = 100
+    seed: int = 0
+    gain_form: bool = False
+    site: tuple[float, float, float] | None = None
+    ecef: bool = False
+    derived: bool = False
+    geoid_m: float | None = None
+    parameters: Parameters = ()
+    lag_s: float = 0.0
 
     def parameter(self, name: str) -> float | None:
         """The parameter of the method by its name; None when it is not set."""

@@ -26,7 +26,7 @@ FLOORS = (
     ("core.comparators", "core.live"),
     ("files", "simulation"),
     ("files.reading", "files.writing"),
-    ("scoring",),
+    ("scoring", "derived"),
     ("methods", "correction"),
     ("quality",),
     ("correction.training",),

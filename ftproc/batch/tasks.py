@@ -65,8 +65,9 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
     from ftproc import pipeline, report
     from ftproc.core import compiled
     from ftproc.correction import model_file
+    from ftproc.derived.columns import with_columns
     from ftproc.files.reading import logs
-    from ftproc.files.writing import atomic, clock, geodesy, trajectories
+    from ftproc.files.writing import atomic, trajectories
     from ftproc.methods import registry
     from ftproc.quality import summary
 
@@ -85,7 +86,7 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
         filtering = pipeline.Filtering(log, settings, model)
         guarded = atomic.guarding([task.at(task.log)])
         with compiled.announced(notify), _forwarded(task.log, notify), guarded:
-            parts = (clock.stamped(geodesy.located(part, settings), log) for part in filtering.parts())
+            parts = (with_columns(part, settings, log) for part in filtering.parts())
             if task.report is None:
                 trajectories.write_parts(parts, lambda: filtering.metadata, task.at(task.output))
             else:

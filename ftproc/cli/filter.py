@@ -50,6 +50,11 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
 @click.option(
     "--ecef", is_flag=True, help="With a site: add x_ecef_m ... vz_ecef_mps, earth-centred, earth-fixed (WGS-84)."
 )
+@click.option(
+    "--derived",
+    is_flag=True,
+    help="Add ground speed, track, climb rate, flight path angle, turn rate and load factor, each with its 1-sigma.",
+)
 @options.azimuth_from("Zero of the azimuth: x, A = atan2(y, x), or north, clockwise; then x is north.")
 @click.option(
     "--elevation-from",

@@ -38,6 +38,7 @@ _PIPE = "Let only the rows that count through a program such as awk, and follow 
 _NOT_FOLLOWED = {
     "where": f"reads every row. {_PIPE}",
     "keep_columns": f"copies no other columns. {_WHOLE}",
+    "derived": f"writes no derived quantities. {_WHOLE}",
     "smooth": f"knows no later rows. {_WHOLE}",
     "model": "corrects nothing with a network. Leave it out.",
     "jobs": "runs in one process. Leave it out.",

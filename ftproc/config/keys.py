@@ -126,6 +126,7 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
         "particles": Key("particles", whole(20), 100, "of the ensemble and particle filters", default=100),
         "seed": Key("seed", whole(0), 0, "of their random numbers", default=0),
         "ecef": Key("ecef", flag, False, "add earth-centred coordinates", default=False),
+        "derived": Key("derived", flag, False, "add ground speed, track, load factor and more", default=False),
         "keep_columns": Key("keep_columns", flag, False, "carry other columns through", default=False),
     },
 }

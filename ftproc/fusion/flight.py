@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,9 @@ import numpy as np
 
 from ftproc import __version__, pipeline
 from ftproc.core.identification import unseen_motion
-from ftproc.errors import InputError
+from ftproc.core.model import kinematics
+from ftproc.derived.columns import with_derived
+from ftproc.errors import InputError, UsageError
 from ftproc.files import arrow
 from ftproc.files.conventions import CONVENTION
 from ftproc.files.writing import geodesy
@@ -84,10 +87,11 @@ def _flight(
     metadata = _metadata(range_, settings, summary, fused)
     n = len(track.time_s)
     sigma, _ = unseen_motion.widened(track.state, track.sigma, np.full((n, 6), np.nan))
+    path_sigma = kinematics.widened(track.state, track.path_sigma, track.sigma, sigma)
     trajectory = Trajectory(
         range_.path, np.arange(n), track.time_s + zero_s, np.full((n, 3), np.nan), track.state, sigma,
         np.full((n, 3), np.nan), np.zeros((n, 3), np.uint8), track.nis, np.zeros((n, 6)), metadata,
-        arrow.table({"stations": results.stations_used(fused).astype(np.int64)}),
+        arrow.table({"stations": results.stations_used(fused).astype(np.int64)}), path_sigma=path_sigma,
     )  # fmt: skip
     located = _located(trajectory, range_, settings)
     edited = {name: results.edited(fused, s, read[s]) for s, name in enumerate(names)}
@@ -95,14 +99,12 @@ def _flight(
 
 
 def _located(trajectory: Trajectory, range_: Range, settings: FilterSettings) -> Trajectory:
-    """With positions on the earth, if the origin is there and the library too."""
-    if range_.origin is None:
-        return trajectory
-    try:
-        geodesy.require_pymap3d()
-    except Exception:
-        return trajectory
-    return geodesy.located(trajectory, replace(settings, site=range_.origin))
+    """With positions on the earth, if the origin is there and the library too, and derived quantities."""
+    if range_.origin is not None:
+        with contextlib.suppress(UsageError):  # without the library
+            geodesy.require_pymap3d()
+            trajectory = geodesy.located(trajectory, replace(settings, site=range_.origin))
+    return with_derived(trajectory, settings)
 
 
 def _alone(range_: Range, log: MeasurementLog, settings: FilterSettings, model: Model | None) -> Flight:
@@ -130,6 +132,7 @@ def _alone(range_: Range, log: MeasurementLog, settings: FilterSettings, model: 
         measurement_sigma=np.full((len(last), 3), np.nan),
         outlier=np.zeros((len(last), 3), np.uint8), nis=found.nis[last], correction=np.zeros((len(last), 6)),
         metadata=metadata, extra=arrow.table({"stations": used[last]}), diagnostics=None,
+        path_sigma=None if found.path_sigma is None else found.path_sigma[last],
     )  # fmt: skip
     edited = {instrument.name: results.edited_alone(found, log)}
     table = results.biases(constants, [instrument.name])

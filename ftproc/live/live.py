@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from ftproc.core.identification import unseen_motion
 from ftproc.core.live.editor import LiveEditor
+from ftproc.core.model import kinematics
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.errors import InputError, UsageError
 from ftproc.live.order import Left, Order
@@ -216,8 +217,12 @@ def _trajectory(row: IntArray, time_s: FloatArray, estimate: Estimate | None) ->
     run, label, absent = estimate.run, estimate.label.copy(), list(estimate.absent)
     state, cleaned = run.state.copy(), from_cartesian(run.state[:, :3])
     sigma, los_sigma = unseen_motion.widened(run.state, run.sigma, run.los_sigma)
+    path_sigma = kinematics.widened(run.state, run.path_sigma, run.sigma, sigma)
     cleaned_sigma = measurement_sigma(cleaned, los_sigma[:, :3])
     if absent:  # the filter ran on stand-ins; what depends on them is not published
-        state[:], sigma[:], label[:, absent] = np.nan, np.nan, MISSING
+        state[:], sigma[:], path_sigma[:], label[:, absent] = np.nan, np.nan, np.nan, MISSING
         cleaned[:, absent], cleaned_sigma[:, absent] = np.nan, np.nan
-    return Trajectory("live", row, time_s, cleaned, state, sigma, cleaned_sigma, label, run.nis, np.zeros((n, 6)))
+    none = np.zeros((n, 6))
+    return Trajectory(
+        "live", row, time_s, cleaned, state, sigma, cleaned_sigma, label, run.nis, none, path_sigma=path_sigma
+    )

@@ -22,7 +22,7 @@ from ftproc.core.editing import two_pass
 from ftproc.core.editing.lasting.faults import Shift, spread
 from ftproc.core.filtering import forward
 from ftproc.core.filtering.records import FilterRun, Model
-from ftproc.core.filtering.smoother import SmootherRun, smooth_log
+from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
 from ftproc.core.identification import likelihood
 from ftproc.core.identification.profile import median_level
 from ftproc.methods import live, preparing
@@ -67,7 +67,7 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     for other in _as_likely(edited, known, run):
         other_starts = preparing.smoothed_starts(edited.log, other, edited.starts)
         run = _worse_of(run, forward.filter_log(edited.log, other, other_starts))
-        smoothed = smoothed and _worse_of(smoothed, smooth_log(edited.log, other, edited.starts))
+        smoothed = smoothed and _worse_of(smoothed, smooth_log(edited.log, other, edited.starts, PATHS))
     shifts = edited.faults.shifts
     if shifts:
         run, smoothed = _widened(run, shifts), smoothed and _widened(smoothed, shifts)
@@ -92,8 +92,8 @@ def _as_likely(edited: two_pass.Edited, known: two_pass.Known, run: FilterRun) -
 
 def _worse_of(run: Run, other: Run) -> Run:
     """A run with sigmas that are the larger of its own and of another's."""
-    sigma, los_sigma = np.maximum(run.sigma, other.sigma), np.maximum(run.los_sigma, other.los_sigma)
-    return run._replace(sigma=sigma, los_sigma=los_sigma)
+    names = ("sigma", "los_sigma", "path_sigma")
+    return run._replace(**{name: np.maximum(getattr(run, name), getattr(other, name)) for name in names})
 
 
 def _widened(run: Run, shifts: Sequence[Shift]) -> Run:

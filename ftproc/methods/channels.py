@@ -154,7 +154,7 @@ def estimate(readings: Readings, log: Log, found: Cleaned) -> Estimate:
         readings.time_s, state, np.full((n, 9), np.nan), sigma,
         nothing if found.innovation is None else found.innovation,
         nothing if found.innovation_sigma is None else found.innovation_sigma,
-        found.weight, np.full(n, np.nan), los_sigma, np.arange(n), np.nan,
+        found.weight, np.full(n, np.nan), los_sigma, np.full((n, 6), np.nan), np.arange(n), np.nan,
     )  # fmt: skip
     model = Model(log.sigma**2, np.full((1, 3), np.nan))
     label = labels(found.weight, readings.measurement)

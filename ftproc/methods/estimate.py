@@ -107,7 +107,9 @@ class Estimate(NamedTuple):
     def smoothed_run(self) -> FilterRun:
         """The run with the smoother's state and sigmas in place of the filter's, where there is a smoother."""
         s = self.smoothed
-        return self.run if s is None else self.run._replace(state=s.state, sigma=s.sigma, los_sigma=s.los_sigma)
+        if s is None:
+            return self.run
+        return self.run._replace(state=s.state, sigma=s.sigma, los_sigma=s.los_sigma, path_sigma=s.path_sigma)
 
     def rows(self, low: int, high: int) -> Estimate:
         """Of the samples [low, high) alone."""

@@ -12,7 +12,7 @@ import numpy as np
 from ftproc.core.editing.two_pass import Known
 from ftproc.core.filtering.initialization import find_starts, first_state
 from ftproc.core.filtering.records import FilterRun, Model
-from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.filtering.smoother import PATHS, smooth_log
 from ftproc.core.identification.likelihood import Fixed, first_jerk, fit_level
 from ftproc.core.live.editor import LiveEditor
 from ftproc.core.live.recursive import Gating
@@ -99,4 +99,4 @@ def smoothed(readings: Readings, settings: FilterSettings) -> Estimate:
     fixed = Fixed(np.isfinite(known.sigma), known.jerk_psd is not None)
     model = fit_level(log, starts, Model(noise, isotropic(jerk_psd)), fixed)
     label = preparing.labels(kept, readings.measurement)
-    return found._replace(label=label, model=model, smoothed=smooth_log(log, model, starts), known=None)
+    return found._replace(label=label, model=model, smoothed=smooth_log(log, model, starts, PATHS), known=None)

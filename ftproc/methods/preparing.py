@@ -11,7 +11,7 @@ from ftproc.core.editing import outlier_chain, two_pass
 from ftproc.core.filtering import forward
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start, between
-from ftproc.core.filtering.smoother import HEADS, smooth_log
+from ftproc.core.filtering.smoother import HEADS, PATHS, smooth_log
 from ftproc.core.identification.likelihood import Fixed, first_jerk, fit_level
 from ftproc.core.identification.profile import from_knot, median_level
 from ftproc.core.identification.scales import scales_of
@@ -48,7 +48,7 @@ def finished(found: Filtered, settings: FilterSettings, kept: FloatArray | None 
     kept: (n, 3) zero for the readings that are called outliers, where these are not those of weight zero.
     """
     log, run, model, starts = found
-    smoothed = smooth_log(log, model, starts) if settings.smooth else None
+    smoothed = smooth_log(log, model, starts, PATHS) if settings.smooth else None
     label = labels(log.weight if kept is None else kept, log.measurement)
     return Estimate(run, label, model, smoothed, re_initialized(starts))
 

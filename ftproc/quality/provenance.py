@@ -58,6 +58,7 @@ def describe(
             "site": settings.site,
             "geoid_m": settings.geoid_m,
             "ecef": settings.ecef,
+            "derived": settings.derived,
             "noise_specified": settings.noise is not None and None not in settings.noise,
             **({"particles": settings.particles, "seed": settings.seed} if method.random else {}),
             **({"parameters": dict(settings.parameters)} if settings.parameters else {}),

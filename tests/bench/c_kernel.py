@@ -36,6 +36,8 @@ def compiled(folder: Path) -> Filter | None:
         filled += [np.full(n, np.nan), np.empty((n, 6)), np.empty(n, np.int64)]  # nis, los_sigma, since_start
         assert all(array.flags.c_contiguous for array in (*taken, *filled))
         pointers = [array.ctypes.data_as(ctypes.c_void_p) for array in (*taken, *filled)]
-        return FilterRun._make([log.time_s, *filled, function(ctypes.c_int64(n), *pointers)])
+        likelihood = function(ctypes.c_int64(n), *pointers)
+        filled.insert(-1, np.full((n, 6), np.nan))  # path_sigma
+        return FilterRun._make([log.time_s, *filled, likelihood])
 
     return run

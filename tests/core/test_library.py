@@ -133,7 +133,7 @@ def test_every_library_computes_the_same(name):
     found, expected = FilterRun.of(a.time, rows, likelihood), filter_log(a.log, a.model, a.starts)
     assert ended == 400
     assert likelihood == expected.log_likelihood
-    for name in ("state", "sigma", "innovation_sigma", "nis", "los_sigma"):
+    for name in ("state", "sigma", "innovation_sigma", "nis", "los_sigma", "path_sigma"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
 
 

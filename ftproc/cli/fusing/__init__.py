@@ -36,6 +36,7 @@ MEANT = (
     "jerk",
     "gate",
     "ecef",
+    "derived",
     "write_calibration",
     "write_config",
 )
@@ -58,6 +59,7 @@ def fuse_logs(ctx: click.Context, debug: bool) -> int:
         jerk_psd_m2ps5=given.get("jerk"),
         gate=given.get("gate", FilterSettings.gate),
         ecef=given.get("ecef", False),
+        derived=given.get("derived", False),
     )
     usual = f"{Path(given['fuse']).stem}.trajectory.parquet"
     output = named = given.get("output") or usual

@@ -15,6 +15,7 @@ from ftproc.core.comparators import ensemble, particles
 from ftproc.core.editing.track import RETRY_SAMPLES, reacquire
 from ftproc.core.filtering.forward import lead_in
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start, between, empty_rows
+from ftproc.core.model import kinematics
 from ftproc.core.model.frames import line_of_sight_axes
 from ftproc.core.model.measurement import NO_RANGE_M
 
@@ -86,7 +87,7 @@ class _Run:
         self.motion = Motion.of(model)
         self.update: Update = partial(particles.UPDATES[settings.method], **settings.tuned)
         self.rows = empty_rows(len(log.time_s))
-        self.blocks = np.empty((len(log.time_s), 2, 3, 3))
+        self.covariance = np.empty((len(log.time_s), 9, 9))
         self.starts: list[Start] = []
         self.log_likelihood = 0.0
 
@@ -131,9 +132,8 @@ class _Run:
             if gamma > 0:
                 row["nis"][k] = known.rho
                 self.log_likelihood += -0.5 * (known.rho - float(np.linalg.slogdet(known.inverse)[1]))
-        covariance = ensemble.spread(cloud)
-        row["sigma"][k] = np.sqrt(np.diag(covariance))
-        self.blocks[k] = covariance[:3, :3], covariance[3:6, 3:6]
+        self.covariance[k] = ensemble.spread(cloud)
+        row["sigma"][k] = np.sqrt(np.diag(self.covariance[k]))
         return cloud
 
 
@@ -154,7 +154,10 @@ def filter_log(
         run.follow(start, stop)
     rows, first = run.rows, starts[0].sample
     axes = line_of_sight_axes(rows["state"][first:, :3])[:, None]
-    variance = np.einsum("...ij,...jk,...ik->...i", axes, run.blocks[first:], axes)
+    covariance = run.covariance[first:]
+    blocks = np.stack([covariance[:, at : at + 3, at : at + 3] for at in (0, 3)], 1)
+    variance = np.einsum("...ij,...jk,...ik->...i", axes, blocks, axes)
     rows["los_sigma"][first:] = np.sqrt(np.maximum(variance, 0.0)).reshape(-1, 6)
+    rows["path_sigma"][first:] = kinematics.sigma_of(rows["state"][first:], covariance)
     lead_in(log, model, starts[0], rows)
     return FilterRun.of(log.time_s, rows, run.log_likelihood), run.starts

@@ -35,7 +35,7 @@ from ftproc.core.editing.lasting.weighing import scene_of
 from ftproc.core.editing.reassessment import believed, likelier, log_probability, reassess, with_less_noise, with_motion
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import SmootherRun, smooth_log
+from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
 from ftproc.core.identification import one_sided, uneven_noise
 from ftproc.core.identification.likelihood import Fixed, first_jerk, without_noise
 from ftproc.core.identification.nearby import residuals_near, samples_around
@@ -91,7 +91,7 @@ class Edited(NamedTuple):
 
     def smoothed(self) -> SmootherRun:
         """What the whole record says of each sample, with these decisions."""
-        return smooth_log(self.log, self.model, self.starts)
+        return smooth_log(self.log, self.model, self.starts, PATHS)
 
 
 class Screened(NamedTuple):

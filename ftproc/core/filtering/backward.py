@@ -13,6 +13,7 @@ from ftproc.core.filtering.filters import OFFSETS, Filter, Posterior, Update
 from ftproc.core.filtering.forward import Estimated
 from ftproc.core.filtering.records import Sample
 from ftproc.core.model import motion
+from ftproc.core.model.kinematics import path_sigma
 from ftproc.core.model.measurement import line_of_sight_sigma
 from ftproc.core.signatures import Layout
 
@@ -23,10 +24,11 @@ class Backward(Protocol):
     """The record of the backward recursion: r, N, and what a step computes on its way.
 
     v, w, nu: v, W, U N of the smoother's head. state, cov: of the smoothed estimate (of the covariance only the blocks
-    of position and velocity, and the diagonal). pn: P N. q: coefficients of Q. vague: whether the covariance before
-    comes from this one, see `heads`; later: this one, whole; inverse, gain: M and C. residual, variance: leave-one-out.
-    noise, wander: the two sums of the score so far, see `smoother`, of the white noise and of the offsets' variances;
-    fade_score: of their correlation times. n_first: N+ of the first sample.
+    of position and velocity, and the diagonal; if `paths` is not zero also those of velocity with acceleration, for
+    the sigmas of `kinematics`, whose gradients `path` holds). pn: P N. q: coefficients of Q. vague: whether
+    the covariance before comes from this one, see `heads`; later: this one, whole; inverse, gain: M and C. residual,
+    variance: leave-one-out. noise, wander: the two sums of the score so far, see `smoother`, of the white noise and of
+    the offsets' variances; fade_score: of their correlation times. n_first: N+ of the first sample.
     """
 
     r: Annotated[FloatArray, 9]
@@ -48,6 +50,8 @@ class Backward(Protocol):
     wander: Annotated[FloatArray, 2, 3]
     fade_score: Annotated[FloatArray, 3]
     n_first: Annotated[FloatArray, 9, 9]
+    path: Annotated[FloatArray, 6, 6]
+    paths: float
 
 
 class Coloured(Backward, Protocol):
@@ -87,7 +91,7 @@ def estimate(back: Backward, after: Posterior) -> None:
             state[i] += p[i, k] * r[k]
             for j in range(len(x)):
                 pn[j] += p[i, k] * n[k, j]
-        for j in range(i // 3 * 3 if i < 6 else i, i + 1):
+        for j in range(i // 3 * 3 if i < 6 else 3 if back.paths > 0 else i, i + 1):
             v = (pn[0] * p[j, 0] + pn[1] * p[j, 1] + pn[2] * p[j, 2]) + (pn[3] * p[j, 3] + pn[4] * p[j, 4])
             v += (pn[5] * p[j, 5] + pn[6] * p[j, 6]) + (pn[7] * p[j, 7] + pn[8] * p[j, 8])
             for k in range(OFFSETS, len(x)):
@@ -103,6 +107,11 @@ def keep(back: Backward, row: Estimated) -> None:
         row.state[i] = back.state[i]
         row.sigma[i] = math.sqrt(max(back.cov[i, i], 0.0))
     line_of_sight_sigma(back.state, back.cov, row.los_sigma)
+    if back.paths > 0:
+        path_sigma(back.state, back.cov, back.path, row.path_sigma)
+    else:
+        for i in range(6):
+            row.path_sigma[i] = math.nan
 
 
 @part

@@ -153,6 +153,19 @@ def _carry(memory: Any, f: Filter, k: int, interval: float, place: int) -> None:
 
 
 @part
+def _widen_path(gradient: FloatArray, direction: FloatArray, row: Any) -> None:
+    """Add what errors of the state in these directions (9, m) add to the sigmas of `kinematics`, to first order."""
+    for i in range(6):
+        variance = row.path_sigma[i] * row.path_sigma[i]
+        for c in range(direction.shape[1]):
+            moved = 0.0
+            for a in range(3 if i < 4 else 6):
+                moved += gradient[i, a] * direction[3 + a, c]
+            variance += moved * moved
+        row.path_sigma[i] = math.sqrt(variance)
+
+
+@part
 def _carry_back(memory: Any, update: Update, sample: Sample, k: int, interval: float, place: int, wanted: int) -> None:
     if wanted == SCORES:
         return
@@ -172,6 +185,8 @@ def _carry_back(memory: Any, update: Update, sample: Sample, k: int, interval: f
             for c in range(m):
                 added += smoothed[i, c] * smoothed[i, c]
             row.sigma[i] = math.sqrt(row.sigma[i] * row.sigma[i] + added)
+    if wanted == STATES:
+        _widen_path(memory.back[0].path, smoothed, row)
     for i in range(3):
         for j in range(9):
             uij = u[i, j]
@@ -231,6 +246,7 @@ def smooth_biased(log: Observations, model: Model, start: Start, directions: Dir
         np.zeros((9, m)), np.zeros((9, m)), np.zeros((blocks, 9, m)), np.zeros((rows, 9, m)),
         np.zeros((rows, 3, m)), np.zeros(m), np.zeros((m, m)), np.zeros((n, 9)),
     )  # fmt: skip
+    memory.back["paths"] = 1.0
     jerk = np.zeros((len(model.jerk), 2, 3))
     samples, profile = log.samples(model.noise_variance), model.profile(log.time_s)
     likelihood = _sweep_biased(Span(first, n, first), samples, profile, memory, jerk, STATES)

@@ -21,7 +21,7 @@ class Filter(Protocol):
     coefficients of Q. z_hat: predicted measurement. e: innovation. used: weight of each component, zero for none. h: H
     on the position. s: innovation covariance. root: L^-1, whose rows and columns are zero for components not used. c,
     y, g, u: see `ukf`. pxz, gain, rest: P H', K and S - H P H', where they are asked for. factor: of the position block
-    of P. d: by pair of sigma points, component and side. bend: its mean, h(x) to z_hat.
+    of P. d: by pair of sigma points, component and side. bend: its mean, h(x) to z_hat. path: see `kinematics`.
     """
 
     x: Annotated[FloatArray, 9]
@@ -48,6 +48,7 @@ class Filter(Protocol):
     factor: Annotated[FloatArray, 3, 3]
     d: Annotated[FloatArray, 3, 3, 2]
     bend: Annotated[FloatArray, 3]
+    path: Annotated[FloatArray, 6, 6]
 
 
 class Coloured(Filter, Protocol):

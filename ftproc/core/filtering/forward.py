@@ -25,6 +25,7 @@ from ftproc.core.filtering.records import (
     between,
 )
 from ftproc.core.model import jacobian, motion
+from ftproc.core.model.kinematics import path_sigma
 from ftproc.core.model.measurement import line_of_sight_sigma
 from ftproc.core.signatures import Layout
 
@@ -63,6 +64,7 @@ def store(f: Filter, row: Row) -> None:
         row.state[i] = f.x[i]
         row.sigma[i] = math.sqrt(max(f.p[i, i], 0.0))
     line_of_sight_sigma(f.x, f.p, row.los_sigma)
+    path_sigma(f.x, f.p, f.path, row.path_sigma)
 
 
 @part
@@ -139,6 +141,7 @@ class Estimated(Protocol):
     state: Annotated[FloatArray, 9]
     sigma: Annotated[FloatArray, 9]
     los_sigma: Annotated[FloatArray, 6]
+    path_sigma: Annotated[FloatArray, 6]
 
 
 class Left(Protocol):
@@ -178,6 +181,7 @@ def _extrapolated(
             row.state[i] = f.x[i]
             row.sigma[i] = math.sqrt(max(f.p[i, i], 0.0))
         line_of_sight_sigma(f.x, f.p, row.los_sigma)
+        path_sigma(f.x, f.p, f.path, row.path_sigma)
 
 
 _extrapolate = kernel(variant(_extrapolated, __name__, "_extrapolate"))
@@ -217,7 +221,7 @@ def run_log(run: Recursion, log: Observations, model: Model, starts: list[Start]
 def lead_in(log: Observations, model: Model, start: Start, rows: Any) -> None:
     """Fill the rows before the first start."""
     before, (found, left) = rows[: start.sample], extrapolated(log, model, start)
-    for name in ("state", "sigma", "los_sigma"):
+    for name in ("state", "sigma", "los_sigma", "path_sigma"):
         before[name] = found[name]
     before["predicted"], before["innovation"] = found["state"], left["residual"]
     before["innovation_sigma"] = np.sqrt(left["residual_variance"])

@@ -44,6 +44,7 @@ class Row(Protocol):
     innovation_sigma: Annotated[FloatArray, 3]
     weight: Annotated[FloatArray, 3]
     los_sigma: Annotated[FloatArray, 6]
+    path_sigma: Annotated[FloatArray, 6]
     nis: float
     since_start: float
 
@@ -194,7 +195,8 @@ class FilterRun(NamedTuple):
     state, predicted: (n, 9) after and before the update, SI units. sigma: (n, 9) 1-sigma after the update.
     innovation: (n, 3) m, rad, rad, NaN where missing. innovation_sigma: (n, 3) square root of the diagonal of S.
     weight: (n, 3) in [0, 1], zero where rejected or missing. nis: (n,) of the components used, NaN where none.
-    los_sigma: (n, 6) 1-sigma of position and velocity along the radial, cross and up axes.
+    los_sigma: (n, 6) 1-sigma of position and velocity along the radial, cross and up axes. path_sigma: (n, 6) of
+    ground speed, track, climb rate, flight path angle, turn rate and load factor, see `kinematics`; SI units and rad.
     since_start: (n,) samples since the last start. log_likelihood: of the innovations used.
     """
 
@@ -207,6 +209,7 @@ class FilterRun(NamedTuple):
     weight: FloatArray
     nis: FloatArray
     los_sigma: FloatArray
+    path_sigma: FloatArray
     since_start: IntArray
     log_likelihood: float
 

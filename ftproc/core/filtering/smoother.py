@@ -43,7 +43,7 @@ FloatArray = NDArray[np.float64]
 class SmootherRun(NamedTuple):
     """What the whole record says of each sample.
 
-    state: (n, 9), SI units. sigma: (n, 9) 1-sigma. los_sigma: (n, 6) as in FilterRun.
+    state: (n, 9), SI units. sigma: (n, 9) 1-sigma. los_sigma, path_sigma: (n, 6) as in FilterRun.
     residual: (n, 3) leave-one-out residual m, rad, rad; NaN where missing. residual_variance: (n, 3) its variance at
     full weight. nis: (n,) of the innovations used in the forward sweep. log_likelihood: of those innovations. heads:
     smoothed state and covariance at each start.
@@ -52,6 +52,7 @@ class SmootherRun(NamedTuple):
     state: FloatArray
     sigma: FloatArray
     los_sigma: FloatArray
+    path_sigma: FloatArray
     residual: FloatArray
     residual_variance: FloatArray
     nis: FloatArray
@@ -60,12 +61,12 @@ class SmootherRun(NamedTuple):
 
     def rows(self, low: int, high: int) -> SmootherRun:
         """Of the samples [low, high) alone; likelihood and heads stay those of the whole run."""
-        return SmootherRun._make([*(each[low:high] for each in self[:6]), *self[6:]])
+        return SmootherRun._make([*(each[low:high] for each in self[:7]), *self[7:]])
 
 
 #: What is wanted of a sweep: the likelihood; its scores too; in place of the jerk's, the residuals of each sample; the
-#: state at each start too; that of each sample too.
-LIKELIHOOD, SCORES, RESIDUALS, HEADS, STATES = range(5)
+#: state at each start too; that of each sample too; and the sigmas of `kinematics`.
+LIKELIHOOD, SCORES, RESIDUALS, HEADS, STATES, PATHS = range(6)
 
 
 @part
@@ -235,6 +236,7 @@ class _Swept(NamedTuple):
 
 
 def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) -> _Swept:
+    paths, wanted = wanted == PATHS, min(wanted, STATES)
     n = len(log.time_s)
     pacing.swept(n)
     samples, profile = log.samples(model.noise_variance, scratch(SAMPLE, n)), model.profile(log.time_s)
@@ -245,6 +247,7 @@ def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) ->
     likelihood, found = 0.0, list[Start]()
     for start, stop in between(starts, n):
         memory = memory_of(stop - start.sample, model.filter(start), estimates, residuals)
+        memory.back["paths"] = paths
         likelihood += sweep(Span(start.sample, stop, start.sample), samples, profile, memory, jerk, wanted)
         noise += memory.back["noise"][0]
         wander += memory.back["wander"][0]
@@ -272,7 +275,7 @@ def smooth_log(log: Observations, model: Model, starts: list[Start], wanted: int
     extrapolated.
 
     wanted: HEADS leaves out states and sigmas (of no sample), which saves half of the time, RESIDUALS also all heads
-    but that of a first start after the first sample.
+    but that of a first start after the first sample; PATHS adds path_sigma, which is NaN without it.
     """
     scores, estimates, residuals, starting = _swept(log, model, starts, wanted)
     first = starts[0].sample

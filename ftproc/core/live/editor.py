@@ -282,7 +282,7 @@ class LiveEditor:
         if self.smoothed is not None:
             begin, smoothed, labels = self.smoothed
             label = labels[first - begin : stop - begin].copy()
-            for name in ("state", "sigma", "los_sigma"):
+            for name in ("state", "sigma", "los_sigma", "path_sigma"):
                 rows[name] = getattr(smoothed, name)[first - begin : stop - begin]
         label[:, list(self.absent)] = 3.0
         again = np.isin(np.arange(low, low + n), window.reacquired)

@@ -85,4 +85,5 @@ def widened(rows: Any, before: int) -> Any:
     found, times = rows[before:], np.sqrt(np.maximum(ratio[before:], 1.0))[:, None]
     found["sigma"] *= times
     found["los_sigma"] *= times
+    found["path_sigma"] *= times
     return found

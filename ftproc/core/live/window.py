@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ftproc.core.editing import outlier_chain, two_pass
 from ftproc.core.filtering.forward import Span
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven, empty_rows
-from ftproc.core.filtering.smoother import SmootherRun, smooth_log
+from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
 from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.identification.scales import Scales, scales_of
 from ftproc.core.live.pieces import BLOCK, Sizes, piece, predicted, stretched
@@ -95,7 +95,7 @@ class Window:
 
     def smoothed(self) -> SmootherRun:
         """The newest part, smoothed with the decisions as they are."""
-        return smooth_log(self._observed(slice(self.near, len(self))), self.allowed, [self.anchor])
+        return smooth_log(self._observed(slice(self.near, len(self))), self.allowed, [self.anchor], PATHS)
 
     def used_lately(self, count: int) -> FloatArray:
         """(3,) share of each component's last `count` readings that is used."""

@@ -284,7 +284,7 @@ def _lead_in(log: Observations, model: Model, run: SmootherRun) -> None:
     back.weight[0] = 0.0  # is in the head
     first = model._replace(jerk=model.jerk[:1], knot_s=math.inf)
     found = smooth_log(back, first, [head._replace(sample=0)])
-    for filled, values in zip(run[:6], found[:6], strict=True):
+    for filled, values in zip(run[:7], found[:7], strict=True):
         filled[: head.sample] = values[:0:-1]
 
 

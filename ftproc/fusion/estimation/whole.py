@@ -14,7 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ftproc.core.filtering.forward import filter_log
+from ftproc.core.filtering.records import FilterRun
 from ftproc.core.filtering.smoother import SmootherRun
+from ftproc.core.model import kinematics
 from ftproc.core.model.stations import levelled
 from ftproc.fusion.estimation import engine
 from ftproc.fusion.estimation.constants import FARTHEST, Constants, Said, parameters
@@ -28,12 +30,13 @@ BESIDE = 10_000  # rows on either side that are smoothed with it
 
 
 class Track(NamedTuple):
-    """What is published: time_s (n,) true time, distinct; state (n, 9) and sigma (n, 9); nis (n,) of all readings of a
-    time, NaN where none was used."""
+    """What is published: time_s (n,) true time, distinct; state (n, 9) and sigma (n, 9); path_sigma (n, 6) as in
+    FilterRun; nis (n,) of all readings of a time, NaN where none was used."""
 
     time_s: FloatArray
     state: FloatArray
     sigma: FloatArray
+    path_sigma: FloatArray
     nis: FloatArray
 
 
@@ -141,18 +144,19 @@ def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, sm
         if len(found) > 1:
             current = engine.at(current, constants.of(each.seen))
         events, run = current.events, current.found.run
-        state, sigma, nis = published(current, smooth)
+        best = published(current, smooth)
         here = slice(*np.searchsorted(events.time_s, [each.first_s, each.stop_s]))
         for k, s in enumerate(each.seen):
             at = here.start + np.flatnonzero(events.station[here] == k)
             near, rows = events.row[at], events.row[at] + each.rows[s].start
             weight[s][rows], possible[s][rows] = current.weight[k][near], current.possible[k][near]
             residual[s][rows], variance[s][rows] = run.residual[at], run.residual_variance[at]
-            position[s][rows] = state[at, :3]
+            position[s][rows] = best.state[at, :3]
             noise[s] += len(rows) / sizes[s] * current.sigma[k] ** 2
             own[s] = np.minimum(own[s], current.own[k])
         last = here.start + distinct(events.time_s[here])
-        tracks.append(Track(events.time_s[last], state[last], sigma[last], _together(nis[here], last - here.start)))
+        nis = _together(best.nis[here], last - here.start)
+        tracks.append(Track(events.time_s[last], best.state[last], best.sigma[last], best.path_sigma[last], nis))
     track = Track(*map(np.concatenate, zip(*tracks, strict=True)))
     jerk, knot_s = _profile(found, track.time_s)
     return Fused(
@@ -197,14 +201,15 @@ def _together(nis: FloatArray, last: IntArray) -> FloatArray:
 def without_run(current: Current) -> Current:
     """The same, of whose smoother run nothing is kept but what `at` needs."""
     run = current.found.run
-    slim = SmootherRun._make([run.state.copy(), *(each[:0].copy() for each in run[1:6]), *run[6:]])
+    slim = SmootherRun._make([run.state.copy(), *(each[:0].copy() for each in run[1:7]), *run[7:]])
     return current._replace(found=current.found._replace(run=slim, spread=run.state[:0].copy()))
 
 
-def published(current: Current, smooth: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """State and sigma (n, 9) and NIS (n,) of the events: smoothed, or by the causal filter with the decisions and the
-    biases of the whole flight. Sigmas include those of the biases."""
+def published(current: Current, smooth: bool) -> FilterRun | SmootherRun:
+    """The run over the events: smoothed, or by the causal filter with the decisions and the biases of the whole flight.
+    Sigmas include those of the biases."""
     if smooth:
-        return current.found.run.state, current.found.run.sigma, current.found.run.nis
+        return current.found.run
     run = filter_log(current.log, current.model, [current.start])
-    return run.state, np.sqrt(run.sigma**2 + current.found.spread), run.nis
+    sigma = np.sqrt(run.sigma**2 + current.found.spread)
+    return run._replace(sigma=sigma, path_sigma=kinematics.widened(run.state, run.path_sigma, run.sigma, sigma))

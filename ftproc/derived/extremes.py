@@ -1,0 +1,87 @@
+"""The extremes of a flight with their times: the table that a test report begins with."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ftproc.derived.quantities import QUANTITIES, Derived
+from ftproc.records import FloatArray, Trajectory
+
+VAGUE = 5.0  # times the median sigma: the same, where a track begins or has a gap
+
+
+class Extreme(NamedTuple):
+    """what: such as `greatest load factor`. value, sigma: in `unit`; the sigma is NaN where it is not known. row: of
+    the trajectory."""
+
+    what: str
+    value: float
+    sigma: float
+    unit: str
+    time_s: float
+    row: int
+
+
+def extremes(trajectory: Trajectory) -> list[Extreme]:
+    """The greatest and least speed, height, climb rate, turn rate, load factor and distance of a flight.
+
+    Rows whose estimate is far vaguer than usual (at a start, in a gap) are passed over. The sigma is that of the row:
+    an extreme of many noisy rows lies a little farther out than the flight has been. Empty without velocities.
+    """
+    derived, state, sigma = Derived.of(trajectory), trajectory.state, trajectory.sigma
+    length, length_sigma = _norm(state[:, :3], sigma[:, :3])
+    speed, speed_sigma = _norm(state[:, 3:6], sigma[:, 3:6])
+    of = {q.name: (derived.value[:, k], derived.sigma[:, k], q.unit) for k, q in enumerate(QUANTITIES)}
+    distance = trajectory.measurement[:, 0], trajectory.measurement_sigma[:, 0], "m"
+    if not np.isfinite(distance[0]).any():
+        distance = length, length_sigma, "m"
+    wanted = (
+        ("greatest speed", (speed, speed_sigma, "m/s"), 1),
+        ("least speed", (speed, speed_sigma, "m/s"), -1),
+        ("greatest height", _height(trajectory), 1),
+        ("least height", _height(trajectory), -1),
+        ("steepest climb", of["climb_rate_mps"], 1),
+        ("steepest descent", of["climb_rate_mps"], -1),
+        ("greatest load factor", of["load_factor"], 1),
+        ("least load factor", of["load_factor"], -1),
+        ("fastest turn", of["turn_rate_degps"], 0),
+        ("closest approach", distance, -1),
+        ("greatest distance", distance, 1),
+    )
+    found = (_extreme(trajectory, what, *each, sign) for what, each, sign in wanted)
+    return [each for each in found if each is not None]
+
+
+def _extreme(
+    trajectory: Trajectory, what: str, value: FloatArray, sigma: FloatArray, unit: str, sign: int
+) -> Extreme | None:
+    """The row with the greatest (least; largest in size) value, among those that are known as well as usual."""
+    usable = np.isfinite(value)
+    known = usable & np.isfinite(sigma)
+    if known.any():
+        usable &= ~(sigma > VAGUE * float(np.median(sigma[known])))
+    if not usable.any():
+        return None
+    rows = np.flatnonzero(usable)
+    by = np.abs(value[rows]) if sign == 0 else sign * value[rows]
+    row = int(rows[by.argmax()])
+    return Extreme(what, float(value[row]), float(sigma[row]), unit, float(trajectory.time_s[row]), row)
+
+
+def _height(trajectory: Trajectory) -> tuple[FloatArray, FloatArray, str]:
+    """Above the ellipsoid with a site, else over the station."""
+    extra = trajectory.extra
+    height = trajectory.state[:, 2]
+    if extra is not None and "height_m" in extra.column_names:
+        height = np.asarray(extra.column("height_m"), float)
+    return height, trajectory.sigma[:, 2], "m"
+
+
+def _norm(vector: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The length of (n, 3) vectors and its 1-sigma, from those along the axes."""
+    length = np.sqrt((vector**2).sum(1))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        spread = np.sqrt(((vector * sigma) ** 2).sum(1)) / length
+    return length, spread
