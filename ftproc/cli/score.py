@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -12,15 +14,38 @@ from ftproc.cli.command import Command
 
 if TYPE_CHECKING:
     from ftproc.records import Trajectory, Truth
+    from ftproc.scoring import Score
+    from ftproc.scoring.limits import Limits, Result
 
 _EXAMPLES = """
 ftproc simulate --scenario zuo2021-outliers -o flight.csv --truth flight.truth.csv
 ftproc filter flight.csv --summary none -o clean.parquet
 ftproc score clean.parquet --truth flight.truth.csv --report errors.html
+ftproc score clean.parquet --truth flight.truth.csv --require ed-142-terminal
 """
 
 
-@click.command(cls=Command, examples=_EXAMPLES)
+class Job(NamedTuple):
+    """The options of the command."""
+
+    trajectories: Sequence[str]
+    truths: Sequence[str]
+    form: str
+    require: Sequence[str]
+    report: str | None
+
+    def files(self) -> list[str]:
+        """The files of limits, which are inputs."""
+        return [name for name in self.require if Path(name).is_file()]
+
+
+def _standards() -> str:
+    from ftproc.scoring import limits
+
+    return "Standards for --require:\n" + "".join(f"  {n:16} {limits.load(n).title}\n" for n in limits.standards())
+
+
+@click.command(cls=Command, examples=_EXAMPLES, more=_standards)
 @click.argument("trajectories", nargs=-1, required=True, type=options.FILE, metavar="TRAJECTORY...")
 @click.option(
     "--truth",
@@ -33,13 +58,24 @@ ftproc score clean.parquet --truth flight.truth.csv --report errors.html
 @click.option(
     "--format", "form", type=click.Choice(["table", "json", "csv"]), default="table", help="Form of the printed scores."
 )
+@click.option(
+    "--require",
+    multiple=True,
+    type=options.FILE,
+    metavar="LIMITS.toml|NAME",
+    help="Limits on the errors: a file of [[require]], or one of the standards below; prints PASS or FAIL of each, and "
+    "the exit code is 1 if one of them is not met. May be given several times.",
+)
 @options.report("a trajectory and, with a truth, its errors beside their sigmas")
-def command(trajectories: tuple[str, ...], truths: tuple[str, ...], form: str, report: str | None) -> None:
+def command(
+    trajectories: tuple[str, ...], truths: tuple[str, ...], form: str, require: tuple[str, ...], report: str | None
+) -> None:
     """Print the scores of trajectories, a column for each.
 
     A TRAJECTORY is a file that `filter` wrote, any table with time_s, x_m, y_m, z_m, or - for CSV on standard input.
     Without a truth the score is the smoothness (average gradient); with it also the errors, their consistency with the
-    published sigmas, and precision and recall of the outlier flags.
+    published sigmas, bias and spread along track, across and vertical, and precision and recall of the outlier flags.
+    Two trajectories are compared with each other too: where they differ, and which decisions changed.
     """
     if len(truths) > 1 and len(truths) != len(trajectories):
         raise click.UsageError(
@@ -49,52 +85,93 @@ def command(trajectories: tuple[str, ...], truths: tuple[str, ...], form: str, r
         )
     if [*trajectories, *truths].count("-") > 1:
         raise click.UsageError("Standard input (-) can be read only once.", click.get_current_context())
-    click.get_current_context().exit(_run(trajectories, truths, form, report))
+    if require and not truths:
+        raise click.UsageError(
+            "--require needs the --truth that the errors are measured from.", click.get_current_context()
+        )
+    click.get_current_context().exit(_run(Job(trajectories, truths, form, require, report)))
 
 
-def _run(trajectories: Sequence[str], truths: Sequence[str], form: str, report: str | None) -> int:
+def _run(job: Job) -> int:
     """Score the trajectories, print the scores, and write the pages; the exit code."""
     from ftproc import report as pages
     from ftproc.batch import plan
     from ftproc.errors import InputError
     from ftproc.files import layout
-    from ftproc.files.reading import trajectories as trajectory_files
     from ftproc.files.writing import atomic, outputs
     from ftproc.report.index import Entry, write
-    from ftproc.scoring import render, score
-    from ftproc.scoring.matching import exchanged_axes
+    from ftproc.scoring import limits
 
-    if report is not None:
-        pages.check(report)
-    places, index = plan.pages(trajectories, report)
-    beside = [found for name in trajectories if (found := layout.sidecar(name)) is not None]
-    outputs.check(plan.pages_written(places, index), [*trajectories, *truths, *beside])
-    scores, entries, failed = [], [], False
+    if job.report is not None:
+        pages.check(job.report)
+    asked = [limits.load(name) for name in job.require]
+    places, index = plan.pages(job.trajectories, job.report)
+    beside = [found for name in job.trajectories if (found := layout.sidecar(name)) is not None]
+    outputs.check(plan.pages_written(places, index), [*job.trajectories, *job.truths, *beside, *job.files()])
+    scored, entries, failed = list[Scored](), [], False
     known: dict[str, Truth] = {}
-    for number, (name, place) in enumerate(zip(trajectories, places, strict=True)):
+    for number, (name, place) in enumerate(zip(job.trajectories, places, strict=True)):
         try:
-            truth = _truth(truths[number % len(truths)], known) if truths else None
-            trajectory = trajectory_files.read(name)
-            scores.append(score(trajectory, truth))
-            if truth is not None and (doubt := exchanged_axes(trajectory, truth)):
-                click.echo(f"ftproc: {doubt}", err=True)
+            truth = _truth(job.truths[number % len(job.truths)], known) if job.truths else None
+            first = scored[0].trajectory if scored and len(job.trajectories) == 2 else None
+            scored.append(_scored(name, truth, asked, first))
             if place is not None:
-                with atomic.guarding([*trajectories, *truths]):
-                    pages.write(trajectory, place, truth)
-                entries.append(Entry(name, place, _summary(trajectory)))
+                with atomic.guarding([*job.trajectories, *job.truths]):
+                    pages.write(scored[-1].trajectory, place, truth)
+                entries.append(Entry(name, place, _summary(scored[-1].trajectory)))
         except InputError as error:
             click.echo(f"ftproc: {error}", err=True)
             entries.append(Entry(name, None, {}, str(error)))
             failed = True
     if index is not None:
         write(entries, index)
-    if scores:
+    if scored:
         try:
-            click.echo(render(scores, form), nl=False)
+            click.echo(_text(scored, job.form), nl=False)
         except OSError as error:
             written = [entry.page for entry in entries if entry.page is not None]
             raise process.unsaid(error, written, "table of scores") from error
-    return int(failed)
+    return int(failed or not all(limits.passed(each.results) for each in scored))
+
+
+class Scored(NamedTuple):
+    """A trajectory, its score, the results of the limits in one list, and these as text."""
+
+    trajectory: Trajectory
+    score: Score
+    results: list[Result]
+    judged: str
+
+
+def _scored(name: str, truth: Truth | None, asked: Sequence[Limits], first: Trajectory | None) -> Scored:
+    """first: another trajectory, with which this one is compared. Raises InputError."""
+    from ftproc.files.reading import trajectories as trajectory_files
+    from ftproc.scoring import compare, limits, score
+    from ftproc.scoring.matching import exchanged_axes
+
+    trajectory = trajectory_files.read(name)
+    found = score(trajectory, truth)
+    if truth is not None and (doubt := exchanged_axes(trajectory, truth)):
+        click.echo(f"ftproc: {doubt}", err=True)
+    judged = [limits.judge(trajectory, truth, each.limits) for each in asked] if truth is not None else []
+    text = "".join(limits.text(name, each, one) for each, one in zip(asked, judged, strict=bool(judged)))
+    results = [result for one in judged for result in one]
+    changes: dict[str, Any] = {"require": limits.as_dicts(results)} if results else {}
+    if first is not None:
+        changes["difference"] = compare(first, trajectory)
+    return Scored(trajectory, replace(found, **changes), results, text)
+
+
+def _text(scored: Sequence[Scored], form: str) -> str:
+    """The scores; below a table for people also differences and limits."""
+    from ftproc.errors import encodable
+    from ftproc.scoring import differences, render
+
+    parts = [render([found.score for found in scored], form)]
+    if form == "table":
+        parts += [differences.text(each.score.difference) for each in scored if each.score.difference is not None]
+        parts += [found.judged for found in scored if found.judged]
+    return encodable("\n".join(parts))
 
 
 def _summary(trajectory: Trajectory) -> dict[str, Any]:

@@ -6,7 +6,8 @@ print(render([score(trajectory, truth)], "table"))
 Calls `core.model`, for angles and frames, and `files` for the text of a CSV; reads and writes no file.
 """
 
+from ftproc.scoring.differences import Difference, compare
 from ftproc.scoring.figures import Detection, Gradient, Score, score
 from ftproc.scoring.rendering import FORMATS, render
 
-__all__ = ["FORMATS", "Detection", "Gradient", "Score", "render", "score"]
+__all__ = ["FORMATS", "Detection", "Difference", "Gradient", "Score", "compare", "render", "score"]

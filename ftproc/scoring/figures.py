@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.errors import InputError
 from ftproc.records import COMPONENTS, ISOLATED, PATCH, FlagArray, FloatArray, Trajectory, Truth
+from ftproc.scoring import named
+from ftproc.scoring.differences import Difference
 from ftproc.scoring.matching import MatchedTruth, match
+from ftproc.scoring.named import Spread
 from ftproc.scoring.sigmas import Consistency, consistency, in_words
 
 #: Quantities of the state: how the whole and its axes are named in the figures, and their unit.
@@ -21,7 +24,8 @@ _STATE = {
     "velocity": ("v", ("vx", "vy", "vz"), "mps"),
     "acceleration": ("a", ("ax", "ay", "az"), "mps2"),
 }
-UNITS = ("m", "rad", "rad")  # of the components
+#: Errors of which `path` has bias and spread.
+_SIDES = [f"{q} {side}" for q in ("position", "velocity") for side in (*named.SIDES, "horizontal")]
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,7 @@ class Detection:
     true_negatives: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Score:
     """The result of `score`; all from `truth` to `outliers` needs a truth and is None without one.
 
@@ -67,8 +71,11 @@ class Score:
     of velocity and acceleration, None if the truth has none; rmse_range_m ...: of the cleaned readings, against range,
     azimuth and elevation of the truth from the station. max_error_m, p95_error_m, p99_error_m: of the norm of the
     position error. position, velocity, acceleration, cleaned: whether their published sigmas hold; None where nothing
-    is published, or the truth has none. in_3sigma, nees_position: two of the position's. sigma_verdict: all of these
-    in words. NaN where nothing could be counted.
+    is published, or the truth has none. path: bias and spread along track, across and vertical, of position and
+    velocity, by name and unit (`position_along_m`); channels: the same of the cleaned readings (`azimuth_rad`); see
+    `named`. in_3sigma, nees_position: two of the position's. sigma_verdict: all of these
+    in words. difference: of a second of two trajectories from the first; require: each limit with what was found. NaN
+    where nothing could be counted.
     """
 
     trajectory: str
@@ -106,10 +113,20 @@ class Score:
     velocity: Consistency | None = None
     acceleration: Consistency | None = None
     cleaned: Consistency | None = None
+    path: dict[str, Spread] | None = None
+    channels: dict[str, Spread] | None = None
     sigma_verdict: str | None = None
     outliers: dict[str, Detection] | None = None
     sees: str | None = None
     smoothed: bool | None = None
+    difference: Difference | None = None
+    require: list[dict[str, Any]] | None = None
+
+    def __repr__(self) -> str:
+        errors = (("position RMSE", self.rmse_3d_m, "m"), ("velocity RMSE", self.rmse_v_mps, "m/s"))
+        known = [f"{what} {value:.4g} {unit}" for what, value, unit in errors if value is not None]
+        sigmas = [f"sigmas {self.sigma_verdict}"] if self.sigma_verdict else []
+        return f"<Score of {self.trajectory}: {', '.join([f'{self.samples} samples', *known, *sigmas])}>"
 
     def as_dict(self) -> dict[str, Any]:
         """Nested and JSON-serialisable: what is unknown is left out, what could not be computed is None."""
@@ -200,31 +217,27 @@ def _errors(trajectory: Trajectory, truth: MatchedTruth) -> dict[str, Any]:
     """RMSE and consistency of position, velocity and acceleration, as far as the truth has them, and of the cleaned
     readings, as far as the trajectory has them."""
     known: dict[str, Any] = {}
-    kinds = (truth.position_m, truth.velocity_mps, truth.acceleration_mps2)
-    for k, (quantity, (whole, axes, unit), true) in enumerate(zip(_STATE, _STATE.values(), kinds, strict=True)):
-        if true is None:
+    errors = named.errors(trajectory, truth)
+    for k, (quantity, (whole, axes, unit)) in enumerate(_STATE.items()):
+        if quantity not in errors:
             continue
-        columns = slice(3 * k, 3 * k + 3)
-        error = trajectory.state[:, columns] - true
-        error[~np.isfinite(error).all(axis=1)] = np.nan
-        known[f"rmse_{whole}_{unit}"] = _rms(np.sqrt(np.sum(error**2, axis=1)))
+        error = named.vector(errors, quantity)
+        known[f"rmse_{whole}_{unit}"] = _rms(errors[quantity])
         known |= {f"rmse_{axis}_{unit}": _rms(column) for axis, column in zip(axes, error.T, strict=True)}
-        known[quantity] = consistency(trajectory.time_s, _in_sigmas(error, trajectory.sigma[:, columns]), axes)
-    error = trajectory.measurement - from_cartesian(truth.position_m)
-    error[:, 1] = wrap(error[:, 1])
-    cleaned = np.flatnonzero(np.isfinite(error).any(axis=0))
-    known |= {f"rmse_{COMPONENTS[c]}_{UNITS[c]}": _rms(error[:, c]) for c in cleaned}
-    ratio, names = _in_sigmas(error, trajectory.measurement_sigma)[:, cleaned], [COMPONENTS[c] for c in cleaned]
-    known["cleaned"] = consistency(trajectory.time_s, ratio, names) if names else None
+        sigma = trajectory.sigma[:, 3 * k : 3 * k + 3]
+        known[quantity] = consistency(trajectory.time_s, named.in_sigmas(error, sigma), axes)
+    cleaned, ratio = named.of_readings(errors, trajectory)
+    known |= {f"rmse_{name}_{named.unit(name)}": _rms(errors[name]) for name in cleaned}
+    known["cleaned"] = consistency(trajectory.time_s, ratio, cleaned) if cleaned else None
+    known |= {"path": _spreads(errors, _SIDES), "channels": _spreads(errors, COMPONENTS)}
     judged = [known[quantity] for quantity in (*_STATE, "cleaned") if known.get(quantity) is not None]
     return known | {"sigma_verdict": in_words(judged)}
 
 
-def _in_sigmas(error: FloatArray, sigma: FloatArray) -> FloatArray:
-    """Errors over published sigmas; NaN where there is no sigma."""
-    published = np.isfinite(sigma) & (sigma > 0)
-    ratio: FloatArray = np.divide(error, sigma, out=np.full(error.shape, np.nan), where=published)
-    return ratio
+def _spreads(errors: Mapping[str, FloatArray], names: Sequence[str]) -> dict[str, Spread]:
+    """Bias and spread of the errors of these names, as far as they are known, by name and unit."""
+    found = {name: Spread.of(errors[name]) for name in names if name in errors}
+    return {f"{name.replace(' ', '_')}_{named.unit(name)}": each for name, each in found.items() if each is not None}
 
 
 def _detection(flag: FlagArray, injected: FlagArray) -> Detection:

@@ -50,6 +50,19 @@ _LABELS = {
     "p95_error_m": "  95 % below",
     "p99_error_m": "  99 % below",
 } | {
+    f"{key}.bias_and_sigma": label
+    for key, label in (
+        ("path.position_along_m", "position along: bias, sigma (m)"),
+        ("path.position_across_m", "  across, to the right"),
+        ("path.position_vertical_m", "  vertical"),
+        ("path.velocity_along_mps", "velocity along: bias, sigma (m/s)"),
+        ("path.velocity_across_mps", "  across, to the right"),
+        ("path.velocity_vertical_mps", "  vertical"),
+        ("channels.range_m", "range: bias, sigma (m)"),
+        ("channels.azimuth_rad", "azimuth: bias, sigma (rad)"),
+        ("channels.elevation_rad", "elevation: bias, sigma (rad)"),
+    )
+} | {
     f"{quantity}.{key}": label.format(quantity)
     for quantity in ("position", "velocity", "acceleration", "cleaned")
     for key, label in (
@@ -144,6 +157,9 @@ def _with_pairs(column: dict[str, Any]) -> dict[str, Any]:
         at, low, high = (column[f"{q}.{name}"] for name in ("largest_sigma_time_s", "nees_low", "nees_high"))
         column[f"{q}.largest"] = f"{column[f'{q}.largest_sigma']:.3g} at {at:.7g} s"
         column[f"{q}.nees_and_bounds"] = f"{column[key]:.3g} ({low:.2g} to {high:.2g})"
+    for key in [key for key in column if key.endswith(".bias")]:
+        name = key.removesuffix(".bias")
+        column[f"{name}.bias_and_sigma"] = f"{column[key]:.2g}, {column[f'{name}.sigma']:.3g}"
     return column
 
 

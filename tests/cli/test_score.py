@@ -102,3 +102,35 @@ def test_comparison_of_all_methods(run, flight):
     rows = list(csv.DictReader(io.StringIO(run("score", *files, "--truth", "flight.truth.csv", "--format", "csv").out)))
     assert len(rows) == len(files)  # in the order given, with the keys of a single score
     assert {"trajectory", "method", "samples", "rmse_3d_m", "outliers.range.recall"} <= rows[0].keys()
+
+
+def test_limits_are_printed_and_decide_the_exit_code(run, clean, flight):
+    limits = flight.with_name("limits.toml")
+    limits.write_text('[[require]]\nwhat = "position horizontal"\nshare = 0.95\nbelow_m = 50\n')
+    met = run("score", clean, "--truth", "flight.truth.csv", "--require", limits, "--require", "ed-142-terminal")
+    assert met.code == 0
+    assert "PASS  position horizontal  95 % below 50 m" in met.out
+    assert "EUROCAE ED-142" in met.out
+    limits.write_text('[[require]]\nwhat = "position"\nrms_below_m = 0.001\n')
+    missed = run("score", clean, "--truth", "flight.truth.csv", "--require", limits)
+    assert missed.code == 1
+    assert "FAIL  position  rms below 0.001 m" in missed.out
+    found = json.loads(run("score", clean, "--truth", "flight.truth.csv", "--require", limits, "--format", "json").out)
+    assert [(each["what"], each["passed"]) for each in found["require"]] == [("position", False)]
+    assert run("score", clean, "--require", limits).code == 2
+    unknown = run("score", clean, "--truth", "flight.truth.csv", "--require", "ed-1")
+    assert unknown.code == 2
+    assert "there are ed-116" in unknown.err
+
+
+def test_two_runs_are_compared(run, clean, flight):
+    assert run("filter", flight, "-o", "smooth.parquet", "--smooth", "--summary", "none").code == 0
+    both = run("score", clean, "smooth.parquet")
+    assert both.code == 0
+    assert "smooth.parquet against" in both.out
+    assert "settings   smooth: False, then True" in both.out
+    found = json.loads(run("score", clean, "smooth.parquet", "--format", "json").out)
+    assert "difference" not in found[0]
+    assert found[1]["difference"]["rows"] == 61
+    assert found[1]["difference"]["settings"]["smooth"] == [False, True]
+    assert "against" not in run("score", clean, clean, clean).out
