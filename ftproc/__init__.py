@@ -1,8 +1,8 @@
 """Clean trajectories, with honest uncertainties, from dirty theodolite and radar logs.
 
     import ftproc
-    trajectory = ftproc.filter_log("flight.csv")
-    frame = ftproc.to_pandas(trajectory)
+    trajectory = ftproc.filter_log("flight.csv", ftproc.FilterSettings(smooth=True))
+    frame = trajectory.to_pandas()
 
 Modules are loaded when first used, so that the import is fast.
 """
@@ -14,11 +14,25 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from ftproc.api import Live, filter_log, plot, read_log, score, simulate, to_pandas, to_table, train, write_report
+    from ftproc.api import (
+        FilterSettings,
+        Live,
+        Station,
+        TrainSettings,
+        filter_log,
+        plot,
+        read_log,
+        score,
+        simulate,
+        to_pandas,
+        to_table,
+        train,
+        write_report,
+    )
 
 __all__ = [
-    "Live", "__version__", "filter_log", "plot", "read_log", "score", "simulate", "to_pandas", "to_table", "train",
-    "write_report",
+    "FilterSettings", "Live", "Station", "TrainSettings", "__version__", "filter_log", "plot", "read_log", "score",
+    "simulate", "to_pandas", "to_table", "train", "write_report",
 ]  # fmt: skip
 
 
@@ -28,3 +42,8 @@ def __getattr__(name: str) -> Any:
     from ftproc import api
 
     return getattr(api, name)
+
+
+def __dir__() -> list[str]:
+    """The public names, also those that are not loaded yet."""
+    return sorted({*globals(), *__all__})

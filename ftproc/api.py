@@ -11,12 +11,13 @@ from ftproc import pipeline
 from ftproc.config.reading import load
 from ftproc.config.recipe import Recipe
 from ftproc.correction import model_file
-from ftproc.files.writing import clock, geodesy
+from ftproc.derived.columns import with_columns
+from ftproc.errors import UsageError
 from ftproc.live.live import Live
-from ftproc.records import MeasurementLog, Trajectory, Truth
-from ftproc.settings import PACKAGED, FilterSettings, TrainSettings
+from ftproc.records import VIEWS, MeasurementLog, Trajectory, Truth
+from ftproc.settings import PACKAGED, FilterSettings, Station, TrainSettings
 
-__all__ = ["Live"]
+__all__ = ["FilterSettings", "Live", "Station", "TrainSettings"]
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,20 +49,32 @@ def filter_log(
     *,
     model: Model | str | None = PACKAGED,
     config: str | Path | None = None,
+    azimuth_from: str | None = None,
+    site: tuple[float, float, float] | None = None,
 ) -> Trajectory:
     """The trajectory of a log (a MeasurementLog, or anything `read_log` takes).
 
+    settings: those of `FilterSettings`; left out, those of the station file, or the defaults.
+
     model: the packaged correction, another one (or its file), or None for none.
     config: a station file: how the log is read (unless it is a MeasurementLog), and the settings and the model where
-    they are not specified here. With a site in the settings the trajectory has `lat_deg`, `lon_deg` and `height_m`.
+    they are not specified here.
+    azimuth_from: `x` or `north`, unless the log is a MeasurementLog, which was read already. site: latitude deg,
+    longitude deg and height m of the station; with one, here or in the settings, the trajectory has `lat_deg`,
+    `lon_deg` and `height_m`.
     Raises InputError, UsageError.
     """
     recipe = _recipe(config)
     settings = settings or recipe.settings
+    if site is not None:
+        settings = replace(settings, site=site)
+    reading = {} if azimuth_from is None else {"azimuth_from": azimuth_from}
+    if reading and isinstance(log, MeasurementLog):
+        raise UsageError("azimuth_from is for reading a log, and this one was read already; give it to read_log.")
     if isinstance(model, str):
         model = model_file.named(recipe.model if model == PACKAGED else model)
-    read = log if isinstance(log, MeasurementLog) else read_log(log, config=config)
-    return clock.stamped(geodesy.located(pipeline.filter_log(read, settings, model), settings), read)
+    read = log if isinstance(log, MeasurementLog) else read_log(log, config=config, **reading)
+    return with_columns(pipeline.filter_log(read, settings, model), settings, read)
 
 
 def train(
@@ -125,6 +138,15 @@ def to_pandas(trajectory: Trajectory) -> pd.DataFrame:
     """The trajectory as a pandas DataFrame, with the columns of its file."""
     frame: pd.DataFrame = to_table(trajectory).to_pandas()
     return frame
+
+
+def _as_html(trajectory: Trajectory) -> str:
+    from ftproc.report import notebook
+
+    return notebook.as_html(trajectory)
+
+
+VIEWS |= {"to_pandas": to_pandas, "to_table": to_table, "_repr_html_": _as_html}
 
 
 def _recipe(config: str | Path | None) -> Recipe:

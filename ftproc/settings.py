@@ -27,15 +27,24 @@ class Air:
 
 @dataclass(frozen=True)
 class Station:
-    """The conventions and the known errors of an instrument's readings."""
+    """The conventions and the known errors of an instrument's readings.
 
-    azimuth_from: str = "x"  # x | north: the axis that the azimuth is counted from, see ftproc.files.conventions
-    azimuth_sense: str | None = None  # clockwise | anticlockwise from above; None: north clockwise, x anticlockwise
-    azimuth_zero_rad: float = 0.0  # azimuth where the instrument reads zero
-    elevation_from: str | None = None  # horizon | zenith; None: zenith if the column's name says so, else horizon
-    bias: tuple[float, float, float] = (0.0, 0.0, 0.0)  # reading minus truth: range m, azimuth rad, elevation rad
-    time_offset_s: float = 0.0  # added to every time
-    refraction: Air | None = None  # for the elevation of an optical instrument; None: no correction
+    azimuth_from: `x` or `north`, the axis that the azimuth is counted from, see `ftproc.files.conventions`.
+    azimuth_sense: `clockwise` or `anticlockwise` from above; None: from north clockwise, from x anticlockwise.
+    azimuth_zero_rad: the azimuth where the instrument reads zero.
+    elevation_from: `horizon` or `zenith`; None: zenith if the column's name says so, else horizon.
+    bias: reading minus truth of range m, azimuth rad, elevation rad; subtracted from every reading.
+    time_offset_s: added to every time.
+    refraction: the air, for the elevation of an optical instrument; None: no correction.
+    """
+
+    azimuth_from: str = "x"
+    azimuth_sense: str | None = None
+    azimuth_zero_rad: float = 0.0
+    elevation_from: str | None = None
+    bias: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    time_offset_s: float = 0.0
+    refraction: Air | None = None
 
 
 @dataclass(frozen=True)
@@ -85,15 +94,26 @@ class FilterSettings:
 
 @dataclass(frozen=True)
 class TrainSettings:
-    """GA-BPNN training: network size, genetic search, back-propagation, hold-out verdict."""
+    """GA-BPNN training: network size, genetic search, back-propagation, hold-out verdict.
 
-    features: str = "auto"  # auto: chosen by held-out flights; or one of ftproc.correction.feature_sets
+    features: `auto` (chosen by held-out flights) or one of `ftproc.correction.feature_sets`.
+    hidden: units of the hidden layer.
+    population, generations: of the genetic search.
+    epochs: most that the optimiser is given.
+    flights: simulated, when a scenario is trained on.
+    seed: of all random numbers.
+    method: the filter whose error is learned.
+    optimiser: `l-bfgs`, or `momentum` as in the paper.
+    start: initial weights, see `ftproc.correction.training.initial_weights`.
+    """
+
+    features: str = "auto"
     hidden: int = 12
     population: int = 40
     generations: int = 60
     epochs: int = 400
-    flights: int = 24  # simulated flights when training on a scenario
+    flights: int = 24
     seed: int = 0
-    method: str = "ga-bpnn-ukf"  # the filter whose error is learned
-    optimiser: str = "l-bfgs"  # or momentum, as in the paper
-    start: str = "genetic"  # initial weights, see ftproc.correction.training.initial_weights
+    method: str = "ga-bpnn-ukf"
+    optimiser: str = "l-bfgs"
+    start: str = "genetic"

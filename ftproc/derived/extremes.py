@@ -9,8 +9,6 @@ import numpy as np
 from ftproc.derived.quantities import QUANTITIES, Derived
 from ftproc.records import FloatArray, Trajectory
 
-VAGUE = 5.0  # times the median sigma: the same, where a track begins or has a gap
-
 
 class Extreme(NamedTuple):
     """what: such as `greatest load factor`. value, sigma: in `unit`; the sigma is NaN where it is not known. row: of
@@ -27,8 +25,9 @@ class Extreme(NamedTuple):
 def extremes(trajectory: Trajectory) -> list[Extreme]:
     """The greatest and least speed, height, climb rate, turn rate, load factor and distance of a flight.
 
-    Rows whose estimate is far vaguer than usual (at a start, in a gap) are passed over. The sigma is that of the row:
-    an extreme of many noisy rows lies a little farther out than the flight has been. Empty without velocities.
+    The row is the one that is farthest out by its value less 1 sigma, so that one that is far vaguer than the others,
+    at a start or in a gap, is none. The sigma is that of the row: of many noisy rows the farthest lies a little farther
+    out than the flight has been.
     """
     derived, state, sigma = Derived.of(trajectory), trajectory.state, trajectory.sigma
     length, length_sigma = _norm(state[:, :3], sigma[:, :3])
@@ -37,11 +36,12 @@ def extremes(trajectory: Trajectory) -> list[Extreme]:
     distance = trajectory.measurement[:, 0], trajectory.measurement_sigma[:, 0], "m"
     if not np.isfinite(distance[0]).any():
         distance = length, length_sigma, "m"
+    over, height = _height(trajectory)
     wanted = (
         ("greatest speed", (speed, speed_sigma, "m/s"), 1),
         ("least speed", (speed, speed_sigma, "m/s"), -1),
-        ("greatest height", _height(trajectory), 1),
-        ("least height", _height(trajectory), -1),
+        (f"highest {over}", height, 1),
+        (f"lowest {over}", height, -1),
         ("steepest climb", of["climb_rate_mps"], 1),
         ("steepest descent", of["climb_rate_mps"], -1),
         ("greatest load factor", of["load_factor"], 1),
@@ -57,26 +57,21 @@ def extremes(trajectory: Trajectory) -> list[Extreme]:
 def _extreme(
     trajectory: Trajectory, what: str, value: FloatArray, sigma: FloatArray, unit: str, sign: int
 ) -> Extreme | None:
-    """The row with the greatest (least; largest in size) value, among those that are known as well as usual."""
-    usable = np.isfinite(value)
-    known = usable & np.isfinite(sigma)
-    if known.any():
-        usable &= ~(sigma > VAGUE * float(np.median(sigma[known])))
-    if not usable.any():
+    """The row with the greatest (sign 1), the least (-1) or in size the largest (0) value."""
+    rows = np.flatnonzero(np.isfinite(value))
+    if not len(rows):
         return None
-    rows = np.flatnonzero(usable)
     by = np.abs(value[rows]) if sign == 0 else sign * value[rows]
-    row = int(rows[by.argmax()])
+    row = int(rows[(by - np.nan_to_num(sigma[rows])).argmax()])
     return Extreme(what, float(value[row]), float(sigma[row]), unit, float(trajectory.time_s[row]), row)
 
 
-def _height(trajectory: Trajectory) -> tuple[FloatArray, FloatArray, str]:
+def _height(trajectory: Trajectory) -> tuple[str, tuple[FloatArray, FloatArray, str]]:
     """Above the ellipsoid with a site, else over the station."""
-    extra = trajectory.extra
-    height = trajectory.state[:, 2]
+    extra, sigma = trajectory.extra, trajectory.sigma[:, 2]
     if extra is not None and "height_m" in extra.column_names:
-        height = np.asarray(extra.column("height_m"), float)
-    return height, trajectory.sigma[:, 2], "m"
+        return "above the ellipsoid", (np.asarray(extra.column("height_m"), float), sigma, "m")
+    return "over the station", (trajectory.state[:, 2], sigma, "m")
 
 
 def _norm(vector: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:

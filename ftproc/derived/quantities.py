@@ -117,10 +117,10 @@ def _values(vectors: FloatArray) -> list[FloatArray]:
     ground = np.hypot(vx, vy)
     with np.errstate(invalid="ignore", divide="ignore"):
         turn = (vx * acceleration[:, 1] - vy * acceleration[:, 0]) / ground**2
-    return [ground, np.arctan2(vy, vx), vz, np.arctan2(vz, ground), turn, _load_factor(vectors)]
+    return [ground, np.arctan2(vy, vx), vz, np.arctan2(vz, ground), turn, load_factor(vectors)]
 
 
-def _load_factor(vectors: FloatArray) -> FloatArray:
+def load_factor(vectors: FloatArray) -> FloatArray:
     """(n,) g: the specific force across the direction of flight; all of it of a target slower than SLOWEST."""
     force, v = vectors[:, 3:] + [0.0, 0.0, GRAVITY], np.sqrt((vectors[:, :3] ** 2).sum(1))
     along = vectors[:, :3] / np.maximum(v, SLOWEST)[:, None]

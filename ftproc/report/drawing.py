@@ -40,7 +40,7 @@ def rows(timeline: Timeline, titles: Sequence[str], height: int, columns: int = 
     figure = make_subplots(
         count, columns, shared_xaxes="all", vertical_spacing=0.16 / count, horizontal_spacing=0.13
     )  # fmt: skip
-    figure.update_layout(**style.LAYOUT, height=height)
+    figure.update_layout(**style.LAYOUT, height=height, meta={"time": True, "columns": columns})
     figure.update_xaxes(**style.axis(range=span(timeline.time_s, margin=EDGE)))
     for index, title in enumerate(titles):
         row, column = divmod(index, columns)

@@ -17,12 +17,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ftproc.records import Trajectory, Truth
-from ftproc.report import tables
+from ftproc.report import deciding, tables
 from ftproc.report.drawing import Drawn
+from ftproc.report.maps.track import ground, track
 from ftproc.report.patches import WORST_S
 from ftproc.report.readings import readings, residuals, worst_seconds
 from ftproc.report.timeplots import correction, errors, motion, nis, sigmas
-from ftproc.report.track import ground, track
 from ftproc.report.view import View, view
 
 if TYPE_CHECKING:
@@ -35,6 +35,8 @@ _WRAPPER = re.compile(
     r"\(\s*function\(root, factory\) \{.*?\(\) => \{\n(.*)\nwindow\.Plotly = Plotly;\s*return Plotly;\s*\}\)\);\s*\Z",
     re.DOTALL,
 )
+
+_SCRIPTS = ("ticks.js", "page.js", "decisions.js")
 
 #: The figures of a trajectory by name; `errors` needs a truth too.
 FIGURES: dict[str, Callable[[View], Drawn]] = {
@@ -68,16 +70,18 @@ def page(trajectory: Trajectory, truth: Truth | None = None) -> str:
     parts = [tables.heading(shown), tables.banner(shown), tables.summary(shown)]
     if truth is not None:
         parts.append(section("Against the truth", [("errors", errors(shown))], tables.score(shown)))
-    parts.append(tables.patches(shown))
+    parts += [tables.extremes(shown), tables.patches(shown)]
     for title, names in _SECTIONS:
         parts.append(section(title, [(name, FIGURES[name](shown)) for name in names]))
-    parts.append(tables.provenance(shown))
+        if "worst" in names:
+            parts.append(deciding.section(shown, str(trajectory.metadata.get("log", ""))))
+    parts += [tables.understood(shown), tables.provenance(shown)]
     return document(tables.name(trajectory), "\n".join(parts), drawn=True)
 
 
 def document(title: str, body: str, drawn: bool = False) -> str:
     """A page around its body (HTML). drawn: with figures."""
-    library, script = (_plotly(), _text("page.js")) if drawn else (None, "")
+    library, script = (_plotly(), "".join(map(_text, _SCRIPTS))) if drawn else (None, "")
     allowed = f"'sha256-{library.sha256}' 'sha256-{_sha256(script)}' 'unsafe-eval'" if library else "'none'"
     policy = f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:"
     return "\n".join(

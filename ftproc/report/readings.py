@@ -51,7 +51,7 @@ def readings(view: View) -> Drawn:
             within = (foot, limits[1]) if flag == MISSING else limits
             traces.append(drawing.marks(timeline.time_s, value, chosen[flag, c], kind, within, total))
         traces.append(drawing.line(timeline, view.cleaned[:, c], "estimate", style.ESTIMATE))
-        _add(figure, traces, row, named)
+        _add(figure, _decidable(traces, c), row, named)
         _add_steps(figure, view, row, c)
     where = "An outlier beyond the axis is drawn at its edge; point at it for its value."
     if view.reading is None:
@@ -93,7 +93,7 @@ def residuals(view: View) -> Drawn:
             )
         if gate is not None:
             traces += [drawing.level(timeline, sign * gate, f"gate of {gate:g} sigmas") for sign in (-1, 1)]
-        _add(figure, traces, row, named)
+        _add(figure, _decidable(traces, c), row, named)
         _add_steps(figure, view, row, c)
     note = "Decisions also rest on neighbouring readings: some inside the gate are outliers, some outside are not."
     if view.trajectory.metadata.get("settings", {}).get("editing") == "none":
@@ -101,6 +101,15 @@ def residuals(view: View) -> Drawn:
     if steps(view):
         note += " A step is taken out of the readings on its shorter side."
     return Drawn(figure, f"{_WHAT[known.residual_kind]}. {note}")
+
+
+def _decidable(traces: list[Any], c: int) -> list[Any]:
+    """The traces, of which those of readings say what a click on one means: a good one is bad, an outlier good."""
+    uses = {"good reading": "bad", style.KINDS[ISOLATED].name: "good", style.KINDS[PATCH].name: "good"}
+    for trace in traces:
+        if trace.name in uses:
+            trace.meta = {"component": COMPONENTS[c], "use": uses[trace.name]}
+    return traces
 
 
 def _height(seen: list[int]) -> int:

@@ -9,9 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from ftproc.derived import Extreme
+from ftproc.derived import extremes as found_extremes
+from ftproc.derived.quantities import site_of
 from ftproc.quality import summary as figures
 from ftproc.quality import verdict
 from ftproc.records import COMPONENTS, Trajectory
+from ftproc.report import deciding
 from ftproc.report.patches import patches as found_patches
 from ftproc.report.patches import steps as found_steps
 from ftproc.report.style import GREY, VERDICT
@@ -29,7 +33,7 @@ def name(trajectory: Trajectory) -> str:
 
 
 def heading(view: View) -> str:
-    """The log, and a line on how it was filtered."""
+    """The log, a line on where and when it was taken, and one on how it was filtered."""
     meta, s = view.trajectory.metadata, view.summary
     parts = []
     if s:
@@ -41,7 +45,32 @@ def heading(view: View) -> str:
         parts = [f"{len(view.trajectory):,} rows"]
     if view.score is not None:
         parts.append(f"compared with {view.score.truth}")
-    return f'<h1>{html.escape(name(view.trajectory))}</h1><p class="sub">{html.escape(" · ".join(parts))}</p>'
+    lines = [line for line in (" · ".join(taken(view)), " · ".join(parts)) if line]
+    said = "".join(f'<p class="sub">{html.escape(line)}</p>' for line in lines)
+    return f"<h1>{html.escape(name(view.trajectory))}</h1>{said}{_clock(view)}"
+
+
+def taken(view: View) -> list[str]:
+    """Date and clock time of the first row, the station, the target and the instrument, as far as they are known."""
+    meta, moments = view.trajectory.metadata, view.moments
+    site = site_of(meta)
+    where = "" if site is None else f"station {abs(site[0]):.5f}° {'SN'[site[0] >= 0]}, {abs(site[1]):.5f}° " \
+        f"{'WE'[site[1] >= 0]}, {site[2]:.6g} m"  # fmt: skip
+    understood, station = meta.get("understood"), meta.get("station")
+    target = understood.get("target") if isinstance(understood, Mapping) else None
+    known = station.get("in_words") if isinstance(station, Mapping) else None
+    instrument = f"instrument: {', '.join(map(str, known))}" if isinstance(known, list | tuple) and known else ""
+    begins = f"T+0 is {moments.begins}" if moments.begins else ""
+    if not begins and moments.counts_from_elsewhere:
+        begins = f"T+0 is {moments.start_s:,.2f} s of the log's clock, whose date is not known"
+    return [each for each in (begins, where, f"target {target}" if target else "", instrument) if each]
+
+
+def _clock(view: View) -> str:
+    """What the scripts need of the log's clock: ms since 1970 (UTC) at time zero, and the first time, s."""
+    zero = view.moments.zero_ms
+    data = f'data-zero="{"" if zero is None else repr(zero)}" data-start="{view.moments.start_s!r}"'
+    return f'<div id="log" hidden {data}></div>'
 
 
 def banner(view: View) -> str:
@@ -66,9 +95,67 @@ def summary(view: View) -> str:
     if "components" not in s:  # nor has a fused flight, whose stations have them
         return ""
     rows = [figures.component_cells(component, s["components"][component]) for component in COMPONENTS]
+    turned = list(zip(figures.HEADER, *rows, strict=True))  # a line for each figure: a telephone shows it whole
     notes = figures.notes(s)
-    body = table(figures.HEADER, rows, "numbers") + _pairs(figures.facts(s)) + _list(notes)
-    return f"<section><h2>Summary</h2>{body}</section>"
+    body = table(turned[0], turned[1:], "numbers whole")
+    body = f'<div class="tables">{body}{_pairs([*figures.facts(s), *figures.network(s)])}</div>{_list(notes)}'
+    return f"<section><h2>Summary</h2>{body}{_rivals(s)}</section>"
+
+
+def _rivals(s: Mapping[str, Any]) -> str:
+    """The other understandings that are nearly as likely, if the summary has some: a line of figures each."""
+    found = [each for each in s.get("rivals", ()) if isinstance(each, Mapping)]
+    if not found:
+        return ""
+    header = list(dict.fromkeys(key for each in found for key in each))
+    rows = [[_shown(each.get(key)) for key in header] for each in found]
+    return f"<h3>Other understandings that are nearly as likely</h3>{table(header, rows)}"
+
+
+def extremes(view: View) -> str:
+    """The extremes of the flight, each a button that zooms to it."""
+    found, moments = found_extremes(view.trajectory), view.moments
+    if not found:
+        return ""
+    around = AROUND_STEP * float(np.ptp(view.trajectory.time_s))
+    rows = [
+        (_zoom(each.what, each.time_s - around, each.time_s + around), *_measured(each), moments.clock(each.time_s),
+         *_since(view, each.time_s))
+        for each in found
+    ]  # fmt: skip
+    header = ("", "value", "1 sigma", _when(view), *(["T+ s"] if moments.counts_from_elsewhere else []))
+    note = (
+        'Farthest out by the value less 1 sigma. <span class="click">A click zooms all figures over time to it.</span>'
+    )
+    body = table(header, rows, "numbers extremes", links=1)
+    return f'<section><h2>Extremes of the flight</h2>{body}<p class="note">{note}</p></section>'
+
+
+def _measured(each: Extreme) -> tuple[str, str]:
+    """Value and sigma, with as many decimals as the sigma's two digits have."""
+    if not each.sigma > 0:
+        return f"{each.value:,.5g} {each.unit}", "-"
+    decimals = int(np.clip(1 - np.floor(np.log10(each.sigma)), 0, 9))
+    return f"{each.value:,.{decimals}f} {each.unit}", f"± {each.sigma:,.{decimals}f}"
+
+
+def understood(view: View) -> str:
+    """How the log was understood, folded."""
+    known = view.trajectory.metadata.get("understood")
+    columns = known.get("columns") if isinstance(known, Mapping) else None
+    if not isinstance(known, Mapping) or not isinstance(columns, Mapping) or not columns:
+        return ""
+    header = ("quantity", "column", "unit", "unit from", "why")
+    rows = [(str(q), *(_shown(c.get(key)) for key in ("column", "unit", "unit_from", "why")))
+            for q, c in columns.items() if isinstance(c, Mapping)]  # fmt: skip
+    rest = [("file", known.get("file")), ("not used", known.get("not_used")), ("clock", known.get("clock")),
+            ("readings", known.get("conventions")), ("doubtful", known.get("doubts"))]  # fmt: skip
+    body = table(header, rows) + _pairs((key, _shown(value)) for key, value in rest)
+    return _folded("Understood as", body)
+
+
+def _folded(title: str, body: str) -> str:
+    return f"<section><details><summary><h2>{html.escape(title)}</h2></summary>{body}</details></section>"
 
 
 def patches(view: View) -> str:
@@ -78,13 +165,16 @@ def patches(view: View) -> str:
         return ""
     around = AROUND_STEP * float(np.ptp(view.trajectory.time_s))
     rows = [
-        (_zoom(s.time_s, s.time_s - around, s.time_s + around), "stays", f"{s.component}, a step", "-", s.size)
+        (_zoom(view.moments.clock(s.time_s), s.time_s - around, s.time_s + around), "", *_since(view, s.time_s),
+         "stays", f"{s.component}, a step", "-", s.size)
         for s in steps
     ]  # fmt: skip
+    longest = sorted(found, key=lambda p: -p.readings)[:MOST_PATCHES]
     rows += [
-        (_zoom(p.start_s, p.start_s, p.end_s), f"{p.end_s:,.2f}", p.component, f"{p.readings:,}",
+        (_zoom(view.moments.clock(p.start_s), p.start_s, p.end_s), deciding.buttons(p), *_since(view, p.start_s),
+         f"{p.end_s - p.start_s:,.2f}", p.component, f"{p.readings:,}",
          "-" if p.size != p.size else f"{p.size:+,.3g} {p.unit}")
-        for p in sorted(found, key=lambda p: -p.readings)[:MOST_PATCHES]
+        for p in sorted(longest, key=lambda p: p.start_s)
     ]  # fmt: skip
     note = "Size: median of reading minus estimate." if found else ""
     if len(found) > MOST_PATCHES:
@@ -93,15 +183,27 @@ def patches(view: View) -> str:
         note = f"A step stays: the estimate bridges it, and follows the longer side. {note}".strip()
     click = "A click on a start zooms all figures over time to it."
     title = " and ".join(["Steps"] * bool(steps) + ["Outlier patches"] * bool(found)).replace("and O", "and o")
-    body = table(("start, s", "end, s", "component", "readings", "size"), rows, "numbers patches", links=1)
+    since = ["T+ s"] if view.moments.counts_from_elsewhere else []
+    header = (_when(view), "it is", *since, "lasts, s", "component", "readings", "size")
+    body = table(header, rows, "numbers patches", links=2)
     whole = '<button data-from="" data-to="">Show the whole log.</button>'
     links = f'<span class="click">{click} {whole}</span>'
     return f'<section><h2>{title}</h2>{body}<p class="note">{note} {links}</p></section>'
 
 
-def _zoom(shown_s: float, start_s: float, end_s: float) -> str:
-    """A time as a button that zooms to a stretch."""
-    return f'<button data-from="{start_s!r}" data-to="{end_s!r}">{shown_s:,.2f}</button>'
+def _zoom(shown: str, start_s: float, end_s: float) -> str:
+    """A text as a button that zooms to a stretch."""
+    return f'<button data-from="{start_s!r}" data-to="{end_s!r}">{html.escape(shown)}</button>'
+
+
+def _when(view: View) -> str:
+    """The title of a column of times."""
+    return "UTC" if view.moments.zero_ms is not None else "time, s"
+
+
+def _since(view: View, time_s: float) -> list[str]:
+    """The cell of seconds since the first row, where they say more than the time."""
+    return [view.moments.since(time_s).removeprefix("T")] if view.moments.counts_from_elsewhere else []
 
 
 def score(view: View) -> str:
@@ -117,12 +219,12 @@ def provenance(view: View) -> str:
     if not meta:
         return ""
     settings = meta.get("settings")
-    about = [(key, meta[key]) for key in meta if key not in ("settings", "summary")]
+    about = [(key, meta[key]) for key in meta if key not in ("settings", "summary", "understood")]
     parts = [_pairs((str(key), _shown(value)) for key, value in about)]
     if isinstance(settings, Mapping):
         parts.insert(0, _pairs((str(key), _shown(value)) for key, value in settings.items()))
     title = "Settings, noise and process noise as used; provenance"
-    return f'<section><h2>{title}</h2><div class="tables">{"".join(parts)}</div></section>'
+    return _folded(title, f'<div class="tables">{"".join(parts)}</div>')
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "", links: int = 0) -> str:

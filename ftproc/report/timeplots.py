@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ftproc.derived.quantities import QUANTITIES, Derived
 from ftproc.quality import consistency
 from ftproc.records import COMPONENTS, FloatArray
 from ftproc.report import drawing, style
 from ftproc.report.drawing import DASHES, Drawn
 from ftproc.report.patches import steps
 from ftproc.report.style import require_plotly
-from ftproc.report.view import View, load_factor, speed
+from ftproc.report.view import View, speed
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 INTERVALS, LEAST_IN_INTERVAL = 60, 25  # number of means of NIS, and least samples in each
 TICKS = [m * 10.0**k for k in range(-6, 9) for m in (1, 3)]  # of logarithmic axes
 WITHIN = 3  # published sigmas, the limits drawn with the errors
+_SHOWN = ("climb_rate_mps", "turn_rate_degps", "load_factor")  # of `derived`
 _STATE = ("position, m", "velocity, m/s", "acceleration, m/s²")
 
 
@@ -87,14 +89,15 @@ def _on_log_scale(figure: go.Figure, view: View, rows: int, note: str) -> Drawn:
 
 
 def motion(view: View) -> Drawn:
-    """Speed, height and load factor."""
+    """Speed, height, climb rate, turn rate and load factor."""
     state = view.trajectory.state
     if not view.has_position:
         return Drawn(None, "Position and velocity are not observable.")
+    value = Derived.of(view.trajectory).value
     parts = [
         ("speed, m/s", speed(state)),
         ("height, m", state[:, 2]),
-        ("load factor, g", load_factor(state)),
+        *((f"{q.label}, {q.unit}", value[:, k]) for k, q in enumerate(QUANTITIES) if q.name in _SHOWN),
     ]
     known = [(title, value) for title, value in parts if np.isfinite(value).any()]
     figure = drawing.rows(view.timeline, [title for title, _ in known], 200 * len(known) + 60)

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ftproc.core.model.frames import from_cartesian, unwrap, wrap
+from ftproc.core.model.frames import from_cartesian, to_cartesian, unwrap, wrap
+from ftproc.files.moments import Moments
 from ftproc.quality.verdict import LEVELS
-from ftproc.records import Diagnostics, FloatArray, Trajectory, Truth
+from ftproc.records import ISOLATED, PATCH, Diagnostics, FloatArray, Trajectory, Truth
 from ftproc.report.style import COMPONENT
 from ftproc.report.thinning import Timeline
 from ftproc.scoring import Score, score
 from ftproc.scoring.matching import match
 
-STANDARD_GRAVITY = 9.80665  # m/s2
-SLOWEST = 1.0  # m/s; a slower target has no direction of flight
+REJECTED_ONES = (ISOLATED, PATCH)
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,20 @@ class View:
     error: FloatArray | None = None
     cleaned_error: FloatArray | None = None
     score: Score | None = None
+
+    @cached_property
+    def moments(self) -> Moments:
+        """How its times are said."""
+        return Moments.of(self.trajectory.metadata, self.trajectory.time_s)
+
+    @cached_property
+    def raw_position(self) -> tuple[FloatArray | None, NDArray[np.bool_]]:
+        """(n, 3) m that each row's readings show, NaN where one is missing, and (n,) whether one of them is an outlier;
+        None when the raw readings are not known."""
+        bad: NDArray[np.bool_] = np.asarray(np.isin(self.trajectory.outlier, REJECTED_ONES).any(1))
+        if self.trajectory.diagnostics is None:
+            return None, bad
+        return to_cartesian(self.trajectory.diagnostics.reading), bad
 
     def part(self, rows: slice) -> View:
         """Some of its rows, for the figure of the readings."""
@@ -111,15 +127,4 @@ def view(trajectory: Trajectory, truth: Truth | None = None) -> View:
 def speed(state: FloatArray) -> FloatArray:
     """(n,) m/s of (n, 9) states."""
     found: FloatArray = np.sqrt((state[:, 3:6] ** 2).sum(1))
-    return found
-
-
-def load_factor(state: FloatArray) -> FloatArray:
-    """(n,) g: the specific force across the direction of flight, which the wings carry; the whole specific force of a
-    target slower than SLOWEST. z is taken as the vertical."""
-    force = state[:, 6:9] + [0.0, 0.0, STANDARD_GRAVITY]
-    v = speed(state)
-    along = state[:, 3:6] / np.maximum(v, SLOWEST)[:, None]
-    across = force - np.where(v > SLOWEST, (force * along).sum(1), 0.0)[:, None] * along
-    found: FloatArray = np.sqrt((across**2).sum(1)) / STANDARD_GRAVITY
     return found

@@ -31,7 +31,7 @@ def test_they_are_near_those_of_the_truth(flight, found):
     closest = by["closest approach"]
     assert closest.value == pytest.approx(distance.min(), abs=5)
     assert closest.time_s == pytest.approx(flight.truth.time_s[distance.argmin()], abs=0.5)
-    assert by["greatest height"].value == pytest.approx(flight.truth.position_m[:, 2].max(), abs=5)
+    assert by["highest over the station"].value == pytest.approx(flight.truth.position_m[:, 2].max(), abs=5)
     assert all(each.sigma > 0 and each.time_s == found.time_s[each.row] for each in by.values())
     assert by["greatest load factor"].unit == "g"
 

@@ -10,9 +10,11 @@ import pytest
 
 import ftproc
 from ftproc.derived import Derived
+from ftproc.derived.quantities import load_factor
 from ftproc.files import arrow
 from ftproc.records import Trajectory
 from ftproc.settings import FilterSettings
+from tests.simulated import load_factor as load_factor_of
 
 G = 9.80665
 
@@ -40,6 +42,13 @@ def test_level_turn_of_60_degrees_of_bank():
     assert track == pytest.approx(0)
     assert load == pytest.approx(2.0)
     assert turn == pytest.approx(np.degrees(G * np.tan(bank) / v))
+
+
+def test_the_load_factor_of_a_simulated_flight():
+    flight = ftproc.simulate("manoeuvre", seed=3, duration_s=40.0)
+    vectors = np.hstack([flight.truth.velocity_mps, flight.truth.acceleration_mps2])
+    np.testing.assert_allclose(load_factor(vectors), load_factor_of(flight), rtol=1e-9)
+    np.testing.assert_allclose(load_factor(np.array([[100.0, 0, 0, 30.0, 0, 0]])), 1.0)  # thrust carries nothing
 
 
 def test_climb_and_free_fall():

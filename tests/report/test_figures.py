@@ -133,7 +133,7 @@ def test_ground_track_is_drawn_at_equal_scales_with_north_up():
     north = replace(filtered(), metadata={**filtered().metadata, "frame": "north-east-up"})
     figure = drawn(north, "ground").figure
     assert figure.layout.xaxis.title.text == "y (east), m"
-    path = np.asarray(figure.data[0].y, float)
+    path = np.asarray(next(trace for trace in figure.data if trace.name == "estimate").y, float)
     assert np.nanmax(path) == pytest.approx(np.nanmax(filtered().state[:, 0]), rel=1e-6)
 
 

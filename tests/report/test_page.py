@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import hashlib
+import html
 import json
 import re
 from dataclasses import replace
@@ -16,7 +17,10 @@ import numpy as np
 import pytest
 
 from ftproc import report
+from ftproc.derived import extremes
 from ftproc.report.page import _WRAPPER, _figure, document, page
+from ftproc.report.patches import patches
+from ftproc.report.view import view
 from tests.report.flights import HOSTILE, angles_only, filtered, flight, hostile, one_row, position_only
 
 
@@ -120,13 +124,61 @@ def test_words_of_the_page(text):
     assert "<h1>simulated manoeuvre, seed 3</h1>" in text
     assert f"{len(filtered()):,} rows · 40 s · filtered by ga-bpnn-ukf, two-pass editing" in text
     assert "<strong>consistent: residuals agree with the published sigmas" in text
-    part = filtered().metadata["summary"]["components"]["azimuth"]
-    assert f"<td>{part['good']}</td><td>{part['isolated']}</td><td>{part['patch']}</td>" in text
+    parts = filtered().metadata["summary"]["components"].values()
+    for name in ("good", "isolated", "patch"):
+        assert f"<td>{name}</td>{''.join(f'<td>{part[name]}</td>' for part in parts)}" in text
     assert re.search(r"<th>jerk_psd_m2ps5</th><td>\d+ values, from", text)
     assert "<th>version</th><td>" in text
     assert "<th>station</th><td>azimuth_from x, azimuth_zero_rad 0, elevation_from horizon, bias 0, 0, 0," in text
     assert "No network correction: " in text
     assert "Against the truth" not in text
+
+
+def test_the_head_says_when_where_and_of_what(text):
+    settings = {**filtered().metadata["settings"], "site": [48.0812, -11.2803, 612.0]}
+    more = {"epoch": "2024-05-25T12:00:00Z", "settings": settings, "understood": {"target": "track=7", "columns": {}}}
+    more["station"] = {"in_words": ["bias 2.5 m of the range taken out"]}
+    found = page(replace(filtered(), metadata={**filtered().metadata, **more}))
+    assert "T+0 is 2024-05-25 12:00:00.00 UTC · station 48.08120° N, 11.28030° W, 612 m · target track=7" in found
+    assert "instrument: bias 2.5 m of the range taken out" in found
+    assert "T+0 is" not in text  # counts from zero, and no date is known
+
+
+def test_extremes_are_buttons_with_their_times(text):
+    greatest = next(each for each in extremes(filtered()) if each.what == "greatest speed")
+    button = rf'<button data-from="[^"]+" data-to="[^"]+">greatest speed</button></td><td>{greatest.value:,.1f}'
+    assert re.search(button, text)
+    assert f"<td>{greatest.time_s:,.2f}</td>" in text
+
+
+def test_what_is_long_is_folded(text):
+    titles = re.findall(r"<details><summary><h2>(.*?)</h2>", text)
+    assert titles == ["Settings, noise and process noise as used; provenance"]
+    columns = {"range": {"column": "RNG<b>", "unit": "km", "unit_from": "assumed", "why": "its name"}}
+    understood = {"file": "text", "columns": columns, "not_used": ["Q"], "clock": "seconds", "epoch": ""}
+    found = page(replace(filtered(), metadata={**filtered().metadata, "understood": understood}))
+    assert "<td>range</td><td>RNG&lt;b&gt;</td><td>km</td><td>assumed</td><td>its name</td>" in found
+
+
+def test_rival_understandings_are_listed_where_there_are_some(text):
+    assert "nearly as likely" not in text
+    rivals = [{"what": "a step of the azimuth at 12 s", "nats": 1.5}, {"what": "a manoeuvre"}]
+    summary = {**filtered().metadata["summary"], "rivals": rivals}
+    found = page(replace(filtered(), metadata={**filtered().metadata, "summary": summary}))
+    assert "<th>what</th><th>nats</th>" in found
+    assert "<td>a manoeuvre</td><td>-</td>" in found
+
+
+def test_decisions_name_the_log_and_every_patch_has_its_buttons(text):
+    found = patches(view(filtered()))
+    assert len(found) > 1
+    for patch in found:
+        ends = f'data-start="{patch.start_s!r}" data-end="{patch.end_s!r}"'
+        assert text.count(f'<button class="decide" data-component="{patch.component}" {ends} data-use="good">') == 1
+    assert "ftproc filter 'simulated manoeuvre, seed 3' --decisions" in html.unescape(text)
+    readings = figures(text)["readings"]["data"]
+    meant = {(trace["name"], trace["meta"]["use"]) for trace in readings if "meta" in trace}
+    assert meant == {("good reading", "bad"), ("isolated outlier", "good"), ("patch outlier", "good")}
 
 
 def test_several_reasons_are_a_list():

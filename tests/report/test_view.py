@@ -7,34 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ftproc.report.view import STANDARD_GRAVITY, load_factor, speed, view
+from ftproc.report.view import view
 from tests.report.flights import filtered, flight
-from tests.simulated import load_factor as load_factor_of
-
-
-def turn(n_g, v=200.0):
-    """A level turn in which wings carry n_g."""
-    across = STANDARD_GRAVITY * np.sqrt(n_g**2 - 1)
-    return np.array([[0, 0, 1e3, v, 0, 0, 0, across, 0]], float)
-
-
-@pytest.mark.parametrize("n_g", [1.0, 2.0, 5.0])
-def test_load_factor_of_a_level_turn(n_g):
-    assert load_factor(turn(n_g)) == pytest.approx(n_g)
-    assert speed(turn(n_g)) == pytest.approx(200.0)
-
-
-def test_load_factor_of_accelerating_resting_and_falling():
-    state = np.zeros((3, 9))
-    state[0, [3, 6]] = 100.0, 30.0  # thrust along the path carries nothing
-    state[2, 8] = -STANDARD_GRAVITY
-    np.testing.assert_allclose(load_factor(state), [1.0, 1.0, 0.0], atol=1e-12)
-
-
-def test_load_factor_of_a_simulated_flight():
-    truth = flight().truth
-    state = np.hstack([truth.position_m, truth.velocity_mps, truth.acceleration_mps2])
-    np.testing.assert_allclose(load_factor(state), load_factor_of(flight()), rtol=1e-9)
 
 
 def test_azimuth_is_unwrapped_and_readings_follow():

@@ -1,4 +1,3 @@
-"use strict";
 // Unpacks the library, draws the figures one after the other, thins crowded marks to the extremes of each column (all of
 // them appear on zooming in), and redraws in the width of the paper for printing.
 (function () {
@@ -100,6 +99,7 @@
       Object.assign(figure.layout, printed(place));
       place.style.height = figure.layout.height + "px";
     }
+    timeTicks.prepare(figure.layout, figure.layout.width || place.clientWidth);
     if (camera) {
       place.away = distance(figure.layout.width || place.clientWidth, place.clientHeight);
       camera.eye = moved(camera.eye, place.away);
@@ -112,9 +112,12 @@
       return;
     }
     await Plotly.newPlot(place, figure.data, figure.layout, config);
-    if (!crowded.size) return;
+    place.dispatchEvent(new Event("drawn"));
     place.on("plotly_relayout", function (changed) {
-      if (!Object.keys(changed).some(function (name) { return /^xaxis\d*\./.test(name); })) return;
+      if (!Object.keys(changed).some(function (name) { return /^(xaxis\d*\.(range|autorange)|width|autosize)/.test(name); })) return;
+      const ticks = timeTicks.update(place._fullLayout, place.clientWidth);
+      if (Object.keys(ticks).length) Plotly.relayout(place, ticks);
+      if (!crowded.size) return;
       const parts = Array.from(crowded.values(), function (all) { return shown(all, place._fullLayout.xaxis.range); });
       const update = {};
       for (const name of ["x", "y", "customdata"]) update[name] = parts.map(function (part) { return part[name]; });
@@ -161,6 +164,10 @@
     }
   }
 
+  // What is folded is printed too.
+  function unfold() { for (const each of document.querySelectorAll("details")) each.open = true; }
+  if (paper) unfold();
+
   for (const button of document.querySelectorAll("button[data-from]")) {
     button.addEventListener("click", function () {
       zoom(button.dataset.from, button.dataset.to);
@@ -170,6 +177,7 @@
 
   if (!paper) {
     addEventListener("beforeprint", function () {
+      unfold();
       places.forEach(function (place) { resize(place, printed(place)); });
     });
     addEventListener("afterprint", function () {

@@ -16,9 +16,9 @@ from ftproc.fusion.flight import Flight
 from ftproc.records import COMPONENTS, FloatArray
 from ftproc.report import style
 from ftproc.report.drawing import Drawn, add, dots, level, marks, rows
+from ftproc.report.maps.track import COLUMNS, HEIGHT
 from ftproc.report.style import require_plotly
 from ftproc.report.thinning import Timeline
-from ftproc.report.track import COLUMNS, HEIGHT
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

@@ -8,9 +8,9 @@ from ftproc.fusion import summary
 from ftproc.fusion.flight import Flight
 from ftproc.report import tables
 from ftproc.report.fused.figures import biases, carried, disagreements, residuals, station_map
+from ftproc.report.maps.track import track
 from ftproc.report.page import document, section
 from ftproc.report.timeplots import motion, sigmas
-from ftproc.report.track import track
 from ftproc.report.view import view
 
 

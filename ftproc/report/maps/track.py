@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ftproc.derived.quantities import compass
 from ftproc.records import FloatArray
 from ftproc.report import style
-from ftproc.report.drawing import Drawn
+from ftproc.report.drawing import Drawn, span
+from ftproc.report.maps import graticule, ticks
 from ftproc.report.style import require_plotly
 from ftproc.report.thinning import Timeline
 from ftproc.report.view import View
@@ -17,16 +19,15 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 COLUMNS = 2000  # intervals of time, in each of which the extremes of x, y and z are drawn
+RAW_COLUMNS = 1500  # the same of the raw positions
 FLATTEST = 0.2  # height over width of the figure in space; the heights of a flatter flight are enlarged,
 MOST_ENLARGED = 10.0  # at most so many times: below that, room above and under it is shown
 LOW = 0.4  # share of the width, up to which an axis has few numbers
 NEAR = 1.0  # widths of the flight; a station within this distance is drawn too
+ROOM = 0.08  # share of the flight's extent around it on the map
 HEIGHT = 460
 FILLING = 1.3  # diagonal of the flight over the distance of the eye
 NOTHING = "There is no position to draw: it is not observable."
-
-_NORTH = {"x": "x (north), m", "y": "y (east), m", "z": "z (up), m"}
-_LOCAL = {"x": "x, m", "y": "y, m", "z": "z (up), m"}
 
 
 def track(view: View) -> Drawn:
@@ -40,7 +41,7 @@ def track(view: View) -> Drawn:
     share = np.maximum(size / widest, [0.02, 0.02, FLATTEST])
     middle, room = (np.nanmin(z) + np.nanmax(z)) / 2, 0.52 * size[2]
     scale = FILLING / float(np.linalg.norm(share))
-    names = _names(view)
+    names = axis_names(view)
     go = require_plotly()
     figure = go.Figure(
         go.Scatter3d(x=x, y=y, z=z, mode="lines", name="estimate", line={"color": style.BLUE, "width": 4})
@@ -64,37 +65,103 @@ def track(view: View) -> Drawn:
 
 
 def ground(view: View) -> Drawn:
-    """x and y as on a map: north up where the frame has north, else y."""
+    """x and y as on a map: north up where it is known, else y. With the raw positions, ticks of time, and a grid of
+    latitude and longitude where the site is known."""
     if not view.has_position:
         return Drawn(None, NOTHING)
-    path, names = _path(view), _names(view)
-    across, up = (1, 0) if names is _NORTH else (0, 1)
+    path, names, north = _path(view), axis_names(view), compass(view.trajectory.metadata)
+    across, up = (0, 1) if north is None else north[::-1]
     go = require_plotly()
     figure = go.Figure()
+    low, high = _room(path[[across, up]])
+    extent = (low, high)
+    graticule.add(figure, view, extent)
+    for raw, name, look in _raw(view, across, up, extent):
+        figure.add_scatter(
+            x=raw[0].astype(np.float32),
+            y=raw[1].astype(np.float32),
+            mode="markers",
+            name=name,
+            marker=look,
+            hoverinfo="skip",
+        )
     figure.add_scatter(
         x=path[across], y=path[up], mode="lines", name="estimate", line={"color": style.BLUE, "width": 2}
     )  # fmt: skip
+    _add_ticks(figure, view, across, up)
     for index, name, symbol in ((0, "start", "circle"), (-1, "end", "square")):
         _spot(figure, path[across, index], path[up, index], name, symbol)
     width = float(max(np.nanmax(v) - np.nanmin(v) for v in path[:2]))
     if float(np.nanmin(np.hypot(path[0], path[1]))) <= NEAR * width:
         _spot(figure, 0.0, 0.0, "station", "triangle-up-open")
+        low, high = np.minimum(low, -ROOM * width), np.maximum(high, ROOM * width)
     axes = "xy"
     figure.update_layout(**style.LAYOUT, height=HEIGHT)
-    figure.update_xaxes(**style.axis(title={"text": names[axes[across]], "standoff": 8}, nticks=4, tickangle=0))
+    title = {"standoff": 8}
+    figure.update_xaxes(
+        **style.axis(title={"text": names[axes[across]], **title}, nticks=4, tickangle=0, range=[low[0], high[0]])
+    )
     figure.update_yaxes(
-        **style.axis(title={"text": names[axes[up]], "standoff": 8}, nticks=8, scaleanchor="x", scaleratio=1)
-    )  # fmt: skip
-    return Drawn(figure, "Over the ground: equal scales.")
+        **style.axis(
+            title={"text": names[axes[up]], **title}, nticks=8, scaleanchor="x", scaleratio=1, range=[low[1], high[1]]
+        )
+    )
+    known = "" if view.reading is None else " Dots: the position that each row of the log shows; some lie outside."
+    return Drawn(figure, f"Over the ground: equal scales; circle: start, square: end, triangle: station.{known}")
+
+
+def axis_names(view: View) -> dict[str, str]:
+    """The titles of the axes, with their directions as far as they are known."""
+    north = compass(view.trajectory.metadata)
+    said = {} if north is None else {"xy"[north[0]]: "north", "xy"[north[1]]: "east"}
+    return {axis: f"{axis} ({said[axis]}), m" if axis in said else f"{axis}, m" for axis in "xy"} | {"z": "z (up), m"}
 
 
 def _spot(figure: go.Figure, x: float, y: float, name: str, symbol: str) -> None:
     marker: dict[str, Any] = {"color": style.BLACK, "symbol": symbol, "size": 9}
-    figure.add_scatter(x=[x], y=[y], mode="markers", name=name, marker=marker)
+    figure.add_scatter(x=[x], y=[y], mode="markers", name=name, marker=marker, showlegend=False)
 
 
-def _names(view: View) -> dict[str, str]:
-    return _NORTH if view.trajectory.metadata.get("frame") == "north-east-up" else _LOCAL
+def _room(path: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The least and the greatest (2,) of a path (2, m) on the map, with some room."""
+    width = max(float(np.ptp(axis[np.isfinite(axis)])) for axis in path) or 1.0
+    ends = np.array([span(axis, margin=0.0) for axis in path])
+    return ends[:, 0] - ROOM * width, ends[:, 1] + ROOM * width
+
+
+def _add_ticks(figure: go.Figure, view: View, across: int, up: int) -> None:
+    """Round moments along the track, with their names."""
+    trajectory = view.trajectory
+    rows, said = ticks.along(view.moments, trajectory.time_s)
+    place = trajectory.state[rows][:, [across, up]]
+    if not len(rows):
+        return
+    look = {"color": style.BLUE, "symbol": "line-ns-open", "size": 9, "line": {"width": 2}}
+    figure.add_scatter(
+        x=place[:, 0], y=place[:, 1], mode="markers+text", name="time", marker=look, text=said, hoverinfo="text",
+        textposition="top right", textfont={"size": 11}, showlegend=False, cliponaxis=True,
+    )  # fmt: skip
+
+
+def _raw(
+    view: View, across: int, up: int, extent: tuple[FloatArray, FloatArray]
+) -> list[tuple[FloatArray, str, dict[str, Any]]]:
+    """(2, m) raw positions on the map inside its extent, thinned, of rows whose readings are all good and of others."""
+    position, bad = view.raw_position
+    if position is None:
+        return []
+    place = position[:, [across, up]]
+    inside = np.asarray(((place >= extent[0]) & (place <= extent[1])).all(1))
+    timeline = Timeline.of(view.trajectory.time_s, RAW_COLUMNS)
+    found = list[tuple[FloatArray, str, dict[str, Any]]]()
+    for chosen, name, colour, size in (
+        (inside & ~bad, "raw position", style.READING, 2.5), (inside & bad, "with an outlier", style.VERMILLION, 3.5),
+    ):  # fmt: skip
+        shown = np.where(chosen[:, None], place, np.nan).T
+        rows = timeline.extremes(*shown)
+        if len(rows):
+            found.append((shown[:, rows], name, {"color": colour, "size": size, "opacity": 0.7}))
+    return found
 
 
 def _path(view: View) -> FloatArray:

@@ -1,0 +1,41 @@
+"""The engineer's decisions on the page: a click on a patch or a reading writes a line, and the lines are kept as the
+file that `ftproc filter --decisions` reads. All of it happens in the browser, without a server."""
+
+from __future__ import annotations
+
+import html
+from pathlib import PurePath
+
+from ftproc.errors import quoted
+from ftproc.records import COMPONENTS
+from ftproc.report.patches import Patch
+from ftproc.report.view import View
+
+HEADER = "component,from_s,to_s,use,reason"
+
+
+def buttons(patch: Patch) -> str:
+    """For a patch of outliers: it is good after all, or bad whatever the editor thinks."""
+    stretch = f'data-component="{patch.component}" data-start="{patch.start_s!r}" data-end="{patch.end_s!r}"'
+    return "".join(f'<button class="decide" {stretch} data-use="{use}">{use}</button> ' for use in ("good", "bad"))
+
+
+def section(view: View, name: str) -> str:
+    """The lines so far, what adds some, and the command that uses them. name: of the log."""
+    if not view.summary:
+        return ""
+    components = "".join(f'<option value="{each}">{each}</option>' for each in (*COMPONENTS, "all"))
+    uses = "".join(f'<option value="{use}">{use}</option>' for use in ("bad", "good", "auto"))
+    file = f"{PurePath(name).name.split('.')[0] or 'log'}.decisions.csv"
+    smooth = " --smooth" if view.trajectory.metadata.get("settings", {}).get("smooth") else ""
+    command = f"ftproc filter {quoted(name)} --decisions {quoted(file)}{smooth}"
+    return (
+        '<section class="deciding"><h2>Decisions</h2><p class="note">You know the flight: a click on a reading, or on '
+        "<em>good</em> or <em>bad</em> beside a patch, writes a line, and a second click takes it back. Readings named "
+        "good are used whatever the editor thinks, bad ones never.</p>"
+        f'<p>The stretch that the figures show: <select id="component">{components}</select> is '
+        f'<select id="use">{uses}</select> <button id="stretch">Add a line.</button></p>'
+        f'<textarea id="decisions" rows="6" spellcheck="false" aria-label="decisions">{HEADER}\n</textarea>'
+        f'<p><button id="keep" data-file="{html.escape(file)}">Keep {html.escape(file)}</button>, then '
+        f"<code>{html.escape(command)}</code></p></section>"
+    )
