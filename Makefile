@@ -57,7 +57,7 @@ $(foreach log,$(logs),$(if $(word 2,$(log-of-$(call stem,$(log)))),\
 $(if $(logs),,$(error LOGS: there is no log among "$(LOGS)"))
 endif
 
-.PHONY: help run test kernels trust fuzz oldest audit samples model bench reproduce clean install FORCE
+.PHONY: help run test kernels trust fuzz oldest audit samples model bench reproduce clean install wheel FORCE
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /make \1	/p' Makefile | expand -t 16
@@ -89,24 +89,32 @@ $(OUT)/.flags: FORCE
 
 # --- the installation -------------------------------------------------------------------------------------------
 
+# What takes long is said by make itself, at once: the output of a recipe is kept until it has ended.
 install: $(installed) ## make .venv and install ftproc in it
+
+wheel: $(bin)/python ## dist/: a wheel for this system, its kernels compiled, and one for every other, which needs numba
+	$(info building two wheels in dist/ (one to four minutes))
+	@mkdir -p dist
+	@$(bin)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+	@FTPROC_ANYWHERE=1 $(bin)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+	@ls dist
 
 $(bin)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo 'ftproc needs Python 3.11 or newer: make PYTHON=/path/to/python3 ...' >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
 	  { echo '$(PYTHON) cannot make virtual environments: install python3-venv (apt-get install python3-venv).' >&2; exit 1; }
-	@echo 'making $(VENV)'
+	$(info making $(VENV))
 	@$(PYTHON) -m venv $(VENV)
 
 # The kernels are compiled here, anew when one of them has changed.
 $(installed): pyproject.toml hatch_build.py $(shell find ftproc/core -name '*.py') | $(bin)/python
-	@echo 'installing ftproc in $(VENV), with its kernels compiled (about a minute)'
+	$(info installing ftproc in $(VENV), once: its libraries are fetched, then its kernels compiled (one to four minutes))
 	@$(bin)/python -m pip install --quiet --disable-pip-version-check -e '.[geo,report]'
 	@touch $@
 
 $(developer): pyproject.toml | $(installed)
-	@echo 'installing the developer tools in $(VENV)'
+	$(info installing the developer tools in $(VENV), once (a minute))
 	@$(bin)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,geo,report]'
 	@touch $@
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -56,3 +58,8 @@ def test_the_site_here_wins_over_the_settings():
     found = ftproc.filter_log(table, settings, site=(48.0, 11.0, 600.0)).to_pandas()
     assert found.lat_deg.between(47, 49).all()
     assert "track_deg" in found
+
+
+def test_the_newest_change_is_of_this_version():
+    changes = Path(ftproc.__file__).with_name("CHANGES.md").read_text(encoding="utf-8")
+    assert re.findall(r"^## (.*)$", changes, re.MULTILINE)[0] == ftproc.__version__

@@ -58,7 +58,8 @@ def _extreme(
     trajectory: Trajectory, what: str, value: FloatArray, sigma: FloatArray, unit: str, sign: int
 ) -> Extreme | None:
     """The row with the greatest (sign 1), the least (-1) or in size the largest (0) value."""
-    rows = np.flatnonzero(np.isfinite(value))
+    known = np.isfinite(value) & np.isfinite(sigma)
+    rows = np.flatnonzero(known if known.any() else np.isfinite(value))
     if not len(rows):
         return None
     by = np.abs(value[rows]) if sign == 0 else sign * value[rows]

@@ -11,6 +11,7 @@ from ftproc.files import leap_seconds
 from ftproc.records import FloatArray
 
 DAY_S = 86_400.0
+NEAR_ZERO_S = 1.0  # a log that begins so near to its time zero counts from its first row
 
 
 class Moments(NamedTuple):
@@ -27,6 +28,12 @@ class Moments(NamedTuple):
         epoch = metadata.get("epoch")
         known = time_s if len(time_s) else np.zeros(1)
         return cls(epoch if isinstance(epoch, str) else "", float(known[0]), float(known[-1]))
+
+    @classmethod
+    def of_summary(cls, s: Mapping[str, Any]) -> Moments:
+        """Those of the log of a summary; of one of an older version, which says nothing of it, as if from zero."""
+        start_s = float(s.get("start_s") or 0.0)
+        return cls(str(s.get("epoch") or ""), start_s, start_s + float(s.get("duration_s") or 0.0))
 
     def utc(self, time_s: float) -> np.datetime64 | None:
         """The clock time in UTC, to the microsecond; None where the clock is not known."""
@@ -53,7 +60,7 @@ class Moments(NamedTuple):
     @property
     def counts_from_elsewhere(self) -> bool:
         """Whether seconds since the first row say more than the time itself."""
-        return bool(self.epoch) or self.start_s != 0
+        return bool(self.epoch) or abs(self.start_s) >= NEAR_ZERO_S
 
     def clock(self, time_s: float, decimals: int = 2) -> str:
         """Clock time, such as 12:00:00.10, with the date where the log is longer than a day; else the time in s."""
@@ -68,10 +75,11 @@ class Moments(NamedTuple):
         return f"T{time_s - self.start_s:+,.{decimals}f}"
 
     def words(self, time_s: float) -> str:
-        """For a sentence: `60.1 s`; with a clock `60.1 s (12:01:00.10 UTC, T+12.30 s)`."""
+        """For a sentence: `60.1 s`; with a clock `43491.2 s (12:04:51.25 UTC)`; if the log does not count from zero,
+        `50702.9 s (T+61.00 s)`."""
         plain = f"{time_s:.6g} s" if abs(time_s) < 1e5 else f"{time_s:.2f} s"
         if self.utc(time_s) is not None:
-            return f"{plain} ({self.clock(time_s)} UTC, {self.since(time_s)} s)"
+            return f"{plain} ({self.clock(time_s)} UTC)"
         return f"{plain} ({self.since(time_s)} s)" if self.counts_from_elsewhere else plain
 
 

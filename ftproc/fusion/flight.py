@@ -84,7 +84,7 @@ def _flight(
         raise InputError(f"{range_.path}: the fused filter diverged; check the places, the clocks and the conventions.")
     names = [station.name for station in fused.stations]
     summary = summarize(fused, zero_s)
-    metadata = _metadata(range_, settings, summary, fused)
+    metadata = {**_metadata(range_, settings, summary, fused), "epoch": logs.epoch(read)}
     n = len(track.time_s)
     sigma, _ = unseen_motion.widened(track.state, track.sigma, np.full((n, 6), np.nan))
     path_sigma = kinematics.widened(track.state, track.path_sigma, track.sigma, sigma)

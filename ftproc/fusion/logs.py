@@ -49,9 +49,19 @@ def as_seen(instruments: Sequence[Instrument], found: Sequence[MeasurementLog]) 
     return seen, zero
 
 
+def epoch(found: Sequence[MeasurementLog]) -> str:
+    """The instant of time zero (ISO 8601, UTC): the first of the logs' dates; "" if none has one."""
+    dates = [log.epoch for log, date in zip(found, _dates(found), strict=True) if date is not None]
+    return min(dates, key=lambda text: datetime.fromisoformat(text.replace("Z", "+00:00")), default="")
+
+
+def _dates(found: Sequence[MeasurementLog]) -> list[datetime | None]:
+    return [None if not log.epoch else datetime.fromisoformat(log.epoch.replace("Z", "+00:00")) for log in found]
+
+
 def _shifts(instruments: Sequence[Instrument], found: Sequence[MeasurementLog]) -> FloatArray:
     """(m,) s that bring logs of different dates to the first of these dates."""
-    dates = [None if not log.epoch else datetime.fromisoformat(log.epoch.replace("Z", "+00:00")) for log in found]
+    dates = _dates(found)
     known = [date for date in dates if date is not None]
     if not known:
         return np.zeros(len(found))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ftproc.files.moments import Moments
 from ftproc.records import COMPONENTS, FloatArray, MeasurementLog
 
 if TYPE_CHECKING:
@@ -72,11 +73,11 @@ def suspicious(s: Mapping[str, Any]) -> Iterator[str]:
     """The faults of a summary of which a single log cannot tell what is right."""
     steps = s["steps"]
     if steps:
-        named = "; ".join(step_in_words(step) for step in steps[:MOST_STEPS])
+        named = "; ".join(step_in_words(step, s) for step in steps[:MOST_STEPS])
         rest = f"; and {len(steps) - MOST_STEPS} more" if len(steps) > MOST_STEPS else ""
         yield f"{named}{rest}: the estimate follows the longer side, which may be the wrong one"
     if s["doubtful_steps"]:
-        named = "; ".join(step_in_words(step) for step in s["doubtful_steps"][:MOST_STEPS])
+        named = "; ".join(step_in_words(step, s) for step in s["doubtful_steps"][:MOST_STEPS])
         yield f"either {named}, or readings beside it are a patch of outliers: the estimate takes them for good"
     if s["clock_set_back"]:
         back = s["clock_set_back"]
@@ -105,10 +106,10 @@ def allowed_for(s: Mapping[str, Any]) -> Iterator[str]:
             yield f"{name} has no noise in {part['computed']} rows, as if a tracker coasts: {rate}"
 
 
-def step_in_words(step: Mapping[str, Any]) -> str:
+def step_in_words(step: Mapping[str, Any], s: Mapping[str, Any]) -> str:
     """A step of a summary, such as: azimuth steps by -4.1 mrad at 60.1 s."""
     what = "the clock jumps" if step["component"] == "clock" else f"{step['component']} steps"
-    return f"{what} by {size_in_words(step)} at {step['time_s']:.6g} s"
+    return f"{what} by {size_in_words(step)} at {Moments.of_summary(s).words(step['time_s'])}"
 
 
 def size_in_words(step: Mapping[str, Any]) -> str:

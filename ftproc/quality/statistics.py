@@ -164,6 +164,8 @@ class RunStatistics:
             "rows_without_estimate": self.unknown,
             "remarks": list(log.remarks),
             "duration_s": float(log.time_s[-1] - log.time_s[0]),
+            "start_s": float(log.time_s[0]),
+            "epoch": log.epoch,
             "interval_s": self.interval_s,
             "gaps": self.gaps,
             "longest_gap_s": self.longest_gap_s,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ftproc.files.moments import Moments
 from ftproc.quality import verdict
 from ftproc.quality.statistics import UNITS
 from ftproc.records import COMPONENTS
@@ -20,7 +21,9 @@ def text(metadata: Mapping[str, Any]) -> str:
     s, settings = metadata["summary"], metadata["settings"]
     way = "smoothed" if settings["smooth"] else "filtered"
     lag = f", {settings['lag_s']:g} s of lag" if settings["editing"] == "live" else ""
-    lines = [f"{metadata['log']}: {counted(s['rows'], 'row')}, {s['duration_s']:.6g} s, {way} by "
+    begins = Moments.of_summary(s).begins
+    since = f" from {begins}" if begins else ""
+    lines = [f"{metadata['log']}: {counted(s['rows'], 'row')}, {s['duration_s']:.6g} s{since}, {way} by "
              f"{metadata['method']} ({settings['editing']} editing{lag})"]  # fmt: skip
     lines += _table(s["components"])
     named = [*facts(s), *network(s), *(("note", text) for text in notes(s))]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from ftproc.files.moments import Moments
 from ftproc.quality import consistency, faults
 
 CONSISTENT, SUSPECT, UNRELIABLE = "consistent", "suspect", "unreliable"
@@ -93,19 +94,19 @@ def _observability(s: Mapping[str, Any]) -> Iterator[Remark]:
         text = f"{_listed(absent)} missing throughout: position and velocity are not observable and left empty; the " \
                f"verdict is about the {seen}"  # fmt: skip
         yield Remark(CONSISTENT, text)
-    yield from _intervals("the position", s["poorly_observable"])
+    yield from _intervals("the position", s["poorly_observable"], Moments.of_summary(s))
     for name, intervals in s["poorly_observable_readings"].items():
-        yield from _intervals(f"the {name}", intervals)
+        yield from _intervals(f"the {name}", intervals, Moments.of_summary(s))
 
 
-def _intervals(what: str, intervals: Sequence[Mapping[str, float]]) -> Iterator[Remark]:
+def _intervals(what: str, intervals: Sequence[Mapping[str, float]], moments: Moments) -> Iterator[Remark]:
     """Where an estimate is poorly observable."""
     if not intervals:
         return
     (name,) = set(intervals[0]) - {"from_s", "to_s"}
     worst = max(intervals, key=lambda part: part[name])
-    first, last = (f"{worst[end]:.6g}" for end in ("from_s", "to_s"))
-    when = f"at {first} s" if first == last else f"from {first} to {last} s"
+    first, last = (moments.words(worst[end]) for end in ("from_s", "to_s"))
+    when = f"at {first}" if first == last else f"from {first.removesuffix(' s')} to {last}"
     size = f"{worst[name]:.3g} m" if name == "sigma_m" else f"{1e3 * worst[name]:.3g} mrad"
     if len(intervals) == 1:
         yield Remark(SUSPECT, f"{what} is poorly observable {when}: 1 sigma up to {size}")

@@ -40,7 +40,7 @@ def steps(view: View) -> list[Step]:
     """The steps within the times of the view, by their time."""
     times = view.trajectory.time_s
     found = [
-        Step(step["component"], step["time_s"], faults.size_in_words(step), faults.step_in_words(step))
+        Step(step["component"], step["time_s"], faults.size_in_words(step), faults.step_in_words(step, view.summary))
         for step in view.summary.get("steps", ())
     ]
     return sorted((step for step in found if times[0] <= step.time_s <= times[-1]), key=lambda step: step.time_s)

@@ -54,7 +54,8 @@ def taken(view: View) -> list[str]:
     """Date and clock time of the first row, the station, the target and the instrument, as far as they are known."""
     meta, moments = view.trajectory.metadata, view.moments
     site = site_of(meta)
-    where = "" if site is None else f"station {abs(site[0]):.5f}° {'SN'[site[0] >= 0]}, {abs(site[1]):.5f}° " \
+    what = "origin" if meta.get("stations") else "station"
+    where = "" if site is None else f"{what} {abs(site[0]):.5f}° {'SN'[site[0] >= 0]}, {abs(site[1]):.5f}° " \
         f"{'WE'[site[1] >= 0]}, {site[2]:.6g} m"  # fmt: skip
     understood, station = meta.get("understood"), meta.get("station")
     target = understood.get("target") if isinstance(understood, Mapping) else None

@@ -16,6 +16,7 @@ from typing import NamedTuple, TypeVar
 
 import pytest
 
+from ftproc import __version__
 from ftproc.batch import cluster, run
 from ftproc.batch.tasks import Task
 from ftproc.config.recipe import Recipe
@@ -91,13 +92,15 @@ def test_a_cluster_reads_no_standard_input(two_workers):
 
 def test_a_worker_with_another_version_is_named(two_workers, flights, monkeypatch):
     monkeypatch.setattr("ftproc.__version__", "9.9")
-    with pytest.raises(UsageError, match=r"the worker tcp://127.0.0.1:\d+ has ftproc 0.1.0, this is ftproc 9.9; .*pip"):
+    with pytest.raises(
+        UsageError, match=rf"the worker tcp://127.0.0.1:\d+ has ftproc {__version__}, this is ftproc 9.9; .*pip"
+    ):
         next(run.run(_tasks(flights, "none"), Recipe(), scheduler=two_workers.address))
     monkeypatch.setattr(cluster, "_check_workers", lambda client, address: None)  # it joins after they were asked
     (late,) = run.run(_tasks(flights[:1], "late"), Recipe(), scheduler=two_workers.address)
     assert late.failure is not None
     assert late.failure.message.startswith("0.csv: the worker tcp://127.0.0.1:")
-    assert "has ftproc 0.1.0, this is ftproc 9.9" in late.failure.message
+    assert f"has ftproc {__version__}, this is ftproc 9.9" in late.failure.message
     assert not _contents("none")
     assert not _contents("late")
 

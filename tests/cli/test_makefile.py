@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -179,7 +180,7 @@ def test_wrong_logs(make, flights, copy, named, sentence):
 def test_help_lists_every_target(make):
     result = make()
     assert result == make("help")
-    for target in ("run", "test", "samples", "model", "readme", "bench", "reproduce", "clean", "install"):
+    for target in ("run", "test", "samples", "model", "readme", "bench", "reproduce", "clean", "install", "wheel"):
         assert f"\nmake {target} " in result.out
 
 
@@ -195,6 +196,21 @@ def test_a_machine_without_the_right_python(make, copy, lacking, sentence):
     assert result.code == 2
     assert sentence in result.err
     assert not (copy / "new").exists()
+
+
+def test_what_takes_long_is_said_before_it_is_done(copy):
+    """The output of a recipe is kept until it ends; what make says itself is not."""
+    python = copy / "slow-python"
+    python.write_text("#!/bin/sh\ncase \"$*\" in *'-m venv'*) touch begun; sleep 60;; esac\nexit 0\n")
+    python.chmod(0o755)
+    command = ["make", "VENV=new", f"PYTHON={python}", "install"]
+    with subprocess.Popen(command, cwd=copy, stdout=subprocess.PIPE, text=True, start_new_session=True) as making:
+        assert making.stdout is not None
+        try:
+            assert making.stdout.readline() == "making new\n"
+            assert making.poll() is None
+        finally:
+            os.killpg(making.pid, signal.SIGKILL)
 
 
 def test_test_does_all_that_ci_needs(make):

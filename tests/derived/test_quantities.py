@@ -138,3 +138,13 @@ def test_columns_are_added_when_they_are_asked_for_and_read_back(tmp_path):
 
     writing.write(found, tmp_path / "a.parquet")
     np.testing.assert_allclose(Derived.of(reading.read(tmp_path / "a.parquet")).sigma, Derived.of(found).sigma)
+
+
+def test_a_fused_flight_has_sigmas_in_every_row():
+    from ftproc.fusion import flight, range_file
+
+    found = flight.fuse(range_file.load("sample_data/range/range.toml"), FilterSettings(smooth=True, derived=True))
+    derived = Derived.of(found.trajectory)
+    assert derived.from_north
+    assert np.isfinite(found.trajectory.path_sigma).all()
+    assert "sigma_track_deg" in found.trajectory.extra.column_names

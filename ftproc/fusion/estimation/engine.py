@@ -17,7 +17,7 @@ import numpy as np
 from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.biases import Biased, Directions, smooth_biased
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import SmootherRun, smooth_log
+from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
 from ftproc.core.identification.likelihood import fit_jerk
 from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
 from ftproc.core.identification.scales import scales_of
@@ -283,7 +283,7 @@ def _lead_in(log: Observations, model: Model, run: SmootherRun) -> None:
     back = log.part(slice(head.sample, None, -1))
     back.weight[0] = 0.0  # is in the head
     first = model._replace(jerk=model.jerk[:1], knot_s=math.inf)
-    found = smooth_log(back, first, [head._replace(sample=0)])
+    found = smooth_log(back, first, [head._replace(sample=0)], PATHS)
     for filled, values in zip(run[:7], found[:7], strict=True):
         filled[: head.sample] = values[:0:-1]
 

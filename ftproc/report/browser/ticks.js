@@ -7,7 +7,7 @@ const timeTicks = (function () {
   const log = document.getElementById("log"); // of the page of a trajectory
   const zero = log && log.dataset.zero !== "" ? Number(log.dataset.zero) / 1000 : null; // s since 1970 at time zero
   const start = log ? Number(log.dataset.start) : 0;
-  const used = zero !== null || start !== 0;
+  const used = zero !== null || Math.abs(start) >= 1; // as in files/moments.py
 
   function clock(time, decimals) { return new Date(Math.round((zero + time) * 1e6) / 1e3).toISOString().slice(11, 20 + (decimals ? decimals : -1)); }
 

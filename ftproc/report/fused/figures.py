@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ftproc.core.model.frames import to_cartesian
+from ftproc.files.moments import Moments
 from ftproc.fusion import findings
 from ftproc.fusion.estimation import constants
 from ftproc.fusion.estimation.events import CLOCK
@@ -161,16 +162,18 @@ def carried(flight: Flight, fused: Fused) -> Drawn:
             hovertemplate="%{x:.6~f} s<br>%{y}: %{z:.0%} used<extra></extra>",
         )
     )
-    figure.update_layout(**style.LAYOUT, height=100 + BAR_PX * len(names))
-    figure.update_xaxes(**style.axis(title={"text": style.TIME, "standoff": 8}))
+    figure.update_layout(**style.LAYOUT, height=100 + BAR_PX * len(names), meta={"time": True})
+    time = {"text": style.TIME, "standoff": 8}
+    figure.update_xaxes(**style.axis(title=time, range=[begin + flight.zero_s, end + flight.zero_s]))
     figure.update_yaxes(**style.axis(autorange="reversed"))
     return Drawn(figure, "Share of each station's readings that are used; white: it has none.")
 
 
 def disagreements(flight: Flight, fused: Fused) -> list[tuple[str, ...]]:
     """Rows of a table: station, from, to, and what happened."""
+    clock = Moments.of(flight.trajectory.metadata, flight.trajectory.time_s).clock
     return [
-        (each.station, f"{each.first_s + flight.zero_s:,.2f}", f"{each.last_s + flight.zero_s:,.2f}", each.kind)
+        (each.station, clock(each.first_s + flight.zero_s), clock(each.last_s + flight.zero_s), each.kind)
         for each in findings.stretches(fused)
     ]
 

@@ -20,7 +20,10 @@ def page(flight: Flight) -> str:
     assert fused is not None
     s = flight.trajectory.metadata["summary"]
     stretches = disagreements(flight, fused)
-    listed = tables.table(("station", "from, s", "to, s", "what"), stretches, "numbers") if stretches else ""
+    when = "UTC" if shown.moments.zero_ms is not None else "s"
+    listed = (
+        tables.table(("station", f"from, {when}", f"to, {when}", "what"), stretches, "numbers") if stretches else ""
+    )
     nothing = "" if stretches else '<p class="note">No station joins late, is silent or follows another target.</p>'
     readings = tables.table(summary.COMPONENT_HEADER, summary.component_rows(s), "numbers")
     known = tables.table(summary.BIAS_HEADER, summary.bias_rows(s), "numbers")
@@ -29,6 +32,7 @@ def page(flight: Flight) -> str:
         tables.heading(shown),
         tables.banner(shown),
         f"<section><h2>Stations</h2>{readings}<ul>{notes}</ul></section>",
+        tables.extremes(shown),
         section("Map", [("map", station_map(flight, fused)), ("track", track(shown))]),
         section("Who carried which stretch", [("carried", carried(flight, fused))], listed + nothing),
         section("Biases and clocks", [("biases", biases(flight, fused))], known),

@@ -16,7 +16,8 @@ from ftproc.errors import InputError
 from ftproc.files.reading.formats import content
 
 _LONGEST_S, _BYTES_A_SECOND = 5.0, 10 << 20  # for any file, and for a large one in addition
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL)
+#: What ends the copy, and nobody hears; Windows, where there is no copy, has not all of them.
+_SIGNALS = ("SIGINT", "SIGTERM", "SIGSEGV", "SIGABRT", "SIGBUS", "SIGFPE", "SIGILL")
 _FIRST_LOOK_S, _LONGEST_LOOK_S = 2e-4, 0.002
 
 
@@ -44,8 +45,8 @@ def rehearse(path: Path, room_name: str, kind: str, read: Callable[[], object]) 
 
 def _read_and_end(read: Callable[[], object]) -> None:
     with contextlib.suppress(BaseException):
-        for number in _SIGNALS:
-            signal.signal(number, signal.SIG_DFL)
+        for name in _SIGNALS:
+            signal.signal(getattr(signal, name), signal.SIG_DFL)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # the library's last words, and ours about them
         faulthandler.disable()
         read()
