@@ -121,8 +121,14 @@ def text(difference: Difference) -> str:
     lines += _cut("decisions", len(d.changes))
     if not d.changes:
         lines.append("  decisions  the same")
-    lines += [f"  settings   {name}: {first}, then {second}" for name, (first, second) in d.settings.items()]
+    lines += [
+        f"  settings   {name}: {_said(first)}, then {_said(second)}" for name, (first, second) in d.settings.items()
+    ]
     return "\n".join(lines) + "\n"
+
+
+def _said(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _longest(each: tuple[Any, ...], size: Any) -> list[Any]:

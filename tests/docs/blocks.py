@@ -99,7 +99,14 @@ BLOCKS = {
     "filter": session(FILTER, before=(SIMULATE,)),
     "score": session(
         SCORE, before=(SIMULATE, FILTER),
-        only=("flight", "position", "velocity", "acceleration in", "the sigmas"),
+        only=("flight", "position RMSE", "position along", "velocity RMSE", "position in", "velocity in", "the sigmas"),
+    ),
+    "limits": session(f"{SCORE} --require ed-117", before=(SIMULATE, FILTER), only=("PASS", "FAIL", "source")),
+    "two-runs": session(
+        "ftproc filter flight.csv -o first.csv --summary none",
+        "ftproc filter flight.csv --noise 2,1e-4,1e-4 -o second.csv --summary none",
+        "ftproc score first.csv second.csv", before=(SIMULATE,),
+        only=("second.csv against", "position   ", "differs", "decisions", "settings"),
     ),
     "fuse-score": session(RANGE, FUSE, "ftproc score best.parquet --truth range/truth.parquet"),
     "train": session(FLY, TRAIN, only=("filter:", "smoother:", "Position error")),

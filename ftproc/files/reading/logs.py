@@ -90,8 +90,14 @@ def read(
     if not (plan.others or plan.conditions) and station.refraction is None:  # refraction needs ranges of other blocks
         log = _in_blocks(plan)
         if log is not None:
-            return log
-    return _at_once(plan)
+            return _of_target(log, extract)
+    return _of_target(_at_once(plan), extract)
+
+
+def _of_target(log: MeasurementLog, extract: Extract) -> MeasurementLog:
+    """The log with the target that was picked among how it was understood."""
+    picked = extract.target if "=" in extract.target else ""
+    return replace(log, understood={**log.understood, "target": picked}) if picked else log
 
 
 def targets(source: tables.Source, column: str, widths: tuple[int, ...] = ()) -> tuple[str, ...]:
