@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -20,8 +21,7 @@ if TYPE_CHECKING:
 _EXAMPLES = """
 ftproc simulate --scenario zuo2021-outliers -o flight.csv --truth flight.truth.csv
 ftproc filter flight.csv --summary none -o clean.parquet
-ftproc score clean.parquet --truth flight.truth.csv --report errors.html
-ftproc score clean.parquet --truth flight.truth.csv --require ed-142-terminal
+ftproc score clean.parquet --truth flight.truth.csv --require ed-142-terminal --report errors.html
 """
 
 
@@ -40,9 +40,11 @@ class Job(NamedTuple):
 
 
 def _standards() -> str:
-    from ftproc.scoring import limits
-
-    return "Standards for --require:\n" + "".join(f"  {n:16} {limits.load(n).title}\n" for n in limits.standards())
+    """The standards that come with the program, read without what scoring needs."""
+    rooms = sorted(Path(__file__).parents[1].joinpath("scoring", "standards").glob("*.toml"))
+    titles = (tomllib.loads(path.read_text(encoding="utf-8"))["title"] for path in rooms)
+    lines = (f"  {path.stem:16} {title}\n" for path, title in zip(rooms, titles, strict=True))
+    return "Standards for --require:\n" + "".join(lines)
 
 
 @click.command(cls=Command, examples=_EXAMPLES, more=_standards)
@@ -156,10 +158,11 @@ def _scored(name: str, truth: Truth | None, asked: Sequence[Limits], first: Traj
     judged = [limits.judge(trajectory, truth, each.limits) for each in asked] if truth is not None else []
     text = "".join(limits.text(name, each, one) for each, one in zip(asked, judged, strict=bool(judged)))
     results = [result for one in judged for result in one]
-    changes: dict[str, Any] = {"require": limits.as_dicts(results)} if results else {}
+    if results:
+        found = replace(found, require=limits.as_dicts(results))
     if first is not None:
-        changes["difference"] = compare(first, trajectory)
-    return Scored(trajectory, replace(found, **changes), results, text)
+        found = replace(found, difference=compare(first, trajectory))
+    return Scored(trajectory, found, results, text)
 
 
 def _text(scored: Sequence[Scored], form: str) -> str:

@@ -57,6 +57,7 @@ max_patch_s = 9
 set = "window=6,m=0.01"
 weight_form = "gain"
 ecef = true
+derived = true
 particles = 150
 seed = 7
 keep_columns = true
@@ -140,6 +141,7 @@ OPTIONS = st.fixed_dictionaries(
         "lag": st.floats(1e-3, 3600),
         "weight_form": st.just("gain"),
         "ecef": st.just(True),
+        "derived": st.just(True),
         "set": st.sampled_from(["window=6", "m = 0.01, F_range_m=3e2"]),
         "particles": st.integers(101, 10_000),
         "seed": st.integers(1, 2**31),
