@@ -26,7 +26,7 @@ FlagArray = NDArray[np.uint8]
 COMPONENTS = ("range", "azimuth", "elevation")
 
 #: Values of the trajectory's `outlier_*` columns.
-GOOD, ISOLATED, PATCH, MISSING = 0, 1, 2, 3
+GOOD, ISOLATED, PATCH, MISSING, REJECTED, ACCEPTED = range(6)  # the last two by hand
 
 #: The readings that an estimate depends on, the fewest first.
 PAST, LAGGED = "past readings", "past readings and those of the next {:g} s"
@@ -132,7 +132,7 @@ class Trajectory:
     state: (n, 9) x y z m, vx vy vz m/s, ax ay az m/s2. NaN where a method does not estimate it.
     sigma: (n, 9) 1-sigma of the state, in its units.
     measurement_sigma: (n, 3) 1-sigma of the cleaned range m, azimuth rad, elevation rad.
-    outlier: (n, 3) GOOD, ISOLATED, PATCH or MISSING per component.
+    outlier: (n, 3) GOOD, ISOLATED, PATCH, MISSING, REJECTED or ACCEPTED per component.
     nis: (n,) normalised innovation squared of the components used; NaN if none was.
     correction: (n, 6) correction by the network of position m and velocity m/s.
     metadata: everything needed to compute it again (JSON-serialisable), see the README.

@@ -82,10 +82,10 @@ class FilterSettings:
     gain_form: bool = False
     site: tuple[float, float, float] | None = None
     ecef: bool = False
-    derived: bool = False
     geoid_m: float | None = None
     parameters: Parameters = ()
     lag_s: float = 0.0
+    derived: bool = False
 
     def parameter(self, name: str) -> float | None:
         """The parameter of the method by its name; None when it is not set."""

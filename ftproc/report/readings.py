@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, FloatArray, IntArray
+from ftproc.records import ACCEPTED, COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, REJECTED, FloatArray, IntArray
 from ftproc.report import drawing, style
 from ftproc.report.drawing import Drawn
 from ftproc.report.patches import steps, worst
@@ -19,6 +19,9 @@ ROOM = 0.35  # share of the trajectory's extent, above and below it, where outli
 FOOT = 0.08  # share of the height, below the lowest outlier, where missing readings are marked
 LARGEST = 3.0  # gates; larger residuals are drawn there
 LARGEST_SIGMAS = 12.0  # the same where the gate is not known
+
+#: Flags of readings that are marked, and what a click on one decides.
+_MARKED = {ISOLATED: "good", PATCH: "good", REJECTED: "auto", ACCEPTED: "auto"}
 
 CLOCK = "clock"  # a step of it
 
@@ -83,9 +86,9 @@ def residuals(view: View) -> Drawn:
     largest = LARGEST_SIGMAS if gate is None else LARGEST * gate
     named: set[str] = set()
     for row, c in enumerate(seen):
-        parts = {flag: np.where(flags[:, c] == flag, scaled[:, c], np.nan) for flag in (GOOD, ISOLATED, PATCH)}
+        parts = {flag: np.where(flags[:, c] == flag, scaled[:, c], np.nan) for flag in (GOOD, *_MARKED)}
         traces = [drawing.dots(timeline, parts[GOOD], "good reading", style.READING)]
-        for flag in (ISOLATED, PATCH):
+        for flag in _MARKED:
             at = timeline.extremes(parts[flag])
             limits = (-largest, largest)
             traces.append(
@@ -104,8 +107,8 @@ def residuals(view: View) -> Drawn:
 
 
 def _decidable(traces: list[Any], c: int) -> list[Any]:
-    """The traces, of which those of readings say what a click on one means: a good one is bad, an outlier good."""
-    uses = {"good reading": "bad", style.KINDS[ISOLATED].name: "good", style.KINDS[PATCH].name: "good"}
+    """The traces, of which those of readings say what a click on one means."""
+    uses = {"good reading": "bad", **{style.KINDS[flag].name: use for flag, use in _MARKED.items()}}
     for trace in traces:
         if trace.name in uses:
             trace.meta = {"component": COMPONENTS[c], "use": uses[trace.name]}

@@ -11,7 +11,7 @@ import numpy as np
 
 from ftproc.errors import UsageError
 from ftproc.quality.verdict import CONSISTENT, SUSPECT, UNRELIABLE
-from ftproc.records import ISOLATED, MISSING, PATCH
+from ftproc.records import ACCEPTED, ISOLATED, MISSING, PATCH, REJECTED
 
 BLUE, ORANGE, GREEN, SKY = "#0072B2", "#E69F00", "#009E73", "#56B4E9"
 VERMILLION, PURPLE, GREY, BLACK = "#D55E00", "#AA4499", "#8C8C8C", "#222222"
@@ -34,6 +34,8 @@ class Kind(NamedTuple):
 KINDS = {
     ISOLATED: Kind("isolated outlier", {"color": VERMILLION, "symbol": "x-thin-open", "size": 7, "line": {"width": 2}}),
     PATCH: Kind("patch outlier", {"color": PURPLE, "symbol": "diamond-open", "size": 7, "line": {"width": 1.5}}),
+    REJECTED: Kind("rejected by hand", {"color": ORANGE, "symbol": "cross-open", "size": 8, "line": {"width": 1.5}}),
+    ACCEPTED: Kind("accepted by hand", {"color": GREEN, "symbol": "circle-open", "size": 8, "line": {"width": 1.5}}),
     MISSING: Kind("missing (at the foot)", {"color": BLACK, "symbol": "line-ns-open", "size": 7, "line": {"width": 1}}),
 }
 

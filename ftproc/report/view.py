@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from ftproc.core.model.frames import from_cartesian, to_cartesian, unwrap, wrap
 from ftproc.files.moments import Moments
 from ftproc.quality.verdict import LEVELS
-from ftproc.records import ISOLATED, PATCH, Diagnostics, FloatArray, Trajectory, Truth
+from ftproc.records import ACCEPTED, GOOD, ISOLATED, PATCH, REJECTED, Diagnostics, FloatArray, Trajectory, Truth
 from ftproc.report.style import COMPONENT
 from ftproc.report.thinning import Timeline
 from ftproc.scoring import Score, score
 from ftproc.scoring.matching import match
 
-REJECTED_ONES = (ISOLATED, PATCH)
+OUTLIERS = (ISOLATED, PATCH, REJECTED)
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class View:
     def raw_position(self) -> tuple[FloatArray | None, NDArray[np.bool_]]:
         """(n, 3) m that each row's readings show, NaN where one is missing, and (n,) whether one of them is an outlier;
         None when the raw readings are not known."""
-        bad: NDArray[np.bool_] = np.asarray(np.isin(self.trajectory.outlier, REJECTED_ONES).any(1))
+        bad: NDArray[np.bool_] = np.asarray(np.isin(self.trajectory.outlier, OUTLIERS).any(1))
         if self.trajectory.diagnostics is None:
             return None, bad
         return to_cartesian(self.trajectory.diagnostics.reading), bad
@@ -120,7 +120,7 @@ def view(trajectory: Trajectory, truth: Truth | None = None) -> View:
         scored = score(trajectory, truth) if np.isfinite(known.position_m).any() else None
     return View(
         trajectory, Timeline.of(trajectory.time_s), cleaned * factor, reading,
-        (trajectory.outlier == 0).sum(1).astype(float), error, cleaned_error, scored,
+        np.isin(trajectory.outlier, (GOOD, ACCEPTED)).sum(1).astype(float), error, cleaned_error, scored,
     )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.errors import InputError
-from ftproc.records import COMPONENTS, ISOLATED, PATCH, FlagArray, FloatArray, Trajectory, Truth
+from ftproc.records import COMPONENTS, ISOLATED, MISSING, PATCH, REJECTED, FlagArray, FloatArray, Trajectory, Truth
 from ftproc.scoring import named
 from ftproc.scoring.differences import Difference
 from ftproc.scoring.matching import MatchedTruth, match
@@ -43,7 +43,7 @@ class Gradient:
 
 @dataclass(frozen=True)
 class Detection:
-    """Outliers found in one component: flagged isolated or patch by the trajectory, against those of the truth.
+    """Outliers found in one component: flagged isolated, patch or rejected by hand, against those of the truth.
 
     Counted over the samples that the truth has too; readings marked missing are left out. A ratio over zero is NaN.
     false_alarm_rate: share of the good readings that were flagged.
@@ -242,8 +242,8 @@ def _spreads(errors: Mapping[str, FloatArray], names: Sequence[str]) -> dict[str
 
 def _detection(flag: FlagArray, injected: FlagArray) -> Detection:
     """From the (m,) flags of one component and the codes of its injected outliers."""
-    measured = flag <= PATCH
-    found, bad = np.isin(flag[measured], (ISOLATED, PATCH)), injected[measured] != 0
+    measured = flag != MISSING
+    found, bad = np.isin(flag[measured], (ISOLATED, PATCH, REJECTED)), injected[measured] != 0
     tp, fp = int((found & bad).sum()), int((found & ~bad).sum())
     fn, tn = int((~found & bad).sum()), int((~found & ~bad).sum())
     return Detection(

@@ -78,7 +78,7 @@ def test_every_key_is_understood():
     found = config.Recipe.of(config.parse(FULL, "s.toml"))
     assert found.settings == FilterSettings(
         "ukf", "forward", True, (3.048, None, pytest.approx(20 * math.pi / 648000)), 5.0, 3.5, 9.0, 150, 7, True,
-        (48.0, 11.5, 612.0), True, 46.2, (("window", 6.0), ("m", 0.01)), 1.5,
+        (48.0, 11.5, 612.0), True, 46.2, (("window", 6.0), ("m", 0.01)), 1.5, True,
     )  # fmt: skip
     assert found.station == Station(
         "north", "anticlockwise", pytest.approx(math.pi / 2), "zenith",

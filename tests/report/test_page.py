@@ -219,3 +219,17 @@ def test_document_without_figures_runs_nothing():
     assert "script-src 'none'" in text
     assert "<title>A &amp; B</title>" in text
     assert scripts(text) == []
+
+
+def test_decisions_by_hand_are_marked_and_a_click_takes_them_back():
+    flags = filtered().outlier.copy()
+    flags[50:55, 0], flags[60, 1] = 4, 5
+    made = replace(filtered(), outlier=flags)
+    for name in ("readings", "residuals"):
+        marked = {trace["name"]: trace for trace in figures(page(made))[name]["data"] if "by hand" in trace["name"]}
+        assert {each: trace["meta"]["use"] for each, trace in marked.items()} == {
+            "rejected by hand": "auto", "accepted by hand": "auto",
+        }  # fmt: skip
+    used = view(made).components_used - view(filtered()).components_used
+    assert used[52] in (-1, 0)
+    assert used[60] in (0, 1)
