@@ -5,6 +5,7 @@ Components are always in the order range, azimuth, elevation; axes in the order 
 
 from __future__ import annotations
 
+import importlib
 import mmap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -119,8 +120,15 @@ class Diagnostics:
         return f"<Diagnostics: {len(self.reading)} rows, {self.residual_kind}>"
 
 
-#: What a trajectory is for pandas, pyarrow and notebooks, by the name of its method; `ftproc.api` says it.
+#: What a trajectory is for pandas, pyarrow and notebooks, by the name of its method. `ftproc.api` fills it, and is
+#: loaded when one is first asked for.
 VIEWS: dict[str, Callable[[Trajectory], Any]] = {}
+
+
+def _seen_as(name: str, trajectory: Trajectory) -> Any:
+    if not VIEWS:
+        importlib.import_module("ftproc.api")
+    return VIEWS[name](trajectory)
 
 
 @dataclass(frozen=True, repr=False)
@@ -169,16 +177,16 @@ class Trajectory:
 
     def to_pandas(self) -> pd.DataFrame:
         """As a pandas DataFrame, with the columns of its file."""
-        found: pd.DataFrame = VIEWS["to_pandas"](self)
+        found: pd.DataFrame = _seen_as("to_pandas", self)
         return found
 
     def to_table(self) -> pa.Table:
         """As a pyarrow Table, with the columns and the metadata of its Parquet file."""
-        return VIEWS["to_table"](self)
+        return _seen_as("to_table", self)
 
     def _repr_html_(self) -> str:
         """For a notebook: the summary, and the track over the ground."""
-        found: str = VIEWS["_repr_html_"](self)
+        found: str = _seen_as("_repr_html_", self)
         return found
 
 
