@@ -16,6 +16,7 @@ from ftproc.files.reading import converting, large, understanding
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.formats.standards import choosing
 from ftproc.files.reading.meaning import plausibility, proposal, rows, schema, several, stamps
 from ftproc.records import FloatArray, IntArray, MeasurementLog
 from ftproc.settings import Station
@@ -34,7 +35,7 @@ class _Plan(NamedTuple):
     station: Station
     conditions: tuple[Condition, ...] = ()
     others: tuple[int, ...] = ()
-    one_target: bool = False
+    extract: Extract = Extract()
 
     def positions(self) -> list[int]:
         """Of the columns of all quantities, in their order."""
@@ -77,17 +78,22 @@ def read(
     conventions.check(station)
     unit_of, column_of = parse_units(units), parse_columns(columns)
     header = tables.read_header(source, extract.widths)
+    choosing.refuse_open(header, {**unit_of, **column_of})
+    column_of = {**header.stated.columns, **column_of}
+    if header.stated.azimuth_from and azimuth_from is None:
+        station = replace(station, azimuth_from=header.stated.azimuth_from)
     propose = proposal.by_values(header)
     if "time" not in column_of and not schema.has_time(header.names, header.units):
         index = proposal.the_moments(header, range(len(header.names)))
         column_of = column_of if index is None else {**column_of, "time": str(index + 1)}
     found = schema.resolve(header.source, header.names, unit_of, column_of, header.units, propose)
-    plan = _Plan(header, found, station, _conditions(header, extract), one_target=bool(extract.target))
+    plan = _Plan(header, found, station, _conditions(header, extract), extract=extract)
     if keep_columns:
         wanted = plan.positions()
         plan = plan._replace(others=tuple(place for place in range(len(header.names)) if place not in wanted))
         _check_others(header, plan.others)
-    if not (plan.others or plan.conditions) and station.refraction is None:  # refraction needs ranges of other blocks
+    whole = plan.others or plan.conditions or header.stated.target or header.stated.station
+    if not whole and station.refraction is None:  # refraction needs ranges of other blocks
         log = _in_blocks(plan)
         if log is not None:
             return _of_target(log, extract)
@@ -167,6 +173,7 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     if table.num_rows == 0:
         raise InputError(f"{header.source}: there are column names but no rows.")
     kept, notes = _kept(plan, table, chosen)
+    choosing.refuse_several(header, plan.extract, kept)
     converted = converting.converted(header, found, table.columns if kept is None else table.take(kept).columns)
     judged = converting.judged(header.source, converted.quantities, converted.found, converted.clock, plan.station)
     quantities = converting.in_other_units(converted.quantities, converted.found, judged.found)
@@ -177,9 +184,9 @@ def _at_once(plan: _Plan) -> MeasurementLog:
         gone = tuple(int(kept[row]) for row in log.rows_without_time)
         log = replace(log, row=kept[log.row], rows_without_time=gone, rows_in_file=table.num_rows)
     plan = plan._replace(found=judged.found)
-    if not plan.one_target:
+    if not choosing.is_one_target(header, plan.extract):
         several.refuse(header, judged.found, log)
-    notes = (*notes, *converted.notes, *converted.clock.notes, *spread)
+    notes = (*header.stated.notes, *notes, *converted.notes, *converted.clock.notes, *spread)
     clock = converted.clock
     if judged.found["time"].unit != converted.found["time"].unit:
         clock = clock._replace(words=f"numbers in {judged.found['time'].unit.name}, by the motion")
@@ -228,7 +235,8 @@ def _explained(
     """The log with its station, and with remarks on how it was understood."""
     station = with_zenith(plan.station, plan.found)
     values = log.measurement if sample is None else sample
-    remarks = schema.remarks(plan.header.names, plan.found, bool(clock.epoch))
+    names = [] if plan.header.is_of_a_standard else plan.header.names
+    remarks = schema.remarks(names, plan.found, bool(clock.epoch))
     doubtful = (*doubts, *plausibility.doubts(values, station))
     said = (*notes, *doubtful)
     understood = understanding.describe(plan.header, plan.found, clock, station, said)

@@ -33,23 +33,24 @@ def describe(
     unused = [name for place, name in enumerate(header.names) if place not in used and name]
     return {
         "file": header.form or "table",
-        "columns": {quantity: _column(column) for quantity, column in found.items()},
+        "columns": {quantity: _column(column, header) for quantity, column in found.items()},
         "not_used": unused,
         "clock": clock.words,
         "epoch": clock.epoch,
         "conventions": _conventions(station, found),
         "doubts": [
             *_others(header.names, found),
-            *_absent(found, unused),
+            *_absent(found, [] if header.is_of_a_standard else unused),
             *doubts,
             *clock.doubts,
-            *_axis(station, found),
+            *([] if header.is_of_a_standard else _axis(station, found)),
         ],
     }
 
 
-def _column(column: Column) -> dict[str, Any]:
-    stated = "stated by the user" if column.unit_stated_by_user else "in its name" if column.unit_in_name else "assumed"
+def _column(column: Column, header: TableHeader) -> dict[str, Any]:
+    known = "by the format" if header.is_of_a_standard else "in its name"
+    stated = "stated by the user" if column.unit_stated_by_user else known if column.unit_in_name else "assumed"
     if column.quantity == "time" and not (column.unit_stated_by_user or column.unit_in_name):
         stated = "see clock"
     if len(column.roles) > 1:

@@ -26,6 +26,7 @@ DEG_A, DEG_E = np.degrees(F.a), np.degrees(F.e)
 PLAIN = lines("time_s,range_m,azimuth_rad,elevation_rad", F.t, F.r, F.a, F.e)
 FIRST_UTC = "2024-05-31T12:34:56"
 SOD = 45296.0
+FLAT = (False, False, True)  # no elevation
 
 
 def texts() -> Iterator[Animal]:
@@ -243,8 +244,8 @@ def files() -> Iterator[Animal]:
     sink = io.BytesIO()
     pa.parquet.write_table(table, sink)
     yield Animal("Parquet, packed", written("a.parquet.gz", gzip.compress(sink.getvalue())), first_s=0)
-    yield Animal("ASTERIX items", written("a.jsonl", _asterix("items")), NORTH, SOD)
-    yield Animal("ASTERIX blocks", written("a.json", _asterix("blocks")), NORTH, SOD)
+    yield Animal("ASTERIX items", written("a.jsonl", _asterix("items")), NORTH, SOD, absent=FLAT)
+    yield Animal("ASTERIX blocks", written("a.json", _asterix("blocks")), NORTH, SOD, absent=FLAT)
     yield from _books(frame)
     yield from _arrays(frame)
 

@@ -56,7 +56,7 @@ class Animal:
     """name: what is special. write: makes the file in a directory. options: of `logs.read`, only what no program can
     know. first_s: time of the first row, NaN to leave it open. utc: of the first row, "" when the log does not say.
     asks: the option that the refusal must name, when the first reading must end in a question. tolerance: of lengths
-    in m; a hundred thousandth of it for angles in rad.
+    in m; a hundred thousandth of it for angles in rad. clock: of times, s. absent: of range, azimuth and elevation.
     """
 
     name: str
@@ -67,6 +67,8 @@ class Animal:
     asks: str = ""
     answer: dict[str, Any] = field(default_factory=dict)
     tolerance: float = 0.02
+    clock: float = 2e-4
+    absent: tuple[bool, bool, bool] = (False, False, False)
     missing: int = 0
     which: int = 0
 

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ftproc.errors import InputError, first_line, row_named
 from ftproc.files import limits
-from ftproc.files.reading.formats import blocks, content, encoding, layout, tagged, trimming
+from ftproc.files.reading.formats import blocks, content, encoding, layout, trimming
 from ftproc.files.reading.formats.header import Blocks, TableHeader
 from ftproc.files.reading.formats.layout import BLANKS
+from ftproc.files.reading.formats.standards import catalogue
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -29,7 +30,6 @@ MISSING_WORDS = (
 )
 
 _QUOTED_COMMA = re.compile(rb'"[+-]?\d+,(?:\d{1,2}|\d{4,})"')  # a decimal comma, that does not separate thousands
-_TAGGED = re.compile(rb"[=:]\s*[\"']?[+-]?\.?\d|^\s*[$!][A-Z]|^\*?\d\d[\d.]{4}[+-]\w{8}")
 _HEAD = 1 << 20  # bytes of a large file that contain its header line
 _PLAIN_ROWS = 20  # under the names, that are looked at before a file counts as plain
 _SEPARATOR_NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks", "": "fixed widths"}
@@ -42,7 +42,7 @@ def text_file(name: str, path: Path, room: limits.Room, widths: Sequence[int] = 
     if large:
         head = content.read(name, path, limit=_HEAD)
         lines = head[: head.rfind(b"\n") + 1 or len(head)]
-        if not trimming.is_boxed(head) and _tagged(lines, room, cut=True) is None:
+        if not trimming.is_boxed(head) and _described(lines, room, cut=True) is None:
             return _large_file(name, path)
     return text_bytes(content.read(name, path), room, widths)
 
@@ -50,7 +50,7 @@ def text_file(name: str, path: Path, room: limits.Room, widths: Sequence[int] = 
 def text_bytes(data: bytes, room: limits.Room, widths: Sequence[int] = ()) -> TableHeader:
     """The bytes of a text file. Raises InputError."""
     name = room.name
-    known = None if widths else _tagged(data, room)
+    known = None if widths else _described(data, room)
     if known is not None:
         return known
     text = split(name, data, widths)
@@ -58,14 +58,14 @@ def text_bytes(data: bytes, room: limits.Room, widths: Sequence[int] = ()) -> Ta
     return TableHeader(text.source, text.names, text.load, commas, units=text.units, form=text.form)
 
 
-def _tagged(data: bytes, room: limits.Room, cut: bool = False) -> TableHeader | None:
-    """A text whose lines say what each value is; None if it is none. cut: `data` is only the beginning."""
+def _described(data: bytes, room: limits.Room, cut: bool = False) -> TableHeader | None:
+    """A text of a format that `catalogue` lists; None if it is none. cut: `data` is only the beginning."""
     head = data[:_HEAD]
     trimming.refuse_wide(room.name, head)
-    if _plain(head) is not None or not _TAGGED.search(head):
+    if _plain(head) is not None:
         return None
-    text = encoding.as_utf8(room.name, data, cut).data.decode("utf-8", "replace")
-    return tagged.sentences(text, room) or tagged.survey(text, room) or tagged.pairs(text, room)
+    sample = encoding.as_utf8(room.name, head, cut or len(data) > len(head)).data.decode("utf-8", "replace")
+    return catalogue.read(sample, lambda: encoding.as_utf8(room.name, data, cut).data.decode("utf-8", "replace"), room)
 
 
 def _large_file(name: str, path: Path) -> TableHeader:

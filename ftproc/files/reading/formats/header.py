@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from ftproc.files.limits import check_names
+from ftproc.files.reading.meaning.names import taken_apart
+from ftproc.files.words import QUANTITIES
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -19,6 +21,25 @@ class Blocks(NamedTuple):
     rows: int
 
 
+class Stated(NamedTuple):
+    """What the standard of a file says of its columns, so that nobody is asked.
+
+    columns: {quantity: name of its column, or none}. azimuth_from: as in `Station`. target, station: the columns that
+    tell targets and stations apart. questions: {quantity: what the standard leaves open}, asked unless the user states
+    its column or unit. notes: what the file holds beside.
+    """
+
+    columns: Mapping[str, str] = {}
+    azimuth_from: str = ""
+    target: str = ""
+    station: str = ""
+    questions: Mapping[str, str] = {}
+    notes: tuple[str, ...] = ()
+
+
+_NOTHING = Stated()
+
+
 @dataclass(frozen=True)
 class TableHeader:
     """A table whose rows are not read yet.
@@ -28,6 +49,7 @@ class TableHeader:
     decimal_comma: numbers may have decimal commas. metadata: key-value pairs of the file.
     blocks: numeric positions -> these columns block by block if the file is large, else None.
     units: the cells of a row of units under the names, or nothing. form: the kind of file and how it is laid out.
+    stated: by the standard of the file.
     """
 
     source: str
@@ -38,6 +60,12 @@ class TableHeader:
     blocks: Callable[[Sequence[int]], Blocks | None] = lambda numeric: None
     units: Sequence[str] = ()
     form: str = ""
+    stated: Stated = _NOTHING
+
+    @property
+    def is_of_a_standard(self) -> bool:
+        """Whether nothing is left to be asked about its columns but what `stated` says."""
+        return self.stated != _NOTHING
 
     def __post_init__(self) -> None:
         check_names(self.source, self.names)
@@ -56,3 +84,10 @@ def of_arrow(
         units=units,
         form=form,
     )
+
+
+def is_log(names: Sequence[str], units: Mapping[str, str]) -> bool:
+    """Whether columns have the names of a time and of a reading. units: of some of them."""
+    apart = [taken_apart(name, units.get(name, "")) for name in names]
+    found = {quantity for quantity in QUANTITIES for name in apart if name.means(quantity)}
+    return "time" in found and len(found) > 1
