@@ -244,8 +244,8 @@ def files() -> Iterator[Animal]:
     sink = io.BytesIO()
     pa.parquet.write_table(table, sink)
     yield Animal("Parquet, packed", written("a.parquet.gz", gzip.compress(sink.getvalue())), first_s=0)
-    yield Animal("ASTERIX items", written("a.jsonl", _asterix("items")), NORTH, SOD, absent=FLAT)
-    yield Animal("ASTERIX blocks", written("a.json", _asterix("blocks")), NORTH, SOD, absent=FLAT)
+    yield Animal("ASTERIX items", written("a.jsonl", _asterix("items")), first_s=SOD, absent=FLAT)
+    yield Animal("ASTERIX blocks", written("a.json", _asterix("blocks")), first_s=SOD, absent=FLAT)
     yield from _books(frame)
     yield from _arrays(frame)
 

@@ -1,8 +1,9 @@
-"""JSON: an object per line, an array of objects, columns by name, or records deep in a document (decoded ASTERIX)."""
+"""JSON: an object per line, an array of objects, columns by name, or records deep in a document."""
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,11 @@ from ftproc.files import limits
 from ftproc.files.reading.formats import content, encoding
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.formats.sparse import Sparse
+from ftproc.files.reading.formats.standards import asterix
 
 _DEEPEST = 12  # objects inside each other
 _HELD, _REFERENCE = 64, 16  # bytes that an object or list takes in memory, and one that is in it
+_BETWEEN = re.compile(r"[\s,]*")  # two documents
 _VALUES = ("val", "value")  # keys under which decoders put the value of an item, beside its meaning
 
 
@@ -24,7 +27,11 @@ def json_file(name: str, path: Path, room: limits.Room) -> TableHeader:
     room.check(_HELD * (text.count("{") + text.count("[")) + _REFERENCE * text.count(","))
     columns = Sparse(room)
     try:
-        for record in _records(name, text):
+        found = _parsed(name, text)
+        radar = asterix.document(found, lambda record: dict(flat(name, record, "", 0)), room)
+        if radar is not None:
+            return radar
+        for record in _records(found):
             columns.add(flat(name, record, "", 0))
     except RecursionError as error:
         raise InputError(f"{name}: this JSON nests too deeply; write one object for each reading.") from error
@@ -35,12 +42,33 @@ def json_file(name: str, path: Path, room: limits.Room) -> TableHeader:
     return columns.header("JSON objects")
 
 
-def _records(name: str, text: str) -> Iterable[Mapping[str, Any]]:
-    """The objects of a document, one for each reading."""
+def plots(text: str, room: limits.Room) -> TableHeader | None:
+    """The plots of ASTERIX in a JSON text, None if it has none."""
+    return asterix.document(_parsed(room.name, text), lambda record: dict(flat(room.name, record, "", 0)), room)
+
+
+def _parsed(name: str, text: str) -> Any:
+    """A document, or a list of those that follow each other, on a line each or with commas between them."""
     try:
-        found = _loaded(text)
+        return _loaded(text)
     except json.JSONDecodeError:
-        found = _by_line(name, text)
+        first = text.lstrip().split("\n", 1)[0].strip()
+    if not first.endswith(("{", ",")):
+        return _by_line(name, text)
+    found, place = [], 0
+    while place < len(text):
+        try:
+            each, place = json.JSONDecoder().raw_decode(text, place)
+        except json.JSONDecodeError:
+            return _by_line(name, text)
+        found.append(each)
+        gap = _BETWEEN.match(text, place)
+        place = gap.end() if gap else place
+    return found
+
+
+def _records(found: Any) -> Iterable[Mapping[str, Any]]:
+    """The objects of a document, one for each reading."""
     return _of_rows(found) or (_of_columns(found) if _is_columns(found) else _deepest_list(found))
 
 

@@ -18,6 +18,7 @@ from ftproc.files.reading.formats import content, csvtext, documents, packing, w
 from ftproc.files.reading.formats.arrays import hdf5, matlab, saved
 from ftproc.files.reading.formats.columnar import ipc, parquet
 from ftproc.files.reading.formats.header import TableHeader, of_arrow
+from ftproc.files.reading.formats.standards import asterix, octets
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,6 +34,14 @@ class How(NamedTuple):
     room: Room
     part: str = ""
     widths: Sequence[int] = ()
+
+
+def _plots(name: str, path: Path, how: How) -> TableHeader:
+    """ASTERIX, or else a text."""
+    found = asterix.binary(content.read(name, path), how.room)
+    if found is None and content.read(name, path, limit=4).startswith(octets.CAPTURES):
+        raise InputError(f"{name}: no packet of this capture holds whole blocks of ASTERIX; name a log.")
+    return _text(name, path, how) if found is None else found
 
 
 def _text(name: str, path: Path, how: How) -> TableHeader:
@@ -51,10 +60,13 @@ FORMATS: Mapping[str, Callable[[str, Path, How], TableHeader]] = {
     ),
     ".mat": lambda name, path, how: matlab.read(name, path, how.room, how.part),
     **dict.fromkeys((".npy", ".npz"), lambda name, path, how: saved.by_numpy(name, path, how.room)),
+    **dict.fromkeys((".pcap", ".pcapng", ".cap", ".ast", ".raw", ".bin"), _plots),
 }
 #: How files begin whose kind the name may not say.
-_BINARY = (b"PAR1", b"ARROW1", b"PK\x03\x04", b"\x89HDF", b"MATLAB")
-_BINARY_KINDS = (".parquet", ".arrow", ".xlsx", ".h5", ".mat")
+_MAGIC = {
+    b"PAR1": ".parquet", b"ARROW1": ".arrow", b"PK\x03\x04": ".xlsx", b"\x89HDF": ".h5", b"MATLAB": ".mat",
+    **dict.fromkeys(octets.CAPTURES, ".pcap"), **{bytes([category, 0]): ".ast" for category in octets.CATEGORIES},
+}  # fmt: skip
 _DEEPEST = 3  # of packed files inside each other
 
 _SMALL = 1 << 16  # bytes of a range file
@@ -71,7 +83,7 @@ _OTHERS = {
     **dict.fromkeys((".ods", ".numbers"), "this spreadsheet is not understood; save it as .xlsx or .csv"),
     **dict.fromkeys((".htm", ".pdf", ".doc", ".docx", ".rtf"), "this is a document; save the table in it as .csv"),
     **dict.fromkeys(
-        (".db", ".sqlite", ".bag", ".db3", ".mcap", ".tdms", ".mf4", ".mdf", ".pcap", ".pkl", ".pickle", ".7z", ".rar"),
+        (".db", ".sqlite", ".bag", ".db3", ".mcap", ".tdms", ".mf4", ".mdf", ".pkl", ".pickle", ".7z", ".rar"),
         "this kind of file is not understood; export the track to .csv, .parquet, .xlsx, .h5 or .mat",
     ),
     ".xls": "this is an old Excel workbook; save it as .xlsx or .csv",
@@ -94,6 +106,8 @@ def read_header(source: Source, widths: Sequence[int] = ()) -> TableHeader:
     except BaseException:
         scratch.remove()
         raise
+    if not header.is_of_a_standard:
+        header = asterix.by_names(header)
     weakref.finalize(header, scratch.remove)
     return header
 
@@ -119,7 +133,7 @@ def _opened(name: str, widths: Sequence[int], scratch: _Scratch) -> TableHeader:
     if name == "-":
         data = content.stdin()
         how = How(Room("<stdin>", len(data)), "", widths)
-        if packing.ending("", data[:8]) is None and not data.startswith(_BINARY):
+        if packing.ending("", data[:8]) is None and not data.startswith(tuple(_MAGIC)):
             return csvtext.text_bytes(data, how.room, widths)
         path = scratch.path() / "stdin"
         path.write_bytes(data)
@@ -158,7 +172,7 @@ def _beginning(path: Path) -> bytes:
 
 def _kind_of(head: bytes) -> str:
     """The kind of a file whose name says nothing, by its first bytes."""
-    return next((kind for magic, kind in zip(_BINARY, _BINARY_KINDS, strict=True) if head.startswith(magic)), ".csv")
+    return next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), ".csv")
 
 
 def _in_memory(table: Any) -> TableHeader:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import re
 import unicodedata
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from ftproc.files.limits import LONGEST_NAME
@@ -131,9 +130,7 @@ def taken_apart(text: str, unit: str = "") -> Name:
             notation = squeezed
         elif inside.strip("-"):
             found = found or ("" if foreign else inside)
-    stem, words, context = _words(plain)
-    if not found and not foreign:
-        found = _asterix_unit(words[-1] if words else "", context)
+    stem, words = _words(plain)
     return Name(text, stem, words, found, notation, foreign)
 
 
@@ -196,35 +193,16 @@ def _without_in(text: str) -> str:
     return re.sub(r"(?<!\s)\s+in$", "", text, flags=re.IGNORECASE)
 
 
-def _words(text: str) -> tuple[str, tuple[str, ...], str]:
-    """Stem and words of the last part of a path such as `CAT048.I040.RHO`, and the path before it."""
+def _words(text: str) -> tuple[str, tuple[str, ...]]:
+    """Stem and words of the last part of a path such as `CAT048.I040.RHO`."""
     context, _, last = text.rpartition("/") if "/" in text else text.rpartition(".")
     parts = _NOT_WORDS.split(last.lower())
     around = set(_NOT_WORDS.split(context.lower())) - {""}
     letter = len(last) == 1 and not around <= QUALIFIERS  # such as Mode 3/A
     if letter or not re.search(r"[^\W\d_]", last) or all(part in QUALIFIERS for part in parts if part):  # Az.Angle
-        context, last = "", text
+        last = text
     words = tuple(word for word in _NOT_WORDS.split(plain_letters(_CAMEL.sub(" ", last))) if word)
     if len(words) > 1 and words[0].isdigit():  # such as 048_040_RHO
         digits = [k for k, word in enumerate(words) if word.isdigit()]
-        cut = next((k for k in range(len(words)) if k not in digits), 0)
-        context, words = f"{context}.{'.'.join(words[:cut])}", words[cut:]
-    return "".join(words), words, context.lower()
-
-
-#: Items of ASTERIX category 048 with the units that its standard states.
-_ASTERIX = {("rho", "040"): "nmi", ("theta", "040"): "deg", ("tod", "140"): "s", ("day", "140"): "s"}
-
-
-def _asterix_unit(word: str, context: str) -> str:
-    parts = {part.removeprefix("i") for part in _NOT_WORDS.split(context)}
-    return next((unit for (name, item), unit in _ASTERIX.items() if name == word and item in parts), "")
-
-
-def of_radar(names: Sequence[Name]) -> list[Name]:
-    """The names; RHO and THETA of a file that has other items of ASTERIX too, with the units of that standard."""
-    words = {word for name in names for word in (*name.words, *_NOT_WORDS.split(name.text.lower()))}
-    if not ({"sac", "sic"} <= words or {"rho", "theta", "polar", "coordinates"} <= words):
-        return list(names)
-    units = {"rho": "nmi", "theta": "deg"}
-    return [name._replace(unit=name.unit or units.get(name.stem, "")) for name in names]
+        words = words[next((k for k in range(len(words)) if k not in digits), 0) :]
+    return "".join(words), words

@@ -20,7 +20,7 @@ from ftproc.errors import InputError, nearest
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
 from ftproc.files.reading.meaning import parts, questions
-from ftproc.files.reading.meaning.names import Name, of_radar, taken_apart
+from ftproc.files.reading.meaning.names import Name, taken_apart
 from ftproc.files.reading.meaning.questions import Propose, answer, listed
 from ftproc.files.units import Unit, si_unit, unit_named
 from ftproc.files.words import GERMAN, QUANTITIES
@@ -83,7 +83,6 @@ def resolve(
         apart = [
             name._replace(unit="") if re.search(r"[(\[] *grad *[)\]]$", name.text, re.I) else name for name in apart
         ]
-    apart = of_radar(apart)
     table = _Table(source, names, apart, units)
     found: dict[str, Column] = {}
     taken = {place for name in columns.values() if name != ABSENT for place in table.places(name)}
@@ -216,7 +215,6 @@ def _recognised(table: _Table, quantity: str, free: Sequence[int]) -> Column | N
             f"{table.source}: columns {' and '.join(names[place] for place in fits)} could each be the {quantity}. "
             f"Say which one it is with {answer(names, {quantity: fits[0]})}."
         )
-    fits.sort(key=lambda place: "140" not in table.apart[place].text)  # the radar's own time, in ASTERIX
     name, unit = table.apart[fits[0]], table.units.get(quantity)
     column = table.column(quantity, fits[0], "its name", [names[place] for place in fits[1:]])
     stated = unit_named(quantity, name.unit) if name.unit else None

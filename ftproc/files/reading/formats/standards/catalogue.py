@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from ftproc.errors import InputError
 from ftproc.files.limits import Room
-from ftproc.files.reading.formats import content, tagged
+from ftproc.files.reading.formats import content, documents, tagged
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.formats.standards import crd, gsi, kinds, meteors, nmea, tdm
+from ftproc.files.reading.formats.standards import asterix, crd, gsi, kinds, meteors, nmea, tdm
 
 _HEAD = 1 << 16  # bytes in which a format is recognised
 
@@ -40,6 +40,9 @@ def _no(name: str, mark: str, what: str) -> Format:
 _SURVEY = "points of a survey without times, not readings of a moving target"
 _EPHEMERIS = "an ephemeris, computed positions and no readings"
 TEXTS = (
+    _of("ASTERIX in text", r"^Item +\d{3} *:", asterix.text),
+    _of("ASTERIX in JSON", r'\A\s*[\[{][^\0]{0,4000}"(?:I?040|CAT0?48)"', documents.plots),
+    _of("ASTERIX in XML", r"<ASTERIX\b[^>]{0,300}\bcat=", asterix.xml),
     _of("CCSDS TDM", r"\A\W*CCSDS_TDM_VERS\s*=|<(?:\w+:)?tdm\b", tdm.read),
     _of("ILRS CRD", r"\A(?:\W*\n|00 .*\n)*[hH]1\s+CRD\b", crd.read),
     _of("FTPdetectinfo", r"\AMeteor Count *=", meteors.read),
@@ -49,7 +52,9 @@ TEXTS = (
     _no("ILRS CPF", r"\A(?:\W*\n)*[hH]1\s+CPF\b", f"a prediction of the ILRS (CPF), {_EPHEMERIS}"),
     _no("SP3", r"\A#[a-d][PV]\d{4} ", f"an SP3 file, {_EPHEMERIS}"),
     _no("CCSDS OEM", r"\A\W*CCSDS_O[EPM]M_VERS\s*=|<(?:\w+:)?o[epm]m\b", f"a CCSDS message with {_EPHEMERIS}"),
-    _no("two-line elements", r"^1 [\d ]{5}[UCS ].{60,63}\r?\n2 [\d ]{5} ", "orbits in two-line elements, no readings"),
+    _no("Horizons", r"^\$\$SOE\s*$", f"a table of JPL Horizons, {_EPHEMERIS}"),
+    _no("two-line elements", r"\A\s*(?:.{1,24}\r?\n)?1 [\d ]{5}[UCS ].{60,63}\r?\n2 [\d ]{5} ",
+        "orbits in two-line elements, and no readings"),
     _no("IOD", r"^\d{5} \d\d \d{3}\w{1,3} +\w{4} [A-Z] \d{12,17} +\d\d \d\d ",
         "positions of satellites among the stars (IOD), in right ascension and declination, not azimuth and elevation"),
     _no("CMN meteor", r"^24\d{5}\.\d{8,} \d{3}\.\d+ [+-]\d\d\.\d+ [+-]\d",
@@ -57,9 +62,12 @@ TEXTS = (
     _no("RINEX", r"\A.{60}RINEX VERSION / TYPE", "a RINEX file, of satellites as a GNSS receiver sees them"),
     _no("GPX", r"<(?:gpx|kml)\b", "positions on the earth, and no readings of a range or an angle"),
     _no("IGC", r"^B\d{6}\d{7}[NS]\d{8}[EW][AV]", "a flight recorder's positions (IGC), no readings of a station"),
+    _no("SBS-1", r"^MSG,[1-8],(?:\d*,){2}", "positions that aircraft broadcast (SBS-1), and no readings of a station"),
     _no("LandXML", r"<LandXML\b", _SURVEY),
     _no("Carlson RW5", r"^SS,OP\w{1,20},FP\w{1,20},AR", f"a field book of a total station (RW5), {_SURVEY}"),
     _no("Nikon RAW", r"\ACO,.*Nikon RAW", f"a field book of a total station (Nikon), {_SURVEY}"),
+    _no("JobXML", r"<JOBFile\b", f"a field book of a total station (JobXML), {_SURVEY}"),
+    _no("Topcon GTS", r"\A_'[^\r\n]{0,200}_\(", f"a field book of a total station (Topcon), {_SURVEY}"),
     _no("Sokkia SDR", r"\A00NM(?:SDR|\w\w)", f"a field book of a total station (SDR), {_SURVEY}"),
     _of("names and values", r"[=:]\s*[\"']?[+-]?\.?\d", tagged.pairs),
 )  # fmt: skip
