@@ -11,9 +11,7 @@ from typing import Any
 from ftproc.errors import InputError, quoted
 from ftproc.files import limits
 from ftproc.files.reading.formats import content, layout, trimming
-from ftproc.files.reading.formats.header import TableHeader, of_arrow
-from ftproc.files.reading.meaning.names import taken_apart
-from ftproc.files.words import QUANTITIES
+from ftproc.files.reading.formats.header import TableHeader, is_log, of_arrow
 
 _CELL, _ROW = 32, 64  # bytes of a cell and a row at least
 _XML = 4  # bytes that a byte of XML takes
@@ -26,7 +24,11 @@ def workbook(name: str, path: Path, room: limits.Room, sheet: str = "") -> Table
     _refuse_bomb(name, path, room)
     read = {title: _table(name, title, cells) for title, cells in _sheets(name, path, room, sheet)}
     tables = {title: table for title, table in read.items() if table is not None}
-    logs = [title for title, table in tables.items() if _is_log(table)]
+    logs = [
+        title
+        for title, table in tables.items()
+        if is_log(table.names, dict(zip(table.names, table.units, strict=False)))
+    ]
     if len(logs) > 1:
         raise InputError(
             f"{name}: it holds several logs, in the sheets {', '.join(logs)}. Name one behind #, such as "
@@ -53,14 +55,6 @@ def _table(name: str, title: str, cells: list[tuple[Any, ...]]) -> TableHeader |
     below = f", {len(rows) - last} lines below the table" if last < len(rows) else ""
     table = pa.Table.from_arrays(columns, names=found.names)
     return of_arrow(table, name, f'Excel workbook, sheet "{title}"{below}', found.units, decimal_comma=True)
-
-
-def _is_log(header: TableHeader) -> bool:
-    """Whether a table has the names of a time and of a reading."""
-    units = header.units or [""] * len(header.names)
-    names = [taken_apart(name, unit) for name, unit in zip(header.names, units, strict=True)]
-    found = {quantity for quantity in QUANTITIES for name in names if name.means(quantity)}
-    return "time" in found and len(found) > 1
 
 
 def _sheets(name: str, path: Path, room: limits.Room, sheet: str) -> Iterator[tuple[str, list[tuple[Any, ...]]]]:

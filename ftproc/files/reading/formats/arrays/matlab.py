@@ -1,4 +1,4 @@
-"""Matlab files: vectors of one length, a structure of such, an array of structures, or a matrix."""
+"""Matlab files: vectors of one length, structures and cells of such, arrays of structures, and matrices."""
 
 from __future__ import annotations
 
@@ -38,29 +38,69 @@ def read(name: str, path: Path, room: Room, variable: str = "") -> TableHeader:
             _survey(content.read(name, path), room)
         rehearse(path, name, "a Matlab file", lambda: loadmat(path, squeeze_me=True, struct_as_record=False))
         found = loadmat(path, squeeze_me=True, struct_as_record=False)
-        tables = dict(_tables({key: value for key, value in found.items() if not key.startswith("__")}))
+        tables = dict(_tables("", {key: value for key, value in found.items() if not key.startswith("__")}))
     return vectors.chosen(room, tables, variable, "Matlab")
 
 
-def _tables(plain: dict[str, Any]) -> Iterator[tuple[str, vectors.Table]]:
-    """The top level, then each structure, array of structures and matrix."""
-    yield "", _vectors(plain)
-    for key, value in plain.items():
-        first = value.flat[0] if isinstance(value, np.ndarray) and value.dtype == object and value.size else value
-        if hasattr(value, "_fieldnames"):
-            yield key, _vectors({field: getattr(value, field) for field in value._fieldnames})
-        elif hasattr(first, "_fieldnames"):  # an array of structures, one for each row
-            yield key, _vectors({field: _cells([getattr(each, field, None) for each in value.flat])
-                                 for field in first._fieldnames})  # fmt: skip
-        elif isinstance(value, np.ndarray) and vectors.is_matrix(value):
-            yield key, vectors.in_memory(vectors.columns(value))
+def _tables(title: str, value: Any) -> Iterator[tuple[str, vectors.Table]]:
+    """Title and table of a value and of what is in it: structures, arrays of them, cells and matrices."""
+    fields = _fields(value)
+    if fields is not None:
+        yield title, _of_fields(fields)
+        parts = ((f"{title}.{name}".strip("."), each, _names_beside(fields, each)) for name, each in fields.items())
+        for name, each, names in parts:
+            if isinstance(each, np.ndarray) and vectors.is_matrix(each):
+                yield name, vectors.in_memory(vectors.columns(each, names))
+            else:
+                yield from _tables(name, each)
+    elif isinstance(value, np.ndarray) and value.dtype == object and value.size:
+        table = _of_cells(value)
+        yield title, table
+        for k, each in enumerate(value.flat if not table.columns else ()):
+            yield from _tables(f"{title}({k + 1})", each)
 
 
-def _vectors(values: dict[str, Any]) -> vectors.Table:
-    arrays = {key: each for key, each in values.items() if isinstance(each, np.ndarray)}
-    plain = {key: _cells(each.tolist()) if each.dtype.kind == "O" and each.ndim == 1 else each
-             for key, each in arrays.items()}  # fmt: skip
-    return vectors.in_memory(vectors.vectors({key: each for key, each in plain.items() if each is not None}))
+def _fields(value: Any) -> dict[str, Any] | None:
+    """The fields of a structure; None of anything else."""
+    if isinstance(value, dict):
+        return value
+    return {name: getattr(value, name) for name in value._fieldnames} if hasattr(value, "_fieldnames") else None
+
+
+def _of_fields(fields: dict[str, Any]) -> vectors.Table:
+    """The vectors of a structure, and the columns of a matrix that is as long as they are."""
+    plain = {name: _cells(each.tolist()) if each.dtype.kind == "O" and each.ndim == 1 else each
+             for name, each in fields.items() if isinstance(each, np.ndarray)}  # fmt: skip
+    arrays = {name: each for name, each in plain.items() if each is not None}
+    lengths = {max(each.shape) for each in arrays.values() if vectors.is_vector(each.shape)}
+    wide = {name: each for name, each in arrays.items() if vectors.is_matrix(each) and max(each.shape) in lengths}
+    parts = ({f"{name}.{k}": column for k, column in vectors.columns(each).items()} for name, each in wide.items())
+    columns = vectors.vectors({**arrays, **{name: each for part in parts for name, each in part.items()}})
+    numeric = any(each.dtype.kind in "iuf" for each in columns.values())
+    return vectors.in_memory(columns if numeric else {})
+
+
+def _of_cells(cells: Any) -> vectors.Table:
+    """An array of structures of single values, a row of each; cells below a row of names; or a vector in each cell."""
+    rows = [_fields(each) for each in cells.flat]
+    first = rows[0]
+    if first is not None:
+        columns = {name: _cells([(row or {}).get(name) for row in rows]) for name in first}
+    elif cells.ndim == 2 and all(isinstance(name, str) for name in cells[0]):
+        columns = {name: _cells(list(column[1:])) for name, column in zip(cells[0], cells.T, strict=True)}
+    else:
+        columns = {str(k + 1): each for k, each in enumerate(cells.flat) if isinstance(each, np.ndarray)}
+        columns = columns if len({each.shape for each in columns.values()}) == 1 else {}
+    return vectors.in_memory(vectors.vectors({name: each for name, each in columns.items() if each is not None}))
+
+
+def _names_beside(fields: dict[str, Any], matrix: Any) -> list[str]:
+    """Texts beside a matrix, as many as it has columns."""
+    if not isinstance(matrix, np.ndarray) or not vectors.is_matrix(matrix):
+        return []
+    count = min(matrix.shape)
+    found = (each for each in fields.values() if isinstance(each, np.ndarray) and each.size == count)
+    return next((each.tolist() for each in found if all(isinstance(name, str) for name in each.flat)), [])
 
 
 def _cells(values: list[Any]) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ftproc.errors import InputError, encodable
 from ftproc.files.limits import Room
-from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.formats.header import TableHeader, is_log
 from ftproc.files.units import Unit, unit_named
 
 _FEWEST = 2  # arrays that make a table
@@ -53,10 +53,13 @@ def chosen(room: Room, tables: Mapping[str, Table], wanted: str, kind: str) -> T
         raise InputError(
             f"{name}: it holds no two arrays of one length, which could be columns; save the vectors side by side."
         )
+    logs = [title for title, table in tables.items() if is_log(list(table.columns), table.units)]
+    if not wanted and len(logs) == 1:
+        wanted = logs[0]
     if not wanted and len(tables) > 1 and "" not in tables:
         first = next(iter(tables))
         raise InputError(f"{name}: it holds several tables: {titles}. Name one behind #, such as {name}#{first}.")
-    title = wanted or ("" if "" in tables else next(iter(tables)))
+    title = wanted if wanted in tables else ("" if "" in tables else next(iter(tables)))
     return _header(room, tables[title], f"{kind}, {title or 'top level'}")
 
 
