@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +38,8 @@ ORIGIN: Mapping[str, Key] = _DEGREES
 STATION: Mapping[str, Key] = {
     "log": Key("log", text, "radar.csv", "relative to this file"),
     "config": Key("config", text, "radar.toml", "the station file of the instrument"),
+    "where": Key("where", text, "station=north", "which rows of the log are of this station"),
+    "target": Key("target", text, "track=7", "which of several targets in the log"),
     **_DEGREES,
     **_METRES,
     "range_bias_sigma": Key("range", SMALLEST, 20.0, _SIGMA, quantity="range"),
@@ -104,13 +104,15 @@ def load(path: str) -> Range:
 
 
 def _check_logs(path: str, stations: Sequence[Instrument]) -> None:
-    """Raise UsageError if two stations have the same log, under whatever names. Two groups of one file are two logs."""
+    """Raise UsageError if two stations have the same log, under whatever names. Two groups of one file are two logs,
+    and so are the rows of two conditions."""
     known: dict[object, list[tuple[str, Instrument]]] = {}
     for each in stations:
         file, part = _source(each.log)
         others = known.setdefault(file, [])
         for other_part, other in others:
-            if part == other_part or not (part and other_part):
+            both, rows = part and other_part and part != other_part, (each.recipe.where, other.recipe.where)
+            if not both and (rows[0] == rows[1] or not all(rows)):
                 raise UsageError(
                     f"{path}: {other.name} and {each.name} have the same log, {each.log}; name the log of each."
                 )
@@ -162,6 +164,9 @@ def _instrument(path: str, origin: Geodetic | None, name: str, keys: Any) -> Ins
     values = reading.values_of(place, STATION, own)
     config = str(Path(path).parent / values["config"]) if "config" in values else ""
     options = _options(place, config, sections)
+    options |= {
+        key: value for key, value in (("where", values.get("where")), ("target", values.get("target"))) if value
+    }
     if "log" not in values:
         raise UsageError(f'{place} names no log; write log = "{name}.csv".')
     log = str(Path(path).parent / values["log"])
@@ -249,50 +254,3 @@ def _other_sign(origin: Geodetic, site: Geodetic) -> str:
         if np.linalg.norm(seen_from(origin, other)[0]) < FARTHEST_M / 2:
             return f", and would be near it with the other sign of its {name}"
     return ""
-
-
-def template(logs: Sequence[str], azimuth_from: str | None) -> str:
-    """The text of a range file for these logs, with places to fill in."""
-    if not logs:
-        raise UsageError(
-            "--fuse --write-config needs the logs of the stations: ftproc filter --fuse --write-config LOG..."
-        )
-    parts = [_HEAD, _ORIGIN]
-    taken: list[str] = []
-    for log in logs:
-        name = "".join(c if c.isalnum() or c in "-_" else "_" for c in Path(log).name.partition(".")[0]) or "station"
-        name = next(each for k in count(1) if (each := name if k == 1 else f"{name}{k}") not in taken)
-        taken.append(name)
-        parts.append(
-            _STATION.format(
-                name=name, log=json.dumps(log), azimuth=azimuth_from or "x", clock=0 if len(taken) == 1 else 0.1
-            )
-        )
-    return "".join(parts)
-
-
-_HEAD = """\
-# A range file of ftproc: ftproc filter --fuse THIS --smooth -o best.parquet. Logs are relative to this file.
-# Keys of a station file may stand here too, such as azimuth_from = "north" or time_offset_s = 0.5; or in a file of
-# its own: config = "radar.toml".
-
-"""
-_ORIGIN = """\
-[origin]                        # of x east, y north, z up; leave its keys out for stations in metres
-lat_deg = 48.0812               # WGS-84
-lon_deg = 11.2803
-height_m = 612.0                # above the ellipsoid
-"""
-_STATION = """
-[station.{name}]
-log = {log}
-lat_deg = 48.0812               # or, with an empty [origin]: east_m, north_m, up_m
-lon_deg = 11.2803
-height_m = 612.0
-azimuth_from = "{azimuth}"            # x: anticlockwise from east; north: clockwise
-range_bias_sigma_m = 20         # 1-sigma of what is not known beforehand; 0: known
-azimuth_bias_sigma_mrad = 1
-elevation_bias_sigma_mrad = 1
-level_sigma_mrad = 0.15         # tilt about east and about north
-clock_offset_sigma_s = {clock}        # 0: this clock is the reference
-"""

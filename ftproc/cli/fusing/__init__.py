@@ -20,7 +20,8 @@ from ftproc.errors import InputError, UsageError, failure, printable
 from ftproc.files import layout, remote
 from ftproc.files.writing import atomic, maps, outputs, tables, trajectories
 from ftproc.fusion import flight, results, summary
-from ftproc.fusion.range_file import Range, load, template
+from ftproc.fusion.range_file import Range, load
+from ftproc.fusion.range_template import template
 from ftproc.quality import summary as single
 from ftproc.quality.summary import line
 from ftproc.settings import PACKAGED, FilterSettings
