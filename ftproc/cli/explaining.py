@@ -16,7 +16,8 @@ from ftproc.quality.summary import line
 from ftproc.records import MeasurementLog
 
 _ROWS = 3  # that are shown
-_LOGS = (".csv", ".csv.gz", ".parquet", ".feather", ".txt", ".tsv", ".dat", ".xlsx", ".jsonl", ".arrow", ".h5", ".mat")
+_LOGS = (".csv", ".csv.gz", ".parquet", ".feather", ".txt", ".tsv", ".dat", ".xlsx", ".jsonl", ".arrow", ".h5", ".mat",
+         ".ast", ".pcap", ".frd", ".npt", ".tdm", ".aer")  # fmt: skip
 
 
 def explain(logs: Sequence[str], recipe: Recipe, form: str, debug: bool) -> int:

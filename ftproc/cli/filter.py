@@ -149,9 +149,9 @@ def command(list_methods: str | None, write_config: bool, explain: bool, follow:
     """Find the outliers of LOGs, and estimate the target's trajectory with its uncertainty.
 
     A LOG is a text file (.csv, .txt, .tsv, .dat), .parquet, .feather, .arrow, .xlsx, .jsonl, .h5 or .mat, even packed
-    (.gz, .bz2, .xz, .zst, .zip), or a URI of one, with time, range, azimuth and elevation; or - for text on standard
-    input. A sheet or group in it stands behind #: flight.h5#radar. Measurement noise and process noise are estimated
-    from the log. A bad log does not stop the others; the exit code is then 1.
+    (.gz, .bz2, .xz, .zst, .zip), or a URI of one, with time, range, azimuth and elevation; ASTERIX, ILRS CRD, CCSDS
+    TDM or NMEA; or - for text on standard input. A sheet or group in it stands behind #: flight.h5#radar. Measurement
+    noise and process noise are estimated from the log. A bad log does not stop the others; the exit code is then 1.
     """
     ctx = click.get_current_context()
     if list_methods is not None:
