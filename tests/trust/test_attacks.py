@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.trust.attacks import attack, binaries, hdf5, running, texts
+from tests.trust.attacks import attack, binaries, hdf5, running, standards, texts
 from tests.trust.attacks.attack import Attack
 
-GENERATORS = (*texts.ALL, *binaries.ALL, *hdf5.ALL)
+GENERATORS = (*texts.ALL, *binaries.ALL, *hdf5.ALL, *standards.ALL)
 LEAST = 600
 pytestmark = pytest.mark.filterwarnings("ignore")  # of the libraries that make odd files
 

@@ -16,7 +16,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.trust.attacks import binaries, hdf5, texts
+from tests.trust.attacks import binaries, hdf5, standards, texts
 from tests.trust.attacks.attack import Attack
 
 MOST_S, MOST_MB = 10.0, 1500
@@ -27,7 +27,7 @@ _LARGEST = 1_000_000  # bytes of a file for which the limits hold
 
 def all_attacks(seed: int = 0) -> Iterator[Attack]:
     """Every attack of every generator."""
-    for generator in (*texts.ALL, *binaries.ALL, *hdf5.ALL):
+    for generator in (*texts.ALL, *binaries.ALL, *hdf5.ALL, *standards.ALL):
         yield from generator(random.Random(f"{seed} {generator.__name__}"))
 
 

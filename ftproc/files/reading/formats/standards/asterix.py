@@ -131,7 +131,7 @@ def _records(found: Any, category: int, depth: int) -> Iterator[tuple[int, Mappi
 
 _LINE = re.compile(
     r"Category: *(?P<category>\d+)|(?P<record>Data Record)|Item +(?P<item>\d{3}) *:.*"
-    r"|\s+(?P<name>[^:]+): *(?P<raw>\S*)(?: *\((?P<value>[-+\d.eE]+) +\S+\))?.*"
+    r"|[\t ]{1,8}(?P<name>[^:\s][^:]{0,100}): *(?P<raw>\S*)(?: *\((?P<value>[-+\d.eE]+) +\S+\))?.*"
 )
 
 
@@ -154,16 +154,19 @@ def _of_text(whole: str) -> Iterator[tuple[int, Row]]:
 
 
 def _of_xml(whole: str) -> Iterator[tuple[int, Row]]:
-    for record in re.finditer(r"<ASTERIX\b[^>]*\bcat=\"(\d{1,3})\"[^>]*>(.*?)</ASTERIX>", whole, re.DOTALL):
-        items = re.findall(r"<I(\d{3})>(.*?)</I\1>", record[2], re.DOTALL)
-        yield (
-            int(record[1]),
-            {
-                f"I{item}.{name}": value.strip()
-                for item, inside in items
-                for name, value in re.findall(r"<(\w+)[^>]*>([^<]*)</\1>", inside)
-            },
-        )
+    category, item, row = 0, "", dict[str, Any]()
+    for tag in re.finditer(r"<(\w++)([^<>]*+)>([^<>]*+)", whole):
+        if tag[1] == "ASTERIX":
+            if row:
+                yield category, row
+            found = re.search(r'\bcat="(\d{1,3})"', tag[2])
+            category, item, row = int(found[1]) if found else 0, "", {}
+        elif _KEY.fullmatch(tag[1]):
+            item = tag[1]
+        elif item:
+            row[f"{item}.{tag[1]}"] = tag[3].strip()
+    if row:
+        yield category, row
 
 
 def _table(records: Iterable[tuple[int, Row]], room: limits.Room, form: str) -> TableHeader | None:

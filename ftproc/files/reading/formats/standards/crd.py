@@ -48,7 +48,9 @@ def read(text: str, room: Room) -> TableHeader:
         try:
             if kind in ("h2", "h3", "h4"):
                 now = _headed(now, kind, words)
-            elif kind in ("10", "11", "30"):
+            elif kind in _RECORDS and not now.day:
+                raise InputError(f"{room.name}: line {number} is a reading before the header H4, which gives its day.")
+            elif kind in _RECORDS:
                 values = _values(now, kind, words, left)
                 if values:
                     columns.add([*values.items(), ("station", now.station), ("target", now.target)])

@@ -18,6 +18,7 @@ from ftproc.files.reading.formats.sparse import Sparse
 
 _FILE = re.compile(r"FF\w*?_(\d{8})_(\d{6})_(\d{3})_\w+\.(?:fits|bin)")
 _METEOR = re.compile(r"(\S+) (\d{4}) \d{4} (\d+\.\d+)( +[-+\d.]+){6}")
+_LONGEST = 500  # characters of a line
 _COLUMNS = "Frame# Col Row RA Dec Azim Elev"
 
 
@@ -31,8 +32,8 @@ def read(text: str, room: Room) -> TableHeader:
     start, station, meteor, rate = np.datetime64(0, "us"), "", "", 0.0
     number = 0
     for line in text.splitlines():
-        words = line.split()
-        if found := _FILE.fullmatch(line.strip()):
+        words = line.split() if len(line) < _LONGEST else []
+        if len(words) == 1 and (found := _FILE.fullmatch(words[0])):
             date, clock = found[1], found[2]
             start = np.datetime64(
                 f"{date[:4]}-{date[4:6]}-{date[6:]}T{clock[:2]}:{clock[2:4]}:{clock[4:]}.{found[3]}000", "us"

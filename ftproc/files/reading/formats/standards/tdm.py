@@ -22,8 +22,7 @@ from ftproc.files.reading.formats.header import Stated, TableHeader
 from ftproc.files.reading.formats.sparse import Sparse
 
 _LIGHT_KMPS = 299_792.458
-_LEAF = re.compile(r"<(?:\w+:)?(\w+)(?:\s[^<>]*)?>([^<>]*)</|<(/?)(?:\w+:)?(metadata|data)>")
-_PAIR = re.compile(r"\s*([A-Z_0-9]+)\s*=\s*(.*?)\s*$")
+_LEAF = re.compile(r"<(?:\w{1,20}:)?(\w{1,60})(?:\s[^<>]*+)?>([^<>]*+)</|<(/?)(?:\w{1,20}:)?(metadata|data)>")
 _ANGLES = {
     "RADEC": "right ascension and declination",
     "XEYN": "angles of an X-Y mount",
@@ -93,15 +92,16 @@ def _of_keywords(text: str) -> Iterator[tuple[str, str, str]]:
     """Keyword, value and, of data, epoch."""
     in_data = False
     for line in text.splitlines():
-        word, pair = line.strip(), _PAIR.match(line)
+        word = line.strip()
+        keyword, equals, behind = (part.strip() for part in word.partition("="))
         if word == "META_START":
             in_data = False
             yield word, "", ""
         elif word == "DATA_START":
             in_data = True
-        elif pair and not word.startswith("COMMENT"):
-            epoch, _, value = pair[2].partition(" ") if in_data else ("", "", pair[2])
-            yield pair[1], value.strip(), epoch
+        elif equals and not word.startswith("COMMENT"):
+            epoch, _, value = behind.partition(" ") if in_data else ("", "", behind)
+            yield keyword, value.strip(), epoch
 
 
 def _of_xml(text: str) -> Iterator[tuple[str, str, str]]:
