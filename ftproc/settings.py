@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 EDITING = ("two-pass", "live", "forward", "none")
+AUTO = "auto"
+MOTIONS = (AUTO, "white-jerk", "turning-force", "ballistic")
 PACKAGED, NO_MODEL = "packaged", "none"  # values of `model` that are not files
 EPOCHS = {"l-bfgs": 400, "momentum": 1000}  # most that an optimiser of `train` is given, where the user says nothing
 
@@ -57,6 +59,7 @@ class FilterSettings:
     smooth: add the fixed-interval smoother: the best estimate of trajectory.
     noise: 1-sigma of range m, azimuth rad, elevation rad; each may be None.
     jerk_psd_m2ps5: process noise, the spectral density of white jerk in m2/s5: 1 for gentle turns, 100 for a fighter.
+    motion: the model of motion: `auto` (the likeliest by the log's readings), or one of MOTIONS.
     gate: in sigmas; a reading whose innovation is larger is suspected of being an outlier.
     max_patch_s: the longest patch of outliers that is expected, in s, for the recursive gate.
     particles, seed: members of the ensemble and particle filters, and the seed of their random numbers.
@@ -75,6 +78,7 @@ class FilterSettings:
     smooth: bool = False
     noise: Noise | None = None
     jerk_psd_m2ps5: float | None = None
+    motion: str = AUTO
     gate: float = 4.0
     max_patch_s: float | None = None
     particles: int = 100

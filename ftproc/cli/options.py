@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from ftproc.settings import EDITING, FilterSettings, Noise
+from ftproc.settings import EDITING, MOTIONS, FilterSettings, Noise
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -213,6 +213,12 @@ _TRACKER: tuple[Callable[[Any], Any], ...] = (
     ),
     click.option("--smooth/--no-smooth", help="Add the fixed-interval smoother: the best estimate of trajectory."),
     *_TUNED,
+    click.option(
+        "--motion", type=click.Choice(MOTIONS), default=FilterSettings.motion,
+        help="How the target moves: driven by white jerk alone (white-jerk), or with a force that turns with the "
+        "velocity, as that of an aircraft does (turning-force), or also grows with the pressure of the air, as on a "
+        "bomb or a shell (ballistic); auto: the likeliest by the log's readings.",
+    ),
     click.option(
         "--lag", type=seconds, metavar="S", default=FilterSettings.lag_s,
         help="In live editing: the estimate at t rests on readings up to t + S seconds, and no later one.",

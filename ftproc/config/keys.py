@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from ftproc.config.kinds import Kind, file_name, flag, method, number, parameters, positive, text, whole, widths, words
 from ftproc.files.units import UNITS
 from ftproc.records import COMPONENTS
-from ftproc.settings import EDITING, LEAST_NOISE, MOST_ERROR, Air, FilterSettings
+from ftproc.settings import AUTO, EDITING, LEAST_NOISE, MOST_ERROR, MOTIONS, Air, FilterSettings
 
 
 class Key(NamedTuple):
@@ -119,6 +119,7 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
         "editing": Key("editing", words(*EDITING), "two-pass", "how outliers are found", default="two-pass"),
         "lag_s": Key("lag", number(0, 3600), 2.0, "of live editing", default=0.0),
         "jerk_psd_m2ps5": Key("jerk", positive(), 10.0, "process noise (jerk PSD); left out: estimated"),
+        "motion": Key("motion", words(*MOTIONS), AUTO, "model of motion; auto: the likelier", default=AUTO),
         "gate": Key("gate", positive(), FilterSettings.gate, "in sigmas of the residual", default=FilterSettings.gate),
         "max_patch_s": Key("max_patch", positive(), 5.0, _PATCH),
         "weight_form": Key("weight_form", words("noise", "gain"), "noise", "in forward editing", default="noise"),

@@ -23,7 +23,8 @@ from ftproc.core.editing.lasting.faults import Shift, spread
 from ftproc.core.filtering import forward
 from ftproc.core.filtering.records import FilterRun, Model
 from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
-from ftproc.core.identification import likelihood
+from ftproc.core.identification import likelihood, motion_models
+from ftproc.core.identification.motion_models import Chosen
 from ftproc.core.identification.profile import median_level
 from ftproc.methods import live, preparing
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
@@ -61,25 +62,31 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     """Two-pass editing. usual: of a segment, what is usual in the log, see `core.editing.two_pass`."""
     known = preparing.what_is_known(readings, settings)
     edited = two_pass.edit(readings.time_s, readings.measurement, known, usual)
-    starts = preparing.smoothed_starts(edited.log, edited.model, edited.starts)
-    run = forward.filter_log(edited.log, edited.model, starts)
-    smoothed = edited.smoothed() if settings.smooth else None
+    motion = motion_models.choose(edited.log, edited.starts, edited.model, preparing.motions(settings))
+    run, smoothed = _with_motion(motion, settings, motion.model)
     for other in _as_likely(edited, known, run):
-        other_starts = preparing.smoothed_starts(edited.log, other, edited.starts)
-        run = _worse_of(run, forward.filter_log(edited.log, other, other_starts))
-        smoothed = smoothed and _worse_of(smoothed, smooth_log(edited.log, other, edited.starts, PATHS))
+        filtered, other_smoothed = _with_motion(motion, settings, other)
+        run = _worse_of(run, filtered)
+        smoothed = smoothed and other_smoothed and _worse_of(smoothed, other_smoothed)
     shifts = edited.faults.shifts
     if shifts:
         run, smoothed = _widened(run, shifts), smoothed and _widened(smoothed, shifts)
     label = preparing.labels(edited.weight, edited.log.measurement)
-    again = preparing.re_initialized(starts)
+    again = preparing.re_initialized(edited.starts)
     decision = edited.decision
     return Estimate(
-        run, label, edited.model, smoothed, again, decision.settled,
+        run, label, motion.model, smoothed, again, decision.settled,
         unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts,
         alternative=decision.alternative,
-        faults=edited.faults,
+        faults=edited.faults, motion=motion,
     )  # fmt: skip
+
+
+def _with_motion(motion: Chosen, settings: FilterSettings, model: Model) -> tuple[FilterRun, SmootherRun | None]:
+    """The filter and, if asked, the smoother over an edited log, by a model."""
+    starts = preparing.smoothed_starts(motion.log, model, motion.starts)
+    run = motion.of_rows(forward.filter_log(motion.log, model.causal, starts))
+    return run, motion.of_rows(smooth_log(motion.log, model, motion.starts, PATHS)) if settings.smooth else None
 
 
 def _as_likely(edited: two_pass.Edited, known: two_pass.Known, run: FilterRun) -> Iterator[Model]:

@@ -12,6 +12,7 @@ from ftproc.core.editing.lasting.faults import Faults
 from ftproc.core.filtering.records import FilterRun, Model, Observations
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification.coloured_noise import Coloured
+from ftproc.core.identification.motion_models import Chosen
 from ftproc.order_statistics import median
 from ftproc.records import FlagArray, FloatArray, forget, thinned
 
@@ -83,8 +84,8 @@ class Estimate(NamedTuple):
     range, azimuth and elevation one by one; NaN there and in its run means not estimated. unexamined: places where
     two-pass editing looked for no alternative, its search having been cut short. faults: of the instrument, that
     two-pass editing found and took out of the readings. screened_out: (n, 3) readings that screening rejects, of a
-    method without sigmas, whose labels nothing else tests. known: (n,) which samples have an estimate, where live
-    editing has none of some; absent: the components that it has not seen.
+    method without sigmas, whose labels nothing else tests. motion: that was chosen. known: (n,) which samples have an
+    estimate, where live editing has none of some; absent: the components that it has not seen.
     """
 
     run: FilterRun
@@ -100,6 +101,7 @@ class Estimate(NamedTuple):
     unexamined: int = 0
     faults: Faults | None = None
     screened_out: NDArray[np.bool_] | None = None
+    motion: Chosen | None = None
     known: NDArray[np.bool_] | None = None
     absent: tuple[int, ...] = ()
 

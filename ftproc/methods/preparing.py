@@ -12,13 +12,14 @@ from ftproc.core.filtering import forward
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start, between
 from ftproc.core.filtering.smoother import HEADS, PATHS, smooth_log
+from ftproc.core.identification import motion_models
 from ftproc.core.identification.likelihood import Fixed, first_jerk, fit_level
 from ftproc.core.identification.profile import from_knot, median_level
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import isotropic
 from ftproc.methods.estimate import Estimate, Readings, Recording
 from ftproc.records import MISSING, FlagArray, FloatArray
-from ftproc.settings import FilterSettings
+from ftproc.settings import AUTO, FilterSettings
 
 HEAD = 256  # samples at the beginning of a log that are edited with two passes before a recursive filter starts
 FEWEST, TO_FORGET = 500, 30.0  # samples after a start that tell its state, and memories of the filter
@@ -106,7 +107,7 @@ def smoothed_starts(log: Observations, model: Model, starts: list[Start]) -> lis
     enough = max(FEWEST, int(TO_FORGET * scales.memory_samples(float(median_level(model).jerk[0, 0]))))
     for start, stop in between(starts, len(log.time_s)):
         span, own = from_knot(model, log.time_s, slice(start.sample, min(start.sample + enough, stop)))
-        begin = start._replace(sample=start.sample - span.start)
+        begin, own = start._replace(sample=start.sample - span.start), own.of(span)
         (head,) = smooth_log(log.part(span), own, [begin], HEADS).heads
         found.append(Start(start.sample, head.state, START_INFLATION * head.covariance))
     return found
@@ -122,6 +123,13 @@ def what_is_known(readings: Readings | Recording, settings: FilterSettings) -> t
     stated = np.array(settings.noise or (None, None, None), float)  # None becomes NaN
     sigma = np.where(np.isnan(stated), readings.assumed_sigma, stated)
     return two_pass.Known(sigma, settings.jerk_psd_m2ps5, settings.gate)
+
+
+def motions(settings: FilterSettings) -> tuple[str, ...]:
+    """The models of motion to choose from. A jerk density that the user has specified is that of white jerk."""
+    if settings.motion != AUTO:
+        return (settings.motion,)
+    return (motion_models.WHITE,) if settings.jerk_psd_m2ps5 is not None else tuple(motion_models.MODELS)
 
 
 def labels(weight: FloatArray, measurement: FloatArray) -> FlagArray:

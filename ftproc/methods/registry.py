@@ -181,6 +181,10 @@ def _recursive(method: Method, settings: FilterSettings) -> bool:
     return method.name == MAIN and settings.editing == "forward"
 
 
+def _edited_twice(method: Method, settings: FilterSettings) -> bool:
+    return method.name == MAIN and settings.editing == "two-pass"
+
+
 def _live(method: Method, settings: FilterSettings) -> bool:
     return method.name == MAIN and settings.editing == "live"
 
@@ -190,6 +194,7 @@ _ENSEMBLES = "it is for the methods enkf, enpf, enpf-chi2 and renpf"
 #: The options that only some ways of filtering use, by their names on the command line.
 USES = {
     "--editing": Use(lambda m, s: m.name == MAIN, f"it is for {MAIN}; the others have editing of their own, or none"),
+    "--motion": Use(_edited_twice, f"it is for {MAIN} with --editing two-pass"),
     "--lag": Use(_live, f"it is for {MAIN} with --editing live"),
     "--max-patch": Use(
         lambda m, s: _recursive(m, s) or (m.random and m.handles_outliers),

@@ -54,6 +54,7 @@ def describe(
             **({"lag_s": settings.lag_s} if method.editing(settings) == "live" else {}),
             "gate": settings.gate,
             "max_patch_s": settings.max_patch_s,
+            "motion": settings.motion,
             "gain_form": settings.gain_form,
             "site": settings.site,
             "geoid_m": settings.geoid_m,
@@ -69,6 +70,8 @@ def describe(
             "noise_correlation": [float(r) for r in statistics.model.correlation(statistics.interval_s)],
             **_motion(statistics),
         },
+        "motion": summary.get("motion"),
+        "motion_gain": summary.get("motion_gain"),
         "model_sha256": None if model is None else sha256(model),
         "summary": dict(summary),
     }
@@ -80,7 +83,8 @@ def _motion(statistics: RunStatistics) -> dict[str, Any]:
     if not np.isfinite(jerk).all() or (statistics.parts > 1 and len(jerk) > 1):
         return {"jerk_psd_m2ps5": None, "jerk_vertical_ratio": None, "jerk_knot_s": None}
     return {
-        "jerk_psd_m2ps5": [float(q) for q in jerk[:, 0]],
-        "jerk_vertical_ratio": float(jerk[0, 2] / jerk[0, 0]),
+        "jerk_psd_m2ps5": [float(q) for q in jerk[:, 1]],
+        "jerk_vertical_ratio": float(jerk[0, 2] / jerk[0, 1]),
+        **({"jerk_along_ratio": float(jerk[0, 0] / jerk[0, 1])} if statistics.model.motion.acts else {}),
         "jerk_knot_s": float(statistics.model.knot_s) if len(jerk) > 1 else None,
     }

@@ -10,7 +10,7 @@ from ftproc.errors import InputError, UsageError, row_named
 from ftproc.methods.estimate import Recording
 from ftproc.order_statistics import median
 from ftproc.records import COMPONENTS, FloatArray, IntArray, MeasurementLog, chunks, forget, thinned
-from ftproc.settings import EDITING, LEAST_NOISE, FilterSettings
+from ftproc.settings import EDITING, LEAST_NOISE, MOTIONS, FilterSettings
 
 FARTHEST_M = 1e12  # with half of all ranges beyond, the column or its unit is wrong
 SHORTEST_S = 1e-6  # the shortest duration of a log of several times; less is a wrong unit
@@ -34,6 +34,8 @@ def check_settings(settings: FilterSettings) -> None:
     """Raises UsageError for settings out of range."""
     if settings.editing not in EDITING:
         raise UsageError(f"editing is one of {', '.join(EDITING)}, not {settings.editing!r}")
+    if settings.motion not in MOTIONS:
+        raise UsageError(f"motion is one of {', '.join(MOTIONS)}, not {settings.motion!r}")
     if settings.particles < FEWEST_PARTICLES:
         raise UsageError(f"particles must be {FEWEST_PARTICLES} or more, not {settings.particles}")
     if not 0 <= settings.lag_s <= LONGEST_LAG_S:

@@ -42,6 +42,8 @@ class RunStatistics:
         self.times: list[FloatArray] = []
         self.sigmas: list[FloatArray] = []
         self.jerk: list[FloatArray] = []
+        self.motions: dict[str, int] = {}
+        self.motion_gain = 0.0
         self.reacquired, self.unexamined, self.stamp_s, self.drifts = 0, 0, 0.0, False
         self.slow_noise_s, self.slow_noise_likelier, self.slow_noise_separable = 0.0, False, True
         self.faults = FaultStatistics()
@@ -74,6 +76,10 @@ class RunStatistics:
         self._add_sigmas(time_s, self._tested_sigmas(best.state, best.sigma, best.los_sigma))
         self.jerk.append(estimate.model.jerk.mean(1))
         self.model = estimate.model
+        if estimate.motion is not None:
+            name = estimate.motion.name
+            self.motions[name] = self.motions.get(name, 0) + len(time_s)
+            self.motion_gain += estimate.motion.gain
         self.reacquired += len(estimate.reacquired)
         if estimate.settled is not None:
             self.converged = estimate.settled and self.converged is not False
@@ -173,6 +179,7 @@ class RunStatistics:
             "not_observable": [COMPONENTS[c] for c in absent],
             "average_gradient": self._average_gradient(),
             "jerk_psd_m2ps5": jerk if np.isfinite(psd).all() else None,
+            **self._motion(),
             "nis_mean": self.nis_sum / self.nis_count if self.nis_count else None,
             "components_used_mean": float(self.used / max(self.rows_used, 1)),
             "poorly_observable": [] if absent else consistency.poorly_observable(time_s, sigma),
@@ -196,6 +203,15 @@ class RunStatistics:
         }
         figures |= correction
         return figures | {"trust": verdict.verdict(verdict.remarks(figures), verdict.too_wide(figures))}
+
+    def _motion(self) -> dict[str, Any]:
+        """The model of motion of most rows, of a method that chooses one; the share of these rows; and by how much more
+        likely the log is with what was chosen than with white jerk, or with the best rival than with white jerk."""
+        if not self.motions:
+            return {"motion": None}
+        name = max(self.motions, key=lambda each: self.motions[each])
+        share = self.motions[name] / sum(self.motions.values())
+        return {"motion": name.replace("-", " "), "motion_share": share, "motion_gain": self.motion_gain}
 
     def _poorly_observable_readings(self, time_s: FloatArray, sigma: FloatArray) -> dict[str, list[dict[str, float]]]:
         """By component, of a log in which the position is not observable."""

@@ -76,9 +76,21 @@ def facts(s: Mapping[str, Any]) -> list[tuple[str, str]]:
     jerk = s["jerk_psd_m2ps5"]
     if jerk is not None:
         found.append(("jerk", f"PSD {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.3g} to {jerk['highest']:.3g})"))
+    if s.get("motion"):
+        found.append(("motion", _motion(s)))
     if s["nis_mean"] is not None:
         found.append(("NIS", f"{s['nis_mean']:.2f} on average, {s['components_used_mean']:.2f} expected"))
     return found
+
+
+def _motion(s: Mapping[str, Any]) -> str:
+    """The model of motion, and how much more likely than white jerk it, or its best rival, is."""
+    some = "" if s["motion_share"] == 1 else f" in {100 * s['motion_share']:.0f} % of the rows"
+    gain = s["motion_gain"]
+    if gain == 0:
+        return f"{s['motion']}{some}"
+    what = "that of white jerk" if s["motion"] != "white jerk" else "it with other motions"
+    return f"{s['motion']}{some} (log-likelihood {abs(gain):.3g} {'above' if gain > 0 else 'below'} {what})"
 
 
 def network(s: Mapping[str, Any]) -> list[tuple[str, str]]:

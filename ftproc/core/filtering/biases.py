@@ -39,6 +39,8 @@ from ftproc.core.filtering.forward import ESTIMATED, LEFT, Estimates, Residuals,
 from ftproc.core.filtering.memory import scratch
 from ftproc.core.filtering.records import Model, Observations, Sample, Start
 from ftproc.core.filtering.smoother import SCORES, STATES, SmootherRun
+from ftproc.core.model import forces
+from ftproc.core.model.motion import Motion
 from ftproc.core.signatures import Cube, Indices, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
@@ -59,9 +61,9 @@ class Directions(NamedTuple):
 
 class Memory(NamedTuple):
     """`smoother.Memory`, and for m columns: station (n,) of each sample; design (n, 3, 3), columns of `Directions`;
-    state (9, m) S; adjoint (9, m) l; at_block (blocks, 9, m) S before each block; in_block (BLOCK, 9, m) S after each
-    sample and white (BLOCK, 3, m) C; score (m,), info (m, m); spread (n, 9) the variance that biases add to the
-    filter's state."""
+    by: the motion; state (9, m) S; adjoint (9, m) l; at_block (blocks, 9, m) S before each block; in_block
+    (BLOCK, 9, m) S after each sample and white (BLOCK, 3, m) C; score (m,), info (m, m); spread (n, 9) the variance
+    that biases add to the filter's state."""
 
     filters: Filters
     before: Filters
@@ -73,6 +75,7 @@ class Memory(NamedTuple):
     station: Indices
     design: Cube
     columns: Matrix
+    by: Motion
     state: Matrix
     adjoint: Matrix
     at_block: Cube
@@ -119,10 +122,14 @@ def _derivative(memory: Any, k: int, i: int, c: int) -> float:
 def _carry(memory: Any, f: Filter, k: int, interval: float, place: int) -> None:
     s, g, u, root, y, h = memory.state, f.g, f.u, f.root, f.y, 0.5 * interval * interval
     white, m = memory.white[max(place, 0)], s.shape[1]
+    if memory.by.acts:
+        forces.kick_columns(s, f, memory.by, max(k - 1, 0), interval)
     for i in range(3):
         for c in range(m):
             s[i, c] += interval * s[i + 3, c] + h * s[i + 6, c]
             s[i + 3, c] += interval * s[i + 6, c]
+    if memory.by.acts:
+        forces.kick_columns(s, f, memory.by, k, interval)
     for i in range(3):
         g0, g1, g2 = g[i, 0], g[i, 1], g[i, 2]
         for c in range(m):
@@ -212,10 +219,14 @@ def _carry_back(memory: Any, update: Update, sample: Sample, k: int, interval: f
         g0, g1, g2 = g[0, i], g[1, i], g[2, i]
         for c in range(m):
             a[i, c] += g0 * white[0, c] + g1 * white[1, c] + g2 * white[2, c]
+    if memory.by.acts:
+        forces.kick_columns_back(a, memory.filters[0], memory.by, k, interval)
     for i in range(3):
         for c in range(m):
             a[i + 6, c] += interval * a[i + 3, c] + h * a[i, c]
             a[i + 3, c] += interval * a[i, c]
+    if memory.by.acts:
+        forces.kick_columns_back(a, memory.filters[0], memory.by, max(k - 1, 0), interval)
 
 
 _sweep_biased = kernel(
@@ -242,7 +253,7 @@ def smooth_biased(log: Observations, model: Model, start: Start, directions: Dir
         model.filter(start), empty(FILTER, blocks), scratch(UPDATE, rows), scratch(POSTERIOR, rows),
         zeros(backward.BACKWARD), estimates, residuals,
         np.ascontiguousarray(log.sites.station), np.ascontiguousarray(directions.design),
-        np.ascontiguousarray(directions.columns),
+        np.ascontiguousarray(directions.columns), model.motion,
         np.zeros((9, m)), np.zeros((9, m)), np.zeros((blocks, 9, m)), np.zeros((rows, 9, m)),
         np.zeros((rows, 3, m)), np.zeros(m), np.zeros((m, m)), np.zeros((n, 9)),
     )  # fmt: skip

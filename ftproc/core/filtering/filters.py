@@ -21,7 +21,8 @@ class Filter(Protocol):
     coefficients of Q. z_hat: predicted measurement. e: innovation. used: weight of each component, zero for none. h: H
     on the position. s: innovation covariance. root: L^-1, whose rows and columns are zero for components not used. c,
     y, g, u: see `ukf`. pxz, gain, rest: P H', K and S - H P H', where they are asked for. factor: of the position block
-    of P. d: by pair of sigma points, component and side. bend: its mean, h(x) to z_hat. path: see `kinematics`.
+    of P. d: by pair of sigma points, component and side. bend: its mean, h(x) to z_hat. path: see `kinematics`. slope,
+    kick, push, along, upward, cross: see `forces`.
     """
 
     x: Annotated[FloatArray, 9]
@@ -49,6 +50,12 @@ class Filter(Protocol):
     d: Annotated[FloatArray, 3, 3, 2]
     bend: Annotated[FloatArray, 3]
     path: Annotated[FloatArray, 6, 6]
+    slope: Annotated[FloatArray, 3, 6]
+    kick: Annotated[FloatArray, 3, 6]
+    push: Annotated[FloatArray, 3]
+    along: Annotated[FloatArray, 3]
+    upward: Annotated[FloatArray, 3]
+    cross: Annotated[FloatArray, 3]
 
 
 class Coloured(Filter, Protocol):

@@ -24,7 +24,7 @@ from ftproc.core.filtering.records import (
     Start,
     between,
 )
-from ftproc.core.model import jacobian, motion
+from ftproc.core.model import forces, jacobian, motion
 from ftproc.core.model.kinematics import path_sigma
 from ftproc.core.model.measurement import line_of_sight_sigma
 from ftproc.core.signatures import Layout
@@ -48,13 +48,21 @@ Recursion = Callable[[Span, Any, motion.Profile, Any, Any, Any], tuple[int, floa
 
 
 @part
+def _move(f: Filter, profile: motion.Profile, before: int, after: int, interval: float) -> None:
+    """Predict over an interval between two samples."""
+    if profile.motion.acts:
+        forces.travel(f, profile.motion, before, after, interval)
+    else:
+        motion.predict(f, interval)
+    motion.wander(f, interval)
+
+
+@part
 def advance(f: Filter, samples: Any, k: int, profile: motion.Profile) -> None:
     """Predict from sample k - 1 to sample k."""
     time_s = samples[k].time_s
-    interval = time_s - samples[k - 1].time_s
     motion.drive(f, profile, time_s)
-    motion.predict(f, interval)
-    motion.wander(f, interval)
+    _move(f, profile, k - 1, k, time_s - samples[k - 1].time_s)
 
 
 @part
@@ -165,10 +173,8 @@ def _extrapolated(
     f = filters[0]
     for k in range(len(estimates) - 1, -1, -1):
         row, left, time_s = estimates[k], residuals[k], samples[k].time_s
-        interval = time_s - samples[k + 1].time_s
         motion.drive(f, profile, time_s)
-        motion.predict(f, interval)
-        motion.wander(f, interval)
+        _move(f, profile, k + 1, k, time_s - samples[k + 1].time_s)
         ukf.expect_at(samples[k], f)
         ukf.innovate(samples[k], f)
         for i in range(3):

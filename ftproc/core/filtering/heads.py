@@ -23,7 +23,7 @@ from ftproc.core.compiled import part
 from ftproc.core.filtering import backward
 from ftproc.core.filtering.backward import Backward
 from ftproc.core.filtering.filters import OFFSETS, Filter, Posterior
-from ftproc.core.model import motion
+from ftproc.core.model import forces, motion
 
 FloatArray = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ def store(memory: Any, f: Filter, samples: Any, profile: motion.Profile, k: int,
     vague = back.vague > 0
     if vague:
         motion.drive(f, profile, samples[k + 1].time_s)
-        vague = carry(back, f, here, samples[k + 1].time_s - samples[k].time_s)
+        vague = carry(back, f, here, samples[k + 1].time_s - samples[k].time_s, profile.motion, k)
     if first:
         back.vague = 1.0
     elif k > low:
@@ -86,19 +86,32 @@ def complete(back: Backward, after: Posterior) -> None:
 
 
 @part
-def carry(back: Backward, f: Filter, after: Posterior, interval: float) -> bool:
-    """The smoothed covariance of a sample from that of the next one, an interval later, which `later` holds. f: a
-    filter with the process noise in between. False, and nothing done, where the prediction has no inverse."""
+def carry(back: Backward, f: Filter, after: Posterior, interval: float, by: motion.Motion, k: int) -> bool:
+    """The smoothed covariance of sample k from that of the next one, an interval later, which `later` holds. f: a
+    filter with the process noise in between. False, and nothing done, where the prediction has no inverse.
+
+    Where forces act, the same is done between the two kicks, which have inverses."""
     p, m, c, cov, size = f.p, back.inverse, back.gain, back.cov, len(f.p)
     for i in range(size):
         for j in range(size):
             p[i, j] = after.p[i, j]
+    if by.acts and size > OFFSETS:
+        return False
+    if by.acts:
+        forces.linearise(f, by.course[k], by, 0.5 * interval)
+        forces.orient(f, by.course[k], by.course[k + 1])
+        forces.spread(f)
+        forces.kick_covariance(p, f.kick, f.slope)
     motion.predict(f, interval)
+    if by.acts:
+        forces.couple(f)
+        forces.linearise(f, by.course[k + 1], by, 0.5 * interval)
+        forces.unkick_covariance(f, back.later)
     motion.wander(f, interval)
     if not invert(p, m, c, back.pn):
         return False
-    _gain(back, f, after, interval)
-    _not_carried(back, f, after, interval)
+    _gain(back, f, after, interval, by.acts)
+    _not_carried(back, f, after, interval, by.acts)
     for i in range(size):  # C P^s_next C'
         for a in range(size):
             back.pn[a] = 0.0
@@ -110,17 +123,24 @@ def carry(back: Backward, f: Filter, after: Posterior, interval: float) -> bool:
                 total += back.pn[a] * c[j, a]
             cov[i, j] = total
             cov[j, i] = total
+    if by.acts:
+        forces.linearise(f, by.course[k], by, 0.5 * interval)
+        forces.unkick_covariance(f, cov)
     return True
 
 
 @part
-def _gain(back: Backward, f: Filter, after: Posterior, interval: float) -> None:
+def _gain(back: Backward, f: Filter, after: Posterior, interval: float, coupled: bool) -> None:
     """C; the rows of P Phi' that belong to offsets stay in the filter's P."""
     m, c, q, p, size = back.inverse, back.gain, f.q, f.p, len(f.p)
     t, h = interval, 0.5 * interval * interval
     for i in range(3):
         for j in range(size):
             mp, mv, ma = f.jerk[i] * m[i, j], f.jerk[i] * m[3 + i, j], f.jerk[i] * m[6 + i, j]
+            if coupled:
+                for k in range(3):
+                    w = f.cross[i + k - 1] if k != i else 0.0
+                    mp, mv, ma = mp + w * m[k, j], mv + w * m[3 + k, j], ma + w * m[6 + k, j]
             gp = -(q[0, 0] * mp + q[0, 1] * mv + q[0, 2] * ma)
             gv = -(q[1, 0] * mp + q[1, 1] * mv + q[1, 2] * ma)
             ga = -(q[2, 0] * mp + q[2, 1] * mv + q[2, 2] * ma)
@@ -140,13 +160,17 @@ def _gain(back: Backward, f: Filter, after: Posterior, interval: float) -> None:
 
 
 @part
-def _not_carried(back: Backward, f: Filter, after: Posterior, interval: float) -> None:
+def _not_carried(back: Backward, f: Filter, after: Posterior, interval: float, coupled: bool) -> None:
     """C Q Phi'^-1, and of the offsets P - C Phi P."""
     c, q, cov, size = back.gain, f.q, back.cov, len(f.p)
     t, h = interval, 0.5 * interval * interval
     for i in range(size):
         for j in range(3):
             cp, cv, ca = f.jerk[j] * c[i, j], f.jerk[j] * c[i, 3 + j], f.jerk[j] * c[i, 6 + j]
+            if coupled:
+                for k in range(3):
+                    w = f.cross[j + k - 1] if k != j else 0.0
+                    cp, cv, ca = cp + w * c[i, k], cv + w * c[i, 3 + k], ca + w * c[i, 6 + k]
             gp = q[0, 0] * cp + q[0, 1] * cv + q[0, 2] * ca
             gv = q[1, 0] * cp + q[1, 1] * cv + q[1, 2] * ca
             ga = q[2, 0] * cp + q[2, 1] * cv + q[2, 2] * ca

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import empty, kernel, record, zeros
 from ftproc.core.filtering.filters import COLOURED, FILTER
-from ftproc.core.model.motion import Profile
+from ftproc.core.model.motion import WHITE_JERK, Motion, Profile
 from ftproc.core.signatures import Layout, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
@@ -150,7 +150,8 @@ class Model(NamedTuple):
 
     noise_variance: (3,) of white noise, m^2, rad^2, rad^2, or (stations, 3). jerk: (m, 3) density of the jerk along x,
     y and z, m^2/s^5, each row holding for `knot_s` seconds from the first sample on. wander_variance, fade_s: (3,) of
-    the noise that is correlated in time (first-order Gauss-Markov), which adds to the white; zero for none.
+    the noise that is correlated in time (first-order Gauss-Markov), which adds to the white; zero for none. motion:
+    what moves the target beside its jerk, whose densities are then along the path, across it, and upward.
     """
 
     noise_variance: FloatArray
@@ -158,11 +159,21 @@ class Model(NamedTuple):
     knot_s: float = math.inf
     wander_variance: FloatArray = np.zeros(3)
     fade_s: FloatArray = np.ones(3)
+    motion: Motion = WHITE_JERK
 
     @property
     def coloured(self) -> bool:
         """Whether some of the noise is correlated in time."""
         return any(self.wander_variance.tolist())
+
+    def of(self, span: slice) -> Model:
+        """The model of a stretch of the log."""
+        return self._replace(motion=self.motion.about(self.motion.course[span]))
+
+    @property
+    def causal(self) -> Model:
+        """The same with a motion that is linearised about the estimate of each time."""
+        return self._replace(motion=self.motion.causal)
 
     @property
     def reading_variance(self) -> FloatArray:
@@ -177,7 +188,7 @@ class Model(NamedTuple):
 
     def profile(self, time_s: FloatArray) -> Profile:
         """The process noise of a log with these times."""
-        return Profile(self.jerk, self.knot_s, float(time_s[0]))
+        return Profile(self.jerk, self.knot_s, float(time_s[0]), self.motion)
 
     def filter(self, start: Start) -> Any:
         """An array of one `filters.Filter` record at a start; of one `filters.Coloured` if some noise is correlated."""

@@ -34,7 +34,7 @@ from ftproc.core.filtering.filters import OFFSETS, Filter, Update, retain, retai
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Span, advance, extrapolated
 from ftproc.core.filtering.memory import ColouredMemory, Memory, memory_of, scratch
 from ftproc.core.filtering.records import SAMPLE, Model, Observations, Sample, Samples, Start, between
-from ftproc.core.model import motion
+from ftproc.core.model import forces, motion
 from ftproc.core.signatures import Cube
 
 FloatArray = NDArray[np.float64]
@@ -119,6 +119,25 @@ def _carry_back(memory: Any, update: Update, sample: Sample, k: int, interval: f
     """and back."""
 
 
+@part
+def _go_back(back: Any, f: Filter, samples: Samples, k: int, profile: motion.Profile, jerk: Cube, wanted: int) -> None:
+    """Take r and N back from sample k to the one before, and add to the jerk's score if that is wanted."""
+    interval, piece = samples[k].time_s - samples[k - 1].time_s, motion.knot_index(samples[k].time_s, profile)
+    acts = profile.motion.acts
+    if acts:
+        forces.kick_back(back, f, profile.motion, k, interval)
+    if wanted == SCORES:
+        if acts:
+            forces.orient(f, profile.motion.course[k - 1], profile.motion.course[k])
+            forces.score_jerk(back, f, interval, jerk, piece)
+        else:
+            backward.score_jerk(back, interval, jerk, piece)
+    motion.adjoint(back, interval)
+    if acts:
+        forces.kick_back(back, f, profile.motion, k - 1, interval)
+    motion.wander_back(back, interval, f.fade_s)
+
+
 def _swept_through(
     span: Span, samples: Samples, profile: motion.Profile, memory: Memory, jerk: Cube, wanted: int
 ) -> float:
@@ -172,15 +191,12 @@ def _swept_through(
                     residuals[k].residual_variance[i] = back.variance[i]
             _carry_back(memory, update, sample, k, interval, k - low, wanted)
             if k > span.first:
-                if wanted == SCORES:
-                    backward.score_jerk(back, interval, jerk, motion.knot_index(samples[k].time_s, profile))
                 backward.score_wander(back, f, interval)
                 if k > low:
                     backward.score_fade(back, after[k - 1 - low], f, interval)
                 else:
                     backward.score_fade(back, before[b], f, interval)
-                motion.adjoint(back, interval)
-                motion.wander_back(back, interval, f.fade_s)
+                _go_back(back, f, samples, k, profile, jerk, wanted)
             else:
                 backward.score_wander(back, f, math.inf)
     return likelihood

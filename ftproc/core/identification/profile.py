@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import decimation, optimizer
-from ftproc.core.identification.likelihood import VERTICAL_PRECISION, jerk_bounds, shaped
+from ftproc.core.identification.likelihood import VERTICAL_PRECISION, jerk_bounds
 from ftproc.core.identification.scales import Scales, scales_of
 from ftproc.order_statistics import median
 
@@ -48,26 +48,40 @@ def fit_profile(
     if log.sites is None:
         count = decimation.how_many(scales, level, knot_s)
         log, starts = decimation.merged(log, starts, count)
+    jerk = np.broadcast_to(level.jerk, (knots, 3))
+    return climbed(log, starts, level._replace(jerk=jerk, knot_s=knot_s), steps, scales)[0]
+
+
+def climbed(log: Observations, starts: list[Start], model: Model, steps: int, scales: Scales) -> tuple[Model, float]:
+    """The likeliest profile with the knots and the motion of this model, from it on, and the log-likelihood with what
+    is known beforehand of profiles. Ratios of the densities along other axes to the second's hold for the whole
+    flight."""
+    knots, free = len(model.jerk), [0, 2] if model.motion.acts else [2]
 
     def unpack(theta: FloatArray) -> Model:
-        return level._replace(jerk=shaped(theta[:knots], theta[knots]), knot_s=knot_s)
+        times = dict(zip(free, theta[knots:].tolist(), strict=True))
+        shape = np.array([math.exp(times.get(axis, 0.0)) for axis in range(3)])
+        return model._replace(jerk=np.exp(theta[:knots])[:, None] * shape)
+
+    costs = list[float]()
 
     def cost(theta: FloatArray) -> optimizer.Point:
         found = score_log(log, unpack(theta), starts)
-        walk, ratio = np.diff(theta[:knots]), theta[knots]
+        walk, ratio = np.diff(theta[:knots]), theta[knots:]
         firm = WALK_PRECISION / np.sqrt(1 + (walk / ABRUPT) ** 2)  # with which a step is drawn to zero
         score, curvature, pull = found.jerk.score, found.jerk.curvature, VERTICAL_PRECISION * ratio
+        costs.append(WALK_PRECISION * _roughness(walk) + 0.5 * float((pull * ratio).sum()) - found.log_likelihood)
         return optimizer.Point(
-            WALK_PRECISION * _roughness(walk) + 0.5 * pull * ratio - found.log_likelihood,
-            np.append(_by_knot(-firm * walk, firm * walk) - score.sum(1), pull - score[:, 2].sum()),
-            np.append(_by_knot(firm, firm) + curvature.sum(1), VERTICAL_PRECISION + curvature[:, 2].sum()),
-            np.append(-firm, 0.0),
+            costs[-1],
+            np.append(_by_knot(-firm * walk, firm * walk) - score.sum(1), [*pull - score[:, free].sum(0)]),
+            np.append(_by_knot(firm, firm) + curvature.sum(1), [*VERTICAL_PRECISION + curvature[:, free].sum(0)]),
+            np.append(-firm, np.zeros(len(free))),
         )
 
-    ratio = math.log(level.jerk[0, 2] / level.jerk[0, 0])
-    theta = np.append(np.broadcast_to(np.log(level.jerk[:, 0]), knots), ratio)
-    low, high = (np.append(np.full(knots, bound), side) for bound, side in jerk_bounds(scales))
-    return unpack(optimizer.minimise(cost, theta, low, high, steps, tolerance=0.1 * knots**0.5))
+    theta = np.append(np.log(model.jerk[:, 1]), np.log(model.jerk[0, free] / model.jerk[0, 1]))
+    low, high = (np.append(np.full(knots, bound), np.full(len(free), side)) for bound, side in jerk_bounds(scales))
+    theta = optimizer.minimise(cost, theta, low, high, steps, tolerance=0.1 * knots**0.5)
+    return unpack(theta), -float(np.nanmin(costs))
 
 
 def _by_knot(before: FloatArray, after: FloatArray) -> FloatArray:

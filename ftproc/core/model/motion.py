@@ -48,13 +48,39 @@ def isotropic(jerk_psd: float) -> FloatArray:
     return np.full((1, 3), float(jerk_psd))
 
 
+class Motion(NamedTuple):
+    """A model of motion, whose formulas are in `forces`. acts: whether there are forces at all; without, the densities
+    of the jerk are along x, y and z, else along the path, across it, and upward. turns, pressed: shares of the force
+    that turns with the velocity, and that grows with the pressure of the air. rotation: (1, 3) of the earth, rad/s.
+    course: (n, 9) the states of the samples about which it is linearised; without rows, about the estimate itself."""
+
+    acts: bool = False
+    turns: float = 0.0
+    pressed: float = 0.0
+    rotation: Matrix = np.zeros((1, 3))
+    course: Matrix = np.zeros((0, 9))
+
+    def about(self, course: FloatArray) -> Motion:
+        """The same linearised about other states (n, 9)."""
+        return self._replace(course=np.ascontiguousarray(course)) if self.acts else self
+
+    @property
+    def causal(self) -> Motion:
+        """The same linearised about the estimate itself."""
+        return self.about(np.zeros((0, 9)))
+
+
+WHITE_JERK = Motion()
+
+
 class Profile(NamedTuple):
     """The process noise of a log: jerk (m, 3) densities along x, y and z, each row holding for knot_s
-    seconds from first_s on."""
+    seconds from first_s on; and the motion that it drives."""
 
     jerk: Matrix
     knot_s: float
     first_s: float
+    motion: Motion = WHITE_JERK
 
 
 @part

@@ -1,0 +1,172 @@
+"""The model of motion that the log's own readings choose, once it is decided which of them are good.
+
+Each model is fitted from the jerk profile of white jerk, linearised about the track that was smoothed with it, and the
+likeliest is kept: the likelihood counts what is known beforehand of the profile and of its ratios.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.filtering.records import FilterRun, Model, Observations, Start, Uneven
+from ftproc.core.filtering.smoother import SmootherRun, likelihood_of, smooth_log
+from ftproc.core.identification import decimation
+from ftproc.core.identification.profile import ALLOWANCE, climbed, median_level, with_allowance
+from ftproc.core.identification.scales import Scales, scales_of
+from ftproc.core.model.forces import AT_REST_MPS, GRAVITY
+from ftproc.core.model.motion import WHITE_JERK, Motion
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Run = TypeVar("Run", FilterRun, SmootherRun)
+
+WHITE = "white-jerk"
+MODELS = {
+    WHITE: WHITE_JERK,
+    "turning-force": Motion(acts=True, turns=1.0),
+    "ballistic": Motion(acts=True, turns=1.0, pressed=1.0),
+}
+STEPS = 3  # of the search for a profile
+MARGIN = 8.0  # in log-likelihood, by which a model must explain a log better than white jerk does: with less, the luck
+# of a single flight decides which is the better one
+FARTHEST_TURN = 0.2  # rad, over which the motion goes on in one step
+MOST_STEPS = 100  # in a gap
+LIFT, SHARE = 0.5, 0.3  # gravities of lift, and the share of a flight with less of it, that may be ballistic
+CALMER = 10.0 ** -np.arange(8)  # times the jerk of white jerk: where the search begins for a body that nobody steers
+
+
+class Chosen(NamedTuple):
+    """The motion of a log.
+
+    name: in MODELS. model: with the profile that was fitted. gain: by how much more likely the log is than with white
+    jerk, in log-likelihood. log, starts: those to run over, with steps in the gaps. row: (n,) where the log's own
+    samples are among these.
+    """
+
+    name: str
+    model: Model
+    gain: float
+    log: Observations
+    starts: list[Start]
+    row: IntArray | None = None
+
+    def of_rows(self, run: Run) -> Run:
+        """A run over the log with its steps, of the log's own samples."""
+        if self.row is None:
+            return run
+        own: dict[str, Any] = {
+            name: each[self.row] for name, each in run._asdict().items() if isinstance(each, np.ndarray)
+        }
+        return run._replace(**own)
+
+
+def choose(log: Observations, starts: list[Start], white: Model, names: tuple[str, ...]) -> Chosen:
+    """The likeliest motion of a log of these names. white: the model with white jerk, whose profile has its allowance.
+
+    A single name is taken without asking how likely it is.
+    """
+    others = [name for name in names if name != WHITE]
+    if not others:
+        return Chosen(WHITE, white, 0.0, log, starts)
+    fitted = _fitted(log, starts, white, others)
+    best = max(fitted, key=lambda each: _finite(each.gain))
+    if best.gain > MARGIN or WHITE not in names:
+        return best
+    return Chosen(WHITE, white, best.gain, log, starts)
+
+
+def _fitted(log: Observations, starts: list[Start], white: Model, names: list[str]) -> list[Chosen]:
+    """Each of these models, fitted to the log with neighbours merged."""
+    scales = scales_of(log, white.noise_variance)
+    likeliest = white._replace(jerk=white.jerk / ALLOWANCE)
+    count = 1 if log.sites is not None else decimation.how_many(scales, likeliest, white.knot_s)
+    short = Logged(*decimation.merged(log, starts, count), scales)
+    _, base = climbed(short.log, short.starts, likeliest, STEPS, scales)
+    course = smooth_log(short.log, white, short.starts).state
+    dense, own, row = with_steps(log, starts, course)
+    track = course if dense is short.log else smooth_log(dense, white, own).state
+    found = list[Chosen]()
+    for name in names:
+        motion = MODELS[name]
+        if motion.pressed and len(names) > 1 and not falls(course):
+            continue
+        fit = _unsteered if motion.pressed else _steered
+        model, likelihood = fit(short, likeliest._replace(motion=motion.about(course)))
+        model = model._replace(motion=motion.about(track))
+        model = model._replace(motion=motion.about(smooth_log(dense, model, own).state))
+        found.append(Chosen(name, model, likelihood - base, dense, own, row))
+    return found
+
+
+class Logged(NamedTuple):
+    """A log with its starts and its scales."""
+
+    log: Observations
+    starts: list[Start]
+    scales: Scales
+
+
+def falls(course: FloatArray) -> bool:
+    """Whether a good part of a course (n, 9) has hardly any lift."""
+    v, force = course[:, 3:6], course[:, 6:] + np.array([0.0, 0.0, GRAVITY])
+    along = (force * v).sum(1) / np.maximum((v * v).sum(1), AT_REST_MPS**2)
+    lift = np.sqrt(((force - along[:, None] * v) ** 2).sum(1))
+    return bool((lift < LIFT * GRAVITY).mean() > SHARE)
+
+
+def _steered(short: Logged, model: Model) -> tuple[Model, float]:
+    """The likeliest profile from this one on, with its allowance, and the likelihood."""
+    model, likelihood = climbed(*short[:2], model, STEPS, short.scales)
+    return with_allowance(short.log, model, short.scales), likelihood
+
+
+def _unsteered(short: Logged, model: Model) -> tuple[Model, float]:
+    """The same where the jerk may be far smaller than the acceleration's changes: from the likeliest of smaller
+    profiles, and of levels, on, about the track that each leads to."""
+    log, starts, scales = short
+    found = list[tuple[Model, float]]()
+    for shape in (model, median_level(model)):
+        calmer = [shape._replace(jerk=times * shape.jerk) for times in CALMER]
+        best = max(calmer, key=lambda each: _finite(likelihood_of(log, each, starts)))
+        for _ in range(2):
+            best, likelihood = climbed(log, starts, best, STEPS, scales)
+            best = best._replace(motion=best.motion.about(smooth_log(log, best, starts).state))
+        found.append((best, likelihood))
+    best, likelihood = max(found, key=lambda each: _finite(each[1]))
+    least = scales.jerk_psd(scales.span_s)
+    return best._replace(jerk=np.maximum(ALLOWANCE * best.jerk, least)), likelihood
+
+
+def _finite(likelihood: float) -> float:
+    return likelihood if math.isfinite(likelihood) else -math.inf
+
+
+def with_steps(
+    log: Observations, starts: list[Start], course: FloatArray
+) -> tuple[Observations, list[Start], IntArray | None]:
+    """The log with samples without readings in its gaps, so that no step turns too far, its starts, and where its own
+    samples are; None where nothing was added. course: (m, 9) states along it."""
+    speed = np.sqrt((course[:, 3:6] ** 2).sum(1) + AT_REST_MPS**2)
+    fastest = float((np.sqrt((course[:, 6:] ** 2).sum(1)) / speed).max())
+    interval = np.diff(log.time_s)
+    with np.errstate(invalid="ignore"):
+        pieces = np.clip(np.nan_to_num(np.ceil(interval * fastest / FARTHEST_TURN)), 1, MOST_STEPS).astype(np.int64)
+    if not (pieces > 1).any():
+        return log, starts, None
+    row = np.append(0, np.cumsum(pieces))
+    number = np.arange(row[-1] + 1)
+    time_s = np.interp(number, row, log.time_s)
+    measurement, weight = np.full((len(number), 3), np.nan), np.zeros((len(number), 3))
+    time_s[row], measurement[row], weight[row] = log.time_s, log.measurement, log.weight
+    uneven = None if log.uneven is None else Uneven.none(len(number))
+    if log.uneven is not None and uneven is not None:
+        uneven.times[row], uneven.late[row] = log.uneven
+    sites = None
+    if log.sites is not None:
+        sites = log.sites.part(np.searchsorted(row, number, "right") - 1)
+    moved = [start._replace(sample=int(row[start.sample])) for start in starts]
+    return Observations(time_s, measurement, weight, uneven, sites), moved, row

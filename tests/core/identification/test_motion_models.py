@@ -1,0 +1,103 @@
+"""The motion that a log's own readings choose."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ftproc import pipeline
+from ftproc.core.filtering.records import Uneven
+from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.identification import motion_models
+from ftproc.core.identification.motion_models import MODELS, WHITE, choose, with_steps
+from ftproc.core.identification.profile import fit_profile, with_allowance
+from ftproc.methods import preparing
+from ftproc.settings import AUTO, MOTIONS, FilterSettings
+from ftproc.simulation import simulate
+from tests.core.identification.test_likelihood import level
+from tests.core.tracks import matched
+
+pytestmark = pytest.mark.compiled
+
+SMOOTH = FilterSettings(smooth=True)
+
+
+def errors(flight, **settings):
+    """RMSE of position m and velocity m/s, and the summary."""
+    found = pipeline.filter_log(flight.log, replace(SMOOTH, **settings))
+    truth = np.concatenate([flight.truth.position_m, flight.truth.velocity_mps], 1)
+    there = np.isin(flight.truth.time_s, found.time_s)
+    wrong = (found.state[:, :6] - truth[there]) ** 2
+    return np.sqrt([wrong[:, :3].sum(1).mean(), wrong[:, 3:].sum(1).mean()]), found.metadata["summary"]
+
+
+def test_an_aircraft_that_manoeuvres_has_a_force_that_turns():
+    ratios = []
+    for seed in range(3):
+        flight = simulate("manoeuvre-clean", seed=seed)
+        white, said = errors(flight, motion=WHITE)
+        assert said["motion"] == "white jerk"
+        assert said["motion_gain"] == 0.0
+        found, said = errors(flight)
+        assert said["motion"] == "turning force"
+        assert said["motion_gain"] > 30
+        ratios.append(found / white)
+    position, velocity = np.median(ratios, 0)
+    assert position < 0.94
+    assert velocity < 0.88
+
+
+def fitted(a):
+    return with_allowance(a.log, fit_profile(a.log, a.starts, level(a), 3))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_flight_of_white_jerk_stays_one(seed):
+    a = matched(seed, 400, dt=0.2, q=3.0)
+    model, log = fitted(a), a.log
+    found = choose(log, a.starts, model, tuple(MODELS))
+    assert found.name == WHITE
+    assert found.gain < motion_models.MARGIN
+    assert found.model is model
+    assert found.log is log
+    assert found.row is None
+
+
+def test_a_single_name_is_taken():
+    a = matched(1, 200, dt=0.2, q=3.0)
+    found = choose(a.log, a.starts, fitted(a), ("turning-force",))
+    assert found.name == "turning-force"
+    assert found.gain < 0
+    assert found.model.motion.acts
+
+
+def test_a_jerk_that_is_specified_is_white():
+    assert preparing.motions(SMOOTH) == tuple(MODELS)
+    assert preparing.motions(replace(SMOOTH, jerk_psd_m2ps5=1.0)) == (WHITE,)
+    assert preparing.motions(replace(SMOOTH, jerk_psd_m2ps5=1.0, motion="turning-force")) == ("turning-force",)
+    assert (AUTO, *MODELS) == MOTIONS
+
+
+def test_gaps_are_crossed_in_steps():
+    a = matched(2, 100, dt=0.2, q=1.0)
+    kept = np.r_[0:40, 70:100]
+    log = a.log.part(kept)._replace(uneven=Uneven.none(len(kept)))
+    course = a.truth[kept].copy()
+    course[:, 3:6], course[:, 6:] = [100.0, 0.0, 0.0], [0.0, 20.0, 0.0]  # 0.2 rad/s
+    dense, starts, row = with_steps(log, a.starts, course)
+    assert row is not None
+    np.testing.assert_array_equal(dense.time_s[row], log.time_s)
+    np.testing.assert_array_equal(dense.measurement[row], log.measurement)
+    between = np.setdiff1d(np.arange(len(dense.time_s)), row)
+    assert (dense.weight[between] == 0).all()
+    assert np.isnan(dense.measurement[between]).all()
+    assert np.diff(dense.time_s).max() <= motion_models.FARTHEST_TURN / 0.2 * 1.05
+    assert starts[0].sample == 0
+    # with white jerk they change nothing
+    found = motion_models.Chosen(WHITE, a.model, 0.0, dense, starts, row)
+    run, plain = found.of_rows(smooth_log(dense, a.model, starts)), smooth_log(log, a.model, a.starts)
+    np.testing.assert_allclose(run.state, plain.state, rtol=1e-7, atol=1e-6)
+    np.testing.assert_allclose(run.sigma, plain.sigma, rtol=1e-6)
+    assert with_steps(a.log, a.starts, a.truth * 0)[2] is None
