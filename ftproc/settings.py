@@ -78,7 +78,6 @@ class FilterSettings:
     smooth: bool = False
     noise: Noise | None = None
     jerk_psd_m2ps5: float | None = None
-    motion: str = AUTO
     gate: float = 4.0
     max_patch_s: float | None = None
     particles: int = 100
@@ -90,6 +89,7 @@ class FilterSettings:
     parameters: Parameters = ()
     lag_s: float = 0.0
     derived: bool = False
+    motion: str = AUTO
 
     def parameter(self, name: str) -> float | None:
         """The parameter of the method by its name; None when it is not set."""

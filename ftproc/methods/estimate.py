@@ -126,6 +126,7 @@ class Estimate(NamedTuple):
             cleaned=None if self.cleaned is None else self.cleaned[low:high],
             screened_out=None if self.screened_out is None else self.screened_out[low:high],
             faults=None if self.faults is None else self.faults.rows(low, high),
+            motion=None if self.motion is None else self.motion.share((high - low) / len(self.label)),
         )
 
 

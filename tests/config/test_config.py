@@ -52,6 +52,7 @@ smooth = true
 editing = "forward"
 lag_s = 1.5
 jerk_psd_m2ps5 = 5
+motion = "turning-force"
 gate = 3.5
 max_patch_s = 9
 set = "window=6,m=0.01"
@@ -79,6 +80,7 @@ def test_every_key_is_understood():
     assert found.settings == FilterSettings(
         "ukf", "forward", True, (3.048, None, pytest.approx(20 * math.pi / 648000)), 5.0, 3.5, 9.0, 150, 7, True,
         (48.0, 11.5, 612.0), True, 46.2, (("window", 6.0), ("m", 0.01)), 1.5, True,
+        "turning-force",
     )  # fmt: skip
     assert found.station == Station(
         "north", "anticlockwise", pytest.approx(math.pi / 2), "zenith",
@@ -140,6 +142,7 @@ OPTIONS = st.fixed_dictionaries(
         "max_patch": numbers,
         "lag": st.floats(1e-3, 3600),
         "weight_form": st.just("gain"),
+        "motion": st.sampled_from(["white-jerk", "turning-force", "ballistic"]),
         "ecef": st.just(True),
         "derived": st.just(True),
         "set": st.sampled_from(["window=6", "m = 0.01, F_range_m=3e2"]),

@@ -54,6 +54,10 @@ class Chosen(NamedTuple):
     starts: list[Start]
     row: IntArray | None = None
 
+    def share(self, of: float) -> Chosen:
+        """What such a share of the samples has of the gain."""
+        return self._replace(gain=of * self.gain)
+
     def of_rows(self, run: Run) -> Run:
         """A run over the log with its steps, of the log's own samples."""
         if self.row is None:
@@ -97,7 +101,8 @@ def _fitted(log: Observations, starts: list[Start], white: Model, names: list[st
         fit = _unsteered if motion.pressed else _steered
         model, likelihood = fit(short, likeliest._replace(motion=motion.about(course)))
         model = model._replace(motion=motion.about(track))
-        model = model._replace(motion=motion.about(smooth_log(dense, model, own).state))
+        if short.log is log:  # else the samples are far closer than the motion is followed
+            model = model._replace(motion=motion.about(smooth_log(dense, model, own).state))
         found.append(Chosen(name, model, likelihood - base, dense, own, row))
     return found
 
