@@ -47,7 +47,7 @@ class MeasurementLog:
     extra: the other columns of the file, row for row with `time_s`; only if they were asked for.
     station: what is known of the instrument, already applied. epoch: the instant of time zero (ISO 8601) or "".
     remarks: how the file was understood, for the user. understood: the same in full, see
-    `files.reading.understanding`.
+    `files.reading.understanding`. sha256: of the file's bytes, "" if it was none.
     """
 
     name: str
@@ -64,6 +64,7 @@ class MeasurementLog:
     epoch: str = ""
     remarks: tuple[str, ...] = ()
     understood: Mapping[str, Any] = field(default_factory=dict)
+    sha256: str = ""
 
     def __len__(self) -> int:
         return len(self.time_s)

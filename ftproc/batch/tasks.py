@@ -69,7 +69,7 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
     from ftproc.files.reading import logs
     from ftproc.files.writing import atomic, trajectories
     from ftproc.methods import registry
-    from ftproc.quality import summary
+    from ftproc.quality import provenance, summary
 
     started = time.perf_counter()
     try:
@@ -84,19 +84,25 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
         else:
             model = model_for(registry.named(task.method), recipe.model)
         filtering = pipeline.Filtering(log, settings, model)
+        own = {"method": task.method, "target": task.target}
+        command = recipe.origin.command(task.log, {name: value for name, value in own.items() if value})
+        known = {"command": command, "options": recipe.origin.options}
+
+        def metadata() -> dict[str, Any]:
+            return provenance.completed(filtering.metadata, known, recipe.origin.before)
+
         guarded = atomic.guarding([task.at(task.log)])
         with compiled.announced(notify), _forwarded(task.log, notify), guarded:
             parts = (with_columns(part, settings, log) for part in filtering.parts())
             if task.report is None:
-                trajectories.write_parts(parts, lambda: filtering.metadata, task.at(task.output))
+                trajectories.write_parts(parts, metadata, task.at(task.output))
             else:
                 trajectory = joined(list(parts))
-                trajectory = replace(trajectory, metadata={**trajectory.metadata, **filtering.metadata})
+                trajectory = replace(trajectory, metadata={**trajectory.metadata, **metadata()})
                 trajectories.write(trajectory, task.at(task.output))
                 report.write(trajectory, task.at(task.report))
-        metadata = filtering.metadata
         elapsed_s = time.perf_counter() - started
-        said = summary.text(metadata), summary.as_dict(metadata)
+        said = summary.text(metadata()), summary.as_dict(metadata())
         return Outcome(task, *said, understood=log.understood, elapsed_s=elapsed_s)
     except BrokenPipeError:
         raise

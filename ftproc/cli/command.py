@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import click
@@ -12,7 +12,9 @@ from click.core import ParameterSource
 from ftproc.cli import process
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
-DEBUG = "--debug"
+#: Options that say where outputs go and what does the work: a trajectory does not depend on them.
+WHERE_TO = ("output", "jobs", "scheduler", "summary", "report", "write_calibration", "debug")
+DEBUG, ARGUMENTS = "--debug", "arguments"  # what the context remembers
 
 
 def debug_option() -> click.Option:
@@ -37,6 +39,10 @@ class Command(click.Command):
         self.examples, self.more = examples, more
         self.params.append(debug_option())
 
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        ctx.meta[ARGUMENTS] = list(args)
+        return super().parse_args(ctx, args)
+
     def invoke(self, ctx: click.Context) -> Any:
         process.check_directory()
         return super().invoke(ctx)
@@ -57,6 +63,21 @@ def stated(ctx: click.Context) -> dict[str, Any]:
     """The options and arguments on the command line, by name."""
     default = (ParameterSource.DEFAULT, ParameterSource.DEFAULT_MAP)
     return {name: value for name, value in ctx.params.items() if ctx.get_parameter_source(name) not in default}
+
+
+def typed(ctx: click.Context, arguments: Sequence[str], without: Iterable[str] = ()) -> dict[str, list[str]]:
+    """The options among some arguments as they were typed, by name and in their order, the last of each that is given
+    twice. without: names to leave out."""
+    values, _, order = ctx.command.make_parser(ctx).parse_args(list(arguments))
+    options = {str(p.name): p for p in order if isinstance(p, click.Option) and p.name in values}
+    found = {}
+    for name, option in options.items():
+        value = values[name]
+        if name not in without and (value is not False or option.secondary_opts):
+            each = value if option.multiple else [value]
+            flag = option.opts[0] if value is not False else option.secondary_opts[0]
+            found[name] = [word for one in each for word in (flag, *([one] if isinstance(one, str) else []))]
+    return found
 
 
 def refuse_with(ctx: click.Context, option: str, useless: Iterable[str]) -> None:

@@ -13,10 +13,10 @@ from ftproc import report
 from ftproc.batch import plan, run
 from ftproc.batch.tasks import Outcome, model_for
 from ftproc.cli import explaining, process
-from ftproc.cli.command import stated
+from ftproc.cli.command import ARGUMENTS, WHERE_TO, stated, typed
 from ftproc.cli.progress import Progress
 from ftproc.config import reading, writing
-from ftproc.config.recipe import Recipe
+from ftproc.config.recipe import Origin, Recipe, relevant
 from ftproc.errors import InputError, UsageError, printable
 from ftproc.files import conventions
 from ftproc.files.options import ABSENT, parse_columns, parse_units, parse_where, parse_widths
@@ -105,7 +105,10 @@ def _followed_recipe(ctx: click.Context) -> Recipe:
 def recipe(ctx: click.Context, live: bool = False) -> Recipe:
     """How every log is filtered; live: with live editing, unless that is recursive. Raises UsageError for what is wrong
     whatever the log, and for options on the command line that have no effect."""
-    found = Recipe.of(_options(ctx))
+    options = _options(ctx)
+    found = Recipe.of(options)
+    words = typed(ctx, ctx.meta[ARGUMENTS], WHERE_TO)
+    found = replace(found, origin=Origin(words, plain(relevant(options))))
     if live and found.settings.editing == "two-pass":
         found = replace(found, settings=replace(found.settings, editing="live"))
     method = found.settings.method

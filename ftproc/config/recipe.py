@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ftproc.files.options import Extract, parse_where, parse_widths
 from ftproc.methods import parameters
@@ -16,12 +17,29 @@ if TYPE_CHECKING:
 
 #: Option -> setting, where the names differ.
 _SETTINGS = {"jerk": "jerk_psd_m2ps5", "max_patch": "max_patch_s", "lag": "lag_s"}
+#: Options that become parts of a setting.
+_PARTS = ("set", "weight_form", "refraction", "temperature_c", "pressure_hpa")
+
+
+class Origin(NamedTuple):
+    """Where a recipe comes from. typed: the words of each option on the command line, by its name. options: those and
+    the station file's, by name, for the metadata. before: the metadata of the run that is run again, if one is."""
+
+    typed: Mapping[str, Sequence[str]] = {}
+    options: Mapping[str, Any] = {}
+    before: Mapping[str, Any] = {}
+
+    def command(self, log: str, own: Mapping[str, str]) -> str:
+        """The command line that filters a log so. own: options of this log alone, by name."""
+        words = {**self.typed, **{name: [f"--{name}", value] for name, value in own.items()}}
+        return shlex.join(["ftproc", "filter", log, *(word for each in words.values() for word in each)])
 
 
 @dataclass(frozen=True)
 class Recipe:
     """What is done with every log. model: `packaged`, `none`, a path or a loaded model. units, columns, station,
-    keep_columns: as in `files.reading.logs.read`. widths, where, target: as the options of these names."""
+    keep_columns: as in `files.reading.logs.read`. widths, where, target: as the options of these names. origin: for the
+    metadata."""
 
     settings: FilterSettings = field(default_factory=FilterSettings)
     model: str | Model = PACKAGED
@@ -32,6 +50,7 @@ class Recipe:
     widths: str | Sequence[int] | None = None
     where: Sequence[str] = ()
     target: str = ""
+    origin: Origin = field(default_factory=Origin)
 
     @classmethod
     def of(cls, options: Mapping[str, Any]) -> Recipe:
@@ -50,6 +69,13 @@ class Recipe:
         plain = {name: getattr(self, name) for name in ("units", "columns", "station", "keep_columns")}
         extract = Extract(parse_widths(self.widths), parse_where(self.where), target or self.target)
         return {**plain, "extract": extract}
+
+
+def relevant(options: Mapping[str, Any]) -> dict[str, Any]:
+    """The options that a trajectory depends on, as `Recipe.of` takes them."""
+    known = {each.name for kind in (FilterSettings, Station, Recipe) for each in fields(kind)}
+    names = (known - set(_SETTINGS.values())) | {*_SETTINGS, *_PARTS}
+    return {name: value for name, value in sorted(options.items()) if name in names and value not in (None, ())}
 
 
 def _picked(kind: type[Any], known: Mapping[str, Any]) -> Any:

@@ -28,6 +28,37 @@ CORRECTION = tuple(f"correction_{name}" for name in (*POSITION, *VELOCITY))
 #: Every column a trajectory always has, in the order in which it is written.
 TRAJECTORY = ("row", "time_s", *MEASUREMENT, *STATE, *SIGMA, *MEASUREMENT_SIGMA, *OUTLIER, "nis", *CORRECTION)
 
+_UNITS = {"_s": "s", "_m": "m", "_rad": "rad", "_mps": "m/s", "_mps2": "m/s2", "_deg": "deg"}
+_MEANINGS = {
+    "row": "row of the log, counted from 0 without the header",
+    "time_s": "time as read",
+    **dict.fromkeys(MEASUREMENT, "cleaned reading, from the estimate"),
+    **dict.fromkeys(POSITION, "estimated position in the local frame"),
+    **dict.fromkeys(VELOCITY, "estimated velocity in the local frame"),
+    **dict.fromkeys(ACCELERATION, "estimated acceleration in the local frame"),
+    **{name: f"1-sigma of {name.removeprefix('sigma_')}" for name in (*SIGMA, *MEASUREMENT_SIGMA)},
+    **dict.fromkeys(
+        OUTLIER, "0 good, 1 isolated outlier, 2 patch outlier, 3 missing, 4 rejected by hand, 5 accepted by hand"
+    ),
+    "nis": "normalised innovation squared of the components used",
+    **dict.fromkeys(CORRECTION, "added by the learned correction; estimate minus correction is the plain filter"),
+    "stations": "stations with a used reading near this time",
+    "lat_deg": "geodetic latitude, WGS-84",
+    "lon_deg": "longitude, WGS-84",
+    "height_m": "height above the WGS-84 ellipsoid",
+    **{f"{axis}_ecef_m": "earth-centred, earth-fixed position" for axis in "xyz"},
+    **{f"v{axis}_ecef_mps": "earth-centred, earth-fixed velocity" for axis in "xyz"},
+}
+
+
+def described(column: str) -> dict[str, str]:
+    """Unit and description of a column of a trajectory, for the metadata of its field; empty for another's."""
+    if column not in _MEANINGS:
+        return {}
+    unit = next((unit for ending, unit in _UNITS.items() if column.endswith(ending)), "1")
+    return {"unit": unit, "description": _MEANINGS[column]}
+
+
 #: Key of the metadata in a Parquet file.
 METADATA_KEY = b"ftproc"
 

@@ -5,17 +5,19 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ftproc import __version__, pipeline
+from ftproc import pipeline
 from ftproc.core.identification import unseen_motion
 from ftproc.core.model import kinematics
 from ftproc.derived.columns import with_derived
 from ftproc.errors import InputError, UsageError
 from ftproc.files import arrow
 from ftproc.files.conventions import CONVENTION
+from ftproc.files.reading.formats import content
 from ftproc.files.writing import geodesy
 from ftproc.fusion import findings, logs, results
 from ftproc.fusion.estimation import constants as posterior
@@ -23,7 +25,7 @@ from ftproc.fusion.estimation import engine, whole
 from ftproc.fusion.estimation.constants import Constants
 from ftproc.fusion.estimation.whole import Fused
 from ftproc.fusion.range_file import Instrument, Range
-from ftproc.quality import verdict
+from ftproc.quality import provenance, verdict
 from ftproc.records import MeasurementLog, Trajectory
 from ftproc.settings import FilterSettings
 
@@ -84,7 +86,7 @@ def _flight(
         raise InputError(f"{range_.path}: the fused filter diverged; check the places, the clocks and the conventions.")
     names = [station.name for station in fused.stations]
     summary = summarize(fused, zero_s)
-    metadata = {**_metadata(range_, settings, summary, fused), "epoch": logs.epoch(read)}
+    metadata = {**_metadata(range_, read, settings, summary, fused), "epoch": logs.epoch(read)}
     n = len(track.time_s)
     sigma, _ = unseen_motion.widened(track.state, track.sigma, np.full((n, 6), np.nan))
     path_sigma = kinematics.widened(track.state, track.path_sigma, track.sigma, sigma)
@@ -125,7 +127,11 @@ def _alone(range_: Range, log: MeasurementLog, settings: FilterSettings, model: 
         "log": range_.path,
         "stations": {instrument.name: {"log": log.name}},
     }
-    metadata = {**found.metadata, "method": METHOD, "log": range_.path, "frame": "local", "summary": summary}
+    here = {"log": log.name, "log_sha256": log.sha256 or None}
+    metadata = {
+        **found.metadata, "method": METHOD, "log": range_.path, "log_sha256": _digest(range_), "frame": "local",
+        "stations": {instrument.name: here}, "summary": summary,
+    }  # fmt: skip
     trajectory = replace(
         turned, name=range_.path, row=np.arange(len(last)), time_s=found.time_s[last], state=turned.state[last],
         sigma=turned.sigma[last], measurement=np.full((len(last), 3), np.nan),
@@ -187,6 +193,11 @@ def summarize(fused: Fused, zero_s: float) -> dict[str, Any]:
     }
 
 
+def _digest(range_: Range) -> str | None:
+    """The SHA-256 of the range file."""
+    return content.sha256(Path(range_.path)) or None
+
+
 def _bias_figures(constants: Constants, s: int) -> dict[str, Any]:
     return {
         name: {
@@ -200,19 +211,26 @@ def _bias_figures(constants: Constants, s: int) -> dict[str, Any]:
     }
 
 
-def _metadata(range_: Range, settings: FilterSettings, summary: dict[str, Any], fused: Fused) -> dict[str, Any]:
+def _metadata(
+    range_: Range, read: Sequence[MeasurementLog], settings: FilterSettings, summary: dict[str, Any], fused: Fused
+) -> dict[str, Any]:
     return {
-        "program": "ftproc",
-        "version": __version__,
+        **provenance.begun(),
         "method": METHOD,
         "log": range_.path,
+        "log_sha256": _digest(range_),
         "frame": "local",
         "axes": "x east, y north, z up at the origin of the range; time is true time: clock offsets are taken out",
         "convention": CONVENTION["local"],
         "origin": range_.origin,
         "stations": {
-            each.name: {"log": each.log, "place_m": each.place.tolist(), "site": each.site}
-            for each in range_.instruments
+            each.name: {
+                "log": each.log,
+                "log_sha256": log.sha256 or None,
+                "place_m": each.place.tolist(),
+                "site": each.site,
+            }
+            for each, log in zip(range_.instruments, read, strict=True)
         },
         "settings": {
             "editing": "two-pass",
@@ -220,11 +238,10 @@ def _metadata(range_: Range, settings: FilterSettings, summary: dict[str, Any], 
             "gate": settings.gate,
             "site": range_.origin,
             "jerk_specified": settings.jerk_psd_m2ps5 is not None,
-            "jerk_psd_m2ps5": [float(q) for q in fused.jerk[:, 0]],
-            "jerk_vertical_ratio": float(fused.jerk[0, 2] / fused.jerk[0, 0]),
-            "jerk_knot_s": float(fused.knot_s) if len(fused.jerk) > 1 else None,
+            "jerk_psd_m2ps5": settings.jerk_psd_m2ps5,
         },
         "sees": "the whole record",
         "model_sha256": None,
         "summary": summary,
+        "jerk_profile": provenance.jerk_profile(fused.jerk, fused.knot_s),
     }

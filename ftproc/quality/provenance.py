@@ -1,22 +1,32 @@
-"""The metadata of a trajectory: everything needed to reproduce it."""
+"""The metadata of a trajectory: everything needed to compute it again."""
 
 from __future__ import annotations
 
+import os
+import platform
+import sys
 from collections.abc import Mapping
 from dataclasses import asdict
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ftproc import __version__
 from ftproc.files.conventions import CONVENTION, in_words
-from ftproc.records import MeasurementLog
+from ftproc.files.writing.trajectories import plain
+from ftproc.records import FloatArray, MeasurementLog
 from ftproc.settings import FilterSettings
 
 if TYPE_CHECKING:
+    from ftproc.core.filtering import records
     from ftproc.correction.model import Model
     from ftproc.methods.registry import Method
     from ftproc.quality.statistics import RunStatistics
+
+_LATEST = 11  # digits of SOURCE_DATE_EPOCH
+#: The metadata that decide on a result.
+DECISIVE = ("version", "versions", "command", "options", "method", "log", "log_sha256", "model_sha256", "decisions")
 
 
 def describe(
@@ -27,18 +37,18 @@ def describe(
     model: Model | None,
     summary: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """The metadata of a trajectory (JSON-serialisable) with its summary, without the jerk profile of a log that was
-    filtered in segments: it would be as long as the log."""
+    """The metadata of a trajectory (JSON-serialisable) with its summary. The jerk profile is the last item; a log that
+    was filtered in segments has none: it would be as long as the log."""
     from ftproc.correction.model_file import sha256
 
     sigma = np.sqrt(statistics.model.reading_variance)
     return {
-        "program": "ftproc",
-        "version": __version__,
+        **begun(),
         "method": method.name,
         "segments": statistics.parts,
         "sees": method.sees(settings),
         "log": log.name,
+        "log_sha256": log.sha256 or None,
         "frame": log.frame,
         "convention": CONVENTION[log.frame],
         "station": {
@@ -64,27 +74,69 @@ def describe(
             **({"particles": settings.particles, "seed": settings.seed} if method.random else {}),
             **({"parameters": dict(settings.parameters)} if settings.parameters else {}),
             "jerk_specified": settings.jerk_psd_m2ps5 is not None,
+            "jerk_psd_m2ps5": settings.jerk_psd_m2ps5,
             "noise_range_m": float(sigma[0]),
             "noise_azimuth_rad": float(sigma[1]),
             "noise_elevation_rad": float(sigma[2]),
             "noise_correlation": [float(r) for r in statistics.model.correlation(statistics.interval_s)],
-            **_motion(statistics),
         },
         "motion": summary.get("motion"),
         "motion_gain": summary.get("motion_gain"),
         "model_sha256": None if model is None else sha256(model),
         "summary": dict(summary),
+        "jerk_profile": None if statistics.parts > 1 else jerk_profile(*_jerk_of(statistics.model)),
     }
 
 
-def _motion(statistics: RunStatistics) -> dict[str, Any]:
-    """The jerk PSD of a method that has one, unless its profile would fill the file."""
-    jerk = statistics.model.jerk
-    if not np.isfinite(jerk).all() or (statistics.parts > 1 and len(jerk) > 1):
-        return {"jerk_psd_m2ps5": None, "jerk_vertical_ratio": None, "jerk_knot_s": None}
+def _jerk_of(model: records.Model) -> tuple[FloatArray, float, bool]:
+    """What `jerk_profile` takes."""
+    return model.jerk, model.knot_s, model.motion.acts
+
+
+def begun() -> dict[str, Any]:
+    """The metadata with which those of every run begin. The command line fills in `command` and `options`."""
+    libraries = {name: str(sys.modules[name].__version__) for name in ("numpy", "pyarrow") if name in sys.modules}
     return {
-        "jerk_psd_m2ps5": [float(q) for q in jerk[:, 1]],
-        "jerk_vertical_ratio": float(jerk[0, 2] / jerk[0, 1]),
-        **({"jerk_along_ratio": float(jerk[0, 0] / jerk[0, 1])} if statistics.model.motion.acts else {}),
-        "jerk_knot_s": float(statistics.model.knot_s) if len(jerk) > 1 else None,
+        "program": "ftproc",
+        "version": __version__,
+        "versions": {"python": platform.python_version(), **libraries},
+        "date_utc": date_utc(),
+        "command": None,
+        "options": {},
+    }
+
+
+def completed(metadata: Mapping[str, Any], known: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:
+    """The metadata with what the command line knows. before: of the run that is run again, whose date stays where
+    nothing else differs."""
+    found = {**metadata, **known}
+    if before and not differing(found, before):
+        found["date_utc"] = before["date_utc"]
+    return found
+
+
+def differing(metadata: Mapping[str, Any], before: Mapping[str, Any]) -> list[str]:
+    """The names of the metadata that decide on a result and are not the same in two runs."""
+    return [name for name in DECISIVE if plain(metadata.get(name)) != plain(before.get(name))]
+
+
+def date_utc() -> str:
+    """The date of this run, without the time of day, so that the same command gives the same bytes. Where
+    SOURCE_DATE_EPOCH is set, that date, by the convention of reproducible builds."""
+    stated = os.environ.get("SOURCE_DATE_EPOCH", "")
+    known = stated.isdecimal() and len(stated) <= _LATEST
+    now = datetime.fromtimestamp(int(stated), UTC) if known else datetime.now(UTC)
+    return f"{now:%Y-%m-%d}"
+
+
+def jerk_profile(jerk: FloatArray, knot_s: float, along: bool = False) -> dict[str, Any] | None:
+    """The process noise along a log, jerk (k, 3) each for knot_s seconds; None of a method that has none. along:
+    whether its first axis goes along the path."""
+    if not np.isfinite(jerk).all():
+        return None
+    return {
+        "psd_m2ps5": [float(q) for q in jerk[:, 1]],
+        "vertical_ratio": float(jerk[0, 2] / jerk[0, 1]),
+        **({"along_ratio": float(jerk[0, 0] / jerk[0, 1])} if along else {}),
+        "knot_s": float(knot_s) if len(jerk) > 1 else None,
     }

@@ -74,9 +74,10 @@ def flights(case: Case, seeds: range) -> dict[str, list[Flight]]:
 def _settings(case: Case, flight: Simulation) -> FilterSettings:
     if case.specified is None:
         return FilterSettings()
-    found = pipeline.filter_log(flight.log).metadata["settings"]
+    metadata = pipeline.filter_log(flight.log).metadata
+    found, jerk = metadata["settings"], metadata["jerk_profile"]["psd_m2ps5"]
     noise = (found["noise_range_m"], found["noise_azimuth_rad"], found["noise_elevation_rad"])
-    return case.specified(noise, float(np.exp(np.mean(np.log(found["jerk_psd_m2ps5"])))))
+    return case.specified(noise, float(np.exp(np.mean(np.log(jerk)))))
 
 
 @dataclass(frozen=True)

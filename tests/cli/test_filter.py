@@ -75,7 +75,7 @@ def test_every_option_reaches_the_filter(run, flight):
     assert settings["noise_range_m"] == pytest.approx(3.0)
     assert settings["noise_azimuth_rad"] == pytest.approx(0.0002)
     assert settings["noise_elevation_rad"] == pytest.approx(0.0003)
-    assert settings["jerk_psd_m2ps5"] == pytest.approx([2.5])
+    assert settings["jerk_psd_m2ps5"] == pytest.approx(2.5)
     assert (settings["gate"], settings["max_patch_s"], settings["gain_form"]) == (5.0, 7.0, True)
     assert settings["site"] == [48.0, 11.0, 600.0]
 

@@ -127,7 +127,7 @@ def test_words_of_the_page(text):
     parts = filtered().metadata["summary"]["components"].values()
     for name in ("good", "isolated", "patch"):
         assert f"<td>{name}</td>{''.join(f'<td>{part[name]}</td>' for part in parts)}" in text
-    assert re.search(r"<th>jerk_psd_m2ps5</th><td>\d+ values, from", text)
+    assert re.search(r"<th>jerk_profile</th><td>psd_m2ps5 \d+ values, from", text)
     assert "<th>version</th><td>" in text
     assert "<th>station</th><td>azimuth_from x, azimuth_zero_rad 0, elevation_from horizon, bias 0, 0, 0," in text
     assert "No network correction: " in text

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import functools
 import json
+import shlex
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ import click
 
 from ftproc.batch import plan
 from ftproc.cli import process
-from ftproc.cli.command import stated
+from ftproc.cli.command import ARGUMENTS, WHERE_TO, stated, typed
 from ftproc.cli.progress import Progress
 from ftproc.correction import model_file
 from ftproc.errors import InputError, UsageError, failure, printable
@@ -22,6 +24,7 @@ from ftproc.files.writing import atomic, maps, outputs, tables, trajectories
 from ftproc.fusion import flight, results, summary
 from ftproc.fusion.range_file import Range, load
 from ftproc.fusion.range_template import template
+from ftproc.quality import provenance
 from ftproc.quality import summary as single
 from ftproc.quality.summary import line
 from ftproc.settings import PACKAGED, FilterSettings
@@ -81,6 +84,12 @@ def fuse_logs(ctx: click.Context, debug: bool) -> int:
             click.echo(failure(error).trace, err=True)
         click.echo(f"ftproc: {error}", err=True)
         return 1
+    words = typed(ctx, ctx.meta[ARGUMENTS], WHERE_TO)
+    command = shlex.join(["ftproc", "filter", *(word for each in words.values() for word in each)])
+    options = {name: given[name] for name in ("fuse", "smooth", "jerk", "gate", "ecef") if name in given}
+    known = {"command": command, "options": options}
+    metadata = provenance.completed(found.trajectory.metadata, known, {})
+    found = replace(found, trajectory=replace(found.trajectory, metadata=metadata))
     with atomic.guarding(range_.inputs):
         _write(found, output, places, range_)
         if page is not None:

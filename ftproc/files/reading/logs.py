@@ -240,7 +240,8 @@ def _explained(
     doubtful = (*doubts, *plausibility.doubts(values, station))
     said = (*notes, *doubtful)
     understood = understanding.describe(plan.header, plan.found, clock, station, said)
-    return replace(log, remarks=(*remarks, *said), understood=understood, station=station)
+    digest = plan.header.sha256()
+    return replace(log, remarks=(*remarks, *said), understood=understood, station=station, sha256=digest)
 
 
 def _check_others(header: TableHeader, others: Iterable[int]) -> None:

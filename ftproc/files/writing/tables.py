@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import gzip
 from collections.abc import Iterator, Mapping
@@ -120,13 +121,14 @@ class _Parquet:
         import pyarrow.parquet as pq
 
         if self.file is None:
-            # With Arrow's schema in the file, readers ignore key-value pairs that are added at the end.
+            # Readers take the metadata from Arrow's schema where there is one, so it is added with them at the end.
             how = {"compression": "snappy", "use_dictionary": _not_floating(table), "store_schema": False}
             self.file = pq.ParquetWriter(self.stream, table.schema, **how)
         self.file.write_table(table)
 
     def add_metadata(self, metadata: Mapping[bytes, bytes]) -> None:
-        self.file.add_key_value_metadata(metadata)
+        schema = base64.b64encode(self.file.schema.with_metadata(metadata).serialize())
+        self.file.add_key_value_metadata({**metadata, b"ARROW:schema": schema})
 
     def close(self) -> None:
         self.file.close()

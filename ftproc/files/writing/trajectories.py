@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +20,9 @@ from ftproc.records import Trajectory, joined
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+#: A list of numbers over several lines, such as a jerk profile; no string of JSON has the end of a line in it.
+_NUMBERS = re.compile(r"(?<=\[)\n[\d.eE+,\s-]+(?=\])")
 
 
 def to_table(trajectory: Trajectory, without: Sequence[str] = ()) -> pa.Table:
@@ -41,7 +45,15 @@ def to_table(trajectory: Trajectory, without: Sequence[str] = ()) -> pa.Table:
         arrays.update(zip(names, np.ascontiguousarray(group.T), strict=True))
     arrays = {name: array for name, array in arrays.items() if name not in without}
     table = tables.with_extra(arrow.table(arrays), trajectory.extra)
-    return table.replace_schema_metadata({METADATA_KEY: to_json(trajectory.metadata, indent=None)})
+    return _described(table).replace_schema_metadata({METADATA_KEY: to_json(trajectory.metadata, indent=None)})
+
+
+def _described(table: pa.Table) -> pa.Table:
+    """The table with the unit and the meaning of each column in the metadata of its field."""
+    import pyarrow as pa
+
+    fields = [field.with_metadata(layout.described(field.name) or field.metadata) for field in table.schema]
+    return pa.Table.from_arrays(table.columns, schema=pa.schema(fields))
 
 
 def write(trajectory: Trajectory, target: Target, without: Sequence[str] = ()) -> None:
@@ -107,7 +119,8 @@ def _write_sidecar(beside: Target, stream: BinaryIO, metadata: Mapping[str, Any]
 
 
 def to_json(metadata: Mapping[str, Any], indent: int | None) -> bytes:
-    return json.dumps(plain(metadata), indent=indent, ensure_ascii=False, allow_nan=False).encode()
+    text = json.dumps(plain(metadata), indent=indent, ensure_ascii=False, allow_nan=False)
+    return _NUMBERS.sub(lambda found: re.sub(r"\s+", " ", found[0]), text).encode()
 
 
 def plain(value: Any) -> Any:

@@ -303,3 +303,18 @@ def test_stretch_that_fails_leaves_nothing(tmp_path, capfdbinary, name):
         write_parts(failing(), dict, target)
     assert list(tmp_path.iterdir()) == []
     assert capfdbinary.readouterr().out == b""
+
+
+def test_fields_have_units_and_descriptions(tmp_path: Path) -> None:
+    """In a file that is written at once, and in one that grows."""
+    whole = some(90)
+    write_trajectory(whole, tmp_path / "whole.parquet")
+    write_parts(pieces(whole, [0, 30, 90]), lambda: METADATA, tmp_path / "grown.parquet")
+    for name in ("whole.parquet", "grown.parquet"):
+        schema = pq.read_schema(tmp_path / name)
+        assert METADATA.items() <= json.loads(schema.metadata[b"ftproc"]).items()
+        for column in layout.TRAJECTORY:
+            found = schema.field(column).metadata
+            assert found[b"description"], column
+            assert (found[b"unit"] == b"1") == (column in ("row", "nis", *layout.OUTLIER)), column
+    assert layout.described("temperature") == {}

@@ -49,7 +49,7 @@ class TableHeader:
     decimal_comma: numbers may have decimal commas. metadata: key-value pairs of the file.
     blocks: numeric positions -> these columns block by block if the file is large, else None.
     units: the cells of a row of units under the names, or nothing. form: the kind of file and how it is laid out.
-    stated: by the standard of the file.
+    stated: by the standard of the file. sha256: of the bytes of the file, as it is stored; "" of a table in memory.
     """
 
     source: str
@@ -61,6 +61,7 @@ class TableHeader:
     units: Sequence[str] = ()
     form: str = ""
     stated: Stated = _NOTHING
+    sha256: Callable[[], str] = lambda: ""
 
     @property
     def is_of_a_standard(self) -> bool:

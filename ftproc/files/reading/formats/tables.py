@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import shutil
 import sys
 import tempfile
 import weakref
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -133,19 +136,22 @@ def _opened(name: str, widths: Sequence[int], scratch: _Scratch) -> TableHeader:
     if name == "-":
         data = content.stdin()
         how = How(Room("<stdin>", len(data)), "", widths)
+        digest = hashlib.sha256(data).hexdigest()
         if packing.ending("", data[:8]) is None and not data.startswith(tuple(_MAGIC)):
-            return csvtext.text_bytes(data, how.room, widths)
+            return replace(csvtext.text_bytes(data, how.room, widths), sha256=lambda: digest)
         path = scratch.path() / "stdin"
         path.write_bytes(data)
-        return _of_file("<stdin>", path, how, scratch)
+        return replace(_of_file("<stdin>", path, how, scratch), sha256=lambda: digest)
     here, part = remote.local(name), ""
     if here is None:
         copy = remote.fetch(name, scratch.path())
-        return _of_file(name, copy.path, How(Room(name, copy.packed), part, widths), scratch)
+        found = _of_file(name, copy.path, How(Room(name, copy.packed), part, widths), scratch)
+        return replace(found, sha256=partial(content.sha256, copy.path))
     whole, mark, behind = name.rpartition("#")
     if mark and not here.exists() and (inner := remote.local(whole)) is not None and inner.exists():
         here, part = inner, behind
-    return _of_file(name, here, How(Room(name, content.size(here)), part, widths), scratch)
+    found = _of_file(name, here, How(Room(name, content.size(here)), part, widths), scratch)
+    return replace(found, sha256=partial(content.sha256, here))
 
 
 def _of_file(name: str, path: Path, how: How, scratch: _Scratch, deep: int = 0) -> TableHeader:
