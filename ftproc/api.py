@@ -13,6 +13,8 @@ from ftproc.config.recipe import Recipe
 from ftproc.correction import model_file
 from ftproc.derived.columns import with_columns
 from ftproc.errors import UsageError
+from ftproc.files.decisions import Decisions
+from ftproc.files.decisions import read as read_decisions
 from ftproc.live.live import Live
 from ftproc.records import VIEWS, MeasurementLog, Trajectory, Truth
 from ftproc.settings import PACKAGED, FilterSettings, Station, TrainSettings
@@ -51,6 +53,7 @@ def filter_log(
     config: str | Path | None = None,
     azimuth_from: str | None = None,
     site: tuple[float, float, float] | None = None,
+    decisions: Decisions | str | Path | None = None,
 ) -> Trajectory:
     """The trajectory of a log (a MeasurementLog, or anything `read_log` takes).
 
@@ -61,7 +64,7 @@ def filter_log(
     they are not specified here.
     azimuth_from: `x` or `north`, unless the log is a MeasurementLog, which was read already. site: latitude deg,
     longitude deg and height m of the station; with one, here or in the settings, the trajectory has `lat_deg`,
-    `lon_deg` and `height_m`.
+    `lon_deg` and `height_m`. decisions: by hand, on its readings (or their file).
     Raises InputError, UsageError.
     """
     recipe = _recipe(config)
@@ -74,6 +77,9 @@ def filter_log(
     if isinstance(model, str):
         model = model_file.named(recipe.model if model == PACKAGED else model)
     read = log if isinstance(log, MeasurementLog) else read_log(log, config=config, **reading)
+    if decisions is not None:
+        by_hand = decisions if isinstance(decisions, Decisions) else read_decisions(decisions)
+        read = by_hand.applied(read)
     return with_columns(pipeline.filter_log(read, settings, model), settings, read)
 
 

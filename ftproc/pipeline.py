@@ -15,7 +15,7 @@ from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import registry
 from ftproc.methods.estimate import Estimate, Part
-from ftproc.quality import provenance, sanity
+from ftproc.quality import by_hand, provenance, sanity
 from ftproc.quality.statistics import RunStatistics
 from ftproc.records import COMPONENTS, MISSING, Diagnostics, FloatArray, MeasurementLog, Trajectory, joined
 from ftproc.settings import FilterSettings
@@ -49,6 +49,7 @@ class Filtering:
             raise UsageError(why)
         self.record = sanity.recording(log)
         self.statistics = RunStatistics(log, self.record.absent)
+        self.effects = by_hand.Effects(None if log.by_hand is None else log.by_hand.decisions, settings.gate)
 
     def parts(self) -> Iterator[Trajectory]:
         """The rows of the log in their order, in parts; their only metadata is the frame."""
@@ -75,9 +76,11 @@ class Filtering:
                 "network": self._network() if self.method.corrected else None,
                 "correction_linear": None if stage is None else stage.linear,
                 "correction_lost_by_smoothing": model is not None and stage is None and model.filter.helps,
+                **self.effects.summary(),
             }
         )
-        return provenance.describe(self.log, self.method, self.settings, self.statistics, self.model, summary)
+        found = provenance.describe(self.log, self.method, self.settings, self.statistics, self.model, summary)
+        return {**found, **self.effects.metadata()}
 
     def _network(self) -> str:
         """What the learned correction did, in words."""
@@ -113,11 +116,14 @@ class Filtering:
             name = self.method.name
             raise InputError(f"{self.log.name}: {name} diverged; give --noise and --jerk, or check the log's units")
         log = self.log.stretch(rows)
+        estimate = estimate._replace(label=by_hand.labelled(estimate.label, log.by_hand))
+        shown, variance = _diagnostics(log.measurement, estimate), cleaned_sigma**2 + estimate.model.reading_variance
+        shown = by_hand.with_rejected(shown, estimate.label, cleaned, variance)
+        self.effects.add(log.by_hand, shown.residual, shown.residual_sigma)
         self.statistics.add(log.time_s, estimate, cleaned, correction, outside)
         return Trajectory(
             log.name, log.row, log.time_s, cleaned, state, sigma, cleaned_sigma, estimate.label, best.nis, correction,
-            metadata={"frame": log.frame}, extra=log.extra, diagnostics=_diagnostics(log.measurement, estimate),
-            path_sigma=path_sigma,
+            metadata={"frame": log.frame}, extra=log.extra, diagnostics=shown, path_sigma=path_sigma,
         )  # fmt: skip
 
 

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
+    from ftproc.files.decisions import ByHand
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 FlagArray = NDArray[np.uint8]
@@ -47,7 +49,8 @@ class MeasurementLog:
     extra: the other columns of the file, row for row with `time_s`; only if they were asked for.
     station: what is known of the instrument, already applied. epoch: the instant of time zero (ISO 8601) or "".
     remarks: how the file was understood, for the user. understood: the same in full, see
-    `files.reading.understanding`. sha256: of the file's bytes, "" if it was none.
+    `files.reading.understanding`. sha256: of the file's bytes, "" if it was none. by_hand: the engineer's decisions on
+    its readings, if there are any.
     """
 
     name: str
@@ -65,6 +68,7 @@ class MeasurementLog:
     remarks: tuple[str, ...] = ()
     understood: Mapping[str, Any] = field(default_factory=dict)
     sha256: str = ""
+    by_hand: ByHand | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -77,7 +81,10 @@ class MeasurementLog:
         arrays = (np.array(self.time_s[rows]), np.array(self.measurement[rows]), np.array(self.row[rows]))
         forget(self.time_s, self.measurement, self.row)
         extra = None if self.extra is None else self.extra.slice(rows.start, rows.stop - rows.start)
-        return replace(self, time_s=arrays[0], measurement=arrays[1], row=arrays[2], extra=extra)
+        by_hand = None if self.by_hand is None else self.by_hand.stretch(rows)
+        return replace(
+            self, time_s=arrays[0], measurement=arrays[1], row=arrays[2], extra=extra, by_hand=by_hand
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False)

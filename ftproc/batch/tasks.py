@@ -5,15 +5,18 @@ from __future__ import annotations
 import contextlib
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ftproc.config.recipe import Recipe
 from ftproc.errors import Failure, FtprocWarning, failure, interruption
-from ftproc.files import remote
-from ftproc.records import joined
+from ftproc.files import decisions, remote
+from ftproc.files.decisions import Line
+from ftproc.records import Trajectory, joined
 from ftproc.settings import PACKAGED
 
 if TYPE_CHECKING:
@@ -28,7 +31,7 @@ Notify = Callable[[str], None]
 class Task:
     """One log to filter and the file of its trajectory; either may be `-`. method: instead of the recipe's. report: the
     file of the HTML page, if there is one. place: the directory of relative names, when it is not the worker's current
-    one. target: COLUMN=VALUE, instead of the recipe's."""
+    one. target: COLUMN=VALUE, instead of the recipe's. takes_decisions: whether the outcome has them."""
 
     log: str
     output: str
@@ -36,6 +39,12 @@ class Task:
     report: str | None = None
     place: str = ""
     target: str = ""
+    takes_decisions: bool = False
+
+    @property
+    def station(self) -> str:
+        """The name of the log in decisions by hand: that of its file, without folder and ending."""
+        return Path(self.log.partition("#")[0]).name.partition(".")[0]
 
     def at(self, name: str) -> str:
         """The file of that name, as the worker finds it."""
@@ -44,8 +53,8 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a task: its summary as text and as a dictionary, or its failure; how its log was understood; and
-    its duration."""
+    """The outcome of a task: its summary as text and as a dictionary, or its failure; how its log was understood; its
+    duration; and the decisions that were taken, if they are asked for."""
 
     task: Task
     text: str = ""
@@ -53,6 +62,7 @@ class Outcome:
     failure: Failure | None = None
     understood: Mapping[str, Any] = field(default_factory=dict)
     elapsed_s: float = 0.0
+    decisions: tuple[Line, ...] = ()
 
 
 #: Submits a task; the function returned waits for its outcome.
@@ -76,6 +86,9 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
         log = logs.read(task.at(task.log), **recipe.reading(task.target))
         if task.place:
             log = replace(log, name=task.log)  # as the user named it
+        if recipe.decisions is not None:
+            log = recipe.decisions.applied(log, task.station)
+        taken: list[Line] = []
         settings = recipe.settings
         if task.method is not None:
             settings = registry.with_own_parameters(settings, task.method)
@@ -93,7 +106,10 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
 
         guarded = atomic.guarding([task.at(task.log)])
         with compiled.announced(notify), _forwarded(task.log, notify), guarded:
-            parts = (with_columns(part, settings, log) for part in filtering.parts())
+            parts: Iterator[Trajectory] = (with_columns(part, settings, log) for part in filtering.parts())
+            if task.takes_decisions:
+                taken += [] if log.by_hand is None else log.by_hand.decisions.lines
+                parts = _noting(parts, task.station, taken)
             if task.report is None:
                 trajectories.write_parts(parts, metadata, task.at(task.output))
             else:
@@ -103,13 +119,23 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
                 report.write(trajectory, task.at(task.report))
         elapsed_s = time.perf_counter() - started
         said = summary.text(metadata()), summary.as_dict(metadata())
-        return Outcome(task, *said, understood=log.understood, elapsed_s=elapsed_s)
+        return Outcome(task, *said, understood=log.understood, elapsed_s=elapsed_s, decisions=tuple(taken))
     except BrokenPipeError:
         raise
     except Exception as error:
         if stop := interruption(error):
             raise stop from None
         return Outcome(task, failure=failure(error, task.log))
+
+
+def _noting(parts: Iterable[Trajectory], station: str, taken: list[Line]) -> Iterator[Trajectory]:
+    """The parts of a trajectory, with the decisions on all of their readings noted behind the last."""
+    found = []
+    for part in parts:
+        found.append((part.time_s, part.row, part.outlier))
+        yield part
+    time_s, row, outlier = map(np.concatenate, zip(*found, strict=True))
+    taken += decisions.taken(time_s, row, outlier, station)
 
 
 def model_for(method: Method, name: str | Model) -> Model | None:

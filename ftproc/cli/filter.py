@@ -40,6 +40,7 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     help="With --fuse: write a station file for each station, with the biases found.",
 )
 @options.tracker
+@options.by_hand
 @click.option(
     "--site",
     type=options.site,
@@ -154,6 +155,8 @@ def command(list_methods: str | None, write_config: bool, explain: bool, follow:
     noise and process noise are estimated from the log. A bad log does not stop the others; the exit code is then 1.
     """
     ctx = click.get_current_context()
+    if options["again"] is not None:
+        options = _before(ctx, options)
     if list_methods is not None:
         from ftproc.methods import registry
 
@@ -193,3 +196,16 @@ def command(list_methods: str | None, write_config: bool, explain: bool, follow:
 
         request = filtering.Request._make(options[name] for name in filtering.Request._fields)
         ctx.exit(filtering.filter_logs(request, filtering.recipe(ctx), ctx.meta[DEBUG]))
+
+
+def _before(ctx: click.Context, options: dict[str, Any]) -> dict[str, Any]:
+    """The options with what a run that is made again says in place of those that are not stated. Remembers the run."""
+    from ftproc.cli import again
+
+    if options["config"] is not None:
+        raise click.UsageError("--again and --config both say how a log is filtered; give one of the two.", ctx)
+    before = ctx.meta[again.AGAIN] = again.load(options["again"])
+    fused = before.options.get("fuse")
+    logs = options["logs"] or (() if fused else (before.log,))
+    found = {"logs": logs, "fuse": options["fuse"] or fused, "output": options["output"] or before.output}
+    return {**options, **found, "again": before}

@@ -12,8 +12,8 @@ import click
 from ftproc import report
 from ftproc.batch import plan, run
 from ftproc.batch.tasks import Outcome, model_for
-from ftproc.cli import explaining, process
-from ftproc.cli.command import ARGUMENTS, WHERE_TO, stated, typed
+from ftproc.cli import again, explaining, process
+from ftproc.cli.command import stated
 from ftproc.cli.progress import Progress
 from ftproc.config import reading, writing
 from ftproc.config.recipe import Origin, Recipe, relevant
@@ -21,6 +21,8 @@ from ftproc.errors import InputError, UsageError, printable
 from ftproc.files import conventions
 from ftproc.files.options import ABSENT, parse_columns, parse_units, parse_where, parse_widths
 from ftproc.files.writing import geodesy, maps, outputs
+from ftproc.files.writing.decisions import write as write_decisions
+from ftproc.files.writing.outputs import Output
 from ftproc.files.writing.trajectories import plain
 from ftproc.methods import registry
 from ftproc.methods.registry import EVERY
@@ -43,6 +45,9 @@ _NOT_FOLLOWED = {
     "model": "corrects nothing with a network. Leave it out.",
     "jobs": "runs in one process. Leave it out.",
     "scheduler": "runs in one process. Leave it out.",
+    "decisions": f"decides on each row as it comes. {_WHOLE}",
+    "write_decisions": f"decides on each row as it comes. {_WHOLE}",
+    "again": "has nothing to compare. Leave it out.",
     "summary": "has no summary but the number of rows. Leave it out, or say --summary none.",
 }
 
@@ -57,6 +62,8 @@ class Request(NamedTuple):
     scheduler: str | None
     summary: str
     report: str | None
+    write_decisions: str | None
+    again: again.Before | None
 
 
 def follow(ctx: click.Context, what: str) -> None:
@@ -106,9 +113,10 @@ def recipe(ctx: click.Context, live: bool = False) -> Recipe:
     """How every log is filtered; live: with live editing, unless that is recursive. Raises UsageError for what is wrong
     whatever the log, and for options on the command line that have no effect."""
     options = _options(ctx)
-    found = Recipe.of(options)
-    words = typed(ctx, ctx.meta[ARGUMENTS], WHERE_TO)
-    found = replace(found, origin=Origin(words, plain(relevant(options))))
+    before = ctx.meta.get(again.AGAIN)
+    found = Recipe.of({**options, **({} if before is None else before.decided(stated(ctx)))})
+    origin = Origin(again.words(ctx, before), plain(relevant(options)), {} if before is None else before.metadata)
+    found = replace(found, origin=origin)
     if live and found.settings.editing == "two-pass":
         found = replace(found, settings=replace(found.settings, editing="live"))
     method = found.settings.method
@@ -129,7 +137,8 @@ def station_file(ctx: click.Context) -> str:
 def _options(ctx: click.Context) -> dict[str, Any]:
     """The options of the station file and those of the command line, which win."""
     given = stated(ctx)
-    kept = reading.load(given["config"]) if "config" in given else {}
+    before = ctx.meta.get(again.AGAIN)
+    kept = reading.load(given["config"]) if "config" in given else {} if before is None else before.options
     options = {**kept, **given}
     for name, parse in (("units", parse_units), ("columns", parse_columns)):  # quantities not named here: the file's
         if name in options:
@@ -151,15 +160,19 @@ def filter_logs(request: Request, recipe: Recipe, debug: bool) -> int:
         report.check(request.report)
     registry.check_parameters(recipe.settings)
     methods = _applicable(recipe) if recipe.settings.method == EVERY else None
-    named = (name for name in (recipe.model, request.config) if isinstance(name, str))
-    inputs = [name for name in named if name not in (PACKAGED, NO_MODEL)]
+    inputs = _inputs(request, recipe)
     targets = _targets(request.logs, recipe)
     tasks = plan.tasks(request.logs, request.output, methods, targets)
+    if recipe.decisions is not None:
+        recipe.decisions.check(list(dict.fromkeys(task.station for task in tasks)))
+    if request.write_decisions is not None:
+        tasks = [replace(task, takes_decisions=True) for task in tasks]
     for task in tasks:
         maps.check(task.output, recipe.settings.site)
     pages, index = plan.pages([task.output for task in tasks], request.report)
     tasks = [replace(task, report=page) for task, page in zip(tasks, pages, strict=True)]
-    outputs.check(plan.written(tasks, request.output, index), [*request.logs, *inputs])
+    made = [] if request.write_decisions is None else [Output(request.write_decisions, "--write-decisions")]
+    outputs.check([*plan.written(tasks, request.output, index), *made], [*request.logs, *inputs])
     if readings := conventions.in_words(recipe.station):
         notify(f"readings: {', '.join(readings)}")
     if recipe.settings.site is not None:
@@ -177,6 +190,11 @@ def filter_logs(request: Request, recipe: Recipe, debug: bool) -> int:
             progress("filtering", len(done), len(tasks))
     if index is not None:
         _write_index(done, index)
+    if request.write_decisions is not None:
+        _write_decisions(done, request.write_decisions)
+    if request.again is not None and done[0].failure is None and done[0].task.output != "-":
+        for difference in request.again.differences(done[0].task.output):
+            notify(difference)
     if request.summary == "json":
         try:
             _show_json(done)
@@ -186,6 +204,20 @@ def filter_logs(request: Request, recipe: Recipe, debug: bool) -> int:
         raise process.unsaid(unsaid, [o.task.output for o in done if o.failure is None and o.task.output != "-"])
     failures = [outcome.failure.exit_code for outcome in done if outcome.failure is not None]
     return failures[0] if len(done) == 1 and failures else int(bool(failures))
+
+
+def _inputs(request: Request, recipe: Recipe) -> list[str]:
+    """The files that are read beside the logs."""
+    by_hand = None if recipe.decisions is None else recipe.decisions.name
+    named = (name for name in (recipe.model, request.config, by_hand) if isinstance(name, str))
+    return [*(name for name in named if name not in (PACKAGED, NO_MODEL)), *again.inputs(request.again)]
+
+
+def _write_decisions(done: Sequence[Outcome], target: str) -> None:
+    """The decisions that were taken on all logs; of several, each line names its log."""
+    several = len(done) > 1
+    lines = [line if several else line._replace(station="") for outcome in done for line in outcome.decisions]
+    write_decisions(lines, target)
 
 
 def _targets(logs: Sequence[str], recipe: Recipe) -> dict[str, list[str]] | None:

@@ -188,6 +188,29 @@ def _with(options: tuple[Callable[[Any], Any], ...], function: F) -> F:
     return function
 
 
+def by_hand(function: F) -> F:
+    """Options of the engineer's decisions, and of a run that is made again."""
+    return _with(_BY_HAND, function)
+
+
+_BY_HAND: tuple[Callable[[Any], Any], ...] = (
+    click.option(
+        "--decisions", type=FILE, metavar="FILE.csv",
+        help="Decisions on readings by hand: component,from_s,to_s,use (or from_row,to_row), where use is bad (never "
+        "used), good (used whatever the editor thinks) or auto. Columns reason and station may follow.",
+    ),
+    click.option(
+        "--write-decisions", type=FILE, metavar="FILE.csv",
+        help="Write the outliers that were found as decisions, to be edited and given to --decisions.",
+    ),
+    click.option(
+        "--again", type=FILE, metavar="RUN.json|TRAJECTORY",
+        help="Run again what a trajectory, or the JSON beside it, says of how it was made, with its log or another; "
+        "what differs is said. Options on the command line win over it.",
+    ),
+)  # fmt: skip
+
+
 _TUNED: tuple[Callable[[Any], Any], ...] = (
     click.option(
         "--editing", type=click.Choice(EDITING), default=FilterSettings.editing,

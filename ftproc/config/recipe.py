@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ftproc.files import decisions
+from ftproc.files.decisions import Decisions
 from ftproc.files.options import Extract, parse_where, parse_widths
 from ftproc.methods import parameters
 from ftproc.settings import PACKAGED, Air, FilterSettings, Station
@@ -38,8 +40,8 @@ class Origin(NamedTuple):
 @dataclass(frozen=True)
 class Recipe:
     """What is done with every log. model: `packaged`, `none`, a path or a loaded model. units, columns, station,
-    keep_columns: as in `files.reading.logs.read`. widths, where, target: as the options of these names. origin: for the
-    metadata."""
+    keep_columns: as in `files.reading.logs.read`. widths, where, target: as the options of these names. decisions: on
+    readings, by hand. origin: for the metadata."""
 
     settings: FilterSettings = field(default_factory=FilterSettings)
     model: str | Model = PACKAGED
@@ -50,6 +52,7 @@ class Recipe:
     widths: str | Sequence[int] | None = None
     where: Sequence[str] = ()
     target: str = ""
+    decisions: Decisions | None = None
     origin: Origin = field(default_factory=Origin)
 
     @classmethod
@@ -60,6 +63,8 @@ class Recipe:
         known["gain_form"] = known.pop("weight_form", "noise") == "gain"
         air = {name: known[name] for name in ("temperature_c", "pressure_hpa") if name in known}
         known["refraction"] = Air(**air) if known.pop("refraction", False) else None
+        if isinstance(known.get("decisions"), str):
+            known["decisions"] = decisions.read(known["decisions"])
         known["settings"], known["station"] = _picked(FilterSettings, known), _picked(Station, known)
         found: Recipe = _picked(cls, known)
         return found

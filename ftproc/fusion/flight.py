@@ -17,6 +17,7 @@ from ftproc.derived.columns import with_derived
 from ftproc.errors import InputError, UsageError
 from ftproc.files import arrow
 from ftproc.files.conventions import CONVENTION
+from ftproc.files.decisions import Decisions
 from ftproc.files.reading.formats import content
 from ftproc.files.writing import geodesy
 from ftproc.fusion import findings, logs, results
@@ -25,7 +26,7 @@ from ftproc.fusion.estimation import engine, whole
 from ftproc.fusion.estimation.constants import Constants
 from ftproc.fusion.estimation.whole import Fused
 from ftproc.fusion.range_file import Instrument, Range
-from ftproc.quality import provenance, verdict
+from ftproc.quality import by_hand, provenance, verdict
 from ftproc.records import MeasurementLog, Trajectory
 from ftproc.settings import FilterSettings
 
@@ -55,13 +56,18 @@ def _unheard(done: int, most: int) -> None:
 
 
 def fuse(
-    range_: Range, settings: FilterSettings, model: Model | None = None, say: Callable[[int, int], None] = _unheard
+    range_: Range,
+    settings: FilterSettings,
+    model: Model | None = None,
+    say: Callable[[int, int], None] = _unheard,
+    decisions: Decisions | None = None,
 ) -> Flight:
-    """The flight that the stations of a range have seen. model: the correction of a single station's filter.
+    """The flight that the stations of a range have seen. model: the correction of a single station's filter. decisions:
+    by hand, on the readings of the stations.
 
     Raises InputError for logs that cannot be read or have nothing in common, UsageError for settings without sense.
     """
-    read = logs.read(range_.instruments)
+    read = logs.read(range_.instruments, decisions)
     if len(read) == 1:
         return _alone(range_, read[0], settings, model)
     seen, zero_s = logs.as_seen(range_.instruments, read)
@@ -75,18 +81,26 @@ def fuse(
             "and two angles, two lines of sight, or three ranges meet in a point. Check the places, the clocks and the "
             "conventions of the stations, or add one."
         ) from cause
-    return _flight(range_, read, fused, zero_s, settings)
+    return _flight(range_, read, fused, zero_s, settings, by_hand.Effects(decisions, settings.gate))
 
 
 def _flight(
-    range_: Range, read: Sequence[MeasurementLog], fused: Fused, zero_s: float, settings: FilterSettings
+    range_: Range,
+    read: Sequence[MeasurementLog],
+    fused: Fused,
+    zero_s: float,
+    settings: FilterSettings,
+    effects: by_hand.Effects,
 ) -> Flight:
     track = fused.track
     if not np.isfinite(track.state).all():
         raise InputError(f"{range_.path}: the fused filter diverged; check the places, the clocks and the conventions.")
     names = [station.name for station in fused.stations]
-    summary = summarize(fused, zero_s)
-    metadata = {**_metadata(range_, read, settings, summary, fused), "epoch": logs.epoch(read)}
+    edited = {name: results.edited(fused, s, read[s]) for s, name in enumerate(names)}
+    for s, (log, table) in enumerate(zip(read, edited.values(), strict=True)):
+        effects.add(log.by_hand, *results.residuals(table, log, fused.noise[s]))
+    summary = summarize(fused, zero_s, effects)
+    metadata = {**_metadata(range_, read, settings, summary, fused), "epoch": logs.epoch(read), **effects.metadata()}
     n = len(track.time_s)
     sigma, _ = unseen_motion.widened(track.state, track.sigma, np.full((n, 6), np.nan))
     path_sigma = kinematics.widened(track.state, track.path_sigma, track.sigma, sigma)
@@ -96,7 +110,6 @@ def _flight(
         arrow.table({"stations": results.stations_used(fused).astype(np.int64)}), path_sigma=path_sigma,
     )  # fmt: skip
     located = _located(trajectory, range_, settings)
-    edited = {name: results.edited(fused, s, read[s]) for s, name in enumerate(names)}
     return Flight(located, edited, results.biases(fused.constants, names), fused.constants, fused, zero_s)
 
 
@@ -161,10 +174,10 @@ def _from_origin(found: Trajectory, instrument: Instrument, frame: str) -> Traje
     return replace(found, state=state, sigma=sigma)
 
 
-def summarize(fused: Fused, zero_s: float) -> dict[str, Any]:
-    """The figures of a fused flight, JSON-serialisable; times as in the logs."""
+def summarize(fused: Fused, zero_s: float, effects: by_hand.Effects) -> dict[str, Any]:
+    """The figures of a fused flight, JSON-serialisable; times as in the logs. effects: of the decisions by hand."""
     time_s, jerk = fused.track.time_s, fused.jerk.mean(1)
-    said = findings.remarks(fused, zero_s)
+    said = [*findings.remarks(fused, zero_s), *verdict.by_hand_remarks(effects.summary())]
     trust = verdict.verdict(said)
     if trust["verdict"] == verdict.CONSISTENT:
         trust["not_shown"] = findings.NOT_SHOWN
@@ -190,6 +203,7 @@ def summarize(fused: Fused, zero_s: float) -> dict[str, Any]:
         "editing_converged": fused.settled,
         "notes": [remark.text for remark in said if remark.text not in trust["reasons"]],
         "trust": trust,
+        **effects.summary(),
     }
 
 

@@ -10,19 +10,23 @@ import numpy as np
 
 from ftproc.core.model.frames import wrap
 from ftproc.errors import InputError
+from ftproc.files.decisions import Decisions
 from ftproc.files.reading import logs
 from ftproc.fusion.estimation.events import Seen
 from ftproc.fusion.range_file import Instrument, Range
 from ftproc.quality import sanity
-from ftproc.records import FloatArray, MeasurementLog
+from ftproc.records import ACCEPTED, REJECTED, FloatArray, MeasurementLog
 
 HOUR_S = 3600.0
 ZONES = range(-14, 15)  # hours by which a clock of another time zone is off
 
 
-def read(instruments: Sequence[Instrument]) -> list[MeasurementLog]:
-    """The log of each. Raises InputError, UsageError."""
+def read(instruments: Sequence[Instrument], decisions: Decisions | None = None) -> list[MeasurementLog]:
+    """The log of each, with the decisions by hand on it. Raises InputError, UsageError."""
     found = [logs.read(each.log, **each.recipe.reading()) for each in instruments]
+    if decisions is not None:
+        decisions.check([each.name for each in instruments], same_clock=True)
+        found = [decisions.applied(log, each.name) for log, each in zip(found, instruments, strict=True)]
     for log in found:
         sanity.check(log)
     return found
@@ -35,7 +39,10 @@ def as_seen(instruments: Sequence[Instrument], found: Sequence[MeasurementLog]) 
     zero = min(float(log.time_s[0]) + shift for log, shift in zip(found, shifts, strict=True))
     seen = []
     for instrument, log, shift in zip(instruments, found, shifts, strict=True):
-        z = np.array(log.measurement)
+        z, accepted = np.array(log.measurement), np.zeros(log.measurement.shape, bool)
+        if log.by_hand is not None:
+            flags = log.by_hand.flags
+            z[flags == REJECTED], accepted = np.nan, flags == ACCEPTED
         if log.frame == "north-east-up":
             z[:, 1] = math.pi / 2 - z[:, 1]
         z[:, 1] = wrap(z[:, 1])
@@ -45,7 +52,7 @@ def as_seen(instruments: Sequence[Instrument], found: Sequence[MeasurementLog]) 
         stated = instrument.options.get("noise") or (None, None, None)
         time_s = np.array(log.time_s) + shift - zero
         place = instrument.place, instrument.axes
-        seen.append(Seen(instrument.name, time_s, z, *place, prior, np.array(stated, float)))
+        seen.append(Seen(instrument.name, time_s, z, *place, prior, np.array(stated, float), accepted))
     return seen, zero
 
 

@@ -22,6 +22,7 @@ from ftproc.fusion.estimation.events import CLOCK
 from ftproc.fusion.estimation.whole import Fused
 from ftproc.fusion.range_file import Instrument, Range
 from ftproc.methods.preparing import labels
+from ftproc.quality import by_hand
 from ftproc.records import COMPONENTS, MISSING, FloatArray, MeasurementLog, Trajectory
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def edited(fused: Fused, s: int, log: MeasurementLog) -> pa.Table:
     near = np.where(np.isfinite(station.measurement[:, 1]), station.measurement[:, 1], 0.0)
     cleaned[:, 1] = near + wrap(cleaned[:, 1] - near)
     residual, variance = fused.residual[s].copy(), fused.residual_variance[s]
-    label = labels(fused.weight[s], station.measurement)
+    label = by_hand.labelled(labels(fused.weight[s], station.measurement), log.by_hand)
     if log.frame == "north-east-up":
         cleaned[:, 1], residual[:, 1] = math.pi / 2 - cleaned[:, 1], -residual[:, 1]
         reading = np.where(np.isfinite(log.measurement[:, 1]), log.measurement[:, 1], math.pi)
@@ -85,6 +86,21 @@ def edited(fused: Fused, s: int, log: MeasurementLog) -> pa.Table:
     for c, name in enumerate(layout.OUTLIER):
         columns[name] = full(label[:, c], MISSING)
     return arrow.table(columns)
+
+
+def residuals(table: pa.Table, log: MeasurementLog, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n, 3) residuals and their sigmas of the readings of a log from its edited table; those of readings rejected by
+    hand, which the estimate has not seen, are about it. noise: (3,) 1-sigma."""
+    units = zip(COMPONENTS, ("m", "rad", "rad"), strict=True)
+    names = [(f"residual_{each}_{unit}", f"residual_sigma_{each}_{unit}") for each, unit in units]
+    residual, sigma, cleaned = (
+        np.column_stack([arrow.to_numpy(table.column(name))[log.row] for name in of])
+        for of in (*zip(*names, strict=True), layout.MEASUREMENT)
+    )
+    rejected = np.isnan(residual)
+    off = log.measurement - cleaned
+    off[:, 1] = wrap(off[:, 1])
+    return np.where(rejected, off, residual), np.where(rejected, noise, sigma)
 
 
 def edited_alone(found: Trajectory, log: MeasurementLog) -> pa.Table:

@@ -83,7 +83,7 @@ class Expected(NamedTuple):
 def look(readings: Readings, settings: FilterSettings, blindly: bool = False) -> Log:
     """What is known of a log before it is filtered: these papers leave their thresholds to the engineer. blindly: the
     method does not know the first state."""
-    time_s, measurement, _ = readings
+    time_s, measurement = readings.time_s, readings.measurement
     weight, sigma, start = trusted(readings, settings)
     steps = np.diff(time_s)
     interval = median(steps[steps > 0]) if (steps > 0).any() else 1.0

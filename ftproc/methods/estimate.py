@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core.by_hand import NOTHING, Accepted
 from ftproc.core.editing.lasting.faults import Faults
 from ftproc.core.filtering.records import FilterRun, Model, Observations
 from ftproc.core.filtering.smoother import SmootherRun
@@ -25,11 +26,12 @@ MOST_INTERVALS = 250_000  # between neighbours, for a typical one to be found am
 class Readings(NamedTuple):
     """A log as the methods see it: time_s (n,) from zero, measurement (n, 3) with NaN where missing, and which
     components' noise cannot be had from the log, with what is assumed for it: (3,) 1-sigma m, rad, rad, NaN where
-    the log tells."""
+    the log tells; and the times of the readings of each component that are accepted by hand."""
 
     time_s: FloatArray
     measurement: FloatArray
     assumed_sigma: FloatArray
+    accepted: Accepted = NOTHING
 
     def unedited(self) -> Observations:
         """The log with every reading used."""
@@ -45,12 +47,15 @@ class Recording:
     """A whole log, of which the methods ask for one stretch at a time; its arrays may lie on a disk.
 
     time_s: (n,). measurement: (n, 3). assumed_sigma: as in `Readings`. absent: components that are missing throughout.
+    rejected: (n, 3) readings that are not to be used, if there are any. accepted: as in `Readings`.
     """
 
     time_s: FloatArray
     measurement: FloatArray
     assumed_sigma: FloatArray
     absent: tuple[int, ...] = ()
+    rejected: NDArray[np.bool_] | None = None
+    accepted: Accepted = NOTHING
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -58,11 +63,13 @@ class Recording:
     def part(self, rows: slice) -> Readings:
         """The readings of a stretch, with times from the log's beginning."""
         measurement = np.clip(self.measurement[rows], -FARTHEST, FARTHEST)
+        if self.rejected is not None:
+            measurement[self.rejected[rows]] = np.nan
         for c in self.absent:
             measurement[:, c] = ASSUMED_READING[c]
         time_s = np.asarray(self.time_s[rows]) - float(self.time_s[0])
         forget(self.time_s, self.measurement)
-        return Readings(time_s, np.ascontiguousarray(measurement), self.assumed_sigma)
+        return Readings(time_s, np.ascontiguousarray(measurement), self.assumed_sigma, self.accepted)
 
     def spans(self) -> list[slice]:
         """SPANS stretches of SPAN samples, spread evenly: what noise and usual jerk of a long log are found from."""

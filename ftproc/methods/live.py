@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ftproc.core.by_hand import NOTHING, Accepted
 from ftproc.core.editing.two_pass import Known
 from ftproc.core.filtering.initialization import find_starts, first_state
 from ftproc.core.filtering.records import FilterRun, Model
@@ -27,10 +28,10 @@ BLOCK = 4096  # samples that are taken at once
 HISTORY = 256  # samples before a stretch that go with it: the network looks back
 
 
-def editor(settings: FilterSettings) -> LiveEditor:
-    """An editor that has seen nothing, with these settings."""
+def editor(settings: FilterSettings, accepted: Accepted = NOTHING) -> LiveEditor:
+    """An editor that has seen nothing, with these settings. accepted: see `Known`."""
     sigma = np.array(settings.noise or (None, None, None), float)  # None becomes NaN
-    known = Known(sigma, settings.jerk_psd_m2ps5, settings.gate)
+    known = Known(sigma, settings.jerk_psd_m2ps5, settings.gate, accepted)
     if settings.editing == "forward":
         return LiveEditor(known, window=Gating(settings.gate, settings.max_patch_s, settings.gain_form).window)
     return LiveEditor(known, settings.lag_s)
@@ -40,7 +41,7 @@ def parts(record: Recording, settings: FilterSettings, block: int = BLOCK) -> It
     """The estimate of a log by stretches; whatever their length, it is the same. Samples before the track is confirmed
     have none. Raises ValueError when it never is."""
     record = replace(record, absent=())  # whether a component is missing throughout shows only at the end
-    live, history = editor(settings), list[Published]()
+    live, history = editor(settings, record.accepted), list[Published]()
     for rows in chunks(len(record), block):
         readings = record.part(rows)
         found = live.push(readings.time_s, readings.measurement)
@@ -77,7 +78,7 @@ def _last(found: Sequence[Published], count: int) -> Published:
 
 def whole(readings: Readings, settings: FilterSettings) -> Estimate:
     """The estimate of a whole log. Errors as in `parts`."""
-    record = Recording(*readings)
+    record = Recording(*readings[:3], accepted=readings.accepted)
     (part,) = parts(record, settings, len(record))
     return part.estimate
 

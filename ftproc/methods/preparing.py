@@ -69,7 +69,7 @@ def trusted(readings: Readings, settings: FilterSettings) -> Trusted:
     Only the head of the log is edited in two passes, because a recursion cannot repair a wrong start; after it the
     weights are those of the screening, and serve to find noise and jerk.
     """
-    time_s, measurement, _ = readings
+    time_s, measurement = readings.time_s, readings.measurement
     weight, _, sigma, _ = two_pass.screen(time_s, measurement, two_pass.rounding_sigma(measurement))
     known = what_is_known(readings, settings)
     start = None
@@ -122,7 +122,7 @@ def what_is_known(readings: Readings | Recording, settings: FilterSettings) -> t
     """What need not be found from the log: what the user has specified, else what is assumed."""
     stated = np.array(settings.noise or (None, None, None), float)  # None becomes NaN
     sigma = np.where(np.isnan(stated), readings.assumed_sigma, stated)
-    return two_pass.Known(sigma, settings.jerk_psd_m2ps5, settings.gate)
+    return two_pass.Known(sigma, settings.jerk_psd_m2ps5, settings.gate, readings.accepted)
 
 
 def motions(settings: FilterSettings) -> tuple[str, ...]:

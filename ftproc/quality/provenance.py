@@ -26,7 +26,18 @@ if TYPE_CHECKING:
 
 _LATEST = 11  # digits of SOURCE_DATE_EPOCH
 #: The metadata that decide on a result.
-DECISIVE = ("version", "versions", "command", "options", "method", "log", "log_sha256", "model_sha256", "decisions")
+DECISIVE = (
+    "version",
+    "versions",
+    "command",
+    "options",
+    "method",
+    "log",
+    "log_sha256",
+    "model_sha256",
+    "stations",
+    "decisions",
+)
 
 
 def describe(
@@ -103,6 +114,7 @@ def begun() -> dict[str, Any]:
         "date_utc": date_utc(),
         "command": None,
         "options": {},
+        "decisions": None,
     }
 
 

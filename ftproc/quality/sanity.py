@@ -5,11 +5,22 @@ from __future__ import annotations
 
 import numpy as np
 
+from ftproc.core.by_hand import NOTHING, Accepted
 from ftproc.core.components import totals
 from ftproc.errors import InputError, UsageError, row_named
 from ftproc.methods.estimate import Recording
 from ftproc.order_statistics import median
-from ftproc.records import COMPONENTS, FloatArray, IntArray, MeasurementLog, chunks, forget, thinned
+from ftproc.records import (
+    ACCEPTED,
+    COMPONENTS,
+    REJECTED,
+    FloatArray,
+    IntArray,
+    MeasurementLog,
+    chunks,
+    forget,
+    thinned,
+)
 from ftproc.settings import EDITING, LEAST_NOISE, MOTIONS, FilterSettings
 
 FARTHEST_M = 1e12  # with half of all ranges beyond, the column or its unit is wrong
@@ -25,9 +36,16 @@ ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of a component with fewer
 
 def recording(log: MeasurementLog) -> Recording:
     """The log as the methods take it. Raises InputError as `check`."""
-    count = check(log)
+    count, rejected, accepted = check(log), None, NOTHING
+    if log.by_hand is not None:
+        flags, times = log.by_hand.flags, log.time_s - log.time_s[0]
+        rejected, accepted = flags == REJECTED, Accepted(tuple(times[flag == ACCEPTED] for flag in flags.T))
+        count = count - totals(rejected)
     assumed = np.where(count < FEWEST_READINGS, ASSUMED_SIGMA, np.nan)
-    return Recording(log.time_s, log.measurement, assumed, tuple(np.flatnonzero(count == 0).tolist()))
+    absent = tuple(np.flatnonzero(count == 0).tolist())
+    if len(absent) == len(COMPONENTS):
+        raise InputError(f"{log.name}: every reading is rejected by hand; check the decisions.")
+    return Recording(log.time_s, log.measurement, assumed, absent, rejected, accepted)
 
 
 def check_settings(settings: FilterSettings) -> None:

@@ -14,7 +14,18 @@ from ftproc.methods.estimate import ASSUMED_READING, typical_interval
 from ftproc.order_statistics import median
 from ftproc.quality import consistency, verdict
 from ftproc.quality.faults import FaultStatistics, clock_set_back
-from ftproc.records import COMPONENTS, GOOD, ISOLATED, MISSING, PATCH, FlagArray, FloatArray, MeasurementLog
+from ftproc.records import (
+    ACCEPTED,
+    COMPONENTS,
+    GOOD,
+    ISOLATED,
+    MISSING,
+    PATCH,
+    REJECTED,
+    FlagArray,
+    FloatArray,
+    MeasurementLog,
+)
 from ftproc.scoring.figures import changes
 
 if TYPE_CHECKING:
@@ -25,7 +36,7 @@ if TYPE_CHECKING:
 UNITS = ("m", "rad", "rad")
 GAP_INTERVALS = 3.0  # median intervals that make a gap
 MOST_KEPT = 250_000  # samples whose sigmas are kept; of more, the largest of every few
-_LABELS = {"good": GOOD, "isolated": ISOLATED, "patch": PATCH, "missing": MISSING}
+_LABELS = {"isolated": ISOLATED, "patch": PATCH, "missing": MISSING}
 
 
 class RunStatistics:
@@ -225,7 +236,7 @@ class _Component:
 
     def __init__(self, every: int) -> None:
         self.every = every
-        self.labels = np.zeros(4, int)
+        self.labels = np.zeros(6, int)
         self.longest_s, self.patch_from = 0.0, np.nan  # the longest patch, and the start of one that may continue
         self.squares, self.count = 0.0, 0
         self.innovation_sigma: list[FloatArray] = []
@@ -237,9 +248,9 @@ class _Component:
         self.innovation_sigma.append(sigma[:: self.every][tested[:: self.every]])
 
     def add_labels(self, time_s: FloatArray, label: FlagArray) -> None:
-        """Missing readings inside a patch do not end it, nor does the end of a part."""
-        self.labels += np.bincount(label, minlength=4)
-        there = np.flatnonzero(label != MISSING)
+        """Missing readings inside a patch do not end it, nor do those rejected by hand, nor the end of a part."""
+        self.labels += np.bincount(label, minlength=6)
+        there = np.flatnonzero((label != MISSING) & (label != REJECTED))
         if not there.size:
             return
         inside = np.r_[False, label[there] == PATCH, False]
@@ -251,8 +262,11 @@ class _Component:
         self.patch_from = starts[-1] if len(edges) and edges[-1, 1] == len(there) else np.nan
 
     def counts(self) -> dict[str, Any]:
+        """How many readings have which label; those accepted by hand are good."""
         counts = {name: int(self.labels[label]) for name, label in _LABELS.items()}
-        return {**counts, "longest_patch_s": self.longest_s}
+        good, rejected, accepted = (int(self.labels[label]) for label in (GOOD, REJECTED, ACCEPTED))
+        by_hand = {"rejected_by_hand": rejected, "accepted_by_hand": accepted} if rejected or accepted else {}
+        return {"good": good + accepted, **counts, **by_hand, "longest_patch_s": self.longest_s}
 
     def consistency(self, noise_sigma: float) -> dict[str, Any]:
         sigmas = np.concatenate(self.innovation_sigma)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from ftproc.files.moments import Moments
-from ftproc.quality import consistency, faults
+from ftproc.quality import by_hand, consistency, faults
 
 CONSISTENT, SUSPECT, UNRELIABLE = "consistent", "suspect", "unreliable"
 LEVELS = (CONSISTENT, SUSPECT, UNRELIABLE)  # from good to bad
@@ -42,6 +42,7 @@ def remarks(s: Mapping[str, Any]) -> list[Remark]:
     found = [*_observability(s), *_sigmas(s), *_editing(s)]
     found += [Remark(SUSPECT, text) for text in faults.suspicious(s)]
     found += [Remark(CONSISTENT, text) for text in faults.allowed_for(s)]
+    found += by_hand_remarks(s)
     correlation = max(part["noise_correlation"] for part in s["components"].values())
     if correlation > 0:
         text = f"the noise is correlated between samples (coefficient up to {correlation:.2f}); the sigmas allow for it"
@@ -63,6 +64,12 @@ def remarks(s: Mapping[str, Any]) -> list[Remark]:
             found.append(Remark(SUSPECT, text))
         found.append(Remark(CONSISTENT, f"{kind} correction {size}; {outside}"))
     return found
+
+
+def by_hand_remarks(s: Mapping[str, Any]) -> list[Remark]:
+    """On the decisions by hand in a summary."""
+    contradicted = [Remark(SUSPECT, text) for text in by_hand.contradicted(s)]
+    return [*contradicted, *(Remark(CONSISTENT, text) for text in by_hand.in_words(s))]
 
 
 def verdict(found: Sequence[Remark], too_wide: Sequence[str] = ()) -> dict[str, Any]:

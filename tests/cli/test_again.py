@@ -54,3 +54,73 @@ def test_the_jerk_profile_has_a_place_of_its_own(run, flight):
     assert len(found["jerk_profile"]["psd_m2ps5"]) == 1 or found["jerk_profile"]["knot_s"] > 0
     assert found["settings"]["jerk_psd_m2ps5"] is None
     assert '"psd_m2ps5": [ ' in text, "a list of numbers is one line"
+
+
+def same(one: str, other: str) -> bool:
+    return Path(one).read_bytes() == Path(other).read_bytes()
+
+
+@pytest.mark.parametrize("run_before", ["a.csv", "a.json", "summary.json"])
+def test_again_gives_the_same_bytes(run, flight, run_before, monkeypatch):
+    """On another day too, from the trajectory, the JSON beside it, or the printed summary; beside the first run."""
+    Path("radar.toml").write_text("[azimuth]\nbias_mrad = 2\n[filter]\nsmooth = true\n")
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "0")
+    first = run(
+        "filter", flight, "--config", "radar.toml", "--noise", "auto,2e-4,auto", "-o", "a.csv", "--summary", "json"
+    )
+    assert first.code == 0, first.err
+    Path("summary.json").write_text(first.out)
+    monkeypatch.delenv("SOURCE_DATE_EPOCH")
+    Path("radar.toml").unlink()  # what it said is in the metadata
+    second = run("filter", "--again", run_before)
+    assert second.code == 0, second.err
+    output = f"{Path(flight).stem}.again.trajectory.csv"
+    assert f"{output} is the same as a.csv, to the last byte" in second.err
+    assert same("a.csv", output)
+    assert same("a.json", output.replace(".csv", ".json"))
+
+
+def test_again_with_decisions_needs_their_file_no_more(run, flight):
+    Path("d.csv").write_text("component,from_row,to_row,use\nrange,3,5,bad\n")
+    assert run("filter", flight, "--decisions", "d.csv", "-o", "a.parquet").code == 0
+    found = metadata("a.parquet")["decisions"]
+    assert found["sha256"] == hashlib.sha256(Path("d.csv").read_bytes()).hexdigest()
+    assert found["lines"][0] | {"line": 2, "from_row": 3, "to_row": 5, "use": "bad"} == found["lines"][0]
+    Path("d.csv").unlink()
+    assert run("filter", "--again", "a.parquet", "-o", "b.parquet").code == 0
+    assert same("a.parquet", "b.parquet")
+
+
+def test_again_says_what_differs(run, flight, monkeypatch):
+    """The version, the log, options that win, and the estimate."""
+    assert run("filter", flight, "-o", "a.parquet").code == 0
+    monkeypatch.setattr(provenance, "__version__", "9.9")
+    second = run("filter", "--again", "a.parquet", "-o", "b.parquet")
+    assert "ftproc: version of ftproc: was 0.1.0, is 9.9" in second.err
+    assert "every number of the estimate is the same" in second.err
+    log = Path(flight).read_text().splitlines()
+    Path(flight).write_text("\n".join([*log[:-1], ""]))
+    third = run("filter", "--again", "a.parquet", "--smooth", "-o", "c.parquet")
+    assert third.code == 0, third.err
+    assert "content of the log (SHA-256): was " in third.err
+    assert "options: was none, is smooth True" in third.err
+    assert f"command: was ftproc filter {flight}, is ftproc filter {flight} --smooth" in third.err
+    assert "rows: were" in third.err
+
+
+def test_again_overwrites_nothing_and_names_what_it_cannot_read(run, flight):
+    assert run("filter", flight, "-o", "a.parquet").code == 0
+    refused = run("filter", "--again", "a.parquet", "-o", "a.parquet")
+    assert refused.code == 1
+    assert "a.parquet" in refused.err
+    Path("other.json").write_text('{"program": "ftproc"}')
+    Path("bad.json").write_text("{")
+    for name, sentence in (
+        ("other.json", "does not say with which options it was made"),
+        ("bad.json", "this is not JSON"),
+        ("none.parquet", "no such file"),
+    ):
+        assert sentence in run("filter", "--again", name).err
+    assert "give one of the two" in run("filter", "--again", "a.parquet", "--config", "x.toml").err
+    Path(flight).unlink()
+    assert "no such file" in run("filter", "--again", "a.parquet").err

@@ -12,15 +12,18 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
 from ftproc.batch import plan
-from ftproc.cli import process
-from ftproc.cli.command import ARGUMENTS, WHERE_TO, stated, typed
+from ftproc.cli import again, process
+from ftproc.cli.command import stated
 from ftproc.cli.progress import Progress
 from ftproc.correction import model_file
 from ftproc.errors import InputError, UsageError, failure, printable
-from ftproc.files import layout, remote
+from ftproc.files import decisions, layout, remote
 from ftproc.files.writing import atomic, maps, outputs, tables, trajectories
+from ftproc.files.writing.decisions import write as write_decisions
+from ftproc.files.writing.outputs import Output
 from ftproc.fusion import flight, results, summary
 from ftproc.fusion.range_file import Range, load
 from ftproc.fusion.range_template import template
@@ -41,9 +44,15 @@ MEANT = (
     "gate",
     "ecef",
     "derived",
+    "decisions",
+    "write_decisions",
+    "again",
     "write_calibration",
     "write_config",
 )
+
+#: Those on which the trajectory depends.
+OPTIONS = ("fuse", "smooth", "jerk", "gate", "ecef", "decisions")
 
 
 def range_file(ctx: click.Context) -> str:
@@ -55,8 +64,9 @@ def range_file(ctx: click.Context) -> str:
 
 def fuse_logs(ctx: click.Context, debug: bool) -> int:
     """Fuse, write, and print the summary; the exit code. Raises UsageError, and errors of the outputs."""
-    given = stated(ctx)
-    _refuse_idle(ctx, given)
+    before, asked = ctx.meta.get(again.AGAIN), stated(ctx)
+    given = asked if before is None else {**before.options, **asked}
+    _refuse_idle(ctx, asked)
     range_ = load(given["fuse"])
     settings = FilterSettings(
         smooth=given.get("smooth", False),
@@ -65,7 +75,8 @@ def fuse_logs(ctx: click.Context, debug: bool) -> int:
         ecef=given.get("ecef", False),
         derived=given.get("derived", False),
     )
-    usual = f"{Path(given['fuse']).stem}.trajectory.parquet"
+    usual = f"{Path(given['fuse']).stem}{'' if before is None else '.again'}.trajectory.parquet"
+    by_hand = _decisions(given, {} if before is None else before.decided(asked))
     output = named = given.get("output") or usual
     if Path(output).is_dir() or output.endswith("/"):
         output = remote.within(output, usual)
@@ -73,22 +84,24 @@ def fuse_logs(ctx: click.Context, debug: bool) -> int:
     places = results.places(range_, output, _folder(given.get("write_calibration")))
     page = _page(output, given.get("report"))
     written = [*outputs.trajectory(output, made=output != named), *results.written(places)]
-    outputs.check([*written, *plan.pages_written([page], None)], range_.inputs)
+    if given.get("write_decisions"):
+        written.append(Output(given["write_decisions"], "--write-decisions"))
+    inputs = [*range_.inputs, *([] if by_hand is None else [by_hand.name]), *again.inputs(before)]
+    outputs.check([*written, *plan.pages_written([page], None)], inputs)
     began = time.monotonic()
     try:
         with Progress() as progress:
             model = model_file.named(PACKAGED) if len(range_.instruments) == 1 else None
-            found = flight.fuse(range_, settings, model, functools.partial(progress, "fusing"))
+            found = flight.fuse(range_, settings, model, functools.partial(progress, "fusing"), by_hand)
     except InputError as error:
         if debug:
             click.echo(failure(error).trace, err=True)
         click.echo(f"ftproc: {error}", err=True)
         return 1
-    words = typed(ctx, ctx.meta[ARGUMENTS], WHERE_TO)
+    words = again.words(ctx, before)
     command = shlex.join(["ftproc", "filter", *(word for each in words.values() for word in each)])
-    options = {name: given[name] for name in ("fuse", "smooth", "jerk", "gate", "ecef") if name in given}
-    known = {"command": command, "options": options}
-    metadata = provenance.completed(found.trajectory.metadata, known, {})
+    known = {"command": command, "options": {name: given[name] for name in OPTIONS if name in given}}
+    metadata = provenance.completed(found.trajectory.metadata, known, {} if before is None else before.metadata)
     found = replace(found, trajectory=replace(found.trajectory, metadata=metadata))
     with atomic.guarding(range_.inputs):
         _write(found, output, places, range_)
@@ -96,6 +109,11 @@ def fuse_logs(ctx: click.Context, debug: bool) -> int:
             from ftproc.report.fused import write
 
             write(found, page)
+    if given.get("write_decisions"):
+        _write_decisions(found, by_hand, given["write_decisions"])
+    if before is not None and output != "-":
+        for difference in before.differences(output):
+            click.echo(f"ftproc: {difference}", err=True)
     own = [f"{folder.rstrip('/')}/" for folder in places.folders]
     files = [name for name in (output, places.biases, *own, page) if name is not None]
     try:
@@ -103,6 +121,24 @@ def fuse_logs(ctx: click.Context, debug: bool) -> int:
     except OSError as error:
         raise process.unsaid(error, [name for name in files if name != "-"]) from error
     return 0
+
+
+def _decisions(given: Mapping[str, Any], before: Mapping[str, decisions.Decisions]) -> decisions.Decisions | None:
+    """Those of the run that is made again, or of the file named, if there are any. Raises UsageError."""
+    if "decisions" in before:
+        return before["decisions"]
+    return decisions.read(given["decisions"]) if given.get("decisions") else None
+
+
+def _write_decisions(found: flight.Flight, by_hand: decisions.Decisions | None, target: str) -> None:
+    """Those by hand, and those that were taken on the readings of all stations."""
+    lines = [] if by_hand is None else list(by_hand.lines)
+    for name, table in found.edited.items():
+        time_s = table.column("time_s").to_numpy()
+        order = np.argsort(time_s, kind="stable")
+        columns = np.column_stack([table.column(each).to_numpy() for each in layout.OUTLIER])
+        lines += decisions.taken(time_s[order], table.column("row").to_numpy()[order], columns[order], name)
+    write_decisions(lines, target)
 
 
 def _refuse_idle(ctx: click.Context, given: Mapping[str, Any]) -> None:

@@ -42,11 +42,14 @@ PRECISION, COARSER, DIFFERENCES = 1e-11, 10.0, 24  # of the largest reading, fro
 # step to be one; and differences between neighbouring values, the smallest, from which it is found
 
 
-def without_copies(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatArray, KindArray]:
+def without_copies(
+    time_s: FloatArray, measurement: FloatArray, genuine: NDArray[np.bool_] | None = None
+) -> tuple[FloatArray, KindArray]:
     """The readings (n, 3), missing where they were not measured, and (n, 3) HELD, INTERPOLATED or COMPUTED there, else
     MEASURED.
 
     time_s (n,), measurement (n, 3). Repeats of a component that is stuck now and then are outliers, not copies.
+    genuine: (n, 3) readings that are no copies whatever they look like.
     """
     z, kind = measurement.copy(), np.zeros(measurement.shape, np.uint8)
     quiet, moving = np.zeros(z.shape, bool), np.zeros(len(z), bool)
@@ -65,6 +68,8 @@ def without_copies(time_s: FloatArray, measurement: FloatArray) -> tuple[FloatAr
         moving[seen] |= moves
     kind[quiet & moving[:, None]] = COMPUTED  # a target that rests may be seen without any noise
     z[kind > 0] = np.nan
+    if genuine is not None:
+        z[genuine], kind[genuine] = measurement[genuine], MEASURED
     return z, kind
 
 

@@ -41,7 +41,7 @@ class Record(NamedTuple):
     """What stays the same while decisions are made: the log, the readings that may be good at all (n, 3), what
     screening trusts (n, 3) and the noise 1-sigma (3,) that it saw, what the user has fixed, the gate in sigmas, the
     1-sigma (3,) that rounding alone makes, what work is left for alternatives, and how the noise of single readings
-    differs, if it does. white: whether the noise is taken for white and even."""
+    differs, if it does. white: whether the noise is taken for white and even. accepted: (n, 3), by hand."""
 
     time_s: FloatArray
     measurement: FloatArray
@@ -54,6 +54,11 @@ class Record(NamedTuple):
     work: Work
     uneven: Uneven | None = None
     white: bool = False
+    accepted: NDArray[np.bool_] | None = None
+
+    def with_accepted(self, weight: FloatArray) -> FloatArray:
+        """Weights (n, 3) with the readings used that are good by hand."""
+        return weight if self.accepted is None else np.where(self.accepted, 1.0, weight)
 
     def weighted(self, weight: FloatArray) -> Observations:
         """The log with weights (n, 3)."""
@@ -64,6 +69,7 @@ class Record(NamedTuple):
         return self._replace(
             time_s=self.time_s[span], measurement=self.measurement[span], possible=self.possible[span],
             screened=self.screened[span], uneven=None if self.uneven is None else self.uneven.part(span),
+            accepted=None if self.accepted is None else self.accepted[span],
         )  # fmt: skip
 
 
@@ -112,7 +118,7 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
         noise = model.reading_variance
         good = outlier_chain.classify(*last.residuals, noise, rates, record.gate)
         mean += (good - mean) / max(rounds - TUNING_ROUNDS + 1, 1)
-        decided = _keep_most(((mean > 0.5) & record.possible).astype(float), record.screened)
+        decided = record.with_accepted(_keep_most(np.where(record.possible, mean > 0.5, 0.0), record.screened))
         settled = int((decided != weight).sum()) <= STILL * weight.size and (rounds > 0 or not tune_first)
         weight = decided
         rounds += 1

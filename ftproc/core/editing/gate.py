@@ -36,6 +36,7 @@ ZERO_AT = 1.5  # of the gate C: no weight from k1 = 6 sigma on
 JUMP = 4.0  # sigmas of a difference of two readings that make a jump
 SETTLE = 2  # samples within the gate, after the jump back, that end a patch
 FLOOR = 1e-3  # weights below it are zero
+BY_HAND = 2.0  # the weight in the log of a reading that is used whatever the gate says
 DIVERGED = 100.0  # ranges that the target would fly within the longest patch
 
 
@@ -105,6 +106,10 @@ def _decide(f: Filter, sample: Sample, gate: Gate, sigma: FloatArray) -> bool:
     for i in range(3):
         used[i] = 0.0
         if not math.isfinite(e[i]) or sample.weight[i] <= 0:
+            continue
+        if sample.weight[i] == BY_HAND:
+            used[i] = 1.0
+            gate.in_patch[i] = gate.rejected[i] = gate.inside[i] = 0.0
             continue
         u = abs(e[i]) / sigma[i]
         step = e[i] - gate.residual[i]
@@ -177,7 +182,8 @@ def _diverged(f: Filter, range_m: float, longest_patch_s: float) -> bool:
 
 @part
 def _gated(f: Filter, sample: Sample, gates: Gates, row: Row) -> tuple[float, bool]:
-    """The update of a sample through the gate; a component whose weight is zero in the log is barred."""
+    """The update of a sample through the gate; a component whose weight is zero in the log is barred, and one of
+    weight BY_HAND is used."""
     gate = gates[0]
     unscented.linearise(f)
     ukf.innovate(sample, f)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core.by_hand import NOTHING, Accepted
 from ftproc.core.editing import jump_patches, outlier_chain, screening
 from ftproc.core.editing.alternatives import WORK, Work
 from ftproc.core.editing.copies import rounding_step, without_copies
@@ -64,11 +65,13 @@ LASTING_ROUNDS = 4  # of looking for faults that last: where one is taken out, a
 
 class Known(NamedTuple):
     """What the user has specified: noise 1-sigma (3,) m, rad, rad, NaN where it is to be found; jerk_psd m^2/s^5, None
-    where it is to be found; the gate, in sigmas, beyond which a lone reading is called an outlier."""
+    where it is to be found; the gate, in sigmas, beyond which a lone reading is called an outlier; the readings that
+    are good by hand."""
 
     sigma: FloatArray
     jerk_psd: float | None
     gate: float
+    accepted: Accepted = NOTHING
 
 
 class Edited(NamedTuple):
@@ -163,7 +166,8 @@ def edit(
     tell whether the noise is uneven or correlated: it is taken for white.
     Raises ValueError when a component has no reading that agrees with its neighbours.
     """
-    measurement, copied = without_copies(time_s, measurement)
+    accepted = known.accepted.of(time_s, measurement)
+    measurement, copied = without_copies(time_s, measurement, accepted)
     work = Work(len(time_s), 0 if live else WORK)  # a window that moves on is soon looked at again
     decided = partial(_decided, time_s, known=known, segment_of=segment_of, work=work, white=short)
     banned = np.zeros(measurement.shape, bool)
@@ -190,6 +194,7 @@ def edit(
         doubtful = [step for step in doubtful if step.component != CLOCK]
     if not record.fixed.jerk and not live:  # at the end of a window a patch may look like motion
         decision = with_motion(record, decision)
+    decision = decision._replace(weight=np.where(accepted, 1.0, decision.weight))
     if segment_of is None and not short:
         decision = allow_for_colour(record, decision)
     log = record.weighted(decision.weight)
@@ -228,14 +233,17 @@ def _decided(
     jerk_psd = known.jerk_psd
     rounding = rounding_sigma(measurement)
     screened, jumps_only, sigma, exact = screen(time_s, measurement, rounding)
+    accepted = known.accepted.of(time_s, measurement)
     possible = np.isfinite(measurement) & ~banned & ~stuck_readings(measurement, sigma)
+    possible |= accepted & np.isfinite(measurement)
     possible[:, 0] &= measurement[:, 0] > NO_RANGE_M  # no target is at the station, or behind it
     fixed = Fixed(np.isfinite(known.sigma) | exact | (segment_of is not None), jerk_psd is not None)
     coarse = np.where(rounding > COARSE * sigma, np.sqrt(12) * rounding, 0.0)
     uneven = uneven_noise.repeated(measurement, coarse)
     record = Record(
-        time_s, measurement, possible, screened * possible, sigma, fixed, known.gate, rounding, work, uneven, white
-    )
+        time_s, measurement, possible, screened * possible, sigma, fixed, known.gate, rounding, work, uneven, white,
+        accepted,
+    )  # fmt: skip
     begin = partial(_first, segment_of=segment_of, known=known)
     record, decision = with_less_noise(begin(record, record.screened), begin)
     found = _examined(record, decision, known)
@@ -249,6 +257,7 @@ def _decided(
 
 def _first(record: Record, weight: FloatArray, segment_of: Model | None, known: Known) -> tuple[Record, Decision]:
     """The decisions that are made from these weights (n, 3) on, and from the noise of the record."""
+    weight = record.with_accepted(weight)
     log, noise = record.weighted(weight), np.where(np.isfinite(known.sigma), known.sigma, record.sigma) ** 2
     jerk_psd = known.jerk_psd
     model = segment_of or Model(noise, isotropic(first_jerk(log, noise) if jerk_psd is None else jerk_psd))

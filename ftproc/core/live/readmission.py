@@ -27,13 +27,14 @@ MARGIN = 5.0  # by which the log-probability of other decisions must be better
 
 class Open(NamedTuple):
     """What is open: the log with the decisions (n, 3) so far, which of its readings are possible (n, 3), the model, the
-    start, and the rates (3, 3) of outliers."""
+    start, the rates (3, 3) of outliers, and which readings are good by hand (n, 3)."""
 
     log: Observations
     possible: NDArray[np.bool_]
     model: Model
     start: Start
     rates: FloatArray
+    accepted: NDArray[np.bool_] | bool = False
 
 
 def settled(case: Open, gate: float) -> Open:
@@ -43,7 +44,7 @@ def settled(case: Open, gate: float) -> Open:
         good = outlier_chain.classify(
             smoothed.residual, smoothed.residual_variance, case.model.reading_variance, case.rates.copy(), gate
         )
-        weight = ((good > 0.5) & case.possible).astype(float)
+        weight = (((good > 0.5) & case.possible) | case.accepted).astype(float)
         if (weight == case.log.weight).all():
             break
         case = case._replace(log=case.log._replace(weight=weight))

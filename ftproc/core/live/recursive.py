@@ -96,10 +96,12 @@ class GatedWindow(Window):
         self.reacquired += [low + start.sample for start in recursion.starts]
 
     def _gateable(self, low: int) -> FloatArray:
-        """(m, 3) one for the readings from a sample on that the gate may take."""
-        found = np.isfinite(self.measurement[low:])
-        found[:, 0] &= self.measurement[low:, 0] > 0
-        return found.astype(float)
+        """(m, 3) one for the readings from a sample on that the gate may take, BY_HAND for those that it must."""
+        readings = self.measurement[low:]
+        found = np.isfinite(readings)
+        found[:, 0] &= readings[:, 0] > 0
+        accepted = self.known.accepted.of(self.time_s[low:], readings)
+        return np.where(accepted, gate.BY_HAND, found.astype(float))
 
     def in_doubt(self) -> bool:
         return self.learns and super().in_doubt()

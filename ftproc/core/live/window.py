@@ -140,6 +140,7 @@ class Window:
         kept["weight"][new], kept["times"][new], kept["late"][new] = OPEN, *typical(*uneven)
         kept["times"][samples], kept["late"][samples] = uneven
         kept["weight"][~kept["possible"]] = 0.0
+        kept["weight"][self.known.accepted.of(self.time_s, self.measurement)] = 1.0
         starts = [start._replace(sample=int(samples[start.sample])) for start in found.starts]
         if len(new):
             log, start = self._observed(slice(0, len(self))), starts[-1]
@@ -201,7 +202,7 @@ class Window:
         """Keep the next readings, undecided where they may be good at all: no target is at the station, or behind it,
         and none stands still to the last digit. Samples and component of the readings that were repeated so."""
         n, m = len(self), len(time_s)
-        possible = np.isfinite(measurement)
+        accepted, possible = self.known.accepted.of(time_s, measurement), np.isfinite(measurement)
         possible[:, 0] &= measurement[:, 0] > 0
         self.kept.append(
             time_s=time_s, measurement=measurement, possible=possible, weight=np.zeros((m, 3)),
@@ -216,6 +217,7 @@ class Window:
                 repeated.append((np.flatnonzero(np.isfinite(self.measurement[: n + k + 1, c]))[-run:], c))
             self.kept["possible"][n + k, c] = False
         self.kept["weight"][n:][self.kept["possible"][n:]] = OPEN
+        self.kept["weight"][n:][accepted] = 1.0
         return repeated
 
     def _bar(self, repeated: list[tuple[IntArray, int]]) -> None:
@@ -253,7 +255,8 @@ class Window:
         log, gate = self._observed(near), self.known.gate
         scales = scales_of(log, self.model.noise_variance)
         self.allowed = self._with_allowance(log, scales)
-        case = settled(Open(log, self.kept["possible"][near], self.allowed, self.anchor, self.rates), gate)
+        by_hand = self.known.accepted.of(log.time_s, log.measurement)
+        case = settled(Open(log, self.kept["possible"][near], self.allowed, self.anchor, self.rates, by_hand), gate)
         other = readmitted(case)
         if other is not None:
             case = settled(case._replace(log=log._replace(weight=other)), gate)

@@ -16,7 +16,7 @@ from ftproc.files.layout import POSITION, Target
 from ftproc.files.reading import columns
 from ftproc.files.reading.formats import content, tables
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.records import MISSING, FloatArray, Trajectory
+from ftproc.records import ACCEPTED, FloatArray, Trajectory
 
 _MOST_METADATA = 16 << 20  # bytes
 
@@ -49,12 +49,17 @@ def read(source: tables.Source) -> Trajectory:
         state=group(layout.STATE),
         sigma=group(layout.SIGMA),
         measurement_sigma=group(layout.MEASUREMENT_SIGMA),
-        outlier=columns.outlier_flags(header, found, highest=MISSING)[order],
+        outlier=columns.outlier_flags(header, found, highest=ACCEPTED)[order],
         nis=group(("nis",))[:, 0],
         correction=group(layout.CORRECTION),
         metadata=_metadata(source, header),
         extra=extra.take(order) if others else None,
     )
+
+
+def metadata(source: Target) -> dict[str, Any]:
+    """Those of a trajectory's file alone; empty if there are none. Raises InputError."""
+    return _metadata(source, tables.read_header(source))
 
 
 def _metadata(source: tables.Source, header: TableHeader) -> dict[str, Any]:

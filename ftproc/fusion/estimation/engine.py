@@ -199,7 +199,7 @@ def _reassessed(
             changed = True
     if not changed:
         return current, False
-    by_station = [events.of(s, weight) for s in range(len(current.stations))]
+    by_station = [np.where(each.accepted, 1.0, events.of(s, weight)) for s, each in enumerate(current.stations)]
     calm = median_level(current.model) if math.isfinite(current.model.knot_s) else current.model
     return _smoothed(current._replace(weight=by_station, model=calm, settled=False)), True
 
@@ -215,7 +215,7 @@ def _decided(current: Current, trusted: list[FloatArray], gate: float, first: in
         sure = np.where((before > 0) | (first is not None), 0.5, READMITTED)
         decided = ((good > sure) & (current.possible[s] > 0)).astype(float)
         lost = decided.sum(0) < FEWEST_KEPT * trusted[s].sum(0)
-        decided = np.where(lost, trusted[s], decided)
+        decided = np.where(current.stations[s].accepted, 1.0, np.where(lost, trusted[s], decided))
         changed += int((decided != before)[current.events.of(s, started) > 0].sum())
         total += int((current.possible[s] > 0).sum())
         weight.append(decided)

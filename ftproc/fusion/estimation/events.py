@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.core.filtering.biases import PARAMETERS
 from ftproc.core.filtering.records import Observations, Sites
@@ -18,7 +19,7 @@ class Seen(NamedTuple):
     """What one station has seen. time_s: (n,) by its own clock. measurement: (n, 3) range m, azimuth anticlockwise from
     its x (east) and elevation rad, NaN where missing. place (3,) m, axes (3, 3): see `core.model.stations`. prior:
     (PARAMETERS,) 1-sigma of its biases m, rad, rad, tilts rad, rad, and clock offset s; zero for what is known. known:
-    (3,) noise 1-sigma that the user specified, else NaN."""
+    (3,) noise 1-sigma that the user specified, else NaN. accepted: (n, 3) readings that are good by hand."""
 
     name: str
     time_s: FloatArray
@@ -27,6 +28,7 @@ class Seen(NamedTuple):
     axes: FloatArray
     prior: FloatArray
     known: FloatArray
+    accepted: NDArray[np.bool_]
 
     @property
     def components(self) -> list[int]:

@@ -45,7 +45,8 @@ def screen(station: Seen, banned: NDArray[np.bool_]) -> Screened:
     sigma = np.where(np.isfinite(station.known), station.known, np.maximum(sigma, LEAST_NOISE))
     possible = np.isfinite(z) & ~two_pass.stuck_readings(z, sigma)
     possible[:, 0] &= z[:, 0] > 0
-    return Screened(possible.astype(float), weight * possible, sigma)
+    possible |= station.accepted
+    return Screened(possible.astype(float), np.where(station.accepted, 1.0, weight * possible), sigma)
 
 
 def agreeing(station: Seen, screened: Screened, track: Track) -> FloatArray:

@@ -123,7 +123,9 @@ def _rows(stations: list[Seen], times: FloatArray, first_s: float, stop_s: float
 
 
 def _part(station: Seen, rows: slice) -> Seen:
-    return station._replace(time_s=station.time_s[rows], measurement=station.measurement[rows])
+    return station._replace(
+        time_s=station.time_s[rows], measurement=station.measurement[rows], accepted=station.accepted[rows]
+    )
 
 
 def _said(found: list[Stretch], k: int) -> Said:

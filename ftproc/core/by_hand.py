@@ -1,0 +1,27 @@
+"""Readings that the engineer accepts, as the editors know them: by their times."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+class Accepted(NamedTuple):
+    """times: those of the readings of each component that are good whatever an editor finds, (m,) s by component;
+    nothing if there are none."""
+
+    times: tuple[FloatArray, ...] = ()
+
+    def of(self, time_s: FloatArray, measurement: FloatArray) -> NDArray[np.bool_]:
+        """(n, 3) which of some readings these are. time_s (n,), measurement (n, 3)."""
+        found = np.isfinite(measurement)
+        for c in range(3):
+            found[:, c] &= np.isin(time_s, self.times[c]) if self.times else False
+        return found
+
+
+NOTHING = Accepted()

@@ -1,0 +1,27 @@
+"""Decisions on readings out, in the form in which `files.decisions` reads them."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+
+from ftproc.files.decisions import COLUMNS, ENDS, Line
+from ftproc.files.layout import Target
+from ftproc.files.writing import atomic
+from ftproc.files.writing.csvtext import no_formula
+
+
+def write(lines: Sequence[Line], target: Target) -> None:
+    """Write a file of these lines, with the columns that they need, complete or not at all. Raises OutputError."""
+    ends = {end for line in lines for end in line.ends} or set(ENDS[0])
+    station = {"station"} if any(line.station for line in lines) else set()
+    text = io.StringIO()
+    named = [column for column in COLUMNS if column in {"component", "use", "reason", *ends, *station}]
+    writer = csv.DictWriter(text, named, restval="", extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    for line in lines:
+        cells = line.as_dict()
+        writer.writerow({**cells, **{name: no_formula(cells.get(name, "")) for name in ("station", "reason")}})
+    with atomic.replacing(target) as stream:
+        stream.write(text.getvalue().encode())
