@@ -116,10 +116,7 @@ def interruption(error: BaseException) -> BaseException | None:
 
     A signal that arrives while a compiled kernel returns is raised as a SystemError with the interruption as its cause.
     """
-    cause: BaseException | None = error
-    while isinstance(cause, Exception):
-        cause = cause.__cause__
-    return cause if isinstance(cause, KeyboardInterrupt | SystemExit) else None
+    return next((cause for cause in _causes(error) if isinstance(cause, KeyboardInterrupt | SystemExit)), None)
 
 
 _NO_MEMORY = (
@@ -131,9 +128,11 @@ _NO_PROCESS = ("Resource temporarily unavailable", "can't start new thread")
 
 
 def _causes(error: BaseException) -> Iterator[BaseException]:
-    """An error, and those that it was raised from."""
+    """An error, and those that it was raised from; an error may be raised from itself."""
     cause: BaseException | None = error
-    while cause is not None:
+    found: list[BaseException] = []
+    while cause is not None and cause not in found:
+        found.append(cause)
         yield cause
         cause = cause.__cause__
 

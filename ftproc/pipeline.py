@@ -15,7 +15,7 @@ from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import registry
 from ftproc.methods.estimate import Estimate, Part
-from ftproc.quality import by_hand, provenance, sanity
+from ftproc.quality import by_hand, next_steps, provenance, sanity
 from ftproc.quality.statistics import RunStatistics
 from ftproc.records import COMPONENTS, MISSING, Diagnostics, FloatArray, MeasurementLog, Trajectory, joined
 from ftproc.settings import FilterSettings
@@ -81,6 +81,13 @@ class Filtering:
         )
         found = provenance.describe(self.log, self.method, self.settings, self.statistics, self.model, summary)
         return {**found, **self.effects.metadata()}
+
+    @property
+    def next_steps(self) -> list[next_steps.Step]:
+        """What to do next where the verdict is not consistent, best first; none has been tried."""
+        return next_steps.steps(
+            self.metadata["summary"], self.settings, self.model is not None and self.method.corrected
+        )
 
     def _network(self) -> str:
         """What the learned correction did, in words."""

@@ -7,6 +7,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -73,6 +74,7 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
     """Read, filter and write one log. Its errors are in the outcome; only a closed pipe and an interruption are
     raised."""
     from ftproc import pipeline, report
+    from ftproc.batch import trying
     from ftproc.core import compiled
     from ftproc.correction import model_file
     from ftproc.derived.columns import with_columns
@@ -97,12 +99,16 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
         else:
             model = model_for(registry.named(task.method), recipe.model)
         filtering = pipeline.Filtering(log, settings, model)
-        own = {"method": task.method, "target": task.target}
-        command = recipe.origin.command(task.log, {name: value for name, value in own.items() if value})
-        known = {"command": command, "options": recipe.origin.options}
+        own = {name: value for name, value in (("method", task.method), ("target", task.target)) if value}
+        command = partial(recipe.origin.command, task.log, own)
 
+        @cache
         def metadata() -> dict[str, Any]:
-            return provenance.completed(filtering.metadata, known, recipe.origin.before)
+            found, known = filtering.metadata, {"command": command(), "options": recipe.origin.options}
+            steps = trying.steps(filtering, found["summary"], command)
+            trust = {**found["summary"]["trust"], "next_steps": steps}
+            known["summary"] = {**found["summary"], "trust": trust}
+            return provenance.completed(found, known, recipe.origin.before)
 
         guarded = atomic.guarding([task.at(task.log)])
         with compiled.announced(notify), _forwarded(task.log, notify), guarded:

@@ -31,9 +31,10 @@ class Origin(NamedTuple):
     options: Mapping[str, Any] = {}
     before: Mapping[str, Any] = {}
 
-    def command(self, log: str, own: Mapping[str, str]) -> str:
-        """The command line that filters a log so. own: options of this log alone, by name."""
-        words = {**self.typed, **{name: [f"--{name}", value] for name, value in own.items()}}
+    def command(self, log: str, own: Mapping[str, str], changed: Mapping[str, Sequence[str]] | None = None) -> str:
+        """The command line that filters a log so. own: options of this log alone, by name. changed: words of options
+        that are to be others."""
+        words = {**self.typed, **{name: [f"--{name}", value] for name, value in own.items()}, **(changed or {})}
         return shlex.join(["ftproc", "filter", log, *(word for each in words.values() for word in each)])
 
 

@@ -28,6 +28,7 @@ from ftproc.core.identification.motion_models import Chosen
 from ftproc.core.identification.profile import median_level
 from ftproc.methods import live, preparing
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
+from ftproc.order_statistics import median
 from ftproc.settings import FilterSettings
 
 Run = TypeVar("Run", FilterRun, SmootherRun)
@@ -63,14 +64,18 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     known = preparing.what_is_known(readings, settings)
     edited = two_pass.edit(readings.time_s, readings.measurement, known, usual)
     motion = motion_models.choose(edited.log, edited.starts, edited.model, preparing.motions(settings))
-    run, smoothed = _with_motion(motion, settings, motion.model)
+    both = settings.smooth or usual is None  # cheap, and says what could be had
+    run, smoothed = _with_motion(motion, both, motion.model)
     for other in _as_likely(edited, known, run):
-        filtered, other_smoothed = _with_motion(motion, settings, other)
+        filtered, other_smoothed = _with_motion(motion, both, other)
         run = _worse_of(run, filtered)
         smoothed = smoothed and other_smoothed and _worse_of(smoothed, other_smoothed)
     shifts = edited.faults.shifts
     if shifts:
         run, smoothed = _widened(run, shifts), smoothed and _widened(smoothed, shifts)
+    could_be = None
+    if smoothed is not None and not settings.smooth:
+        could_be, smoothed = median(np.sqrt((smoothed.sigma[:, :3] ** 2).sum(1))), None
     label = preparing.labels(edited.weight, edited.log.measurement)
     again = preparing.re_initialized(edited.starts)
     decision = edited.decision
@@ -78,15 +83,15 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         run, label, motion.model, smoothed, again, decision.settled,
         unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts,
         alternative=decision.alternative,
-        faults=edited.faults, motion=motion,
+        faults=edited.faults, motion=motion, smoothed_sigma_m=could_be,
     )  # fmt: skip
 
 
-def _with_motion(motion: Chosen, settings: FilterSettings, model: Model) -> tuple[FilterRun, SmootherRun | None]:
+def _with_motion(motion: Chosen, smooth: bool, model: Model) -> tuple[FilterRun, SmootherRun | None]:
     """The filter and, if asked, the smoother over an edited log, by a model."""
     starts = preparing.smoothed_starts(motion.log, model, motion.starts)
     run = motion.of_rows(forward.filter_log(motion.log, model.causal, starts))
-    return run, motion.of_rows(smooth_log(motion.log, model, motion.starts, PATHS)) if settings.smooth else None
+    return run, motion.of_rows(smooth_log(motion.log, model, motion.starts, PATHS)) if smooth else None
 
 
 def _as_likely(edited: two_pass.Edited, known: two_pass.Known, run: FilterRun) -> Iterator[Model]:

@@ -92,7 +92,8 @@ class Estimate(NamedTuple):
     two-pass editing looked for no alternative, its search having been cut short. faults: of the instrument, that
     two-pass editing found and took out of the readings. screened_out: (n, 3) readings that screening rejects, of a
     method without sigmas, whose labels nothing else tests. motion: that was chosen. known: (n,) which samples have an
-    estimate, where live editing has none of some; absent: the components that it has not seen.
+    estimate, where live editing has none of some; absent: the components that it has not seen. smoothed_sigma_m: the
+    median 1-sigma of the position that the smoother would have, where it is known and was not asked for.
     """
 
     run: FilterRun
@@ -111,6 +112,7 @@ class Estimate(NamedTuple):
     motion: Chosen | None = None
     known: NDArray[np.bool_] | None = None
     absent: tuple[int, ...] = ()
+    smoothed_sigma_m: float | None = None
 
     @property
     def smoothed_run(self) -> FilterRun:

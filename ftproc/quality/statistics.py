@@ -60,6 +60,7 @@ class RunStatistics:
         self.faults = FaultStatistics()
         self.screened_out, self.overlooked = 0, 0
         self.converged: bool | None = None
+        self.smoothed_sigma_m: float | None = None
         self.largest_m, self.largest_sigma = 0.0, 0.0
         self.outside, self.rows, self.parts, self.unknown = 0.0, 0, 0, 0
 
@@ -102,6 +103,7 @@ class RunStatistics:
             self.slow_noise_separable &= estimate.alternative.separable
             self.slow_noise_s = max(self.slow_noise_s, float(other.fade_s[other.wander_variance > 0].max()))
         self.unexamined += estimate.unexamined
+        self.smoothed_sigma_m = None if self.absent else estimate.smoothed_sigma_m
         if estimate.screened_out is not None:
             self.screened_out += int(estimate.screened_out.sum())
             self.overlooked += int((estimate.screened_out & (estimate.label == GOOD)).sum())
@@ -195,6 +197,8 @@ class RunStatistics:
             "components_used_mean": float(self.used / max(self.rows_used, 1)),
             "poorly_observable": [] if absent else consistency.poorly_observable(time_s, sigma),
             "poorly_observable_readings": self._poorly_observable_readings(time_s, sigma),
+            "median_sigma_m": None if absent or not np.isfinite(middle := median(np.sqrt(sums(sigma**2)))) else middle,
+            "median_sigma_smoothed_m": self.smoothed_sigma_m,
             "sigmas_published": bool(np.isfinite(sigma).all(1).any()),
             "reacquired": self.reacquired,
             "editing_converged": self.converged,

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ftproc.files.moments import Moments
-from ftproc.quality import verdict
+from ftproc.quality import next_steps, verdict
 from ftproc.quality.statistics import UNITS
 from ftproc.records import COMPONENTS
 
@@ -26,14 +26,28 @@ def text(metadata: Mapping[str, Any]) -> str:
     lines = [f"{metadata['log']}: {counted(s['rows'], 'row')}, {s['duration_s']:.6g} s{since}, {way} by "
              f"{metadata['method']} ({settings['editing']} editing{lag})"]  # fmt: skip
     lines += _table(s["components"])
-    named = [*facts(s), *network(s), *(("note", text) for text in notes(s))]
+    named = [*facts(s), *(("note", text) for text in notes(s))]
     level, reasons = s["trust"]["verdict"], s["trust"]["reasons"]
     if len(reasons) < 2:
         named.append(("verdict", verdict.sentence(s["trust"])))
         named += [("", s["trust"]["not_shown"])] if level == verdict.CONSISTENT else []
     else:
         named += [("verdict", f"{level}:"), *(("", f"- {reason}") for reason in reasons)]
+    named += _next(s, metadata)
     return "\n".join([*lines, *(line(name, what) for name, what in named)])
+
+
+def _next(s: Mapping[str, Any], metadata: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What would be better: the first of the next steps, or the smoother."""
+    steps = s["trust"].get("next_steps")
+    if steps:
+        first, *more = next_steps.in_words(steps[0])
+        return [("next", first), *(("", each) for each in more)]
+    smooth = s["median_sigma_smoothed_m"]
+    if smooth is None:
+        return []
+    command = f"{metadata['command']} --smooth" if metadata["command"] else "smooth=True"
+    return [("better", f"1 sigma of {smooth:.3g} m, not {s['median_sigma_m']:.3g} m (median of positions): {command}")]
 
 
 def counted(number: int, what: str) -> str:
@@ -70,7 +84,7 @@ def component_cells(name: str, part: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def facts(s: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Name and text of the lines about the log, the process noise and the innovations."""
+    """Name and text of the lines about the log and the process noise."""
     found = [("gaps", f"{s['gaps']}, the longest {s['longest_gap_s']:.4g} s" if s["gaps"] else "none")]
     found += [("rows", text) for text in _rows(s)]
     jerk = s["jerk_psd_m2ps5"]
@@ -78,8 +92,6 @@ def facts(s: Mapping[str, Any]) -> list[tuple[str, str]]:
         found.append(("jerk", f"PSD {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.3g} to {jerk['highest']:.3g})"))
     if s.get("motion"):
         found.append(("motion", _motion(s)))
-    if s["nis_mean"] is not None:
-        found.append(("NIS", f"{s['nis_mean']:.2f} on average, {s['components_used_mean']:.2f} expected"))
     return found
 
 
@@ -93,10 +105,11 @@ def _motion(s: Mapping[str, Any]) -> str:
     return f"{s['motion']}{some} (log-likelihood {abs(gain):.3g} {'above' if gain > 0 else 'below'} {what})"
 
 
-def network(s: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """The line about the learned correction, of a method that may have one."""
-    said = s.get("network")
-    return [("network", said)] if said else []
+def innovations(s: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Name and text of the line about the size of the innovations."""
+    if s["nis_mean"] is None:
+        return []
+    return [("NIS", f"{s['nis_mean']:.2f} on average, {s['components_used_mean']:.2f} expected")]
 
 
 def notes(s: Mapping[str, Any]) -> list[str]:

@@ -99,7 +99,7 @@ def summary(view: View) -> str:
     turned = list(zip(figures.HEADER, *rows, strict=True))  # a line for each figure: a telephone shows it whole
     notes = figures.notes(s)
     body = table(turned[0], turned[1:], "numbers whole")
-    body = f'<div class="tables">{body}{_pairs([*figures.facts(s), *figures.network(s)])}</div>{_list(notes)}'
+    body = f'<div class="tables">{body}{_pairs([*figures.facts(s), *figures.innovations(s)])}</div>{_list(notes)}'
     return f"<section><h2>Summary</h2>{body}{_rivals(s)}</section>"
 
 

@@ -124,3 +124,25 @@ def test_again_overwrites_nothing_and_names_what_it_cannot_read(run, flight):
     assert "give one of the two" in run("filter", "--again", "a.parquet", "--config", "x.toml").err
     Path(flight).unlink()
     assert "no such file" in run("filter", "--again", "a.parquet").err
+
+
+def test_the_next_step_is_said_with_the_command_to_type(run, flight):
+    """And in the JSON; the command does what is said."""
+    result = run("filter", flight, "--noise", "0.01,1e-6,1e-6", "--jerk", "1e-4", "-o", "a.parquet")
+    assert result.code == 0, result.err
+    steps = metadata("a.parquet")["summary"]["trust"]["next_steps"]
+    assert steps[0]["outcome"] == "consistent"
+    lines = result.out.splitlines()
+    k = next(k for k, line in enumerate(lines) if line.startswith("  next "))
+    assert lines[k].split(None, 1)[1] == f"{steps[0]['advice']}: then it is consistent"
+    assert lines[k + 1].strip() == steps[0]["command"]
+    words = steps[0]["command"].split()
+    assert words[:2] == ["ftproc", "filter"]
+    assert "verdict    consistent" in run(*words[1:], "-o", "b.parquet").out
+
+
+def test_scores_on_a_closed_standard_output_end(shell, flight):
+    """An error that was raised from itself was looked at for ever."""
+    assert shell(f"ftproc filter {flight} -o a.csv --summary none").code == 0
+    result = shell("timeout 60 ftproc score a.csv >&-")
+    assert (result.code, result.err.startswith("ftproc: standard output is closed")) == (1, True)

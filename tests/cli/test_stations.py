@@ -161,6 +161,9 @@ def test_every_filter_option_can_be_kept_in_a_file():
         "fuse",
         "write_calibration",
         "follow",
+        "decisions",
+        "write_decisions",
+        "again",
     }
     options = {p.name for p in command.params if isinstance(p, click.Option)} - about_the_run
     assert options <= {key.option for _, _, key in every()}

@@ -40,7 +40,9 @@ def in_parts(monkeypatch, most=1500, beside=400):
 def cut(station, until_s):
     """What a station has seen until then."""
     n = int(np.searchsorted(station.time_s, until_s))
-    return station._replace(time_s=station.time_s[:n], measurement=station.measurement[:n])
+    return station._replace(
+        time_s=station.time_s[:n], measurement=station.measurement[:n], accepted=station.accepted[:n]
+    )
 
 
 @pytest.mark.parametrize("smooth", [True, False])
@@ -99,7 +101,8 @@ def test_a_stretch_without_a_first_track_joins_its_neighbour(stations, monkeypat
 def test_what_other_stretches_have_said_narrows_the_biases(stations):
     def half(known, *ends):
         part = [each._replace(time_s=each.time_s[slice(*np.searchsorted(each.time_s, ends))],
-                              measurement=each.measurement[slice(*np.searchsorted(each.time_s, ends))])
+                              measurement=each.measurement[slice(*np.searchsorted(each.time_s, ends))],
+                              accepted=each.accepted[slice(*np.searchsorted(each.time_s, ends))])
                 for each in stations]  # fmt: skip
         return engine.fuse(part, FilterSettings().gate, None, known, lambda number: None)
 

@@ -130,7 +130,8 @@ def test_lines_stand_under_each_other(dirty):
 
 
 def test_text_ends_with_the_verdict(dirty):
-    assert summary.text(dirty[1].metadata).splitlines()[-2:] == [
+    lines = summary.text(dirty[1].metadata).splitlines()
+    assert lines[-3:-1] == [
         "  verdict    consistent: residuals agree with the published sigmas, and no fault shows",
         f"             {NOT_SHOWN}",
     ]

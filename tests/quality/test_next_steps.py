@@ -1,0 +1,130 @@
+"""What is said of what to do next, and whether it helps: each first step that the program tries is run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from ftproc import pipeline
+from ftproc.batch import trying
+from ftproc.files.reading import logs
+from ftproc.quality import next_steps, summary
+from ftproc.quality.verdict import LEVELS
+from ftproc.records import MeasurementLog, joined
+from ftproc.settings import FilterSettings
+from ftproc.simulation import simulate
+from ftproc.simulation.simulation import Simulation
+
+SMOOTH = FilterSettings(smooth=True)
+
+
+def flight(seed: int, outliers: str | None = None) -> Simulation:
+    return simulate("manoeuvre", seed=seed, dt_s=0.1, duration_s=60, outliers=outliers)
+
+
+def found(log: MeasurementLog, settings: FilterSettings) -> tuple[pipeline.Filtering, np.ndarray]:
+    filtering = pipeline.Filtering(log, settings, None)
+    return filtering, joined(list(filtering.parts())).state[:, :3]
+
+
+def level(filtering: pipeline.Filtering) -> int:
+    return LEVELS.index(filtering.metadata["summary"]["trust"]["verdict"])
+
+
+def first_step(filtering: pipeline.Filtering) -> tuple[next_steps.Step, dict]:
+    """The first of the steps after trying, as it was tried, and as it is said."""
+    said = trying.steps(filtering, filtering.metadata["summary"], lambda changed: f"ftproc filter LOG {changed}")[0]
+    return next(step for step in filtering.next_steps if step.advice == said["advice"]), said
+
+
+#: What was specified that does not hold -> the advice.
+TOLD = {
+    "noise too small": (6, replace(SMOOTH, noise=(0.5, 2e-5, 2e-5)), "leave --noise out"),
+    "jerk too small": (8, replace(SMOOTH, jerk_psd_m2ps5=1e-4), "leave --jerk out"),
+    "jerk too large": (8, replace(SMOOTH, jerk_psd_m2ps5=1e7), "leave --jerk out"),
+    "gate too small": (9, replace(SMOOTH, gate=1.5), "leave --gate out"),
+    "no editing": (10, replace(SMOOTH, editing="none"), "leave --editing out"),
+    "no editor": (14, replace(SMOOTH, method="ukf"), "leave --method out"),
+    "weights alone": (15, replace(SMOOTH, method="huber-ukf"), "leave --method out"),
+    "channels alone": (14, FilterSettings(method="gate"), "leave --method out"),
+    "two of them": (6, replace(SMOOTH, noise=(0.5, 2e-5, 2e-5), gate=2.0), "leave --noise and --gate out"),
+    "recursive": (12, FilterSettings(editing="forward"), "leave --editing out"),
+}
+
+
+@pytest.mark.parametrize("case", TOLD)
+def test_what_was_specified_and_does_not_hold_is_left_out_first(case: str) -> None:
+    """The step makes the errors smaller, and the verdict no worse."""
+    seed, settings, advice = TOLD[case]
+    this = flight(seed, "patch=4:10-40:30-200" if case in ("weights alone", "recursive") else None)
+    before, state = found(this.log, settings)
+    assert level(before) > 0
+    step, said = first_step(before)
+    assert step.advice == said["advice"]
+    assert said["advice"] == advice or (case == "recursive" and said["advice"] == "add --smooth, without --editing")
+    assert step.settings is not None
+    after, better = found(this.log, step.settings)
+    assert level(after) <= level(before)
+    assert said["outcome"] in (None, LEVELS[level(after)])
+    known = np.isfinite(state).all(1)
+    errors = [float(np.sqrt(((each - this.truth.position_m) ** 2).sum(1)[known].mean())) for each in (state, better)]
+    assert errors[1] < 0.9 * errors[0]
+
+
+def test_the_engineer_is_asked_where_only_he_knows() -> None:
+    """Two tracks: the place, and a command that writes what was decided."""
+    filtering, _ = found(flight(3, "all.offset=3:30-50:40-400,isolated=0.01").log, SMOOTH)
+    step, said = first_step(filtering)
+    assert step.options == {"write_decisions": ("--write-decisions", "decisions.csv")}
+    intervals = filtering.metadata["summary"]["poorly_observable"]
+    worst = max(intervals, key=lambda each: each["sigma_m"])
+    assert said["place"] == f"{worst['from_s']:.6g} to {worst['to_s']:.6g} s"
+
+
+def test_a_step_that_stays_needs_another_station() -> None:
+    log = simulate("manoeuvre-clean", seed=16, dt_s=0.1, duration_s=60).log
+    log.measurement[350:, 0] += 60.0
+    _, said = first_step(found(log, SMOOTH)[0])
+    assert said["command"].startswith("ftproc filter --fuse --write-config ")
+    assert said["place"] == "35 s"
+
+
+def test_a_clock_that_was_set_back_names_its_rows() -> None:
+    log = simulate("cruise", seed=3, duration_s=60.0, outliers="none").log
+    names = ("range_m", "azimuth_rad", "elevation_rad")
+    table = pd.DataFrame({"time_s": log.time_s, **dict(zip(names, log.measurement.T, strict=True))})
+    table.loc[300:, "time_s"] -= 5.0
+    filtering, _ = found(logs.read(table), SMOOTH)
+    _, said = first_step(filtering)
+    assert "all,300,600,bad" in said["advice"]
+
+
+def test_nothing_is_said_of_a_consistent_run_and_nothing_tried_in_a_long_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    filtering, _ = found(flight(5).log, SMOOTH)
+    assert filtering.next_steps == []
+    monkeypatch.setattr(trying, "MOST_ROWS", 100)
+    bad, _ = found(flight(6).log, replace(SMOOTH, jerk_psd_m2ps5=1e-4))
+    assert {each["outcome"] for each in trying.steps(bad, bad.metadata["summary"], str)} == {None}
+
+
+def test_what_would_be_better_is_what_the_smoother_publishes() -> None:
+    this = simulate("manoeuvre", seed=3)
+    here, smooth = (pipeline.filter_log(this.log, FilterSettings(smooth=on)) for on in (False, True))
+    s = here.metadata["summary"]
+    for trajectory, name in ((here, "median_sigma_m"), (smooth, "median_sigma_smoothed_m")):
+        assert s[name] == pytest.approx(
+            np.median(np.sqrt((trajectory.sigma[:, :3] ** 2).sum(1))), rel=0.02
+        )  # which then allows for unseen motion
+    last = summary.text(here.metadata).splitlines()[-1]
+    assert last.startswith(f"  better     1 sigma of {s['median_sigma_smoothed_m']:.3g} m, not ")
+    assert "better" not in summary.text(smooth.metadata)
+
+
+@pytest.mark.parametrize("settings", [FilterSettings(), SMOOTH, replace(SMOOTH, jerk_psd_m2ps5=1e-4)])
+def test_figures_that_nobody_can_use_are_not_in_the_text(settings: FilterSettings) -> None:
+    text = summary.text(pipeline.filter_log(flight(5).log, settings).metadata)
+    assert "NIS" not in text
+    assert "network" not in text
