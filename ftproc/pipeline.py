@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ from ftproc.errors import InputError, UsageError
 from ftproc.methods import registry
 from ftproc.methods.estimate import Estimate, Part
 from ftproc.quality import by_hand, next_steps, provenance, sanity
+from ftproc.quality.next_steps import Step
 from ftproc.quality.statistics import RunStatistics
 from ftproc.records import COMPONENTS, MISSING, Diagnostics, FloatArray, MeasurementLog, Trajectory, joined
 from ftproc.settings import FilterSettings
@@ -79,15 +80,17 @@ class Filtering:
                 **self.effects.summary(),
             }
         )
+        summary = next_steps.added(summary, [step.as_dict() for step in self._steps(summary)])
         found = provenance.describe(self.log, self.method, self.settings, self.statistics, self.model, summary)
         return {**found, **self.effects.metadata()}
 
     @property
-    def next_steps(self) -> list[next_steps.Step]:
+    def next_steps(self) -> list[Step]:
         """What to do next where the verdict is not consistent, best first; none has been tried."""
-        return next_steps.steps(
-            self.metadata["summary"], self.settings, self.model is not None and self.method.corrected
-        )
+        return self._steps(self.metadata["summary"])
+
+    def _steps(self, summary: Mapping[str, Any]) -> list[Step]:
+        return next_steps.steps(summary, self.settings, self.model is not None and self.method.corrected)
 
     def _network(self) -> str:
         """What the learned correction did, in words."""

@@ -81,7 +81,7 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
     from ftproc.files.reading import logs
     from ftproc.files.writing import atomic, trajectories
     from ftproc.methods import registry
-    from ftproc.quality import provenance, summary
+    from ftproc.quality import next_steps, provenance, summary
 
     started = time.perf_counter()
     try:
@@ -106,8 +106,7 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
         def metadata() -> dict[str, Any]:
             found, known = filtering.metadata, {"command": command(), "options": recipe.origin.options}
             steps = trying.steps(filtering, found["summary"], command)
-            trust = {**found["summary"]["trust"], "next_steps": steps}
-            known["summary"] = {**found["summary"], "trust": trust}
+            known["summary"] = next_steps.added(found["summary"], steps)
             return provenance.completed(found, known, recipe.origin.before)
 
         guarded = atomic.guarding([task.at(task.log)])

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ftproc.fusion.estimation.constants import NAMES, WORDS
-from ftproc.quality import verdict
+from ftproc.quality import next_steps, verdict
 from ftproc.quality.summary import counted, line
 
 COMPONENT_HEADER = ("station", "component", "good", "rejected", "missing", "noise (1 sigma)")
@@ -30,6 +30,8 @@ def text(metadata: Mapping[str, Any]) -> str:
         named += [("", s["trust"]["not_shown"])] if level == verdict.CONSISTENT else []
     else:
         named += [("verdict", f"{level}:"), *(("", f"- {reason}") for reason in reasons)]
+    for first, *more in map(next_steps.in_words, s["trust"].get("next_steps", [])[:1]):
+        named += [("next", first), *(("", each) for each in more)]
     return "\n".join([*lines, *(line(name, what) for name, what in named)])
 
 

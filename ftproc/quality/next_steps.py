@@ -58,6 +58,21 @@ def steps(s: Summary, settings: FilterSettings, model_corrects: bool) -> list[St
     return [step for k, step in enumerate(every) if step not in every[:k]]
 
 
+def of_fused(s: Summary, smooth: bool) -> list[Step]:
+    """For the summary of several stations."""
+    if s["trust"]["verdict"] == "consistent":
+        return []
+    found = [] if smooth else [Step("add --smooth", _CAUSAL, {"smooth": ("--smooth",)})]
+    places = sorted(s["stretches"], key=lambda each: float(each["from_s"] - each["to_s"]))[:1]
+    where = [f"{each['station']}, {each['from_s']:.6g} to {each['to_s']:.6g} s" for each in places] or [""]
+    return [*found, _DECIDE._replace(place=where[0])]
+
+
+def added(s: Summary, found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """A summary with these steps in its verdict, if there are any."""
+    return {**s, "trust": {**s["trust"], "next_steps": list(found)}} if found else dict(s)
+
+
 def _left_out(settings: FilterSettings) -> Iterator[Step]:
     """Without what was specified: all of it, and each alone."""
     usual = FilterSettings()
@@ -88,11 +103,17 @@ def _smoothed(settings: FilterSettings) -> Iterator[Step]:
         options = {_OPTIONS.get(name, name): () for name in whole}
         yield Step(
             f"add --smooth{', without --editing' if causal else ''}",
-            "a filter knows only what came before a gap or a patch",
+            _CAUSAL,
             {**options, "smooth": ("--smooth",)}, settings=replace(settings, smooth=True, **whole),
         )  # fmt: skip
 
 
+_CAUSAL = "a filter knows only what came before a gap or a patch"
+_DECIDE = Step(
+    f"write the decisions, correct them in {DECISIONS}, and filter with --decisions {DECISIONS}",
+    "which of two tracks, or of many outliers, is the target's shows only from outside the log",
+    {"write_decisions": ("--write-decisions", DECISIONS)},
+)
 _FUSE = Step(
     "fuse with the log of another station: ftproc filter --fuse range.toml",
     "the readings there do not determine the position",
@@ -110,11 +131,7 @@ def _outliers(s: Summary) -> Iterator[Step]:
     doubtful = any(s[name] for name in ("editing_places_unexamined", "doubtful_steps", "reacquired"))
     places = s["poorly_observable"] if any(outliers.values()) else []
     if many or doubtful or s["editing_converged"] is False or places:
-        yield Step(
-            f"write the decisions, correct them in {DECISIONS}, and filter with --decisions {DECISIONS}",
-            "which of two tracks, or of many outliers, is the target's shows only from outside the log",
-            {"write_decisions": ("--write-decisions", DECISIONS)}, _worst(places, s["doubtful_steps"]),
-        )  # fmt: skip
+        yield _DECIDE._replace(place=_worst(places, s["doubtful_steps"]))
 
 
 def _worst(places: Sequence[Summary], steps: Sequence[Summary]) -> str:

@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pyarrow.parquet as pq
 
 from ftproc.records import ACCEPTED, REJECTED
@@ -50,14 +51,30 @@ def test_what_is_rejected_by_hand_is_not_used(folder, run):
     Path("d.csv").write_text(f"component,from_s,to_s,use,station\nall,10,12,bad,{one}\n")
     assert run("filter", "--fuse", "range.toml", "--decisions", "d.csv", "-o", "a.parquet").code == 0
     log = Path(tomllib.loads(Path("range.toml").read_text())["station"][one]["log"])
-    table = pq.read_table(log).to_pandas() if log.suffix == ".parquet" else None
-    if table is None:
-        import pandas as pd
-
-        table = pd.read_csv(log)
+    table = pq.read_table(log).to_pandas() if log.suffix == ".parquet" else pd.read_csv(log)
     inside = table.time_s.between(10, 12)
     table.loc[inside, table.columns[2]] += 0.3
     table.to_parquet(log) if log.suffix == ".parquet" else table.to_csv(log, index=False)
     assert run("filter", "--fuse", "range.toml", "--decisions", "d.csv", "-o", "b.parquet").code == 0
     first, second = (pq.read_table(name).to_pandas() for name in ("a.parquet", "b.parquet"))
     np.testing.assert_array_equal(first.x_m, second.x_m)
+
+
+def test_a_fused_run_that_is_not_consistent_says_what_to_do_next(folder, run):
+    """First to smooth, then to decide: with the place, and a command that can be typed."""
+    one = stations(folder)[0]
+    log = Path(tomllib.loads(Path("range.toml").read_text())["station"][one]["log"])
+    table = pq.read_table(log).to_pandas() if log.suffix == ".parquet" else pd.read_csv(log)
+    table.loc[table.time_s.between(10, 30), table.columns[2]] += 0.3
+    table.to_parquet(log) if log.suffix == ".parquet" else table.to_csv(log, index=False)
+    result = run("filter", "--fuse", "range.toml", "-o", "a.parquet")
+    found = json.loads(pq.read_schema("a.parquet").metadata[b"ftproc"])["summary"]
+    assert found["trust"]["verdict"] != "consistent"
+    steps = found["trust"]["next_steps"]
+    assert [step["command"] for step in steps] == [
+        "ftproc filter --fuse range.toml --smooth",
+        "ftproc filter --fuse range.toml --write-decisions decisions.csv",
+    ]
+    longest = max(found["stretches"], key=lambda each: each["to_s"] - each["from_s"])
+    assert steps[1]["place"].startswith(f"{longest['station']}, {longest['from_s']:.6g} to ")
+    assert "  next " in result.out

@@ -103,8 +103,9 @@ def test_several_reasons_have_a_line_each():
     trajectory = pipeline.filter_log(flight.log, FilterSettings(editing="none", noise=noise, jerk_psd_m2ps5=1.0))
     lines = summary.text(trajectory.metadata).splitlines()
     at = lines.index("  verdict    unreliable:")
-    assert [line.split()[1] for line in lines[at + 1 :]] == ["range", "azimuth", "elevation"]
-    assert all(line.startswith("             - ") for line in lines[at + 1 :])
+    assert [line.split()[1] for line in lines[at + 1 : -1]] == ["range", "azimuth", "elevation"]
+    assert all(line.startswith("             - ") for line in lines[at + 1 : -1])
+    assert lines[-1] == "  next       leave --editing and --noise and --jerk out"
 
 
 def test_a_component_with_too_large_sigmas_is_named_by_a_consistent_verdict(good):

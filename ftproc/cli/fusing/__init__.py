@@ -27,7 +27,7 @@ from ftproc.files.writing.outputs import Output
 from ftproc.fusion import flight, results, summary
 from ftproc.fusion.range_file import Range, load
 from ftproc.fusion.range_template import template
-from ftproc.quality import provenance
+from ftproc.quality import next_steps, provenance
 from ftproc.quality import summary as single
 from ftproc.quality.summary import line
 from ftproc.settings import PACKAGED, FilterSettings
@@ -101,6 +101,8 @@ def fuse_logs(ctx: click.Context, debug: bool) -> int:
     words = again.words(ctx, before)
     command = shlex.join(["ftproc", "filter", *(word for each in words.values() for word in each)])
     known = {"command": command, "options": {name: given[name] for name in OPTIONS if name in given}}
+    if found.fused is not None:
+        known["summary"] = _with_steps(found.trajectory.metadata["summary"], settings.smooth, words)
     metadata = provenance.completed(found.trajectory.metadata, known, {} if before is None else before.metadata)
     found = replace(found, trajectory=replace(found.trajectory, metadata=metadata))
     with atomic.guarding(range_.inputs):
@@ -121,6 +123,16 @@ def fuse_logs(ctx: click.Context, debug: bool) -> int:
     except OSError as error:
         raise process.unsaid(error, [name for name in files if name != "-"]) from error
     return 0
+
+
+def _with_steps(s: Mapping[str, Any], smooth: bool, words: Mapping[str, list[str]]) -> dict[str, Any]:
+    """A summary with what to do next, and the commands to type."""
+    steps = []
+    for step in next_steps.of_fused(s, smooth):
+        typed = {**words, **step.options}
+        command = shlex.join(["ftproc", "filter", *(word for each in typed.values() for word in each)])
+        steps.append({**step.as_dict(), "command": command})
+    return next_steps.added(s, steps)
 
 
 def _decisions(given: Mapping[str, Any], before: Mapping[str, decisions.Decisions]) -> decisions.Decisions | None:
