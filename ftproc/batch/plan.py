@@ -19,7 +19,6 @@ _REPORT = "--report"
 _PAGES = (".html", ".htm", ".pdf")
 #: Ending of the trajectory's name by that of the log's, where it is not .csv.
 _SUFFIX = {".parquet": ".parquet", ".feather": ".feather"}
-_PACKED = (".gz", ".bz2", ".xz", ".zst", ".zip")
 
 
 def tasks(
@@ -96,19 +95,11 @@ def _task(log: str, output: str | None, directory: str | None, method: str | Non
     if log == "-" and output is None:
         return Task(log, "-", method, target=target)  # in a pipe, out of a pipe
     name = "stdin.csv" if log == "-" else Path(log).name
-    stem, kind = _stem_and_kind(name)
+    stem, kind = layout.stem_and_kind(name)
     value = re.sub(r"[^\w+-]", "_", target.partition("=")[2])
     middle = "".join(f".{part}" for part in (value, method) if part)
     written = remote.within(directory or ".", f"{stem}{middle}.trajectory{_SUFFIX.get(kind, '.csv')}")
     return Task(log, written, method, target=target)
-
-
-def _stem_and_kind(name: str) -> tuple[str, str]:
-    """The name of a log without its endings, and the last of these that is not one of packing: flight.csv.gz, .csv."""
-    path = Path(name.partition("#")[0])
-    if path.suffix.lower() in _PACKED and path.stem:
-        path = Path(path.stem)
-    return path.stem, path.suffix.lower()
 
 
 def pages(names: Sequence[str], report: str | None) -> tuple[list[str | None], str | None]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ftproc.config.recipe import Recipe
 from ftproc.errors import Failure, FtprocWarning, failure, interruption
-from ftproc.files import decisions, remote
+from ftproc.files import decisions, layout, remote
 from ftproc.files.decisions import Line
 from ftproc.records import Trajectory, joined
 from ftproc.settings import PACKAGED
@@ -45,7 +45,7 @@ class Task:
     @property
     def station(self) -> str:
         """The name of the log in decisions by hand: that of its file, without folder and ending."""
-        return Path(self.log.partition("#")[0]).name.partition(".")[0]
+        return layout.stem_and_kind(self.log)[0]
 
     def at(self, name: str) -> str:
         """The file of that name, as the worker finds it."""

@@ -64,6 +64,7 @@ METADATA_KEY = b"ftproc"
 
 #: Endings of the names of tables and of maps.
 TABLES = (".csv", ".csv.gz", ".parquet", ".feather")
+PACKED = (".gz", ".bz2", ".xz", ".zst", ".zip")  # of logs
 MAPS = (".kml", ".geojson", ".czml")
 
 
@@ -75,6 +76,14 @@ def table_kind(name: Target) -> str | None:
 def map_kind(name: Target) -> str | None:
     """The one of MAPS that `name` ends in, in any case, or None."""
     return ending(name, MAPS)
+
+
+def stem_and_kind(log: str) -> tuple[str, str]:
+    """The name of a log without its endings, and the last of these that is not one of packing: flight.csv.gz, .csv."""
+    path = Path(log.partition("#")[0])
+    if path.suffix.lower() in PACKED and path.stem:
+        path = Path(path.stem)
+    return path.stem, path.suffix.lower()
 
 
 def ending(name: Target, kinds: Iterable[str]) -> str | None:

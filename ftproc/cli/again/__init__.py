@@ -57,7 +57,7 @@ class Before(NamedTuple):
     @property
     def output(self) -> str:
         """The file of the trajectory where the user names none: never that of the run before."""
-        stem = Path(self.log.partition("#")[0]).name.partition(".")[0] if self.log != "-" else "stdin"
+        stem = "stdin" if self.log == "-" else layout.stem_and_kind(self.log)[0]
         kind = layout.table_kind(self.trajectory) if self.trajectory else None
         return f"{stem}.again.trajectory{kind or '.csv'}"
 
