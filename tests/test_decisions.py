@@ -11,6 +11,10 @@ import pytest
 
 import ftproc
 from ftproc import pipeline
+from ftproc.core.by_hand import Accepted
+from ftproc.core.editing import two_pass
+from ftproc.core.editing.alternatives import Work
+from ftproc.core.editing.decisions import Decision, Record
 from ftproc.errors import InputError
 from ftproc.files import decisions
 from ftproc.files.decisions import ENDS, Decisions, Line
@@ -114,15 +118,37 @@ def test_what_is_accepted_is_used_whatever_the_editor_thinks(way: str) -> None:
     assert verdict(used) != "consistent", "accepted readings that the rest contradicts are said"
 
 
-@pytest.mark.parametrize("way", ["two-pass", "live"])
-def test_held_readings_are_used_when_they_are_accepted(way: str) -> None:
-    """Of a target that stands still, say: they are taken neither for copies nor for a component that is stuck."""
+def test_held_readings_are_used_when_they_are_accepted() -> None:
+    """They are taken neither for copies nor for a component that is stuck."""
     flight = clean()
     log = replace(flight.log, measurement=flight.log.measurement.copy())
-    log.measurement[200:212, 2] = log.measurement[200, 2]
-    used = pipeline.filter_log(by_hand(log, ("elevation", 200, 211, "good")), WAYS[way])
+    log.measurement[1:-1:2, 2] = log.measurement[0:-2:2, 2]
+    plain, used = (pipeline.filter_log(each, SMOOTH) for each in (log, by_hand(log, ("elevation", 200, 211, "good"))))
+    held = [found.metadata["summary"]["components"]["elevation"]["held"] for found in (plain, used)]
     assert (used.outlier[200:212, 2] == ACCEPTED).all()
-    assert used.metadata["summary"]["components"]["elevation"]["held"] == 0
+    assert held[0] - held[1] == 6
+
+
+def test_every_round_of_decisions_keeps_what_is_accepted() -> None:
+    log = clean().log
+    measurement, far = log.measurement.copy(), np.arange(5, 400, 50)
+    measurement[far, 0] += np.where(far % 100 == 5, 300.0, -300.0)
+    for times, kept in ((log.time_s[far], True), (log.time_s[:0], False)):
+        known = two_pass.Known(np.full(3, np.nan), None, 4.0, Accepted((times, times[:0], times[:0])))
+        _, decision = two_pass._decided(log.time_s, measurement, known, None, Work(len(log)), False)
+        assert (decision.weight[far, 0] > 0).all() == kept
+
+
+def test_no_later_step_takes_back_what_is_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
+    def rejecting(record: Record, decision: Decision) -> Decision:
+        weight = decision.weight.copy()
+        weight[200:220] = 0.0
+        return decision._replace(weight=weight)
+
+    monkeypatch.setattr(two_pass, "with_motion", rejecting)
+    found = pipeline.filter_log(by_hand(clean().log, ("range", 200, 219, "good")), SMOOTH)
+    assert (found.outlier[200:220, 0] == ACCEPTED).all()
+    assert (found.outlier[200:220, 1] != GOOD).all()
 
 
 def test_each_line_has_its_effect_in_the_metadata() -> None:

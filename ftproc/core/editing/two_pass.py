@@ -257,7 +257,6 @@ def _decided(
 
 def _first(record: Record, weight: FloatArray, segment_of: Model | None, known: Known) -> tuple[Record, Decision]:
     """The decisions that are made from these weights (n, 3) on, and from the noise of the record."""
-    weight = record.with_accepted(weight)
     log, noise = record.weighted(weight), np.where(np.isfinite(known.sigma), known.sigma, record.sigma) ** 2
     jerk_psd = known.jerk_psd
     model = segment_of or Model(noise, isotropic(first_jerk(log, noise) if jerk_psd is None else jerk_psd))
