@@ -137,6 +137,6 @@ BLOCKS = {
     "reliability": table("python -m tests.trust", note=COUNTS),
     "verdicts": table("python -m tests.trust.verdicts 0-19", without="seconds"),
     "hard": table("python -m tests.trust.hard 0-4", without="seconds"),
-    "fused-faults": table("python -m tests.trust.fused_faults 0-2", without="seconds"),
+    "fused-faults": table("python -m tests.trust.fused_faults 0-0", without="seconds"),
     "reference": Block(("python -m tests.docs.reference",), _as_it_is),
 }  # fmt: skip
