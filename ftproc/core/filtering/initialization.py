@@ -55,8 +55,9 @@ def find_starts(log: Observations, noise_variance: FloatArray, jerk_psd: float) 
     """
     time_s, measurement, weight = log[:3]
     starts = [first_start(log, noise_variance)]
-    longest, shortest = _longest_and_shortest(*(np.ascontiguousarray(each) for each in log[:3]))
-    if longest <= shortest_gap(shortest):  # so it is by the typical interval
+    longest, shortest, nearest_m = _extremes(*(np.ascontiguousarray(each) for each in log[:3]))
+    bridged = not np.sqrt(jerk_psd * longest**5 / 20) > 0.99 * WIDEST_BRIDGE * nearest_m  # as every shorter gap is
+    if bridged or longest <= shortest_gap(shortest):  # so it is by the typical interval
         return starts
     longest_s = shortest_gap(typical(time_s[1:] - time_s[:-1]))
     if longest <= longest_s:
@@ -106,9 +107,10 @@ def gaps_of(
 
 
 @kernel
-def _longest_and_shortest(time: Vector, z: Matrix, weight: Matrix) -> tuple[float, float]:
-    """The longest time between samples, or between good readings of a component, and the shortest between samples."""
-    longest, shortest = 0.0, math.inf
+def _extremes(time: Vector, z: Matrix, weight: Matrix) -> tuple[float, float, float]:
+    """The longest time between samples, or between good readings of a component, and the shortest between samples; and
+    the shortest good range."""
+    longest, shortest, nearest = 0.0, math.inf, math.inf
     for k in range(1, len(time)):
         longest, shortest = max(longest, time[k] - time[k - 1]), min(shortest, time[k] - time[k - 1])
     for c in range(3):
@@ -116,7 +118,9 @@ def _longest_and_shortest(time: Vector, z: Matrix, weight: Matrix) -> tuple[floa
         for k in range(len(time)):
             if weight[k, c] > 0 and math.isfinite(z[k, c]):
                 longest, last = max(longest, time[k] - last), time[k]
-    return longest, shortest
+                if c == 0:
+                    nearest = min(nearest, z[k, c])
+    return longest, shortest, nearest
 
 
 def first_state(log: Observations, noise_variance: FloatArray, sample: int, within: slice) -> Start:

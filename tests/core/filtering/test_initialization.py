@@ -217,6 +217,23 @@ def test_filter_is_re_initialized_after_a_gap_too_long_to_coast(gap, jerk, again
         assert inside(start, truth[start.sample])
 
 
+@pytest.mark.parametrize("missing", [(), (0,), (1, 2)])
+def test_gaps_that_cannot_matter_are_not_looked_at(monkeypatch, missing):
+    """What the nearest range and the longest gap tell at once is what all gaps and ranges tell."""
+    from ftproc.core.filtering import initialization
+
+    whole, found = initialization._extremes, []
+    for gap in np.geomspace(3.0, 100.0, 25):
+        time, z, _ = interrupted(float(gap))
+        z[60:80, missing] = np.nan
+        for bound in (whole, lambda *log: (*whole(*log)[:2], 0.0)):  # of a target that may be here: it may matter
+            monkeypatch.setattr(initialization, "_extremes", bound)
+            found.append([start.sample for start in find_starts(log(time, z), NOISE, 10.0)])
+    assert found[::2] == found[1::2]
+    assert [0] in found
+    assert [0, 80] in found
+
+
 def test_too_few_readings_after_a_gap_are_no_start():
     time, z, _ = interrupted(300.0, after=5)
     assert len(find_starts(log(time, z), NOISE, 10.0)) == 1
