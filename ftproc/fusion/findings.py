@@ -158,7 +158,7 @@ def _steps(fused: Fused, zero_s: float) -> Iterator[Remark]:
     for each in fused.steps:
         name, unit = faults.NAMES[each.component], faults.UNITS[each.component]
         step = {"component": name, "time_s": each.time_s + zero_s, f"size_{unit}": each.size}
-        yield Remark(SUSPECT, f"{each.station}: {faults.step_in_words(step)}; the estimate allows for it")
+        yield Remark(SUSPECT, f"{each.station}: {faults.step_in_words(step, {})}; the estimate allows for it")
 
 
 def _scattered(fused: Fused) -> Iterator[Remark]:
