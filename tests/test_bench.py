@@ -23,7 +23,7 @@ def test_a_rule_is_off_inside_and_on_again(rule):
 def test_a_rule_that_is_off_is_missed():
     """Ranges that jump by their ambiguity, with nobody to look for steps."""
     name = f"fault/range ambiguity/{logs.SEEDS[1]}"
-    assert ablation.run("steps", name).error_m > 100 * ablation.run(None, name).error_m
+    assert ablation.run("faults that last", name).error_m > 100 * ablation.run(None, name).error_m
 
 
 def test_what_two_versions_differ_in_is_named():

@@ -20,10 +20,11 @@ from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
-from ftproc.core import compiled
+from ftproc.core import by_hand, compiled
 from ftproc.core.editing import gate, track, two_pass
 from ftproc.core.filtering import records, smoother
 from ftproc.core.live import doubt, editor, pace, pieces, readings, recursive, rows, whole, window
+from ftproc.core.model import motion
 from ftproc.errors import InputError, OutputError
 from ftproc.files.writing import atomic
 from ftproc.live import forms, growing, live, order
@@ -40,7 +41,7 @@ _KINDS: dict[str, Any] = {
         editor.LiveEditor, window.Window, recursive.GatedWindow, recursive.Gating, whole.Whole, doubt.Doubt,
         pace.Pace, pace.Clock, pieces.Sizes, readings.Columns, readings.Labels, readings.Repeats, rows.Waiting,
         rows.Published, records.Model, records.Start, smoother.SmootherRun, two_pass.Known, track.Track,
-        gate.GateSettings,
+        gate.GateSettings, by_hand.Accepted, motion.Motion,
     )
 }  # fmt: skip
 _FUNCTIONS = {"edit": two_pass.edit}

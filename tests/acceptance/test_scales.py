@@ -14,7 +14,7 @@ from ftproc.pipeline import filter_log
 from ftproc.settings import FilterSettings
 from tests.simulated import simulate
 
-SETTINGS = FilterSettings(smooth=True)
+SETTINGS = FilterSettings(motion="white-jerk", smooth=True)
 
 
 @pytest.fixture(autouse=True)

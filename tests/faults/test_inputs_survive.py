@@ -262,6 +262,7 @@ def test_an_output_that_comes_to_name_the_log(tmp_path: Path, name: str, kind: s
         try:
             time.sleep(2.5)
             target = tmp_path / name
+            target.unlink(missing_ok=True)
             if kind == "hard":
                 target.hardlink_to(log)
             elif kind == "soft":

@@ -15,7 +15,7 @@ def estimate():
     count = np.arange(float(N))
     of_three, of_six, of_nine = (count[:, None] + np.arange(width) / 10 for width in (3, 6, 9))
     run = FilterRun(
-        count, of_nine, of_nine, of_nine, of_three, of_three, of_three, count, of_six, count.astype(int), -7.0
+        count, of_nine, of_nine, of_nine, of_three, of_three, of_three, count, of_six, of_six, count.astype(int), -7.0
     )
     label = (of_three % 4).astype(np.uint8)
     return Estimate(run, label, Model(np.ones(3), np.ones((1, 6))), reacquired=(3, 20, 39), known=count > 5)

@@ -53,7 +53,7 @@ def offences(source: str) -> list[str]:
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
             names = [node.func.attr] if node.func.attr in _METHODS else []
         elif isinstance(node, ast.keyword) and node.arg in ("shell", "allow_pickle"):
-            names = [node.arg]
+            names = [] if isinstance(node.value, ast.Constant) and node.value.value is False else [node.arg]
         found += [f"line {getattr(node, 'lineno', 0)}: {name}" for name in names]
     return found
 

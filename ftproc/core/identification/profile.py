@@ -81,7 +81,7 @@ def climbed(log: Observations, starts: list[Start], model: Model, steps: int, sc
     theta = np.append(np.log(model.jerk[:, 1]), np.log(model.jerk[0, free] / model.jerk[0, 1]))
     low, high = (np.append(np.full(knots, bound), np.full(len(free), side)) for bound, side in jerk_bounds(scales))
     theta = optimizer.minimise(cost, theta, low, high, steps, tolerance=0.1 * knots**0.5)
-    return unpack(theta), -float(np.nanmin(costs))
+    return unpack(theta), -float(np.min(costs, where=np.isfinite(costs), initial=np.inf))
 
 
 def _by_knot(before: FloatArray, after: FloatArray) -> FloatArray:

@@ -40,11 +40,8 @@ SLIDES = 0.25  # of the newest part that it is longer before it is cut
 
 
 class Window:
-    """A track and the readings it rests on.
-
-    white: whether its noise is taken for white and even, whatever it is. refresh_every: so many times less often than
-    usual. stand_ins: components whose readings are constants.
-    """
+    """A track and the readings it rests on. white: whether its noise is taken for white and even. refresh_every: so many
+    times less often than usual. stand_ins: components whose readings are constants."""
 
     white, refresh_every = False, 1
 
@@ -55,9 +52,8 @@ class Window:
         self.known, self.sizes, self.stand_ins, self.near = known, sizes, stand_ins, 0
         self.repeats, self.labels = Repeats(), Labels()
         self.next_times, self.next_late = np.ones(3), np.zeros(3)  # how the noise of the next readings differs
-        self.reacquired: list[int] = []  # samples at which a lost track was found again
-        self.left = 0  # samples that did not wait for their lag, because too many did
-        self.forgotten, self.begun = 0, -1  # samples that are kept no more; and before the track's start, of all
+        # Samples of re-acquisition; how many left before their lag, are kept no more, and came before the track's start.
+        self.reacquired, self.left, self.forgotten, self.begun = list[int](), 0, 0, -1
         self.under_way: Whole | None = None
         nothing, ones = np.zeros((0, 3)), np.ones((0, 3))
         self.kept = Columns(
@@ -98,7 +94,7 @@ class Window:
         return smooth_log(self._observed(slice(self.near, len(self))), self.allowed, [self.anchor], PATHS)
 
     def used_lately(self, count: int) -> FloatArray:
-        """(3,) share of each component's last `count` readings that is used."""
+        """See `readings.used_lately`."""
         return used_lately(self.measurement, self.kept["weight"], count)
 
     def in_doubt(self) -> bool:

@@ -39,7 +39,7 @@ def test_a_json_file_of_another_program_is_no_metadata(make: Make, text: str | b
             "time_s,x_m,y_m,z_m,nis\n0,1,2,3,q\n",
             'column "nis": "q" is not a number; expected a number. Correct the cell.',
         ),
-        ("time_s,x_m,y_m,z_m,outlier_range\n0,1,2,3,4\n", '"4" is not a flag; expected a whole number from 0 to 3.'),
+        ("time_s,x_m,y_m,z_m,outlier_range\n0,1,2,3,7\n", '"7" is not a flag; expected a whole number from 0 to 5.'),
     ],
 )
 def test_the_fault_of_a_trajectory_is_named(make: Make, text: str, expected: str) -> None:

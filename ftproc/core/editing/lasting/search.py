@@ -35,7 +35,9 @@ LEAST_OFF = 10.0  # the same of a jump in a rejected run, by the noise alone
 CERTAIN = 4.0  # sigmas of its size from which a component takes part in a step of several
 AROUND, MEMORIES = (150, 2000), 12.0  # samples on each side of what is weighed, and memories
 SHORTEST_CELL = 2  # samples in a cell of a scan
-PRIOR, MARGIN = -6.0, 4.0  # log-odds of such a fault at a place, and by which it must be likelier
+OPEN = 4.0  # in log-probability: within it, whether a fault stays is open
+REMEMBERED = 2.5  # samples that a filter remembers: with fewer, hard turns jump as faults do
+PRIOR, MARGIN = -6.0, 8.0  # log-odds of such a fault at a place, and by which it must be likelier
 HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
 SURE = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
 END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step cannot be told from a patch
@@ -77,7 +79,7 @@ def search(scene: Scene) -> list[Found]:
     found, rejected = list[Found](), list[Jump]()
     for _ in range(ROUNDS):
         best = _likeliest(look_at(scene.without([curve for each in found for curve in each.curves])), rejected)
-        if best is None:
+        if best is None or any(best.curves[0][:3] == each.curves[0][:3] for each in found):
             break
         found.append(best)
     return found
@@ -88,6 +90,8 @@ def look_at(scene: Scene) -> Look:
     log = scene.log._replace(weight=scene.taken_in)
     memory = scales_of(log, scene.calm.noise_variance).memory_samples(float(scene.calm.jerk[0, 0]))
     width, around = max(int(memory / 2), SHORTEST_CELL), int(np.clip(MEMORIES * memory, *AROUND))
+    if memory < REMEMBERED:
+        return Look(scene, around, width, [])
     starts, n = scene.starts(log), len(scene.possible)
     if len(scene.rates) > 1:
         width = max(width, n // CELLS)
@@ -243,7 +247,7 @@ def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
                 large = not _may_be_a_halt(scene, curve)
             else:
                 large = abs(curve.size[0]) > SURE * math.sqrt(noise_variance[curve.component])
-            sure = bool(large and each.gain - each.second > MARGIN)
+            sure = bool(large and each.gain - each.second > OPEN)
             (result.steps if sure else result.doubtful).append(
                 Step(curve.component, curve.begin, curve.size[0], sigma, sure)
             )
