@@ -69,9 +69,11 @@ class Difference:
 
 
 def compare(first: Trajectory, second: Trajectory) -> Difference | None:
-    """Rows are those of one log where both name the same one, else those with equal times. None without any in both."""
+    """Rows are those of one log where both name the same one, else those with equal times. None without any in both,
+    and where both are of known logs of different content."""
+    logs = {each.metadata.get("log_sha256") for each in (first, second)}
     a, b = _rows_in_both(first, second)
-    if not len(a):
+    if not len(a) or (None not in logs and len(logs) > 1):
         return None
     time_s, gap = first.time_s[a], second.state[b, :3] - first.state[a, :3]
     length = np.sqrt((gap**2).sum(1))

@@ -40,8 +40,8 @@ SLIDES = 0.25  # of the newest part that it is longer before it is cut
 
 
 class Window:
-    """A track and the readings it rests on. white: whether its noise is taken for white and even. refresh_every: so many
-    times less often than usual. stand_ins: components whose readings are constants."""
+    """A track and the readings it rests on. white: whether its noise is taken for white and even. refresh_every: so
+    many times less often than usual. stand_ins: components whose readings are constants."""
 
     white, refresh_every = False, 1
 
@@ -52,7 +52,7 @@ class Window:
         self.known, self.sizes, self.stand_ins, self.near = known, sizes, stand_ins, 0
         self.repeats, self.labels = Repeats(), Labels()
         self.next_times, self.next_late = np.ones(3), np.zeros(3)  # how the noise of the next readings differs
-        # Samples of re-acquisition; how many left before their lag, are kept no more, and came before the track's start.
+        # Samples of re-acquisition; how many left before their lag, are kept no more, came before the track's start.
         self.reacquired, self.left, self.forgotten, self.begun = list[int](), 0, 0, -1
         self.under_way: Whole | None = None
         nothing, ones = np.zeros((0, 3)), np.ones((0, 3))
