@@ -252,8 +252,7 @@ class _Swept(NamedTuple):
 
 
 def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) -> _Swept:
-    paths, wanted = wanted == PATHS, min(wanted, STATES)
-    n = len(log.time_s)
+    paths, wanted, n = wanted == PATHS, min(wanted, STATES), len(log.time_s)
     pacing.swept(n)
     samples, profile = log.samples(model.noise_variance, scratch(SAMPLE, n)), model.profile(log.time_s)
     sweep = _sweep_coloured if model.coloured else _sweep
@@ -287,15 +286,13 @@ def score_log(log: Observations, model: Model, starts: list[Start]) -> Scores:
 
 
 def smooth_log(log: Observations, model: Model, starts: list[Start], wanted: int = STATES) -> SmootherRun:
-    """Smooth the whole log; the record on each side of a start separately. Samples before the first start are
-    extrapolated.
+    """Smooth the whole log, on each side of a start separately; samples before the first start are extrapolated.
 
     wanted: HEADS leaves out states and sigmas (of no sample), which saves half of the time, RESIDUALS also all heads
     but that of a first start after the first sample; PATHS adds path_sigma, which is NaN without it.
     """
     scores, estimates, residuals, starting = _swept(log, model, starts, wanted)
-    first = starts[0].sample
-    if first > 0:
+    if (first := starts[0].sample) > 0:
         before, residuals[:first] = extrapolated(log, model, starting[0])
         estimates[:first] = before[: len(estimates)]
     fields = {name: estimates[name] for name in ESTIMATED.names or ()}
