@@ -84,7 +84,7 @@ def fuse(
         log, possible = current.log, current.events.gathered(current.possible)
         run = current.found.run
         decided = lasting.Decided(
-            current.events, log, possible, current.model, run.state, run.residual, current.rates
+            current.events, log, possible, current.model, run.state, run.sigma, run.residual, current.rates
         )  # fmt: skip
         found = lasting.find(decided, gate, jerk_psd is not None)
         if not found:

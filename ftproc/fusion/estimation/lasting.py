@@ -41,14 +41,15 @@ class Readings(NamedTuple):
 
 
 class Decided(NamedTuple):
-    """Events and what was decided on them: their log, possible (n, 3), the model, state (n, 9), leave-one-out
-    residual (n, 3), and the rates of outliers (stations, 3, 3)."""
+    """Events and what was decided on them: their log, possible (n, 3), the model, state (n, 9) and sigma (n, 9),
+    leave-one-out residual (n, 3), and the rates of outliers (stations, 3, 3)."""
 
     events: Events
     log: Observations
     possible: FloatArray
     model: Model
     state: FloatArray
+    sigma: FloatArray
     residual: FloatArray
     rates: FloatArray
 
@@ -63,7 +64,8 @@ def find(decided: Decided, gate: float, jerk_known: bool) -> list[Found]:
     setting = Setting(events.time_s, late_of(log, decided.state), events.station)
     calm = median_level(decided.model)
     scene = Scene(
-        log, possible, taken_in, setting, calm, jerk_known, decided.rates, gate, decided.residual, decided.state
+        log, possible, taken_in, setting, calm, jerk_known, decided.rates, gate, decided.residual, decided.state,
+        decided.sigma,
     )  # fmt: skip
     return search(scene)
 

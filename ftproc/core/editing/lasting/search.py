@@ -35,10 +35,11 @@ LEAST_OFF = 10.0  # the same of a jump in a rejected run, by the noise alone
 CERTAIN = 4.0  # sigmas of its size from which a component takes part in a step of several
 AROUND, MEMORIES = (150, 2000), 12.0  # samples on each side of what is weighed, and memories
 SHORTEST_CELL = 2  # samples in a cell of a scan
-OPEN = 4.0  # in log-probability: within it, whether a fault stays is open
+OPEN, MOVES = 4.0, 15.0  # in log-probability: within it, whether a fault stays is open; before half of a log is moved
 REMEMBERED = 2.5  # samples that a filter remembers: with fewer, hard turns jump as faults do
-PRIOR, MARGIN = -6.0, 8.0  # log-odds of such a fault at a place, and by which it must be likelier
+PRIOR, DOUBT, MARGIN = -6.0, -6.0, 8.0  # log-odds of such a fault at a place; with which it is told, and taken out
 HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
+MOST_EACH = 20.0  # of log-probability, of each reading: where more is gained, the part without the fault was lost
 SURE = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
 END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step cannot be told from a patch
 
@@ -148,7 +149,7 @@ def _at(look: Look, jump: Jump) -> Found | None:
     moves = [c.component for c, s in zip(step.curves, step.sigma, strict=True) if abs(c.size[0]) > CERTAIN * s]
     if 0 < len(moves) < len(step.curves):
         gain, place, step = max((gain, place, step), _as_step(look, jump, moves, null), key=lambda each: each[0])
-    if gain < MARGIN or not 0 < place.sample < n:
+    if not DOUBT <= gain < MOST_EACH * look.scene.possible[near].sum() or not 0 < place.sample < n:
         return None
     if place.channels[0][0] == CLOCK:
         return Found(_in_whole(step, near, n), step.sigma, gain)
@@ -181,7 +182,7 @@ def _best(look: Look, proposed: Sequence[Sequence[Curve]], here: slice, place: P
 
     outcomes = [outcome(curves) for curves in proposed]
     best = max(outcomes, key=lambda each: each.gain)
-    if best.gain < MARGIN:
+    if not DOUBT <= best.gain < MOST_EACH * part.possible.sum():
         return None
     if len(best.curves[0].size) > 1:  # its other end is known to a cell
         one = best.curves[0]
@@ -239,7 +240,7 @@ def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
     for each in found:
         for curve, sigma in zip(each.curves, each.sigma, strict=True):
             if curve.end < n or min(curve.begin, n - curve.begin) < end_of(n):
-                if curve.component != CLOCK:
+                if curve.component != CLOCK and each.gain > MARGIN:
                     side = slice(0, curve.begin) if curve.end == n and 2 * curve.begin < n else curve.rows
                     result.banned[side, curve.component] = True
                 continue
@@ -247,7 +248,7 @@ def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
                 large = not _may_be_a_halt(scene, curve)
             else:
                 large = abs(curve.size[0]) > SURE * math.sqrt(noise_variance[curve.component])
-            sure = bool(large and each.gain - each.second > OPEN)
+            sure = bool(large and each.gain > MOVES and each.gain - each.second > OPEN)
             (result.steps if sure else result.doubtful).append(
                 Step(curve.component, curve.begin, curve.size[0], sigma, sure)
             )

@@ -31,7 +31,7 @@ IntArray = NDArray[np.int64]
 SETTLED = 2  # rounds of deciding
 TAKEN_IN, EVEN = 3, 5.0  # readings in a rejected run, and second differences in sigmas, that may be a track
 PROFILE_STEPS = 2  # of the search for the process noise
-FREE = (50.0, 20.0, 20.0)  # m, m/s, m/s2: 1-sigma of the state where a part of a track begins
+FREE, WIDER = (50.0, 20.0, 20.0), 3.0  # m, m/s, m/s2, and times its own: 1-sigma of the state where a part begins
 
 
 class Scene(NamedTuple):
@@ -40,7 +40,8 @@ class Scene(NamedTuple):
     log: with the weights as decided. possible (n, 3): readings that may be good. taken_in (n, 3): the weights with the
     rejected runs that may be a track. setting: see `curves`. calm: a model with a single level of jerk; fixed: whether
     that is known. rates (stations, 3, 3) of outliers. gate: in sigmas. residual (n, 3): leave-one-out, as decided.
-    track: (n, 9) states about which a filter may start, None where a start is to be found in the readings.
+    track, doubt: (n, 9) states about which a filter may start, and their 1-sigma; None where a start is to be found in
+    the readings.
     """
 
     log: Observations
@@ -53,6 +54,7 @@ class Scene(NamedTuple):
     gate: float
     residual: FloatArray
     track: FloatArray | None = None
+    doubt: FloatArray | None = None
 
     def part(self, near: slice) -> Scene:
         """Some of the samples."""
@@ -60,6 +62,7 @@ class Scene(NamedTuple):
             log=self.log.part(near), possible=self.possible[near], taken_in=self.taken_in[near],
             setting=self.setting.part(near), residual=self.residual[near],
             track=None if self.track is None else self.track[near],
+            doubt=None if self.doubt is None else self.doubt[near],
         )  # fmt: skip
 
     def without(self, curves: Sequence[Curve]) -> Scene:
@@ -84,8 +87,8 @@ class Scene(NamedTuple):
 
     def starts(self, log: Observations) -> list[Start]:
         """Where a filter over the log starts."""
-        if self.track is not None:
-            return [Start(0, self.track[0], np.diag(np.repeat(FREE, 3) ** 2))]
+        if self.track is not None and self.doubt is not None:
+            return [Start(0, self.track[0], np.diag(np.repeat(FREE, 3) ** 2 + (WIDER * self.doubt[0]) ** 2))]
         return find_starts(log, self.calm.noise_variance, float(self.calm.jerk[0, 0]))
 
 
