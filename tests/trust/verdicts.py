@@ -19,6 +19,7 @@ MOST_CONFIDENT = 0.01  # of the runs of a class that has no bound of its own
 BOUNDS = {
     **{name: Bound(confident=MOST_CONFIDENT) for name in faulty_logs.CLASSES},
     **{name: Bound(confident=MOST_CONFIDENT, reported=0.1) for name in faulty_logs.SOUND},
+    "step of 10 sigma": Bound(confident=0.1),
     "several steps": Bound(confident=0.03),
     "clock jump": Bound(confident=0.05),
     "held": Bound(confident=0.02),
