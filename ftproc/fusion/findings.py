@@ -193,14 +193,16 @@ def _correlated(fused: Fused) -> Iterator[Remark]:
 
 def _rejections(fused: Fused) -> Iterator[Remark]:
     for s, station in enumerate(fused.stations):
-        shares = {}
-        for c in station.components:
-            possible = np.isfinite(station.measurement[:, c])
-            if possible.sum() >= FEWEST:
-                shares[COMPONENTS[c]] = float(1 - (fused.weight[s][possible, c] > 0).mean())
-        if shares and min(shares.values()) > TOO_MANY_REJECTED:
+        possible, used = np.isfinite(station.measurement), fused.weight[s] > 0
+        shares = {
+            COMPONENTS[c]: float(1 - used[possible[:, c], c].mean())
+            for c in station.components
+            if possible[:, c].sum() >= FEWEST
+        }
+        if shares and used[possible].mean() < 1 - TOO_MANY_REJECTED:
             text = f"{station.name} contradicts the others: most of its readings are rejected; check its place, its "
-            yield Remark(SUSPECT, text + "clock, its conventions, and that it follows the same target")
+            yield Remark(SUSPECT, text + "clock and its conventions, and that it follows the same target")
+        if shares and min(shares.values()) > TOO_MANY_REJECTED:
             continue
         for name, share in shares.items():
             if share > MANY_REJECTED:

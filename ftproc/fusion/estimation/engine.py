@@ -81,6 +81,8 @@ def fuse(
     readings = lasting.Readings.of(stations)
     current = _settled(readings, gate, jerk_psd, known, progress)
     for _ in range(LASTING_ROUNDS):
+        if _contradicted(current):
+            break
         log, possible = current.log, current.events.gathered(current.possible)
         run = current.found.run
         decided = lasting.Decided(
@@ -90,8 +92,19 @@ def fuse(
         if not found:
             break
         readings = lasting.taken_out(readings, current.events, found)
-        current = _settled(readings, gate, jerk_psd, known, progress)._replace(steps=readings.steps)
+        without = _settled(readings, gate, jerk_psd, known, progress)._replace(steps=readings.steps)
+        if _contradicted(without):
+            break
+        current = without
     return _last(current)
+
+
+def _contradicted(current: Current) -> bool:
+    """Whether most readings of a station are rejected: about such a flight no fault can be told from another."""
+    return any(
+        2 * (weight > 0).sum() < np.isfinite(station.measurement).sum()
+        for station, weight in zip(current.stations, current.weight, strict=True)
+    )
 
 
 def _settled(

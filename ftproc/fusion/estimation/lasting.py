@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing.lasting.curves import CLOCK, Curve, Setting
-from ftproc.core.editing.lasting.search import Found, search
+from ftproc.core.editing.lasting.search import MARGIN, Found, search
 from ftproc.core.editing.lasting.weighing import Scene, late_of, with_even_runs
 from ftproc.core.filtering.records import Model, Observations
 from ftproc.core.identification.profile import median_level
@@ -55,7 +55,7 @@ class Decided(NamedTuple):
 
 
 def find(decided: Decided, gate: float, jerk_known: bool) -> list[Found]:
-    """The faults that last."""
+    """The faults that last, as far as they are certain enough to be taken out."""
     events, log = decided.events, decided.log
     possible, taken_in, sigma = decided.possible > 0, log.weight.copy(), np.sqrt(decided.model.noise_variance)
     for s in range(len(decided.rates)):
@@ -67,7 +67,7 @@ def find(decided: Decided, gate: float, jerk_known: bool) -> list[Found]:
         log, possible, taken_in, setting, calm, jerk_known, decided.rates, gate, decided.residual, decided.state,
         decided.sigma,
     )  # fmt: skip
-    return search(scene)
+    return [each for each in search(scene) if each.gain > MARGIN]
 
 
 def taken_out(readings: Readings, events: Events, found: Sequence[Found]) -> Readings:
