@@ -81,30 +81,20 @@ def fuse(
     readings = lasting.Readings.of(stations)
     current = _settled(readings, gate, jerk_psd, known, progress)
     for _ in range(LASTING_ROUNDS):
-        if _contradicted(current):
+        if lasting.contradicted(current.stations, current.weight):
             break
-        log, possible = current.log, current.events.gathered(current.possible)
-        run = current.found.run
+        run, possible = current.found.run, current.events.gathered(current.possible)
         decided = lasting.Decided(
-            current.events, log, possible, current.model, run.state, run.sigma, run.residual, current.rates
+            current.events, current.log, possible, current.model, run.state, run.sigma, run.residual, current.rates
         )  # fmt: skip
-        found = lasting.find(decided, gate, jerk_psd is not None)
-        if not found:
+        if not (found := lasting.find(decided, gate, jerk_psd is not None)):
             break
         readings = lasting.taken_out(readings, current.events, found)
         without = _settled(readings, gate, jerk_psd, known, progress)._replace(steps=readings.steps)
-        if _contradicted(without):
+        if lasting.contradicted(without.stations, without.weight):
             break
         current = without
     return _last(current)
-
-
-def _contradicted(current: Current) -> bool:
-    """Whether most readings of a station are rejected: about such a flight no fault can be told from another."""
-    return any(
-        2 * (weight > 0).sum() < np.isfinite(station.measurement).sum()
-        for station, weight in zip(current.stations, current.weight, strict=True)
-    )
 
 
 def _settled(

@@ -54,6 +54,15 @@ class Decided(NamedTuple):
     rates: FloatArray
 
 
+def contradicted(stations: Sequence[Seen], weight: Sequence[FloatArray]) -> bool:
+    """Whether most readings of a station are rejected, weight (rows, 3) of each: about such a flight no fault can be
+    told from another."""
+    return any(
+        2 * (used > 0).sum() < np.isfinite(station.measurement).sum()
+        for station, used in zip(stations, weight, strict=True)
+    )
+
+
 def find(decided: Decided, gate: float, jerk_known: bool) -> list[Found]:
     """The faults that last, as far as they are certain enough to be taken out."""
     events, log = decided.events, decided.log
