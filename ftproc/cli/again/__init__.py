@@ -16,7 +16,7 @@ from ftproc.cli.command import ARGUMENTS, WHERE_TO, typed
 from ftproc.errors import InputError, UsageError
 from ftproc.files import decisions, layout
 from ftproc.files.reading import trajectories
-from ftproc.files.reading.formats import content
+from ftproc.files.reading.formats import content, tables
 from ftproc.quality import provenance
 from ftproc.records import Trajectory
 
@@ -112,7 +112,7 @@ def load(name: str) -> Before:
 def _metadata(name: str) -> tuple[dict[str, Any], str]:
     """The metadata in a file, and the trajectory that they are of."""
     if not name.lower().endswith(".json"):
-        return trajectories.metadata(name), name
+        return trajectories.metadata(name, tables.read_header(name)), name
     text = content.read(name, Path(name))
     try:
         found = json.loads(text)

@@ -52,23 +52,20 @@ def read(source: tables.Source) -> Trajectory:
         outlier=columns.outlier_flags(header, found, highest=ACCEPTED)[order],
         nis=group(("nis",))[:, 0],
         correction=group(layout.CORRECTION),
-        metadata=_metadata(source, header),
+        metadata=metadata(source, header),
         extra=extra.take(order) if others else None,
     )
 
 
-def metadata(source: Target) -> dict[str, Any]:
-    """Those of a trajectory's file alone; empty if there are none. Raises InputError."""
-    return _metadata(source, tables.read_header(source))
-
-
-def _metadata(source: tables.Source, header: TableHeader) -> dict[str, Any]:
-    """From the file itself or its sidecar; empty if there is none or another program wrote it."""
-    text = header.metadata.get(layout.METADATA_KEY, b"")
+def metadata(source: tables.Source, header: TableHeader | None = None) -> dict[str, Any]:
+    """The metadata of a trajectory, from the file itself or its sidecar; empty if there are none or another program
+    wrote them. header: of the file, where it is open already."""
     beside = layout.sidecar(source) if isinstance(source, str | Path) else None
     try:
         if beside is not None:
             text = _bytes(beside)
+        else:
+            text = (header or tables.read_header(source)).metadata.get(layout.METADATA_KEY, b"")
         found = json.loads(text)
     except (OSError, ValueError, RecursionError, InputError):
         return {}

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import itertools
 import json
+import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -13,7 +16,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from ftproc.errors import encodable
-from ftproc.files import arrow, layout
+from ftproc.files import arrow, layout, remote
 from ftproc.files.layout import METADATA_KEY, Target, sidecar
 from ftproc.files.writing import atomic, maps, tables
 from ftproc.records import Trajectory, joined
@@ -63,18 +66,17 @@ def write(trajectory: Trajectory, target: Target, without: Sequence[str] = ()) -
     the same bytes. Raises OutputError; BrokenPipeError if standard output is closed; UsageError as `to_table` and
     `maps.check`.
     """
-    beside = sidecar(target)
-    if beside is None:
+    if sidecar(target) is None:
         tables.write_table(to_table(trajectory, without), target)
         return
     map_kind = layout.map_kind(target)
     drawn = maps.as_bytes(trajectory, map_kind) if map_kind else b""
-    with atomic.replacing(target) as stream:
+    with _with_sidecar(target) as (stream, text):
         if map_kind:
             stream.write(drawn)
         else:
             tables.write_stream(to_table(trajectory, without), stream, tables.kind_of(target))
-        _write_sidecar(beside, stream, trajectory.metadata)
+        text.write(to_json(trajectory.metadata, indent=2) + b"\n")
 
 
 def write_parts(parts: Iterable[Trajectory], metadata: Callable[[], Mapping[str, Any]], target: Target) -> None:
@@ -89,15 +91,13 @@ def write_parts(parts: Iterable[Trajectory], metadata: Callable[[], Mapping[str,
         whole = joined([*first, *stretches])
         write(replace(whole, metadata={**whole.metadata, **metadata()}), target)
         return
-    beside = sidecar(target)
-    with atomic.replacing(target) as stream:
+    with _with_sidecar(target) as (stream, text):
         with tables.growing(stream, tables.kind_of(target)) as file:
             for stretch in itertools.chain(first, stretches):
                 file.append(to_table(stretch).replace_schema_metadata(None))
             complete = {**first[0].metadata, **metadata()}
             file.add_metadata({METADATA_KEY: to_json(complete, indent=None)})
-        if beside is not None:
-            _write_sidecar(beside, stream, complete)
+        text.write(to_json(complete, indent=2) + b"\n")
 
 
 def _can_stream(stretch: Trajectory, target: Target) -> bool:
@@ -110,12 +110,31 @@ def _can_stream(stretch: Trajectory, target: Target) -> bool:
     return plain and layout.map_kind(target) is None and str(target) != "-" and tables.can_grow(tables.kind_of(target))
 
 
-def _write_sidecar(beside: Target, stream: BinaryIO, metadata: Mapping[str, Any]) -> None:
-    """Write the sidecar before its file appears on `stream`, so that a process waiting for the file finds both."""
+@contextlib.contextmanager
+def _with_sidecar(target: Target) -> Iterator[tuple[BinaryIO, BinaryIO]]:
+    """Streams of a file and of its metadata, which appear one after the other when both are on the disk; of a file that
+    holds its own, nothing becomes of the second stream.
+
+    A process that waits for a new file finds its metadata too, which appear first. Of a file that is replaced they
+    appear last: a kill in between never leaves them beside an older file, which would then pass for finished.
+    """
+    near, beside = remote.local(target), sidecar(target)
+    if beside is None:
+        with atomic.replacing(target) as stream:
+            yield stream, io.BytesIO()
+    elif near is not None and near.is_file():
+        with atomic.replacing(beside) as text, atomic.replacing(target) as stream:
+            yield stream, text
+            _sync(text)
+    else:
+        with atomic.replacing(target) as stream, atomic.replacing(beside) as text:
+            yield stream, text
+            _sync(stream)
+
+
+def _sync(stream: BinaryIO) -> None:
     if stream.seekable():  # not a pipe
         atomic.sync(stream)
-    with atomic.replacing(beside) as text:
-        text.write(to_json(metadata, indent=2) + b"\n")
 
 
 def to_json(metadata: Mapping[str, Any], indent: int | None) -> bytes:
@@ -125,12 +144,14 @@ def to_json(metadata: Mapping[str, Any], indent: int | None) -> bytes:
 
 def plain(value: Any) -> Any:
     """numpy values, tuples, paths and names -> JSON types; NaN and infinity, which JSON lacks, -> null."""
-    if isinstance(value, Mapping):
-        return {encodable(str(key)): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return encodable(str(value)) if isinstance(value, Path | str) else value
+    if isinstance(value, Path | str):
+        return encodable(str(value))
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, Mapping):
+        return {encodable(str(key)): plain(item) for key, item in value.items()}
+    return value
