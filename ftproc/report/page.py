@@ -79,10 +79,13 @@ def page(trajectory: Trajectory, truth: Truth | None = None) -> str:
     return document(tables.name(trajectory), "\n".join(parts), drawn=True)
 
 
-def document(title: str, body: str, drawn: bool = False) -> str:
-    """A page around its body (HTML). drawn: with figures."""
-    library, script = (_plotly(), "".join(map(_text, _SCRIPTS))) if drawn else (None, "")
-    allowed = f"'sha256-{library.sha256}' 'sha256-{_sha256(script)}' 'unsafe-eval'" if library else "'none'"
+def document(title: str, body: str, drawn: bool = False, script: str = "") -> str:
+    """A page around its body (HTML). drawn: with figures, and their scripts; else with the `script` of this name."""
+    named = _SCRIPTS if drawn else (script,) if script else ()
+    library, text = _plotly() if drawn else None, "".join(map(_text, named))
+    allowed = f"'sha256-{_sha256(text)}'" if text else "'none'"
+    if library:
+        allowed = f"'sha256-{library.sha256}' {allowed} 'unsafe-eval'"
     policy = f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:"
     return "\n".join(
         [
@@ -95,7 +98,7 @@ def document(title: str, body: str, drawn: bool = False) -> str:
             f"<style>\n{_text('page.css')}</style></head>",
             f"<body><main>\n{body}\n</main>",
             *([f'<script type="application/gzip" id="library">{library.packed}</script>'] if library else []),
-            *([f"<script>{script}</script>"] if script else []),
+            *([f"<script>{text}</script>"] if text else []),
             "</body></html>\n",
         ]
     )

@@ -10,7 +10,9 @@ import pytest
 
 from ftproc import report
 from ftproc.records import ISOLATED
+from ftproc.report import index
 from ftproc.report.browser import printing
+from ftproc.report.index import Entry
 from ftproc.report.page import _text
 from tests.report.browser import NEEDED, Opened, browser
 from tests.report.flights import filtered, flight, hostile
@@ -295,3 +297,22 @@ def test_a_telephone_shows_the_summary_whole(show):
     )
     assert inside
     assert opened.page.evaluate("document.documentElement.scrollWidth") == 390
+
+
+def test_the_index_sorts_and_filters(context, tmp_path):
+    summary = {"method": "ukf", **filtered().metadata["summary"]}
+    entries = [Entry(f"{rows}.csv", None, {**summary, "rows": rows}) for rows in (900, 12_000, 61)]
+    index.write([*entries, Entry("none.csv", None, {}, "none.csv: there is no such file.")], tmp_path / "index.html")
+    opened = Opened(context, tmp_path / "index.html")
+    page, logs = opened.page, "td:first-child:visible"
+    assert page.locator(logs).all_inner_texts() == ["none.csv", "900.csv", "12000.csv", "61.csv"]
+    page.get_by_role("button", name="rows").click()
+    assert page.locator(logs).all_inner_texts() == ["61.csv", "900.csv", "12000.csv", "none.csv"]
+    page.get_by_role("button", name="rows").click()
+    assert page.locator(logs).all_inner_texts() == ["12000.csv", "900.csv", "61.csv", "none.csv"]
+    page.get_by_label("failed").uncheck()
+    page.get_by_label("Show only rows with").fill("0.csv UKF")
+    assert page.locator(logs).all_inner_texts() == ["12000.csv", "900.csv"]
+    assert "2 of 4 shown" in page.locator(".filter").inner_text()
+    assert opened.complaints == []
+    page.close()
