@@ -16,17 +16,15 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import CancelledError
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
 import ftproc
-from ftproc.batch.tasks import Outcome, Submit, Task, filter_one
-from ftproc.config.recipe import Recipe
+from ftproc.batch.tasks import Notify, Outcome, Task, filter_one
 from ftproc.core.threads import use
 from ftproc.correction import model_file
 from ftproc.errors import Failure, UsageError, failure
@@ -53,31 +51,35 @@ def require_distributed() -> Any:
     return distributed
 
 
-@contextlib.contextmanager
-def pool(recipe: Recipe, address: str) -> Iterator[Submit]:
-    """All workers of the scheduler at `address`. Raises UsageError when it does not answer, has no worker, or has one
-    with another version of ftproc."""
+def outcomes(
+    tasks: Sequence[Task], address: str, notify: Notify | None = None
+) -> Generator[tuple[int, Outcome], None, None]:
+    """The number of each task and its outcome, in their order, from all workers of the scheduler at `address`. Raises
+    UsageError when it does not answer, has no worker, or has one with another version of ftproc; and for standard
+    input."""
+    if any("-" in (task.log, task.output) for task in tasks):
+        raise UsageError("a cluster reads and writes files only: name the log, and the output with -o.")
     _reach(address)
     distributed = require_distributed()
-    carried = replace(recipe, model=model_file.named(recipe.model) or NO_MODEL)
+    unseen: list[str] = []
     with _quiet(), contextlib.closing(_connect(distributed, address)) as client:
         _check_workers(client, address)
-        futures: list[Any] = []
-        unseen: list[str] = []
-
-        def submit(task: Task) -> Callable[[], Outcome]:
-            if "-" in (task.log, task.output):
-                raise UsageError("a cluster reads and writes files only: name the log, and the output with -o.")
-            here = replace(task, place=os.getcwd())  # noqa: PTH109
-            future = client.submit(_work, here, carried, ftproc.__version__, pure=False)
-            futures.append(future)
-            return partial(_outcome, distributed, future, task, address, unseen)
-
+        futures = client.map(_work, [_carried(task) for task in tasks], version=ftproc.__version__, pure=False)
         try:
-            yield submit
+            for number, (task, future) in enumerate(zip(tasks, futures, strict=True)):
+                outcome, said = _outcome(distributed, future, task, address, unseen)
+                for text in said:
+                    (notify or str)(text)
+                yield number, outcome
         except BaseException:
             client.cancel(futures)
             raise
+
+
+def _carried(task: Task) -> Task:
+    """What a worker needs: the directory of this process, and the model itself."""
+    recipe = replace(task.recipe, model=model_file.named(task.recipe.model) or NO_MODEL)
+    return replace(task, recipe=recipe, place=os.getcwd())  # noqa: PTH109
 
 
 def _connect(distributed: Any, address: str) -> Any:
@@ -150,16 +152,26 @@ def _differs(worker: str, found: str | None, wanted: str) -> str:
     return f"the worker {worker} has {has}, this is ftproc {wanted}; {_CURE.format(wanted)}"
 
 
-def _work(task: Task, recipe: Recipe, version: str) -> tuple[Outcome, dict[str, str]]:
-    """On the worker, which may have joined after the versions were checked. Also what it has written, see `_marks`."""
+class _Done(NamedTuple):
+    """What comes back from a worker. written: the files that the task has written there, see `_marks`. said: what the
+    user is told."""
+
+    outcome: Outcome
+    written: dict[str, str]
+    said: list[str]
+
+
+def _work(task: Task, version: str) -> _Done:
+    """On the worker, which may have joined after the versions were checked."""
     if ftproc.__version__ != version:
         from distributed import get_worker
 
         message = f"{task.log}: {_differs(get_worker().address, ftproc.__version__, version)}"
-        return Outcome(task, failure=Failure(message, 1, "")), {}
+        return _Done(Outcome(task, failure=Failure(message, 1, "")), {}, [])
     use(1)  # Dask runs one task for each thread of the machine
-    outcome = filter_one(task, recipe)
-    return outcome, _marks(task) if outcome.failure is None else {}
+    said: list[str] = []
+    outcome = filter_one(task, said.append)
+    return _Done(outcome, _marks(task) if outcome.failure is None else {}, said)
 
 
 def _marks(task: Task) -> dict[str, str]:
@@ -199,18 +211,20 @@ def _arrived(outcome: Outcome, written: dict[str, str], unseen: list[str]) -> Ou
     return outcome
 
 
-def _outcome(distributed: Any, future: Any, task: Task, address: str, unseen: list[str]) -> Outcome:
-    """Waits for the outcome. Dask gives the task of a worker that died to another one, a few times. unseen: files that
-    workers have written, but not where this machine finds them; gets another one."""
+def _outcome(
+    distributed: Any, future: Any, task: Task, address: str, unseen: list[str]
+) -> tuple[Outcome, Sequence[str]]:
+    """Waits for the outcome, and what the user is told. Dask gives the task of a worker that died to another one, a few
+    times. unseen: files that workers have written, but not where this machine finds them; gets another one."""
     try:
-        outcome, written = future.result()
-        return _arrived(replace(outcome, task=task), written, unseen)
+        done: _Done = future.result()
+        return _arrived(replace(done.outcome, task=task), done.written, unseen), done.said
     except distributed.KilledWorker as error:
-        return _failed(task, "every worker that took it died (out of memory, or killed). Split the log.", error)
+        return _failed(task, "every worker that took it died (out of memory, or killed). Split the log.", error), ()
     except CancelledError as error:
-        return _failed(task, f"the scheduler {address} stopped before it was done; run again.", error)
+        return _failed(task, f"the scheduler {address} stopped before it was done; run again.", error), ()
     except Exception as error:
-        return Outcome(task, failure=failure(error, task.log))
+        return Outcome(task, failure=failure(error, task.log)), ()
     finally:
         future.release()
 

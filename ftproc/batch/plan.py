@@ -1,12 +1,15 @@
-"""Where each trajectory and each report goes: the rules of `-o` and `--report`."""
+"""Which logs are meant, and where each trajectory and each report goes: the rules of LOG, `-o` and `--report`."""
 
 from __future__ import annotations
 
+import glob
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from ftproc.batch.tasks import Task
+from ftproc.config.recipe import Recipe
 from ftproc.errors import UsageError
 from ftproc.files import layout, remote
 from ftproc.files.writing import outputs
@@ -19,33 +22,58 @@ _REPORT = "--report"
 _PAGES = (".html", ".htm", ".pdf")
 #: Ending of the trajectory's name by that of the log's, where it is not .csv.
 _SUFFIX = {".parquet": ".parquet", ".feather": ".feather"}
+#: In the name of an output or a station file: the name of each log.
+ANY = "*"
+_NO_LOGS = (".truth.", ".trajectory.")
 
 
-def tasks(
-    logs: Sequence[str],
-    output: str | None,
-    methods: Sequence[str] | None = None,
-    targets: Mapping[str, Sequence[str]] | None = None,
-) -> list[Task]:
-    """One task per log, or per log, target and method, with its output.
+class Wanted(NamedTuple):
+    """A trajectory that a user wants: of which log, how. parts: what its name contains beside the log's, such as the
+    target and the method."""
 
-    methods: names of methods, which the names of the outputs then contain. targets: COLUMN=VALUE of the targets of each
-    log, whose values the names of the outputs then contain. Raises UsageError.
+    log: str
+    recipe: Recipe = Recipe()
+    parts: tuple[str, ...] = ()
+
+
+def chosen(names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The logs among the names of a command line, and what a pattern has named beside them: truths and trajectories.
+
+    A name with * or ? that no shell has replaced stands for all files that it fits. One name alone is always a log.
     """
-    if "-" in logs and len(logs) > 1:
+    found = [each for name in names for each in _expanded(name)]
+    if len(found) == 1:
+        return found, []
+    logs = [name for name in found if not _is_result(name)]
+    return (logs, list(filter(_is_result, found))) if logs else (found, [])
+
+
+def _is_result(name: str) -> bool:
+    return any(part in Path(name).name.lower() for part in _NO_LOGS)
+
+
+def _expanded(name: str) -> list[str]:
+    """Sorted, as a shell does; a name that fits nothing stays."""
+    if not any(sign in name for sign in "*?[") or remote.is_uri(name) or Path(name).exists():
+        return [name]
+    return sorted(glob.glob(name)) or [name]  # noqa: PTH207
+
+
+def named_after(pattern: str, log: str) -> str:
+    """The pattern with the log's name, without its endings, in place of *; a pattern without a directory is of files
+    beside the logs."""
+    name = pattern.replace(ANY, layout.stem_and_kind(Path(log).name)[0])
+    return str(Path(log).with_name(name)) if Path(pattern).name == pattern and log != "-" else name
+
+
+def tasks(wanted: Sequence[Wanted], output: str | None, redo: bool = True) -> list[Task]:
+    """A task for each trajectory, with its output. redo: also of logs that an earlier run has finished. Raises
+    UsageError."""
+    if any(each.log == "-" for each in wanted) and len({each.log for each in wanted}) > 1:
         raise UsageError("- stands for one log on standard input; it cannot be mixed with other logs.")
-    if output is None:
-        directory: str | None = "."
-        if methods:
-            raise UsageError("--method all writes several trajectories: name a directory with -o.")
-    else:
-        directory = _directory(output, several=len(logs) > 1 or bool(methods) or bool(targets))
-    planned = [
-        _task(log, output, directory, method, target)
-        for log in logs
-        for target in (targets or {}).get(log, ("",))
-        for method in (methods or (None,))
-    ]
+    several = len(wanted) > 1 or any(each.parts for each in wanted)
+    directory = "." if output is None else _directory(output, several)
+    planned = [Task(each.log, _output(each, output, directory), each.recipe, redo=redo) for each in wanted]
     taken: dict[str, str] = {}
     for task in planned:
         if task.output in taken:
@@ -74,8 +102,10 @@ def pages_written(pages: Sequence[str | None], index: str | None) -> list[Output
 
 
 def _directory(output: str, several: bool) -> str | None:
-    """The directory that `-o` names, or None when it names a file or standard output."""
+    """The directory that `-o` names, or None when it names a file, a file for each log, or standard output."""
     path = Path(output)
+    if ANY in path.name and layout.ending(path, (*layout.TABLES, *layout.MAPS)):
+        return None
     if output != "-" and (output.endswith("/") or path.is_dir()):
         return output
     if output == "-" or layout.table_kind(path) or layout.map_kind(path):
@@ -89,17 +119,15 @@ def _directory(output: str, several: bool) -> str | None:
     return output
 
 
-def _task(log: str, output: str | None, directory: str | None, method: str | None, target: str) -> Task:
-    if output is not None and directory is None:
-        return Task(log, output, method, target=target)
+def _output(wanted: Wanted, output: str | None, directory: str | None) -> str:
+    log = wanted.log
     if log == "-" and output is None:
-        return Task(log, "-", method, target=target)  # in a pipe, out of a pipe
-    name = "stdin.csv" if log == "-" else Path(log).name
-    stem, kind = layout.stem_and_kind(name)
-    value = re.sub(r"[^\w+-]", "_", target.partition("=")[2])
-    middle = "".join(f".{part}" for part in (value, method) if part)
-    written = remote.within(directory or ".", f"{stem}{middle}.trajectory{_SUFFIX.get(kind, '.csv')}")
-    return Task(log, written, method, target=target)
+        return "-"  # in a pipe, out of a pipe
+    stem, kind = layout.stem_and_kind("stdin.csv" if log == "-" else Path(log).name)
+    name = ".".join([stem, *(re.sub(r"[^\w+-]", "_", part) for part in wanted.parts)])
+    if directory is None:
+        return str(output).replace(ANY, name)
+    return remote.within(directory, f"{name}.trajectory{_SUFFIX.get(kind, '.csv')}")
 
 
 def pages(names: Sequence[str], report: str | None) -> tuple[list[str | None], str | None]:

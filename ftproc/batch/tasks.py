@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ftproc.batch import finished
 from ftproc.config.recipe import Recipe
-from ftproc.errors import Failure, FtprocWarning, failure, interruption
+from ftproc.errors import Failure, FtprocWarning, failure, interruption, printable
 from ftproc.files import decisions, layout, remote
 from ftproc.files.decisions import Line
 from ftproc.records import Trajectory, joined
@@ -30,16 +31,16 @@ Notify = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Task:
-    """One log to filter and the file of its trajectory; either may be `-`. method: instead of the recipe's. report: the
-    file of the HTML page, if there is one. place: the directory of relative names, when it is not the worker's current
-    one. target: COLUMN=VALUE, instead of the recipe's. takes_decisions: whether the outcome has them."""
+    """One log to filter and the file of its trajectory; either may be `-`. report: the file of the HTML page, if there
+    is one. place: the directory of relative names, when it is not the worker's current one. redo: filter it, although
+    its outputs are those that it would get. takes_decisions: whether the outcome has them."""
 
     log: str
     output: str
-    method: str | None = None
+    recipe: Recipe = field(default_factory=Recipe)
     report: str | None = None
     place: str = ""
-    target: str = ""
+    redo: bool = True
     takes_decisions: bool = False
 
     @property
@@ -51,11 +52,18 @@ class Task:
         """The file of that name, as the worker finds it."""
         return str(Path(self.place, name)) if self.place and not remote.is_uri(name) else name
 
+    def as_named(self, text: str) -> str:
+        """A message of the worker with the names that the user has given."""
+        for name in filter(None, (self.log, self.output, self.report)) if self.place else ():
+            text = text.replace(printable(self.at(name)), printable(name))
+        return text
+
 
 @dataclass(frozen=True)
 class Outcome:
     """The outcome of a task: its summary as text and as a dictionary, or its failure; how its log was understood; its
-    duration; and the decisions that were taken, if they are asked for."""
+    duration; and the decisions that were taken, if they are asked for. before: an earlier run has done it, so that
+    there is no text."""
 
     task: Task
     text: str = ""
@@ -64,15 +72,34 @@ class Outcome:
     understood: Mapping[str, Any] = field(default_factory=dict)
     elapsed_s: float = 0.0
     decisions: tuple[Line, ...] = ()
+    before: bool = False
 
 
-#: Submits a task; the function returned waits for its outcome.
-Submit = Callable[[Task], Callable[[], Outcome]]
+def filter_one(task: Task, notify: Notify | None = None) -> Outcome:
+    """Read, filter and write one log, unless it is finished. Its errors are in the outcome; only a closed pipe and an
+    interruption are raised."""
+    try:
+        return (None if task.redo else _kept(task)) or _filtered(task, notify)
+    except BrokenPipeError:
+        raise
+    except Exception as error:
+        if stop := interruption(error):
+            raise stop from None
+        found = failure(error, task.log)
+        return Outcome(task, failure=replace(found, message=task.as_named(found.message)))
 
 
-def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outcome:
-    """Read, filter and write one log. Its errors are in the outcome; only a closed pipe and an interruption are
-    raised."""
+def _kept(task: Task) -> Outcome | None:
+    """The outcome of an earlier run that has left what this one would make, or None."""
+    from ftproc.quality import summary
+
+    if task.report is not None and not Path(task.at(task.report)).is_file():
+        return None
+    metadata = finished.metadata(task.at(task.output), task.at(task.log), task.recipe)
+    return None if metadata is None else Outcome(task, summary=summary.as_dict(metadata), before=True)
+
+
+def _filtered(task: Task, notify: Notify | None) -> Outcome:
     from ftproc import pipeline, report
     from ftproc.batch import trying
     from ftproc.core import compiled
@@ -80,57 +107,51 @@ def filter_one(task: Task, recipe: Recipe, notify: Notify | None = None) -> Outc
     from ftproc.derived.columns import with_columns
     from ftproc.files.reading import logs
     from ftproc.files.writing import atomic, trajectories
-    from ftproc.methods import registry
     from ftproc.quality import next_steps, provenance, summary
 
-    started = time.perf_counter()
-    try:
-        log = logs.read(task.at(task.log), **recipe.reading(task.target))
-        if task.place:
-            log = replace(log, name=task.log)  # as the user named it
-        if recipe.decisions is not None:
-            log = recipe.decisions.applied(log, task.station)
-        taken: list[Line] = []
-        settings = recipe.settings
-        if task.method is not None:
-            settings = registry.with_own_parameters(settings, task.method)
-        if task.method is None:
-            model = model_file.named(recipe.model)
+    started, recipe = time.perf_counter(), task.recipe
+    log = logs.read(task.at(task.log), **recipe.reading())
+    if task.place:
+        log = replace(log, name=task.log)  # as the user named it
+    if recipe.decisions is not None:
+        log = recipe.decisions.applied(log, task.station)
+    taken: list[Line] = []
+    filtering = pipeline.Filtering(log, recipe.settings, model_file.named(recipe.model))
+    command = partial(recipe.origin.command, task.log)
+
+    @cache
+    def metadata() -> dict[str, Any]:
+        found, known = filtering.metadata, {"command": command(), "options": recipe.origin.options}
+        steps = trying.steps(filtering, found["summary"], command)
+        known["summary"] = next_steps.added(found["summary"], steps)
+        known["recipe_sha256"] = finished.recipe_sha256(recipe)
+        return provenance.completed(found, known, recipe.origin.before)
+
+    guarded = atomic.guarding([task.at(task.log)])
+    with compiled.announced(notify), _forwarded(task.log, notify), guarded:
+        parts: Iterator[Trajectory] = (with_columns(part, recipe.settings, log) for part in filtering.parts())
+        if task.takes_decisions:
+            taken += [] if log.by_hand is None else log.by_hand.decisions.lines
+            parts = _noting(parts, task.station, taken)
+        if task.report is None:
+            trajectories.write_parts(parts, metadata, task.at(task.output))
         else:
-            model = model_for(registry.named(task.method), recipe.model)
-        filtering = pipeline.Filtering(log, settings, model)
-        own = {name: value for name, value in (("method", task.method), ("target", task.target)) if value}
-        command = partial(recipe.origin.command, task.log, own)
+            trajectory = joined(list(parts))
+            trajectory = replace(trajectory, metadata={**trajectory.metadata, **metadata()})
+            trajectories.write(trajectory, task.at(task.output))
+            report.write(trajectory, task.at(task.report))
+    elapsed_s = time.perf_counter() - started
+    said = summary.text(metadata()), summary.as_dict(metadata())
+    return Outcome(task, *said, understood=log.understood, elapsed_s=elapsed_s, decisions=tuple(taken))
 
-        @cache
-        def metadata() -> dict[str, Any]:
-            found, known = filtering.metadata, {"command": command(), "options": recipe.origin.options}
-            steps = trying.steps(filtering, found["summary"], command)
-            known["summary"] = next_steps.added(found["summary"], steps)
-            return provenance.completed(found, known, recipe.origin.before)
 
-        guarded = atomic.guarding([task.at(task.log)])
-        with compiled.announced(notify), _forwarded(task.log, notify), guarded:
-            parts: Iterator[Trajectory] = (with_columns(part, settings, log) for part in filtering.parts())
-            if task.takes_decisions:
-                taken += [] if log.by_hand is None else log.by_hand.decisions.lines
-                parts = _noting(parts, task.station, taken)
-            if task.report is None:
-                trajectories.write_parts(parts, metadata, task.at(task.output))
-            else:
-                trajectory = joined(list(parts))
-                trajectory = replace(trajectory, metadata={**trajectory.metadata, **metadata()})
-                trajectories.write(trajectory, task.at(task.output))
-                report.write(trajectory, task.at(task.report))
-        elapsed_s = time.perf_counter() - started
-        said = summary.text(metadata()), summary.as_dict(metadata())
-        return Outcome(task, *said, understood=log.understood, elapsed_s=elapsed_s, decisions=tuple(taken))
-    except BrokenPipeError:
-        raise
-    except Exception as error:
-        if stop := interruption(error):
-            raise stop from None
-        return Outcome(task, failure=failure(error, task.log))
+def with_method(recipe: Recipe, name: str) -> Recipe:
+    """The recipe for one of all methods, with the parameters and the model that suit it. Raises ModelError."""
+    from ftproc.methods import registry
+    from ftproc.settings import NO_MODEL
+
+    model = model_for(registry.named(name), recipe.model)
+    return replace(recipe, settings=registry.with_own_parameters(recipe.settings, name), model=model or NO_MODEL)
 
 
 def _noting(parts: Iterable[Trajectory], station: str, taken: list[Line]) -> Iterator[Trajectory]:

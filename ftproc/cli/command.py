@@ -15,7 +15,7 @@ CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 #: Options that say where outputs go and what does the work: a trajectory does not depend on them.
 WHERE_TO = (
     *("output", "jobs", "scheduler", "summary", "report", "write_calibration", "write_decisions"),
-    *("again", "debug"),
+    *("again", "table", "redo", "debug"),
 )
 DEBUG, ARGUMENTS = "--debug", "arguments"  # what the context remembers
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +20,13 @@ _LOGS = (".csv", ".csv.gz", ".parquet", ".feather", ".txt", ".tsv", ".dat", ".xl
          ".ast", ".pcap", ".frd", ".npt", ".tdm", ".aer")  # fmt: skip
 
 
-def explain(logs: Sequence[str], recipe: Recipe, form: str, debug: bool) -> int:
+def explain(recipes: Mapping[str, Recipe], form: str, debug: bool) -> int:
     """Print how each log is understood, as text or JSON; the exit code."""
     from ftproc.files.reading import logs as reading
 
     found: list[dict[str, Any]] = []
     codes = []
-    for name in logs:
+    for name, recipe in recipes.items():
         try:
             log = reading.read(name, **recipe.reading())
         except FtprocError as error:
@@ -40,7 +40,7 @@ def explain(logs: Sequence[str], recipe: Recipe, form: str, debug: bool) -> int:
             click.echo(_first_rows(log))
     if form == "json":
         click.echo(json.dumps(found[0] if len(found) == 1 else found, indent=2, ensure_ascii=False))
-    return 0 if not codes else codes[0] if len(logs) == 1 else 1
+    return 0 if not codes else codes[0] if len(recipes) == 1 else 1
 
 
 def text(name: str, understood: Mapping[str, Any]) -> str:

@@ -20,7 +20,7 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
 @click.argument("logs", nargs=-1, type=options.FILE, metavar="LOG...")
 @options.output(
     "File (.parquet, .feather, .csv, .csv.gz; with a site also .kml, .geojson, .czml), - for CSV on stdout, or a "
-    "directory, which is made when absent; several logs need a directory. "
+    "directory, which is made when absent; several logs need a directory, or a * for the name of each. "
     "[default: STEM.trajectory.parquet or .csv, like the log, in the current directory]",
     "OUT",
 )
@@ -88,7 +88,8 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     type=options.FILE,
     metavar="FILE",
     help="A station file (TOML): site, conventions, columns, known biases, noise and options of one instrument; "
-    "--write-config prints one. Options on the command line win over it.",
+    "--write-config prints one. Options on the command line win over it. With a * for the name of each log: of "
+    "those that have one, '*.toml' beside it.",
 )
 @click.option("--write-config", is_flag=True, help="Print a station file with these options, and filter nothing.")
 @click.option(
@@ -101,10 +102,20 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     "have the same names on all workers, or be URIs such as s3://bucket/flight.csv.",
 )
 @click.option(
+    "--redo", is_flag=True, help="Filter all logs. Else, of several, those are left that the same version has finished."
+)
+@click.option(
     "--summary",
-    type=click.Choice(["text", "json", "none"]),
+    type=click.Choice(["text", "line", "json", "none"]),
     default="text",
-    help="Form of the printed summary of each trajectory; on stderr when the trajectory goes to stdout.",
+    help="Form of the printed summary of each trajectory; on stderr when the trajectory goes to stdout. After several "
+    "logs follows the number of each verdict.",
+)
+@click.option(
+    "--table",
+    type=options.FILE,
+    metavar="FILE",
+    help="Write a table (.csv, .json, .html) of all logs: verdict, reasons, rows, outliers, noise, outputs.",
 )
 @click.option(
     "--follow",
@@ -172,9 +183,9 @@ def command(list_methods: str | None, write_config: bool, explain: bool, follow:
     elif options.pop("write_calibration") is not None:
         raise click.UsageError("--write-calibration does nothing without --fuse. Leave it out.", ctx)
     elif write_config:
-        from ftproc.cli import filtering
+        from ftproc.cli.filtering import recipes
 
-        click.echo(filtering.station_file(ctx), nl=False)
+        click.echo(recipes.station_file(ctx), nl=False)
     elif follow is not None and not explain:
         from ftproc.cli import filtering
 
@@ -187,15 +198,22 @@ def command(list_methods: str | None, write_config: bool, explain: bool, follow:
         click.echo(f"{ctx.command_path}: {explaining.first_commands()}", err=True)
         ctx.exit(2)
     elif explain:
-        from ftproc.cli import explaining, filtering
+        from ftproc.cli import explaining
+        from ftproc.cli.filtering import recipes
 
-        ctx.exit(explaining.explain(options["logs"], filtering.recipe(ctx), options["summary"], ctx.meta[DEBUG]))
+        found = recipes.of_logs(ctx, options["logs"])
+        ctx.exit(explaining.explain(found, options["summary"], ctx.meta[DEBUG]))
     else:
         start_quickly()
+        from ftproc.batch import plan
         from ftproc.cli import filtering
+        from ftproc.cli.filtering import recipes
 
+        options["logs"], others = plan.chosen(options["logs"])
+        if others:
+            filtering.notify(f"left out: {len(others)} truths and trajectories, such as {others[0]}")
         request = filtering.Request._make(options[name] for name in filtering.Request._fields)
-        ctx.exit(filtering.filter_logs(request, filtering.recipe(ctx), ctx.meta[DEBUG]))
+        ctx.exit(filtering.filter_logs(request, recipes.of_logs(ctx, request.logs), ctx.meta[DEBUG]))
 
 
 def _before(ctx: click.Context, options: dict[str, Any]) -> dict[str, Any]:

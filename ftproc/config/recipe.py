@@ -31,10 +31,14 @@ class Origin(NamedTuple):
     options: Mapping[str, Any] = {}
     before: Mapping[str, Any] = {}
 
-    def command(self, log: str, own: Mapping[str, str], changed: Mapping[str, Sequence[str]] | None = None) -> str:
-        """The command line that filters a log so. own: options of this log alone, by name. changed: words of options
-        that are to be others."""
-        words = {**self.typed, **{name: [f"--{name}", value] for name, value in own.items()}, **(changed or {})}
+    def stating(self, own: Mapping[str, str]) -> Origin:
+        """The same with options of one trajectory alone, by name."""
+        typed = {name: [f"--{name}", value] for name, value in own.items()}
+        return self._replace(typed={**self.typed, **typed}, options={**self.options, **own})
+
+    def command(self, log: str, changed: Mapping[str, Sequence[str]] | None = None) -> str:
+        """The command line that filters a log so. changed: words of options that are to be others."""
+        words = {**self.typed, **(changed or {})}
         return shlex.join(["ftproc", "filter", log, *(word for each in words.values() for word in each)])
 
 
@@ -70,10 +74,10 @@ class Recipe:
         found: Recipe = _picked(cls, known)
         return found
 
-    def reading(self, target: str = "") -> dict[str, Any]:
-        """The arguments for `files.reading.logs.read`. target: instead of the recipe's."""
+    def reading(self) -> dict[str, Any]:
+        """The arguments for `files.reading.logs.read`."""
         plain = {name: getattr(self, name) for name in ("units", "columns", "station", "keep_columns")}
-        extract = Extract(parse_widths(self.widths), parse_where(self.where), target or self.target)
+        extract = Extract(parse_widths(self.widths), parse_where(self.where), self.target)
         return {**plain, "extract": extract}
 
 

@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
+from functools import partial
 from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Any
@@ -36,9 +37,17 @@ class Workers:
     def __init__(self, jobs: int, prepare: Callable[..., None] | None = None, *arguments: Any) -> None:
         with starting():
             alive, self._held = CONTEXT.Pipe(duplex=False)
-            self._pool = ProcessPoolExecutor(
-                jobs, mp_context=CONTEXT, initializer=_begin, initargs=(alive, prepare, arguments)
-            )
+        self._made = partial(ProcessPoolExecutor, jobs, CONTEXT, _begin, (alive, prepare, arguments))
+        self.replace()
+
+    def replace(self) -> None:
+        """New processes, after one has died; what was submitted is lost."""
+        with starting():
+            self._pool = self._made()
+
+    def stop(self) -> None:
+        """End the workers in the middle of their work, without waiting for it."""
+        self._held.close()
 
     def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """As of an executor; raises BrokenProcessPool after a worker has died."""
@@ -52,7 +61,7 @@ class Workers:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if error is not None:
-            self._held.close()
+            self.stop()
         self._pool.shutdown(wait=True, cancel_futures=error is not None)
         self._held.close()
 

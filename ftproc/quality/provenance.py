@@ -105,7 +105,8 @@ def _jerk_of(model: records.Model) -> tuple[FloatArray, float, bool]:
 
 
 def begun() -> dict[str, Any]:
-    """The metadata with which those of every run begin. The command line fills in `command` and `options`."""
+    """The metadata with which those of every run begin. The command line fills in `command`, `options` and
+    `recipe_sha256`."""
     libraries = {name: str(sys.modules[name].__version__) for name in ("numpy", "pyarrow") if name in sys.modules}
     return {
         "program": "ftproc",
@@ -114,6 +115,7 @@ def begun() -> dict[str, Any]:
         "date_utc": date_utc(),
         "command": None,
         "options": {},
+        "recipe_sha256": None,
         "decisions": None,
     }
 

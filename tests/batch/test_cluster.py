@@ -23,6 +23,7 @@ from ftproc.config.recipe import Recipe
 from ftproc.correction import model_file
 from ftproc.errors import UsageError
 from ftproc.files.writing.flights import write_log
+from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
 
 T = TypeVar("T")
@@ -73,21 +74,30 @@ def test_the_cluster_gives_what_this_process_gives(two_workers, flights, monkeyp
     """Names are relative to the user's directory, and a model is the user's, not one that a worker has cached."""
     model_file.save(model_file.named("packaged"), Path("mine.safetensors"))
     recipe = Recipe(model="mine.safetensors")
-    alone = list(run.run(_tasks(flights, "alone"), recipe))
-    shared = list(run.run(_tasks(flights, "shared"), recipe, scheduler=two_workers.address))
+    alone = list(run.run(_tasks(flights, "alone", recipe)))
+    shared = list(run.run(_tasks(flights, "shared", recipe), scheduler=two_workers.address))
     assert [outcome.failure is None for outcome in shared] == [True, True, False, True, True, True]
     assert [outcome.text for outcome in shared] == [outcome.text for outcome in alone]
     assert [outcome.summary for outcome in shared] == [outcome.summary for outcome in alone]
     assert [outcome.task.log for outcome in shared] == flights
     assert shared[2].failure is not None
-    assert "2.csv: the header line" in shared[2].failure.message
+    assert alone[2].failure is not None
+    assert shared[2].failure.message == alone[2].failure.message  # with the names that the user has given
     assert _contents("shared") == _contents("alone")
     assert len(_contents("alone")) == 10  # each with its sidecar
 
 
+def test_warnings_of_workers_reach_the_user(two_workers, flights):
+    recipe, said = Recipe(settings=FilterSettings(method="renpf", particles=40)), list[str]()
+    assert (
+        len(list(run.run(_tasks(flights[:2], "few", recipe), notify=said.append, scheduler=two_workers.address))) == 2
+    )
+    assert said == [f"{n}: renpf: 40 particles are few for 9 states; 90 or more are trustworthy" for n in flights[:2]]
+
+
 def test_a_cluster_reads_no_standard_input(two_workers):
     with pytest.raises(UsageError, match="a cluster reads and writes files only"):
-        next(run.run([Task("-", "-")], Recipe(), scheduler=two_workers.address))
+        next(run.run([Task("-", "-")], scheduler=two_workers.address))
 
 
 def test_a_worker_with_another_version_is_named(two_workers, flights, monkeypatch):
@@ -95,9 +105,9 @@ def test_a_worker_with_another_version_is_named(two_workers, flights, monkeypatc
     with pytest.raises(
         UsageError, match=rf"the worker tcp://127.0.0.1:\d+ has ftproc {__version__}, this is ftproc 9.9; .*pip"
     ):
-        next(run.run(_tasks(flights, "none"), Recipe(), scheduler=two_workers.address))
+        next(run.run(_tasks(flights, "none"), scheduler=two_workers.address))
     monkeypatch.setattr(cluster, "_check_workers", lambda client, address: None)  # it joins after they were asked
-    (late,) = run.run(_tasks(flights[:1], "late"), Recipe(), scheduler=two_workers.address)
+    (late,) = run.run(_tasks(flights[:1], "late"), scheduler=two_workers.address)
     assert late.failure is not None
     assert late.failure.message.startswith("0.csv: the worker tcp://127.0.0.1:")
     assert f"has ftproc {__version__}, this is ftproc 9.9" in late.failure.message
@@ -108,7 +118,7 @@ def test_a_worker_with_another_version_is_named(two_workers, flights, monkeypatc
 def test_the_log_of_a_worker_that_dies_is_done_by_the_other(two_workers, flights):
     """One is killed as soon as a first trajectory is there, while both have logs to do."""
     write_log(simulate("zuo2021-outliers", seed=2).log, "2.csv")
-    expected = list(run.run(_tasks(flights, "alone"), Recipe()))
+    expected = list(run.run(_tasks(flights, "alone")))
     command = [FTPROC, "filter", *flights, "-o", "shared/", "--scheduler", two_workers.address]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         try:
@@ -133,7 +143,7 @@ def test_an_output_that_only_the_worker_has(two_workers, flights, monkeypatch, t
     monkeypatch.setattr(cluster.os, "getcwd", lambda: str(tmp_path / "theirs"))
     tasks = [Task(str(tmp_path / name), f"{name}.out.csv") for name in flights[:2]]
     Path("1.csv.out.csv").write_bytes(b"earlier")
-    missing, older = run.run(tasks, Recipe(), scheduler=two_workers.address)
+    missing, older = run.run(tasks, scheduler=two_workers.address)
     for outcome, name in ((missing, "0.csv.out.csv"), (older, "1.csv.out.csv")):
         assert outcome.failure is not None
         assert outcome.failure.exit_code == 1
@@ -152,14 +162,14 @@ def test_all_workers_dead(two_workers, flights, monkeypatch):
     with pytest.raises(
         UsageError, match=r"it has no workers. Start one with `PYTHONSAFEPATH=1 dask worker tcp://127.0.0.1:\d+ "
     ):
-        next(run.run(_tasks(flights, "none"), Recipe(), scheduler=two_workers.address))
+        next(run.run(_tasks(flights, "none"), scheduler=two_workers.address))
 
 
 def test_the_scheduler_stops(two_workers, flights, monkeypatch):
     """After the last test it has no workers, so the log waits when it is killed."""
     monkeypatch.setattr(cluster, "PATIENCE_S", 3.0)
     monkeypatch.setattr(cluster, "_check_workers", lambda client, address: two_workers.scheduler.kill())
-    (outcome,) = run.run(_tasks(flights[:1], "none"), Recipe(), scheduler=two_workers.address)
+    (outcome,) = run.run(_tasks(flights[:1], "none"), scheduler=two_workers.address)
     assert outcome.failure is not None
     expected = f"0.csv: the scheduler {two_workers.address} stopped before it was done; run again."
     assert outcome.failure.message == expected
@@ -192,7 +202,7 @@ def test_a_log_that_kills_every_worker_is_named():
         def release(self) -> None:
             pass
 
-    outcome = cluster._outcome(distributed, Future(), Task("a.csv", "b.csv"), "tcp://there:1", [])
+    outcome, _ = cluster._outcome(distributed, Future(), Task("a.csv", "b.csv"), "tcp://there:1", [])
     assert outcome.failure is not None
     assert outcome.failure.message.startswith("a.csv: every worker that took it died (out of memory, or killed).")
     assert "KilledWorker" in outcome.failure.trace
@@ -200,7 +210,7 @@ def test_a_log_that_kills_every_worker_is_named():
 
 def _refused(flights: list[str], address: str) -> str:
     with pytest.raises(UsageError) as caught:
-        next(run.run(_tasks(flights, "none"), Recipe(), scheduler=address))
+        next(run.run(_tasks(flights, "none"), scheduler=address))
     assert str(caught.value).startswith(f"--scheduler {address}: ")
     assert str(caught.value).endswith(
         "Start one with `dask scheduler`; it prints its address, such as tcp://10.0.0.1:8786."
@@ -279,7 +289,7 @@ def test_without_distributed(flights, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     missing = pytest.raises(UsageError, match=r"--scheduler needs distributed, which is not installed: pip install")
     with socket.create_server(("127.0.0.1", 0)) as server, missing:
-        next(run.run(_tasks(flights, "none"), Recipe(), scheduler=f"127.0.0.1:{server.getsockname()[1]}"))
+        next(run.run(_tasks(flights, "none"), scheduler=f"127.0.0.1:{server.getsockname()[1]}"))
 
 
 def _start(folder: Path, module: str, *args: str) -> subprocess.Popen[bytes]:
@@ -287,9 +297,9 @@ def _start(folder: Path, module: str, *args: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
-def _tasks(names: list[str], directory: str) -> list[Task]:
+def _tasks(names: list[str], directory: str, recipe: Recipe | None = None) -> list[Task]:
     Path(directory).mkdir(exist_ok=True)
-    return [Task(name, f"{directory}/{name.replace('.csv', '.trajectory.csv')}") for name in names]
+    return [Task(n, f"{directory}/{n.replace('.csv', '.trajectory.csv')}", recipe or Recipe()) for n in names]
 
 
 def _contents(directory: str) -> dict[str, bytes]:

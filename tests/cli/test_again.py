@@ -47,6 +47,16 @@ def test_the_date_of_reproducible_builds(monkeypatch, stated, date):
     assert provenance.date_utc() == (date or today)
 
 
+def test_one_of_all_methods_is_made_again_alone(run, flight):
+    assert run("filter", flight, "--method", "all", "-o", "d/").code == 0
+    (name,) = (str(each) for each in Path("d").iterdir() if each.name.endswith(".ekf.trajectory.csv"))
+    found = json.loads(Path(name).with_suffix(".json").read_text())
+    assert found["command"] == f"ftproc filter {flight} --method ekf"
+    assert run("filter", "--again", name, "-o", "e.csv").code == 0
+    assert same(name, "e.csv")
+    assert same(str(Path(name).with_suffix(".json")), "e.json")
+
+
 def test_the_jerk_profile_has_a_place_of_its_own(run, flight):
     assert run("filter", flight, "-o", "a.csv").code == 0
     text = Path("a.json").read_text()

@@ -14,13 +14,17 @@ from ftproc.files.writing import outputs
 WRITTEN = ".trajectory"
 
 
-def where(*logs: str, output: str | None = None, methods: list[str] | None = None) -> list[str]:
-    return [task.output for task in plan.tasks(logs, output, methods)]
+def wanted(*logs: str) -> list[plan.Wanted]:
+    return [plan.Wanted(log) for log in logs]
+
+
+def where(*logs: str, output: str | None = None) -> list[str]:
+    return [task.output for task in plan.tasks(wanted(*logs), output)]
 
 
 def prepare(log: str, output: str) -> None:
     """As `filter` does before it reads a log."""
-    outputs.check(plan.written(plan.tasks([log], output), output, None), [log])
+    outputs.check(plan.written(plan.tasks(wanted(log), output), output, None), [log])
 
 
 @pytest.mark.parametrize(
@@ -46,14 +50,15 @@ def test_one_log(here, log, output, expected):
     (here / "there").mkdir()
     (here / "there.csv").mkdir()
     assert where(log, output=output) == [expected]
-    outputs.check(plan.written(plan.tasks([log], output), output, None), [log])
+    outputs.check(plan.written(plan.tasks(wanted(log), output), output, None), [log])
     assert Path(expected).parent.is_dir()
 
 
 def test_several_logs(here):
     assert where("a.csv", "b/c.parquet", output="new") == ["new/a.trajectory.csv", "new/c.trajectory.parquet"]
     assert where("a.csv", "b.csv") == ["a.trajectory.csv", "b.trajectory.csv"]
-    assert where("a.csv", output="d", methods=["ukf", "ekf"]) == ["d/a.ukf.trajectory.csv", "d/a.ekf.trajectory.csv"]
+    parts = [plan.Wanted("a.csv", parts=(part, "ukf")) for part in ("7", "8 b")]
+    assert [t.output for t in plan.tasks(parts, "d")] == ["d/a.7.ukf.trajectory.csv", "d/a.8_b.ukf.trajectory.csv"]
 
 
 @pytest.mark.parametrize(
@@ -73,15 +78,16 @@ def test_several_logs(here):
 )
 def test_wrong_usage(here, logs, output, sentence):
     with pytest.raises(UsageError, match=r".*") as caught:
-        plan.tasks(logs, output)
+        plan.tasks(wanted(*logs), output)
     assert sentence in str(caught.value)
     assert list(here.iterdir()) == []
 
 
-def test_all_methods_need_a_directory(here):
-    for output in (None, "a.csv", "-"):
-        with pytest.raises(UsageError, match="name a directory"):
-            plan.tasks(["log.csv"], output, ["ukf", "ekf"])
+def test_all_methods_need_a_directory(run, flight):
+    for output in ((), ("-o", "a.csv"), ("-o", "-")):
+        result = run("filter", flight, "--method", "all", *output)
+        assert result.code == 2
+        assert "name a directory" in result.err
 
 
 def test_a_place_that_cannot_be(here):
@@ -107,12 +113,12 @@ def test_never_writes_over_an_input(run, flight, output):
 
 
 def test_never_writes_over_another_log_or_the_model(run, flight):
-    shutil.copy(flight, "x.trajectory.csv")
+    shutil.copy(flight, "clean-x.csv")
     shutil.copy(flight, "x.csv")
     before = flight.read_bytes()
-    result = run("filter", "x.csv", "x.trajectory.csv", "-o", ".")
+    result = run("filter", "x.csv", "clean-x.csv", "-o", "clean-*.csv")
     assert (result.code, result.out) == (1, "")
-    assert Path("x.trajectory.csv").read_bytes() == before
+    assert Path("clean-x.csv").read_bytes() == before
     Path("model.parquet").write_bytes(b"precious")
     assert "which is never overwritten" in run("filter", "x.csv", "--model", "model.parquet", "-o", "model.parquet").err
     assert Path("model.parquet").read_bytes() == b"precious"

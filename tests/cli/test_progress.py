@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import time
 
 from ftproc.cli.progress import Progress
 
@@ -14,7 +15,7 @@ class Terminal(io.StringIO):
 
 def shown(stream: io.StringIO, times: list[float]) -> str:
     ticks = iter([0.0, *times])
-    with Progress(stream, lambda: next(ticks)) as progress:
+    with Progress(stream=stream, clock=lambda: next(ticks)) as progress:
         for number, _ in enumerate(times):
             progress("filtering", number + 1, len(times))
     return stream.getvalue()
@@ -24,8 +25,22 @@ def test_nothing_for_short_work():
     assert shown(Terminal(), [0.5, 1.0, 1.9]) == ""
 
 
-def test_nothing_into_a_file():
+def test_no_bar_into_a_file():
     assert shown(io.StringIO(), [5.0, 10.0]) == ""
+
+
+def test_a_line_now_and_then_into_a_file(monkeypatch):
+    """Also while no step ends."""
+    monkeypatch.setattr("ftproc.cli.progress.LINE_S", 0.05)
+    stream = io.StringIO()
+    with Progress("filtering", 400, stream=stream) as progress:
+        progress.step()
+        time.sleep(0.3)
+    lines = stream.getvalue().splitlines()
+    assert len(lines) >= 2
+    assert set(lines) == {"ftproc: filtering: 1 of 400 done in 0 min"}
+    time.sleep(0.1)
+    assert stream.getvalue().splitlines() == lines
 
 
 def test_long_work_shows_and_leaves_no_trace():

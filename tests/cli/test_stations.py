@@ -12,10 +12,10 @@ import pytest
 
 import ftproc
 from ftproc import config
-from ftproc.batch.run import Recipe
-from ftproc.cli import filtering
 from ftproc.cli.filter import command
+from ftproc.cli.filtering import recipes
 from ftproc.config.keys import every
+from ftproc.config.recipe import Recipe
 from ftproc.files.reading import logs, trajectories
 from ftproc.settings import FilterSettings
 
@@ -141,7 +141,7 @@ def test_the_command_s_defaults_are_those_of_the_settings():
     ctx = command.make_context("filter", ["x.csv"])
     keys = {key.option for _, _, key in every()}
     given = {name: value for name, value in ctx.params.items() if name in keys}
-    assert config.Recipe.of(given) == Recipe() == filtering.recipe(ctx)
+    assert config.Recipe.of(given) == Recipe() == recipes.recipe(ctx)
 
 
 def test_every_filter_option_can_be_kept_in_a_file():
@@ -167,6 +167,8 @@ def test_every_filter_option_can_be_kept_in_a_file():
         "decisions",
         "write_decisions",
         "again",
+        "redo",
+        "table",
     }
     options = {p.name for p in command.params if isinstance(p, click.Option)} - about_the_run
     assert options <= {key.option for _, _, key in every()}

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ftproc import config
-from ftproc.batch.run import Recipe
 from ftproc.config.keys import KEYS, every
+from ftproc.config.recipe import Recipe
 from ftproc.errors import UsageError
 from ftproc.settings import Air, FilterSettings, Station
 

@@ -242,7 +242,7 @@ def test_a_summary_is_not_sent_to_the_trajectory(tmp_path: Path) -> None:
 def test_outputs_of_one_content_may_be_linked(tmp_path: Path) -> None:
     """As programs that save room do."""
     batches.fill(tmp_path, 2)
-    command = ("filter", "0.csv", "1.csv", "-o", "out/")
+    command = ("filter", "0.csv", "1.csv", "-o", "out/", "--redo")
     assert ran(tmp_path, *command).returncode == 0
     (tmp_path / "out" / "1.trajectory.csv").unlink()
     (tmp_path / "out" / "1.trajectory.csv").hardlink_to(tmp_path / "out" / "0.trajectory.csv")

@@ -11,7 +11,6 @@ import pytest
 
 from ftproc.batch import plan, run
 from ftproc.batch.tasks import Task
-from ftproc.config.recipe import Recipe
 from ftproc.errors import InputError, OutputError, UsageError
 from ftproc.files import layout, remote
 from ftproc.files.reading import logs, trajectories
@@ -85,7 +84,7 @@ def test_trajectory_in_a_bucket_is_that_on_the_disk(bucket, temporary, tmp_path,
     bucket.pipe("/bucket/flight.csv", flight[1].read_bytes())
     near, far = tmp_path / f"out.{kind}", f"memory://bucket/made/out.{kind}"
     for task in (Task("memory://bucket/flight.csv", str(near)), Task("memory://bucket/flight.csv", far, place="/work")):
-        assert run.filter_one(task, Recipe()).failure is None
+        assert run.filter_one(task).failure is None
     assert bucket.cat(f"/bucket/made/out.{kind}") == near.read_bytes()
     found = trajectories.read(far)
     assert found.metadata["log"] == "memory://bucket/flight.csv"
@@ -94,7 +93,7 @@ def test_trajectory_in_a_bucket_is_that_on_the_disk(bucket, temporary, tmp_path,
 
 def test_file_uri_is_a_path(tmp_path, flight):
     uri = f"file://{tmp_path}/out.parquet"
-    assert run.filter_one(Task(f"file://{flight[1]}", uri), Recipe()).failure is None
+    assert run.filter_one(Task(f"file://{flight[1]}", uri)).failure is None
     assert len(trajectories.read(tmp_path / "out.parquet")) == len(flight[0])
     with pytest.raises(OutputError, match="never overwritten"):
         outputs.check([Output(f"file://{flight[1]}")], [flight[1]])
@@ -149,9 +148,9 @@ def test_errors_of_the_storage_are_quoted(bucket, temporary, monkeypatch):
 
 def test_outputs_by_uri_are_planned(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    tasks = plan.tasks(["s3://in/a.csv", "s3://in/b.parquet"], "s3://out/clean/")
+    tasks = plan.tasks([plan.Wanted("s3://in/a.csv"), plan.Wanted("s3://in/b.parquet")], "s3://out/clean/")
     assert [t.output for t in tasks] == ["s3://out/clean/a.trajectory.csv", "s3://out/clean/b.trajectory.parquet"]
-    assert plan.tasks(["s3://in/a.csv"], None)[0].output == "a.trajectory.csv"
+    assert plan.tasks([plan.Wanted("s3://in/a.csv")], None)[0].output == "a.trajectory.csv"
     with pytest.raises(OutputError, match="never overwritten"):
         outputs.check([Output("s3://in/a.csv")], ["s3://in/a.csv"])
     assert layout.sidecar("s3://out/a.csv") == "s3://out/a.json"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import codecs
 from collections.abc import Iterator
 
-from ftproc.batch.run import Recipe
 from ftproc.config.keys import every
+from ftproc.config.recipe import Recipe
 from tests.config.test_config import FULL
 from tests.trust import bad_models
 from tests.trust.cases import Case, written

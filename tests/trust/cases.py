@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ftproc import config, pipeline
-from ftproc.batch.run import Recipe
+from ftproc.config.recipe import Recipe
 from ftproc.correction import model, model_file
 from ftproc.errors import FtprocError
 from ftproc.files.reading import logs, truth

@@ -112,7 +112,7 @@ def test_kept_columns_and_scores_are_no_formulas(tmp_path: Path, monkeypatch: py
 
 @pytest.mark.parametrize("log", ["../a.csv", "../../../../etc/a.csv", "/etc/..csv", "x/../../b.parquet", "..", "."])
 def test_outputs_stay_in_the_directory_asked_for(log: str, tmp_path: Path) -> None:
-    for task in plan.tasks([log], f"{tmp_path}/out/"):
+    for task in plan.tasks([plan.Wanted(log)], f"{tmp_path}/out/"):
         assert Path(task.output).resolve().parent == (tmp_path / "out").resolve()
 
 
