@@ -16,8 +16,7 @@ KERNELS ?= tests/core
 .DELETE_ON_ERROR:
 .SECONDEXPANSION:
 .SUFFIXES:
-# A bad log does not stop the others; the messages of parallel jobs do not mix.
-MAKEFLAGS += --keep-going --output-sync=target --no-builtin-rules
+MAKEFLAGS += --keep-going --no-builtin-rules
 
 bin := $(VENV)/bin
 ftproc := $(bin)/ftproc
@@ -44,6 +43,12 @@ seen = $(firstword $(wildcard $(dir $(1))truth.parquet $(dir $(1))truth.csv))
 ranges := $(wildcard $(RANGES))
 $(foreach range,$(ranges),$(eval range-of-$(patsubst $(OUT)/%.fused.parquet,%,$(call fused,$(range))) := $(range)))
 known := $(foreach range,$(ranges),$(if $(call seen,$(range)),$(range)))
+# TRAJECTORY TRUTH LOG, a line for each that can be scored.
+define scores
+$(foreach log,$(scored),$(call output,$(log)) $(call truth,$(log)) $(log)
+)$(foreach range,$(known),$(call fused,$(range)) $(call seen,$(range)) $(range)
+)
+endef
 
 program := $(shell find ftproc -name '*.py' -o -name '*.safetensors')
 
@@ -62,34 +67,42 @@ endif
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /make \1	/p' Makefile | expand -t 16
 	@echo
-	@echo 'make run LOGS="flights/*.csv" OUT=clean FLAGS="--smooth" filters your own logs; -j2 runs two at a time.'
+	@echo 'make run LOGS="flights/*.csv" OUT=clean FLAGS="--smooth" filters your own logs; -j2 two at a time (--jobs).'
 	@echo 'Only logs that changed are run again. A truth beside a log (STEM.truth.csv or .parquet) is used for the score,'
 	@echo 'a station file beside it (STEM.toml) for reading it. RANGES="flight7/range.toml" fuses the logs of a range file.'
 
+# One process filters all logs that are old: they would start slower than they are filtered. A log that fails stops
+# neither the others nor the scores of what is there; a trajectory that is older than its log is not.
 run: $(outputs) $(foreach range,$(ranges),$(call fused,$(range))) ## filter the LOGS to OUT with FLAGS, then print the score table
-ifneq ($(scored)$(known),)
-	@echo
-	@$(ftproc) score $(foreach log,$(scored),$(call output,$(log)) --truth $(call truth,$(log))) \
-	  $(foreach range,$(known),$(call fused,$(range)) --truth $(call seen,$(range)))
-else
-	@echo 'No log has a truth beside it, so there is nothing to score.'
-endif
+	$(file >$(OUT)/.scores,$(scores))
+	@[ ! -e $(OUT)/.old ] || tr '\n' '\0' < $(OUT)/.old | \
+	  xargs -0 $(ftproc) filter -o '$(OUT)/*.trajectory.parquet' --config '*.toml' --jobs $(jobs) --redo $(FLAGS) || \
+	  : > $(OUT)/.failed
+	@set --; while read -r trajectory truth log; do \
+	  [ ! -e "$$trajectory" ] || [ "$$trajectory" -ot "$$log" ] || set -- "$$@" "$$trajectory" --truth "$$truth"; \
+	  done < $(OUT)/.scores; echo; \
+	  if [ $$# -gt 0 ]; then $(ftproc) score "$$@"; else echo 'There is no trajectory with a truth beside its log to score.'; fi
+	@[ ! -e $(OUT)/.failed ]
+
+# -j2 is two logs at a time, -j as many as there are processors.
+jobs = $(or $(patsubst -j%,%,$(filter -j%,$(MAKEFLAGS))),$(if $(filter -j,$(MAKEFLAGS)),$$(nproc),1))
 
 # The log is the first prerequisite. A change of the program, its model or FLAGS makes all results old.
 $(OUT)/%.trajectory.parquet: $$(log-of-$$*) $$(call station,$$(log-of-$$*)) $(OUT)/.flags $(program) | $(installed)
-	@$(ftproc) filter $< -o $@ $(addprefix --config ,$(call station,$<)) $(FLAGS)
+	$(file >>$(OUT)/.old,$<)
 
 $(OUT)/%.fused.parquet: $$(range-of-$$*) $$(wildcard $$(dir $$(range-of-$$*))*) $(OUT)/.flags $(program) | $(installed)
-	@$(ftproc) filter --fuse $< -o $@ $(FLAGS)
+	@$(ftproc) filter --fuse $< -o $@ $(FLAGS) || : > $(OUT)/.failed
 
 export FLAGS
 $(OUT)/.flags: FORCE
 	@mkdir -p $(@D)
+	@rm -f $(OUT)/.old $(OUT)/.failed
 	@printf '%s\n' "$$FLAGS" | cmp -s - $@ || printf '%s\n' "$$FLAGS" > $@
 
 # --- the installation -------------------------------------------------------------------------------------------
 
-# What takes long is said by make itself, at once: the output of a recipe is kept until it has ended.
+# What takes long is said before it is done.
 install: $(installed) ## make .venv and install ftproc in it
 
 wheel: $(bin)/python ## dist/: a wheel for this system, its kernels compiled, and one for every other, which needs numba

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -79,13 +80,23 @@ def test_all_logs_then_the_score_table(make, flights, copy):
 
 
 def test_a_failed_log_fails_the_target_but_stops_no_other(make, flights, copy):
+    """What is there is scored, but not an older trajectory of a log that fails now."""
+    shutil.copy(flights / "c.parquet", flights / "d.parquet")
+    shutil.copy(flights / "c.truth.parquet", flights / "d.truth.parquet")
+    (copy / "out").mkdir()
+    (copy / "out" / "d.trajectory.parquet").write_bytes(b"older")
+    os.utime(copy / "out" / "d.trajectory.parquet", (0, 0))
     (flights / "a.csv").write_text("time_s,range_m\n0,wrong\n")
+    (flights / "d.parquet").write_bytes(b"broken")
     result = make("run", LOGS)
     assert result.code == 2
     assert 'ftproc: flights/a.csv: row 0 (the first data row is 0), column "range_m"' in result.err
-    assert sorted(path.name for path in (copy / "out").iterdir()) == [
-        ".flags", "b.trajectory.parquet", "c.trajectory.parquet",
+    assert (copy / "out" / "d.trajectory.parquet").read_bytes() == b"older"
+    assert sorted(path.name for path in (copy / "out").glob("[!.]*")) == [
+        "b.trajectory.parquet", "c.trajectory.parquet", "d.trajectory.parquet",
     ]  # fmt: skip
+    assert re.search(r"^4 logs: .*, 2 failed$", result.out, re.MULTILINE)
+    assert result.out.split("\n\n")[-1].split()[:2] == ["c", "method"]
 
 
 @pytest.fixture
@@ -93,7 +104,12 @@ def plan(make, copy) -> Callable[..., list[str]]:
     """plan("LOGS=...") -> the commands of `make run`, each given to a program that only writes an empty output."""
     program = copy / "venv" / "bin" / "ftproc"
     program.parent.mkdir(parents=True)
-    program.write_text('#!/bin/sh\necho "ftproc $*"\n[ "$1" = score ] || : > "$4"\n')
+    program.write_text(
+        "#!/bin/sh\n"
+        'echo "ftproc $*"\n'
+        'if [ "$1" = filter ]; then for log; do\n'
+        'case "$log" in flights/*) name=${log##*/}; : > "${3%/*}/${name%%.*}.trajectory.parquet";; esac; done; fi\n'
+    )
     program.chmod(0o755)
     (program.parents[1] / ".installed").touch()
 
@@ -105,8 +121,10 @@ def plan(make, copy) -> Callable[..., list[str]]:
     return execute
 
 
-def filtered(name: str, out: str = "out") -> str:
-    return f"ftproc filter flights/{name} -o {out}/{name[0]}.trajectory.parquet"
+def filtered(*names: str, out: str = "out", jobs: int = 1, flags: str = "") -> str:
+    """All logs in one process, each with the station file beside it, if there is one."""
+    how = f"-o {out}/*.trajectory.parquet --config *.toml --jobs {jobs} --redo"
+    return " ".join(["ftproc filter", how, *filter(None, [flags]), *(f"flights/{name}" for name in names)])
 
 
 def scored(out: str = "out") -> str:
@@ -114,48 +132,52 @@ def scored(out: str = "out") -> str:
     return "ftproc score " + " ".join(f"{out}/{k}.trajectory.parquet --truth flights/{v}" for k, v in truths.items())
 
 
+ALL = ("a.csv", "b.csv.gz", "c.parquet")
+
+
 def test_only_what_changed_runs_again(plan, flights):
-    score = scored()
-    assert plan(LOGS) == [*map(filtered, ("a.csv", "b.csv.gz", "c.parquet")), score]
-    assert plan(LOGS) == [score]
+    assert plan(LOGS) == [filtered(*ALL), scored()]
+    assert plan(LOGS) == [scored()]
     later = time.time() + 5
     os.utime(flights / "b.csv.gz", (later, later))
-    assert plan(LOGS) == [filtered("b.csv.gz"), score]
+    assert plan(LOGS) == [filtered("b.csv.gz"), scored()]
+
+
+@pytest.mark.parametrize(("option", "jobs"), [("-j3", 3), ("-j1", 1), ("-j", os.cpu_count())])
+def test_as_many_at_a_time_as_make_is_told(plan, flights, option, jobs):
+    assert plan(LOGS, option) == [filtered(*ALL, jobs=jobs), scored()]
 
 
 def test_a_change_of_the_program_makes_all_results_old(plan, flights, copy):
-    assert len(plan(LOGS)) == 4
+    assert plan(LOGS) == [filtered(*ALL), scored()]
     later = time.time() + 5
     os.utime(copy / "ftproc" / "settings.py", (later, later))
-    assert len(plan(LOGS)) == 4
+    assert plan(LOGS) == [filtered(*ALL), scored()]
 
 
 def test_other_flags_make_all_results_old(plan, flights):
     for flags in ("--model none", "--model none --smooth"):
-        *filters, _ = plan(LOGS, "OUT=clean", f"FLAGS={flags}")
-        assert filters == [f"{filtered(name, 'clean')} {flags}" for name in ("a.csv", "b.csv.gz", "c.parquet")]
+        assert plan(LOGS, "OUT=clean", f"FLAGS={flags}") == [filtered(*ALL, out="clean", flags=flags), scored("clean")]
     assert plan(LOGS, "OUT=clean", "FLAGS=--model none --smooth") == [scored("clean")]
 
 
 def test_logs_without_truth(plan, flights):
-    nothing = "No log has a truth beside it, so there is nothing to score."
+    nothing = "There is no trajectory with a truth beside its log to score."
     assert plan("LOGS=flights/b.csv.gz") == [nothing, filtered("b.csv.gz")]
 
 
-def test_a_station_file_beside_a_log_is_used(plan, flights):
-    """And the result is old when it changes."""
-    station = flights / "b.toml"
-    station.touch()
-    with_station = f"{filtered('b.csv.gz')} --config flights/b.toml"
-    assert with_station in plan("LOGS=flights/b.csv.gz")
-    assert with_station not in plan("LOGS=flights/b.csv.gz")
+def test_a_station_file_beside_a_log_makes_its_result_old(plan, flights):
+    only = "LOGS=flights/b.csv.gz"
+    plan(only)
+    assert filtered("b.csv.gz") not in plan(only)
+    (flights / "b.toml").touch()
     later = time.time() + 5
-    os.utime(station, (later, later))
-    assert with_station in plan("LOGS=flights/b.csv.gz")
+    os.utime(flights / "b.toml", (later, later))
+    assert filtered("b.csv.gz") in plan(only)
 
 
 def test_trajectories_and_truths_are_no_logs(plan, flights):
-    assert len(plan(LOGS, "OUT=flights")) == 4
+    assert plan(LOGS, "OUT=flights") == [filtered(*ALL, out="flights"), scored("flights")]
     assert plan(LOGS, "OUT=flights") == [scored("flights")]
 
 
@@ -199,7 +221,7 @@ def test_a_machine_without_the_right_python(make, copy, lacking, sentence):
 
 
 def test_what_takes_long_is_said_before_it_is_done(copy):
-    """The output of a recipe is kept until it ends; what make says itself is not."""
+    """So that nobody takes it for a program that hangs."""
     python = copy / "slow-python"
     python.write_text("#!/bin/sh\ncase \"$*\" in *'-m venv'*) touch begun; sleep 60;; esac\nexit 0\n")
     python.chmod(0o755)
