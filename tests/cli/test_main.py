@@ -239,12 +239,16 @@ def test_the_shell_s_part_of_completion(shell):
     assert shell("ftproc", **asked).out == "plain,filter\n"
 
 
+#: Options of systemctl and dask that a page names.
+OTHERS = {"--now", "--port", "--nthreads", "--nworkers"}
+
+
 def test_the_pages_name_only_options_that_there_are():
     """In the README, in the guide, and in the station files' comments."""
     known = {name for command in commands() for p in command.params for name in (*p.opts, *p.secondary_opts)}
     for page in (*PAGES, *(ROOT / "sample_data").glob("*.toml")):
         named = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", page.read_text()))
-        assert named - known - {"--help"} == set(), page
+        assert named - known - {"--help"} - OTHERS == set(), page
 
 
 def test_a_log_in_place_of_a_command_gets_the_command(run, here):

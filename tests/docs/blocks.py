@@ -89,6 +89,11 @@ FLY, NEXT = (
 TRAIN = "ftproc train --log circle.csv --truth circle.gps.csv -o theodolite.safetensors"
 RANGE = "ftproc simulate --scenario range-radar --seed 7 --duration 60 -o range --truth range/truth.parquet"
 FUSE = "ftproc filter --fuse range/range.toml --smooth -o best.parquet"
+FLIGHTS = tuple(
+    f"mkdir -p flights && ftproc simulate --scenario {scenario} --seed 3 -o flights/{name}.csv"
+    for name, scenario in (("aerobatics", "manoeuvre"), ("climb", "zuo2021-outliers"), ("transit", "cruise"))
+)
+NIGHT = "ftproc filter 'flights/*.csv' -o clean/ --summary line"
 STUDY = "ftproc train --scenario manoeuvre-clean --jerk 0.1 --editing none --compare-starts"
 TIMES = "; times vary from machine to machine"
 COUNTS = "; how many files are mutated in its time varies from machine to machine"
@@ -116,6 +121,8 @@ BLOCKS = {
         "ftproc score plain.csv corrected.csv --truth next.gps.csv",
         before=(FLY, TRAIN, NEXT), only=("plain", "mean position", "position RMSE", "velocity RMSE", "95 %"),
     ),
+    "night": session(NIGHT, before=FLIGHTS),
+    "again": session(f"{NIGHT} --table night.csv", before=(*FLIGHTS, NIGHT)),
     "list-methods": session("ftproc filter --list-methods"),
     "all-methods": session(
         "ftproc filter flight.csv --method all -o methods --summary none",

@@ -7,7 +7,9 @@ from collections.abc import Mapping
 
 from tests.docs.shell import ROOT
 
-PAGES = tuple(ROOT / name for name in ("README.md", "ftproc/README.md", "ftproc/cli/README.md"))
+PAGES = tuple(
+    ROOT / name for name in ("README.md", "ftproc/README.md", "ftproc/cli/README.md", "ftproc/batch/README.md")
+)
 _BLOCK = re.compile(r"<!-- BEGIN (?P<name>[\w-]+): (?P<command>.*) -->\n(?P<text>.*?)<!-- END (?P=name) -->", re.DOTALL)
 _MARK = re.compile(r"<!-- (?:BEGIN|END) ")
 
