@@ -98,11 +98,10 @@ def facts(s: Mapping[str, Any]) -> list[tuple[str, str]]:
 def _motion(s: Mapping[str, Any]) -> str:
     """The model of motion, and how much more likely than white jerk it, or its best rival, is."""
     some = "" if s["motion_share"] == 1 else f" in {100 * s['motion_share']:.0f} % of the rows"
-    gain = s["motion_gain"]
-    if gain == 0:
+    if s["motion_gain"] == 0:
         return f"{s['motion']}{some}"
-    what = "that of white jerk" if s["motion"] != "white jerk" else "it with other motions"
-    return f"{s['motion']}{some} (log-likelihood {abs(gain):.3g} {'above' if gain > 0 else 'below'} {what})"
+    rival = "white jerk" if s["motion"] != "white jerk" else "any other motion"
+    return f"{s['motion']}{some} (log-likelihood {abs(s['motion_gain']):,.0f} above that of {rival})"
 
 
 def innovations(s: Mapping[str, Any]) -> list[tuple[str, str]]:
