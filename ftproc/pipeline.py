@@ -13,7 +13,7 @@ from ftproc.core.identification import unseen_motion
 from ftproc.core.model import kinematics
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.errors import InputError, UsageError
-from ftproc.methods import registry
+from ftproc.methods import registry, simultaneous
 from ftproc.methods.estimate import Estimate, Part
 from ftproc.quality import by_hand, next_steps, provenance, sanity
 from ftproc.quality.next_steps import Step
@@ -49,6 +49,9 @@ class Filtering:
         if why is not None:
             raise UsageError(why)
         self.record = sanity.recording(log)
+        self.at_once = simultaneous.of(self.record) if settings.editing == "two-pass" else None
+        if self.at_once is not None:
+            self.record = self.at_once.of_stamps(self.record)
         self.statistics = RunStatistics(log, self.record.absent)
         self.effects = by_hand.Effects(None if log.by_hand is None else log.by_hand.decisions, settings.gate)
 
@@ -62,7 +65,7 @@ class Filtering:
                 return
             except ValueError as cause:
                 raise sanity.no_start(self.log, cause) from cause
-            yield self._trajectory(part)
+            yield self._trajectory(part if self.at_once is None else self.at_once.of_rows(part))
 
     @cached_property
     def metadata(self) -> dict[str, Any]:
@@ -75,6 +78,7 @@ class Filtering:
                     name for name, sigma in zip(COMPONENTS, self.settings.noise or (), strict=False) if sigma
                 ],
                 "network": self._network() if self.method.corrected else None,
+                "at_once": self.at_once is not None,
                 "correction_linear": None if stage is None else stage.linear,
                 "correction_lost_by_smoothing": model is not None and stage is None and model.filter.helps,
                 **self.effects.summary(),

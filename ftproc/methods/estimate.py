@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,11 @@ from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification.coloured_noise import Coloured
 from ftproc.core.identification.motion_models import Chosen
 from ftproc.order_statistics import median
-from ftproc.records import FlagArray, FloatArray, forget, thinned
+from ftproc.records import FlagArray, FloatArray, IntArray, forget, thinned
 
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: stands in for a component that is missing throughout
+Run = TypeVar("Run", FilterRun, SmootherRun)
+_ONCE = {"innovation", "residual", "nis", "weight"}  # that a reading has, and not a state
 FARTHEST = 1e12  # m, rad: a larger reading is no more of an outlier, but its square would overflow
 SPANS, SPAN = 6, 2_000
 MOST_INTERVALS = 250_000  # between neighbours, for a typical one to be found among them
@@ -136,6 +138,31 @@ class Estimate(NamedTuple):
             screened_out=None if self.screened_out is None else self.screened_out[low:high],
             faults=None if self.faults is None else self.faults.rows(low, high),
             motion=None if self.motion is None else self.motion.share((high - low) / len(self.label)),
+        )
+
+    def at(self, sample: IntArray, first: IntArray) -> Estimate:
+        """Of rows (n,) that repeat these samples (m,); first (m + 1,): the row of each sample that has its innovation,
+        and their number."""
+        again = np.ones(len(sample), bool)
+        again[first[:-1]] = False
+
+        def repeated(run: Run) -> Run:
+            own: dict[str, Any] = {
+                name: each[sample] for name, each in run._asdict().items() if isinstance(each, np.ndarray)
+            }
+            for name in _ONCE & own.keys():
+                own[name][again] = 0.0 if name == "weight" else np.nan
+            return run._replace(**own)
+
+        return self._replace(
+            run=repeated(self.run),
+            label=self.label[sample],
+            smoothed=None if self.smoothed is None else repeated(self.smoothed),
+            reacquired=tuple(int(first[k]) for k in self.reacquired),
+            known=None if self.known is None else self.known[sample],
+            cleaned=None if self.cleaned is None else self.cleaned[sample],
+            screened_out=None if self.screened_out is None else self.screened_out[sample],
+            faults=None if self.faults is None else self.faults.at(sample, first),
         )
 
 

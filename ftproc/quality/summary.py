@@ -129,5 +129,6 @@ def _rows(s: Mapping[str, Any]) -> list[str]:
         found.append(f"{counted(s['rows_without_estimate'], 'row')} without an estimate: no track was confirmed yet")
     if s["duplicate_times"]:
         share = "shares" if s["duplicate_times"] == 1 else "share"
-        found.append(f"{counted(s['duplicate_times'], 'row')} {share} the time of the row before")
+        merged = "; those of one time are taken as one reading, their mean" if s.get("at_once") else ""
+        found.append(f"{counted(s['duplicate_times'], 'row')} {share} the time of the row before{merged}")
     return found

@@ -25,6 +25,7 @@ from ftproc.core.model.frames import line_of_sight_axes
 from ftproc.order_statistics import median, medians
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 CLOCK_ROUNDS = 2  # of taking a jump of the clock out: the way that is missing shows without it only
 SAME = 4.5  # sigmas of the noise within which two levels are one
@@ -69,6 +70,12 @@ class Faults(NamedTuple):
             if s.end > low and s.begin < high
         )
         return self._replace(copied=self.copied[low:high], steps=steps, shifts=shifts)
+
+    def at(self, sample: IntArray, first: IntArray) -> Faults:
+        """Of rows (n,) that repeat these samples (m,); first (m + 1,): where each begins, and their number."""
+        steps = tuple(s._replace(sample=int(first[s.sample])) for s in self.steps)
+        shifts = tuple(s._replace(begin=int(first[s.begin]), end=int(first[s.end])) for s in self.shifts)
+        return self._replace(copied=self.copied[sample], steps=steps, shifts=shifts)
 
 
 def refined(
