@@ -10,8 +10,8 @@ import pytest
 from ftproc import pipeline
 from ftproc.core.comparators import particles
 from ftproc.errors import FtprocWarning, InputError, UsageError
-from ftproc.methods import ensemble
 from ftproc.methods.estimate import Readings
+from ftproc.methods.papers import ensemble
 from ftproc.records import GOOD, MISSING
 from ftproc.settings import FilterSettings
 from tests.methods.flights import PATHS, TIME, held, measured, rms, run

@@ -163,7 +163,7 @@ def test_logs_of_a_few_rows(name, rows):
 
 
 def test_lost_track_of_a_robust_filter_is_a_sentence(monkeypatch):
-    monkeypatch.setattr("ftproc.methods.robust.LOST_AT", 0.5)
+    monkeypatch.setattr("ftproc.methods.papers.robust.LOST_AT", 0.5)
     message = r"^flight\.csv: mcc-ukf lost the track, and cannot re-acquire it; use ga-bpnn-ukf$"
     with pytest.raises(InputError, match=message):
         run(measured(PATHS["receding"](TIME)), "mcc-ukf")

@@ -7,8 +7,9 @@ import pytest
 
 from ftproc.core.editing import two_pass
 from ftproc.core.filtering.smoother import HEADS, smooth_log
-from ftproc.methods import anti_outlier, kalman, preparing, robust
+from ftproc.methods import anti_outlier, preparing
 from ftproc.methods.estimate import Readings
+from ftproc.methods.papers import kalman, robust
 from ftproc.settings import FilterSettings
 from tests.methods.flights import PATHS, TIME, measured
 from tests.simulated import simulate
