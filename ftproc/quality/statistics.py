@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 UNITS = ("m", "rad", "rad")
 GAP_INTERVALS = 3.0  # median intervals that make a gap
 MOST_KEPT = 250_000  # samples whose sigmas are kept; of more, the largest of every few
+SURE = 3.0  # sigmas by which an acceleration is larger than zero
 _LABELS = {"isolated": ISOLATED, "patch": PATCH, "missing": MISSING}
 
 
@@ -55,6 +56,7 @@ class RunStatistics:
         self.jerk: list[FloatArray] = []
         self.motions: dict[str, int] = {}
         self.motion_gain = 0.0
+        self.acceleration = 0.0  # m/s2, that the target had at least
         self.reacquired, self.unexamined, self.stamp_s, self.drifts = 0, 0, 0.0, False
         self.slow_noise_s, self.slow_noise_likelier, self.slow_noise_separable = 0.0, False, True
         self.faults = FaultStatistics()
@@ -80,6 +82,9 @@ class RunStatistics:
             component.add_innovations(squares[:, c], run.innovation_sigma[:, c], used[:, c])
         self._add_gaps(time_s)
         self._add_changes(cleaned)
+        if not self.absent:
+            least = np.sqrt(sums(best.state[:, 6:] ** 2)) - SURE * np.sqrt(sums(best.sigma[:, 6:] ** 2))
+            self.acceleration = max(self.acceleration, float(np.max(least, initial=0.0, where=np.isfinite(least))))
         finite = np.isfinite(run.nis)
         self.nis_sum += float(run.nis[finite].sum())
         self.nis_count += int(finite.sum())
@@ -193,6 +198,7 @@ class RunStatistics:
             "average_gradient": self._average_gradient(),
             "jerk_psd_m2ps5": jerk if np.isfinite(psd).all() else None,
             **self._motion(),
+            "acceleration_at_least_mps2": self.acceleration,
             "nis_mean": self.nis_sum / self.nis_count if self.nis_count else None,
             "components_used_mean": float(self.used / max(self.rows_used, 1)),
             "poorly_observable": [] if absent else consistency.poorly_observable(time_s, sigma),

@@ -20,6 +20,8 @@ FEWEST_OVERLOOKED, OVERLOOKED = (
 MANY_REJECTED, TOO_MANY_REJECTED = 0.25, 0.5  # share of a component's readings. With a third of all readings outliers,
 # one flight in five diverges, and nearly all of these have more than a quarter rejected.
 
+FASTEST_MPS2 = 1000.0  # of acceleration: 100 g, of the hardest interceptors
+CHANCE_RAD = 0.25  # of noise: readings at chance over half a turn have 0.9, over a quarter 0.45, no instrument 0.1
 TOO_WIDE = 0.5  # innovation ratio below which the sigmas are far too large
 
 _NO_FAULT = "residuals agree with the published sigmas, and no fault shows"
@@ -39,7 +41,7 @@ class Remark(NamedTuple):
 
 def remarks(s: Mapping[str, Any]) -> list[Remark]:
     """All remarks on a summary (see `RunStatistics.summary`)."""
-    found = [*_observability(s), *_sigmas(s), *_editing(s)]
+    found = [*_observability(s), *_sigmas(s), *_no_flight(s), *_editing(s)]
     found += [Remark(SUSPECT, text) for text in faults.suspicious(s)]
     found += [Remark(CONSISTENT, text) for text in faults.allowed_for(s)]
     found += by_hand_remarks(s)
@@ -162,6 +164,18 @@ def _sigmas(s: Mapping[str, Any]) -> Iterator[Remark]:
                "for both, the estimate follows the motion"  # fmt: skip
         wrong = UNRELIABLE if not s["not_observable"] else SUSPECT  # what stands in for a component is no motion
         yield Remark(wrong if likelier else CONSISTENT if s["slow_noise_separable"] else SUSPECT, text)
+
+
+def _no_flight(s: Mapping[str, Any]) -> Iterator[Remark]:
+    """What no flight explains."""
+    least = s.get("acceleration_at_least_mps2", 0.0)
+    if least > FASTEST_MPS2:
+        text = f"the readings ask for an acceleration of {least:.3g} m/s2, which hardly anything has that flies"
+        yield Remark(SUSPECT, text)
+    for name, part in s["components"].items():
+        if (part.get("noise_rad") or 0.0) > CHANCE_RAD:
+            text = f"the {name} noise of {part['noise_rad']:.2g} rad is nearly that of readings at chance"
+            yield Remark(UNRELIABLE, f"{text}: check the columns and their units")
 
 
 def _editing(s: Mapping[str, Any]) -> Iterator[Remark]:

@@ -6,9 +6,11 @@ from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from ftproc import pipeline
+from ftproc.files.reading import logs
 from ftproc.quality import summary, verdict
 from ftproc.quality.verdict import CONSISTENT, SUSPECT, UNRELIABLE
 from ftproc.settings import FilterSettings
@@ -74,6 +76,8 @@ OFF = {"innovation_ratio": 1.5, "innovation_bounds": [0.8, 1.2], "verdict": "ove
         ({"reacquired": 1}, {}, SUSPECT, "re-initialized once (track loss, or a gap too long to bridge)"),
         ({"reacquired": 2}, {}, SUSPECT, "re-initialized twice (track loss"),
         ({"reacquired": 3}, {}, SUSPECT, "re-initialized 3 times (track loss"),
+        ({"acceleration_at_least_mps2": 999.0}, {}, CONSISTENT, None),
+        ({"acceleration_at_least_mps2": 2540.0}, {}, SUSPECT, "the readings ask for an acceleration of 2.54e+03 m/s2"),
         ({"correction_largest_m": 2.0, "correction_largest_sigma": 4.9}, {}, CONSISTENT, None),
         ({"correction_largest_m": 2.0, "correction_largest_sigma": 5.1}, {}, SUSPECT, "up to 2 m, 5.1 sigma: more"),
     ],
@@ -87,6 +91,16 @@ def test_one_fault(good, changes, part, level, reason):
         (given,) = found["reasons"]
         assert reason in given
         assert verdict.sentence(found) == f"{level}: {given}"
+
+
+@pytest.mark.parametrize("samples", [30, 300, 3000])
+def test_readings_at_chance_are_no_flight(samples):
+    rng = np.random.default_rng(samples)
+    chance = {"range_m": (1e3, 2e4), "azimuth_rad": (-3.0, 3.0), "elevation_rad": (0.0, 1.5)}
+    columns = {name: rng.uniform(*limits, samples) for name, limits in chance.items()}
+    found = pipeline.filter_log(logs.read(pa.table({"time_s": 0.1 * np.arange(samples), **columns})))
+    assert found.metadata["summary"]["trust"]["verdict"] == UNRELIABLE
+    assert "readings at chance" in str(found.metadata["summary"]["trust"]["reasons"])
 
 
 def test_the_worst_level_decides_and_gives_the_reasons(good):
