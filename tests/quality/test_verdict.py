@@ -51,7 +51,7 @@ OFF = {"innovation_ratio": 1.5, "innovation_bounds": [0.8, 1.2], "verdict": "ove
         ({}, CAUTIOUS, SUSPECT, "range innovations are 0.4 times their predicted sigma: the published sigmas are too "
                                 "large; noise and motion cannot be told apart at this rate"),
         ({"specified_noise": ["range"]}, CAUTIOUS, CONSISTENT, None),
-        ({}, {"good": 19, "isolated": 0, "patch": 0}, SUSPECT, "too few good range readings (19) to test the sigmas"),
+        ({}, {"good": 15, "isolated": 0, "patch": 0}, SUSPECT, "too few good range readings (15) to test the sigmas"),
         ({}, {"good": 60, "patch": 40, "isolated": 0}, SUSPECT, "40 % of the range readings are rejected as outliers"),
         ({}, {"good": 60, "patch": 40, "isolated": 40}, UNRELIABLE, "57 % of the range readings are rejected"),
         ({}, {"predicted_sigma_ratio": 9.0}, SUSPECT, "range is poorly observable: its predicted sigma is 9 times"),
