@@ -10,7 +10,7 @@ from ftproc.quality import by_hand, consistency, faults
 
 CONSISTENT, SUSPECT, UNRELIABLE = "consistent", "suspect", "unreliable"
 LEVELS = (CONSISTENT, SUSPECT, UNRELIABLE)  # from good to bad
-FEWEST_GOOD = 16  # readings of a component, for a test of its sigmas: of 12, one sound log in 16 is 5 sigma off, of 16 one in 50
+FEWEST_GOOD = 16  # readings of a component, for a test of its sigmas; of 12, one sound log in 16 is 5 sigma off
 UNRELIABLE_RATIO = 2.0  # innovation ratio over its upper bound, from which the sigmas mean nothing
 MANY_SIGMAS = 5.0  # of a network's correction, from which only an error of the instrument can be its reason
 FEWEST_OVERLOOKED, OVERLOOKED = (
