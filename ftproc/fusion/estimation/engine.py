@@ -81,8 +81,8 @@ def fuse(
     readings = lasting.Readings.of(stations)
     current = _settled(readings, gate, jerk_psd, known, progress)
     for _ in range(LASTING_ROUNDS):
-        if lasting.contradicted(current.stations, current.weight):
-            break
+        if current.unexamined or lasting.contradicted(current.stations, current.weight):
+            break  # the work that a flight may cost is spent, or the stations disagree throughout
         run, possible = current.found.run, current.events.gathered(current.possible)
         decided = lasting.Decided(
             current.events, current.log, possible, current.model, run.state, run.sigma, run.residual, current.rates
