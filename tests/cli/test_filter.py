@@ -137,7 +137,11 @@ def test_list_methods(run):
     assert all(name in result.out for name in registry.METHODS)
 
 
-def test_all_methods(run, flight):
+@pytest.mark.parametrize("again", [False, True])
+def test_all_methods(run, flight, again):
+    """What is left out is said once in each run, also in a process that has said so before."""
+    if again:
+        assert run("filter", flight, "--method", "all", "-o", "before").code == 0
     result = run("filter", flight, "--method", "all", "-o", "d")
     assert result.code == 0
     (left_out,) = result.err.splitlines()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
 from typing import NamedTuple
 
 import click
@@ -115,7 +114,10 @@ def _planned(request: Request, recipes: Mapping[str, Recipe]) -> tuple[list[Task
     """The tasks, and the index page if there is one, with all outputs checked against all inputs."""
     if request.table is not None:
         table.check(request.table)
-    wanted = [each for log in request.logs for each in _wanted(log, recipes[log])]
+    left_out = dict[str, None]()
+    wanted = [each for log in request.logs for each in _wanted(log, recipes[log], left_out)]
+    for why in left_out:
+        notify(f"left out: {why}")
     if request.output is None and any(each.recipe.settings.method in each.parts for each in wanted):
         raise UsageError("--method all writes several trajectories: name a directory with -o.")
     redo = request.redo or len(wanted) == 1 or request.write_decisions is not None
@@ -149,11 +151,11 @@ def _write_decisions(done: Sequence[Outcome], target: str) -> None:
     write_decisions(lines, target)
 
 
-def _wanted(log: str, recipe: Recipe) -> Iterator[plan.Wanted]:
-    """The trajectories of a log: one, or one of each target and of each method."""
+def _wanted(log: str, recipe: Recipe, left_out: dict[str, None]) -> Iterator[plan.Wanted]:
+    """The trajectories of a log: one, or one of each target and of each method. left_out gets why others are not."""
     registry.check_parameters(recipe.settings)
     targets = _targets(log, recipe)
-    methods = _applicable(recipe) if recipe.settings.method == EVERY else [""]
+    methods = _applicable(recipe, left_out) if recipe.settings.method == EVERY else [""]
     for target in targets or [recipe.target]:
         for method in methods:
             own = {"method": method, **({"target": target} if targets else {})}
@@ -191,14 +193,8 @@ def _targets(log: str, recipe: Recipe) -> list[str]:
         return [column]
 
 
-@cache
-def _left_out(why: str) -> None:
-    """Says once why a method is left out."""
-    notify(f"left out: {why}")
-
-
-def _applicable(recipe: Recipe) -> list[str]:
-    """The methods that can be run; reports why the others are left out."""
+def _applicable(recipe: Recipe, left_out: dict[str, None]) -> list[str]:
+    """The methods that can be run; left_out gets why the others cannot, once each and in their order."""
     found = []
     for method in registry.METHODS.values():
         model = model_for(method, recipe.model)
@@ -206,7 +202,7 @@ def _applicable(recipe: Recipe) -> list[str]:
         if why is None:
             found.append(method.name)
         else:
-            _left_out(why)
+            left_out[why] = None
     return found
 
 
