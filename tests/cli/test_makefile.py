@@ -23,6 +23,11 @@ from tests.cli.conftest import Result
 PROJECT = Path(__file__).parents[2]
 
 
+def outside_make() -> dict[str, str]:
+    """The environment without what a make that runs the tests says to the makes that it starts."""
+    return {name: value for name, value in os.environ.items() if not name.startswith("MAKE") and name != "MFLAGS"}
+
+
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
     shutil.copytree(PROJECT / "ftproc", tmp_path / "ftproc", ignore=shutil.ignore_patterns("__pycache__"))
@@ -34,12 +39,11 @@ def copy(tmp_path: Path) -> Path:
 @pytest.fixture
 def make(copy: Path) -> Callable[..., Result]:
     """make("run", "OUT=there"): the environment counts as installed, whatever else is to be done is done."""
-    mine = {name: value for name, value in os.environ.items() if not name.startswith("MAKE") and name != "MFLAGS"}
 
     def execute(*args: str, venv: str = sys.prefix) -> Result:
         installed = ["-o", f"{venv}/.installed"] if venv == sys.prefix else []
         command = ["make", f"VENV={venv}", *installed, *args]
-        done = subprocess.run(command, cwd=copy, env=mine, capture_output=True, text=True, timeout=300)
+        done = subprocess.run(command, cwd=copy, env=outside_make(), capture_output=True, text=True, timeout=300)
         return Result(done.returncode, done.stdout, done.stderr)
 
     return execute
@@ -225,7 +229,9 @@ def test_what_takes_long_is_said_before_it_is_done(copy):
     python.write_text("#!/bin/sh\ncase \"$*\" in *'-m venv'*) touch begun; sleep 60;; esac\nexit 0\n")
     python.chmod(0o755)
     command = ["make", "VENV=new", f"PYTHON={python}", "install"]
-    with subprocess.Popen(command, cwd=copy, stdout=subprocess.PIPE, text=True, start_new_session=True) as making:
+    with subprocess.Popen(
+        command, cwd=copy, env=outside_make(), stdout=subprocess.PIPE, text=True, start_new_session=True
+    ) as making:
         assert making.stdout is not None
         try:
             assert making.stdout.readline() == "making new\n"
