@@ -80,13 +80,30 @@ def _row(cells: Sequence[str]) -> str:
     return text.getvalue()
 
 
+class Cycle:
+    """A clock that begins again after a period, such as a day."""
+
+    def __init__(self, period_s: float) -> None:
+        self.period_s, self.begun_s, self.latest_s = period_s, 0.0, 0.0
+
+    def unfolded(self, time_s: float) -> float:
+        """Its times as they go on; rows may be late across its beginning."""
+        if time_s + self.begun_s < self.latest_s - self.period_s / 2:
+            self.begun_s += self.period_s
+        found = time_s + self.begun_s
+        if self.begun_s and found > self.latest_s + self.period_s / 2:
+            found -= self.period_s
+        self.latest_s = max(self.latest_s, found)
+        return found
+
+
 class Nmea(Form):
     """Tracked targets (TTM: number, distance, true bearing, UTC), each a row; or, where the first sentence is
     another, the fields of those of its kind as columns that are numbered from 1. Sentences with a wrong checksum are
     dropped, other ones passed over."""
 
     def __init__(self) -> None:
-        self.kind, self.day_s, self.latest_s = "", 0.0, 0.0
+        self.kind, self.cycle = "", Cycle(DAY_S)
 
     def table(self, source: str, block: Block) -> Block:
         lines = list[str]()
@@ -110,10 +127,7 @@ class Nmea(Form):
         time_s = _seconds(fields[13])
         if fields[3] != "T" or time_s is None:
             return ""
-        if time_s + self.day_s < self.latest_s - DAY_S / 2:
-            self.day_s += DAY_S
-        self.latest_s = max(self.latest_s, time_s + self.day_s)
-        return _row([repr(time_s + self.day_s), fields[0], _metres(fields[1], fields[9]), fields[2]])
+        return _row([repr(self.cycle.unfolded(time_s)), fields[0], _metres(fields[1], fields[9]), fields[2]])
 
 
 def _metres(text: str, unit: str) -> str:

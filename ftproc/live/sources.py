@@ -18,6 +18,7 @@ from urllib.parse import urlsplit
 from ftproc.errors import InputError
 from ftproc.files import remote
 from ftproc.files.reading.formats import content
+from ftproc.files.reading.formats.standards import octets
 from ftproc.live.stop import Source
 
 MOST = 1 << 18  # bytes that are read at once
@@ -173,7 +174,7 @@ def _resolved(source: str, address: tuple[str, int], kind: socket.SocketKind) ->
 
 
 class Udp:
-    """Datagrams that are sent to an address of this machine, each of one or more whole lines."""
+    """Datagrams that are sent to an address of this machine, each of one or more whole lines, or data blocks."""
 
     news = ""
 
@@ -199,7 +200,8 @@ class Udp:
         with contextlib.suppress(BlockingIOError):
             while len(found) < MOST:
                 datagram = self._socket.recv(1 << 16)
-                found += datagram if datagram.endswith(b"\n") else datagram + b"\n"
+                whole = datagram.endswith(b"\n") or octets.are_blocks(datagram)
+                found += datagram if whole else datagram + b"\n"
         return bytes(found) or None
 
     def wait(self, seconds: float) -> None:

@@ -27,7 +27,7 @@ from ftproc.core.live import doubt, editor, pace, pieces, readings, recursive, r
 from ftproc.core.model import motion
 from ftproc.errors import InputError, OutputError
 from ftproc.files.writing import atomic
-from ftproc.live import forms, growing, live, order
+from ftproc.live import forms, growing, live, order, plots
 
 MAGIC = b"ftproc state 1\n"
 _HEAD = struct.Struct("<Q16s")  # size and digest of what is known
@@ -38,6 +38,7 @@ _KINDS: dict[str, Any] = {
     kind.__name__: kind
     for kind in (
         live.Live, order.Order, order.Left, order._Copy, growing.Lines, forms.Form, forms.Json, forms.Nmea,
+        forms.Cycle, plots.Plots,
         editor.LiveEditor, window.Window, recursive.GatedWindow, recursive.Gating, whole.Whole, doubt.Doubt,
         pace.Pace, pace.Clock, pieces.Sizes, readings.Columns, readings.Labels, readings.Repeats, rows.Waiting,
         rows.Published, records.Model, records.Start, smoother.SmootherRun, two_pass.Known, track.Track,

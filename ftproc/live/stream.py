@@ -17,6 +17,7 @@ from ftproc.live import forms
 from ftproc.live.columns import Reader
 from ftproc.live.growing import LINES, Block, Lines, Say
 from ftproc.live.live import Live
+from ftproc.live.plots import Plots, is_asterix
 from ftproc.live.sources import is_network
 from ftproc.live.stop import Stop
 from ftproc.records import FloatArray, IntArray, Trajectory
@@ -60,7 +61,8 @@ class Stream:
         self.fault: InputError | None = None
         self._came_s = dict[str, float]()  # when the newest reading of each track came
         self._coasted = dict[str, int]()  # rows since then
-        self._lines, self._form = Lines(source), forms.Form()
+        self._lines: Lines | Plots = Lines(source)
+        self._form = forms.Form()
         self._reader, self._head = Reader(source, recipe, say), list[str]()
         self._begun, self._at_once, self._said_late = False, 1, False
 
@@ -71,9 +73,17 @@ class Stream:
 
     def understand_again(self) -> None:
         """When the rest is as it was kept: the table, from its first lines."""
+        if isinstance(self._lines, Plots):
+            self._of_plots(self._lines)
         said, self._reader._say = self._reader._say, lambda _: None
         self._reader.read(Block(1, self._head))
         self._reader._say = said
+
+    def _of_plots(self, plots: Plots) -> None:
+        """What comes are plots, whose standard says where azimuths count from."""
+        self._lines, station = plots, replace(self.recipe.station, azimuth_from="north")
+        self.recipe = replace(self.recipe, station=station)
+        self._reader = Reader(self.source, self.recipe, self._say)
 
     def begin_again(self, news: str) -> None:
         """The content is another one."""
@@ -84,6 +94,8 @@ class Stream:
 
     def take(self, data: bytes, now_s: float, stop: Stop) -> Iterator[Trajectory]:
         """The rows that are published when these bytes come, at a time of the clock. Raises InputError."""
+        if not self._begun and not self._lines.number and is_asterix(data):
+            self._of_plots(Plots())
         for block in self._lines.blocks(data):
             if stop.overdue or self.fault is not None:
                 return

@@ -58,17 +58,17 @@ def records(data: bytes) -> Iterator[Record]:
 
 def _parts(packet: bytes) -> list[bytes]:
     """The data blocks of a packet, or those in frames of a recorder: length, four octets of its clock, blocks."""
-    if _are_blocks(packet):
+    if are_blocks(packet):
         return [packet]
     parts, place = list[bytes](), 0
     while place < len(packet):
         end = place + max(_number(packet[place : place + 2]), _FRAME)
         parts.append(packet[place + _FRAME : end])
         place = end
-    return parts if place == len(packet) and all(map(_are_blocks, parts)) else []
+    return parts if place == len(packet) and all(map(are_blocks, parts)) else []
 
 
-def _blocks(data: bytes) -> Iterator[tuple[int, int, int]]:
+def _blocks(data: bytes | bytearray) -> Iterator[tuple[int, int, int]]:
     """Category, start and end of each block; the end is beyond the data where that is none."""
     place = 0
     while place < len(data):
@@ -77,12 +77,19 @@ def _blocks(data: bytes) -> Iterator[tuple[int, int, int]]:
         place += max(length, _HEADER + 1)
 
 
-def _are_blocks(data: bytes) -> bool:
+def are_blocks(data: bytes) -> bool:
+    """Whether data are blocks that follow each other, and nothing else."""
     end = 0
     for category, _, end in _blocks(data):
         if not category or end > len(data):
             return False
     return end == len(data) > 0
+
+
+def whole_blocks(data: bytes | bytearray) -> int:
+    """The length of the blocks with which data begin that are complete."""
+    ends = [0, *(end for _, _, end in _blocks(data) if end <= len(data))]
+    return ends[-1]
 
 
 def _records(data: bytes) -> Iterator[Record]:
