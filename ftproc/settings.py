@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 EDITING = ("two-pass", "live", "forward", "none")
 AUTO = "auto"
-MOTIONS = (AUTO, "white-jerk", "turning-force", "ballistic")
+MOTIONS = (AUTO, "white-jerk", "turning-force", "ballistic", "orbital")
 PACKAGED, NO_MODEL = "packaged", "none"  # values of `model` that are not files
 EPOCHS = {"l-bfgs": 400, "momentum": 1000}  # most that an optimiser of `train` is given, where the user says nothing
 

@@ -240,7 +240,7 @@ _TRACKER: tuple[Callable[[Any], Any], ...] = (
         "--motion", type=click.Choice(MOTIONS), default=FilterSettings.motion,
         help="How the target moves: driven by white jerk alone (white-jerk), or with a force that turns with the "
         "velocity, as that of an aircraft does (turning-force), or also grows with the pressure of the air, as on a "
-        "bomb or a shell (ballistic); auto: the likeliest by the log's readings.",
+        "bomb or a shell (ballistic), or by gravity alone (orbital); auto: the likeliest by the log's readings.",
     ),
     click.option(
         "--lag", type=seconds, metavar="S", default=FilterSettings.lag_s,

@@ -63,7 +63,8 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     """Two-pass editing. usual: of a segment, what is usual in the log, see `core.editing.two_pass`."""
     known = preparing.what_is_known(readings, settings)
     edited = two_pass.edit(readings.time_s, readings.measurement, known, usual)
-    motion = motion_models.choose(edited.log, edited.starts, edited.model, preparing.motions(settings))
+    specified = np.isfinite(known.sigma)
+    motion = motion_models.choose(edited.log, edited.starts, edited.model, preparing.motions(settings), specified)
     both = settings.smooth or usual is None  # cheap, and says what could be had
     run, smoothed = _with_motion(motion, both, motion.model)
     for other in _as_likely(edited, known, run):

@@ -142,7 +142,7 @@ OPTIONS = st.fixed_dictionaries(
         "max_patch": numbers,
         "lag": st.floats(1e-3, 3600),
         "weight_form": st.just("gain"),
-        "motion": st.sampled_from(["white-jerk", "turning-force", "ballistic"]),
+        "motion": st.sampled_from(["white-jerk", "turning-force", "ballistic", "orbital"]),
         "ecef": st.just(True),
         "derived": st.just(True),
         "set": st.sampled_from(["window=6", "m = 0.01, F_range_m=3e2"]),

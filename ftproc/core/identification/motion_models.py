@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start, Uneven
 from ftproc.core.filtering.smoother import SmootherRun, likelihood_of, smooth_log
-from ftproc.core.identification import decimation
+from ftproc.core.identification import decimation, orbits
 from ftproc.core.identification.profile import ALLOWANCE, climbed, median_level, with_allowance
 from ftproc.core.identification.scales import Scales, scales_of
 from ftproc.core.model.forces import AT_REST_MPS, GRAVITY
@@ -24,12 +24,14 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Run = TypeVar("Run", FilterRun, SmootherRun)
 
-WHITE = "white-jerk"
+WHITE, ORBITAL = "white-jerk", "orbital"
 MODELS = {
     WHITE: WHITE_JERK,
     "turning-force": Motion(acts=True, turns=1.0),
     "ballistic": Motion(acts=True, turns=1.0, pressed=1.0),
+    ORBITAL: Motion(acts=True),
 }
+NOTHING = np.zeros(3, bool)
 STEPS = 3  # of the search for a profile
 MARGIN = 8.0  # in log-likelihood, by which a model must explain a log better than white jerk does: with less, the luck
 # of a single flight decides which is the better one
@@ -42,9 +44,9 @@ CALMER = 10.0 ** -np.arange(8)  # times the jerk of white jerk: where the search
 class Chosen(NamedTuple):
     """The motion of a log.
 
-    name: in MODELS. model: with the profile that was fitted. gain: by how much more likely the log is than with white
-    jerk, in log-likelihood. log, starts: those to run over, with steps in the gaps. row: (n,) where the log's own
-    samples are among these.
+    name: in MODELS. model: with the profile that was fitted, and, of an orbit, the noise. gain: by how much more likely
+    the log is than with white jerk, in log-likelihood. log, starts: those to run over, with steps in the gaps. row:
+    (n,) where the log's own samples are among these.
     """
 
     name: str
@@ -68,22 +70,27 @@ class Chosen(NamedTuple):
         return run._replace(**own)
 
 
-def choose(log: Observations, starts: list[Start], white: Model, names: tuple[str, ...]) -> Chosen:
+def choose(
+    log: Observations, starts: list[Start], white: Model, names: tuple[str, ...], known: NDArray[np.bool_] = NOTHING
+) -> Chosen:
     """The likeliest motion of a log of these names. white: the model with white jerk, whose profile has its allowance.
+    known: (3,) which noise the user has specified.
 
     A single name is taken without asking how likely it is.
     """
     others = [name for name in names if name != WHITE]
     if not others:
         return Chosen(WHITE, white, 0.0, log, starts)
-    fitted = _fitted(log, starts, white, others)
+    fitted = _fitted(log, starts, white, others, known)
     best = max(fitted, key=lambda each: _finite(each.gain))
     if best.gain > MARGIN or WHITE not in names:
         return best
     return Chosen(WHITE, white, best.gain, log, starts)
 
 
-def _fitted(log: Observations, starts: list[Start], white: Model, names: list[str]) -> list[Chosen]:
+def _fitted(
+    log: Observations, starts: list[Start], white: Model, names: list[str], known: NDArray[np.bool_]
+) -> list[Chosen]:
     """Each of these models, fitted to the log with neighbours merged."""
     scales = scales_of(log, white.noise_variance)
     likeliest = white._replace(jerk=white.jerk / ALLOWANCE)
@@ -91,15 +98,23 @@ def _fitted(log: Observations, starts: list[Start], white: Model, names: list[st
     short = Logged(*decimation.merged(log, starts, count), scales)
     _, base = climbed(short.log, short.starts, likeliest, STEPS, scales)
     course = smooth_log(short.log, white, short.starts).state
-    dense, own, row = with_steps(log, starts, course)
+    turn = orbits.FARTHEST_TURN if orbits.may_be(course) else FARTHEST_TURN
+    dense, own, row = with_steps(log, starts, course, turn)
+    if orbits.may_be(course):  # whose readings alone are too far apart to follow it
+        short = Logged(*with_steps(short.log, short.starts, course, turn)[:2], scales)
+        course = smooth_log(short.log, white, short.starts).state
     track = course if dense is short.log else smooth_log(dense, white, own).state
     found = list[Chosen]()
     for name in names:
         motion = MODELS[name]
-        if motion.pressed and len(names) > 1 and not falls(course):
+        if len(names) > 1 and not _may_be(name, course):
             continue
-        fit = _unsteered if motion.pressed else _steered
-        model, likelihood = fit(short, likeliest._replace(motion=motion.about(course)))
+        begin = likeliest._replace(motion=motion.about(course))
+        if name == ORBITAL:
+            model, likelihood = orbits.fit(orbits.Track(*short[:2], known), begin)
+            motion = model.motion
+        else:
+            model, likelihood = (_unsteered if motion.pressed else _steered)(short, begin)
         model = model._replace(motion=motion.about(track))
         if short.log is log:  # else the samples are far closer than the motion is followed
             model = model._replace(motion=motion.about(smooth_log(dense, model, own).state))
@@ -113,6 +128,13 @@ class Logged(NamedTuple):
     log: Observations
     starts: list[Start]
     scales: Scales
+
+
+def _may_be(name: str, course: FloatArray) -> bool:
+    """Whether a motion is worth a trial, by a course (n, 9): an orbit is one above the air, and nothing else is."""
+    if orbits.may_be(course) or name == ORBITAL:
+        return orbits.may_be(course) and (name == ORBITAL or not MODELS[name].turns)
+    return not MODELS[name].pressed or falls(course)
 
 
 def falls(course: FloatArray) -> bool:
@@ -151,15 +173,15 @@ def _finite(likelihood: float) -> float:
 
 
 def with_steps(
-    log: Observations, starts: list[Start], course: FloatArray
+    log: Observations, starts: list[Start], course: FloatArray, turn: float = FARTHEST_TURN
 ) -> tuple[Observations, list[Start], IntArray | None]:
     """The log with samples without readings in its gaps, so that no step turns too far, its starts, and where its own
-    samples are; None where nothing was added. course: (m, 9) states along it."""
+    samples are; None where nothing was added. course: (m, 9) states along it. turn: rad, of a step."""
     speed = np.sqrt((course[:, 3:6] ** 2).sum(1) + AT_REST_MPS**2)
     fastest = float((np.sqrt((course[:, 6:] ** 2).sum(1)) / speed).max())
     interval = np.diff(log.time_s)
     with np.errstate(invalid="ignore"):
-        pieces = np.clip(np.nan_to_num(np.ceil(interval * fastest / FARTHEST_TURN)), 1, MOST_STEPS).astype(np.int64)
+        pieces = np.clip(np.nan_to_num(np.ceil(interval * fastest / turn)), 1, MOST_STEPS).astype(np.int64)
     if not (pieces > 1).any():
         return log, starts, None
     row = np.append(0, np.cumsum(pieces))

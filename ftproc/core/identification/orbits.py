@@ -1,0 +1,127 @@
+"""Orbits: the motion of what nothing but gravity moves far above the air, as it is seen from the turning earth.
+
+Of such a track white jerk takes what gravity does between two readings for noise: a satellite whose ranges are read
+every few minutes to 4 m shows 1,400 m. With gravity the noise is fitted again, beside a single level of the jerk. How
+the earth turns below the station nobody has said: its latitude, and where north is, are those by which the log is
+likeliest.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.filtering.records import Model, Observations, Start
+from ftproc.core.filtering.smoother import likelihood_of, score_log, smooth_log
+from ftproc.core.identification import optimizer
+from ftproc.core.identification.likelihood import RATIO_BOUND, of_level, shaped
+from ftproc.core.identification.profile import median_level
+from ftproc.core.model.forces import EARTH_M
+from ftproc.core.model.motion import Motion
+
+FloatArray = NDArray[np.float64]
+
+ABOVE_M = 100e3  # where the air ends
+FARTHEST_TURN = 0.005  # rad, over which the motion goes on in one step
+EARTH_RADPS = 7.292115e-5  # its rotation
+LATITUDES, NORTHS = np.radians([-60, -30, 0, 30, 60]), np.radians(np.arange(0, 360, 45))
+CALMER = (1.0, 1e-2, 1e-4)  # times the jerk that stands in for the earth's rotation while it is not known
+STEPS, ROUNDS, TURNS = 12, 3, 16  # of the search for noise and jerk; of both searches; of that for the rotation
+NARROWER = 0.5  # times the angle of a turn, after one that leads nowhere
+FARTHEST = 12.0, 25.0  # ln of times: less noise variance, and less jerk, than white jerk leaves
+
+
+class Track(NamedTuple):
+    """A log with its starts, and (3,) which noise the user has specified."""
+
+    log: Observations
+    starts: list[Start]
+    known: NDArray[np.bool_]
+
+    def likelihood(self, model: Model) -> float:
+        """The log-likelihood; a model with which the filter diverges is impossible."""
+        found = likelihood_of(self.log, model, self.starts)
+        return found if math.isfinite(found) else -math.inf
+
+    def about_its_own(self, model: Model) -> Model:
+        """The model linearised about the track that it leads to."""
+        return model._replace(motion=model.motion.about(smooth_log(self.log, model, self.starts).state))
+
+
+def may_be(course: FloatArray) -> bool:
+    """Whether most of a course (n, 9) is above the air."""
+    height = np.sqrt((course[:, :2] ** 2).sum(1) + (course[:, 2] + EARTH_M) ** 2) - EARTH_M
+    return bool(np.median(height) > ABOVE_M)
+
+
+def fit(track: Track, model: Model) -> tuple[Model, float]:
+    """The likeliest noise, jerk and rotation of the earth, from the noise and the jerk of a model and the course about
+    which it is linearised on, and the log-likelihood."""
+    still = _settled(track, median_level(model)._replace(motion=Motion(acts=True).about(model.motion.course)))
+    turning = [
+        still._replace(jerk=times * still.jerk, motion=still.motion._replace(rotation=_rotation(np.array(direction))))
+        for direction in itertools.product(LATITUDES, NORTHS)
+        for times in CALMER
+    ]
+    best = max(turning, key=track.likelihood)
+    for _ in range(ROUNDS):
+        best = _turned(track, _settled(track, best))
+    best = max(still, _settled(track, best), key=track.likelihood)
+    return best, track.likelihood(best)
+
+
+def _rotation(direction: FloatArray) -> FloatArray:
+    """(1, 3) rad/s along x, y and z at a latitude, with north at an angle from x: (2,) rad."""
+    latitude, north = direction.tolist()
+    level = math.cos(latitude)
+    return EARTH_RADPS * np.array([[level * math.cos(north), level * math.sin(north), math.sin(latitude)]])
+
+
+def _direction(rotation: FloatArray) -> FloatArray:
+    """The inverse of `_rotation`."""
+    x, y, z = rotation[0].tolist()
+    return np.array([math.atan2(z, math.hypot(x, y)), math.atan2(y, x)])
+
+
+def _settled(track: Track, model: Model) -> Model:
+    """The likeliest noise and level of the jerk, linearised about its own track."""
+    log_noise, level = np.log(model.noise_variance), math.log(model.jerk[0, 0])
+    less, calmer = FARTHEST
+    lower = np.r_[np.where(track.known, log_noise, log_noise - less), level - calmer, -RATIO_BOUND]
+    upper = np.r_[np.where(track.known, log_noise, log_noise + less), level + calmer, RATIO_BOUND]
+
+    def of(theta: FloatArray) -> Model:
+        return model._replace(noise_variance=np.exp(theta[:3]), jerk=shaped(theta[3:4], theta[4]))
+
+    def cost(theta: FloatArray) -> optimizer.Point:
+        found = score_log(track.log, of(theta), track.starts)
+        jerk = of_level(found, theta[4])
+        slope = np.r_[-found.noise.score, jerk.gradient]
+        return optimizer.Point(jerk.value, slope, np.r_[found.noise.curvature, jerk.curvature])
+
+    theta = np.r_[log_noise, level, math.log(model.jerk[0, 2] / model.jerk[0, 0])]
+    return track.about_its_own(of(optimizer.minimise(cost, theta, lower, upper, STEPS, tolerance=0.05)))
+
+
+def _turned(track: Track, model: Model) -> Model:
+    """The model with a likelier rotation of the earth: turned by ever smaller angles, along each of the two."""
+    best, likelihood = model, track.likelihood(model)
+    angles = np.diff(LATITUDES)[0] * np.eye(2) / 2
+    for _ in range(TURNS):
+        here = _direction(best.motion.rotation)
+        tried = [
+            best._replace(motion=best.motion._replace(rotation=_rotation(here + side * angle)))
+            for angle in angles
+            for side in (1, -1)
+        ]
+        found = [track.likelihood(each) for each in tried]
+        if max(found) > likelihood:
+            likelihood = max(found)
+            best = tried[found.index(likelihood)]
+        else:
+            angles = NARROWER * angles
+    return track.about_its_own(best)
