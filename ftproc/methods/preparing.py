@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core.editing import outlier_chain, two_pass
+from ftproc.core.editing import outlier_chain, screened, two_pass
 from ftproc.core.filtering import forward
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start, between
@@ -70,7 +70,7 @@ def trusted(readings: Readings, settings: FilterSettings) -> Trusted:
     weights are those of the screening, and serve to find noise and jerk.
     """
     time_s, measurement = readings.time_s, readings.measurement
-    weight, _, sigma, _ = two_pass.screen(time_s, measurement, two_pass.rounding_sigma(measurement))
+    weight, _, sigma, _ = screened.screen(time_s, measurement, screened.rounding_sigma(measurement))
     known = what_is_known(readings, settings)
     start = None
     with contextlib.suppress(ValueError):  # too few readings in the head: the screening has to do

@@ -26,6 +26,7 @@ class FaultStatistics:
         self.copies = np.zeros((len(COMPONENTS), 4), int)
         self.steps: list[dict[str, Any]] = []
         self.doubtful: list[dict[str, Any]] = []
+        self.rivals: list[dict[str, Any]] = []
         self.one_sided: dict[str, dict[str, Any]] = {}
 
     def add(self, time_s: FloatArray, faults: Faults) -> None:
@@ -36,6 +37,10 @@ class FaultStatistics:
             found = {"component": NAMES[step.component], "time_s": float(time_s[step.sample])}
             found |= {f"{what}_{UNITS[step.component]}": size for what, size in sizes.items()}
             (self.steps if step.sure else self.doubtful).append(found)
+        for rival in faults.rivals:
+            times = {"from_s": float(time_s[rival.begin]), "to_s": float(time_s[rival.end - 1])}
+            chosen = {"chosen": "motion" if rival.motion else "patch", "gain": rival.gain}
+            self.rivals.append({"component": NAMES[rival.component], **times, **chosen})
         for one in faults.one_sided:
             name, unit = NAMES[one.component], UNITS[one.component]
             found = {"component": name, "share": one.share, f"error_{unit}": one.error, f"shift_{unit}": one.shift}
@@ -45,7 +50,8 @@ class FaultStatistics:
     def figures(self) -> dict[str, Any]:
         """JSON-serialisable; units are in the names."""
         one_sided = list(self.one_sided.values())
-        return {"steps": self.steps, "doubtful_steps": self.doubtful, "one_sided_errors": one_sided}
+        found = {"steps": self.steps, "doubtful_steps": self.doubtful, "rivals": self.rivals}
+        return {**found, "one_sided_errors": one_sided}
 
     def of_component(self, c: int) -> dict[str, int]:
         """How many readings of a component were not measured."""
@@ -79,6 +85,13 @@ def suspicious(s: Mapping[str, Any]) -> Iterator[str]:
     if s["doubtful_steps"]:
         named = "; ".join(step_in_words(step, s) for step in s["doubtful_steps"][:MOST_STEPS])
         yield f"either {named}, or readings beside it are a patch of outliers: the estimate takes them for good"
+    for rival in s["rivals"][:MOST_STEPS]:
+        other = "a patch of outliers" if rival["chosen"] == "motion" else "motion of the target"
+        yield (
+            f"the {rival['component']} from {rival['from_s']:.6g} to {rival['to_s']:.6g} s was taken for "
+            f"{'motion' if rival['chosen'] == 'motion' else 'a patch of outliers'}, and may be {other}: that is less "
+            f"likely by {rival['gain']:.1f} in log-probability only"
+        )
     if s["clock_set_back"]:
         back = s["clock_set_back"]
         yield f"the time goes back by {-back['by_s']:.3g} s at row {back['row']}, and rows before and after it overlap"

@@ -128,16 +128,16 @@ def _outliers(s: Summary) -> Iterator[Step]:
     """Where the decisions are in doubt, the engineer's eye."""
     outliers = {name: part["isolated"] + part["patch"] for name, part in s["components"].items()}
     many = any(count > MANY * (count + s["components"][name]["good"]) for name, count in outliers.items())
-    doubtful = any(s[name] for name in ("editing_places_unexamined", "doubtful_steps", "reacquired"))
+    doubtful = any(s[name] for name in ("editing_places_unexamined", "doubtful_steps", "rivals", "reacquired"))
     places = s["poorly_observable"] if any(outliers.values()) else []
     if many or doubtful or s["editing_converged"] is False or places:
-        yield _DECIDE._replace(place=_worst(places, s["doubtful_steps"]))
+        yield _DECIDE._replace(place=_worst([*places, *s["rivals"]], s["doubtful_steps"]))
 
 
 def _worst(places: Sequence[Summary], steps: Sequence[Summary]) -> str:
     """The times of the place that is least determined, or of the first step that is in doubt."""
     if places:
-        worst = max(places, key=lambda each: float(each["sigma_m"]))
+        worst = max(places, key=lambda each: float(each.get("sigma_m", 0.0)))
         return f"{worst['from_s']:.6g} to {worst['to_s']:.6g} s"
     return f"{steps[0]['time_s']:.6g} s" if steps else ""
 

@@ -27,10 +27,12 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 LONGEST = 48  # used readings between two rejected runs
+LENGTHS = (4, 6, 9, 13, 19, 28, 40)  # samples beside a rejected run, or at an end of the log, that may be the patch
 GAP_INTERVALS = 8.0  # median intervals without a reading, which a patch may end at
 AROUND = 80  # samples on each side that the comparison looks at
 ROUNDS = 5
-MARGIN = 5.0  # by which the log-probability of another decision must be better
+MARGIN = 5.0  # by which the log-probability of another decision must be better,
+ONE_SIDED = 25.0  # and of a patch with one edge: a start in a turn gains 21 without one, patches that were missed 43
 MOST = 100  # comparisons in one look
 WORK, WORK_PER_SAMPLE = 250_000, 60  # samples that may be smoothed for a log, and for each of its samples
 STEPS = 14  # of filling a hole, or of taking out what stands out most
@@ -111,7 +113,7 @@ class Step(NamedTuple):
 
 def try_alternatives(log: Neighbourhood, weight: FloatArray, search: Search) -> FloatArray:
     """The decisions (n, 3), replaced by others where these are likelier."""
-    result = weight.copy()
+    result = _one_sided(log, weight, search)
     new = [island for island in islands(log.time_s, weight, log.possible) if island not in search.tried]
     search.unexamined.update(new[MOST:])
     for island in new[:MOST]:
@@ -129,6 +131,58 @@ def try_alternatives(log: Neighbourhood, weight: FloatArray, search: Search) -> 
         if likeliest.likelihood > steps[0].likelihood + MARGIN:
             result[near] = likeliest.weight
     return result
+
+
+def _one_sided(log: Neighbourhood, weight: FloatArray, search: Search) -> FloatArray:
+    """The decisions (n, 3), replaced where it is likelier that a rejected run, or an end of the log, is the edge of a
+    patch that was followed: a ramp begins without a jump, and at an end of the log there is no other edge. Of several
+    in the same place, the likeliest."""
+    found = list[tuple[float, Island, slice, FloatArray]]()
+    for edge in [each for each in _edges(weight, log.possible) if each not in search.tried]:
+        if not search.take(edge):
+            continue
+        near = slice(max(edge.first - LENGTHS[-1] - AROUND, 0), edge.last + LENGTHS[-1] + AROUND)
+        try:
+            steps = _beside(log.part(near), weight[near], edge.shifted(near.start))
+        except ValueError:  # a component has too few readings there
+            continue
+        search.work.left -= sum(len(step.weight) for step in steps)
+        best = max(steps, key=lambda step: step.likelihood)
+        if best.likelihood > steps[0].likelihood + ONE_SIDED:
+            found.append((best.likelihood - steps[0].likelihood, edge, near, best.weight))
+    result, changed = weight.copy(), np.zeros(len(weight), bool)
+    for _, edge, near, other in sorted(found, key=lambda each: -each[0]):
+        if changed[near].any():
+            search.tried.discard(edge)
+        else:
+            result[near], changed[near] = other, True
+    return result
+
+
+def _beside(part: Neighbourhood, weight: FloatArray, edge: Island) -> list[Step]:
+    """The decisions, and those with readings beside a rejected run rejected in its place."""
+    component, first, begin, end, last = edge
+    steps = [_step(part, weight)[0]]
+    for side, length in itertools.product((-1, 1), LENGTHS):
+        patch = slice(max(first - length, 0), first) if side < 0 else slice(last, last + length)
+        other = weight.copy()
+        other[begin:end, component] = part.possible[begin:end, component]
+        other[patch, component] = 0.0
+        if (other != weight).any():
+            steps.append(_step(part, other)[0])
+    best = max(steps, key=lambda step: step.likelihood)
+    return steps if best is steps[0] else [*steps, *decisions(part, best.weight)]
+
+
+def _edges(weight: FloatArray, possible: NDArray[np.bool_]) -> list[Island]:
+    """The rejected runs of each component, and the ends of the log, which are runs of nothing."""
+    found, n = list[Island](), len(weight)
+    for c in range(3):
+        seen = np.flatnonzero(possible[:, c])
+        if len(seen):
+            runs = [(int(seen[a]), int(seen[b - 1]) + 1) for a, b in runs_of(weight[seen, c] <= 0, SHORTEST_RUN)]
+            found += [Island(c, a, a, b, b) for a, b in [(0, 0), *runs, (n, n)]]
+    return found
 
 
 def islands(time_s: FloatArray, weight: FloatArray, possible: NDArray[np.bool_]) -> list[Island]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from ftproc.core.components import any_of
 from ftproc.core.editing import alternatives
 from ftproc.core.editing.decisions import Decision, Record, decide
+from ftproc.core.editing.lasting.faults import Rival
 from ftproc.core.editing.runs import confirmed, suspicious
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
@@ -35,7 +37,7 @@ ROUNDS = 6
 SHORTEST, ENDS = 4, 5  # readings in a run that may be motion, and at its ends, of which the second nearest must be ...
 JOINED, FAR = 12.0, 25.0  # ... so many sigmas off the track at most; and of one that is an outlier in any case
 SAME_SIDE = 0.7  # share of them that are on the side of the track where the one before is: noise changes sides
-SELDOM = 8.0  # ln of how much more often such runs are motion than patches
+SELDOM, OPEN = 8.0, 5.0  # ln of how much more often such runs are motion than patches; within which either may be
 LEAST_KEPT = 0.8  # of the readings of a component that were good before the first round
 MARGIN = 5.0  # in log-probability, by which the decisions made again may be less likely than those before
 FEW_MORE = 0.01  # of the readings: those that another hypothesis may reject beyond the first, to be believed
@@ -136,19 +138,30 @@ def _until_settled(record: Record, decision: Decision, profile: Model) -> Decisi
         if not _stands_out(record.time_s, profile).any() and (weight == decision.weight).all():
             break
         again = decide(record, decision._replace(weight=weight, model=calm), tune_first=False)
+        again = again._replace(model=_profile(record, again))
+        if (weight != decision.weight).any():  # of which a single level of the jerk may lead away again
+            again = max(again, _as_they_are(record, decision, weight), key=partial(_likelihood, record))
         if (again.weight == decision.weight).all() or (again.weight.sum(0) < LEAST_KEPT * first.weight.sum(0)).any():
             break
-        decision, profile = again, _profile(record, again)
+        decision, profile = again, again.model
     found = decision._replace(model=profile, unexamined=len(search.unexamined - search.tried))
     if (found.weight != first.weight).any() and _likelihood(record, found) < _likelihood(record, first) - MARGIN:
         return first._replace(rounds=found.rounds, unexamined=found.unexamined)
     return found
 
 
-def with_motion(record: Record, decision: Decision) -> Decision:
+def _as_they_are(record: Record, decision: Decision, weight: FloatArray) -> Decision:
+    """Other decisions, with a jerk profile of their own."""
+    weight = record.with_accepted(weight)
+    other = decision._replace(weight=weight, starts=_starts(record, weight, median_level(decision.model)))
+    return other._replace(model=_profile(record, other))
+
+
+def with_motion(record: Record, decision: Decision) -> tuple[Decision, tuple[Rival, ...]]:
     """The decisions on a log with those long rejected runs taken in that leave the track and join it again without a
-    jump, where a jerk profile of their own makes that likelier: no patch, but a take-off or a turn."""
-    found, calm = decision.weight.copy(), median_level(decision.model)
+    jump, where a jerk profile of their own makes that likelier: no patch, but a take-off or a turn; and those of which
+    either may be."""
+    found, calm, rivals = decision.weight.copy(), median_level(decision.model), list[Rival]()
     for c, inside, near in list(_may_be_motion(record, decision)):
         part, weight = _short(record, near), found[near].copy()
         weight[inside - near.start, c] = 1.0
@@ -161,12 +174,16 @@ def with_motion(record: Record, decision: Decision) -> Decision:
             one, other = (Decision(w, calm, _starts(part, w, calm), decision.rates) for w in (found[near], weight))
         except ValueError:  # a component has too few readings there
             continue
-        taken_in = weight[inside - near.start, c].mean() > 0.5
-        if taken_in and log_probability(part, other) > log_probability(part, one) - SELDOM:
+        if weight[inside - near.start, c].mean() <= 0.5:
+            continue
+        gain = log_probability(part, other) - log_probability(part, one) + SELDOM
+        if gain > 0:
             found[near] = weight
+        if abs(gain) < OPEN:
+            rivals.append(Rival(c, int(inside[0]), int(inside[-1]) + 1, abs(gain), gain > 0))
     if (found == decision.weight).all():
-        return decision
-    return decision._replace(weight=found, starts=_starts(record, found, calm))
+        return decision, tuple(rivals)
+    return decision._replace(weight=found, starts=_starts(record, found, calm)), tuple(rivals)
 
 
 def _may_be_motion(record: Record, decision: Decision) -> Iterator[tuple[int, IntArray, slice]]:

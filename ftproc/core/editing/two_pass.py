@@ -6,7 +6,6 @@ leave-one-out residuals -> again, until the decisions stand still; then a jerk p
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import NamedTuple
 
@@ -14,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.by_hand import NOTHING, Accepted
-from ftproc.core.editing import jump_patches, outlier_chain, screening
+from ftproc.core.editing import outlier_chain
 from ftproc.core.editing.alternatives import WORK, Work
-from ftproc.core.editing.copies import rounding_step, without_copies
+from ftproc.core.editing.copies import without_copies
 from ftproc.core.editing.decisions import (
     IMPRECISE,
     Decision,
@@ -30,30 +29,27 @@ from ftproc.core.editing.decisions import (
     late_stamps,
 )
 from ftproc.core.editing.lasting.curves import CLOCK
-from ftproc.core.editing.lasting.faults import Faults, Shift, Step, levelled, refined, taken_out
+from ftproc.core.editing.lasting.faults import Faults, Rival, Shift, Step, levelled, refined, taken_out
 from ftproc.core.editing.lasting.search import search, sorted_out
 from ftproc.core.editing.lasting.weighing import scene_of
 from ftproc.core.editing.reassessment import believed, likelier, log_probability, reassess, with_less_noise, with_motion
+from ftproc.core.editing.screened import rounding_sigma, screen, stuck_readings
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
 from ftproc.core.identification import one_sided, uneven_noise
-from ftproc.core.identification.likelihood import Fixed, first_jerk, without_noise
+from ftproc.core.identification.likelihood import Fixed, first_jerk
 from ftproc.core.identification.nearby import residuals_near, samples_around
 from ftproc.core.identification.one_sided import OneSided
 from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
-from ftproc.core.model.frames import unwrap
+from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.measurement import NO_RANGE_M
 from ftproc.core.model.motion import isotropic
-from ftproc.order_statistics import median
 
 FloatArray = NDArray[np.float64]
 
-SHORT_WINDOW = 11  # samples: sees jumps, and little else
-WINDOWS = (31, 75)  # samples: the short one follows manoeuvres, the long one sees through patches
 COARSE = 0.5  # of a component's noise: rounding that makes so much of it decides how its readings repeat
-OUTVOTED = 0.5  # share of a window's parabolas that a reading is off
-FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
+FORGETS, REMEMBERED = 0.8, 5.0  # intervals that a filter remembers: with fewer it follows each reading; another start
 STAMP_ROUNDS = 3  # of estimating how late each time stamp is
 MOST_LATE = 0.08  # share of the readings, rejected, that stamps which are later by far may explain
 DRIFT_ROUNDS = 3  # of following the noise: where it grows, each finds readings that the next can follow
@@ -95,59 +91,6 @@ class Edited(NamedTuple):
     def smoothed(self) -> SmootherRun:
         """What the whole record says of each sample, with these decisions."""
         return smooth_log(self.log, self.model, self.starts, PATHS)
-
-
-class Screened(NamedTuple):
-    """What screening each component alone finds: weights (n, 3), those of the short window alone, which sees jumps but
-    through which turns pass (n, 3), the noise 1-sigma (3,), and which components show none (3,)."""
-
-    weight: FloatArray
-    jumps_only: FloatArray
-    sigma: FloatArray
-    exact: NDArray[np.bool_]
-
-
-def screen(time_s: FloatArray, measurement: FloatArray, least: FloatArray) -> Screened:
-    """Screen each component alone. least: (3,) 1-sigma that each has at least, by its rounding."""
-    weight, sigma = np.isfinite(measurement).astype(float), np.zeros(3)
-    jumps_only = weight.copy()
-    for c in range(3):
-        channel, floor = np.ascontiguousarray(measurement[:, c]), math.sqrt(2) * float(least[c])
-        weight[:, c], jumps_only[:, c], sigma[c] = screen_channel(time_s, channel, c == 1, floor)
-    exact, sigma = without_noise(Observations(time_s, measurement, weight), sigma)
-    return Screened(weight, jumps_only, sigma, exact)
-
-
-def rounding_sigma(measurement: FloatArray) -> FloatArray:
-    """(3,) 1-sigma m, rad, rad that the rounding of the readings (n, 3) makes: step / sqrt(12)."""
-    steps = [rounding_step(measurement[:, c]) for c in range(3)]
-    return np.array(steps) / math.sqrt(12)
-
-
-def screen_channel(
-    time_s: FloatArray, channel: FloatArray, angular: bool, least_sigma: float
-) -> tuple[FloatArray, FloatArray, float]:
-    """(n,) weights, (n,) those of the short window, and the noise 1-sigma of one component."""
-    seen = np.isfinite(channel).astype(float)
-    near, scales = screening.screen_component(time_s, channel, SHORT_WINDOW, angular, least_sigma)
-    jumps_only = np.where(near > OUTVOTED, 0.0, seen)
-    weight, sigma = seen.copy(), least_sigma
-    for window in WINDOWS:
-        votes, scales = screening.screen_component(time_s, channel, window, angular, least_sigma)
-        screening.bar_runs(channel, votes, near, weight)
-        if window == WINDOWS[0] and len(scales):
-            sigma = max(median(scales), least_sigma)
-    weight[jump_patches.find(time_s, unwrap(channel) if angular else channel, weight, sigma) > 0] = 0.0
-    # A component that swings too fast for parabolas loses half of itself: then only the short window is believed.
-    for alternative in (jumps_only, seen):
-        if weight.sum() < FEWEST_TRUSTED * seen.sum():
-            weight = alternative
-    return weight, jumps_only, sigma
-
-
-def stuck_readings(measurement: FloatArray, sigma: FloatArray) -> NDArray[np.bool_]:
-    """(n, 3) readings that merely repeat the one before; see `screening.stuck`."""
-    return np.stack([screening.stuck(measurement[:, c], float(sigma[c])) for c in range(3)], 1)
 
 
 @np.errstate(all="ignore")  # after a gap of years numbers overflow; what comes of it is unlikely, and is not followed
@@ -192,8 +135,9 @@ def edit(
         (record, decision), found, banned = other, steps, banned | new.banned
     if decision.stamp_s > 0:  # which explains a clock that seems to jump
         doubtful = [step for step in doubtful if step.component != CLOCK]
+    rivals: tuple[Rival, ...] = ()
     if not record.fixed.jerk and not live:  # at the end of a window a patch may look like motion
-        decision = with_motion(record, decision)
+        decision, rivals = with_motion(record, decision)
     decision = decision._replace(weight=np.where(accepted, 1.0, decision.weight))
     if segment_of is None and not short:
         decision = allow_for_colour(record, decision)
@@ -207,7 +151,7 @@ def edit(
         log, found, shifts = refined(read, decision.model, scene.setting, found)
     leaning = [] if live else _one_sided(log, decision.model, record.rounding)
     shifts += tuple(Shift(one.component, 0, len(time_s), one.sigma) for one in leaning)
-    faults = Faults(copied, (*found, *doubtful), shifts, tuple(leaning))
+    faults = Faults(copied, (*found, *doubtful), shifts, tuple(leaning), rivals)
     return Edited(one_sided.without(log, leaning), decision.model, decision.starts, decision, faults)
 
 
@@ -245,7 +189,10 @@ def _decided(
         accepted,
     )  # fmt: skip
     begin = partial(_first, segment_of=segment_of, known=known)
-    record, decision = with_less_noise(begin(record, record.screened), begin)
+    first = begin(record, record.screened)
+    if segment_of is None and _forgets(*first):  # outliers that screening has missed may look like motion
+        first = likelier(first, begin(record, record.screened, shortest=REMEMBERED))
+    record, decision = with_less_noise(first, begin)
     found = _examined(record, decision, known)
     if jerk_psd is None and found[1].stamp_s == 0 and not found[1].settled:  # turns may have been taken for patches
         other = begin(record, jumps_only * possible)
@@ -255,11 +202,20 @@ def _decided(
     return found
 
 
-def _first(record: Record, weight: FloatArray, segment_of: Model | None, known: Known) -> tuple[Record, Decision]:
-    """The decisions that are made from these weights (n, 3) on, and from the noise of the record."""
+def _forgets(record: Record, decision: Decision) -> bool:
+    """Whether a filter with this model follows each reading."""
+    scales = scales_of(record.weighted(decision.weight), decision.model.noise_variance)
+    return scales.memory_samples(float(decision.model.jerk[0, 0])) < FORGETS
+
+
+def _first(
+    record: Record, weight: FloatArray, segment_of: Model | None, known: Known, shortest: float = 0.0
+) -> tuple[Record, Decision]:
+    """The decisions that are made from these weights (n, 3) on, and from the noise of the record. shortest: see
+    `first_jerk`."""
     log, noise = record.weighted(weight), np.where(np.isfinite(known.sigma), known.sigma, record.sigma) ** 2
     jerk_psd = known.jerk_psd
-    model = segment_of or Model(noise, isotropic(first_jerk(log, noise) if jerk_psd is None else jerk_psd))
+    model = segment_of or Model(noise, isotropic(first_jerk(log, noise, shortest) if jerk_psd is None else jerk_psd))
     rates = np.tile(np.array(outlier_chain.START_RATES), (3, 1))
     starts = find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
     return record, decide(record, Decision(weight, model, starts, rates), tune_first=True)

@@ -66,8 +66,9 @@ def representative(
     return (log, starts) if found is None else found[1:]
 
 
-def first_jerk(log: Observations, noise_variance: FloatArray) -> float:
-    """The jerk density, m^2/s^5, with which a search begins: the likeliest of a few."""
+def first_jerk(log: Observations, noise_variance: FloatArray, shortest: float = 0.0) -> float:
+    """The jerk density, m^2/s^5, with which a search begins: the likeliest of a few. shortest: intervals that the
+    filter is to remember at least."""
     scales = scales_of(log, noise_variance)
 
     def likelihood(jerk_psd: float) -> float:
@@ -76,7 +77,8 @@ def first_jerk(log: Observations, noise_variance: FloatArray) -> float:
         found = likelihood_of(part, Model(noise_variance, isotropic(jerk_psd)), starts)
         return found if math.isfinite(found) else -math.inf
 
-    return max((scales.jerk_psd(memory * scales.interval_s) for memory in FIRST_MEMORIES), key=likelihood)
+    memories = [memory for memory in FIRST_MEMORIES if memory >= shortest]
+    return max((scales.jerk_psd(memory * scales.interval_s) for memory in memories), key=likelihood)
 
 
 def without_noise(log: Observations, sigma: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.editing import two_pass
+from ftproc.core.editing import screened
 from ftproc.core.editing.copies import without_copies
 from ftproc.core.filtering.records import Model
 from ftproc.core.model import stations as geometry
@@ -36,14 +36,14 @@ class Screened(NamedTuple):
 def screen(station: Seen, banned: NDArray[np.bool_]) -> Screened:
     """A station alone. banned: (rows, 3) readings of patches."""
     z, _ = without_copies(station.time_s, np.where(banned, np.nan, station.measurement))
-    weight, sigma, least = np.isfinite(z).astype(float), np.ones(3), two_pass.rounding_sigma(z)
+    weight, sigma, least = np.isfinite(z).astype(float), np.ones(3), screened.rounding_sigma(z)
     for c in station.components:
         channel = np.ascontiguousarray(z[:, c])
-        weight[:, c], _, sigma[c] = two_pass.screen_channel(
+        weight[:, c], _, sigma[c] = screened.screen_channel(
             station.time_s, channel, c == 1, math.sqrt(2) * float(least[c])
         )
     sigma = np.where(np.isfinite(station.known), station.known, np.maximum(sigma, LEAST_NOISE))
-    possible = np.isfinite(z) & ~two_pass.stuck_readings(z, sigma)
+    possible = np.isfinite(z) & ~screened.stuck_readings(z, sigma)
     possible[:, 0] &= z[:, 0] > 0
     possible |= station.accepted
     return Screened(possible.astype(float), np.where(station.accepted, 1.0, weight * possible), sigma)

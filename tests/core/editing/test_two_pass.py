@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ftproc.core.editing import alternatives, decisions, reassessment, two_pass
+from ftproc.core.editing import alternatives, decisions, reassessment, screened, two_pass
 from ftproc.core.filtering.initialization import first_state
 from ftproc.core.filtering.records import Observations
 from tests.core.tracks import matched, position_error
@@ -126,7 +126,7 @@ def test_missing_readings_have_no_weight_and_decisions_are_all_or_nothing():
 
 def test_screening_trusts_most_of_a_clean_log_and_finds_its_noise():
     a = matched(2, 600, q=1e-2)
-    weight, _, sigma, _ = two_pass.screen(a.time, a.z, np.zeros(3))
+    weight, _, sigma, _ = screened.screen(a.time, a.z, np.zeros(3))
     assert weight.mean() > 0.95
     np.testing.assert_allclose(sigma**2, a.model.noise_variance, rtol=0.6)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,30 +52,51 @@ class Shift(NamedTuple):
     sigma: float
 
 
+class Rival(NamedTuple):
+    """The readings [begin, end) of a component may be a patch, or the target's motion: by how much more likely, in
+    log-probability, that is which was chosen. motion: whether it was motion."""
+
+    component: int
+    begin: int
+    end: int
+    gain: float
+    motion: bool
+
+
+Lasting = TypeVar("Lasting", Shift, Rival)
+
+
 class Faults(NamedTuple):
     """copied: (n, 3) kinds of the readings that were not measured, see `copies`. steps: that stay. shifts: what was
-    moved for them. one_sided: components of which many errors have one sign."""
+    moved for them. one_sided: components of which many errors have one sign. rivals: of what was chosen."""
 
     copied: KindArray
     steps: tuple[Step, ...] = ()
     shifts: tuple[Shift, ...] = ()
     one_sided: tuple[OneSided, ...] = ()
+    rivals: tuple[Rival, ...] = ()
 
     def rows(self, low: int, high: int) -> Faults:
         """Of the samples [low, high) alone."""
         steps = tuple(s._replace(sample=s.sample - low) for s in self.steps if low <= s.sample < high)
-        shifts = tuple(
-            s._replace(begin=max(s.begin, low) - low, end=min(s.end, high) - low)
-            for s in self.shifts
-            if s.end > low and s.begin < high
-        )
-        return self._replace(copied=self.copied[low:high], steps=steps, shifts=shifts)
+
+        def inside(of: tuple[Lasting, ...]) -> tuple[Lasting, ...]:
+            return tuple(
+                each._replace(begin=max(each.begin, low) - low, end=min(each.end, high) - low)
+                for each in of
+                if each.end > low and each.begin < high
+            )
+
+        return Faults(self.copied[low:high], steps, inside(self.shifts), self.one_sided, inside(self.rivals))
 
     def at(self, sample: IntArray, first: IntArray) -> Faults:
         """Of rows (n,) that repeat these samples (m,); first (m + 1,): where each begins, and their number."""
         steps = tuple(s._replace(sample=int(first[s.sample])) for s in self.steps)
-        shifts = tuple(s._replace(begin=int(first[s.begin]), end=int(first[s.end])) for s in self.shifts)
-        return self._replace(copied=self.copied[sample], steps=steps, shifts=shifts)
+
+        def of_rows(of: tuple[Lasting, ...]) -> tuple[Lasting, ...]:
+            return tuple(each._replace(begin=int(first[each.begin]), end=int(first[each.end])) for each in of)
+
+        return Faults(self.copied[sample], steps, of_rows(self.shifts), self.one_sided, of_rows(self.rivals))
 
 
 def refined(
