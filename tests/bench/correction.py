@@ -111,7 +111,7 @@ def result(case: Case, new: int = NEW, settings: TrainSettings | None = None) ->
             for flight in runs:
                 error = flight.error[:, :6]
                 used = model.stages.get(stage)
-                left = error if used is None else error - correct(flight.run, used).values
+                left = error if used is None else error - correct(flight.run, used, flight.smoothed).values
                 known = np.isfinite(error).all(1)
                 pairs.append([np.sum(e[known][:, columns] ** 2) for e in (left, error)])
             squares[f"{stage} {quantity}"] = np.array(pairs)
