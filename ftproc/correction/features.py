@@ -105,7 +105,7 @@ class Features(ABC):
     reach: radius of the region where it holds, in units of that covered by the training inputs. proven: applied only
     where the smoother of the same flight proves it. hidden: usual units of the hidden layer.
     most: samples of a flight that are learned from; None: all. restarts: fits from other first weights, of which the
-    best on validation data is kept.
+    best on validation data is kept. share: of the errors learned from that bounds a correction at twice its largest.
     """
 
     name: ClassVar[str]
@@ -117,6 +117,7 @@ class Features(ABC):
     hidden: ClassVar[int] = 12
     most: ClassVar[int | None] = None
     restarts: ClassVar[int] = 1
+    share: ClassVar[float] = 0.683
 
     @property
     @abstractmethod

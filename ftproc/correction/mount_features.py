@@ -15,19 +15,21 @@ from ftproc.correction.instrument_features import InstrumentFeatures
 from ftproc.records import FloatArray
 
 USUAL_M, USUAL_MPS = 10_000.0, 300.0
+FAR_M = (5_000.0, 10_000.0, 20_000.0)  # from where echoes may be weak: their power falls with the fourth power of range
 
 
 class MountFeatures(InstrumentFeatures):
     """Those of `instrument`, and cos E times the first and the second harmonic of the azimuth, the second of the
-    elevation, the log of the range and its square, the rates of the angles across and up, their accelerations, and the
-    range rate. Targets as there."""
+    elevation, the log of the range and what weak echoes add, the rates of the angles across and up, their
+    accelerations, and the range rate. Targets as there."""
 
     name = "mount"
     restarts = 3
+    share = 0.99  # the error of a far range is many times that of most
 
     @property
     def floor(self) -> FloatArray:
-        return np.array((*super().floor, *(0.3,) * 6, 0.3, 0.3, 0.005, 0.005, 0.002, 0.002, 0.05))
+        return np.array((*super().floor, *(0.3,) * 6, *(0.3,) * 4, 0.005, 0.005, 0.002, 0.002, 0.05))
 
     def _raw(self, run: FilterRun, start: int, stop: int) -> FloatArray:
         los = LineOfSight.of(run, start, stop)
@@ -45,7 +47,7 @@ class MountFeatures(InstrumentFeatures):
             np.cos(2 * elevation),
             np.sin(2 * elevation),
             log_range,
-            log_range**2,
+            *(np.log1p((distance / far) ** 4) for far in FAR_M),
             *rates,
             across_a / distance - 2 * rates[0] * (outward / distance - rates[1] * tilt),
             up_a / distance - 2 * rates[1] * outward / distance - rates[0] ** 2 * tilt,

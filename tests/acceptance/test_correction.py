@@ -28,6 +28,13 @@ def test_an_instrument_learned_from_two_calibration_flights_is_corrected_on_new_
     assert found.ratio("smoother position") <= 0.5
 
 
+def test_servo_circles_and_range_walk_are_learned():
+    case = replace(CASES["all"], training=14, duration_s=50.0)
+    ratios = [result(case, new=3, settings=replace(QUICK, seed=seed)).ratio("smoother position") for seed in range(2)]
+    assert max(ratios) <= 0.4
+    assert max(ratios) / min(ratios) <= 1.2
+
+
 def test_a_repeatable_elevation_bias_is_taken_out_of_filter_and_smoother():
     found = result(replace(CASES["b"], training=8, duration_s=60.0), new=3, settings=QUICK)
     assert {s.features.name for s in found.model.stages.values()} == {"instrument"}

@@ -139,10 +139,11 @@ def samples(flights: Sequence[Flight], pieces: Sequence[Piece], features: Featur
     return Samples(np.concatenate(inputs), np.concatenate(targets))
 
 
-def overconfidence(flights: Sequence[Flight], pieces: Sequence[Piece]) -> FloatArray:
+def overconfidence(flights: Sequence[Flight], pieces: Sequence[Piece], share: float) -> FloatArray:
     """(6,) by what factor the filter's line-of-sight sigmas are too small in `pieces`, at least 1.
 
-    The 68.3 % quantile of error over sigma (1 for a consistent Gaussian sigma), so that a few outliers do not count.
+    The quantile of error over sigma that holds this share of samples: with 68.3 % (1 for a consistent Gaussian sigma)
+    a few outliers do not count.
     """
     ratios = [np.ones((1, APPLIED))]
     for number, start, stop in pieces:
@@ -151,4 +152,4 @@ def overconfidence(flights: Sequence[Flight], pieces: Sequence[Piece]) -> FloatA
         los = LineOfSight.of(flight.run, start, stop).rows(settled)
         ratio = np.abs(los.from_cartesian(flight.error[start:stop, :APPLIED][settled])) / los.sigma
         ratios.append(ratio[np.all(np.isfinite(ratio), axis=1)])
-    return np.maximum(np.quantile(np.concatenate(ratios), 0.683, axis=0), 1.0)
+    return np.maximum(np.quantile(np.concatenate(ratios), share, axis=0), 1.0)

@@ -90,7 +90,7 @@ def train(flights: Sequence[Flight], settings: TrainSettings, progress: Progress
         targets=data.targets,
         envelope=Envelope.fit(data.training.inputs, features.reach),
         gain=np.ones(APPLIED),
-        bound_sigma=BOUND_SIGMA * overconfidence(flights, data.parts.training),
+        bound_sigma=BOUND_SIGMA * overconfidence(flights, data.parts.training, features.share),
         fingerprint=data.fingerprint,
     )
     progress("validation", 0, 1)
