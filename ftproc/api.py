@@ -86,13 +86,16 @@ def filter_log(
 def train(
     pairs: Sequence[tuple[Any, Any]], settings: TrainSettings | None = None, filtering: FilterSettings | None = None
 ) -> Model:
-    """A correction learnt from (log, truth) pairs: records, files or tables.
+    """A correction learnt from (log, truth) pairs: records, files or tables; truth None: the smoother is the teacher.
 
     filtering: the settings of the filter that it is made for. Raises InputError, UsageError.
     """
     from ftproc.correction.training.flights import train_flights
 
-    read = [(log if isinstance(log, MeasurementLog) else read_log(log), _truth(truth)) for log, truth in pairs]
+    read = [
+        (log if isinstance(log, MeasurementLog) else read_log(log), None if truth is None else _truth(truth))
+        for log, truth in pairs
+    ]
     return train_flights(read, settings or TrainSettings(), filtering)
 
 

@@ -22,7 +22,8 @@ from ftproc.records import COMPONENTS, MISSING, Diagnostics, FloatArray, Measure
 from ftproc.settings import FilterSettings
 
 if TYPE_CHECKING:
-    from ftproc.correction.model import Model
+    from ftproc.correction.apply import Correction
+    from ftproc.correction.model import Model, Stage
 
 
 def filter_log(log: MeasurementLog, settings: FilterSettings | None = None, model: Model | None = None) -> Trajectory:
@@ -53,6 +54,7 @@ class Filtering:
         if self.at_once is not None:
             self.record = self.at_once.of_stamps(self.record)
         self.statistics = RunStatistics(log, self.record.absent)
+        self.why_not = ""  # nothing is corrected
         self.effects = by_hand.Effects(None if log.by_hand is None else log.by_hand.decisions, settings.gate)
 
     def parts(self) -> Iterator[Trajectory]:
@@ -70,8 +72,7 @@ class Filtering:
     @cached_property
     def metadata(self) -> dict[str, Any]:
         """Settings, noise, model and summary: everything needed to reproduce the trajectory, and to judge it."""
-        model = self.model if self.method.corrected else None
-        stage = None if model is None else model.smoother if self.settings.smooth else model.filter
+        model, stage = self.model if self.method.corrected else None, self._stage
         summary = self.statistics.summary(
             {
                 "specified_noise": [
@@ -80,7 +81,7 @@ class Filtering:
                 "network": self._network() if self.method.corrected else None,
                 "at_once": self.at_once is not None,
                 "correction_linear": None if stage is None else stage.linear,
-                "correction_lost_by_smoothing": model is not None and stage is None and model.filter.helps,
+                "correction_lost_by_smoothing": model is not None and stage is None and model.filter.lost_by_smoothing,
                 **self.effects.summary(),
             }
         )
@@ -94,25 +95,36 @@ class Filtering:
         return self._steps(self.metadata["summary"])
 
     def _steps(self, summary: Mapping[str, Any]) -> list[Step]:
-        return next_steps.steps(summary, self.settings, self.model is not None and self.method.corrected)
+        doubtful = self._stage is not None and not self._stage.features.proven
+        return next_steps.steps(summary, self.settings, doubtful)
+
+    @property
+    def _stage(self) -> Stage | None:
+        """The network that corrects what is published, if there is one."""
+        if self.model is None or not self.method.corrected:
+            return None
+        return self.model.smoother if self.settings.smooth else self.model.filter
 
     def _network(self) -> str:
         """What the learned correction did, in words."""
         if self.model is None:
             return "none: no correction applied"
-        stage = self.model.smoother if self.settings.smooth else self.model.filter
+        stage = self._stage
         if stage is None or not stage.helps:
             return "gain 0: no correction applied"
         if self.statistics.largest_m == 0:
-            return f"gain {stage.gain.max():.2g}, but no sample is like those it was trained on: no correction applied"
-        return f"gain {stage.gain.max():.2g}: corrections of up to {self.statistics.largest_m:.3g} m"
+            why_not = self.why_not or "no sample is like those it was trained on"
+            return f"gain {stage.gain.max():.2g}, but {why_not}: no correction applied"
+        size = f"{self.statistics.largest_m:.3g} m, {self.statistics.largest_sigma:.2g} sigma"
+        proven = ", proven by the smoother of this run" if stage.features.proven else ""
+        return f"gain {stage.gain.max():.2g}: corrections of up to {size}{proven}"
 
     def _trajectory(self, part: Part) -> Trajectory:
         """The rows of a part that count, corrected, and added to the statistics."""
         absent = list(part.estimate.absent if part.estimate.known is not None else self.record.absent)
         correction, outside = np.zeros((len(part.estimate.label), 6)), 0.0
         if self.model is not None and self.method.corrected and not absent:
-            correction, outside = _corrected(part.estimate, self.model)
+            correction, outside, self.why_not = _corrected(part.estimate, self.model)
         correction, estimate = correction[part.low : part.high], part.estimate.rows(part.low, part.high)
         rows = slice(part.first + part.low, part.first + part.high)
         best = estimate.run if estimate.smoothed is None else estimate.smoothed
@@ -141,14 +153,14 @@ class Filtering:
         )  # fmt: skip
 
 
-def _corrected(estimate: Estimate, model: Model) -> tuple[FloatArray, float]:
-    """(n, 6) what the network of the stage adds, and the share of samples outside its training."""
-    from ftproc.correction.apply import correct
+def _corrected(estimate: Estimate, model: Model) -> Correction:
+    """What the network of the stage adds."""
+    from ftproc.correction.apply import Correction, correct
 
     if estimate.smoothed is None:
-        return correct(estimate.run, model.filter)
+        return correct(estimate.run, model.filter, estimate.hindsight)
     if model.smoother is None:
-        return np.zeros((len(estimate.run.time_s), 6)), 0.0
+        return Correction(np.zeros((len(estimate.run.time_s), 6)), 0.0)
     return correct(estimate.smoothed_run, model.smoother)
 
 

@@ -101,7 +101,7 @@ class TrainSettings:
     """GA-BPNN training: network size, genetic search, back-propagation, hold-out verdict.
 
     features: `auto` (chosen by held-out flights) or one of `ftproc.correction.feature_sets`.
-    hidden: units of the hidden layer.
+    hidden: units of the hidden layer; None: as many as the feature set usually needs.
     population, generations: of the genetic search.
     epochs: most that the optimiser is given.
     flights: simulated, when a scenario is trained on.
@@ -112,7 +112,7 @@ class TrainSettings:
     """
 
     features: str = "auto"
-    hidden: int = 12
+    hidden: int | None = None
     population: int = 40
     generations: int = 60
     epochs: int = 400

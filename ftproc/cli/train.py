@@ -1,4 +1,4 @@
-"""`ftproc train`: a correction model from flights whose truth is known."""
+"""`ftproc train`: a correction model from past flights, with truth or without."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def _number(name: str, least: int, default: int, text: str) -> Callable[[options
     return click.option(f"--{name}", type=kind, default=default, metavar="N", help=text)
 
 
-@click.command(cls=Command, short_help="A correction model from flights with truth.", examples=_EXAMPLES)
+@click.command(cls=Command, short_help="A correction model from past flights.", examples=_EXAMPLES)
 @click.option(
     "--log",
     "logs",
     multiple=True,
     type=options.FILE,
     metavar="LOG",
-    help="A log to train on; give --log and --truth in pairs.",
+    help="A log to train on, once for each.",
 )
 @click.option(
     "--truth",
@@ -37,7 +37,7 @@ def _number(name: str, least: int, default: int, text: str) -> Callable[[options
     multiple=True,
     type=options.FILE,
     metavar="TRUTH",
-    help="The truth of the --log at the same position.",
+    help="The truth of the --log at the same position. Without any, the smoother is the teacher of the filter.",
 )
 @click.option("--config", type=options.FILE, metavar="FILE", help="The station file of the logs.")
 @options.scenario(False, "Train on simulated flights instead; the names are in `ftproc simulate -h`.")
@@ -48,11 +48,18 @@ def _number(name: str, least: int, default: int, text: str) -> Callable[[options
     "--features",
     metavar="NAME",
     default=TrainSettings.features,
-    help="Input of the network: window (the last innovations: corrects a wrong noise or jerk PSD, of any tracker), "
-    "instrument (the target's position: corrects the repeatable errors of one tracker, which smoothing leaves), "
-    "correction (as in Zuo et al. 2021), or auto: of the former two the better one on held-out flights.",
+    help="Input of the network: motion (what the target does: corrects the lag of the filter in manoeuvres, where the "
+    "smoother of the same flight proves it), window (the last innovations: corrects a wrong noise or jerk PSD, of any "
+    "tracker), instrument (the target's position: corrects the repeatable errors of one tracker, which smoothing "
+    "leaves), mount (position and motion: servo lag, circles and range walk too), correction (as in Zuo et al. 2021), "
+    "or auto: of the first three the best one on held-out flights.",
 )
-@_number("hidden", 1, TrainSettings.hidden, "Hidden units of the network.")
+@click.option(
+    "--hidden",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Hidden units of the network. [default: 64 (motion) or 12]",
+)
 @_number("population", 2, TrainSettings.population, "Individuals in the genetic search for the first weights.")
 @_number("generations", 0, TrainSettings.generations, "Generations of the genetic search.")
 @click.option(
@@ -85,7 +92,7 @@ def _number(name: str, least: int, default: int, text: str) -> Callable[[options
     help="Compare the genetic search with random first weights at equal cost, and write no model.",
 )
 def command(show: str | None, **options: Any) -> None:
-    """Train the network that corrects the filter, from logs with truth or simulated flights.
+    """Train the network that corrects the filter, from past logs, with truth or without, or simulated flights.
 
     Prints the model's card: its effect on flights that it was not trained on, which may be none. Filter with the same
     --editing, --noise and --jerk as here.
@@ -126,11 +133,11 @@ def _check(options: Mapping[str, Any]) -> None:
     elif options["output"] is not None and comparing:
         why = "--compare-starts writes no model; leave out -o."
     elif simulated == bool(logs or truths):
-        why = "Learn either from --log LOG --truth TRUTH pairs or from --scenario NAME."
+        why = "Learn either from --log LOG [--truth TRUTH] or from --scenario NAME."
     elif simulated and options["config"] is not None:
         why = "--config says how to read a --log; --scenario has none."
-    elif logs != truths:
-        why = f"--log is given {logs} times and --truth {truths} times; give them in pairs."
+    elif truths and logs != truths:
+        why = f"--log is given {logs} times and --truth {truths} times; give them in pairs, or no --truth."
     else:
         return
     raise click.UsageError(why, click.get_current_context())

@@ -34,7 +34,7 @@ class Request(NamedTuple):
     output: str | None
     compare_starts: bool
     features: str
-    hidden: int
+    hidden: int | None
     population: int
     generations: int
     optimiser: str
@@ -89,18 +89,18 @@ def run(request: Request) -> None:
         raise process.unsaid(error, [] if output is None else [output], "model's card") from error
 
 
-def _read(request: Request) -> list[tuple[MeasurementLog, Truth]]:
+def _read(request: Request) -> list[tuple[MeasurementLog, Truth | None]]:
+    """The logs with their truths, or with None where none are given."""
     stated = {name: text for name in ("units", "columns") if (text := getattr(request, name)) is not None}
-    return [
-        (api.read_log(log, config=request.config, **stated), truth_files.read(truth))
-        for log, truth in zip(request.logs, request.truths, strict=True)
-    ]
+    logs = [api.read_log(log, config=request.config, **stated) for log in request.logs]
+    truths: list[Truth | None] = [truth_files.read(truth) for truth in request.truths]
+    return list(zip(logs, truths or [None] * len(logs), strict=True))
 
 
-def _simulated(scenario: str, settings: TrainSettings, progress: Progress) -> list[tuple[MeasurementLog, Truth]]:
+def _simulated(scenario: str, settings: TrainSettings, progress: Progress) -> list[tuple[MeasurementLog, Truth | None]]:
     """Flights whose seeds are not small, so that those of `ftproc simulate` stay fit for testing."""
     seeds = np.random.SeedSequence(settings.seed).generate_state(settings.flights, np.uint64)
-    pairs = []
+    pairs: list[tuple[MeasurementLog, Truth | None]] = []
     for number, seed in enumerate(seeds):
         progress("simulating", number, len(seeds))
         flight = simulate(scenario, seed=int(seed))

@@ -11,6 +11,7 @@ from ftproc.core.filtering.records import FilterRun
 from ftproc.correction.features import APPLIED, BoolArray, LineOfSight
 from ftproc.correction.model import Stage
 from ftproc.correction.network import forward
+from ftproc.correction.proof import own_gain
 from ftproc.records import FloatArray
 
 CHUNK = 32768  # samples at a time: bounds the memory for a long run
@@ -18,10 +19,12 @@ CHUNK = 32768  # samples at a time: bounds the memory for a long run
 
 class Correction(NamedTuple):
     """values: (n, 6) m, m/s to be added to x y z vx vy vz. outside: share in [0, 1] of the usable samples (settled, not
-    coasting) whose input lies outside the training envelope; their correction is zero."""
+    coasting) whose input lies outside the training envelope; their correction is zero. why_not: why nothing is
+    corrected, where the flight itself must prove it."""
 
     values: FloatArray
     outside: float
+    why_not: str = ""
 
 
 class Output(NamedTuple):
@@ -33,15 +36,27 @@ class Output(NamedTuple):
     outside: BoolArray
 
 
-def network_output(run: FilterRun, stage: Stage, start: int, stop: int) -> Output:
-    """The network's output for samples start:stop, before gain and bound."""
+def network_output(run: FilterRun, stage: Stage, start: int, stop: int, smoothed: FloatArray | None = None) -> Output:
+    """The network's output for samples start:stop, before gain and bound. smoothed: (n, 9) the smoother's states, by
+    which the output of a feature set that must be proven is multiplied by what they prove in these samples."""
     raw, usable = stage.features.inputs(run, start, stop)
     normalised = stage.inputs.forward(raw)
     inside = stage.envelope.contains(normalised)
     output = stage.targets.back(forward(stage.weights, normalised))[:, :APPLIED]
     values = np.zeros((len(raw), APPLIED))  # a feature set may have no output for velocity
     values[:, : output.shape[1]] = np.where((usable & inside)[:, None], output, 0.0)
+    if stage.features.proven:
+        values *= 0.0 if smoothed is None else _own_gain(run, stage, slice(start, stop), smoothed, values, usable)
     return Output(values, usable, usable & ~inside)
+
+
+def _own_gain(
+    run: FilterRun, stage: Stage, rows: slice, smoothed: FloatArray, values: FloatArray, usable: BoolArray
+) -> FloatArray:
+    """(6,) what the smoother's states prove of the output (m, 6) for these rows."""
+    later = smoothed[rows, :APPLIED] - run.state[rows, :APPLIED]
+    los, bounded_values = LineOfSight.of(run, rows.start, rows.stop), np.clip(values, -stage.bound, stage.bound)
+    return own_gain(los, bounded_values, later, run.time_s[rows], usable)
 
 
 def bounded(los: LineOfSight, stage: Stage, output: FloatArray) -> FloatArray:
@@ -59,17 +74,26 @@ def bounded(los: LineOfSight, stage: Stage, output: FloatArray) -> FloatArray:
     return values
 
 
-def correct(run: FilterRun, stage: Stage) -> Correction:
-    """The correction of a run of n samples: (n, 6), to be added to position and velocity."""
+def correct(run: FilterRun, stage: Stage, smoothed: FloatArray | None = None) -> Correction:
+    """The correction of a run of n samples: (n, 6), to be added to position and velocity.
+
+    smoothed: (n, 9) the smoother's states of the same run, where there are any: what a feature set that must be proven
+    is held against. Such a run is corrected as a whole, others a chunk at a time.
+    """
     n = len(run.time_s)
     values = np.zeros((n, APPLIED))
     if not stage.helps:
         return Correction(values, 0.0)
+    if stage.features.proven and smoothed is None:
+        return Correction(values, 0.0, "there is no smoother of this run that could prove it")
     outside = usable = 0
-    for start in range(0, n, CHUNK):
-        stop = min(start + CHUNK, n)
-        output = network_output(run, stage, start, stop)
+    chunk = max(n, 1) if stage.features.proven else CHUNK
+    for start in range(0, n, chunk):
+        stop = min(start + chunk, n)
+        output = network_output(run, stage, start, stop, smoothed)
         values[start:stop] = bounded(LineOfSight.of(run, start, stop), stage, output.values * stage.gain)
         outside += int(output.outside.sum())
         usable += int(output.usable.sum())
-    return Correction(values, outside / usable if usable else 0.0)
+    unproven = stage.features.proven and not values.any()
+    why_not = "the smoother of this run does not prove it" if unproven else ""
+    return Correction(values, outside / usable if usable else 0.0, why_not)

@@ -14,11 +14,13 @@ from typing import ClassVar
 import numpy as np
 
 from ftproc.core.filtering.records import FilterRun
-from ftproc.correction.features import APPLIED, Features, LineOfSight
+from ftproc.correction.features import APPLIED, LOS_NAMES, Features, LineOfSight, innovations
+from ftproc.correction.instrument_features import InstrumentFeatures
+from ftproc.correction.motion_features import MotionFeatures
+from ftproc.correction.mount_features import MountFeatures
 from ftproc.errors import UsageError
-from ftproc.records import FloatArray, IntArray
+from ftproc.records import FloatArray
 
-LOS_NAMES = ("radial", "cross", "up", "radial velocity", "cross velocity", "up velocity")
 CARTESIAN_NAMES = ("x", "y", "z", "vx", "vy", "vz")
 
 
@@ -66,22 +68,9 @@ class WindowFeatures(Features):
         return np.array((*(0.25,) * (3 * (self.SINGLE + len(self.SUMS))), *self._GEOMETRY_FLOOR))
 
     def _raw(self, run: FilterRun, start: int, stop: int) -> FloatArray:
-        return np.concatenate([self._history(run, start, stop), self._geometry(run, start, stop)], axis=1)
-
-    def _history(self, run: FilterRun, start: int, stop: int) -> FloatArray:
-        """(m, 33) three components at each lag and of each sum; zero before the last (re-)initialization."""
-        first = max(start - 2 * self.SUMS[-1], 0)
-        ratio = run.innovation[first:stop] / run.innovation_sigma[first:stop]
-        ratio = np.where(run.weight[first:stop] > 0.0, ratio, 0.0)
-        since = run.since_start[first:stop, None]
-        columns = [_earlier(ratio, lag, since) for lag in range(self.SINGLE)]
-        total, width = ratio, 1
-        while width <= self.SUMS[-1]:  # total: over the last `width` samples, any cut of the run gives the same sums
-            before = _earlier(total, width, since)
-            if width in self.SUMS:
-                columns.append(before / np.sqrt(width))
-            total, width = total + before, 2 * width
-        return np.concatenate(columns, axis=1)[start - first :]
+        return np.concatenate(
+            [innovations(run, start, stop, self.SINGLE, self.SUMS), self._geometry(run, start, stop)], axis=1
+        )
 
     @staticmethod
     def _geometry(run: FilterRun, start: int, stop: int) -> FloatArray:
@@ -103,40 +92,9 @@ class WindowFeatures(Features):
         return self.from_cartesian(los, error[:, :APPLIED])
 
 
-class InstrumentFeatures(Features):
-    """Cosine and sine of the azimuth and of the elevation, the first two times the sine of the elevation, and the
-    ground range in km. Targets: position error along the line of sight in m, across and up as angles in rad.
-
-    Zero-set errors, mislevel and collimation are linear in these, and so is refraction of a low target: a network
-    with direct connections learns them from a few flights and extrapolates to other directions.
-    """
-
-    name = "instrument"
-    outputs = LOS_NAMES[:3]
-    direct = True
-    smoothed = True
-    reach = 3.0
-
-    @property
-    def floor(self) -> FloatArray:
-        return np.array((*(0.3,) * 6, 3.0))
-
-    def _raw(self, run: FilterRun, start: int, stop: int) -> FloatArray:
-        x, y, z = run.state[start:stop, :3].T
-        flat = np.hypot(x, y)
-        distance = np.hypot(flat, z)
-        cos_a, sin_a, cos_e, sin_e = x / flat, y / flat, flat / distance, z / distance
-        return np.stack([cos_a, sin_a, cos_e, sin_e, cos_a * sin_e, sin_a * sin_e, 1e-3 * flat], axis=1)
-
-    def unit(self, los: LineOfSight) -> FloatArray:
-        distance = np.linalg.norm(los.position_m, axis=1)
-        return np.stack([np.ones_like(distance), distance, distance] * 2, axis=1)
-
-    def targets(self, los: LineOfSight, error: FloatArray) -> FloatArray:
-        return self.from_cartesian(los, error[:, :APPLIED])[:, :3]
-
-
-FEATURES: dict[str, Features] = {f.name: f for f in (CorrectionFeatures(), WindowFeatures(), InstrumentFeatures())}
+FEATURES: dict[str, Features] = {
+    f.name: f for f in (CorrectionFeatures(), WindowFeatures(), MotionFeatures(), InstrumentFeatures(), MountFeatures())
+}
 
 
 def named(name: str) -> Features:
@@ -144,10 +102,3 @@ def named(name: str) -> Features:
     if name not in FEATURES:
         raise UsageError(f"there is no feature set {name!r}; choose one of {', '.join(FEATURES)}")
     return FEATURES[name]
-
-
-def _earlier(values: FloatArray, lag: int, since: IntArray) -> FloatArray:
-    """(n, 3) the values `lag` samples earlier; 0 where `since` (n, 1), samples since the initialization, is less."""
-    moved = np.zeros_like(values)
-    moved[lag:] = values[: max(len(values) - lag, 0)]
-    return np.where(since >= lag, moved, 0.0)

@@ -4,6 +4,7 @@ in x, y, z. The feature sets themselves are in `feature_sets`."""
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -13,10 +14,11 @@ from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import FilterRun
 from ftproc.core.model.frames import line_of_sight_axes
-from ftproc.records import FloatArray
+from ftproc.records import FloatArray, IntArray
 
 SETTLING = 25  # samples after (re-)initialization that are neither learned from nor corrected
 APPLIED = 6  # outputs that are applied to the trajectory: position and velocity
+LOS_NAMES = ("radial", "cross", "up", "radial velocity", "cross velocity", "up velocity")
 
 BoolArray = NDArray[np.bool_]
 
@@ -70,12 +72,40 @@ def usable(run: FilterRun, start: int, stop: int) -> BoolArray:
     return fit
 
 
+def innovations(run: FilterRun, start: int, stop: int, single: int, sums: Sequence[int]) -> FloatArray:
+    """(m, 3 (single + sums)) innovations over their sigmas of so many last samples, newest first, then their sums over
+    as many samples before those as `sums` says (powers of two), each over the root of its length; zero where not used,
+    and before the last (re-)initialization."""
+    first = max(start - 2 * sums[-1], 0)
+    ratio = run.innovation[first:stop] / run.innovation_sigma[first:stop]
+    ratio = np.where(run.weight[first:stop] > 0.0, ratio, 0.0)
+    since = run.since_start[first:stop, None]
+    columns = [_earlier(ratio, lag, since) for lag in range(single)]
+    total, width = ratio, 1
+    while width <= sums[-1]:  # total: over the last `width` samples, any cut of the run gives the same sums
+        before = _earlier(total, width, since)
+        if width in sums:
+            columns.append(before / np.sqrt(width))
+        total, width = total + before, 2 * width
+    return np.concatenate(columns, axis=1)[start - first :]
+
+
+def _earlier(values: FloatArray, lag: int, since: IntArray) -> FloatArray:
+    """(n, 3) the values `lag` samples earlier; 0 where `since` (n, 1), samples since the initialization, is less."""
+    moved = np.zeros_like(values)
+    moved[lag:] = values[: max(len(values) - lag, 0)]
+    return np.where(since >= lag, moved, 0.0)
+
+
 class Features(ABC):
     """A feature set: its name, the names of its outputs (the first six, or fewer, are applied), and the mappings, over
     the m samples `start:stop` of a filter run or of one with the smoother's states.
 
     direct: the network has direct connections. smoothed: valid for smoothed runs too, because it needs no innovations.
-    reach: radius of the region where it holds, in units of that covered by the training inputs.
+    reach: radius of the region where it holds, in units of that covered by the training inputs. proven: applied only
+    where the smoother of the same flight proves it. hidden: usual units of the hidden layer.
+    most: samples of a flight that are learned from; None: all. restarts: fits from other first weights, of which the
+    best on validation data is kept. share: of the errors learned from that bounds a correction at twice its largest.
     """
 
     name: ClassVar[str]
@@ -83,6 +113,11 @@ class Features(ABC):
     direct: ClassVar[bool] = False
     smoothed: ClassVar[bool] = False
     reach: ClassVar[float] = 1.0
+    proven: ClassVar[bool] = False
+    hidden: ClassVar[int] = 12
+    most: ClassVar[int | None] = None
+    restarts: ClassVar[int] = 1
+    share: ClassVar[float] = 0.683
 
     @property
     @abstractmethod

@@ -58,6 +58,11 @@ class Stage:
         return bool(self.gain.any())
 
     @property
+    def lost_by_smoothing(self) -> bool:
+        """Whether it takes out what smoothing leaves."""
+        return self.helps and not self.features.proven
+
+    @property
     def linear(self) -> bool:
         """Whether the hidden layer adds nothing: the output is linear in the inputs, by the direct connections."""
         return not (self.weights.w1.any() and self.weights.w2.any())

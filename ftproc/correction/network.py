@@ -99,6 +99,11 @@ def forward(weights: Weights, inputs: FloatArray) -> FloatArray:
     return output
 
 
+def squares(weights: Weights, inputs: FloatArray, targets: FloatArray) -> FloatArray:
+    """(o,) sums of the squared errors of each output over the samples."""
+    return np.asarray(np.sum((forward(weights, inputs) - targets) ** 2, axis=0))
+
+
 def cost(vector: FloatArray, shape: Shape, inputs: FloatArray, targets: FloatArray) -> float:
     """E/n: squared error summed over outputs (seed eq. 13), mean over the n samples."""
     residual = forward(unpack(vector, shape), inputs) - targets

@@ -74,9 +74,10 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     shifts = edited.faults.shifts
     if shifts:
         run, smoothed = _widened(run, shifts), smoothed and _widened(smoothed, shifts)
-    could_be = None
+    could_be = hindsight = None
     if smoothed is not None and not settings.smooth:
-        could_be, smoothed = median(np.sqrt((smoothed.sigma[:, :3] ** 2).sum(1))), None
+        could_be, hindsight = median(np.sqrt((smoothed.sigma[:, :3] ** 2).sum(1))), smoothed.state
+        smoothed = None
     label = preparing.labels(edited.weight, edited.log.measurement)
     again = preparing.re_initialized(edited.starts)
     decision = edited.decision
@@ -84,7 +85,7 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         run, label, motion.model, smoothed, again, decision.settled,
         unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts,
         alternative=decision.alternative,
-        faults=edited.faults, motion=motion, smoothed_sigma_m=could_be,
+        faults=edited.faults, motion=motion, smoothed_sigma_m=could_be, hindsight=hindsight,
     )  # fmt: skip
 
 

@@ -95,7 +95,8 @@ class Estimate(NamedTuple):
     two-pass editing found and took out of the readings. screened_out: (n, 3) readings that screening rejects, of a
     method without sigmas, whose labels nothing else tests. motion: that was chosen. known: (n,) which samples have an
     estimate, where live editing has none of some; absent: the components that it has not seen. smoothed_sigma_m: the
-    median 1-sigma of the position that the smoother would have, where it is known and was not asked for.
+    median 1-sigma of the position that the smoother would have, where it is known and was not asked for, and
+    hindsight: (n, 9) its states.
     """
 
     run: FilterRun
@@ -115,6 +116,7 @@ class Estimate(NamedTuple):
     known: NDArray[np.bool_] | None = None
     absent: tuple[int, ...] = ()
     smoothed_sigma_m: float | None = None
+    hindsight: FloatArray | None = None
 
     @property
     def smoothed_run(self) -> FilterRun:
@@ -135,6 +137,7 @@ class Estimate(NamedTuple):
             reacquired=tuple(k - low for k in self.reacquired if low <= k < high),
             known=None if self.known is None else self.known[low:high],
             cleaned=None if self.cleaned is None else self.cleaned[low:high],
+            hindsight=None if self.hindsight is None else self.hindsight[low:high],
             screened_out=None if self.screened_out is None else self.screened_out[low:high],
             faults=None if self.faults is None else self.faults.rows(low, high),
             motion=None if self.motion is None else self.motion.share((high - low) / len(self.label)),
@@ -161,6 +164,7 @@ class Estimate(NamedTuple):
             reacquired=tuple(int(first[k]) for k in self.reacquired),
             known=None if self.known is None else self.known[sample],
             cleaned=None if self.cleaned is None else self.cleaned[sample],
+            hindsight=None,
             screened_out=None if self.screened_out is None else self.screened_out[sample],
             faults=None if self.faults is None else self.faults.at(sample, first),
         )

@@ -46,11 +46,12 @@ class Step(NamedTuple):
         return {**found, "command": None, "outcome": None}
 
 
-def steps(s: Summary, settings: FilterSettings, model_corrects: bool) -> list[Step]:
-    """For a summary whose verdict is not consistent; model_corrects: whether a network has added something."""
+def steps(s: Summary, settings: FilterSettings, model_doubtful: bool) -> list[Step]:
+    """For a summary whose verdict is not consistent; model_doubtful: whether the network is one that
+    the flight itself has not proven."""
     if s["trust"]["verdict"] == "consistent":
         return []
-    found = [*_left_out(settings), *([_WITHOUT_MODEL] if model_corrects and s["correction_largest_m"] > 0 else [])]
+    found = [*_left_out(settings), *([_WITHOUT_MODEL] if model_doubtful and s["correction_largest_m"] > 0 else [])]
     found += _smoothed(settings)
     share = max(verdict.outlier_share(part) for part in s["components"].values())
     rules = (_outliers, *_RULES) if share > verdict.MANY_REJECTED else _RULES  # many may be taken for noise

@@ -9,8 +9,10 @@ import numpy as np
 
 from ftproc.core.model.frames import from_cartesian, to_cartesian, wrap
 from ftproc.records import COMPONENTS, FloatArray
+from ftproc.simulation.kinematics import Flight
 
 REFRACTION_SCALE_HEIGHT_M = 8000.0
+DIFFERENCE_S = 0.01  # over which rates of angles are taken
 
 
 @dataclass(frozen=True)
@@ -21,6 +23,11 @@ class InstrumentErrors:
     mislevel_rad: tilt of the vertical axis towards the azimuth mislevel_azimuth_rad.
     collimation_rad: angle between line of sight and normal of the trunnion axis; its azimuth error is this over cos E.
     refraction: refractivity n - 1 at the station, 2.8e-4 for light, about 3.2e-4 for radar, 0 for none.
+    servo_lag_s, servo_lag_s2: the mount is behind the target by so much times the rates of its angles, and by so much
+    times their accelerations.
+    *_eccentricity_rad, *_ellipticity_rad: first and second harmonic of the error of a divided circle, zero at the angle
+    circle_zero_rad.
+    range_walk_m: by which a range is read longer, times log(1 + (range / range_walk_at_m)^4): the echo gets weaker.
     *_wander_*: 1-sigma of a first-order Gauss-Markov offset of the component; wander_s: its correlation time.
     stamp_jitter_s: 1-sigma by which the instant of a sample differs from its time stamp, the same for its components.
     *_rounding_*: step to which the readings are rounded, 0 for none.
@@ -34,6 +41,15 @@ class InstrumentErrors:
     mislevel_azimuth_rad: float = 0.0
     collimation_rad: float = 0.0
     refraction: float = 0.0
+    servo_lag_s: float = 0.0
+    servo_lag_s2: float = 0.0
+    azimuth_eccentricity_rad: float = 0.0
+    azimuth_ellipticity_rad: float = 0.0
+    elevation_eccentricity_rad: float = 0.0
+    elevation_ellipticity_rad: float = 0.0
+    circle_zero_rad: float = 0.0
+    range_walk_m: float = 0.0
+    range_walk_at_m: float = 10_000.0
     range_wander_m: float = 0.0
     azimuth_wander_rad: float = 0.0
     elevation_wander_rad: float = 0.0
@@ -60,7 +76,7 @@ def systematic(position: FloatArray, errors: InstrumentErrors) -> FloatArray:
     """(n, 3) range m, azimuth rad, elevation rad that a noiseless instrument reads for (n, 3) true
     positions in m.
 
-    Order as the light travels: refraction, tilted axis, collimation, zero-set. Azimuth is not yet wrapped.
+    Order as the light travels: refraction, tilted axis, collimation, circles, zero-set. Azimuth is not yet wrapped.
     """
     reading = from_cartesian(position)
     reading[:, 2] += errors.refraction * _bending(position)
@@ -68,8 +84,35 @@ def systematic(position: FloatArray, errors: InstrumentErrors) -> FloatArray:
         reading = from_cartesian(to_cartesian(reading) @ _tilt(errors).T)
     # Within 1 mrad of the zenith no collimation error is defined: the mount cannot point there.
     reading[:, 1] += errors.collimation_rad / np.maximum(np.cos(reading[:, 2]), 1e-3)
+    reading += _walk_and_circles(reading, errors)
     zero_set = np.array([errors.range_zero_m, errors.azimuth_zero_rad, errors.elevation_zero_rad])
     return np.asarray(reading + zero_set)
+
+
+def servo_lag(flight: Flight, time_s: FloatArray, errors: InstrumentErrors) -> FloatArray:
+    """(n, 3) by which the mount is behind at (n,) times: 0, azimuth rad, elevation rad, to be subtracted."""
+    lag = np.zeros((len(time_s), 3))
+    if errors.servo_lag_s or errors.servo_lag_s2:
+        before, now, after = (from_cartesian(flight.at(time_s + k * DIFFERENCE_S)[0])[:, 1:] for k in (-1, 0, 1))
+        back, ahead = wrap(now - before), wrap(after - now)
+        lag[:, 1:] = errors.servo_lag_s * (back + ahead) / (2 * DIFFERENCE_S)
+        lag[:, 1:] += errors.servo_lag_s2 * (ahead - back) / DIFFERENCE_S**2
+    return lag
+
+
+def _walk_and_circles(reading: FloatArray, errors: InstrumentErrors) -> FloatArray:
+    """(n, 3) range walk m, and errors of the two circles rad."""
+    walk = errors.range_walk_m * np.log1p((reading[:, 0] / errors.range_walk_at_m) ** 4)
+    azimuth, elevation = (reading[:, 1:] - errors.circle_zero_rad).T
+    return np.stack(
+        [
+            walk,
+            errors.azimuth_eccentricity_rad * np.sin(azimuth) + errors.azimuth_ellipticity_rad * np.sin(2 * azimuth),
+            errors.elevation_eccentricity_rad * np.sin(elevation)
+            + errors.elevation_ellipticity_rad * np.sin(2 * elevation),
+        ],
+        axis=1,
+    )
 
 
 def _bending(position: FloatArray) -> FloatArray:

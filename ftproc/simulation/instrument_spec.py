@@ -16,6 +16,15 @@ LARGEST = {
     "mislevel_azimuth_rad": 2 * math.pi,
     "collimation_rad": 0.1,
     "refraction": 0.01,
+    "servo_lag_s": 1.0,
+    "servo_lag_s2": 1.0,
+    "azimuth_eccentricity_rad": 0.1,
+    "azimuth_ellipticity_rad": 0.1,
+    "elevation_eccentricity_rad": 0.1,
+    "elevation_ellipticity_rad": 0.1,
+    "circle_zero_rad": 2 * math.pi,
+    "range_walk_m": 1e4,
+    "range_walk_at_m": 1e7,
     "range_wander_m": 1e5,
     "azimuth_wander_rad": 0.1,
     "elevation_wander_rad": 0.1,
@@ -39,6 +48,13 @@ name.
   mislevel_azimuth_deg  towards this azimuth
   collimation_mrad      angle between the line of sight and the normal of the trunnion axis
   refraction            refractivity n - 1 at the station: 2.8e-4 for light, 3.2e-4 for radar
+  servo_lag_s, servo_lag_s2
+                        the mount is behind by so much times the rates of the angles, and times their accelerations
+  azimuth_eccentricity_mrad, azimuth_ellipticity_mrad, elevation_eccentricity_mrad, elevation_ellipticity_mrad
+                        first and second harmonic of the error of a divided circle,
+  circle_zero_deg       zero at this angle
+  range_walk_m          weak echoes read longer, by this times log(1 + (range / range_walk_at_m)^4),
+  range_walk_at_m       with this range (10000 m)
   range_wander_m, azimuth_wander_mrad, elevation_wander_mrad
                         1 sigma of an offset that wanders (first-order Gauss-Markov),
   wander_s              with this correlation time (1 s)
@@ -78,7 +94,7 @@ def _named(written: str) -> tuple[str, float]:
 
 def _least(name: str) -> float:
     """The smallest value of a field: what is no offset has no sign."""
-    if name.endswith("_held"):
+    if name.endswith(("_held", "_at_m")):
         return 1.0
     return 0.0 if any(word in name for word in ("wander", "jitter", "rounding")) else -LARGEST[name]
 

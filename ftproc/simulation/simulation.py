@@ -13,7 +13,16 @@ from ftproc.errors import UsageError
 from ftproc.records import FloatArray, IntArray, MeasurementLog, Truth
 from ftproc.simulation.contamination import contaminate
 from ftproc.simulation.flights import FLIGHTS
-from ftproc.simulation.instrument import InstrumentErrors, held, readable, rounded, systematic, unit_noise, wandering
+from ftproc.simulation.instrument import (
+    InstrumentErrors,
+    held,
+    readable,
+    rounded,
+    servo_lag,
+    systematic,
+    unit_noise,
+    wandering,
+)
 from ftproc.simulation.kinematics import Flight
 from ftproc.simulation.outlier_spec import OutlierSpec, parse_outliers
 from ftproc.simulation.sampling import jumps, kept_rows, row_count, sample_times, with_duplicates
@@ -114,7 +123,8 @@ def measure(flight: Flight, plan: Plan, sigma: FloatArray, name: str, seed: int 
     visible, hidden = (jumps(grid, each, streams["clock"]) for each in (spec.clock, spec.late))
     late = plan.instrument.stamp_jitter_s * rng.standard_normal(len(grid))
     taken = (np.clip(grid + late, grid[0], grid[-1]) if late.any() else grid) - hidden
-    exact = systematic(flight.at(taken)[0], plan.instrument) + wandering(grid, plan.instrument, rng)
+    exact = systematic(flight.at(taken)[0], plan.instrument) - servo_lag(flight, taken, plan.instrument)
+    exact += wandering(grid, plan.instrument, rng)
     usual = np.asarray(plan.noise * unit_noise(grid, spec.correlation_s, spec.tails_dof, streams["noise"]))
     noise, _ = contaminate(usual, spec.noise, sigma, plan.dt_s, streams["clock"])
     clean = exact + noise

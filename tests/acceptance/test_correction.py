@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from ftproc.settings import TrainSettings
+from ftproc import pipeline
+from ftproc.correction import model_file
+from ftproc.settings import FilterSettings, TrainSettings
+from ftproc.simulation import simulate
 from tests.bench.correction import CASES, result
 
 QUICK = TrainSettings(epochs=120, population=10, generations=10)
@@ -24,6 +28,13 @@ def test_an_instrument_learned_from_two_calibration_flights_is_corrected_on_new_
     assert found.ratio("smoother position") <= 0.5
 
 
+def test_servo_circles_and_range_walk_are_learned():
+    case = replace(CASES["all"], training=14, duration_s=50.0)
+    ratios = [result(case, new=3, settings=replace(QUICK, seed=seed)).ratio("smoother position") for seed in range(2)]
+    assert max(ratios) <= 0.4
+    assert max(ratios) / min(ratios) <= 1.2
+
+
 def test_a_repeatable_elevation_bias_is_taken_out_of_filter_and_smoother():
     found = result(replace(CASES["b"], training=8, duration_s=60.0), new=3, settings=QUICK)
     assert {s.features.name for s in found.model.stages.values()} == {"instrument"}
@@ -36,3 +47,31 @@ def test_a_filter_with_right_settings_is_not_harmed():
     for what, squares in found.squares.items():
         assert found.ratio(what) <= 1.005
         assert (squares[:, 0] <= 1.01**2 * squares[:, 1]).all()
+
+
+def test_the_packaged_network_takes_out_the_lag_of_the_filter_on_flights_it_has_not_seen():
+    """Flights of its family with other seeds than it was trained on; none may get worse."""
+    model, ratios = model_file.named("packaged"), []
+    for seed in range(7000, 7008):
+        flight = simulate("family", seed=seed, duration_s=60.0)
+        plain, corrected = (pipeline.filter_log(flight.log, model=each) for each in (None, model))
+        away = [np.linalg.norm(t.state[:, :3] - flight.truth.position_m, axis=1) for t in (corrected, plain)]
+        ratios.append(np.sqrt(np.mean(away[0] ** 2) / np.mean(away[1] ** 2)))
+    assert max(ratios) <= 1.005
+    assert np.median(ratios) <= 0.97
+
+
+@pytest.mark.parametrize(
+    ("settings", "why"),
+    [
+        (FilterSettings(editing="live"), "there is no smoother of this run that could prove it"),
+        (FilterSettings(smooth=True), "gain 0"),
+        (FilterSettings(editing="none"), "there is no smoother of this run that could prove it"),
+    ],
+)
+def test_where_a_flight_cannot_prove_it_nothing_is_corrected_and_the_summary_says_why(settings, why):
+    flight = simulate("manoeuvre-clean", seed=3, duration_s=20.0)
+    found = pipeline.filter_log(flight.log, settings, model_file.named("packaged"))
+    assert not found.correction.any()
+    assert why in found.metadata["summary"]["network"]
+    assert "corrects the filter only" not in " ".join(found.metadata["summary"]["trust"]["reasons"])

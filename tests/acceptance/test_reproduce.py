@@ -67,6 +67,18 @@ def test_page_has_a_section_and_plots_for_each_experiment(tmp_path, capsys):
     assert "**does not hold**" not in text
 
 
+def test_an_experiment_leaves_the_other_sections_of_the_page(tmp_path, monkeypatch):
+    class Quick:
+        def __init__(self, text):
+            self.section = lambda page: text
+
+    monkeypatch.setattr(reproduce, "experiments", lambda: {"one": Quick("first"), "two": Quick("second")})
+    reproduce.main([], tmp_path)
+    monkeypatch.setattr(reproduce, "experiments", lambda: {"one": Quick("first"), "two": Quick("again")})
+    reproduce.main(["two"], tmp_path)
+    assert (tmp_path / "reproduce.md").read_text().endswith("first\nagain")
+
+
 def test_unknown_experiment_is_a_sentence(tmp_path):
     with pytest.raises(SystemExit, match=r"^there is no experiment alchemy; there are zuo2021, range_test"):
         reproduce.main(["alchemy"], tmp_path)

@@ -4,7 +4,7 @@ it has not seen, with 90 % bootstrap intervals over these."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,15 @@ THEODOLITE = InstrumentErrors(
     collimation_rad=4e-4, refraction=2.8e-4,
 )  # fmt: skip
 
+SERVO = InstrumentErrors(servo_lag_s=0.02, servo_lag_s2=0.01)
+CIRCLES = InstrumentErrors(
+    azimuth_eccentricity_rad=4e-4, azimuth_ellipticity_rad=4e-4, elevation_ellipticity_rad=4e-4, circle_zero_rad=-0.4
+)
+ALL = InstrumentErrors(**{
+    **{name: value for each in (SERVO, CIRCLES, THEODOLITE) for name, value in vars(each).items() if value},
+    "range_zero_m": -3.0, "range_walk_m": 6.0, "range_walk_at_m": 9000.0,
+})  # fmt: skip
+
 HEADER = ("what is wrong", "flights learned from", "features", "filter", "velocity", "smoother")
 
 
@@ -40,6 +49,7 @@ class Case:
     specified: Callable[[tuple[float, float, float], float], FilterSettings] | None = None
     training: int = TRAINING
     duration_s: float | None = None
+    features: str = "auto"
 
 
 CASES = {
@@ -56,6 +66,9 @@ CASES = {
     "d": Case("noise correlated over 0.5 s", outliers="correlation=0.5"),
     "calibration": Case("zero-set, mislevel, collimation, refraction", "calibration", THEODOLITE, training=3),
     "manoeuvre": Case("the same, manoeuvring flights", "manoeuvre", THEODOLITE, training=6),
+    "servo": Case("servo lag", instrument=SERVO, features="mount"),
+    "circles": Case("circles off their axes", instrument=CIRCLES, features="mount"),
+    "all": Case("all of these, and range walk", instrument=ALL, features="mount"),
 }
 
 
@@ -103,7 +116,8 @@ class Result:
 
 def result(case: Case, new: int = NEW, settings: TrainSettings | None = None) -> Result:
     """Learn from the training flights of a case, and hold what was learned against new ones."""
-    model = train_model(flights(case, range(FIRST_SEED, FIRST_SEED + case.training)), settings or TrainSettings())
+    settings = replace(settings or TrainSettings(), features=case.features)
+    model = train_model(flights(case, range(FIRST_SEED, FIRST_SEED + case.training)), settings)
     squares = {}
     for stage, runs in flights(case, range(FIRST_SEED + TRAINING, FIRST_SEED + TRAINING + new)).items():
         for quantity, columns in (("position", slice(0, 3)), ("velocity", slice(3, 6))):
@@ -111,7 +125,7 @@ def result(case: Case, new: int = NEW, settings: TrainSettings | None = None) ->
             for flight in runs:
                 error = flight.error[:, :6]
                 used = model.stages.get(stage)
-                left = error if used is None else error - correct(flight.run, used).values
+                left = error if used is None else error - correct(flight.run, used, flight.smoothed).values
                 known = np.isfinite(error).all(1)
                 pairs.append([np.sum(e[known][:, columns] ** 2) for e in (left, error)])
             squares[f"{stage} {quantity}"] = np.array(pairs)

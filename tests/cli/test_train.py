@@ -30,6 +30,14 @@ def test_from_logs_with_truth(run, here):
     assert run("filter", "0.parquet", "--model", "model.safetensors", "-o", "clean.csv").code == 0
 
 
+def test_from_past_logs_without_truth(run, here):
+    logs = [part for number in range(4) for part in simulate(run, number)[:2]]
+    trained = run("train", *logs, *SMALL, "-o", "model.safetensors")
+    assert trained.code == 0, trained.err
+    assert "teacher smoother" in trained.out
+    assert "smoother: no network" in trained.out
+
+
 def test_from_a_scenario_the_same_seed_gives_the_same_bytes(run, here):
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
         args = ("--scenario", "radar", "--flights", 3, *SMALL, "--seed", seed, "-o", f"{name}.safetensors")
@@ -125,9 +133,12 @@ def test_ctrl_c_leaves_no_file(run, here, monkeypatch):
     ("args", "sentence"),
     [
         ([], "-o MODEL is missing"),
-        (["-o", "m"], "Learn either from --log LOG --truth TRUTH pairs or from --scenario NAME."),
+        (["-o", "m"], "Learn either from --log LOG [--truth TRUTH] or from --scenario NAME."),
         (["-o", "m", "--scenario", "radar", "--log", "a", "--truth", "b"], "Learn either from"),
-        (["-o", "m", "--log", "a"], "--log is given 1 times and --truth 0 times; give them in pairs."),
+        (
+            ["-o", "m", "--log", "a", "--log", "b", "--truth", "c"],
+            "--log is given 2 times and --truth 1 times; give them in",
+        ),
         (["-o", "m", "--scenario", "moon"], 'There is no scenario "moon"'),
         (["-o", "m", "--scenario", "radar", "--compare-starts"], "--compare-starts writes no model; leave out -o."),
         (["-o", "-", "--scenario", "radar"], "a model is not written to standard output"),

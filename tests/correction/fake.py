@@ -28,6 +28,7 @@ def run(rng: np.random.Generator, n: int = 600, dt: float = 0.1) -> FilterRun:
         innovation_sigma=sigma,
         weight=np.ones((n, 3)),
         los_sigma=np.tile(SIGMA, (n, 1)),
+        sigma=np.tile([1.5] * 3 + [0.6] * 3 + [0.3] * 3, (n, 1)),
         path_sigma=np.full((n, 6), np.nan),
         since_start=np.arange(n),
     )

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ftproc.core.filtering.records import FilterRun
 from ftproc.correction import apply
 from ftproc.correction.apply import correct
 from ftproc.correction.envelope import Envelope, Normaliser
@@ -14,6 +15,7 @@ from ftproc.correction.feature_sets import FEATURES, named
 from ftproc.correction.features import SETTLING, LineOfSight
 from ftproc.correction.model import MOST_SIGMA, Stage
 from ftproc.correction.network import Weights
+from ftproc.records import FloatArray
 from tests.correction import fake
 
 
@@ -35,6 +37,29 @@ def constant(name: str, output: float, gain: float = 1.0, bound: float = 2.0) ->
     )
 
 
+def ahead(filtered: FilterRun, sigmas: float) -> FloatArray:
+    """(n, 9) states that are so many sigmas away along each line-of-sight axis: a smoother's that proves them."""
+    states = filtered.state.copy()
+    los = LineOfSight.of(filtered, 0, len(states))
+    states[:, :6] += los.to_cartesian(sigmas * los.sigma)
+    return states
+
+
+@pytest.mark.parametrize(("sigmas", "applied"), [(0.5, 0.5), (2.0, 0.8), (0.2, 0.2), (-0.5, 0.0)])
+def test_the_smoother_of_the_flight_bounds_and_proves_a_correction(sigmas: float, applied: float) -> None:
+    filtered = fake.run(np.random.default_rng(1))
+    found = correct(filtered, constant("motion", 0.8), ahead(filtered, sigmas))
+    along = LineOfSight.of(filtered, 0, 600).from_cartesian(found.values) / filtered.los_sigma
+    assert along[SETTLING:] == pytest.approx(np.full((575, 6), applied))
+    assert bool(found.why_not) == (not applied)
+
+
+def test_without_a_smoother_nothing_is_proven() -> None:
+    found = correct(fake.run(np.random.default_rng(1)), constant("motion", 0.5))
+    assert not found.values.any()
+    assert found.why_not == "there is no smoother of this run that could prove it"
+
+
 def test_zero_while_coasting_and_settling_and_nowhere_else() -> None:
     filtered = fake.without(fake.run(np.random.default_rng(0)), slice(100, 110))
     filtered = fake.without(filtered, slice(200, 210), [0, 2])
@@ -53,7 +78,7 @@ def test_the_output_is_applied_within_two_sigmas(output: float) -> None:
 @pytest.mark.parametrize("name", FEATURES)
 def test_every_feature_set_is_bounded_along_the_line_of_sight(name: str) -> None:
     filtered = fake.run(np.random.default_rng(1))
-    values = correct(filtered, constant(name, 1e4)).values
+    values = correct(filtered, constant(name, 1e4), ahead(filtered, 3.0)).values
     along = LineOfSight.of(filtered, 0, 600).from_cartesian(values) / filtered.los_sigma
     assert np.abs(along).max() == pytest.approx(2.0)
 

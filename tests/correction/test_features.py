@@ -13,6 +13,7 @@ from ftproc.correction.features import SETTLING, Features, LineOfSight
 from ftproc.errors import UsageError
 from ftproc.simulation.instrument import InstrumentErrors, systematic
 from tests.correction import fake
+from tests.simulated import simulate
 
 coordinate = st.floats(-2e5, 2e5)
 
@@ -47,7 +48,7 @@ def test_what_lies_along_an_axis(position: tuple[float, ...], axis: int, towards
 
 @pytest.mark.parametrize("features", FEATURES.values(), ids=FEATURES)
 def test_adding_the_wanted_output_gives_the_truth(features: Features) -> None:
-    flight = fake.flights(0, 1, bias=(1, -2, 3, 0, 0.5, 1))[0]
+    flight = fake.flights(0, 1, bias=(1, -1, 0.5, 0, 0.5, 1))[0]
     los = LineOfSight.of(flight.run, 0, 600)
     wanted = features.targets(los, flight.error)
     assert wanted.shape == (600, features.output_size)
@@ -169,3 +170,68 @@ def test_an_empty_run(features: Features) -> None:
 def test_an_unknown_feature_set_is_named_with_the_known_ones() -> None:
     with pytest.raises(UsageError, match=r"no feature set 'wndow'.*correction, window"):
         named("wndow")
+
+
+def test_motion_looks_no_farther_back_than_the_last_initialization() -> None:
+    filtered = fake.run(np.random.default_rng(2))
+    filtered.state[:, 6:] = np.random.default_rng(3).normal(size=(600, 3))
+    since = filtered.since_start.copy()
+    since[300:] = np.arange(300)
+    filtered = filtered._replace(since_start=since)
+    x, _ = named("motion").inputs(filtered, 0, 600)
+    expected, _ = named("motion").inputs(filtered.rows(300, 600), 0, 300)
+    assert x[300 + SETTLING :] == pytest.approx(expected[SETTLING:], abs=1e-12)
+    assert expected[SETTLING:].any(axis=0).sum() > 50
+
+
+def test_motion_has_no_unit_of_length() -> None:
+    """A flight twice as far and as fast, with sigmas twice as large, has the same inputs but for the load and the logs
+    of speed and of the sigma of the acceleration."""
+    filtered = fake.run(np.random.default_rng(2))
+    filtered.state[:, 6:] = np.random.default_rng(3).normal(size=(600, 3))
+    unit = np.array([2.0, 1.0, 1.0])
+    twice = filtered._replace(
+        state=2 * filtered.state, sigma=2 * filtered.sigma, los_sigma=2 * filtered.los_sigma,
+        innovation=unit * filtered.innovation, innovation_sigma=unit * filtered.innovation_sigma,
+    )  # fmt: skip
+    one, other = (named("motion").inputs(run, 0, 600)[0] for run in (filtered, twice))
+    differ = np.flatnonzero(np.abs(one - other).max(axis=0) > 0.1)
+    assert differ.tolist() == [54, 55, 56]
+
+
+def test_a_steady_turn_has_the_jerk_that_turns_its_acceleration() -> None:
+    """Inputs 27 to 29 are the compressed -|a_n|^2 / |v|^2 v, over the sigma of the acceleration and the memory."""
+    filtered, speed, rate = fake.run(np.random.default_rng(2)), 100.0, 0.2
+    angle = rate * filtered.time_s
+    circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    ahead = np.stack([-np.sin(angle), np.cos(angle), 0 * angle], axis=1)
+    filtered.state[:, 3:6], filtered.state[:, 6:] = speed * ahead, -speed * rate * circle
+    x, _ = named("motion").inputs(filtered, 0, 600)
+    los = LineOfSight.of(filtered, 0, 600)
+    memory_s = np.sqrt(np.mean(filtered.los_sigma[:, 3:] ** 2, axis=1)) / 0.3
+    jerk = np.einsum("nij,nj->ni", los.axes, -(rate**2) * speed * ahead) * (memory_s / 0.3)[:, None]
+    expected = np.sign(jerk) * np.log1p(np.abs(jerk))
+    assert x[300:, 27:30] == pytest.approx(expected[300:], abs=0.05)
+
+
+def test_the_errors_of_a_mount_are_linear_in_its_features() -> None:
+    flown = simulate("manoeuvre-clean", seed=4, dt_s=0.1, duration_s=100.0, noise=(1e-3, 1e-7, 1e-7))
+    errors = InstrumentErrors(
+        servo_lag_s=0.02, servo_lag_s2=0.01, azimuth_eccentricity_rad=3e-4, azimuth_ellipticity_rad=2e-4,
+        elevation_ellipticity_rad=2e-4, circle_zero_rad=0.4, collimation_rad=2e-4,
+    )  # fmt: skip
+    wrong = simulate("manoeuvre-clean", seed=4, dt_s=0.1, duration_s=100.0, noise=(0, 0, 0), instrument=errors)
+    truth, seen = flown.truth, to_cartesian(wrong.log.measurement)
+    assert truth.velocity_mps is not None
+    acceleration = np.gradient(truth.velocity_mps, truth.time_s, axis=0)
+    n = len(truth.time_s)
+    state = np.concatenate([truth.position_m, truth.velocity_mps, acceleration], axis=1)
+    features, run = named("mount"), fake.run(np.random.default_rng(0), n=n)._replace(state=state)
+    x, valid = features.inputs(run, 0, n)
+    los = LineOfSight.of(run, 0, n).rows(valid)
+    error = np.concatenate([truth.position_m - seen, np.zeros((n, 6))], axis=1)[valid]
+    target = features.targets(los, error)
+    columns = np.concatenate([x[valid], np.ones((int(valid.sum()), 1))], axis=1)
+    left = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
+    assert np.sqrt((target**2).mean(0))[1:].min() > 2e-4
+    assert np.sqrt((left**2).mean(0))[1:].max() < 1e-5

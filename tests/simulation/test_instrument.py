@@ -8,7 +8,8 @@ import pytest
 from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.records import FloatArray
 from ftproc.simulation import InstrumentErrors, simulate
-from ftproc.simulation.instrument import readable, systematic, unit_noise
+from ftproc.simulation.instrument import readable, servo_lag, systematic, unit_noise
+from ftproc.simulation.kinematics import Flight, constant_acceleration
 
 
 def test_correlated_noise_has_the_stated_correlation_and_variance() -> None:
@@ -63,6 +64,19 @@ def test_instrument_errors_to_first_order() -> None:
         (InstrumentErrors(azimuth_zero_rad=small), (zero, zero + small, zero)),
         (InstrumentErrors(elevation_zero_rad=small), (zero, zero, zero + small)),
         (InstrumentErrors(collimation_rad=small), (zero, small / np.cos(e), zero)),
+        (InstrumentErrors(azimuth_eccentricity_rad=small), (zero, small * np.sin(a), zero)),
+        (
+            InstrumentErrors(azimuth_ellipticity_rad=small, circle_zero_rad=towards),
+            (zero, small * np.sin(2 * (a - towards)), zero),
+        ),
+        (
+            InstrumentErrors(elevation_eccentricity_rad=small, elevation_ellipticity_rad=-small),
+            (zero, zero, small * (np.sin(e) - np.sin(2 * e))),
+        ),
+        (
+            InstrumentErrors(range_walk_m=2.0, range_walk_at_m=3000.0),
+            (2 * np.log(1 + (r / 3000) ** 4), zero, zero),
+        ),
         (
             InstrumentErrors(mislevel_rad=small, mislevel_azimuth_rad=towards),
             (zero, small * np.sin(a - towards) * np.tan(e), small * np.cos(a - towards)),
@@ -106,3 +120,19 @@ def test_readable_edges() -> None:
     np.testing.assert_array_equal(shown[:2], [[0.0, -np.pi, np.pi / 2], [5.0, -np.pi, -np.pi / 2]])
     np.testing.assert_allclose(shown[2], [1.0, 4.0 - 2 * np.pi, 0.1])
     assert np.isnan(shown[3]).all()
+
+
+def test_a_servo_is_behind_by_rates_and_accelerations_of_its_angles() -> None:
+    """Of a steady circle round the station the azimuth's rate is constant; it passes +-180 degrees."""
+    step, rate = 0.001, 0.7
+    angle = 3.0 + rate * step * np.arange(2001)
+    circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    flight = Flight(
+        0.0, step, 5000 * circle, 5000 * rate * np.roll(circle, 1, 1) * (-1, 1, 0), -5000 * rate**2 * circle
+    )
+    found = servo_lag(flight, np.linspace(0.2, 1.8, 9), InstrumentErrors(servo_lag_s=0.02, servo_lag_s2=0.5))
+    np.testing.assert_allclose(found, np.tile([0.0, 0.02 * rate, 0.0], (9, 1)), atol=2e-5)
+    falling = constant_acceleration(10.0, np.array([1000.0, 0, 0]), np.zeros(3), np.array([0.0, 0, 2.0]))
+    found = servo_lag(falling, np.array([0.05]), InstrumentErrors(servo_lag_s2=0.5))
+    np.testing.assert_allclose(found, [[0.0, 0.0, 0.5 * 2.0 / 1000.0]], rtol=1e-3)
+    assert not servo_lag(falling, np.array([5.0]), InstrumentErrors()).any()

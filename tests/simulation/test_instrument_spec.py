@@ -39,6 +39,8 @@ def test_what_has_no_sign_has_none() -> None:
     for name in ("range_wander_m", "stamp_jitter_s", "azimuth_rounding_mrad"):
         with pytest.raises(UsageError, match="expected a number from 0 to"):
             parse_instrument(f"{name}=-1")
+    with pytest.raises(UsageError, match="expected a number from 1 to"):
+        parse_instrument("range_walk_at_m=0")
     for value in ("0", "2.5", "1001"):
         with pytest.raises(UsageError, match="expected a whole number from 1 to 1000"):
             parse_instrument(f"range_held={value}")

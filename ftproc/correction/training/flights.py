@@ -1,5 +1,5 @@
-"""From logs with truth to a trained correction: every log is filtered and smoothed, held against its truth, and the
-differences are learned."""
+"""From logs to a trained correction: every log is filtered and smoothed, held against its truth, or without one the
+filter against the smoother, and the differences are learned."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from ftproc.correction.training.samples import Flight
 from ftproc.correction.training.stages import train_model
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import registry
+from ftproc.methods.estimate import Estimate
 from ftproc.quality import sanity
 from ftproc.records import COMPONENTS, MeasurementLog, Truth
 from ftproc.scoring.matching import match
@@ -21,13 +22,13 @@ from ftproc.settings import FilterSettings, TrainSettings
 
 
 def train_flights(
-    pairs: Sequence[tuple[MeasurementLog, Truth]],
+    pairs: Sequence[tuple[MeasurementLog, Truth | None]],
     settings: TrainSettings,
     filtering: FilterSettings | None = None,
     progress: Progress = silent,
     jobs: int = 1,
 ) -> Model:
-    """A correction learned from (log, truth) pairs.
+    """A correction learned from (log, truth) pairs, or with None for the truths from the smoother.
 
     filtering: the settings that the correction is made for. Raises InputError when a log cannot be processed or
     shares no time with its truth, UsageError for a method that takes no correction.
@@ -37,6 +38,7 @@ def train_flights(
         settings = replace(settings, start="random")
     model = train_model(filtered_flights(pairs, filtering, progress), settings, progress, jobs)
     made_for = {
+        "teacher": "smoother" if any(truth is None for _, truth in pairs) else "truth",
         "editing": filtering.editing,
         **({"lag_s": filtering.lag_s} if filtering.editing == "live" else {}),
         "noise": filtering.noise or "auto",
@@ -46,7 +48,7 @@ def train_flights(
 
 
 def filtered_flights(
-    pairs: Sequence[tuple[MeasurementLog, Truth]],
+    pairs: Sequence[tuple[MeasurementLog, Truth | None]],
     filtering: FilterSettings | None = None,
     progress: Progress = silent,
 ) -> dict[str, list[Flight]]:
@@ -68,13 +70,27 @@ def filtered_flights(
             estimate = method.run(record.whole(), filtering)
         except ValueError as cause:
             raise sanity.no_start(log, cause) from cause
-        known = match(log.time_s, truth)
-        if not np.isfinite(known.position_m).any():
-            raise InputError(f"{truth.name}: its times do not overlap those of {log.name}")
-        runs = {FILTER: estimate.run}
-        if estimate.smoothed is not None:
-            runs[SMOOTHER] = estimate.smoothed_run
-        for stage, run in runs.items():
-            flights[stage].append(Flight(run, known.position_m, known.velocity_mps))
+        for stage, flight in _flown(log, truth, estimate, proven=method.editing(filtering) == "two-pass").items():
+            flights[stage].append(flight)
     progress("filtering", len(pairs), len(pairs))
     return {stage: found for stage, found in flights.items() if found}
+
+
+def _flown(log: MeasurementLog, truth: Truth | None, estimate: Estimate, proven: bool) -> dict[str, Flight]:
+    """The flight of each stage. proven: whether filtering has a smoother that can prove a correction. Raises
+    InputError when truth and log share no time, UsageError where neither truth nor smoother is there to learn from."""
+    smoothed = estimate.smoothed
+    later = smoothed.state if smoothed is not None and proven else None
+    if truth is None:
+        if later is None:
+            raise UsageError(
+                "without --truth the smoother is the teacher: it needs ga-bpnn-ukf with --editing two-pass"
+            )
+        return {FILTER: Flight(estimate.run, later[:, :3], later[:, 3:6], later)}
+    known = match(log.time_s, truth)
+    if not np.isfinite(known.position_m).any():
+        raise InputError(f"{truth.name}: its times do not overlap those of {log.name}")
+    found = {FILTER: Flight(estimate.run, known.position_m, known.velocity_mps, later)}
+    if smoothed is not None:
+        found[SMOOTHER] = Flight(estimate.smoothed_run, known.position_m, known.velocity_mps)
+    return found

@@ -21,6 +21,7 @@ WHOLE_FLIGHTS = 6  # with fewer, flights are cut into blocks
 BLOCK_S = 30.0  # shortest block, s
 APART = 8  # samples left out between two blocks of a flight, for neighbours share their error
 VALIDATION_SHARE, TEST_SHARE = 1 / 3, 1 / 6
+MOST_VALIDATION, MOST_TEST = 60, 30  # pieces: more prove no more
 
 
 @dataclass(frozen=True)
@@ -29,12 +30,13 @@ class Flight:
     x, y, z.
 
     truth_position: (n, 3) m. truth_velocity: (n, 3) m/s, differenced from the position when None. Rows without truth
-    are NaN and are not used.
+    are NaN and are not used. smoothed: (n, 9) the smoother's states, by which a filter's correction can be proven.
     """
 
     run: FilterRun
     truth_position: FloatArray
     truth_velocity: FloatArray | None = None
+    smoothed: FloatArray | None = None
 
     @cached_property
     def error(self) -> FloatArray:
@@ -104,7 +106,8 @@ def _blocks(flights: Sequence[Flight]) -> list[Piece]:
 
 
 def split(flights: Sequence[Flight], rng: np.random.Generator) -> Split:
-    """Half for training, a third for validation, a sixth for the test (at least one of each), in random order.
+    """A third for validation, a sixth for the test (at least one of each, and no more than needed), in random order;
+    the others for training.
 
     Raises InputError when there are fewer than three pieces.
     """
@@ -116,28 +119,31 @@ def split(flights: Sequence[Flight], rng: np.random.Generator) -> Split:
             "s, and training, validation and test need one each; add flights with truth"
         )
     order = [pieces[i] for i in rng.permutation(len(pieces))]
-    tests = max(math.floor(TEST_SHARE * len(order)), 1)
-    held = tests + max(round(VALIDATION_SHARE * len(order)), 1)
+    tests = min(max(math.floor(TEST_SHARE * len(order)), 1), MOST_TEST)
+    held = tests + min(max(round(VALIDATION_SHARE * len(order)), 1), MOST_VALIDATION)
     return Split(tuple(order[held:]), tuple(order[tests:held]), tuple(order[:tests]), by)
 
 
 def samples(flights: Sequence[Flight], pieces: Sequence[Piece], features: Features) -> Samples:
-    """All samples in `pieces` that are valid and have truth, not normalised."""
+    """The samples in `pieces` that are valid and have truth, not normalised; of each piece at most so many as the
+    feature set wants, at even distances, so that long flights count no more than others."""
     inputs, targets = [np.empty((0, features.input_size))], [np.empty((0, features.output_size))]
     for number, start, stop in pieces:
         flight = flights[number]
         x, valid = features.inputs(flight.run, start, stop)
         t = features.targets(LineOfSight.of(flight.run, start, stop).rows(valid), flight.error[start:stop][valid])
         known = np.all(np.isfinite(t), axis=1)
-        inputs.append(x[valid][known])
-        targets.append(t[known])
+        every = 1 if features.most is None else max(-(-int(known.sum()) // features.most), 1)
+        inputs.append(x[valid][known][::every])
+        targets.append(t[known][::every])
     return Samples(np.concatenate(inputs), np.concatenate(targets))
 
 
-def overconfidence(flights: Sequence[Flight], pieces: Sequence[Piece]) -> FloatArray:
+def overconfidence(flights: Sequence[Flight], pieces: Sequence[Piece], share: float) -> FloatArray:
     """(6,) by what factor the filter's line-of-sight sigmas are too small in `pieces`, at least 1.
 
-    The 68.3 % quantile of error over sigma (1 for a consistent Gaussian sigma), so that a few outliers do not count.
+    The quantile of error over sigma that holds this share of samples: with 68.3 % (1 for a consistent Gaussian sigma)
+    a few outliers do not count.
     """
     ratios = [np.ones((1, APPLIED))]
     for number, start, stop in pieces:
@@ -146,4 +152,4 @@ def overconfidence(flights: Sequence[Flight], pieces: Sequence[Piece]) -> FloatA
         los = LineOfSight.of(flight.run, start, stop).rows(settled)
         ratio = np.abs(los.from_cartesian(flight.error[start:stop, :APPLIED][settled])) / los.sigma
         ratios.append(ratio[np.all(np.isfinite(ratio), axis=1)])
-    return np.maximum(np.quantile(np.concatenate(ratios), 0.683, axis=0), 1.0)
+    return np.maximum(np.quantile(np.concatenate(ratios), share, axis=0), 1.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
+from typing import Any
 
 from ftproc.correction.feature_sets import FEATURES, named
 from ftproc.correction.model import FILTER, SMOOTHER, Model, Stage
@@ -12,10 +13,11 @@ from ftproc.correction.training import Progress, silent
 from ftproc.correction.training.parallel import each
 from ftproc.correction.training.samples import Flight
 from ftproc.correction.training.train import train
+from ftproc.errors import UsageError
 from ftproc.settings import TrainSettings
 
 AUTO = "auto"
-CANDIDATES = {FILTER: ("window", "instrument"), SMOOTHER: ("instrument",)}
+CANDIDATES = {FILTER: ("window", "motion", "instrument"), SMOOTHER: ("instrument",)}
 
 
 def train_model(
@@ -28,22 +30,32 @@ def train_model(
 
     Raises InputError when there is too little data, UsageError for a wrong choice in the settings.
     """
-    wanted = [(stage, name) for stage in flights for name in _candidates(stage, settings)]
+    wanted = [(stage, name) for stage in flights for name in _candidates(stage, flights[stage], settings)]
     tasks = [(flights[stage], replace(settings, features=name)) for stage, name in wanted]
     trained = each(train, tasks, jobs, progress)
     stages: dict[str, Stage] = {}
     for (stage, _), candidate in zip(wanted, trained, strict=True):
         if stage not in stages or _remaining_error(candidate) < _remaining_error(stages[stage]):
             stages[stage] = candidate
-    return Model({k: v for k, v in stages.items() if k == FILTER or v.helps}, asdict(settings))
+    return Model({k: v for k, v in stages.items() if k == FILTER or v.helps}, _recorded(settings))
 
 
-def _candidates(stage: str, settings: TrainSettings) -> tuple[str, ...]:
-    """Names of the feature sets to try."""
+def _recorded(settings: TrainSettings) -> dict[str, Any]:
+    """As the model keeps them."""
+    return {name: AUTO if value is None else value for name, value in asdict(settings).items()}
+
+
+def _candidates(stage: str, flights: Sequence[Flight], settings: TrainSettings) -> tuple[str, ...]:
+    """Names of the feature sets to try. Raises UsageError for one that these flights cannot prove."""
+    provable = all(flight.smoothed is not None for flight in flights)
     if settings.features == AUTO:
-        return CANDIDATES[stage]
-    serves = stage == FILTER or named(settings.features).smoothed
-    return (settings.features,) if serves else ()
+        return tuple(name for name in CANDIDATES[stage] if provable or not named(name).proven)
+    features = named(settings.features)
+    if stage == FILTER and features.proven and not provable:
+        raise UsageError(
+            f"the feature set {features.name!r} needs ga-bpnn-ukf with --editing two-pass, whose smoother proves it"
+        )
+    return (settings.features,) if stage == FILTER or features.smoothed else ()
 
 
 def _remaining_error(stage: Stage) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -13,16 +13,15 @@ import numpy as np
 from ftproc.correction import network
 from ftproc.correction.envelope import Envelope, Normaliser
 from ftproc.correction.feature_sets import named
-from ftproc.correction.features import APPLIED, Features
+from ftproc.correction.features import APPLIED, BoolArray, Features
 from ftproc.correction.model import Stage
-from ftproc.correction.network import Shape
+from ftproc.correction.network import Shape, Weights
 from ftproc.correction.training import Progress, descent, initial_weights, silent
-from ftproc.correction.training.descent import OPTIMISERS, Problem
+from ftproc.correction.training.descent import OPTIMISERS, Fit, Problem
 from ftproc.correction.training.genetic import GeneticSettings
 from ftproc.correction.training.holdout import with_verdict
 from ftproc.correction.training.samples import Flight, Samples, Split, overconfidence, samples, split
 from ftproc.errors import InputError, UsageError
-from ftproc.records import FloatArray
 from ftproc.settings import TrainSettings
 
 MOST_SAMPLES = 40_000  # for back-propagation
@@ -33,7 +32,8 @@ LEAST_BEND = 0.05  # relative decrease of validation cost below which the hidden
 
 @dataclass(frozen=True)
 class Prepared:
-    """Data to train on. training, validation, test: normalised samples, the first two at most MOST_SAMPLES.
+    """Data to train on. training, validation, test: normalised samples, the first two at most MOST_SAMPLES of a
+    feature set that does not limit those of a flight.
     fingerprint: SHA-256 of all samples."""
 
     features: Features
@@ -45,8 +45,10 @@ class Prepared:
     test: Samples
     fingerprint: str
 
-    def shape(self, hidden: int) -> Shape:
-        return Shape(self.features.input_size, hidden, self.features.output_size, self.features.direct)
+    def shape(self, hidden: int | None) -> Shape:
+        return Shape(
+            self.features.input_size, hidden or self.features.hidden, self.features.output_size, self.features.direct
+        )
 
 
 def prepare(flights: Sequence[Flight], features: Features, seed: int) -> Prepared:
@@ -63,7 +65,8 @@ def prepare(flights: Sequence[Flight], features: Features, seed: int) -> Prepare
     inputs = Normaliser.fit(tables[0].inputs, features.floor)
     targets = Normaliser.fit(tables[0].targets, 1e-9)
     training, validation, test = (Samples(inputs.forward(x), targets.forward(t)) for x, t in tables)
-    training, validation = (s.thinned(MOST_SAMPLES, thinning) for s in (training, validation))
+    if features.most is None:
+        training, validation = (s.thinned(MOST_SAMPLES, thinning) for s in (training, validation))
     return Prepared(features, parts, inputs, targets, training, validation, test, _fingerprint(tables))
 
 
@@ -79,38 +82,62 @@ def train(flights: Sequence[Flight], settings: TrainSettings, progress: Progress
         kinds = ", ".join(initial_weights.KINDS)
         raise UsageError(f"optimiser is one of {', '.join(OPTIMISERS)}; start is one of {kinds}")
     data = prepare(flights, features, settings.seed)
+    bent, line = _fitted(data, settings, progress)
     stage = Stage(
         features=features,
-        weights=network.unpack(_fitted(data, settings, progress), data.shape(settings.hidden)),
+        weights=bent,
         inputs=data.inputs,
         targets=data.targets,
         envelope=Envelope.fit(data.training.inputs, features.reach),
         gain=np.ones(APPLIED),
-        bound_sigma=BOUND_SIGMA * overconfidence(flights, data.parts.training),
+        bound_sigma=BOUND_SIGMA * overconfidence(flights, data.parts.training, features.share),
         fingerprint=data.fingerprint,
     )
     progress("validation", 0, 1)
     stage = with_verdict(stage, flights, data.parts, _streams(settings.seed)[4])
+    unproven = (stage.gain[: len(bent.b2)] == 0.0) & bent.w2[:APPLIED].any(axis=1)
+    if line is not None and unproven.any():
+        stage = replace(stage, weights=_mixed(bent, line, ~unproven))
+        stage = with_verdict(stage, flights, data.parts, _streams(settings.seed)[4])
     progress("validation", 1, 1)
     return stage
 
 
-def _fitted(data: Prepared, settings: TrainSettings, progress: Progress) -> FloatArray:
-    """(size,) weights of the network."""
+def _fitted(data: Prepared, settings: TrainSettings, progress: Progress) -> tuple[Weights, Weights | None]:
+    """The weights of the network, and those of the linear fit where it has direct connections.
+
+    A linear output needs less data and extrapolates better: all are linear where the hidden layer does not decrease the
+    validation cost, and so is each whose own it does not decrease.
+    """
     searching, descending = _streams(settings.seed)[2:4]
     problem = Problem(data.shape(settings.hidden), data.training, data.validation)
     search = GeneticSettings(population=settings.population, generations=settings.generations)
-    initial = initial_weights.initial_weights(
-        settings.start, problem.shape, data.training, search, searching, partial(progress, "genetic search")
-    )
-    fit = descent.descend(
-        settings.optimiser, initial, problem, settings.epochs, descending, partial(progress, "back-propagation")
-    )
-    if problem.shape.direct:  # a linear model needs less data and extrapolates better
-        linear = initial_weights.linear(problem.shape, data.training)
-        if fit.validation_cost > (1.0 - LEAST_BEND) * network.cost(linear, problem.shape, *data.validation):
-            return linear
-    return fit.vector
+    best: Fit | None = None
+    for _ in range(data.features.restarts):
+        initial = initial_weights.initial_weights(
+            settings.start, problem.shape, data.training, search, searching, partial(progress, "genetic search")
+        )
+        fit = descent.descend(
+            settings.optimiser, initial, problem, settings.epochs, descending, partial(progress, "back-propagation")
+        )
+        best = fit if best is None or fit.validation_cost < best.validation_cost else best
+    assert best is not None
+    bent = network.unpack(best.vector, problem.shape)
+    if not problem.shape.direct:
+        return bent, None
+    line = network.unpack(initial_weights.linear(problem.shape, data.training), problem.shape)
+    left, straight = (network.squares(weights, *data.validation) for weights in (bent, line))
+    better = left <= (1.0 - LEAST_BEND) * straight
+    return _mixed(bent, line, better & (left.sum() <= (1.0 - LEAST_BEND) * straight.sum())), line
+
+
+def _mixed(bent: Weights, line: Weights, which: BoolArray) -> Weights:
+    """The weights of one network for the outputs of a mask (o,), those of the linear fit for the others."""
+    if not which.any():
+        return line
+    pairs = ((bent.w2, line.w2), (bent.b2, line.b2), (bent.direct, line.direct))
+    w2, b2, direct = (np.where(which.reshape(-1, *[1] * (one.ndim - 1)), one, other) for one, other in pairs)
+    return Weights(bent.w1, bent.b1, w2, b2, direct)
 
 
 def _streams(seed: int) -> list[np.random.Generator]:

@@ -31,18 +31,19 @@ def experiments() -> dict[str, ModuleType]:
 
 
 def main(arguments: Sequence[str], out: Path = OUT) -> None:
-    """Write the page with the experiments that are named, or all."""
+    """Write the page; experiments that are not named keep the sections that they have."""
     found = experiments()
     if unknown := set(arguments) - set(found):
         sys.exit(f"there is no experiment {', '.join(sorted(unknown))}; there are {', '.join(found)}")
     out.mkdir(parents=True, exist_ok=True)
-    sections = []
-    for name, module in found.items():
+    kept = [out / f"{name}.section.md" for name in found]
+    for path, (name, module) in zip(kept, found.items(), strict=True):
         if not arguments or name in arguments:
             began = time.monotonic()
-            sections.append(module.section(Page(out)))
+            path.write_text(module.section(Page(out)), encoding="utf-8")
             print(f"{name}: {time.monotonic() - began:.0f} s", file=sys.stderr, flush=True)
     target = out / "reproduce.md"
+    sections = [path.read_text(encoding="utf-8") for path in kept if path.exists()]
     target.write_text("\n".join([_INTRODUCTION, *sections]), encoding="utf-8")
     print(f"-> {target}")
 

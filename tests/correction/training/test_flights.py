@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ftproc.correction.training.flights import train_flights
+from ftproc.correction.training.flights import filtered_flights, train_flights
 from ftproc.errors import InputError, UsageError
 from ftproc.records import Truth
 from ftproc.settings import FilterSettings, TrainSettings
@@ -34,3 +34,25 @@ def test_of_live_editing_the_filter_alone_is_corrected():
     assert model.smoother is None
     assert model.settings["editing"] == "live"
     assert model.settings["lag_s"] == 1.0
+
+
+def test_without_truth_the_smoother_is_the_teacher():
+    flown = [simulate("manoeuvre-clean", seed=seed, dt_s=0.2, duration_s=100.0) for seed in range(2)]
+    found = filtered_flights([(flight.log, None) for flight in flown])
+    assert list(found) == ["filter"]
+    for flight in found["filter"]:
+        np.testing.assert_array_equal(flight.truth_position, flight.smoothed[:, :3])
+        np.testing.assert_allclose(flight.error[:, 3:6], flight.smoothed[:, 3:6] - flight.run.state[:, 3:6])
+    settings = TrainSettings(population=2, generations=0, epochs=5)
+    model = train_flights([(flight.log, None) for flight in flown], settings)
+    assert model.settings["teacher"] == "smoother"
+    assert model.smoother is None
+    with pytest.raises(UsageError, match="without --truth the smoother is the teacher: it needs ga-bpnn-ukf with"):
+        train_flights([(flown[0].log, None)], settings, FilterSettings(editing="live"))
+
+
+def test_a_filter_without_a_smoother_to_prove_it_is_not_taught_motion():
+    flight = simulate("manoeuvre-clean", seed=1, dt_s=0.5, duration_s=100.0)
+    settings = TrainSettings("motion", population=2, generations=0, epochs=5)
+    with pytest.raises(UsageError, match="'motion' needs ga-bpnn-ukf with --editing two-pass"):
+        train_flights([(flight.log, flight.truth)], settings, FilterSettings(editing="none"))

@@ -48,7 +48,7 @@ def test_velocity_and_acceleration_of_the_truth_are_differenced_when_not_given()
 def test_consistent_sigmas_are_not_widened() -> None:
     flights = fake.flights(12, 6)
     pieces = split(flights, np.random.default_rng(0)).training
-    assert overconfidence(flights, pieces) == pytest.approx(np.ones(6), abs=0.05)
+    assert overconfidence(flights, pieces, 0.683) == pytest.approx(np.ones(6), abs=0.05)
 
 
 def test_thinning_keeps_the_order() -> None:

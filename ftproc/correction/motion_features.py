@@ -1,0 +1,128 @@
+"""The feature set `motion`: what the target does, as the filter sees it, in line-of-sight axes and in units of the
+filter's own sigmas and memory, so that one network serves any range, rate, noise and target.
+
+A filter that takes the jerk for white noise lags behind every manoeuvre in the same way: the acceleration of a steady
+turn has the rate -|a_n|^2/|v|^2 v, that of a change of thrust stays where it is. The last innovations alone do not say
+which it is.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from ftproc.core.filtering.records import FilterRun
+from ftproc.correction.features import APPLIED, LOS_NAMES, Features, LineOfSight, innovations
+from ftproc.records import FloatArray, IntArray
+
+GRAVITY = 9.81  # m/s2
+SLOW_MPS = 0.5  # below this a target has no direction
+LONGEST = 256  # samples that are looked back at most
+MOST = 6.0  # innovations are cut off at so many sigmas
+FARTHEST = 5.0  # sigmas, targets likewise: what is learned is not the few worst samples
+SINGLE, SUMS = 4, (4, 8, 16)  # innovations, and sums of those before
+MEMORIES = (0.5, 2.0)  # of the filter, over which changes of the acceleration are looked at
+
+
+class MotionFeatures(Features):
+    """Sums of innovations; the acceleration, its part across the velocity, and its rate in a steady turn, over the
+    sigma of the acceleration; its changes; how the sigmas of readings, position, velocity and acceleration compare;
+    direction and speed of the flight; elevation; and which components were used. Targets: the error along the
+    line-of-sight axes over the filter's sigma."""
+
+    name = "motion"
+    outputs = LOS_NAMES
+    direct = True
+    proven = True
+    hidden = 64
+    most = 400
+    _SIZE: ClassVar[int] = 61
+
+    @property
+    def floor(self) -> FloatArray:
+        return np.full(self._SIZE, 0.05)
+
+    def _raw(self, run: FilterRun, start: int, stop: int) -> FloatArray:
+        first = max(start - LONGEST, 0)
+        latest = innovations(run, start, stop, SINGLE, SUMS).clip(-MOST, MOST)
+        return np.concatenate([latest, _Motion(run.rows(first, stop)).columns()[start - first :]], axis=1)
+
+    def unit(self, los: LineOfSight) -> FloatArray:
+        return los.sigma
+
+    def targets(self, los: LineOfSight, error: FloatArray) -> FloatArray:
+        return self.from_cartesian(los, error[:, :APPLIED]).clip(-FARTHEST, FARTHEST)
+
+
+class _Motion:
+    """Quantities of the motion of n samples. v, a: (n, 3) along the line-of-sight axes. memory_s: (n, 1) of the filter,
+    the sigma of the velocity over that of the acceleration."""
+
+    def __init__(self, run: FilterRun) -> None:
+        los = LineOfSight.of(run, 0, len(run.time_s))
+        self.run = run
+        self.v, self.a = (np.einsum("nij,nj->ni", los.axes, run.state[:, k : k + 3]) for k in (3, 6))
+        self.position_sigma, self.velocity_sigma = run.los_sigma[:, :3], run.los_sigma[:, 3:]
+        self.acceleration_sigma = _rms(run.sigma[:, 6:])
+        self.memory_s = _rms(self.velocity_sigma) / self.acceleration_sigma
+
+    def columns(self) -> FloatArray:
+        """(n, 40)."""
+        run, v, a, memory_s = self.run, self.v, self.a, self.memory_s
+        unit = self.acceleration_sigma
+        speed = np.linalg.norm(v, axis=1, keepdims=True) + SLOW_MPS
+        along = (a * v).sum(1, keepdims=True) / speed
+        across = a - along * v / speed
+        rate = np.linalg.norm(across, axis=1, keepdims=True) / speed  # of turn, rad/s
+        x, y, z = run.state[:, :3].T
+        ground = np.hypot(x, y)
+        distance = np.hypot(ground, z)[:, None]
+        lever = np.concatenate([np.ones_like(distance), np.maximum(ground[:, None], 1e-3 * distance), distance], axis=1)
+        innovation_sigma = run.innovation_sigma * lever
+        back = [self.samples_back(share) for share in MEMORIES]
+        return np.concatenate(
+            [
+                _compressed(a / unit),
+                _compressed(across / unit),
+                _compressed(-(rate**2) * v * memory_s / unit),
+                _compressed(along / speed * across * memory_s / unit),
+                *(_compressed(np.nan_to_num((a - a[k]) / unit)) for k in back),
+                np.log(self.position_sigma / innovation_sigma),
+                np.log(self.position_sigma / (memory_s * self.velocity_sigma)),
+                np.log(self.velocity_sigma / (memory_s * unit)),
+                np.log(memory_s / self.interval_s()),
+                _compressed(speed * memory_s / _rms(self.position_sigma)) / 5,
+                v / speed,
+                _compressed(3 * rate * memory_s),
+                _compressed(np.linalg.norm(a, axis=1, keepdims=True) / GRAVITY),
+                np.log(speed) / 3,
+                np.log(unit),
+                np.arctan2(z, ground)[:, None],
+                run.weight > 0.0,
+            ],
+            axis=1,
+        )
+
+    def samples_back(self, memories: float) -> IntArray:
+        """(n,) the sample that was so many memories before each, since the filter was initialized."""
+        time_s, own = self.run.time_s, np.arange(len(self.run.time_s))
+        wanted = time_s - memories * np.nan_to_num(self.memory_s[:, 0], posinf=0.0)
+        oldest = np.maximum(own - np.minimum(self.run.since_start, LONGEST), 0)
+        return np.clip(np.searchsorted(time_s, wanted), oldest, own)
+
+    def interval_s(self) -> FloatArray:
+        """(n, 1) the mean interval of the last 16 samples."""
+        back = np.maximum(np.arange(len(self.run.time_s)) - 16, 0)
+        passed = np.arange(len(back)) - back
+        return ((self.run.time_s - self.run.time_s[back]) / np.maximum(passed, 1))[:, None].clip(1e-6)
+
+
+def _rms(values: FloatArray) -> FloatArray:
+    """(n, 1) root mean square of (n, m)."""
+    return np.asarray(np.sqrt(np.mean(values**2, axis=1, keepdims=True)))
+
+
+def _compressed(values: FloatArray) -> FloatArray:
+    """log(1 + |x|) with the sign of x."""
+    return np.asarray(np.sign(values) * np.log1p(np.abs(values)))
