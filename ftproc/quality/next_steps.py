@@ -48,7 +48,7 @@ class Step(NamedTuple):
 
 def steps(s: Summary, settings: FilterSettings, model_corrects: bool) -> list[Step]:
     """For a summary whose verdict is not consistent; model_corrects: whether a network has added something."""
-    if s["trust"]["verdict"] == "consistent":
+    if verdict.level_of(s["trust"]) == verdict.CONSISTENT:
         return []
     found = [*_left_out(settings), *([_WITHOUT_MODEL] if model_corrects and s["correction_largest_m"] > 0 else [])]
     found += _smoothed(settings)
@@ -60,7 +60,7 @@ def steps(s: Summary, settings: FilterSettings, model_corrects: bool) -> list[St
 
 def of_fused(s: Summary, smooth: bool) -> list[Step]:
     """For the summary of several stations."""
-    if s["trust"]["verdict"] == "consistent":
+    if verdict.level_of(s["trust"]) == verdict.CONSISTENT:
         return []
     found = [] if smooth else [Step("add --smooth", _CAUSAL, {"smooth": ("--smooth",)})]
     places = sorted(s["stretches"], key=lambda each: float(each["from_s"] - each["to_s"]))[:1]

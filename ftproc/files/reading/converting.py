@@ -10,8 +10,9 @@ import numpy as np
 from ftproc.files.reading.clocks import joint, numeric, times
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.meaning import motion, plausibility, readings, schema
+from ftproc.files.reading.meaning import readings, schema
 from ftproc.files.reading.meaning.numbers import Origin, finite, without_thousands
+from ftproc.files.reading.meaning.values import deciding, ways
 from ftproc.records import FloatArray
 from ftproc.settings import Station
 
@@ -78,14 +79,16 @@ def _origin(header: TableHeader, column: schema.Column) -> Origin:
 
 
 def judged(
-    source: str, quantities: Mapping[str, FloatArray], found: Found, clock: Clock, station: Station
-) -> plausibility.Judged:  # fmt: skip
-    """The units and conventions that the values show, see `plausibility` and `motion`."""
-    by_size = plausibility.judged(source, quantities, found, station)
+    source: str, quantities: Mapping[str, FloatArray], found: Found, clock: Clock, station: Station,
+    standard: bool = False,
+) -> deciding.Open:  # fmt: skip
+    """What the values show of the units and conventions that the names leave open, see `deciding`. standard: the format
+    says what the columns are."""
     time = found["time"]
     bare_time = not (time.unit_is_stated or clock.epoch) and clock.words.startswith(numeric.BARE)
-    in_si = in_other_units(quantities, found, by_size.found)
-    return by_size._replace(found=motion.judged(source, in_si, by_size.found, bare_time))
+    numbered = not clock.epoch and clock.words.startswith("numbers in")
+    known = ways.Known(source, found, station, bare_time, numbered, standard)
+    return deciding.judged(known, quantities)
 
 
 def in_other_units(quantities: Mapping[str, FloatArray], found: Found, decided: Found) -> dict[str, FloatArray]:

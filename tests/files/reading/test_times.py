@@ -82,7 +82,7 @@ def test_timestamps_keep_microseconds_for_a_week(ticks: list[int]) -> None:
     first = min(ticks) // (86400 * 10**6) * 86400 * 10**6
     for unit in ("us", "ns"):
         column = pa.array([day + tick for tick in ticks], pa.timestamp("us")).cast(pa.timestamp(unit, "UTC"))
-        log = logs.read(pa.table({"time": column, "R": [1.0] * len(ticks)}))
+        log = logs.read(pa.table({"time": column, "range_m": [1.0] * len(ticks)}))
         assert log.time_s.tolist() == sorted((tick - first) / 10**6 for tick in ticks)
 
 
