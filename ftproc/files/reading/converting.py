@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,6 +12,7 @@ from ftproc.files.reading.clocks import joint, numeric, times
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning import readings, schema
+from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.numbers import Origin, finite, without_thousands
 from ftproc.files.reading.meaning.values import deciding, ways
 from ftproc.records import FloatArray
@@ -18,6 +20,8 @@ from ftproc.settings import Station
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+_LOCAL = frozenset(("local", "localtime", "lt", "ortszeit", "lokalzeit"))
 
 Found = Mapping[str, schema.Column]
 
@@ -61,6 +65,7 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
                 clock = joint.read(dict(zip(column.roles, mine, strict=True)), origin, column)
             else:
                 clock = times.read(mine[0], origin, column)
+            clock = _of_a_zone(clock, column)
             quantities[quantity] = clock.time_s
             continue
         read_here[quantity] = readings.read(mine, origin, column)
@@ -70,6 +75,17 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
         quantities[quantity] = each.column.unit.to_si(each.values)
         notes += each.notes
     return Converted(quantities, decided, clock, (*marks, *notes), readings.undecided(read_here))
+
+
+def _of_a_zone(clock: Clock, column: schema.Column) -> Clock:
+    """Without an epoch if the times are local ones and name no zone: they are no UTC."""
+    local = bool(_LOCAL & set(re.findall(r"[a-z]+", taken_apart(column.name).text.lower())))
+    zoned = len(column.roles) == 1 and not set(times.NO_ZONE) & set(clock.doubts)
+    if not clock.epoch or not local or zoned:
+        return clock
+    doubts = tuple(doubt for doubt in clock.doubts if doubt not in times.NO_ZONE)
+    said = f'"{column.name}" is a local time without its zone, so there is no time_utc'
+    return clock._replace(epoch="", doubts=(*doubts, said))
 
 
 def _origin(header: TableHeader, column: schema.Column) -> Origin:
