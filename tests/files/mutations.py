@@ -129,7 +129,8 @@ def _lengths() -> Iterator[Kind]:
                        ("cm", 1e-2), ("counts of 0.5 m", 0.5)):  # fmt: skip
         yield Kind(f"{name}, unsaid", head, lambda f, u=size: [f.t, f.r / u, _deg(f.a), _deg(f.e)])
     yield Kind("ft named m", DEG, lambda f: [f.t, f.r / 0.3048, _deg(f.a), _deg(f.e)], unknowable=True)
-    yield Kind("km named m", DEG, lambda f: [f.t, f.r / 1e3, _deg(f.a), _deg(f.e)])
+    words = "Time (s),Range (m),Az (deg),El (deg)"
+    yield Kind("km named m", words, lambda f: [f.t, f.r / 1e3, _deg(f.a), _deg(f.e)])
     yield Kind("there and back, named m", DEG, lambda f: [f.t, f.r * 2, _deg(f.a), _deg(f.e)], unknowable=True)
     yield Kind("of 20 rows, km", head, lambda f: [f.t, f.r / 1e3, _deg(f.a), _deg(f.e)])
     yield Kind("of 20 rows, ft", head, lambda f: [f.t, f.r / 0.3048, _deg(f.a), _deg(f.e)])

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ftproc.errors import InputError, nearest, quoted
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
-from ftproc.files.reading.meaning.names import Name
+from ftproc.files.reading.meaning.names import Name, taken_apart
 from ftproc.files.units import UNITS, unit_named
 from ftproc.files.words import ALIASES, EITHER_ANGLE, NOT_UNITS, QUANTITIES
 
@@ -150,7 +150,8 @@ def check_complete(source: str, names: Sequence[str], found: Mapping[str, tuple[
             f"{source}: there is no line of column names.{seen}{none_moves} Say which column is which by their "
             f"numbers, such as {say}."
         )
-    hint = nearest(CANONICAL[wanted], [names[place] for place in free])
+    others = [names[place] for place in free if not NOT_UNITS & {*taken_apart(names[place]).words}]
+    hint = nearest(CANONICAL[wanted], others)
     similar = next((place for place in free if hint and f'"{names[place]}"' in hint), None)
     say = say if proposed.answer or similar is None else answer(names, {wanted: similar})
     raise InputError(

@@ -29,6 +29,7 @@ _OTHER = {
     "range": (3e-4, ("m", "km", "mm")),
     "angle": (0.02, ("rad", "deg", "grad", "mil")),
 }
+_CANONICAL = 0.3  # times as likely in a column of the program's own name
 _MIXED, _ONE_WRONG = 0.03, 0.2  # two angles in two units, where no name states one, and where names do
 _ZENITH, _ZENITH_BY_SURVEYORS, _EXCHANGED = 0.02, 0.5, 0.003
 _SMALL_RAD, _SMALL = 6.284, 0.05  # azimuths that are all below a turn in rad, in another unit
@@ -91,8 +92,8 @@ def _units(log: Known, quantity: str) -> Iterator[tuple[Unit | None, float]]:
     if (_is_sure(column) and not is_canonical(column)) or (quantity == "time" and not log.numbered):
         return
     prior, others = _OTHER[kind]
-    if is_canonical(column) and kind == "angle":
-        return
+    if is_canonical(column):
+        prior *= _CANONICAL if kind != "angle" else 0.0
     for name in others:
         if name != column.unit.name and not (name == "grad" and column.unit.name == "gon"):
             yield UNITS[quantity][name], prior
