@@ -31,7 +31,8 @@ class Air:
 class Station:
     """The conventions and the known errors of an instrument's readings.
 
-    azimuth_from: `x` or `north`, the axis that the azimuth is counted from, see `ftproc.files.conventions`.
+    azimuth_from: `x` or `north`, the axis that the azimuth is counted from, see `ftproc.files.conventions`; None: north
+        if the column's name says so, else x.
     azimuth_sense: `clockwise` or `anticlockwise` from above; None: from north clockwise, from x anticlockwise.
     azimuth_zero_rad: the azimuth where the instrument reads zero.
     elevation_from: `horizon` or `zenith`; None: zenith if the column's name says so, else horizon.
@@ -40,7 +41,7 @@ class Station:
     refraction: the air, for the elevation of an optical instrument; None: no correction.
     """
 
-    azimuth_from: str = "x"
+    azimuth_from: str | None = None
     azimuth_sense: str | None = None
     azimuth_zero_rad: float = 0.0
     elevation_from: str | None = None

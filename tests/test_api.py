@@ -55,7 +55,7 @@ def test_filter_log_takes_the_azimuths_zero_and_the_site():
 def test_the_site_here_wins_over_the_settings():
     table, _ = frame()
     settings = ftproc.FilterSettings(site=(10.0, 10.0, 0.0), derived=True)
-    found = ftproc.filter_log(table, settings, site=(48.0, 11.0, 600.0)).to_pandas()
+    found = ftproc.filter_log(table, settings, site=(48.0, 11.0, 600.0), azimuth_from="x").to_pandas()
     assert found.lat_deg.between(47, 49).all()
     assert "track_deg" in found
 

@@ -106,7 +106,7 @@ def _filtered(task: Task, notify: Notify | None) -> Outcome:
     from ftproc.correction import model_file
     from ftproc.derived.columns import with_columns
     from ftproc.files.reading import logs
-    from ftproc.files.writing import atomic, trajectories
+    from ftproc.files.writing import atomic, geodesy, trajectories
     from ftproc.quality import next_steps, provenance, summary
 
     started, recipe = time.perf_counter(), task.recipe
@@ -115,6 +115,7 @@ def _filtered(task: Task, notify: Notify | None) -> Outcome:
         log = replace(log, name=task.log)  # as the user named it
     if recipe.decisions is not None:
         log = recipe.decisions.applied(log, task.station)
+    geodesy.check_axes(log, recipe.settings)
     taken: list[Line] = []
     filtering = pipeline.Filtering(log, recipe.settings, model_file.named(recipe.model))
     command = partial(recipe.origin.command, task.log)

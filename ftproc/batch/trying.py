@@ -10,7 +10,7 @@ from typing import Any
 from ftproc.errors import FtprocError
 from ftproc.pipeline import Filtering
 from ftproc.quality.next_steps import Step
-from ftproc.quality.verdict import LEVELS
+from ftproc.quality.verdict import LEVELS, level_of
 
 MOST_ROWS, MOST_TRIALS = 5_000, 3  # of a log that is filtered again, and how often
 Command = Callable[[Mapping[str, Any]], str]
@@ -19,7 +19,7 @@ Command = Callable[[Mapping[str, Any]], str]
 def steps(filtering: Filtering, summary: Mapping[str, Any], command: Command) -> list[dict[str, Any]]:
     """The next steps, those first that make the verdict better; those that make it worse are left out. command: the
     command line with some options changed."""
-    level, left = LEVELS.index(summary["trust"]["verdict"]), MOST_TRIALS
+    level, left = LEVELS.index(level_of(summary["trust"])), MOST_TRIALS
     better: list[tuple[int, dict[str, Any]]] = []
     same: list[dict[str, Any]] = []
     rest: list[dict[str, Any]] = []
@@ -47,6 +47,6 @@ def _tried(filtering: Filtering, step: Step) -> int | None:
         other = Filtering(filtering.log, replace(settings), filtering.model if step.model else None)
         for _ in other.parts():
             pass
-        return LEVELS.index(other.metadata["summary"]["trust"]["verdict"])
+        return LEVELS.index(level_of(other.metadata["summary"]["trust"]))
     except FtprocError:
         return None

@@ -56,7 +56,10 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
     is_flag=True,
     help="Add ground speed, track, climb rate, flight path angle, turn rate and load factor, each with its 1-sigma.",
 )
-@options.azimuth_from("Zero of the azimuth: x, A = atan2(y, x), or north, clockwise; then x is north.")
+@options.azimuth_from(
+    "Zero of the azimuth: x, A = atan2(y, x), or north, clockwise; then x is north. [default: north if the column is "
+    "called so, such as Bearing, else x]"
+)
 @click.option(
     "--elevation-from",
     type=click.Choice(["horizon", "zenith"]),

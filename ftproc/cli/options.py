@@ -164,8 +164,8 @@ def units(text: str) -> Callable[[F], F]:
     return click.option("--units", metavar="NAME=UNIT,...", help=text)
 
 
-def azimuth_from(text: str) -> Callable[[F], F]:
-    return click.option("--azimuth-from", type=click.Choice(["x", "north"]), default="x", help=text)
+def azimuth_from(text: str, default: str | None = None) -> Callable[[F], F]:
+    return click.option("--azimuth-from", type=click.Choice(["x", "north"]), default=default, help=text)
 
 
 def tracker(function: F) -> F:

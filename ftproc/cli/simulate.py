@@ -61,8 +61,9 @@ def _scenarios_and_grammar() -> str:
 )
 @options.units("Units to write, such as range=km,azimuth=deg; they show in the column names. [default: m, rad, s]")
 @options.azimuth_from(
-    "north: azimuth in the survey convention, clockwise from north, from 0 to a full turn. The truth's x is then "
-    "north, y east and z up."
+    default="x",
+    text="north: azimuth in the survey convention, clockwise from north, from 0 to a full turn. The truth's x is then "
+    "north, y east and z up.",
 )
 @options.output(
     "The log to write: .csv, .csv.gz, .parquet, .feather, or - for CSV on stdout; of several stations (range...) the "

@@ -93,7 +93,7 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
     "range": {**_column("range", "RNG"), **_errors("range", 3.0, 2.5)},
     "azimuth": {
         **_column("azimuth", "AZ"),
-        "from": Key("azimuth_from", words("x", "north"), "x", _FROM_X, default="x"),
+        "from": Key("azimuth_from", words("x", "north"), "north", _FROM_X),
         "sense": Key("azimuth_sense", words("clockwise", "anticlockwise"), "clockwise", _SENSE),
         "zero": Key(
             "azimuth_zero_rad", number(), 14.5, _ZERO, None, "azimuth", 0.0, "deg", -MOST_ERROR[1], MOST_ERROR[1]

@@ -14,8 +14,10 @@ from ftproc.settings import FilterSettings
 def with_columns(trajectory: Trajectory, settings: FilterSettings, log: MeasurementLog) -> Trajectory:
     """The trajectory of a log with all columns that the settings ask for, and UTC where the log's clock is known.
 
-    Raises UsageError if a kept column has the name of one of them, or a library is missing.
+    Raises InputError as `geodesy.check_axes`, UsageError if a kept column has the name of one
+    of them, or a library is missing.
     """
+    geodesy.check_axes(log, settings)
     located = geodesy.located(trajectory, settings)
     return clock.stamped(with_derived(located, settings), log)
 

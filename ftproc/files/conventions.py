@@ -13,7 +13,7 @@ from typing import cast
 
 import numpy as np
 
-from ftproc.errors import UsageError
+from ftproc.errors import InputError, UsageError
 from ftproc.records import FloatArray, MeasurementLog
 from ftproc.settings import Air, Station
 
@@ -34,7 +34,7 @@ def check(station: Station) -> None:
     """Raise UsageError for values that are not understood."""
     for name, words in _CHOICES.items():
         value = getattr(station, name)
-        if value not in words and not (value is None and name == "elevation_from"):
+        if value not in (*words, None):
             option = "--" + name.replace("_", "-")
             raise UsageError(f'{option}: "{value}" is not understood; say {" or ".join(words)}.')
     if station.azimuth_sense not in (None, *_OWN_SENSE.values()):
@@ -60,11 +60,29 @@ def apply(log: MeasurementLog, station: Station) -> MeasurementLog:
         measurement[:, 2] -= _refraction(measurement, station.refraction)
     if station.time_offset_s:
         time_s = time_s + station.time_offset_s
-    return replace(log, measurement=measurement, time_s=time_s, frame=FRAMES[station.azimuth_from], station=station)
+    return replace(log, measurement=measurement, time_s=time_s, frame=frame(station), station=station)
+
+
+def axis(station: Station) -> str:
+    """The axis that the azimuth is counted from, x where nothing is known."""
+    return station.azimuth_from or "x"
+
+
+def frame(station: Station) -> str:
+    """The frame of a log of the station."""
+    return FRAMES[axis(station)]
+
+
+def axis_question(source: str, name: str) -> InputError:
+    """Asked where positions on the earth are wanted. name: of the azimuth's column."""
+    return InputError(
+        f'{source}: nothing says from where the azimuth in column "{name}" counts, so there are no positions on the '
+        "earth. Say --azimuth-from north if clockwise from north, or --azimuth-from x if anticlockwise from east."
+    )
 
 
 def _reversed(station: Station) -> bool:
-    return station.azimuth_sense not in (None, _OWN_SENSE[station.azimuth_from])
+    return station.azimuth_sense not in (None, _OWN_SENSE[axis(station)])
 
 
 def _refraction(measurement: FloatArray, air: Air) -> FloatArray:
@@ -98,9 +116,9 @@ def in_words(station: Station) -> list[str]:
     if station.time_offset_s:
         lines.append(f"{station.time_offset_s:g} s added to the time")
     if _reversed(station):
-        lines.append(f"azimuth counted {station.azimuth_sense} from {station.azimuth_from}, reversed")
+        lines.append(f"azimuth counted {station.azimuth_sense} from {axis(station)}, reversed")
     if station.azimuth_zero_rad:
-        lines.append(f"azimuth zero at {math.degrees(station.azimuth_zero_rad):.9g} deg from {station.azimuth_from}")
+        lines.append(f"azimuth zero at {math.degrees(station.azimuth_zero_rad):.9g} deg from {axis(station)}")
     if station.elevation_from == "zenith":
         lines.append("elevation from zenith angles")
     if station.refraction is not None:

@@ -110,6 +110,22 @@ NOT_UNITS = frozenset(
 )
 
 
+#: Words of columns that are neither a time, a range nor an angle from a station.
+OTHER_THINGS = frozenset(
+    _split(
+        """
+    lat latitude lon lng long longitude breite breitengrad laenge lange langengrad height hgt alt altitude hohe
+    hoehe x y z east north up easting northing down ra dec declination rightascension
+    vx vy vz ax ay az_rate speed velocity vel course cog sog heading hdg roll pitch yaw rate dot
+    id sensor sensorid station code mode squawk icao callsign target track trackid number no index idx count
+    date day month year hour minute min second sec hours minutes
+    snr rcs db power amplitude mag magnitude temp temperature pressure humidity voltage battery quality status flag
+    fl flightlevel
+    """
+    )
+)
+
+
 def plain_letters(text: str) -> str:
     """Small letters without accents."""
     bare = "".join(

@@ -99,7 +99,10 @@ def _flight(
     edited = {name: results.edited(fused, s, read[s]) for s, name in enumerate(names)}
     for s, (log, table) in enumerate(zip(read, edited.values(), strict=True)):
         effects.add(log.by_hand, *results.residuals(table, log, fused.noise[s]))
-    summary = summarize(fused, zero_s, effects)
+    assumed = [
+        f"{name}: {each}" for name, log in zip(names, read, strict=True) for each in log.understood.get("assumed", ())
+    ]
+    summary = summarize(fused, zero_s, effects, assumed)
     metadata = {**_metadata(range_, read, settings, summary, fused), "epoch": logs.epoch(read), **effects.metadata()}
     n = len(track.time_s)
     sigma, _ = unseen_motion.widened(track.state, track.sigma, np.full((n, 6), np.nan))
@@ -174,12 +177,13 @@ def _from_origin(found: Trajectory, instrument: Instrument, frame: str) -> Traje
     return replace(found, state=state, sigma=sigma)
 
 
-def summarize(fused: Fused, zero_s: float, effects: by_hand.Effects) -> dict[str, Any]:
-    """The figures of a fused flight, JSON-serialisable; times as in the logs. effects: of the decisions by hand."""
+def summarize(fused: Fused, zero_s: float, effects: by_hand.Effects, assumed: Sequence[str] = ()) -> dict[str, Any]:
+    """The figures of a fused flight, JSON-serialisable; times as in the logs. effects: of the decisions by hand.
+    assumed: what nothing states of the logs."""
     time_s, jerk = fused.track.time_s, fused.jerk.mean(1)
     said = [*findings.remarks(fused, zero_s), *verdict.by_hand_remarks(effects.summary())]
-    trust = verdict.verdict(said)
-    if trust["verdict"] == verdict.CONSISTENT:
+    trust = verdict.verdict(said, assumed=assumed)
+    if verdict.level_of(trust) == verdict.CONSISTENT:
         trust["not_shown"] = findings.NOT_SHOWN
     return {
         "rows": len(time_s),

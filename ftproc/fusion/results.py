@@ -14,6 +14,7 @@ from ftproc.core.model import stations as geometry
 from ftproc.core.model.frames import wrap
 from ftproc.errors import OutputError
 from ftproc.files import arrow, layout, remote
+from ftproc.files.conventions import axis
 from ftproc.files.writing import atomic, outputs
 from ftproc.files.writing.outputs import Output
 from ftproc.fusion.estimation import constants as posterior
@@ -201,7 +202,7 @@ def calibration(instrument: Instrument, constants: Constants, s: int) -> str:
     options = dict(instrument.options)
     estimate, observed = constants.estimate[s], constants.observable[s]
     station = instrument.recipe.station
-    sense = -1.0 if (station.azimuth_sense or SENSE[station.azimuth_from]) == "clockwise" else 1.0
+    sense = -1.0 if (station.azimuth_sense or SENSE[axis(station)]) == "clockwise" else 1.0
     zenith = -1.0 if station.elevation_from == "zenith" else 1.0
     before = options.get("bias") or (0.0, 0.0, 0.0)
     signs = (1.0, sense, zenith)  # in the sense of the readings as they are written

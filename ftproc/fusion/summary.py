@@ -24,7 +24,7 @@ def text(metadata: Mapping[str, Any]) -> str:
     jerk = s["jerk_psd_m2ps5"]
     named = [("jerk", f"PSD {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.3g} to {jerk['highest']:.3g})")]
     named += [("note", note) for note in s["notes"]]
-    level, reasons = s["trust"]["verdict"], s["trust"]["reasons"]
+    level, reasons = verdict.level_of(s["trust"]), s["trust"]["reasons"]
     if len(reasons) < 2:
         named.append(("verdict", verdict.sentence(s["trust"])))
         named += [("", s["trust"]["not_shown"])] if level == verdict.CONSISTENT else []

@@ -30,7 +30,7 @@ from ftproc.settings import Station
 
 _MOST_LINES = 20  # that are no comments, among which the names and the first row must be,
 _MOST_HEAD, _LARGEST_HEAD = 2000, 1 << 22  # and of all lines to the first row, as in a complete log, and characters
-_SAMPLE = 100  # rows by which assumptions are judged
+_SAMPLE = 100  # rows that judge assumptions
 _OTHERS = {"time": "ms", "range": "km", "azimuth": "deg", "elevation": "deg"}  # units, as examples
 _MISSING = frozenset(MISSING_WORDS)
 
@@ -65,9 +65,13 @@ class Reader:
                 self._judge()
         return self._table.converted(readings), fault
 
+    @property
+    def station(self) -> Station:
+        """With what the names say, once they are known."""
+        return (self._table or self._recipe).station
+
     def cell(self, line: str, name: str) -> str | None:
-        """The cell of a row in the column of that name; None where it has none. Raises InputError when no column is
-        called so."""
+        """The cell of a row in a column, None where it has none. Raises InputError when no column is called so."""
         assert self._table is not None
         if name not in self._table.names:
             raise InputError(
@@ -174,7 +178,9 @@ class _Table(NamedTuple):
                     "--follow when it is complete."
                 )
         above = frozenset(line.strip() for line in head[: text.first])
-        station = logs.with_zenith(recipe.station, found)
+        station = logs.as_named(recipe.station, found)
+        if recipe.settings.site and not logs.knows_axis(recipe.station, found):
+            raise conventions.axis_question(source, found["azimuth"].name)
         widths = parse_widths(recipe.widths)
         return cls(source, names, text.separator, widths, above, found, recipe.station, station)
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from ftproc import __version__
 from ftproc.config.recipe import Recipe
 from ftproc.core import compiled
-from ftproc.files.conventions import FRAMES
+from ftproc.files.conventions import frame
 from ftproc.files.writing import atomic, geodesy, maps, outputs, streams
 from ftproc.live.following import Following
 from ftproc.live.growing import Say
@@ -108,8 +108,8 @@ class _Run:
             faults.append(error)
 
     def _publish(self, part: Trajectory) -> None:
-        frame = {"frame": FRAMES[self._stream.recipe.station.azimuth_from]}
-        part = geodesy.located(replace(part, metadata=frame), self._stream.recipe.settings)
+        known = {"frame": frame(self._stream.station)}
+        part = geodesy.located(replace(part, metadata=known), self._stream.recipe.settings)
         self._counts.add(part)
         self._output.add(part)
         if self._page is not None:

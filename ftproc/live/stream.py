@@ -21,6 +21,7 @@ from ftproc.live.plots import Plots, is_asterix
 from ftproc.live.sources import is_network
 from ftproc.live.stop import Stop
 from ftproc.records import FloatArray, IntArray, Trajectory
+from ftproc.settings import Station
 
 AT_ONCE_S = 0.1  # that a push of some rows may take, about, so that a stop is heard between two
 LATE = 100  # rows that came too late, after which it is said
@@ -65,6 +66,11 @@ class Stream:
         self._form = forms.Form()
         self._reader, self._head = Reader(source, recipe, say), list[str]()
         self._begun, self._at_once, self._said_late = False, 1, False
+
+    @property
+    def station(self) -> Station:
+        """The conventions of the log, with what its names say once they are known."""
+        return self._reader.station
 
     @property
     def late(self) -> int:

@@ -49,7 +49,7 @@ class Step(NamedTuple):
 def steps(s: Summary, settings: FilterSettings, model_doubtful: bool) -> list[Step]:
     """For a summary whose verdict is not consistent; model_doubtful: whether the network is one that
     the flight itself has not proven."""
-    if s["trust"]["verdict"] == "consistent":
+    if verdict.level_of(s["trust"]) == verdict.CONSISTENT:
         return []
     found = [*_left_out(settings), *([_WITHOUT_MODEL] if model_doubtful and s["correction_largest_m"] > 0 else [])]
     found += _smoothed(settings)
@@ -61,7 +61,7 @@ def steps(s: Summary, settings: FilterSettings, model_doubtful: bool) -> list[St
 
 def of_fused(s: Summary, smooth: bool) -> list[Step]:
     """For the summary of several stations."""
-    if s["trust"]["verdict"] == "consistent":
+    if verdict.level_of(s["trust"]) == verdict.CONSISTENT:
         return []
     found = [] if smooth else [Step("add --smooth", _CAUSAL, {"smooth": ("--smooth",)})]
     places = sorted(s["stretches"], key=lambda each: float(each["from_s"] - each["to_s"]))[:1]

@@ -187,6 +187,7 @@ class RunStatistics:
             "duplicate_times": log.duplicate_times,
             "rows_without_estimate": self.unknown,
             "remarks": list(log.remarks),
+            "assumed": list(log.understood.get("assumed", ())),
             "duration_s": float(log.time_s[-1] - log.time_s[0]),
             "start_s": float(log.time_s[0]),
             "epoch": log.epoch,
@@ -223,7 +224,8 @@ class RunStatistics:
             "correction_outside_training": self.outside / max(self.rows, 1),
         }
         figures |= correction
-        return figures | {"trust": verdict.verdict(verdict.remarks(figures), verdict.too_wide(figures))}
+        trust = verdict.verdict(verdict.remarks(figures), verdict.too_wide(figures), figures["assumed"])
+        return figures | {"trust": trust}
 
     def _motion(self) -> dict[str, Any]:
         """The model of motion of most rows, of a method that chooses one; the share of these rows; and by how much more

@@ -27,7 +27,7 @@ def text(metadata: Mapping[str, Any]) -> str:
              f"{metadata['method']} ({settings['editing']} editing{lag})"]  # fmt: skip
     lines += _table(s["components"])
     named = [*facts(s), *(("note", text) for text in notes(s))]
-    level, reasons = s["trust"]["verdict"], s["trust"]["reasons"]
+    level, reasons = verdict.level_of(s["trust"]), s["trust"]["reasons"]
     if len(reasons) < 2:
         named.append(("verdict", verdict.sentence(s["trust"])))
         named += [("", s["trust"]["not_shown"])] if level == verdict.CONSISTENT else []

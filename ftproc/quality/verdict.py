@@ -74,20 +74,30 @@ def by_hand_remarks(s: Mapping[str, Any]) -> list[Remark]:
     return [*contradicted, *(Remark(CONSISTENT, text) for text in by_hand.in_words(s))]
 
 
-def verdict(found: Sequence[Remark], too_wide: Sequence[str] = ()) -> dict[str, Any]:
+def verdict(found: Sequence[Remark], too_wide: Sequence[str] = (), assumed: Sequence[str] = ()) -> dict[str, Any]:
     """The worst level among the remarks, with the remarks of that level as reasons, and of a consistent run what a
-    single log cannot show, and which components (see `too_wide`) have too large sigmas; JSON-serialisable."""
+    single log cannot show, and which components (see `too_wide`) have too large sigmas; JSON-serialisable.
+
+    assumed: what nothing states of the log, such as `the range is in m`. A consistent run is so only if that holds, and
+    its verdict says it.
+    """
     level = max((remark.level for remark in found), key=LEVELS.index, default=CONSISTENT)
     if level == CONSISTENT:
         cautious = {"cautious": list(too_wide)} if too_wide else {}
-        return {"verdict": level, "reasons": [], **cautious, "not_shown": NOT_SHOWN}
+        named = f"{level} if {listed(assumed)}" if assumed else level
+        return {"verdict": named, "reasons": [], **cautious, "not_shown": NOT_SHOWN}
     return {"verdict": level, "reasons": [remark.text for remark in found if remark.level == level]}
+
+
+def level_of(trust: Mapping[str, Any]) -> str:
+    """One of LEVELS (or what another program wrote), without what is assumed."""
+    return str(trust.get("verdict", "")).partition(" if ")[0]
 
 
 def sentence(trust: Mapping[str, Any]) -> str:
     """The verdict with its reasons."""
     cautious = trust.get("cautious")
-    nothing = _NO_FAULT_BUT.format(_listed(cautious)) if cautious else _NO_FAULT
+    nothing = _NO_FAULT_BUT.format(listed(cautious)) if cautious else _NO_FAULT
     return f"{trust['verdict']}: {'; '.join(trust['reasons']) or nothing}"
 
 
@@ -99,8 +109,8 @@ def too_wide(s: Mapping[str, Any]) -> list[str]:
 def _observability(s: Mapping[str, Any]) -> Iterator[Remark]:
     absent = s["not_observable"]
     if absent:
-        seen = _listed([name for name in s["components"] if name not in absent])
-        text = f"{_listed(absent)} missing throughout: position and velocity are not observable and left empty; the " \
+        seen = listed([name for name in s["components"] if name not in absent])
+        text = f"{listed(absent)} missing throughout: position and velocity are not observable and left empty; the " \
                f"verdict is about the {seen}"  # fmt: skip
         yield Remark(CONSISTENT, text)
     yield from _intervals("the position", s["poorly_observable"], Moments.of_summary(s))
@@ -125,7 +135,7 @@ def _intervals(what: str, intervals: Sequence[Mapping[str, float]], moments: Mom
         )
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
     """range; range and azimuth; range, azimuth and elevation."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 

@@ -40,7 +40,7 @@ class Entry(NamedTuple):
     def level(self) -> str:
         """The verdict, or what there is instead."""
         trust = self.summary.get("trust", {})
-        return FAILED if self.failure is not None else str(trust.get("verdict", UNKNOWN))
+        return FAILED if self.failure is not None else verdict.level_of(trust) or UNKNOWN
 
     @property
     def shares(self) -> list[float]:

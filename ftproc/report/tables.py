@@ -79,7 +79,7 @@ def banner(view: View) -> str:
     trust = view.summary.get("trust")
     if not trust:
         return _banner(GREY, "no verdict: this file does not say how it was made", [])
-    level, reasons = trust["verdict"], trust["reasons"]
+    level, reasons = verdict.level_of(trust), trust["reasons"]
     if len(reasons) < 2:
         return _banner(VERDICT[level], verdict.sentence(trust), [trust["not_shown"]] if "not_shown" in trust else [])
     return _banner(VERDICT[level], f"{level}:", reasons)

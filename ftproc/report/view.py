@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.model.frames import from_cartesian, to_cartesian, unwrap, wrap
 from ftproc.files.moments import Moments
-from ftproc.quality.verdict import LEVELS
+from ftproc.quality.verdict import LEVELS, level_of
 from ftproc.records import ACCEPTED, GOOD, ISOLATED, PATCH, REJECTED, Diagnostics, FloatArray, Trajectory, Truth
 from ftproc.report.style import COMPONENT
 from ftproc.report.thinning import Timeline
@@ -92,7 +92,7 @@ def summary_of(trajectory: Trajectory) -> Mapping[str, Any]:
     """The summary in its metadata; empty for a trajectory of another program or version."""
     found = trajectory.metadata.get("summary")
     trust = found.get("trust") if isinstance(found, Mapping) else None
-    if not isinstance(found, Mapping) or not isinstance(trust, Mapping) or trust.get("verdict") not in LEVELS:
+    if not isinstance(found, Mapping) or not isinstance(trust, Mapping) or level_of(trust) not in LEVELS:
         return {}
     return found
 

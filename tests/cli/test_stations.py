@@ -222,7 +222,6 @@ def test_train_reads_its_logs_as_the_station_file_says(run, here):
     small = ("--population", "4", "--generations", "1", "--epochs", "2", "--hidden", "2")
     log, real = SAMPLES / "total_station.csv", SAMPLES / "total_station.truth.csv"
     pairs = ("train", *("--log", log, "--truth", real) * 6, "-o", "m.safetensors", *small)
-    assert 'total_station.csv: no unit is stated for "Hz" and "V"' in run(*pairs).err
     result = run(*pairs, "--config", SAMPLES / "total_station.toml")
     assert result.code == 0, result.err
     assert Path("m.safetensors").exists()

@@ -172,8 +172,9 @@ def _readings(recipes: Iterable[Recipe]) -> list[str]:
         if readings := conventions.in_words(recipe.station):
             found.append(f"readings: {', '.join(readings)}")
         if recipe.settings.site is not None:
-            axes = geodesy.axes(conventions.FRAMES[recipe.station.azimuth_from])
-            found.append(f"positions on the earth: {axes}, z is up")
+            axes = geodesy.axes(conventions.frame(recipe.station))
+            named = "" if recipe.station.azimuth_from else " (unless the azimuth's name says north)"
+            found.append(f"positions on the earth: {axes}{named}, z is up")
     return list(dict.fromkeys(found))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -10,13 +11,17 @@ import numpy as np
 from ftproc.files.reading.clocks import joint, numeric, times
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.meaning import motion, plausibility, readings, schema
+from ftproc.files.reading.meaning import readings, schema
+from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.numbers import Origin, finite, without_thousands
+from ftproc.files.reading.meaning.values import deciding, ways
 from ftproc.records import FloatArray
 from ftproc.settings import Station
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+_LOCAL = frozenset(("local", "localtime", "lt", "ortszeit", "lokalzeit"))
 
 Found = Mapping[str, schema.Column]
 
@@ -60,6 +65,7 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
                 clock = joint.read(dict(zip(column.roles, mine, strict=True)), origin, column)
             else:
                 clock = times.read(mine[0], origin, column)
+            clock = _of_a_zone(clock, column)
             quantities[quantity] = clock.time_s
             continue
         read_here[quantity] = readings.read(mine, origin, column)
@@ -71,6 +77,17 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
     return Converted(quantities, decided, clock, (*marks, *notes), readings.undecided(read_here))
 
 
+def _of_a_zone(clock: Clock, column: schema.Column) -> Clock:
+    """Without an epoch if the times are local ones and name no zone: they are no UTC."""
+    local = bool(_LOCAL & set(re.findall(r"[a-z]+", taken_apart(column.name).text.lower())))
+    zoned = len(column.roles) == 1 and not set(times.NO_ZONE) & set(clock.doubts)
+    if not clock.epoch or not local or zoned:
+        return clock
+    doubts = tuple(doubt for doubt in clock.doubts if doubt not in times.NO_ZONE)
+    said = f'"{column.name}" is a local time without its zone, so there is no time_utc'
+    return clock._replace(epoch="", doubts=(*doubts, said))
+
+
 def _origin(header: TableHeader, column: schema.Column) -> Origin:
     timestamp = " or an ISO-8601 timestamp" if column.quantity == "time" else ""
     expected = f"{'an' if column.quantity[0] in 'ae' else 'a'} {column.quantity} in {column.unit.name}{timestamp}"
@@ -78,14 +95,16 @@ def _origin(header: TableHeader, column: schema.Column) -> Origin:
 
 
 def judged(
-    source: str, quantities: Mapping[str, FloatArray], found: Found, clock: Clock, station: Station
-) -> plausibility.Judged:  # fmt: skip
-    """The units and conventions that the values show, see `plausibility` and `motion`."""
-    by_size = plausibility.judged(source, quantities, found, station)
+    source: str, quantities: Mapping[str, FloatArray], found: Found, clock: Clock, station: Station,
+    standard: bool = False,
+) -> deciding.Open:  # fmt: skip
+    """What the values show of the units and conventions that the names leave open, see `deciding`. standard: the format
+    says what the columns are."""
     time = found["time"]
     bare_time = not (time.unit_is_stated or clock.epoch) and clock.words.startswith(numeric.BARE)
-    in_si = in_other_units(quantities, found, by_size.found)
-    return by_size._replace(found=motion.judged(source, in_si, by_size.found, bare_time))
+    numbered = not clock.epoch and clock.words.startswith("numbers in")
+    known = ways.Known(source, found, station, bare_time, numbered, standard)
+    return deciding.judged(known, quantities)
 
 
 def in_other_units(quantities: Mapping[str, FloatArray], found: Found, decided: Found) -> dict[str, FloatArray]:

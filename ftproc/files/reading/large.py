@@ -82,7 +82,7 @@ def _into(spool: _Spool, source: str, blocks: Blocks, convert: Convert, station:
         return None
     time_s, measurement, row = spool.arrays()
     log = MeasurementLog(
-        source, time_s, measurement, row, conventions.FRAMES[station.azimuth_from], spool.rows_in_file,
+        source, time_s, measurement, row, conventions.frame(station), spool.rows_in_file,
         tuple(spool.without_time), duplicate_times=times.duplicates, station=station, epoch=times.epoch,
     )  # fmt: skip
     return Spooled(log, {name: np.concatenate([each[name] for each in sampled]) for name in sampled[0]})

@@ -11,13 +11,15 @@ import numpy as np
 
 from ftproc.errors import InputError
 from ftproc.files import conventions
+from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT, Condition, Extract, parse_columns, parse_units, parse_where
-from ftproc.files.reading import converting, large, understanding
+from ftproc.files.reading import converting, large, proposal, understanding
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.formats.standards import choosing
-from ftproc.files.reading.meaning import plausibility, proposal, rows, schema, several, stamps
+from ftproc.files.reading.meaning import names, rows, schema, several
+from ftproc.files.reading.meaning.values import deciding, plausibility, stamps
 from ftproc.records import FloatArray, IntArray, MeasurementLog
 from ftproc.settings import Station
 
@@ -28,7 +30,8 @@ Found = Mapping[str, schema.Column]
 
 
 class _Plan(NamedTuple):
-    """What is read of a table, and how. others: positions of the columns that are kept beside."""
+    """What is read of a table, and how. others: positions of the columns that are kept beside. notes: on what its
+    values have shown."""
 
     header: TableHeader
     found: Found
@@ -36,6 +39,7 @@ class _Plan(NamedTuple):
     conditions: tuple[Condition, ...] = ()
     others: tuple[int, ...] = ()
     extract: Extract = Extract()
+    notes: tuple[str, ...] = ()
 
     def positions(self) -> list[int]:
         """Of the columns of all quantities, in their order."""
@@ -80,7 +84,7 @@ def read(
     header = tables.read_header(source, extract.widths)
     choosing.refuse_open(header, {**unit_of, **column_of})
     column_of = {**header.stated.columns, **column_of}
-    if header.stated.azimuth_from and azimuth_from is None:
+    if header.stated.azimuth_from and station.azimuth_from is None:
         station = replace(station, azimuth_from=header.stated.azimuth_from)
     propose = proposal.by_values(header)
     if "time" not in column_of and not schema.has_time(header.names, header.units):
@@ -151,7 +155,7 @@ def _in_blocks(plan: _Plan) -> MeasurementLog | None:
         clocks[:] = clocks or [clock._replace(time_s=clock.time_s[:0])]
         return converted.quantities, clock.epoch
 
-    station = with_zenith(plan.station, plan.found)
+    station = as_named(plan.station, plan.found)
     spooled = large.read(header.source, blocks, convert, station)
     if spooled is None:
         return None
@@ -163,7 +167,7 @@ def _in_blocks(plan: _Plan) -> MeasurementLog | None:
     times = sample["time"][~np.isnan(sample["time"])]
     if several.alternate(timed) or log.duplicate_times > len(log) / 3 or stamps.coarse(times) is not None:
         return None  # only the whole file shows what these are
-    return _explained(plan, log, clocks[0]._replace(epoch=log.epoch), (), judged.doubts, timed)
+    return _explained(plan, log, clocks[0]._replace(epoch=log.epoch), (), judged, timed)
 
 
 def _at_once(plan: _Plan) -> MeasurementLog:
@@ -175,7 +179,11 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     kept, notes = _kept(plan, table, chosen)
     choosing.refuse_several(header, plan.extract, kept)
     converted = converting.converted(header, found, table.columns if kept is None else table.take(kept).columns)
-    judged = converting.judged(header.source, converted.quantities, converted.found, converted.clock, plan.station)
+    known = converted.quantities, converted.found, converted.clock, plan.station, header.is_of_a_standard
+    judged = converting.judged(header.source, *known)
+    packed = {q: column for q, column in judged.found.items() if column.notation != converted.found[q].notation}
+    if packed:  # their cells are read anew
+        return _at_once(plan._replace(found={**found, **packed}, notes=judged.doubts))
     quantities = converting.in_other_units(converted.quantities, converted.found, judged.found)
     quantities["time"], spread = stamps.spread(quantities)
     extra = table.select(list(range(len(chosen), table.num_columns))) if plan.others else None
@@ -190,7 +198,7 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     clock = converted.clock
     if judged.found["time"].unit != converted.found["time"].unit:
         clock = clock._replace(words=f"numbers in {judged.found['time'].unit.name}, by the motion")
-    explained = _explained(plan, replace(log, epoch=clock.epoch), clock, notes, judged.doubts)
+    explained = _explained(plan, replace(log, epoch=clock.epoch), clock, notes, judged)
     return conventions.apply(explained, explained.station)
 
 
@@ -220,26 +228,39 @@ def _kept(plan: _Plan, table: pa.Table, chosen: list[int]) -> tuple[IntArray | N
     return kept.astype(np.int64), (f"{left_out} of {len(mask)} rows are left out, which do not meet {said}",)
 
 
-def with_zenith(station: Station, found: Found) -> Station:
-    """The station with what the name of the elevation's column says."""
-    if station.elevation_from is not None:
-        return station
+def as_named(station: Station, found: Found) -> Station:
+    """The station with what the names of the angles' columns say."""
     zenith = "elevation" in found and found["elevation"].zenith
-    return replace(station, elevation_from="zenith" if zenith else "horizon")
+    north = "azimuth" in found and names.says_north(found["azimuth"].name)
+    return replace(
+        station,
+        elevation_from=station.elevation_from or ("zenith" if zenith else "horizon"),
+        azimuth_from=station.azimuth_from or ("north" if north else "x"),
+    )
+
+
+def knows_axis(station: Station, found: Found) -> bool:
+    """Whether anything says from where the azimuth counts: the user, its name, or that it is one of the program's own
+    names, whose azimuths count from x."""
+    azimuth = found.get("azimuth")
+    stated = station.azimuth_from or station.azimuth_sense
+    return bool(azimuth is None or stated or azimuth.name == CANONICAL["azimuth"] or names.says_north(azimuth.name))
 
 
 def _explained(
-    plan: _Plan, log: MeasurementLog, clock: Clock, notes: Iterable[str], doubts: Iterable[str],
+    plan: _Plan, log: MeasurementLog, clock: Clock, notes: Iterable[str], judged: deciding.Open,
     sample: FloatArray | None = None,
 ) -> MeasurementLog:  # fmt: skip
     """The log with its station, and with remarks on how it was understood."""
-    station = with_zenith(plan.station, plan.found)
+    station = as_named(plan.station, plan.found)
     values = log.measurement if sample is None else sample
-    names = [] if plan.header.is_of_a_standard else plan.header.names
-    remarks = schema.remarks(names, plan.found, bool(clock.epoch))
-    doubtful = (*doubts, *plausibility.doubts(values, station))
+    called = [] if plan.header.is_of_a_standard else plan.header.names
+    remarks = schema.remarks(called, plan.found, bool(clock.epoch))
+    doubtful = (*plan.notes, *judged.doubts, *plausibility.doubts(values, station))
     said = (*notes, *doubtful)
-    understood = understanding.describe(plan.header, plan.found, clock, station, said)
+    axis = knows_axis(plan.station, plan.found)
+    understood = understanding.describe(plan.header, plan.found, clock, station, said, axis)
+    understood["assumed"] = list(judged.conditions)
     digest = plan.header.sha256()
     return replace(log, remarks=(*remarks, *said), understood=understood, station=station, sha256=digest)
 

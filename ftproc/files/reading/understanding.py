@@ -17,6 +17,7 @@ from ftproc.settings import Station
 
 Understood = Mapping[str, Any]
 
+_AXIS = "nothing says where the azimuth counts from: if clockwise from north, say --azimuth-from north"
 _AXES = {
     "x": "azimuth anticlockwise from x",
     "north": "azimuth clockwise from north, x is north and y is east",
@@ -24,10 +25,12 @@ _AXES = {
 
 
 def describe(
-    header: TableHeader, found: Mapping[str, Column], clock: Clock, station: Station, doubts: Sequence[str]
-) -> dict[str, Any]:
+    header: TableHeader, found: Mapping[str, Column], clock: Clock, station: Station, doubts: Sequence[str],
+    axis_is_known: bool,
+) -> dict[str, Any]:  # fmt: skip
     """file: kind and layout. columns: of each quantity its column, unit and why. not_used: the other columns. clock and
-    epoch: of the times. conventions: of the angles, and what was corrected. doubts: each with the option that settles
+    epoch: of the times. conventions: of the angles, and what was corrected. axis_is_known: whether anything says from
+    where the azimuth counts. doubts: each with the option that settles
     it."""
     used = {place for column in found.values() for place in column.positions}
     unused = [name for place, name in enumerate(header.names) if place not in used and name]
@@ -38,12 +41,13 @@ def describe(
         "clock": clock.words,
         "epoch": clock.epoch,
         "conventions": _conventions(station, found),
+        "axis_is_known": axis_is_known,
         "doubts": [
             *_others(header.names, found),
             *_absent(found, [] if header.is_of_a_standard else unused),
             *doubts,
             *clock.doubts,
-            *([] if header.is_of_a_standard else _axis(station, found)),
+            *([] if header.is_of_a_standard or axis_is_known else [_AXIS]),
         ],
     }
 
@@ -59,7 +63,7 @@ def _column(column: Column, header: TableHeader) -> dict[str, Any]:
 
 
 def _conventions(station: Station, found: Mapping[str, Column]) -> list[str]:
-    lines = [_AXES[station.azimuth_from]] if "azimuth" in found else []
+    lines = [_AXES[conventions.axis(station)]] if "azimuth" in found else []
     zenith = station.elevation_from == "zenith"
     lines += [] if zenith or "elevation" not in found else ["elevation above the horizontal"]
     return lines + conventions.in_words(station)
@@ -82,13 +86,6 @@ def _absent(found: Mapping[str, Column], unused: Sequence[str]) -> list[str]:
     return [f"nothing is taken for the {q}: if one of {free} is it, say --columns {q}=NAME" for q in absent if free]
 
 
-def _axis(station: Station, found: Mapping[str, Column]) -> list[str]:
-    column = found.get("azimuth")
-    if column is None or station.azimuth_from == "north" or station.azimuth_sense or column.name == "azimuth_rad":
-        return []
-    return ["nothing says where the azimuth counts from: if clockwise from north, say --azimuth-from north"]
-
-
 def lines(understood: Understood) -> list[tuple[str, str]]:
     """Five lines, each a name and a text."""
     columns = [
@@ -97,6 +94,7 @@ def lines(understood: Understood) -> list[tuple[str, str]]:
         for quantity, column in understood["columns"].items()
     ]  # fmt: skip
     unused = listed(understood["not_used"])
+    assumed = [f"nothing tells whether {each}, which is assumed" for each in understood.get("assumed", ())]
     zero = f"time zero is {understood['epoch']}" if understood["epoch"] else "no date known"
     clock = f"{understood['clock']}, {zero}"
     return [
@@ -104,5 +102,5 @@ def lines(understood: Understood) -> list[tuple[str, str]]:
         ("columns", "; ".join(columns) + (f"; not used: {unused}" if unused else "")),
         ("clock", clock),
         ("readings", "; ".join(understood["conventions"]) or "as they are"),
-        ("doubtful", "; ".join(understood["doubts"]) or "nothing"),
+        ("doubtful", "; ".join([*understood["doubts"], *assumed]) or "nothing"),
     ]

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ftproc.errors import UsageError
-from ftproc.files import arrow
+from ftproc.files import arrow, conventions
 from ftproc.files.writing import tables
-from ftproc.records import FloatArray, Trajectory
+from ftproc.records import FloatArray, MeasurementLog, Trajectory
 from ftproc.settings import FilterSettings
 
 COLUMNS = ("lat_deg", "lon_deg", "height_m")
@@ -42,6 +42,13 @@ def check(settings: FilterSettings) -> None:
         require_pymap3d()
     elif settings.ecef:
         raise UsageError("--ecef needs the station: give --site LAT,LON,HEIGHT, or [site] in the --config file.")
+
+
+def check_axes(log: MeasurementLog, settings: FilterSettings) -> None:
+    """Raise InputError, a question, if positions on the earth are asked for and nothing says from where the azimuths of
+    a log count."""
+    if settings.site is not None and log.understood.get("axis_is_known") is False:
+        raise conventions.axis_question(log.name, log.understood["columns"]["azimuth"]["column"])
 
 
 def located(trajectory: Trajectory, settings: FilterSettings) -> Trajectory:

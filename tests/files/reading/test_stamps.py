@@ -8,7 +8,7 @@ import pytest
 
 from ftproc.files.reading import logs
 from ftproc.files.reading.formats import blocks, content
-from ftproc.files.reading.meaning import stamps
+from ftproc.files.reading.meaning.values import stamps
 from ftproc.records import FloatArray, MeasurementLog
 from tests.files.conftest import Make
 

@@ -82,7 +82,7 @@ def test_timestamps_keep_microseconds_for_a_week(ticks: list[int]) -> None:
     first = min(ticks) // (86400 * 10**6) * 86400 * 10**6
     for unit in ("us", "ns"):
         column = pa.array([day + tick for tick in ticks], pa.timestamp("us")).cast(pa.timestamp(unit, "UTC"))
-        log = logs.read(pa.table({"time": column, "R": [1.0] * len(ticks)}))
+        log = logs.read(pa.table({"time": column, "range_m": [1.0] * len(ticks)}))
         assert log.time_s.tolist() == sorted((tick - first) / 10**6 for tick in ticks)
 
 
@@ -107,3 +107,11 @@ def test_the_day_of_timestamps_is_kept():
     assert found.epoch == "2024-05-31T00:00:00Z"
     np.testing.assert_array_equal(found.time_s, [86399.0, 86401.0])
     assert logs.read(pa.table({"time_s": [0.0], "range_m": [5.0]})).epoch == ""
+
+
+def test_a_local_time_is_no_utc(make: Make) -> None:
+    rows = "".join(f"2024-05-31 12:00:{k:02d},{1000 + k}\n" for k in range(20))
+    for name, epoch in (("Time", "2024-05-31T00:00:00Z"), ("Local Time", "")):
+        log = logs.read(make(f"{name},range_m\n{rows}"))
+        assert log.epoch == epoch
+        assert any("without its zone" in doubt for doubt in log.understood["doubts"]) == (not epoch)

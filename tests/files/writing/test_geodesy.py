@@ -9,10 +9,12 @@ import pyarrow as pa
 import pytest
 
 from ftproc.core.model.frames import to_cartesian
-from ftproc.errors import UsageError
+from ftproc.errors import InputError, UsageError
+from ftproc.files.reading import logs
 from ftproc.files.writing import geodesy
 from ftproc.records import Trajectory
 from ftproc.settings import FilterSettings
+from tests.files.conftest import Make
 
 SITE = (48.0812, 11.2803, 612.0)
 
@@ -111,3 +113,21 @@ def test_without_a_site_nothing_is_added_and_ecef_is_refused():
     assert geodesy.located(plain, FilterSettings()) is plain
     with pytest.raises(UsageError, match=r"--ecef needs the station: give --site LAT,LON,HEIGHT, or \[site\]"):
         geodesy.located(plain, FilterSettings(ecef=True))
+
+
+@pytest.mark.parametrize(
+    ("name", "axis"), [("Az", ""), ("Bearing", "north"), ("True Azimuth", "north"), ("azimuth_rad", "x")]
+)
+def test_the_axis_of_an_unknown_azimuth_is_asked_about(make: Make, name: str, axis: str) -> None:
+    settings = FilterSettings(site=(48.0, 11.0, 600.0))
+    rows = "".join(f"{k},{4000 + 30 * k},{0.3 + 0.002 * k},0.1\n" for k in range(30))
+    path = make(f"time_s,range_m,{name},el_rad\n{rows}")
+    log = logs.read(path, units=None if axis == "x" else "azimuth=rad")
+    assert log.station.azimuth_from == (axis or "x")
+    if axis:
+        geodesy.check_axes(log, settings)
+        return
+    with pytest.raises(InputError, match="Say --azimuth-from north if clockwise from north, or --azimuth-from x"):
+        geodesy.check_axes(log, settings)
+    geodesy.check_axes(log, FilterSettings())
+    geodesy.check_axes(logs.read(path, units="azimuth=rad", azimuth_from="x"), settings)

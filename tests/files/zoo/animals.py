@@ -172,8 +172,7 @@ def names() -> Iterator[Animal]:
     gon = (DEG_A / 0.9, DEG_E / 0.9)
     yield _named("bare gon past a turn", "Time,SD,HZ,Altitude angle", F.t, F.r, *gon)
     zenith = 90 - DEG_E
-    asked = {"answer": {"elevation_from": "zenith"}, "asks": "--elevation-from zenith"}
-    yield _named("bare V is a zenith angle", "Time,SD,Hz (deg),V (deg)", F.t, F.r, DEG_A, zenith, **asked)
+    yield _named("bare V is a zenith angle", "Time,SD,Hz (deg),V (deg)", F.t, F.r, DEG_A, zenith)
     yield _named("ZA", "Time,SD (m),AZ (deg),ZA (deg)", F.t, F.r, DEG_A, zenith)
     for label, pattern in (("signs", "{d}°{m:02d}'{s:05.2f}\""), ("colons", "{d}:{m:02d}:{s:05.2f}"),
                            ("blanks", "{d} {m:02d} {s:05.2f}")):  # fmt: skip

@@ -194,8 +194,7 @@ def lists() -> Iterator[Animal]:
     yield Animal("a radar among lidar", written("a.txt", mixed), absent=FLAT, **UTC)
     yield Animal("FTPdetectinfo", written("FTPdetectinfo_X.txt", _meteor()), absent=ANGLES_ONLY, clock=2e-3, **UTC)
     words = "".join(_gsi(k) for k in range(len(F.t)))
-    asked = {"asks": "--elevation-from zenith", "answer": {"elevation_from": "zenith"}}
-    yield Animal("GSI of 16 digits with word 51", written("a.gsi", words), **asked, **UTC)
+    yield Animal("GSI of 16 digits with word 51", written("a.gsi", words), **UTC)
 
 
 def _meteor() -> str:

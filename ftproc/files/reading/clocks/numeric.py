@@ -58,6 +58,10 @@ def read(values: FloatArray, column: Column, source: str = "") -> Clock:
     kind = _STEMS.get(column.key, "")
     if not known.size:
         return Clock(column.unit.to_si(values), "", "no time is there")
+    if _is_hhmmss_named_s(values, column):
+        seconds, notes = unrolled(from_hhmmss(values), DAY_S)
+        doubt = f'"{column.name}" jumps by 40 at each full minute, as hhmmss: if it is in s, say --units time=s'
+        return Clock(seconds, "", "time of day as hhmmss, in s since midnight", notes, (doubt,))
     if column.unit_is_stated and not (kind in _DAY_COUNTS and column.unit.name == "d"):
         return _in_seconds(column.unit.to_si(values), kind, column, f"numbers in {column.unit.name}")
     size, most = _typical(known), float(known.max())
@@ -144,6 +148,11 @@ def _is_hhmmss(kind: str, notation: str, values: FloatArray, most: float) -> boo
     if notation.startswith("hhmmss"):
         return True
     return kind in ("day", "") and DAY_S < most < 240_000 and is_hhmmss(values) and (kind == "day" or _jumps(values))
+
+
+def _is_hhmmss_named_s(values: FloatArray, column: Column) -> bool:
+    in_s = column.unit_in_name and not column.unit_stated_by_user and column.unit.name == "s"
+    return in_s and _is_hhmmss("", "", values, float(np.nanmax(values)))
 
 
 def _is_calendar(known: FloatArray) -> bool:

@@ -58,6 +58,11 @@ NOTATIONS = frozenset(
 )
 
 
+#: Words of azimuths that count clockwise from north, and how else it is said.
+_FROM_NORTH = frozenset(("bearing", "brg", "taz", "north", "clockwise", "cw", "peilung", "пеленг"))
+_EAST_OF_NORTH = re.compile(r"\+?\s*(?:E|east) (?:of|from) (?:due |true )?N(?:orth)?\b", re.IGNORECASE)
+
+
 class Name(NamedTuple):
     """text: as in the file. stem: small letters and digits. words: of the stem. unit: as written, or "".
 
@@ -101,7 +106,7 @@ def taken_apart(text: str, unit: str = "") -> Name:
     if max(len(text), len(unit)) > LONGEST_NAME:
         return Name(text, "", ())
     plain = _compatible(text).strip().strip("\"'#%;!:").strip()
-    plain = _VALUE.sub("", _NUMBERED.sub("", plain))
+    plain = _EAST_OF_NORTH.sub("", _VALUE.sub("", _NUMBERED.sub("", plain)))
     found, notation, foreign = "", "", False
     opening = _OPENING.search(plain) if plain.endswith(_CLOSING) else None
     if opening:
@@ -145,6 +150,13 @@ def _unit_inside(text: str) -> str:
     if _is_unit(text) or _COUNTS.search(_LIMITS_OF_VALUES.sub("", text)):
         return text if _is_unit(text) else ""
     return next((part for part in re.split(r"[\s,;]+", text) if _is_unit(part)), "")
+
+
+def says_north(text: str) -> bool:
+    """Whether the name of an azimuth says that it counts clockwise from true north."""
+    name = taken_apart(text)
+    said = name.notation in ("t", "true") or name.words[:1] == ("true",) or _FROM_NORTH & {name.stem, *name.words}
+    return bool(said or _EAST_OF_NORTH.search(text))
 
 
 def _squeezed(text: str) -> str:

@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 from ftproc.errors import InputError, nearest, quoted
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
-from ftproc.files.reading.meaning.names import Name
+from ftproc.files.reading.meaning.names import Name, taken_apart
 from ftproc.files.units import UNITS, unit_named
 from ftproc.files.words import ALIASES, EITHER_ANGLE, NOT_UNITS, QUANTITIES
 
 #: Words of NOT_UNITS with which a column may still be the quantity.
 _OF_THE_QUANTITY = frozenset(["true", "corr", "raw", "ref"])
 
-#: Free columns and quantities sought -> which column may be which, by the values; see `proposal`.
-Propose = Callable[[Sequence[int], Sequence[str]], Mapping[str, int]]
+
+class Proposal(NamedTuple):
+    """answer: the options that say which column is which, as they were tried on the log; or "". seen: what each column
+    holds."""
+
+    answer: str = ""
+    seen: str = ""
+
+
+#: Free columns, and those of each quantity that is known -> which of the free ones may be which; see `proposal`.
+Propose = Callable[[Sequence[int], Mapping[str, Sequence[int]]], Proposal]
 
 
 def named(name: str, place: int) -> str:
@@ -24,9 +34,10 @@ def named(name: str, place: int) -> str:
     return name if plain else str(place + 1)
 
 
-def answer(names: Sequence[str], columns: Mapping[str, int]) -> str:
-    """`--columns range=RNG,azimuth=3`, as a shell takes it."""
-    return f"--columns {','.join(f'{q}={quoted(named(names[place], place))}' for q, place in columns.items())}"
+def answer(names: Sequence[str], columns: Mapping[str, int], time: str = "") -> str:
+    """`--columns range=RNG,azimuth=3`, as a shell takes it. time: its columns, such as 1+2."""
+    each = [*([f"time={time}"] if time else []), *(f"{q}={named(names[place], place)}" for q, place in columns.items())]
+    return f"--columns {quoted(','.join(each))}"
 
 
 def listed(names: Sequence[str]) -> str:
@@ -117,13 +128,8 @@ def check_complete(source: str, names: Sequence[str], found: Mapping[str, tuple[
         return
     taken = {place for places in found.values() for place in places}
     free = [place for place in range(len(names)) if place not in taken]
-    sought = [quantity for quantity in QUANTITIES if quantity not in found]
-    proposed = propose(free, sought)
-    if names and list(names) == [str(number) for number in range(1, len(names) + 1)]:
-        raise InputError(
-            f"{source}: there is no line of column names. Say which column is which by their numbers, such as "
-            f"{answer(names, proposed or in_order(free, sought))}."
-        )
+    sought = [quantity for quantity in QUANTITIES if quantity not in found and ("time" in found or len(found) == 0)]
+    sought = sought or ["time"]
     wanted = "time" if "time" not in found else "range"
     what = "no time column" if wanted == "time" else "neither range nor azimuth nor elevation"
     if {"x_m", "y_m", "z_m"} <= set(names):
@@ -131,23 +137,29 @@ def check_complete(source: str, names: Sequence[str], found: Mapping[str, tuple[
             f"{source}: x_m, y_m, z_m are columns of a truth, for `ftproc score TRAJECTORY --truth {source}`, not of a "
             f"log: it has {what}. Its columns are: {listed(names)}."
         )
-    hint = nearest(CANONICAL[wanted], [names[place] for place in free])
-    similar = next(({wanted: place} for place in free if hint and f'"{names[place]}"' in hint), {})
-    proposed = proposed if set(proposed) == set(sought) else similar or proposed
-    say = answer(names, proposed) if wanted in proposed or (wanted == "range" and proposed) else ""
+    proposed = propose(free, found)
+    seen = f" Its columns hold, in two rows: {proposed.seen}." if proposed.seen else ""
+    none = f"--columns {','.join(f'{quantity}=NAME' for quantity in sought)}"
+    say = f"{proposed.answer or none}{', which gives a target that moves like one' * (len(sought) > 1)}" \
+        if proposed.answer else none  # fmt: skip
+    if names and list(names) == [str(number) for number in range(1, len(names) + 1)]:
+        none_moves = (
+            "" if proposed.answer or not seen else " No choice of them gives a target that clearly moves like one."
+        )
+        raise InputError(
+            f"{source}: there is no line of column names.{seen}{none_moves} Say which column is which by their "
+            f"numbers, such as {say}."
+        )
+    others = [names[place] for place in free if not NOT_UNITS & {*taken_apart(names[place]).words}]
+    hint = nearest(CANONICAL[wanted], others)
+    similar = next((place for place in free if hint and f'"{names[place]}"' in hint), None)
+    say = say if proposed.answer or similar is None else answer(names, {wanted: similar})
     raise InputError(
         f"{source}: {what} (expected {CANONICAL[wanted]} or {' or '.join(ALIASES[wanted][:2])}){hint or '.'} "
-        f"Its columns are: {listed(names)}. Name the right ones with "
-        f"{say or '--columns ' + ','.join(f'{quantity}=NAME' for quantity in sought)}."
+        f"Its columns are: {listed(names)}.{seen} Name the right ones with {say}."
     )
 
 
-def in_order(free: Sequence[int], sought: Sequence[str]) -> Mapping[str, int]:
-    """The columns in the order of the quantities; without the range if there are too few."""
-    sought = sought if len(free) >= len(sought) else [quantity for quantity in sought if quantity != "range"]
-    return dict(zip(sought, free, strict=False))
-
-
-def nothing(free: Sequence[int], sought: Sequence[str]) -> Mapping[str, int]:
+def nothing(free: Sequence[int], found: Mapping[str, Sequence[int]]) -> Proposal:
     """No proposal."""
-    return {}
+    return Proposal()

@@ -21,8 +21,17 @@ from ftproc.settings import Station
 _MAX_MEDIAN = {"azimuth": 4 * math.pi, "elevation": math.pi / 2, "zenith angle": math.pi}
 _STEEP_DEG = 60  # few records have a median elevation above this
 _MAX_ANGLE = 1e6  # rad; larger ones are clipped
-_SURVEYORS = ("hz", "horizontalangle", "horizontaldirection", "hzangle", "v", "verticalangle", "vertangle", "ha", "va")
-_TURNS = {"deg": 360.0, "grad": 400.0, "mil6000": 6000.0, "mrad": 2e3 * math.pi, "mil6300": 6300.0, "mil": 6400.0}
+SURVEYORS = ("hz", "horizontalangle", "horizontaldirection", "hzangle", "v", "verticalangle", "vertangle", "ha", "va")
+_TURNS = {
+    "rad": 2 * math.pi,
+    "deg": 360.0,
+    "grad": 400.0,
+    "mil6000": 6000.0,
+    "mrad": 2e3 * math.pi,
+    "mil6300": 6300.0,
+    "mil": 6400.0,
+}
+_SAME_TURN = 0.002
 _FEWEST, _FEWEST_MINUTES = 24, 3  # rows, and different minutes in them, by which packed angles are known
 
 
@@ -33,7 +42,7 @@ class Judged(NamedTuple):
     doubts: tuple[str, ...] = ()
 
 
-class _Angles(NamedTuple):
+class Sizes(NamedTuple):
     """Sizes of the angles of a column in its own unit: the median and the 99th percentile of the absolute values, the
     smallest value, and the turn by which they jump, or 0."""
 
@@ -49,31 +58,34 @@ def judged(source: str, quantities: Mapping[str, FloatArray], found: Mapping[str
 
     quantities: (n,) in SI units as `found` says. station: its `elevation_from` may be None (not stated).
     """
-    angles = {q: _angles(quantities[q], found[q].unit) for q in ("azimuth", "elevation") if q in found}
-    known = {quantity: sizes for quantity, sizes in angles.items() if sizes is not None}
-    bare = {quantity: sizes for quantity, sizes in known.items() if not found[quantity].unit_is_stated}
-    decided, doubts = dict(found), []
-    other = _other_mil(found, known)
-    if other:
-        for quantity in known:
-            if _is_bare_mil(found[quantity]):
-                decided[quantity] = found[quantity]._replace(unit=UNITS[quantity][other])
-        doubts.append(f"the azimuth turns at {_TURNS[other]:g}, so its mils are {other}")
+    known = sizes(quantities, found)
+    bare = {quantity: mine for quantity, mine in known.items() if not found[quantity].unit_is_stated}
+    decided, doubts = with_other_mil(found, known)
     zenith = station.elevation_from == "zenith" or ("elevation" in found and found["elevation"].zenith)
     if bare:
         unit, doubt = _common_unit(source, bare, found, zenith)
         for quantity in bare:
             decided[quantity] = found[quantity]._replace(unit=UNITS[quantity][unit])
         doubts += [doubt] if doubt else []
-    for quantity, sizes in known.items():
+    for quantity, mine in known.items():
         if quantity not in bare:
-            _check(source, quantity, sizes, found, zenith)
-    _ask_about_packed(source, quantities, found, decided)
+            _check(source, quantity, mine, found, zenith)
     _ask_about_zenith(source, known, decided, station)
     return Judged(decided, tuple(doubts))
 
 
-def _angles(values: FloatArray, unit: Unit) -> _Angles | None:
+def sizes(quantities: Mapping[str, FloatArray], found: Mapping[str, Column]) -> dict[str, Sizes]:
+    """The sizes of the angles that are there."""
+    return sizes_in(quantities, {q: found[q].unit for q in ("azimuth", "elevation") if q in found})
+
+
+def sizes_in(quantities: Mapping[str, FloatArray], units: Mapping[str, Unit]) -> dict[str, Sizes]:
+    """The sizes of the angles of which there are units."""
+    each = {quantity: _sizes(quantities[quantity], unit) for quantity, unit in units.items()}
+    return {quantity: mine for quantity, mine in each.items() if mine is not None}
+
+
+def _sizes(values: FloatArray, unit: Unit) -> Sizes | None:
     known = values[~np.isnan(values)]
     if not known.size:
         return None
@@ -88,34 +100,36 @@ def _angles(values: FloatArray, unit: Unit) -> _Angles | None:
         if near.any() and most <= 1.0001 * size:
             turn = size
             break
-    return _Angles(half, most, float(known.min()), turn)
+    return Sizes(half, most, float(known.min()), turn)
 
 
 def _is_bare_mil(column: Column) -> bool:
     return column.unit.name == "mil" and column.unit_in_name and not column.unit_stated_by_user
 
 
-def _other_mil(found: Mapping[str, Column], known: Mapping[str, _Angles]) -> str:
-    """The other kind of mil at whose turn the azimuth jumps, or ""."""
+def with_other_mil(found: Mapping[str, Column], known: Mapping[str, Sizes]) -> tuple[dict[str, Column], list[str]]:
+    """The columns with the kind of mil at whose turn the azimuth jumps, and a note on it."""
     if "azimuth" not in known or not _is_bare_mil(found["azimuth"]):
-        return ""
-    return next((name for name in ("mil6000", "mil6300") if known["azimuth"].turn == _TURNS[name]), "")
+        return dict(found), []
+    other = next((name for name in ("mil6000", "mil6300") if known["azimuth"].turn == _TURNS[name]), "")
+    if not other:
+        return dict(found), []
+    mils = {q: found[q]._replace(unit=UNITS[q][other]) for q in known if _is_bare_mil(found[q])}
+    return {**found, **mils}, [f"the azimuth turns at {_TURNS[other]:g}, so its mils are {other}"]
 
 
-def _common_unit(
-    source: str, bare: Mapping[str, _Angles], found: Mapping[str, Column], zenith: bool
-) -> tuple[str, str]:
+def _common_unit(source: str, bare: Mapping[str, Sizes], found: Mapping[str, Column], zenith: bool) -> tuple[str, str]:
     """The unit of the angles without one, which one instrument writes alike, and what is doubtful about it."""
-    if all(_fits(quantity, "rad", sizes, zenith) for quantity, sizes in bare.items()):
+    if all(fits(quantity, UNITS[quantity]["rad"], sizes, zenith) for quantity, sizes in bare.items()):
         return "rad", ""
     names = " and ".join(f'"{found[quantity].name}"' for quantity in bare)
     say = ",".join(f"{quantity}=UNIT" for quantity in bare)
     turn = next((sizes.turn for sizes in bare.values() if sizes.turn), 0.0)
     turned = next((name for name, size in _TURNS.items() if size == turn), "")
-    possible = [u for u in _TURNS if all(_fits(q, u, sizes, zenith) for q, sizes in bare.items())]
+    possible = [u for u in _TURNS if all(fits(q, UNITS[q][u], sizes, zenith) for q, sizes in bare.items())]
     if turned in possible:
         return turned, ""
-    surveyors = any(found[quantity].key in _SURVEYORS for quantity in bare)
+    surveyors = any(found[quantity].key in SURVEYORS for quantity in bare)
     azimuth = bare.get("azimuth")
     if possible[:1] == ["deg"] and not surveyors and not (azimuth and azimuth.most > 360):
         grad = say.replace("UNIT", "grad")
@@ -130,17 +144,23 @@ def _common_unit(
     )
 
 
-def _fits(quantity: str, unit: str, sizes: _Angles, zenith: bool) -> bool:
-    """Whether angles are possible in a unit."""
-    if unit == "rad":
-        return sizes.half <= _MAX_MEDIAN["zenith angle" if quantity == "elevation" and zenith else quantity]
-    turn = _TURNS[unit]
+def fits(quantity: str, unit: Unit, sizes: Sizes, zenith: bool, stated: bool = False) -> bool:
+    """Whether angles are possible in a unit. stated: by a name, so that an azimuth may count on beyond a turn."""
+    if unit.name == "rad" or stated:
+        most = _MAX_MEDIAN["zenith angle" if quantity == "elevation" and zenith else quantity]
+        return sizes.half * unit.multiply / unit.divide <= most
+    turn = 2 * math.pi * unit.divide / unit.multiply
     if quantity == "azimuth":
         return sizes.half <= turn and (sizes.most <= 1.03 * turn or sizes.half <= turn / 2)
-    return sizes.half <= (turn / 2 if zenith else turn / 3)
+    return sizes.half <= (turn / 2 if zenith else turn / 4)
 
 
-def _check(source: str, quantity: str, sizes: _Angles, found: Mapping[str, Column], zenith: bool) -> None:
+def turns(unit: Unit, sizes: Sizes) -> bool:
+    """Whether the azimuth jumps by a whole turn of the unit."""
+    return abs(2 * math.pi * unit.divide / unit.multiply / sizes.turn - 1) < _SAME_TURN
+
+
+def _check(source: str, quantity: str, sizes: Sizes, found: Mapping[str, Column], zenith: bool) -> None:
     """Raise InputError if the angles cannot be in the unit that a name states."""
     column = found[quantity]
     what = "zenith angle" if quantity == "elevation" and zenith else quantity
@@ -183,24 +203,16 @@ def _and_the_other_angle(quantity: str, found: Mapping[str, Column], unit: str) 
     return f" (and {other.quantity}={unit} if that is so too)"
 
 
-def _ask_about_packed(
-    source: str, quantities: Mapping[str, FloatArray], found: Mapping[str, Column], decided: Mapping[str, Column]
-) -> None:
-    """Raise InputError, a question, for degrees whose decimals may be minutes and seconds: 60.1608 as 60°16′08″."""
+def packed(
+    quantities: Mapping[str, FloatArray], found: Mapping[str, Column], decided: Mapping[str, Column]
+) -> list[str]:
+    """The quantities in degrees whose decimals are minutes and seconds: 60.1608 is 60°16′08″."""
     degrees = [q for q, column in decided.items() if column.unit.name == "deg" and not column.unit_stated_by_user]
-    packed = [q for q in degrees if not decided[q].notation and _is_packed(quantities[q], found[q].unit)]
-    if packed:
-        names = " and ".join(f'"{decided[quantity].name}"' for quantity in packed)
-        named_so = " and ".join(f"{quantity}_dms" for quantity in packed)
-        raise InputError(
-            f"{source}: no minutes and seconds in the digits of {names} reach 60, as if they were packed (D.MMSS). "
-            f"If they are, rename to {named_so}; if they are degrees with decimals, "
-            f"say --units {','.join(f'{quantity}=deg' for quantity in packed)}."
-        )
+    return [q for q in degrees if not decided[q].notation and _is_packed(quantities[q], found[q].unit)]
 
 
 def _is_packed(values: FloatArray, unit: Unit) -> bool:
-    """Whether the decimals are possible minutes and seconds, of all sizes."""
+    """Whether the decimals are possible minutes and seconds, of all sizes: of so many decimals that is no accident."""
     with np.errstate(over="ignore", invalid="ignore"):
         digits = np.floor(np.abs(values[np.isfinite(values)]) * unit.divide / unit.multiply * 1e4 + 1e-5)
         minute, second = np.floor(digits / 100) % 100, digits % 100
@@ -209,9 +221,7 @@ def _is_packed(values: FloatArray, unit: Unit) -> bool:
     return bool(minute.max() < 60 and second.max() < 60 and second.min() < 10 and second.max() >= 50)
 
 
-def _ask_about_zenith(
-    source: str, known: Mapping[str, _Angles], decided: Mapping[str, Column], station: Station
-) -> None:
+def _ask_about_zenith(source: str, known: Mapping[str, Sizes], decided: Mapping[str, Column], station: Station) -> None:
     """Raise InputError, a question, for steep angles in a column whose name does not say that they are elevations."""
     sizes, column = known.get("elevation"), decided.get("elevation")
     if sizes is None or column is None or station.elevation_from is not None or column.zenith:

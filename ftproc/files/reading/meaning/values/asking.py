@@ -1,0 +1,95 @@
+"""Questions about what the names of a log and its motion leave open, each with the options that answer it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ftproc.errors import InputError, quoted
+from ftproc.files.reading.meaning.questions import named
+from ftproc.files.reading.meaning.values.motion import Way
+from ftproc.files.reading.meaning.values.ways import Known
+from ftproc.files.words import QUANTITIES
+
+
+class Choice(NamedTuple):
+    """fit: the likelihood of a way. odds: this times how likely it was before."""
+
+    way: Way
+    fit: float
+    odds: float
+
+
+def contradicted(log: Known, likely: Sequence[Choice], named_so: Sequence[Choice]) -> InputError:
+    """The question where the motion contradicts the names."""
+    ways = [choice.way for choice in (*likely, *named_so)]
+    answers = _answers(log, ways)
+    *first, last = answers if named_so else [*answers, ""]
+    names_are = f", or {last} if the names are right" if named_so else ""
+    return InputError(
+        f"{log.source}: what the names say of {_differing_words(log, ways)} gives the target no likely motion, and "
+        f"another way does. Say {' or '.join(first)}{names_are}."
+    )
+
+
+def left_open(log: Known, likely: Sequence[Choice]) -> InputError:
+    """The question where nothing is stated and the motion does not tell."""
+    ways = [choice.way for choice in likely]
+    quantities, *_ = _differing(log, ways)
+    what = f"no unit is stated for {_differing_words(log, ways)}" if quantities else "it is not stated from where " \
+           f"{_differing_words(log, ways)} counts"  # fmt: skip
+    return InputError(
+        f"{log.source}: {what}, and the motion of the target does not tell which it is. "
+        f"Say {' or '.join(_answers(log, ways))}."
+    )
+
+
+def _differing(log: Known, ways: Sequence[Way]) -> tuple[list[str], bool, bool]:
+    """The quantities whose units differ among ways, whether the zenith does, and whether the angles are exchanged."""
+    units = [q for k, q in enumerate(QUANTITIES) if len({_unit(way, k) for way in ways}) > 1]
+    if len(ways) == 1:  # all other ways are impossible
+        units = [q for q in QUANTITIES if q in log.found and ways[0].units[QUANTITIES.index(q)] != log.found[q].unit]
+    zenith = len({way.zenith for way in ways} | {log.is_zenith}) > 1
+    return units, zenith, len({way.exchanged for way in ways} | {False}) > 1
+
+
+def _unit(way: Way, k: int) -> str:
+    """The name of the unit of the kth quantity, wherever its readings stand."""
+    place = 5 - k if way.exchanged and k > 1 else k
+    unit = way.units[place]
+    return unit.name if unit else ""
+
+
+def _differing_words(log: Known, ways: Sequence[Way]) -> str:
+    units, zenith, exchanged = _differing(log, ways)
+    places = [*units, *(["elevation"] if zenith else []), *(QUANTITIES[2:] if exchanged else ())]
+    return " and ".join(dict.fromkeys(f'"{log.found[q].name}"' for q in places))
+
+
+def _answers(log: Known, ways: Sequence[Way]) -> list[str]:
+    """The options that say each way, each once."""
+    units, zenith, exchanged = _differing(log, ways)
+    return list(dict.fromkeys(_options(log, way, units, zenith, exchanged) for way in ways))
+
+
+def _options(log: Known, way: Way, units: Sequence[str], zenith: bool, exchanged: bool) -> str:
+    turned = {"azimuth": "elevation", "elevation": "azimuth"} if way.exchanged else {}
+    insisted = [q for q in units if not log.is_open(turned.get(q, q))]
+    columns = {
+        q: log.found[turned.get(q, q)] for q in QUANTITIES if q in insisted or (exchanged and q in QUANTITIES[2:])
+    }
+    words = []
+    if columns:
+        each = (f"{q}={named(column.name, column.position)}" for q, column in columns.items())
+        words.append(f"--columns {quoted(','.join(each))}")
+    if units:
+        words.append(f"--units {quoted(','.join(f'{q}={_unit(way, QUANTITIES.index(q))}' for q in units))}")
+    if zenith:
+        words.append(f"--elevation-from {'zenith' if way.zenith else 'horizon'}")
+    return " ".join(words)
+
+
+def of_angles(choices: Sequence[Choice]) -> list[Choice]:
+    """The likeliest of each way to understand the angles, if these are what is open; else all."""
+    tops = {choice.way[1:] + choice.way.units[2:]: choice for choice in reversed(choices)}
+    return list(reversed(tops.values())) if len(tops) > 1 else list(choices)

@@ -1,0 +1,221 @@
+"""Which column may be which, of a log whose names do not say so: tried on the log, for a question and not for a guess.
+
+A choice is proposed only where it gives a target that moves like one, and no other choice does nearly as well.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ftproc.errors import InputError
+from ftproc.files.reading import converting
+from ftproc.files.reading.clocks import notations
+from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.meaning import schema
+from ftproc.files.reading.meaning.names import taken_apart
+from ftproc.files.reading.meaning.numbers import as_text, parsed, without_text
+from ftproc.files.reading.meaning.questions import Proposal, Propose, answer, named
+from ftproc.files.reading.meaning.values import motion, plausibility
+from ftproc.files.units import UNITS, Unit
+from ftproc.files.words import OTHER_THINGS, QUANTITIES
+from ftproc.records import FloatArray
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_UNNAMED = ("", "index", "__index_level_0__", "Unnamed: 0")
+_COUNTERS = ("", *"nik", *("no", "nr", "num", "number", "row", "index", "idx", "id", "sample", "count", "seq", "frame"))
+_ROWS = 2000
+_MOST_COLUMNS, _MOST_TRIED, _SHOWN = 60, 7, 8
+_RISES = 0.98  # of the steps of a time are forward
+_CLEARLY = 10.0  # times likelier than any other choice
+_STRAIGHT, _LEAST_TURN_RAD = 0.3, 0.03  # a path that no wrong choice gives, seen from a side
+_TURNED_RAD, _GONE = 0.09, 0.05  # or a path that is bent, of which angles and range change so much
+_NOISE_RAD, _MOST_NOISE_RAD = 1e-6, 0.02  # of the angles of an instrument
+_SPEED_MPS = (0.3, 75_000.0)
+_UPRIGHT_RAD = 1.65  # beyond any elevation
+_FAR = 400.0  # a number that is no angle
+_UNITS = {"range": (("m", 1.0), ("km", 0.5), ("nmi", 0.2)), "angle": (("deg", 1.0), ("rad", 1.0))}
+
+
+class _Try(NamedTuple):
+    """odds: how likely a choice of columns is. columns: of the quantities."""
+
+    odds: float
+    columns: Mapping[str, int]
+
+
+def by_values(header: TableHeader) -> Propose:
+    """How columns of a table are proposed."""
+    return partial(_proposed, header)
+
+
+def the_moments(header: TableHeader, free: Sequence[int]) -> int | None:
+    """The column of timestamps or durations among those that have no name, as pandas writes its index; or None."""
+    places = [place for place in free if header.names[place] in _UNNAMED]
+    table = header.load([], places) if places else None
+    found = [place for k, place in enumerate(places) if table is not None and _are_moments(table.column(k))]
+    return found[0] if len(found) == 1 else None
+
+
+def _are_moments(column: pa.ChunkedArray) -> bool:
+    import pyarrow as pa
+
+    if pa.types.is_temporal(column.type):
+        return True
+    return without_text(column) is None and bool(notations.matching(as_text(column), notations.STAMPS))
+
+
+def _proposed(header: TableHeader, free: Sequence[int], found: Mapping[str, Sequence[int]]) -> Proposal:
+    """found: the columns that are known, of each quantity."""
+    places = list(free)[:_MOST_COLUMNS]
+    if not places:
+        return Proposal()
+    table = header.load([], places).slice(0, _ROWS)
+    cells = {place: table.column(k) for k, place in enumerate(places)}
+    numbers = {place: values for place, column in cells.items() if (values := _values(column, header)) is not None}
+    seen = "; ".join(_shown(header, place, cells[place], numbers.get(place)) for place in places[:_SHOWN])
+    times = [tuple(found["time"])] if "time" in found else list(_times(header, cells, numbers))
+    if "time" not in found and found:  # only the time is sought
+        only = [place for place in times if len(place) == 1]
+        return Proposal(answer(header.names, {"time": only[0][0]}) if len(only) == 1 else "", seen)
+    best = _best(header, times, numbers)
+    if best is None:
+        return Proposal(seen=seen)
+    time, columns = best
+    clock = "+".join(named(header.names[place], place) for place in time)
+    return Proposal(answer(header.names, columns, "" if "time" in found else clock), seen)
+
+
+def _times(
+    header: TableHeader, cells: Mapping[int, pa.ChunkedArray], numbers: Mapping[int, FloatArray]
+) -> Iterator[tuple[int, ...]]:
+    """Columns that may be the time: of text alone or two together, or of numbers that go forward and do not count."""
+    texts = [place for place in cells if place not in numbers][:4]
+    stamps = [(place,) for place in texts]
+    yield from (each for each in [*itertools.permutations(texts, 2), *stamps] if _goes(_clock(header, each)))
+    forward = [place for place, values in numbers.items() if _goes(values) and not _is_other(header.names[place])]
+    steady = [place for place in forward if (numbers[place][1:] == numbers[place][:-1] + 1).all()]
+    spare = len(forward) > 1
+    counters = [place for place in steady if spare or header.names[place].lower().strip("#. ") in _COUNTERS]
+    yield from ((place,) for place in forward if place not in counters)
+
+
+def _goes(values: FloatArray) -> bool:
+    known = values[np.isfinite(values)]
+    return len(known) > 1 and float(np.ptp(known)) > 0 and bool(np.mean(known[1:] >= known[:-1]) > _RISES)
+
+
+def _clock(header: TableHeader, places: Sequence[int]) -> FloatArray:
+    """(n,) the times of columns in s; empty if they are none."""
+    other = next(place for place in range(len(header.names) + 1) if place not in places)
+    say = {"time": "+".join(str(place + 1) for place in places), "range": str(other + 1)}
+    try:
+        column = schema.resolve(header.source, header.names, {}, say, header.units)["time"]
+        table = header.load([], list(places)).slice(0, _ROWS)
+        return converting.converted(header, {"time": column}, table.columns).clock.time_s
+    except InputError:
+        return np.zeros(0)
+
+
+def _best(
+    header: TableHeader, times: Sequence[tuple[int, ...]], numbers: Mapping[int, FloatArray]
+) -> tuple[tuple[int, ...], Mapping[str, int]] | None:
+    """The time and the columns that make a target which moves like one, if no other choice nearly does."""
+    for time in times[:3]:
+        clock = _clock(header, time)
+        varied = [
+            place for place, values in numbers.items()
+            if place not in time and np.ptp(values[np.isfinite(values)]) > 0 and not _is_other(header.names[place])
+        ][:_MOST_TRIED]  # fmt: skip
+        kinds = [QUANTITIES[1:]] if len(varied) > 2 else [QUANTITIES[1:3], QUANTITIES[2:]]
+        tries = [
+            each
+            for kind in kinds
+            for places in itertools.permutations(varied, len(kind))
+            for each in _tries(clock, {q: numbers[p] for q, p in zip(kind, places, strict=True)}, places)
+        ]
+        tries.sort(key=lambda each: -each.odds)
+        if tries and all(each.odds * _CLEARLY < tries[0].odds for each in tries if each.columns != tries[0].columns):
+            return time, tries[0].columns
+    return None
+
+
+def _is_other(name: str) -> bool:
+    """Whether a name says that the column is something else."""
+    apart = taken_apart(name)
+    return apart.foreign or bool({apart.stem, *apart.words} & OTHER_THINGS)
+
+
+def _tries(clock: FloatArray, readings: Mapping[str, FloatArray], places: Sequence[int]) -> Iterator[_Try]:
+    """A choice of columns, in each of the common units in which the target moves like one."""
+    if len(clock) != len(next(iter(readings.values()))):
+        return
+    raw = {"time": clock, **readings}
+    moved = motion.of(raw, {q: next(iter(UNITS[q].values())) for q in raw})
+    angles = {q: UNITS[q]["rad"] for q in readings if q != "range"}
+    sizes = plausibility.sizes_in(readings, angles)
+    for (angle, a), (length, b) in itertools.product(_UNITS["angle"], _UNITS["range"]):
+        if moved is None or not all(_fits(q, UNITS[q][angle], sizes[q]) for q in angles):
+            continue
+        names = {"time": "s", "range": length, "azimuth": angle, "elevation": angle}
+        way = motion.Way(tuple(UNITS[q][names[q]] if q in raw else None for q in QUANTITIES))
+        if _is_a_target(moved, way):
+            yield _Try(moved.likelihood(way) * a * b, dict(zip(readings, places, strict=True)))
+
+
+def _fits(quantity: str, unit: Unit, sizes: plausibility.Sizes) -> bool:
+    upright = quantity == "azimuth" or sizes.most * unit.multiply / unit.divide < _UPRIGHT_RAD
+    return upright and plausibility.fits(quantity, unit, sizes, False)
+
+
+def _is_a_target(moved: motion.Motion, way: motion.Way) -> bool:
+    """Whether something moves so: at a speed of things that move, with the noise of an instrument, straight or at least
+    not as numbers would do that are something else."""
+    noises, turn = moved.noises(way), moved.turn(way)
+    if max(noises) > _MOST_NOISE_RAD or turn < _LEAST_TURN_RAD:
+        return False
+    if way.units[1] is None:
+        return min(noises) > _NOISE_RAD and turn > _TURNED_RAD
+    speed, bent = moved.speed(way), moved.bent(way)
+    if speed is None or not _SPEED_MPS[0] < speed < _SPEED_MPS[1] or bent is None:
+        return False
+    if bent < _STRAIGHT:
+        return way.units[3] is not None or moved.distance() > _FAR
+    return way.units[3] is not None and min(noises) > _NOISE_RAD and turn > _TURNED_RAD and moved.gone() > _GONE
+
+
+def _values(column: pa.ChunkedArray, header: TableHeader) -> FloatArray | None:
+    """The numbers of a column; None of others."""
+    values = without_text(column)
+    if values is None:
+        values = parsed(as_text(column), header.decimal_comma)
+    return None if values is None or not np.isfinite(values).any() else values
+
+
+def _shown(header: TableHeader, place: int, column: pa.ChunkedArray, values: FloatArray | None) -> str:
+    """A column by its number, its cells in two rows, its limits, and what these allow."""
+    name = "" if header.names[place] in ("", str(place + 1)) else f' "{header.names[place]}"'
+    cells = " and ".join(str(cell) for cell in as_text(column.slice(0, 2)).to_pylist())
+    if values is None:
+        return f"{place + 1}{name}: {cells[:60]}"
+    known = values[np.isfinite(values)]
+    low, high = float(known.min()), float(known.max())
+    possible = [] if low == high or _is_other(header.names[place]) else list(_possible(low, high))
+    return f"{place + 1}{name}: {cells[:60]}, from {low:.6g} to {high:.6g}{' (' * bool(possible)}" \
+           f"{' or '.join(possible)}{')' * bool(possible)}"  # fmt: skip
+
+
+def _possible(low: float, high: float) -> Iterator[str]:
+    if low > 0:
+        yield "range"
+    if low >= -180 and high <= 400:
+        yield "azimuth"
+    if (low >= -90 and high <= 90) or (low >= 0 and high <= 2 * math.pi):
+        yield "elevation"
