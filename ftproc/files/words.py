@@ -53,6 +53,18 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     ),
 }
 
+#: Names of what a log may hold beside, by quantity; see `files.reading.further`.
+FURTHER_ALIASES: Mapping[str, tuple[str, ...]] = {
+    "height": _split(
+        """
+        height altitude alt flightlevel fl modec modecaltitude modecheight baroaltitude baroalt baroheight
+        barometricaltitude barometricheight pressurealtitude geoaltitude geoheight geometricaltitude
+        geometricheight heightmsl altitudemsl altmsl mslheight mslaltitude hohe flughohe flugflache hoogte
+        altitud altura quota vyska yukseklik высота эшелон 高度 飞行高度层
+        """
+    ),
+}
+
 #: Names that other things have too: used where no column has one of ALIASES.
 WEAK_ALIASES: Mapping[str, tuple[str, ...]] = {
     "time": ("date", "gpst", "daytime"),

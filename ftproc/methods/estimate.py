@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.by_hand import NOTHING, Accepted
 from ftproc.core.editing.lasting.faults import Faults
-from ftproc.core.filtering.records import FilterRun, Model, Observations
+from ftproc.core.filtering.records import FilterRun, Model, Observations, Uneven
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification.coloured_noise import Coloured
 from ftproc.core.identification.motion_models import Chosen
@@ -28,12 +28,14 @@ MOST_INTERVALS = 250_000  # between neighbours, for a typical one to be found am
 class Readings(NamedTuple):
     """A log as the methods see it: time_s (n,) from zero, measurement (n, 3) with NaN where missing, and which
     components' noise cannot be had from the log, with what is assumed for it: (3,) 1-sigma m, rad, rad, NaN where
-    the log tells; and the times of the readings of each component that are accepted by hand."""
+    the log tells; the times of the readings of each component that are accepted by hand; and how the noise of single
+    readings is known to differ, if it is."""
 
     time_s: FloatArray
     measurement: FloatArray
     assumed_sigma: FloatArray
     accepted: Accepted = NOTHING
+    uneven: Uneven | None = None
 
     def unedited(self) -> Observations:
         """The log with every reading used."""
@@ -41,7 +43,7 @@ class Readings(NamedTuple):
 
     def weighted(self, weight: FloatArray) -> Observations:
         """The log with weights (n, 3)."""
-        return Observations(self.time_s, self.measurement, weight)
+        return Observations(self.time_s, self.measurement, weight, self.uneven)
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ class Recording:
     """A whole log, of which the methods ask for one stretch at a time; its arrays may lie on a disk.
 
     time_s: (n,). measurement: (n, 3). assumed_sigma: as in `Readings`. absent: components that are missing throughout.
-    rejected: (n, 3) readings that are not to be used, if there are any. accepted: as in `Readings`.
+    rejected: (n, 3) readings that are not to be used, if there are any. accepted, uneven: as in `Readings`.
     """
 
     time_s: FloatArray
@@ -58,6 +60,7 @@ class Recording:
     absent: tuple[int, ...] = ()
     rejected: NDArray[np.bool_] | None = None
     accepted: Accepted = NOTHING
+    uneven: Uneven | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -71,7 +74,8 @@ class Recording:
             measurement[:, c] = ASSUMED_READING[c]
         time_s = np.asarray(self.time_s[rows]) - float(self.time_s[0])
         forget(self.time_s, self.measurement)
-        return Readings(time_s, np.ascontiguousarray(measurement), self.assumed_sigma, self.accepted)
+        uneven = None if self.uneven is None else self.uneven.part(rows)
+        return Readings(time_s, np.ascontiguousarray(measurement), self.assumed_sigma, self.accepted, uneven)
 
     def spans(self) -> list[slice]:
         """SPANS stretches of SPAN samples, spread evenly: what noise and usual jerk of a long log are found from."""

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ftproc.methods.estimate import Estimate
+    from ftproc.methods.heights import Common
 
 UNITS = ("m", "rad", "rad")
 GAP_INTERVALS = 3.0  # median intervals that make a gap
@@ -41,10 +42,11 @@ _LABELS = {"isolated": ISOLATED, "patch": PATCH, "missing": MISSING}
 
 
 class RunStatistics:
-    """Figures of one log, to which its parts are added in their order. absent: components missing throughout."""
+    """Figures of one log, to which its parts are added in their order. absent: components missing throughout. height:
+    what stands for the elevation, if something does."""
 
-    def __init__(self, log: MeasurementLog, absent: Sequence[int]) -> None:
-        self.log, self.absent = log, absent
+    def __init__(self, log: MeasurementLog, absent: Sequence[int], height: Common | None = None) -> None:
+        self.log, self.absent, self.height = log, absent, height
         self.every = 1 + (len(log) - 1) // MOST_KEPT
         self.interval_s = typical_interval(log.time_s)
         self.components = [_Component(self.every) for _ in COMPONENTS]
@@ -167,14 +169,18 @@ class RunStatistics:
         log, absent, model = self.log, self.absent, self.model
         components: dict[str, Any] = {}
         for c, name in enumerate(COMPONENTS):
-            noise = float(np.sqrt(model.reading_variance[c]))
-            components[name] = {
+            noise, unit = float(np.sqrt(model.reading_variance[c])), UNITS[c]
+            part = {
                 **self.components[c].counts(),
                 **self.faults.of_component(c),
-                f"noise_{UNITS[c]}": noise if c not in absent else None,
+                f"noise_{unit}": noise if c not in absent else None,
                 "noise_correlation": float(model.correlation(self.interval_s)[c]),
                 **self.components[c].consistency(noise),
             }
+            if c == 2 and self.height is not None and not absent:
+                name, part = "height", {**part, "noise_m": noise * self.height.range_m}
+                del part["noise_rad"]
+            components[name] = part
         psd = np.concatenate(self.jerk)
         jerk = {"lowest": float(psd.min()), "median": median(psd), "highest": float(psd.max())}
         time_s, sigma = np.concatenate(self.times), np.concatenate(self.sigmas)
@@ -195,6 +201,7 @@ class RunStatistics:
             "longest_gap_s": self.longest_gap_s,
             "components": components,
             "not_observable": [COMPONENTS[c] for c in absent],
+            **({} if self.height is None else self.height.figures()),
             "average_gradient": self._average_gradient(),
             "jerk_psd_m2ps5": jerk if np.isfinite(psd).all() else None,
             **self._motion(),

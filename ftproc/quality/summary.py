@@ -7,8 +7,6 @@ from typing import Any
 
 from ftproc.files.moments import Moments
 from ftproc.quality import next_steps, verdict
-from ftproc.quality.statistics import UNITS
-from ftproc.records import COMPONENTS
 
 
 def as_dict(metadata: Mapping[str, Any]) -> dict[str, Any]:
@@ -65,7 +63,7 @@ _NAME = len("elevation")
 
 
 def _table(components: Mapping[str, Any]) -> list[str]:
-    rows = [HEADER, *(component_cells(name, components[name]) for name in COMPONENTS)]
+    rows = [HEADER, *(component_cells(name, part) for name, part in components.items())]
     widths = [max(len(r[i]) for r in rows) for i in range(len(HEADER))]
     return [
         "  ".join(["  " + r[0].ljust(widths[0]), *(v.rjust(w) for v, w in zip(r[1:], widths[1:], strict=True))])
@@ -75,9 +73,8 @@ def _table(components: Mapping[str, Any]) -> list[str]:
 
 def component_cells(name: str, part: Mapping[str, Any]) -> tuple[str, ...]:
     """One component's line of the table, under HEADER."""
-    c = COMPONENTS.index(name)
-    noise = part[f"noise_{UNITS[c]}"]
-    sigma = "-" if noise is None else f"{noise:.3g} m" if c == 0 else f"{1e3 * noise:.3g} mrad"
+    noise = part.get("noise_m", part.get("noise_rad"))
+    sigma = "-" if noise is None else f"{noise:.3g} m" if "noise_m" in part else f"{1e3 * noise:.3g} mrad"
     counts = (str(part[k]) for k in ("good", "isolated", "patch", "missing"))
     share = f"{100 * verdict.outlier_share(part):.2f} %"
     return (name, *counts, share, f"{part['longest_patch_s']:.3g} s", sigma, part["verdict"])

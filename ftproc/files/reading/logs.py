@@ -12,7 +12,7 @@ import numpy as np
 from ftproc.errors import InputError
 from ftproc.files import conventions
 from ftproc.files.options import ABSENT, Condition, Extract, parse_columns, parse_units, parse_where
-from ftproc.files.reading import converting, large, understanding
+from ftproc.files.reading import converting, further, large, understanding
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
@@ -28,7 +28,7 @@ Found = Mapping[str, schema.Column]
 
 
 class _Plan(NamedTuple):
-    """What is read of a table, and how. others: positions of the columns that are kept beside."""
+    """What is read of a table, and how. others: positions of the columns that are kept beside. beside: the height."""
 
     header: TableHeader
     found: Found
@@ -36,6 +36,7 @@ class _Plan(NamedTuple):
     conditions: tuple[Condition, ...] = ()
     others: tuple[int, ...] = ()
     extract: Extract = Extract()
+    beside: further.Further | None = None
 
     def positions(self) -> list[int]:
         """Of the columns of all quantities, in their order."""
@@ -87,12 +88,13 @@ def read(
         index = proposal.the_moments(header, range(len(header.names)))
         column_of = column_of if index is None else {**column_of, "time": str(index + 1)}
     found = schema.resolve(header.source, header.names, unit_of, column_of, header.units, propose)
-    plan = _Plan(header, found, station, _conditions(header, extract), extract=extract)
+    beside = further.find(header, found, unit_of, column_of)
+    plan = _Plan(header, found, station, _conditions(header, extract), extract=extract, beside=beside)
     if keep_columns:
         wanted = plan.positions()
         plan = plan._replace(others=tuple(place for place in range(len(header.names)) if place not in wanted))
         _check_others(header, plan.others)
-    whole = plan.others or plan.conditions or header.stated.target or header.stated.station
+    whole = plan.others or plan.conditions or beside or header.stated.target or header.stated.station
     if not whole and station.refraction is None:  # refraction needs ranges of other blocks
         log = _in_blocks(plan)
         if log is not None:
@@ -183,6 +185,8 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     if kept is not None:
         gone = tuple(int(kept[row]) for row in log.rows_without_time)
         log = replace(log, row=kept[log.row], rows_without_time=gone, rows_in_file=table.num_rows)
+    if plan.beside is not None:
+        log = replace(log, heights=plan.beside.of_rows(plan.beside.read(header)[log.row]))
     plan = plan._replace(found=judged.found)
     if not choosing.is_one_target(header, plan.extract):
         several.refuse(header, judged.found, log)
@@ -235,11 +239,11 @@ def _explained(
     """The log with its station, and with remarks on how it was understood."""
     station = with_zenith(plan.station, plan.found)
     values = log.measurement if sample is None else sample
-    names = [] if plan.header.is_of_a_standard else plan.header.names
+    names = [] if plan.header.is_of_a_standard or plan.beside else plan.header.names
     remarks = schema.remarks(names, plan.found, bool(clock.epoch))
     doubtful = (*doubts, *plausibility.doubts(values, station))
     said = (*notes, *doubtful)
-    understood = understanding.describe(plan.header, plan.found, clock, station, said)
+    understood = understanding.describe(plan.header, plan.found, clock, station, said, plan.beside)
     digest = plan.header.sha256()
     return replace(log, remarks=(*remarks, *said), understood=understood, station=station, sha256=digest)
 

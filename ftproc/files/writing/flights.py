@@ -37,6 +37,8 @@ def _log_table(log: MeasurementLog, units: Mapping[str, str], azimuth_from: str)
     arrays = {}
     for index, quantity in enumerate(QUANTITIES):
         values = log.time_s if index == 0 else log.measurement[:, index - 1]
+        if quantity == "elevation" and np.isnan(values).all() and np.isfinite(log.measurement[:, :2]).any(0).all():
+            continue  # of an instrument that measures none
         if quantity == "azimuth" and azimuth_from == "north":
             values = np.mod(values, 2 * math.pi)
             values = np.where(values >= 2 * math.pi, 0.0, values)  # a tiny negative angle, rounded
