@@ -62,7 +62,8 @@ class MeasurementLog:
     station: what is known of the instrument, already applied. epoch: the instant of time zero (ISO 8601) or "".
     remarks: how the file was understood, for the user. understood: the same in full, see
     `files.reading.understanding`. sha256: of the file's bytes, "" if it was none. by_hand: the engineer's decisions on
-    its readings, if there are any. heights: of the target, where the log has them in place of elevations.
+    its readings, if there are any. heights: of the target, where the log has them in place of elevations. range_rate:
+    (n,) m/s, positive when going away or, in some logs, when coming closer; NaN where missing; None without.
     """
 
     name: str
@@ -82,6 +83,7 @@ class MeasurementLog:
     sha256: str = ""
     by_hand: ByHand | None = None
     heights: Heights | None = None
+    range_rate: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -95,10 +97,11 @@ class MeasurementLog:
         forget(self.time_s, self.measurement, self.row)
         extra = None if self.extra is None else self.extra.slice(rows.start, rows.stop - rows.start)
         by_hand = None if self.by_hand is None else self.by_hand.stretch(rows)
-        heights = None if self.heights is None else self.heights.part(rows)
         return replace(
-            self, time_s=arrays[0], measurement=arrays[1], row=arrays[2], extra=extra, by_hand=by_hand, heights=heights
-        )
+            self, time_s=arrays[0], measurement=arrays[1], row=arrays[2], extra=extra, by_hand=by_hand,
+            heights=None if self.heights is None else self.heights.part(rows),
+            range_rate=None if self.range_rate is None else self.range_rate[rows],
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False)

@@ -35,6 +35,10 @@ _LENGTHS = (
     *(Unit("yd", 0.9144), Unit("kyd", 914.4), Unit("kft", 304.8), Unit("cm", divide=1e2), Unit("mm", divide=1e3)),
 )
 _HEIGHTS = (*_LENGTHS, Unit("fl", 30.48))  # of 100 ft
+_SPEEDS = (
+    *(Unit("mps"), Unit("kmps", 1e3), Unit("kmh", divide=3.6), Unit("kt", 1852.0, 3600.0), Unit("fps", 0.3048)),
+    *(Unit("mph", 0.44704), Unit("mmps", divide=1e3), Unit("cmps", divide=1e2)),
+)
 _ANGLES = (
     Unit("rad"),
     Unit("deg", math.pi, 180.0),
@@ -58,7 +62,7 @@ _ANGLES = (
 UNITS: Mapping[str, Mapping[str, Unit]] = {
     quantity: {unit.name: unit for unit in units}
     for quantity, units in zip(
-        (*QUANTITIES, *FURTHER_ALIASES), (_TIMES, _LENGTHS, _ANGLES, _ANGLES, _HEIGHTS), strict=True
+        (*QUANTITIES, *FURTHER_ALIASES), (_TIMES, _LENGTHS, _ANGLES, _ANGLES, _HEIGHTS, _SPEEDS), strict=True
     )
 }
 
@@ -76,6 +80,13 @@ SPELLINGS: Mapping[str, tuple[str, ...]] = {
     "ft": ("feet", "foot"),
     "kft": ("kilofeet", "kfeet"),
     "fl": ("flightlevel", "flightlevels"),
+    "mps": ("m/s", "m/sec", "ms-1", "м/с"),
+    "kmps": ("km/s", "kms-1", "км/с"),
+    "kmh": ("km/h", "kph", "км/ч"),
+    "kt": ("kts", "knot", "knots", "kn"),
+    "fps": ("ft/s", "ft/sec"),
+    "mmps": ("mm/s",),
+    "cmps": ("cm/s",),
     "nmi": ("nauticalmile", "nauticalmiles", "nautmile", "nautmiles", "nautmi", "nautical"),
     "mi": ("mile", "miles", "smi", "sm", "statutemile", "statutemiles"),
     "yd": ("yds", "yard", "yards"),

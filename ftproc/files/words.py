@@ -63,6 +63,14 @@ FURTHER_ALIASES: Mapping[str, tuple[str, ...]] = {
         altitud altura quota vyska yukseklik высота эшелон 高度 飞行高度层
         """
     ),
+    "range_rate": _split(
+        """
+        rangerate rrate rdot rhodot rrdot rangedot rngrate doppler dopplervelocity dopplerspeed radialvelocity
+        radialspeed radvel vradial vr vrad rangevelocity openingspeed openingvelocity openingrate closingspeed
+        closingvelocity closingrate closurerate closurespeed radialgeschwindigkeit entfernungsanderung
+        vitesseradiale velocidadradial радиальнаяскорость 径向速度
+        """
+    ),
 }
 
 #: Names that other things have too: used where no column has one of ALIASES.

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,9 +33,6 @@ from ftproc.methods.estimate import Recording
 from ftproc.order_statistics import median
 from ftproc.records import ISOLATED, MISSING, PATCH, FlagArray, FloatArray, MeasurementLog
 from ftproc.settings import FilterSettings
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 ABSENT = (2,)  # components that are missing where a height stands in
 PRESSURE_M, TEMPERATURE = 80.0, 0.02  # 1-sigma of barometric heights: 10 hPa, and 5 K of 250 K as a share of the height
@@ -112,7 +109,9 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
     times_s = log.time_s - log.time_s[0]
     accepted = Accepted((*(recording.accepted.times[:2] or (np.zeros(0),) * 2), times_s[good]))
     uneven = Uneven(times, np.zeros_like(times))
-    found = Recording(log.time_s, measurement, assumed, (), recording.rejected, accepted, uneven)
+    found = replace(
+        recording, measurement=measurement, assumed_sigma=assumed, absent=(), accepted=accepted, uneven=uneven
+    )
     known = np.where(np.isfinite(common), common, float(np.nanmedian(common)))
     return found, Common(None, np.hypot(known, step / math.sqrt(12)), own / typical, rejected)
 
@@ -204,15 +203,11 @@ def relabelled(common: Common, part: slice, label: FlagArray) -> FlagArray:
     return found
 
 
-def labelled(label: FlagArray, log: MeasurementLog) -> tuple[FlagArray, pa.Table]:
-    """The labels (n, 3) of a log with heights for elevations, whose elevations are missing, and the log's other columns
-    with those of the heights, `outlier_height`."""
-    from ftproc.files import arrow
-    from ftproc.files.writing import tables
-
-    own = arrow.table({"outlier_height": np.ascontiguousarray(label[:, 2])})
-    extra = own if log.extra is None else tables.with_extra(log.extra, own)
-    return np.where([False, False, True], MISSING, label).astype(np.uint8), extra
+def labelled(label: FlagArray) -> tuple[FlagArray, dict[str, FlagArray]]:
+    """The labels (n, 3) of a log with heights for elevations, whose elevations are missing, and the column of those of
+    the heights."""
+    alone = np.where([False, False, True], MISSING, label).astype(np.uint8)
+    return alone, {"outlier_height": np.ascontiguousarray(label[:, 2])}
 
 
 def _moved(prior: Prior, state: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -60,6 +60,7 @@ def line(name: str, what: str) -> str:
 
 HEADER = ("", "good", "isolated", "patch", "missing", "outliers", "longest patch", "noise (1 sigma)", "sigmas")
 _NAME = len("elevation")
+_NOISE = {"noise_m": ("m", 1.0), "noise_rad": ("mrad", 1e3), "noise_mps": ("m/s", 1.0)}
 
 
 def _table(components: Mapping[str, Any]) -> list[str]:
@@ -73,8 +74,8 @@ def _table(components: Mapping[str, Any]) -> list[str]:
 
 def component_cells(name: str, part: Mapping[str, Any]) -> tuple[str, ...]:
     """One component's line of the table, under HEADER."""
-    noise = part.get("noise_m", part.get("noise_rad"))
-    sigma = "-" if noise is None else f"{noise:.3g} m" if "noise_m" in part else f"{1e3 * noise:.3g} mrad"
+    unit, factor, noise = next((*each, part[key]) for key, each in _NOISE.items() if key in part)
+    sigma = "-" if noise is None else f"{factor * noise:.3g} {unit}"
     counts = (str(part[k]) for k in ("good", "isolated", "patch", "missing"))
     share = f"{100 * verdict.outlier_share(part):.2f} %"
     return (name, *counts, share, f"{part['longest_patch_s']:.3g} s", sigma, part["verdict"])

@@ -109,6 +109,12 @@ _SURVEILLANCE = replace(
     dt_s=(4.0,),
     further=("flight_level",),
 )
+_DOPPLER = replace(
+    _RADAR,
+    name="radar-doppler",
+    description="the radar with range rates too, 0.5 m/s (1 sigma), 2 % of them wrong",
+    further=("elevation", "range_rate"),
+)
 _MARINE = Scenario(
     "marine",
     "a ship's radar without elevation, every 2.5 s; another ship at 1-10 km, cells of 22 m; 2 % outliers",
@@ -224,6 +230,7 @@ _SCENARIOS: dict[str, Scenario] = {
             outliers=("none",),
         ),
         _RADAR,
+        _DOPPLER,
         _SURVEILLANCE,
         _MARINE,
         _OVERHEAD,

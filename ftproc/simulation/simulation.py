@@ -138,7 +138,7 @@ def measure(flight: Flight, plan: Plan, sigma: FloatArray, name: str, seed: int 
         duplicate_times=int(np.sum(np.diff(time[order]) == 0)),
     )
     state = flight.at(log.time_s)
-    log = measured(log, state[0], plan.further, streams["further"])
+    log = measured(log, *state[:2], plan.further, streams["further"])
     truth = Truth(name, log.time_s, *state, code[order])
     return Simulation(log, truth, plan.noise, readable(clean)[order])
 

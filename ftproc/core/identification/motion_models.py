@@ -174,4 +174,5 @@ def with_steps(
     if log.sites is not None:
         sites = log.sites.part(np.searchsorted(row, number, "right") - 1)
     moved = [start._replace(sample=int(row[start.sample])) for start in starts]
-    return Observations(time_s, measurement, weight, uneven, sites), moved, row
+    rates = None if log.rates is None else log.rates.spread(row, len(number))
+    return Observations(time_s, measurement, weight, uneven, sites, rates), moved, row

@@ -28,7 +28,8 @@ Found = Mapping[str, schema.Column]
 
 
 class _Plan(NamedTuple):
-    """What is read of a table, and how. others: positions of the columns that are kept beside. beside: the height."""
+    """What is read of a table, and how. others: positions of the columns that are kept beside. beside: range rates
+    and heights. open: what may be such."""
 
     header: TableHeader
     found: Found
@@ -36,7 +37,8 @@ class _Plan(NamedTuple):
     conditions: tuple[Condition, ...] = ()
     others: tuple[int, ...] = ()
     extract: Extract = Extract()
-    beside: further.Further | None = None
+    beside: tuple[further.Further, ...] = ()
+    open: tuple[str, ...] = ()
 
     def positions(self) -> list[int]:
         """Of the columns of all quantities, in their order."""
@@ -90,8 +92,9 @@ def read(
     found = schema.resolve(header.source, header.names, unit_of, column_of, header.units, propose)
     beside = further.find(header, found, unit_of, column_of)
     plan = _Plan(header, found, station, _conditions(header, extract), extract=extract, beside=beside)
+    plan = plan._replace(open=tuple(further.doubts(header, beside, column_of)))
     if keep_columns:
-        wanted = plan.positions()
+        wanted = [*plan.positions(), *(each.place for each in beside)]
         plan = plan._replace(others=tuple(place for place in range(len(header.names)) if place not in wanted))
         _check_others(header, plan.others)
     whole = plan.others or plan.conditions or beside or header.stated.target or header.stated.station
@@ -185,8 +188,8 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     if kept is not None:
         gone = tuple(int(kept[row]) for row in log.rows_without_time)
         log = replace(log, row=kept[log.row], rows_without_time=gone, rows_in_file=table.num_rows)
-    if plan.beside is not None:
-        log = replace(log, heights=plan.beside.of_rows(plan.beside.read(header)[log.row]))
+    if plan.beside:
+        log = replace(log, **further.of_rows(plan.beside, header, log.row))
     plan = plan._replace(found=judged.found)
     if not choosing.is_one_target(header, plan.extract):
         several.refuse(header, judged.found, log)
@@ -239,9 +242,11 @@ def _explained(
     """The log with its station, and with remarks on how it was understood."""
     station = with_zenith(plan.station, plan.found)
     values = log.measurement if sample is None else sample
-    names = [] if plan.header.is_of_a_standard or plan.beside else plan.header.names
+    beside = {each.place for each in plan.beside}
+    names = [] if plan.header.is_of_a_standard or log.heights is not None else plan.header.names
+    names = [name for place, name in enumerate(names) if place not in beside]
     remarks = schema.remarks(names, plan.found, bool(clock.epoch))
-    doubtful = (*doubts, *plausibility.doubts(values, station))
+    doubtful = (*doubts, *plan.open, *plausibility.doubts(values, station))
     said = (*notes, *doubtful)
     understood = understanding.describe(plan.header, plan.found, clock, station, said, plan.beside)
     digest = plan.header.sha256()

@@ -8,7 +8,7 @@ from typing import Any
 from ftproc.files import conventions
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.further import Further
+from ftproc.files.reading.further import HEIGHT, Further
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.questions import answer, listed
 from ftproc.files.reading.meaning.schema import Column
@@ -26,18 +26,18 @@ _AXES = {
 
 def describe(
     header: TableHeader, found: Mapping[str, Column], clock: Clock, station: Station, doubts: Sequence[str],
-    beside: Further | None = None,
+    beside: Sequence[Further] = (),
 ) -> dict[str, Any]:  # fmt: skip
     """file: kind and layout. columns: of each quantity its column, unit and why. not_used: the other columns. clock and
     epoch: of the times. conventions: of the angles, and what was corrected. doubts: each with the option that settles
     it."""
-    used = {place for column in found.values() for place in column.positions} | ({beside.place} if beside else set())
+    used = {place for column in found.values() for place in column.positions} | {each.place for each in beside}
     unused = [name for place, name in enumerate(header.names) if place not in used and name]
     return {
         "file": header.form or "table",
         "columns": {
             **{quantity: _column(column, header) for quantity, column in found.items()},
-            **({beside.quantity: beside.described()} if beside else {}),
+            **{each.quantity: each.described() for each in beside},
         },
         "not_used": unused,
         "clock": clock.words,
@@ -45,7 +45,7 @@ def describe(
         "conventions": _conventions(station, found),
         "doubts": [
             *_others(header.names, found),
-            *_absent(found, [] if header.is_of_a_standard or beside else unused),
+            *_absent(found, [] if header.is_of_a_standard or HEIGHT in [each.quantity for each in beside] else unused),
             *doubts,
             *clock.doubts,
             *([] if header.is_of_a_standard else _axis(station, found)),

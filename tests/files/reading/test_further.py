@@ -1,4 +1,4 @@
-"""The height of the target beside range and azimuth."""
+"""The height of the target beside range and azimuth, and range rates."""
 
 import numpy as np
 import pytest
@@ -80,3 +80,39 @@ def test_rows_stay_together(tmp_path):
     log = logs.read(path, extract=logs.Extract(where=logs.parse_where(["ok=1"])))
     np.testing.assert_allclose(log.heights.above_m / 30.48, [350, 352])
     assert log.stretch(slice(1, 2)).heights.above_m == pytest.approx([352 * 30.48])
+
+
+@pytest.mark.parametrize(
+    ("head", "mps"),
+    [
+        ("range_rate_mps", 1.0),
+        ("Doppler (m/s)", 1.0),
+        ("radial_velocity_kt", 1852 / 3600),
+        ("radialVelocity [km/h]", 1 / 3.6),
+        ("closing_speed_kmh", -1 / 3.6),
+        ("RDOT_ft/s", 0.3048),
+        ("target range rate, km/s", 1000.0),
+    ],
+)
+def test_names_and_units_of_range_rates(tmp_path, head, mps):
+    path = tmp_path / "log.csv"
+    path.write_text(f'time_s,range_m,azimuth_rad,elevation_rad,"{head}"\n0,50000,0.1,0.1,35\n1,50100,0.1,0.1,\n')
+    log = logs.read(path)
+    np.testing.assert_allclose(log.range_rate, [35 * mps, np.nan])
+    assert log.understood["columns"]["range_rate"]["column"] == head
+
+
+def test_a_range_rate_without_a_unit_is_left_out_with_a_word(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time_s,range_m,azimuth_rad,elevation_rad,doppler\n0,50000,0.1,0.1,35\n1,50100,0.1,0.1,36\n")
+    log = logs.read(path)
+    assert log.range_rate is None
+    assert "--units range_rate=mps" in " ".join(log.remarks)
+    assert logs.read(path, units="range_rate=kt").range_rate[0] == pytest.approx(35 * 1852 / 3600)
+    assert "--units range_rate" not in " ".join(logs.read(path, columns="range_rate=none").remarks)
+
+
+def test_doppler_in_hertz_is_no_range_rate(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time_s,range_m,azimuth_rad,elevation_rad,Doppler (Hz)\n0,50000,0.1,0.1,35\n1,50100,0.1,0.1,36\n")
+    assert logs.read(path).range_rate is None
