@@ -2,8 +2,8 @@
 
 The readings are edited without them. What the record then predicts of each rate shows whether they count outward or
 inward and which of them are wrong; noise and decisions follow in turn from the leave-one-out residuals, the noise by
-maximum likelihood, the outliers by the Markov chain of `outlier_chain`. A channel that contradicts the readings is left
-out. The jerk profile is then fitted again, with the rates.
+maximum likelihood, the outliers by the Markov chain of `outlier_chain`. The jerk profile is then fitted again, with the
+rates. Rates that do not help to predict the readings, but hinder it, are left out.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ftproc.core.editing import outlier_chain
 from ftproc.core.editing.copies import rounding_step
 from ftproc.core.filtering import rates as layout
+from ftproc.core.filtering.forward import filter_with_rates
 from ftproc.core.filtering.records import Model, Observations, Rates, Start
 from ftproc.core.filtering.smoother import rate_residuals
 from ftproc.core.identification.profile import ALLOWANCE, fit_profile, with_allowance
@@ -30,6 +31,7 @@ SURE = 8.0  # in log-likelihood, by which the other sense must be likelier
 TAILS = 4.0  # degrees of freedom of the distribution that tells the sense
 FAR = 6.0  # sigmas from what the readings say, of a rate that is not used to begin with
 MOST_REJECTED = 0.5  # share of rates that contradict the readings: with more, none is used
+CONTRADICTS = 8.0  # in log-likelihood, by which they may make the readings less likely, by chance
 LEAST_MPS = 1e-4  # 1-sigma: no instrument is so good
 TELLING = 5e-4  # variance with which the readings predict rates, of the rates' own: with less, even the forty or so in
 # a memory of the filter make it better by less than 1 %, and are not used
@@ -81,6 +83,7 @@ def fit(
     found = _decided(log, model, starts, found, gate, floor)
     if found.weight.sum() < (1 - MOST_REJECTED) * there.sum():
         return log, model, Channel(unused, label, why="most of the range rates contradict the readings: none is used")
+    without = model
     if median(vague[there]) < TELLING * found.variance:
         silent = found._replace(weight=np.zeros(len(value)))
         return log._replace(rates=silent), model, Channel(found, _labels(found.weight, value), closing)
@@ -88,7 +91,19 @@ def fit(
         fitted = fit_profile(log._replace(rates=found), starts, model._replace(jerk=model.jerk / ALLOWANCE), STEPS)
         model = with_allowance(log, fitted)
         found = _decided(log, model, starts, found, gate, floor)
-    return log._replace(rates=found), model, Channel(found, _labels(found.weight, value), closing)
+    both = log._replace(rates=found)
+    if _of_readings(both, model, starts) < _of_readings(log, without, starts) - CONTRADICTS:
+        why = "the range rates make the readings less likely (biased, late, or not measured): none is used"
+        return log, without, Channel(unused, label, why=why)
+    return both, model, Channel(found, _labels(found.weight, value), closing)
+
+
+def _of_readings(log: Observations, model: Model, starts: list[Start]) -> float:
+    """The log-likelihood of the readings, each predicted from all earlier ones, and from the rates so far."""
+    run, left = filter_with_rates(log, model, starts)
+    used = left[:, layout.WEIGHT] > 0
+    residual, spread = left[used, layout.RESIDUAL], left[used, layout.SPREAD]
+    return run.log_likelihood + 0.5 * float((np.log(spread) + residual**2 / spread).sum())
 
 
 def columns(state: FloatArray, los_sigma: FloatArray, label: FlagArray) -> dict[str, NDArray[Any]]:

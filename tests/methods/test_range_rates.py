@@ -98,6 +98,24 @@ def test_rates_of_something_else_are_left_out(plain):
     assert (errors(found, flight.truth) / without).max() < 1.02
 
 
+@pytest.mark.parametrize("fault", ["bias", "late", "scale", "held", "ambiguous"])
+def test_rates_that_hinder_are_left_out(plain, fault):
+    """The result is that without them, and the summary says so."""
+    flight, _ = plain
+    log = with_rates(flight, 1.0)
+    rate = log.range_rate
+    wrong = {
+        "bias": rate + 5.0,
+        "late": np.roll(rate, 6),
+        "scale": 1.02 * rate,
+        "held": np.repeat(rate[::8], 8)[: len(rate)],
+        "ambiguous": (rate + 25) % 50 - 25,
+    }[fault]
+    found = filter_log(replace(log, range_rate=wrong), SMOOTH)
+    np.testing.assert_array_equal(found.state, filter_log(flight.log, SMOOTH).state)
+    assert "none is used" in " ".join(found.metadata["summary"]["remarks"])
+
+
 def test_a_few_are_not_used(plain):
     flight, _ = plain
     rate = np.full(len(flight.log), np.nan)
