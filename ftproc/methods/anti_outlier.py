@@ -69,6 +69,8 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         fixed = settings.jerk_psd_m2ps5 is not None
         log, model, channel = range_rates.fit(log, model, edited.starts, readings.range_rate, settings.gate, fixed)
     motion = motion_models.choose(log, edited.starts, model, preparing.motions(settings))
+    if channel is not None and channel.used is not None:
+        motion = motion.with_rates(channel.used)
     both = settings.smooth or usual is None  # cheap, and says what could be had
     run, smoothed, left = _with_motion(motion, both, motion.model)
     for other in _as_likely(edited, known, run):

@@ -33,20 +33,23 @@ FAR = 6.0  # sigmas from what the readings say, of a rate that is not used to be
 MOST_REJECTED = 0.5  # share of rates that contradict the readings: with more, none is used
 CONTRADICTS = 8.0  # in log-likelihood, by which they may make the readings less likely, by chance
 LEAST_MPS = 1e-4  # 1-sigma: no instrument is so good
-TELLING = 5e-4  # variance with which the readings predict rates, of the rates' own: with less, even the forty or so in
-# a memory of the filter make it better by less than 1 %, and are not used
+TELLING = 0.02  # variance with which the readings predict rates, of the rates' own: with less, the motion is that which
+# the readings tell
+USEFUL = 5e-4  # the same: with less, even the forty or so in a memory of the filter make it better by less than 1 %
 STEPS = 3  # of the search for a profile
 SCALE = 1.4826
 
 
 class Channel(NamedTuple):
     """What is known of the rates of a log. rates: (n,) outward, with weights and noise. label: (n,). closing: whether
-    the log counts inward. innovation, sigma: (n,) of the filter. why: the rates are not used, "" if they are."""
+    the log counts inward. innovation, sigma: (n,) of the filter. why: the rates are not used, "" if they are. used:
+    those of the last run, where the motion is chosen without them."""
 
     rates: Rates
     label: FlagArray
     closing: bool = False
     why: str = ""
+    used: Rates | None = None
     innovation: FloatArray = np.zeros(0)
     sigma: FloatArray = np.zeros(0)
 
@@ -84,9 +87,11 @@ def fit(
     if found.weight.sum() < (1 - MOST_REJECTED) * there.sum():
         return log, model, Channel(unused, label, why="most of the range rates contradict the readings: none is used")
     without = model
-    if median(vague[there]) < TELLING * found.variance:
+    told = median(vague[there]) / found.variance
+    if told < TELLING:
         silent = found._replace(weight=np.zeros(len(value)))
-        return log._replace(rates=silent), model, Channel(found, _labels(found.weight, value), closing)
+        used = silent if told < USEFUL else found
+        return log._replace(rates=silent), model, Channel(found, _labels(found.weight, value), closing, used=used)
     if not jerk_fixed:
         fitted = fit_profile(log._replace(rates=found), starts, model._replace(jerk=model.jerk / ALLOWANCE), STEPS)
         model = with_allowance(log, fitted)
