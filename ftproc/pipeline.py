@@ -13,7 +13,7 @@ from ftproc.core.identification import unseen_motion
 from ftproc.core.model import kinematics
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.errors import InputError, UsageError
-from ftproc.methods import registry, simultaneous
+from ftproc.methods import heights, range_rates, registry, simultaneous
 from ftproc.methods.estimate import Estimate, Part
 from ftproc.quality import by_hand, next_steps, provenance, sanity
 from ftproc.quality.next_steps import Step
@@ -22,6 +22,8 @@ from ftproc.records import COMPONENTS, MISSING, Diagnostics, FloatArray, Measure
 from ftproc.settings import FilterSettings
 
 if TYPE_CHECKING:
+    import pyarrow as pa
+
     from ftproc.correction.apply import Correction
     from ftproc.correction.model import Model, Stage
 
@@ -49,11 +51,11 @@ class Filtering:
         why = registry.obstacle(self.method, settings.smooth, None if model is None else model.made_for)
         if why is not None:
             raise UsageError(why)
-        self.record = sanity.recording(log)
+        self.record, self.height = heights.stand_in(sanity.recording(log), log, settings)
         self.at_once = simultaneous.of(self.record) if settings.editing == "two-pass" else None
         if self.at_once is not None:
             self.record = self.at_once.of_stamps(self.record)
-        self.statistics = RunStatistics(log, self.record.absent)
+        self.statistics = RunStatistics(log, self.record.absent, self.height)
         self.why_not = ""  # nothing is corrected
         self.effects = by_hand.Effects(None if log.by_hand is None else log.by_hand.decisions, settings.gate)
 
@@ -123,7 +125,8 @@ class Filtering:
         """The rows of a part that count, corrected, and added to the statistics."""
         absent = list(part.estimate.absent if part.estimate.known is not None else self.record.absent)
         correction, outside = np.zeros((len(part.estimate.label), 6)), 0.0
-        if self.model is not None and self.method.corrected and not absent:
+        plain = not absent and self.height is None and self.log.range_rate is None  # as what the network was taught
+        if self.model is not None and self.method.corrected and plain:
             correction, outside, self.why_not = _corrected(part.estimate, self.model)
         correction, estimate = correction[part.low : part.high], part.estimate.rows(part.low, part.high)
         rows = slice(part.first + part.low, part.first + part.high)
@@ -134,8 +137,17 @@ class Filtering:
         known = slice(None) if estimate.known is None else estimate.known
         cleaned = from_cartesian(state[:, :3]) if estimate.cleaned is None else estimate.cleaned
         cleaned_sigma = measurement_sigma(cleaned, los_sigma[:, :3])
-        if absent:  # the filter ran on a stand-in; what depends on it is not published
+        beside: dict[str, Any] = {}
+        if self.log.range_rate is not None:
+            labels = np.full(len(state), MISSING, np.uint8)
+            channel = estimate.range_rate
+            beside = range_rates.columns(state, los_sigma, labels if channel is None else channel.label)
+        if self.height is not None and tuple(absent) in ((), heights.ABSENT):
+            state, sigma, path_sigma = heights.placed(self.height, rows, state, sigma, path_sigma)
+            cleaned_sigma = heights.elevated(self.height, rows, cleaned, cleaned_sigma)
+        elif absent:
             state[:], sigma[:], path_sigma[:] = np.nan, np.nan, np.nan
+        if absent:  # the filter ran on a stand-in; what depends on it is not published
             cleaned[:, absent], cleaned_sigma[:, absent] = np.nan, np.nan
             estimate.label[:, absent] = MISSING
         elif np.isinf(state).any() or (estimate.cleaned is None and np.isnan(state[known]).any()):
@@ -143,14 +155,31 @@ class Filtering:
             raise InputError(f"{self.log.name}: {name} diverged; give --noise and --jerk, or check the log's units")
         log = self.log.stretch(rows)
         estimate = estimate._replace(label=by_hand.labelled(estimate.label, log.by_hand))
+        if self.height is not None:
+            estimate = estimate._replace(label=heights.relabelled(self.height, rows, estimate.label))
         shown, variance = _diagnostics(log.measurement, estimate), cleaned_sigma**2 + estimate.model.reading_variance
         shown = by_hand.with_rejected(shown, estimate.label, cleaned, variance)
         self.effects.add(log.by_hand, shown.residual, shown.residual_sigma)
         self.statistics.add(log.time_s, estimate, cleaned, correction, outside)
+        label = estimate.label
+        if self.height is not None and not absent:
+            label, own = heights.labelled(label)
+            beside |= own
         return Trajectory(
-            log.name, log.row, log.time_s, cleaned, state, sigma, cleaned_sigma, estimate.label, best.nis, correction,
-            metadata={"frame": log.frame}, extra=log.extra, diagnostics=shown, path_sigma=path_sigma,
+            log.name, log.row, log.time_s, cleaned, state, sigma, cleaned_sigma, label, best.nis, correction,
+            metadata={"frame": log.frame}, extra=_beside(log.extra, beside), diagnostics=shown, path_sigma=path_sigma,
         )  # fmt: skip
+
+
+def _beside(extra: pa.Table | None, columns: Mapping[str, Any]) -> pa.Table | None:
+    """The log's other columns with these."""
+    if not columns:
+        return extra
+    from ftproc.files import arrow
+    from ftproc.files.writing import tables
+
+    own = arrow.table(columns)
+    return own if extra is None else tables.with_extra(extra, own)
 
 
 def _corrected(estimate: Estimate, model: Model) -> Correction:

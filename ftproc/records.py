@@ -9,7 +9,7 @@ import importlib
 import mmap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,18 @@ PAST, LAGGED = "past readings", "past readings and those of the next {:g} s"
 EDITED, WHOLE = "past readings, edited with the whole record", "the whole record"
 
 
+class Heights(NamedTuple):
+    """Heights of the target beside its readings. above_m: (n,) above the ellipsoid or the sea, m, NaN where missing.
+    barometric: by the pressure of the air, so that all are off by about the same."""
+
+    above_m: FloatArray
+    barometric: bool
+
+    def part(self, rows: slice) -> Heights:
+        """Of some of the samples."""
+        return self._replace(above_m=self.above_m[rows])
+
+
 @dataclass(frozen=True, repr=False)
 class MeasurementLog:
     """One tracker's log, checked, in SI units and in time order.
@@ -50,7 +62,8 @@ class MeasurementLog:
     station: what is known of the instrument, already applied. epoch: the instant of time zero (ISO 8601) or "".
     remarks: how the file was understood, for the user. understood: the same in full, see
     `files.reading.understanding`. sha256: of the file's bytes, "" if it was none. by_hand: the engineer's decisions on
-    its readings, if there are any.
+    its readings, if there are any. heights: of the target, where the log has them in place of elevations. range_rate:
+    (n,) m/s, positive when going away or, in some logs, when coming closer; NaN where missing; None without.
     """
 
     name: str
@@ -69,6 +82,8 @@ class MeasurementLog:
     understood: Mapping[str, Any] = field(default_factory=dict)
     sha256: str = ""
     by_hand: ByHand | None = None
+    heights: Heights | None = None
+    range_rate: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -83,7 +98,9 @@ class MeasurementLog:
         extra = None if self.extra is None else self.extra.slice(rows.start, rows.stop - rows.start)
         by_hand = None if self.by_hand is None else self.by_hand.stretch(rows)
         return replace(
-            self, time_s=arrays[0], measurement=arrays[1], row=arrays[2], extra=extra, by_hand=by_hand
+            self, time_s=arrays[0], measurement=arrays[1], row=arrays[2], extra=extra, by_hand=by_hand,
+            heights=None if self.heights is None else self.heights.part(rows),
+            range_rate=None if self.range_rate is None else self.range_rate[rows],
         )  # fmt: skip
 
 

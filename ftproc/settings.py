@@ -72,6 +72,8 @@ class FilterSettings:
     geoid_m: height of the geoid above the ellipsoid at the site, for KML.
     parameters: (name, value) pairs of the method; `ftproc filter --list-methods NAME` explains them.
     lag_s: of live editing: the estimate at t rests on readings up to t + lag_s seconds, and no later one.
+    height: of the target above the station, m, and its 1-sigma, where no elevation is measured; None: by the log's
+        heights, else a prior, see `ftproc.methods.heights`.
     """
 
     method: str = "ga-bpnn-ukf"
@@ -91,6 +93,7 @@ class FilterSettings:
     lag_s: float = 0.0
     derived: bool = False
     motion: str = AUTO
+    height: tuple[float, float] | None = None
 
     def parameter(self, name: str) -> float | None:
         """The parameter of the method by its name; None when it is not set."""

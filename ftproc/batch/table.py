@@ -46,7 +46,7 @@ def row(outcome: Outcome) -> dict[str, Any]:
     """What the table says of a log. Percentages are of the readings that are not missing; of a log that failed only its
     error is known."""
     task, s, failure = outcome.task, outcome.summary, outcome.failure
-    parts = {name: s["components"][name] for name in COMPONENTS} if failure is None else {}
+    parts = s["components"] if failure is None else {}
     noise = {name: f"noise_{unit}" for name, unit in zip(COMPONENTS, UNITS, strict=True)}
     return {
         "log": task.log,

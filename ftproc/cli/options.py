@@ -60,6 +60,16 @@ def noise_or_auto(text: Any) -> Noise | None:
     return first, second, third
 
 
+def height(text: Any) -> tuple[float, float]:
+    """Height m and its 1-sigma m."""
+    from ftproc.config.kinds import prior
+
+    try:
+        return prior(text)
+    except ValueError as error:
+        raise click.BadParameter(f'"{text}" is not {error}.') from error
+
+
 def site(text: Any) -> tuple[float, float, float]:
     """Latitude deg, longitude deg, height m."""
     values = _triple(text)
@@ -241,6 +251,11 @@ _TRACKER: tuple[Callable[[Any], Any], ...] = (
         help="How the target moves: driven by white jerk alone (white-jerk), or with a force that turns with the "
         "velocity, as that of an aircraft does (turning-force), or also grows with the pressure of the air, as on a "
         "bomb or a shell (ballistic), or by gravity alone (orbital); auto: the likeliest by the log's readings.",
+    ),
+    click.option(
+        "--height", type=height, metavar="M[,SIGMA]",
+        help="Of a log without elevations: the height of the target above the station and its 1-sigma in m, such as "
+        "0,20 for ships. [SIGMA: 100; default: the log's heights or flight levels, else what the summary says]",
     ),
     click.option(
         "--lag", type=seconds, metavar="S", default=FilterSettings.lag_s,

@@ -6,7 +6,20 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from ftproc.config.kinds import Kind, file_name, flag, method, number, parameters, positive, text, whole, widths, words
+from ftproc.config.kinds import (
+    Kind,
+    file_name,
+    flag,
+    method,
+    number,
+    parameters,
+    positive,
+    prior,
+    text,
+    whole,
+    widths,
+    words,
+)
 from ftproc.files.units import UNITS
 from ftproc.records import COMPONENTS
 from ftproc.settings import AUTO, EDITING, LEAST_NOISE, MOST_ERROR, MOTIONS, Air, FilterSettings
@@ -42,6 +55,7 @@ SECTIONS: Mapping[str, str] = {
     "range": "",
     "azimuth": "",
     "elevation": "",
+    "height": "",
     "refraction": "Refraction of light in the air, for optical instruments, not for radars.",
     "filter": "As the options of the same names.",
 }
@@ -73,6 +87,7 @@ _SENSE = "seen from above; left out: clockwise from north, anticlockwise from x"
 _OFFSET = "added to every time"
 _ZERO = "azimuth where it reads zero"
 _WIDTHS = "of fixed-width columns, in characters"
+_PRIOR = "of the target above the station, and 1 sigma, where no elevation is measured"
 _GEOID = "height of the geoid above the ellipsoid, for KML"
 _MODEL = "packaged, none, or a file beside this one"
 _PATCH = "longest patch of outliers expected (forward editing)"
@@ -104,6 +119,10 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
         **_column("elevation", "EL"),
         "from": Key("elevation_from", words("horizon", "zenith"), "horizon", "left out: as the column is called"),
         **_errors("elevation", 0.2, 0.1),
+    },
+    "height": {
+        **_column("height", "FL"),
+        "prior_m": Key("height", prior, (0.0, 100.0), _PRIOR),
     },
     "refraction": {
         "correct": Key("refraction", flag, False, "subtract it from the elevation", default=False),

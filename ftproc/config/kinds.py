@@ -13,6 +13,7 @@ from ftproc.files.options import parse_widths
 Kind = Callable[[object], Any]
 
 _LARGEST = 2**53
+UNSTATED_M = 100.0  # 1-sigma of a height for which none is stated
 
 
 def number(low: float = -math.inf, high: float = math.inf) -> Kind:
@@ -82,6 +83,20 @@ def widths(value: object) -> str:
         return ",".join(map(str, parse_widths(value)))
     except UsageError as error:
         raise ValueError(expected) from error
+
+
+def prior(value: object) -> tuple[float, float]:
+    """A height in m and its 1-sigma, as text such as "0,100"; of one without a sigma 100 m."""
+    parts = str(value).split(",")
+    try:
+        found = tuple(float(part) for part in parts)
+    except ValueError:
+        found = ()
+    known = 0 < len(found) <= 2 and all(map(math.isfinite, found)) and not isinstance(value, bool)
+    if not known or min(found[1:], default=1) <= 0:
+        raise ValueError('a height in m and its sigma, such as "0,100"')
+    height, sigma = (*found, UNSTATED_M)[:2]
+    return height, sigma
 
 
 def file_name(value: object) -> str:

@@ -49,4 +49,6 @@ def _toml(value: Any) -> str:
         return str(value).lower()
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, tuple):
+        return json.dumps(",".join(map(repr, value)))
     return str(value) if isinstance(value, int) else repr(float(value))

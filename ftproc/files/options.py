@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from ftproc.errors import UsageError, nearest
 from ftproc.files.units import UNITS, unit_named
-from ftproc.files.words import ALIASES, QUANTITIES
+from ftproc.files.words import ALIASES, FURTHER_ALIASES, QUANTITIES
 
 #: `--columns range=none`: the file has no such quantity, whatever its columns are called.
 ABSENT = "none"
@@ -116,10 +116,10 @@ def _split(option: str, text: str) -> list[tuple[str, str]]:
 
 def _quantity(option: str, key: str) -> str:
     wanted = key.strip().lower()
-    for quantity, aliases in ALIASES.items():
-        if wanted in aliases:
+    for quantity, aliases in (*ALIASES.items(), *FURTHER_ALIASES.items()):
+        if wanted in (quantity, *aliases):
             return quantity
+    known = (*QUANTITIES, *FURTHER_ALIASES)
     raise UsageError(
-        f'{option}: "{key.strip()}" is not a quantity of a log; expected {", ".join(QUANTITIES)}'
-        f"{nearest(wanted, QUANTITIES)}"
+        f'{option}: "{key.strip()}" is not a quantity of a log; expected {", ".join(known)}{nearest(wanted, known)}'
     )

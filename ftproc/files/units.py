@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import NamedTuple
 
-from ftproc.files.words import QUANTITIES
+from ftproc.files.words import FURTHER_ALIASES, QUANTITIES
 from ftproc.records import FloatArray
 
 
@@ -34,6 +34,11 @@ _LENGTHS = (
     *(Unit("m"), Unit("km", 1e3), Unit("ft", 0.3048), Unit("nmi", 1852.0), Unit("nm", 1852.0), Unit("mi", 1609.344)),
     *(Unit("yd", 0.9144), Unit("kyd", 914.4), Unit("kft", 304.8), Unit("cm", divide=1e2), Unit("mm", divide=1e3)),
 )
+_HEIGHTS = (*_LENGTHS, Unit("fl", 30.48))  # of 100 ft
+_SPEEDS = (
+    *(Unit("mps"), Unit("kmps", 1e3), Unit("kmh", divide=3.6), Unit("kt", 1852.0, 3600.0), Unit("fps", 0.3048)),
+    *(Unit("mph", 0.44704), Unit("mmps", divide=1e3), Unit("cmps", divide=1e2)),
+)
 _ANGLES = (
     Unit("rad"),
     Unit("deg", math.pi, 180.0),
@@ -56,7 +61,9 @@ _ANGLES = (
 #: quantity -> unit name -> unit; the first of each is the SI unit.
 UNITS: Mapping[str, Mapping[str, Unit]] = {
     quantity: {unit.name: unit for unit in units}
-    for quantity, units in zip(QUANTITIES, (_TIMES, _LENGTHS, _ANGLES, _ANGLES), strict=True)
+    for quantity, units in zip(
+        (*QUANTITIES, *FURTHER_ALIASES), (_TIMES, _LENGTHS, _ANGLES, _ANGLES, _HEIGHTS, _SPEEDS), strict=True
+    )
 }
 
 #: Unit -> its other spellings, in small letters without blanks and points.
@@ -72,6 +79,14 @@ SPELLINGS: Mapping[str, tuple[str, ...]] = {
     "km": ("kms", "kilometer", "kilometers", "kilometre", "kilometres", "км", "公里", "千米"),
     "ft": ("feet", "foot"),
     "kft": ("kilofeet", "kfeet"),
+    "fl": ("flightlevel", "flightlevels"),
+    "mps": ("m/s", "m/sec", "ms-1", "м/с"),
+    "kmps": ("km/s", "kms-1", "км/с"),
+    "kmh": ("km/h", "kph", "км/ч"),
+    "kt": ("kts", "knot", "knots", "kn"),
+    "fps": ("ft/s", "ft/sec"),
+    "mmps": ("mm/s",),
+    "cmps": ("cm/s",),
     "nmi": ("nauticalmile", "nauticalmiles", "nautmile", "nautmiles", "nautmi", "nautical"),
     "mi": ("mile", "miles", "smi", "sm", "statutemile", "statutemiles"),
     "yd": ("yds", "yard", "yards"),

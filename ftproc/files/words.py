@@ -53,6 +53,26 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     ),
 }
 
+#: Names of what a log may hold beside, by quantity; see `files.reading.further`.
+FURTHER_ALIASES: Mapping[str, tuple[str, ...]] = {
+    "height": _split(
+        """
+        height altitude alt flightlevel fl modec modecaltitude modecheight baroaltitude baroalt baroheight
+        barometricaltitude barometricheight pressurealtitude geoaltitude geoheight geometricaltitude
+        geometricheight heightmsl altitudemsl altmsl mslheight mslaltitude hohe flughohe flugflache hoogte
+        altitud altura quota vyska yukseklik высота эшелон 高度 飞行高度层
+        """
+    ),
+    "range_rate": _split(
+        """
+        rangerate rrate rdot rhodot rrdot rangedot rngrate doppler dopplervelocity dopplerspeed radialvelocity
+        radialspeed radvel vradial vr vrad rangevelocity openingspeed openingvelocity openingrate closingspeed
+        closingvelocity closingrate closurerate closurespeed radialgeschwindigkeit entfernungsanderung
+        vitesseradiale velocidadradial радиальнаяскорость 径向速度
+        """
+    ),
+}
+
 #: Names that other things have too: used where no column has one of ALIASES.
 WEAK_ALIASES: Mapping[str, tuple[str, ...]] = {
     "time": ("date", "gpst", "daytime"),

@@ -26,9 +26,10 @@ from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
 from ftproc.core.identification import likelihood, motion_models
 from ftproc.core.identification.motion_models import Chosen
 from ftproc.core.identification.profile import median_level
-from ftproc.methods import live, preparing
+from ftproc.methods import live, preparing, range_rates
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
 from ftproc.order_statistics import median
+from ftproc.records import FloatArray
 from ftproc.settings import FilterSettings
 
 Run = TypeVar("Run", FilterRun, SmootherRun)
@@ -64,11 +65,17 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     known = preparing.what_is_known(readings, settings)
     edited = two_pass.edit(readings.time_s, readings.measurement, known, usual)
     specified = np.isfinite(known.sigma)
-    motion = motion_models.choose(edited.log, edited.starts, edited.model, preparing.motions(settings), specified)
+    log, model, channel = edited.log, edited.model, None
+    if readings.range_rate is not None:
+        fixed = settings.jerk_psd_m2ps5 is not None
+        log, model, channel = range_rates.fit(log, model, edited.starts, readings.range_rate, settings.gate, fixed)
+    motion = motion_models.choose(log, edited.starts, model, preparing.motions(settings), specified)
+    if channel is not None and channel.used is not None:
+        motion = motion.with_rates(channel.used)
     both = settings.smooth or usual is None  # cheap, and says what could be had
-    run, smoothed = _with_motion(motion, both, motion.model)
+    run, smoothed, left = _with_motion(motion, both, motion.model)
     for other in _as_likely(edited, known, run):
-        filtered, other_smoothed = _with_motion(motion, both, other)
+        filtered, other_smoothed, _ = _with_motion(motion, both, other)
         run = _worse_of(run, filtered)
         smoothed = smoothed and other_smoothed and _worse_of(smoothed, other_smoothed)
     shifts = edited.faults.shifts
@@ -86,14 +93,18 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts,
         alternative=decision.alternative,
         faults=edited.faults, motion=motion, smoothed_sigma_m=could_be, hindsight=hindsight,
+        range_rate=channel and channel.filtered(left),
     )  # fmt: skip
 
 
-def _with_motion(motion: Chosen, smooth: bool, model: Model) -> tuple[FilterRun, SmootherRun | None]:
-    """The filter and, if asked, the smoother over an edited log, by a model."""
+def _with_motion(motion: Chosen, smooth: bool, model: Model) -> tuple[FilterRun, SmootherRun | None, FloatArray]:
+    """The filter and, if asked, the smoother over an edited log, by a model; and what the filter leaves of its range
+    rates, see `core.filtering.rates`."""
     starts = preparing.smoothed_starts(motion.log, model, motion.starts)
-    run = motion.of_rows(forward.filter_log(motion.log, model.causal, starts))
-    return run, motion.of_rows(smooth_log(motion.log, model, motion.starts, PATHS)) if smooth else None
+    run, left = forward.filter_with_rates(motion.log, model.causal, starts)
+    left = left if motion.row is None or not len(left) else left[motion.row]
+    smoothed = motion.of_rows(smooth_log(motion.log, model, motion.starts, PATHS)) if smooth else None
+    return motion.of_rows(run), smoothed, left
 
 
 def _as_likely(edited: two_pass.Edited, known: two_pass.Known, run: FilterRun) -> Iterator[Model]:

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.by_hand import NOTHING, Accepted
 from ftproc.core.editing.lasting.faults import Faults
-from ftproc.core.filtering.records import FilterRun, Model, Observations
+from ftproc.core.filtering.records import FilterRun, Model, Observations, Uneven
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification.coloured_noise import Coloured
 from ftproc.core.identification.motion_models import Chosen
 from ftproc.order_statistics import median
 from ftproc.records import FlagArray, FloatArray, IntArray, forget, thinned
+
+if TYPE_CHECKING:
+    from ftproc.methods.range_rates import Channel
 
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: stands in for a component that is missing throughout
 Run = TypeVar("Run", FilterRun, SmootherRun)
@@ -28,12 +31,15 @@ MOST_INTERVALS = 250_000  # between neighbours, for a typical one to be found am
 class Readings(NamedTuple):
     """A log as the methods see it: time_s (n,) from zero, measurement (n, 3) with NaN where missing, and which
     components' noise cannot be had from the log, with what is assumed for it: (3,) 1-sigma m, rad, rad, NaN where
-    the log tells; and the times of the readings of each component that are accepted by hand."""
+    the log tells; the times of the readings of each component that are accepted by hand; and how the noise of single
+    readings is known to differ, if it is. range_rate: (n,) m/s, NaN where missing, if there are such."""
 
     time_s: FloatArray
     measurement: FloatArray
     assumed_sigma: FloatArray
     accepted: Accepted = NOTHING
+    uneven: Uneven | None = None
+    range_rate: FloatArray | None = None
 
     def unedited(self) -> Observations:
         """The log with every reading used."""
@@ -41,7 +47,7 @@ class Readings(NamedTuple):
 
     def weighted(self, weight: FloatArray) -> Observations:
         """The log with weights (n, 3)."""
-        return Observations(self.time_s, self.measurement, weight)
+        return Observations(self.time_s, self.measurement, weight, self.uneven)
 
 
 @dataclass(frozen=True)
@@ -49,7 +55,7 @@ class Recording:
     """A whole log, of which the methods ask for one stretch at a time; its arrays may lie on a disk.
 
     time_s: (n,). measurement: (n, 3). assumed_sigma: as in `Readings`. absent: components that are missing throughout.
-    rejected: (n, 3) readings that are not to be used, if there are any. accepted: as in `Readings`.
+    rejected: (n, 3) readings that are not to be used, if there are any. accepted, uneven, range_rate: as in `Readings`.
     """
 
     time_s: FloatArray
@@ -58,6 +64,8 @@ class Recording:
     absent: tuple[int, ...] = ()
     rejected: NDArray[np.bool_] | None = None
     accepted: Accepted = NOTHING
+    uneven: Uneven | None = None
+    range_rate: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -71,7 +79,9 @@ class Recording:
             measurement[:, c] = ASSUMED_READING[c]
         time_s = np.asarray(self.time_s[rows]) - float(self.time_s[0])
         forget(self.time_s, self.measurement)
-        return Readings(time_s, np.ascontiguousarray(measurement), self.assumed_sigma, self.accepted)
+        uneven = None if self.uneven is None else self.uneven.part(rows)
+        rate = None if self.range_rate is None else np.ascontiguousarray(self.range_rate[rows])
+        return Readings(time_s, np.ascontiguousarray(measurement), self.assumed_sigma, self.accepted, uneven, rate)
 
     def spans(self) -> list[slice]:
         """SPANS stretches of SPAN samples, spread evenly: what noise and usual jerk of a long log are found from."""
@@ -96,7 +106,7 @@ class Estimate(NamedTuple):
     method without sigmas, whose labels nothing else tests. motion: that was chosen. known: (n,) which samples have an
     estimate, where live editing has none of some; absent: the components that it has not seen. smoothed_sigma_m: the
     median 1-sigma of the position that the smoother would have, where it is known and was not asked for, and
-    hindsight: (n, 9) its states.
+    hindsight: (n, 9) its states. range_rate: what is known of the range rates, see `methods.range_rates`.
     """
 
     run: FilterRun
@@ -117,6 +127,7 @@ class Estimate(NamedTuple):
     absent: tuple[int, ...] = ()
     smoothed_sigma_m: float | None = None
     hindsight: FloatArray | None = None
+    range_rate: Channel | None = None
 
     @property
     def smoothed_run(self) -> FilterRun:
@@ -141,6 +152,7 @@ class Estimate(NamedTuple):
             screened_out=None if self.screened_out is None else self.screened_out[low:high],
             faults=None if self.faults is None else self.faults.rows(low, high),
             motion=None if self.motion is None else self.motion.share((high - low) / len(self.label)),
+            range_rate=None if self.range_rate is None else self.range_rate.of_rows(slice(low, high)),
         )
 
     def at(self, sample: IntArray, first: IntArray) -> Estimate:
@@ -167,6 +179,7 @@ class Estimate(NamedTuple):
             hindsight=None,
             screened_out=None if self.screened_out is None else self.screened_out[sample],
             faults=None if self.faults is None else self.faults.at(sample, first),
+            range_rate=None if self.range_rate is None else self.range_rate.of_rows(sample),
         )
 
 

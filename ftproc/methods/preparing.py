@@ -74,7 +74,8 @@ def trusted(readings: Readings, settings: FilterSettings) -> Trusted:
     known = what_is_known(readings, settings)
     start = None
     with contextlib.suppress(ValueError):  # too few readings in the head: the screening has to do
-        head = two_pass.edit(time_s[:HEAD], measurement[:HEAD], known)
+        uneven = None if known.uneven is None else known.uneven.part(slice(HEAD))
+        head = two_pass.edit(time_s[:HEAD], measurement[:HEAD], known._replace(uneven=uneven))
         weight[:HEAD] = head.weight
         start = smoothed_starts(head.log, head.model, head.starts)[0]
         if len(time_s) <= HEAD:
@@ -122,7 +123,7 @@ def what_is_known(readings: Readings | Recording, settings: FilterSettings) -> t
     """What need not be found from the log: what the user has specified, else what is assumed."""
     stated = np.array(settings.noise or (None, None, None), float)  # None becomes NaN
     sigma = np.where(np.isnan(stated), readings.assumed_sigma, stated)
-    return two_pass.Known(sigma, settings.jerk_psd_m2ps5, settings.gate, readings.accepted)
+    return two_pass.Known(sigma, settings.jerk_psd_m2ps5, settings.gate, readings.accepted, readings.uneven)
 
 
 def motions(settings: FilterSettings) -> tuple[str, ...]:

@@ -37,7 +37,11 @@ class Simultaneous(NamedTuple):
     def of_stamps(self, recording: Recording) -> Recording:
         """The recording of a reading a stamp."""
         time_s = np.asarray(recording.time_s)[self.first[:-1]]
-        return replace(recording, time_s=time_s, measurement=self.measurement, rejected=None)
+        uneven = None if recording.uneven is None else recording.uneven.part(self.first[:-1])
+        rate = None if recording.range_rate is None else recording.range_rate[self.first[:-1]]
+        return replace(
+            recording, time_s=time_s, measurement=self.measurement, rejected=None, uneven=uneven, range_rate=rate
+        )
 
     def of_rows(self, part: Part) -> Part:
         """The estimate of all rows from one of the stamps. All rows of a stamp have its state; its first one has its

@@ -165,7 +165,7 @@ def _noise(s: Summary) -> Iterator[Step]:
     """Where noise and motion cannot be separated, the instrument's noise."""
     names = [name for name, part in s["components"].items() if part["verdict"] == "cautious" or part["good"] < 20]
     if names or s["slow_noise_s"]:
-        found = [s["components"][name][f"noise_{unit}"] for name, unit in UNITS.items()]
+        found = [s["components"].get(name, {}).get(f"noise_{unit}") for name, unit in UNITS.items()]
         example = ",".join("auto" if sigma is None else f"{sigma:.2g}" for sigma in found)
         yield Step(
             "give the noise of the instrument (m, rad, rad; here are those found)",

@@ -76,6 +76,7 @@ def describe(
             "gate": settings.gate,
             "max_patch_s": settings.max_patch_s,
             "motion": settings.motion,
+            **({"height": settings.height} if settings.height is not None else {}),
             "gain_form": settings.gain_form,
             "site": settings.site,
             "geoid_m": settings.geoid_m,

@@ -6,23 +6,17 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.components import any_of, sums, totals
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.methods.estimate import ASSUMED_READING, typical_interval
 from ftproc.order_statistics import median
 from ftproc.quality import consistency, verdict
+from ftproc.quality.components import Component, RangeRate
 from ftproc.quality.faults import FaultStatistics, clock_set_back
 from ftproc.records import (
-    ACCEPTED,
     COMPONENTS,
     GOOD,
-    ISOLATED,
-    MISSING,
-    PATCH,
-    REJECTED,
-    FlagArray,
     FloatArray,
     MeasurementLog,
 )
@@ -32,22 +26,24 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ftproc.methods.estimate import Estimate
+    from ftproc.methods.heights import Common
 
 UNITS = ("m", "rad", "rad")
 GAP_INTERVALS = 3.0  # median intervals that make a gap
 MOST_KEPT = 250_000  # samples whose sigmas are kept; of more, the largest of every few
 SURE = 3.0  # sigmas by which an acceleration is larger than zero
-_LABELS = {"isolated": ISOLATED, "patch": PATCH, "missing": MISSING}
 
 
 class RunStatistics:
-    """Figures of one log, to which its parts are added in their order. absent: components missing throughout."""
+    """Figures of one log, to which its parts are added in their order. absent: components missing throughout. height:
+    what stands for the elevation, if something does."""
 
-    def __init__(self, log: MeasurementLog, absent: Sequence[int]) -> None:
-        self.log, self.absent = log, absent
+    def __init__(self, log: MeasurementLog, absent: Sequence[int], height: Common | None = None) -> None:
+        self.log, self.absent, self.height = log, absent, height
+        self.range_rate: RangeRate | None = None
         self.every = 1 + (len(log) - 1) // MOST_KEPT
         self.interval_s = typical_interval(log.time_s)
-        self.components = [_Component(self.every) for _ in COMPONENTS]
+        self.components = [Component(self.every) for _ in COMPONENTS]
         self.gaps, self.longest_gap_s, self.last_time = 0, 0.0, np.nan
         self.last_cleaned, self.changed, self.changes = np.full((1, 3), np.nan), np.zeros(3), np.zeros(3, int)
         self.nis_sum, self.nis_count, self.used, self.rows_used = 0.0, 0, 0, 0
@@ -112,6 +108,9 @@ class RunStatistics:
         if estimate.screened_out is not None:
             self.screened_out += int(estimate.screened_out.sum())
             self.overlooked += int((estimate.screened_out & (estimate.label == GOOD)).sum())
+        if estimate.range_rate is not None:
+            self.range_rate = self.range_rate or RangeRate(self.every)
+            self.range_rate.add(time_s, estimate.range_rate)
         if estimate.faults is not None:
             self.faults.add(time_s, estimate.faults)
         if correction.any():
@@ -167,14 +166,20 @@ class RunStatistics:
         log, absent, model = self.log, self.absent, self.model
         components: dict[str, Any] = {}
         for c, name in enumerate(COMPONENTS):
-            noise = float(np.sqrt(model.reading_variance[c]))
-            components[name] = {
+            noise, unit = float(np.sqrt(model.reading_variance[c])), UNITS[c]
+            part = {
                 **self.components[c].counts(),
                 **self.faults.of_component(c),
-                f"noise_{UNITS[c]}": noise if c not in absent else None,
+                f"noise_{unit}": noise if c not in absent else None,
                 "noise_correlation": float(model.correlation(self.interval_s)[c]),
                 **self.components[c].consistency(noise),
             }
+            if c == 2 and self.height is not None and not absent:
+                name, part = "height", {**part, "noise_m": noise * self.height.range_m}
+                del part["noise_rad"]
+            components[name] = part
+        if self.range_rate is not None and self.range_rate.used:
+            components["range_rate"] = self.range_rate.figures()
         psd = np.concatenate(self.jerk)
         jerk = {"lowest": float(psd.min()), "median": median(psd), "highest": float(psd.max())}
         time_s, sigma = np.concatenate(self.times), np.concatenate(self.sigmas)
@@ -186,7 +191,7 @@ class RunStatistics:
             "rows_out_of_order": log.rows_out_of_order,
             "duplicate_times": log.duplicate_times,
             "rows_without_estimate": self.unknown,
-            "remarks": list(log.remarks),
+            "remarks": [*log.remarks, *(self.range_rate.remarks() if self.range_rate else ())],
             "assumed": list(log.understood.get("assumed", ())),
             "duration_s": float(log.time_s[-1] - log.time_s[0]),
             "start_s": float(log.time_s[0]),
@@ -196,6 +201,7 @@ class RunStatistics:
             "longest_gap_s": self.longest_gap_s,
             "components": components,
             "not_observable": [COMPONENTS[c] for c in absent],
+            **({} if self.height is None else self.height.figures()),
             "average_gradient": self._average_gradient(),
             "jerk_psd_m2ps5": jerk if np.isfinite(psd).all() else None,
             **self._motion(),
@@ -241,48 +247,3 @@ class RunStatistics:
         seen = [c for c in range(3) if self.absent and c not in self.absent]
         found = {COMPONENTS[c]: consistency.poorly_observable(time_s, sigma[:, [c]], UNITS[c]) for c in seen}
         return {name: intervals for name, intervals in found.items() if intervals}
-
-
-class _Component:
-    """Figures of range, azimuth or elevation. every: of so many innovation sigmas one is kept."""
-
-    def __init__(self, every: int) -> None:
-        self.every = every
-        self.labels = np.zeros(6, int)
-        self.longest_s, self.patch_from = 0.0, np.nan  # the longest patch, and the start of one that may continue
-        self.squares, self.count = 0.0, 0
-        self.innovation_sigma: list[FloatArray] = []
-
-    def add_innovations(self, squares: FloatArray, sigma: FloatArray, tested: NDArray[np.bool_]) -> None:
-        """Squares of the normalised innovations (n,), their sigmas (n,), and which of them count (n,)."""
-        self.squares += float(squares[tested].sum())
-        self.count += int(tested.sum())
-        self.innovation_sigma.append(sigma[:: self.every][tested[:: self.every]])
-
-    def add_labels(self, time_s: FloatArray, label: FlagArray) -> None:
-        """Missing readings inside a patch do not end it, nor do those rejected by hand, nor the end of a part."""
-        self.labels += np.bincount(label, minlength=6)
-        there = np.flatnonzero((label != MISSING) & (label != REJECTED))
-        if not there.size:
-            return
-        inside = np.r_[False, label[there] == PATCH, False]
-        edges = np.flatnonzero(inside[1:] != inside[:-1]).reshape(-1, 2)
-        starts, ends = time_s[there[edges[:, 0]]], time_s[there[edges[:, 1] - 1]]
-        if len(edges) and edges[0, 0] == 0 and np.isfinite(self.patch_from):
-            starts[0] = self.patch_from
-        self.longest_s = max(self.longest_s, float((ends - starts).max(initial=0.0)))
-        self.patch_from = starts[-1] if len(edges) and edges[-1, 1] == len(there) else np.nan
-
-    def counts(self) -> dict[str, Any]:
-        """How many readings have which label; those accepted by hand are good."""
-        counts = {name: int(self.labels[label]) for name, label in _LABELS.items()}
-        good, rejected, accepted = (int(self.labels[label]) for label in (GOOD, REJECTED, ACCEPTED))
-        by_hand = {"rejected_by_hand": rejected, "accepted_by_hand": accepted} if rejected or accepted else {}
-        return {"good": good + accepted, **counts, **by_hand, "longest_patch_s": self.longest_s}
-
-    def consistency(self, noise_sigma: float) -> dict[str, Any]:
-        sigmas = np.concatenate(self.innovation_sigma)
-        return {
-            "predicted_sigma_ratio": consistency.predicted_sigma_ratio(sigmas, noise_sigma),
-            **consistency.innovation_test(self.squares, self.count),
-        }

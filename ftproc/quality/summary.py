@@ -7,8 +7,6 @@ from typing import Any
 
 from ftproc.files.moments import Moments
 from ftproc.quality import next_steps, verdict
-from ftproc.quality.statistics import UNITS
-from ftproc.records import COMPONENTS
 
 
 def as_dict(metadata: Mapping[str, Any]) -> dict[str, Any]:
@@ -62,10 +60,11 @@ def line(name: str, what: str) -> str:
 
 HEADER = ("", "good", "isolated", "patch", "missing", "outliers", "longest patch", "noise (1 sigma)", "sigmas")
 _NAME = len("elevation")
+_NOISE = {"noise_m": ("m", 1.0), "noise_rad": ("mrad", 1e3), "noise_mps": ("m/s", 1.0)}
 
 
 def _table(components: Mapping[str, Any]) -> list[str]:
-    rows = [HEADER, *(component_cells(name, components[name]) for name in COMPONENTS)]
+    rows = [HEADER, *(component_cells(name, part) for name, part in components.items())]
     widths = [max(len(r[i]) for r in rows) for i in range(len(HEADER))]
     return [
         "  ".join(["  " + r[0].ljust(widths[0]), *(v.rjust(w) for v, w in zip(r[1:], widths[1:], strict=True))])
@@ -75,9 +74,8 @@ def _table(components: Mapping[str, Any]) -> list[str]:
 
 def component_cells(name: str, part: Mapping[str, Any]) -> tuple[str, ...]:
     """One component's line of the table, under HEADER."""
-    c = COMPONENTS.index(name)
-    noise = part[f"noise_{UNITS[c]}"]
-    sigma = "-" if noise is None else f"{noise:.3g} m" if c == 0 else f"{1e3 * noise:.3g} mrad"
+    unit, factor, noise = next((*each, part[key]) for key, each in _NOISE.items() if key in part)
+    sigma = "-" if noise is None else f"{factor * noise:.3g} {unit}"
     counts = (str(part[k]) for k in ("good", "isolated", "patch", "missing"))
     share = f"{100 * verdict.outlier_share(part):.2f} %"
     return (name, *counts, share, f"{part['longest_patch_s']:.3g} s", sigma, part["verdict"])

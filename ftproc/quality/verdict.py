@@ -107,8 +107,10 @@ def too_wide(s: Mapping[str, Any]) -> list[str]:
 
 
 def _observability(s: Mapping[str, Any]) -> Iterator[Remark]:
-    absent = s["not_observable"]
-    if absent:
+    absent, height = s["not_observable"], _height(s)
+    if height:
+        yield Remark(CONSISTENT, height)
+    elif absent:
         seen = listed([name for name in s["components"] if name not in absent])
         text = f"{listed(absent)} missing throughout: position and velocity are not observable and left empty; the " \
                f"verdict is about the {seen}"  # fmt: skip
@@ -116,6 +118,21 @@ def _observability(s: Mapping[str, Any]) -> Iterator[Remark]:
     yield from _intervals("the position", s["poorly_observable"], Moments.of_summary(s))
     for name, intervals in s["poorly_observable_readings"].items():
         yield from _intervals(f"the {name}", intervals, Moments.of_summary(s))
+
+
+def _height(s: Mapping[str, Any]) -> str:
+    """What stands for an elevation that is not measured, in a sentence; "" for nothing."""
+    if "height_common_sigma_m" in s:
+        off = s["height_common_sigma_m"]
+        return (
+            f"heights stand for the elevation; all of them may be off by {off:.3g} m (1 sigma): the sigmas allow for it"
+        )
+    if "height_m" not in s:
+        return ""
+    above = f"{s['height_m']:g} m above the station, 1 sigma {s['height_sigma_m']:g} m"
+    if s["height_of"] != "specified":
+        above = f"that of {s['height_of']}, {above} (--height states another)"
+    return f"elevation missing throughout: the height is taken for {above}; z is that, and x and y allow for it"
 
 
 def _intervals(what: str, intervals: Sequence[Mapping[str, float]], moments: Moments) -> Iterator[Remark]:

@@ -14,7 +14,7 @@ from ftproc.derived import extremes as found_extremes
 from ftproc.derived.quantities import site_of
 from ftproc.quality import summary as figures
 from ftproc.quality import verdict
-from ftproc.records import COMPONENTS, Trajectory
+from ftproc.records import Trajectory
 from ftproc.report import deciding
 from ftproc.report.patches import patches as found_patches
 from ftproc.report.patches import steps as found_steps
@@ -95,7 +95,7 @@ def summary(view: View) -> str:
     s = view.summary
     if "components" not in s:  # nor has a fused flight, whose stations have them
         return ""
-    rows = [figures.component_cells(component, s["components"][component]) for component in COMPONENTS]
+    rows = [figures.component_cells(name, part) for name, part in s["components"].items()]
     turned = list(zip(figures.HEADER, *rows, strict=True))  # a line for each figure: a telephone shows it whole
     notes = figures.notes(s)
     body = table(turned[0], turned[1:], "numbers whole")

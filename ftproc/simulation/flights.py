@@ -114,6 +114,20 @@ def _rocket(rng: np.random.Generator, duration_s: float) -> Flight:
     return integrate(-10.0, step, acceleration, velocity + gust_velocity, start)
 
 
+def _ship(rng: np.random.Generator, duration_s: float) -> Flight:
+    """A steady speed, straight legs and slow turns, a mast somewhat above the station."""
+    step, speed, away = 0.5, rng.uniform(3.0, 12.0), rng.uniform(1e3, 10e3)
+    legs = round((duration_s + 20.0) / step / 100) + 2  # of 50 s, every other one straight
+    rate = np.repeat(rng.uniform(-0.015, 0.015, legs) * (np.arange(legs) % 2), 100)
+    rate = smoothed(rate[:, None], 40)[:, 0]
+    course = rng.uniform(-np.pi, np.pi) + np.cumsum(rate) * step
+    turning = np.stack([-np.sin(course), np.cos(course), np.zeros_like(course)], 1) * (speed * rate)[:, None]
+    bearing = rng.uniform(-np.pi, np.pi)
+    ahead = np.array([np.cos(course[0]), np.sin(course[0]), 0.0])
+    start = np.array([away * np.cos(bearing), away * np.sin(bearing), rng.uniform(1.0, 20.0)])
+    return integrate(-10.0, step, turning, speed * ahead, start)
+
+
 def _zuo2021(rng: np.random.Generator, duration_s: float) -> Flight:
     """Section 3.1 of Zuo et al. 2021: the same flight whatever the seed."""
     position, velocity, acceleration = (
@@ -133,5 +147,6 @@ FLIGHTS: dict[str, Callable[[np.random.Generator, float], Flight]] = {
     "overhead": _overhead,
     "orbit": _orbit,
     "rocket": _rocket,
+    "ship": _ship,
     **ABRUPT,
 }

@@ -20,7 +20,8 @@ class Scenario:
     flights: kinds in `flights.FLIGHTS`, one is drawn. duration_s: uniform. dt_s: one is drawn.
     range_noise_m, angle_noise_rad: 1-sigma, log-uniform; elevation has the angle noise times a draw of
     `elevation_ratio`. outliers: specifications (see `outlier_spec.GRAMMAR`), one is drawn. instrument: its
-    errors. members: when given, one of these scenarios is drawn instead of all of the above.
+    errors. further: what is measured beside range and azimuth, see `further`. members: when given, one of these
+    scenarios is drawn instead of all of the above.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Scenario:
     outliers: tuple[str, ...] = ("none",)
     instrument: InstrumentErrors = PERFECT
     members: tuple[Scenario, ...] = ()
+    further: tuple[str, ...] = ("elevation",)
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,7 @@ class Plan:
     noise: tuple[float, float, float]
     outliers: str
     instrument: InstrumentErrors
+    further: tuple[str, ...] = ("elevation",)
 
 
 def draw(scenario: Scenario, rng: np.random.Generator) -> Plan:
@@ -61,6 +64,7 @@ def draw(scenario: Scenario, rng: np.random.Generator) -> Plan:
         noise=(range_m, angle_rad, angle_rad * rng.uniform(*scenario.elevation_ratio)),
         outliers=str(rng.choice(scenario.outliers)),
         instrument=scenario.instrument,
+        further=scenario.further,
     )
 
 
@@ -97,6 +101,31 @@ _RADAR = Scenario(
     range_noise_m=(20.0, 30.0),
     angle_noise_rad=(1e-3, 1e-3),
     outliers=("isolated=0.03:6-200,jitter=0.2,gap=1:8-20,duplicates=5",),
+)
+_SURVEILLANCE = replace(
+    _RADAR,
+    name="surveillance-2d",
+    description="radar without elevation, every 4 s; flight levels of 25 ft, off by the air's pressure, 2 % garbled",
+    dt_s=(4.0,),
+    further=("flight_level",),
+)
+_DOPPLER = replace(
+    _RADAR,
+    name="radar-doppler",
+    description="the radar with range rates too, 0.5 m/s (1 sigma), 2 % of them wrong",
+    further=("elevation", "range_rate"),
+)
+_MARINE = Scenario(
+    "marine",
+    "a ship's radar without elevation, every 2.5 s; another ship at 1-10 km, cells of 22 m; 2 % outliers",
+    flights=("ship",),
+    duration_s=(600.0, 900.0),
+    dt_s=(2.5,),
+    range_noise_m=(5.0, 10.0),
+    angle_noise_rad=(6e-3, 12e-3),
+    outliers=("isolated=0.02:6-30",),
+    instrument=replace(PERFECT, range_rounding_m=22.0),
+    further=(),
 )
 _OVERHEAD = Scenario(
     "overhead",
@@ -201,6 +230,9 @@ _SCENARIOS: dict[str, Scenario] = {
             outliers=("none",),
         ),
         _RADAR,
+        _DOPPLER,
+        _SURVEILLANCE,
+        _MARINE,
         _OVERHEAD,
         _CRUISE,
         _CALIBRATION,

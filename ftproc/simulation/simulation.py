@@ -13,6 +13,7 @@ from ftproc.errors import UsageError
 from ftproc.records import FloatArray, IntArray, MeasurementLog, Truth
 from ftproc.simulation.contamination import contaminate
 from ftproc.simulation.flights import FLIGHTS
+from ftproc.simulation.further import measured
 from ftproc.simulation.instrument import (
     InstrumentErrors,
     held,
@@ -32,7 +33,7 @@ MAX_DURATION_S = 1e5
 MAX_ROWS = 10_000_000
 
 # One child generator each, so that flight and noise do not depend on the outlier specification.
-_STREAMS = ("plan", "flight", "times", "noise", "outliers", "gaps", "duplicates", "instrument", "clock")
+_STREAMS = ("plan", "flight", "times", "noise", "outliers", "gaps", "duplicates", "instrument", "clock", "further")
 
 
 @dataclass(frozen=True)
@@ -146,7 +147,9 @@ def measure(flight: Flight, plan: Plan, sigma: FloatArray, name: str, seed: int 
         rows_out_of_order=int(np.sum(np.diff(time) < 0)),
         duplicate_times=int(np.sum(np.diff(time[order]) == 0)),
     )
-    truth = Truth(name, log.time_s, *flight.at(log.time_s), code[order])
+    state = flight.at(log.time_s)
+    log = measured(log, *state[:2], plan.further, streams["further"])
+    truth = Truth(name, log.time_s, *state, code[order])
     return Simulation(log, truth, plan.noise, readable(clean)[order])
 
 

@@ -45,6 +45,9 @@ bias_deg = -0.5
 correct = true
 temperature_c = -3
 pressure_hpa = 900
+[height]
+unit = "ft"
+prior_m = "9000,50"
 [filter]
 method = "ukf"
 model = "none"
@@ -75,19 +78,20 @@ def test_every_key_is_understood():
         ("azimuth", "unit"),
         ("azimuth", "sigma"),
         ("elevation", "unit"),
+        ("height", "column"),
     }
     found = config.Recipe.of(config.parse(FULL, "s.toml"))
     assert found.settings == FilterSettings(
         "ukf", "forward", True, (3.048, None, pytest.approx(20 * math.pi / 648000)), 5.0, 3.5, 9.0, 150, 7, True,
         (48.0, 11.5, 612.0), True, 46.2, (("window", 6.0), ("m", 0.01)), 1.5, True,
-        "turning-force",
+        "turning-force", (9000.0, 50.0),
     )  # fmt: skip
     assert found.station == Station(
         "north", "anticlockwise", pytest.approx(math.pi / 2), "zenith",
         (2.0, pytest.approx(0.002 * math.pi / 200), pytest.approx(math.radians(-0.5))), -0.02, Air(-3.0, 900.0),
     )  # fmt: skip
     assert (found.model, found.keep_columns) == ("none", True)
-    assert found.units == {"time": "ms", "range": "km"}
+    assert found.units == {"time": "ms", "range": "km", "height": "ft"}
     assert found.columns == {"time": "UTC", "range": "RNG", "elevation": "none"}
 
 
@@ -148,6 +152,7 @@ OPTIONS = st.fixed_dictionaries(
         "particles": st.integers(101, 10_000),
         "seed": st.integers(1, 2**31),
         "keep_columns": st.just(True),
+        "height": st.tuples(st.floats(-100, 1e5), numbers),
     },
 )
 
@@ -176,13 +181,13 @@ def test_a_model_lies_beside_its_file(tmp_path, monkeypatch):
         ("[range]\nbais_m = 1", '[range] has no key "bais_m"; did you mean "bias_m"? Its keys are: column, unit, '
          "sigma_UNIT, bias_UNIT."),
         ("[azimut]\nzero_deg = 1", 'there is no section "azimut"; did you mean "azimuth"? The sections: [site], '
-         "[file], [time], [range], [azimuth], [elevation], [refraction], [filter]."),
+         "[file], [time], [range], [azimuth], [elevation], [height], [refraction], [filter]."),
         ("[file]\nwidths = '8,x'", '[file] widths = "8,x": expected widths such as "10,12,12,12".'),
         ("gate = 3", '"gate" stands outside of its section; write it below [filter].'),
         ("unit = 'm'", '"unit" stands outside of its section; write it below [time] or [range] or [azimuth] or '
-         "[elevation]."),
+         "[elevation] or [height]."),
         ("nonsense = 3", 'there is no key "nonsense". The sections: [site], [file], [time], [range], [azimuth], '
-         '[elevation], '
+         '[elevation], [height], '
          "[refraction], [filter]."),
         ("site = 3", '"site" is a section: write [site], and its keys below it.'),
         ("[range]\nbias_ell = 1", '[range] "bias_ell" must end in its unit: bias_m, bias_km, bias_ft, bias_nmi, '

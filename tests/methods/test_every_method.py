@@ -93,7 +93,10 @@ def test_component_missing_throughout(name, component):
     z = log.measurement.copy()
     z[:, component] = np.nan
     found = run(replace(log, measurement=z), name)
-    assert np.isnan(found.state).all()
+    if component < 2:
+        assert np.isnan(found.state).all()
+    else:  # a height stands in for the elevation
+        assert np.isfinite(found.state[:, :3]).all(1).mean() > 0.9
     assert np.isnan(found.measurement[:, component]).all()
     others = [c for c in range(3) if c != component]
     off = np.abs(found.measurement - log.measurement)[:, others] / np.array([3.0, 2e-4, 2e-4])[others]

@@ -228,7 +228,8 @@ def test_every_scenario_takes_every_override(name: str) -> None:
     error[:, 1] = wrap(error[:, 1])
     below_zenith = np.abs(flight.clean[:, 2]) < 1.55
     np.testing.assert_allclose(error[below_zenith].std(axis=0), (7.0, 0.001, 0.002), rtol=0.15)
-    assert np.isnan(flight.log.measurement).mean() == pytest.approx(0.5, abs=0.06)
+    measured = 3 if np.isfinite(flight.log.measurement[:, 2]).any() else 2
+    assert np.isnan(flight.log.measurement[:, :measured]).mean() == pytest.approx(0.5, abs=0.06)
 
 
 def test_noise_free_log_is_the_truth_and_outliers_keep_their_size() -> None:

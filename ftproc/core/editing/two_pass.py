@@ -35,7 +35,7 @@ from ftproc.core.editing.lasting.weighing import scene_of
 from ftproc.core.editing.reassessment import believed, likelier, log_probability, reassess, with_less_noise, with_motion
 from ftproc.core.editing.screened import rounding_sigma, screen, stuck_readings
 from ftproc.core.filtering.initialization import find_starts
-from ftproc.core.filtering.records import Model, Observations, Start
+from ftproc.core.filtering.records import Model, Observations, Start, Uneven
 from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
 from ftproc.core.identification import one_sided, uneven_noise
 from ftproc.core.identification.likelihood import Fixed, first_jerk
@@ -62,12 +62,13 @@ LASTING_ROUNDS = 4  # of looking for faults that last: where one is taken out, a
 class Known(NamedTuple):
     """What the user has specified: noise 1-sigma (3,) m, rad, rad, NaN where it is to be found; jerk_psd m^2/s^5, None
     where it is to be found; the gate, in sigmas, beyond which a lone reading is called an outlier; the readings that
-    are good by hand."""
+    are good by hand, or otherwise known to be; and how the noise of single readings is known to differ."""
 
     sigma: FloatArray
     jerk_psd: float | None
     gate: float
     accepted: Accepted = NOTHING
+    uneven: Uneven | None = None
 
 
 class Edited(NamedTuple):
@@ -184,8 +185,11 @@ def _decided(
     fixed = Fixed(np.isfinite(known.sigma) | exact | (segment_of is not None), jerk_psd is not None)
     coarse = np.where(rounding > COARSE * sigma, np.sqrt(12) * rounding, 0.0)
     uneven = uneven_noise.repeated(measurement, coarse)
+    if known.uneven is not None:
+        uneven = known.uneven if uneven is None else Uneven(uneven.times * known.uneven.times, uneven.late)
+    trusted = screened if known.uneven is None else np.where(accepted, 1.0, screened)
     record = Record(
-        time_s, measurement, possible, screened * possible, sigma, fixed, known.gate, rounding, work, uneven, white,
+        time_s, measurement, possible, trusted * possible, sigma, fixed, known.gate, rounding, work, uneven, white,
         accepted,
     )  # fmt: skip
     begin = partial(_first, segment_of=segment_of, known=known)

@@ -1,4 +1,4 @@
-"""The memory that the smoother's sweeps work on."""
+"""The memory that the smoother's sweeps work on, and the scores that they find."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import threading
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.core.compiled import empty, zeros
 from ftproc.core.filtering import backward
@@ -23,6 +24,8 @@ from ftproc.core.filtering.filters import (
     Updates,
 )
 from ftproc.core.filtering.forward import Estimates, Residuals
+
+FloatArray = NDArray[np.float64]
 
 BLOCK = 1 << 16  # samples whose updates are kept
 
@@ -75,3 +78,37 @@ def scratch(layout: np.dtype[np.void], count: int) -> Any:
         held[layout] = empty(layout, count)
     _held.records = held
     return held[layout][:count]
+
+
+class Slope(NamedTuple):
+    """How the log-likelihood depends on the logarithms of some variances: the sums of what the record says of each,
+    and of what it would say on average if the variance were right. Their difference is the score."""
+
+    found: FloatArray
+    expected: FloatArray
+
+    @property
+    def score(self) -> FloatArray:
+        """d log-likelihood / d ln(variance)."""
+        return self.found - self.expected
+
+    @property
+    def curvature(self) -> FloatArray:
+        """Of the log-likelihood, downward, from here to where the two sums are equal, if the second stays as it is and
+        the first falls as the variance grows: with it a Newton step goes ln(found / expected) at once."""
+        found, expected = np.maximum(self.found, 1e-300), np.maximum(self.expected, 1e-300 * np.maximum(self.found, 1))
+        ratio = np.log(found / expected)
+        near = np.abs(ratio) < 1e-3
+        mean: FloatArray = np.where(near, 0.5 * (found + expected), (found - expected) / np.where(near, 1.0, ratio))
+        return mean
+
+
+class Scores(NamedTuple):
+    """The likelihood of a model and its slope: by ln(variance) of the noise and of the offsets (3,), by
+    ln(correlation time) of these (3,), and by ln(jerk density) of each axis in each piece of the profile (m, 3)."""
+
+    log_likelihood: float
+    noise: Slope
+    wander: Slope
+    fade: FloatArray
+    jerk: Slope

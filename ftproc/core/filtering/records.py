@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import empty, kernel, record, zeros
+from ftproc.core.filtering import rates
 from ftproc.core.filtering.filters import COLOURED, FILTER
 from ftproc.core.model.motion import WHITE_JERK, Motion, Profile
 from ftproc.core.signatures import Layout, Matrix, Vector
@@ -86,22 +87,50 @@ class Sites(NamedTuple):
         return self._replace(station=self.station[rows])
 
 
+class Rates(NamedTuple):
+    """Range rates beside the readings of a log: value (n,) m/s, NaN where missing, the variance of their noise and
+    their weight (n,), zero for one that is not used."""
+
+    value: FloatArray
+    variance: float
+    weight: FloatArray
+
+    def part(self, rows: slice | IntArray) -> Rates:
+        """Of some of the samples."""
+        return self._replace(value=self.value[rows], weight=self.weight[rows])
+
+    def spread(self, row: IntArray, samples: int) -> Rates:
+        """Of so many samples, among which the own ones are at rows (n,)."""
+        value, weight = np.full(samples, np.nan), np.zeros(samples)
+        value[row], weight[row] = self.value, self.weight
+        return self._replace(value=value, weight=weight)
+
+    def rows(self) -> FloatArray:
+        """What the sweeps work on, see `rates`."""
+        found = np.full((len(self.value), rates.WIDTH), np.nan)
+        found[:, rates.VALUE], found[:, rates.VARIANCE] = self.value, self.variance
+        found[:, rates.WEIGHT] = self.weight
+        return found
+
+
 class Observations(NamedTuple):
     """A log as the filters see it: time_s (n,), measurement (n, 3) slant range m, azimuth and elevation rad, NaN where
     missing, the weight (n, 3) in [0, 1] of each reading, zero for one that is not used, how the noise of single
-    readings differs, if it does, and who took them, if not the one station at the origin."""
+    readings differs, if it does, who took them, if not the one station at the origin, and the range rates beside."""
 
     time_s: FloatArray
     measurement: FloatArray
     weight: FloatArray
     uneven: Uneven | None = None
     sites: Sites | None = None
+    rates: Rates | None = None
 
     def part(self, rows: slice | IntArray) -> Observations:
         """Some of the samples."""
         uneven = None if self.uneven is None else self.uneven.part(rows)
         sites = None if self.sites is None else self.sites.part(rows)
-        return Observations(self.time_s[rows], self.measurement[rows], self.weight[rows], uneven, sites)
+        beside = None if self.rates is None else self.rates.part(rows)
+        return Observations(self.time_s[rows], self.measurement[rows], self.weight[rows], uneven, sites, beside)
 
     def samples(self, noise_variance: FloatArray, made: Any = None) -> Any:
         """The same as an array (n,) of `Sample` records, with noise (3,) m^2, rad^2, rad^2, or (m, 3) by station. made:
@@ -189,6 +218,11 @@ class Model(NamedTuple):
     def profile(self, time_s: FloatArray) -> Profile:
         """The process noise of a log with these times."""
         return Profile(self.jerk, self.knot_s, float(time_s[0]), self.motion)
+
+    def profile_of(self, log: Observations) -> Profile:
+        """The same with the range rates of the log."""
+        found = self.profile(log.time_s)
+        return found if log.rates is None else found._replace(rates=log.rates.rows())
 
     def filter(self, start: Start) -> Any:
         """An array of one `filters.Filter` record at a start; of one `filters.Coloured` if some noise is correlated."""

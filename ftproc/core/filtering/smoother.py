@@ -29,10 +29,10 @@ from numpy.typing import NDArray
 
 from ftproc.core import pacing
 from ftproc.core.compiled import empty, kernel, part, variant
-from ftproc.core.filtering import backward, heads, ukf
+from ftproc.core.filtering import backward, heads, rates, ukf
 from ftproc.core.filtering.filters import OFFSETS, Filter, Update, retain, retain_linearised, retain_state
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Span, advance, extrapolated
-from ftproc.core.filtering.memory import ColouredMemory, Memory, memory_of, scratch
+from ftproc.core.filtering.memory import ColouredMemory, Memory, Scores, Slope, memory_of, scratch
 from ftproc.core.filtering.records import SAMPLE, Model, Observations, Sample, Samples, Start, between
 from ftproc.core.model import forces, motion
 from ftproc.core.signatures import Cube
@@ -160,6 +160,9 @@ def _swept_through(
             sample, interval = samples[k], samples[k].time_s - samples[max(k - 1, span.first)].time_s
             if k > span.first:
                 advance(f, samples, k, profile)
+            if len(profile.rates) > 0:
+                gain = rates.take(f.x, f.p, profile.rates, k)
+                likelihood += gain if turn <= last else 0.0
             nis, gained = take_in(f, sample)
             _carry(memory, f, k, interval, k - low if turn >= last else -1)
             if turn <= last:
@@ -189,6 +192,8 @@ def _swept_through(
                 for i in range(3):
                     residuals[k].residual[i] = back.residual[i]
                     residuals[k].residual_variance[i] = back.variance[i]
+            if len(profile.rates) > 0:
+                rates.absorb(back.r, back.n, back.pn, profile.rates, k)
             _carry_back(memory, update, sample, k, interval, k - low, wanted)
             if k > span.first:
                 backward.score_wander(back, f, interval)
@@ -208,40 +213,6 @@ _sweep = kernel(variant(_swept_through, __name__, "_sweep"))
 _sweep_coloured = kernel(variant(_swept_through, __name__, "_sweep_coloured", memory=ColouredMemory))
 
 
-class Slope(NamedTuple):
-    """How the log-likelihood depends on the logarithms of some variances: the sums of what the record says of each,
-    and of what it would say on average if the variance were right. Their difference is the score."""
-
-    found: FloatArray
-    expected: FloatArray
-
-    @property
-    def score(self) -> FloatArray:
-        """d log-likelihood / d ln(variance)."""
-        return self.found - self.expected
-
-    @property
-    def curvature(self) -> FloatArray:
-        """Of the log-likelihood, downward, from here to where the two sums are equal, if the second stays as it is and
-        the first falls as the variance grows: with it a Newton step goes ln(found / expected) at once."""
-        found, expected = np.maximum(self.found, 1e-300), np.maximum(self.expected, 1e-300 * np.maximum(self.found, 1))
-        ratio = np.log(found / expected)
-        near = np.abs(ratio) < 1e-3
-        mean: FloatArray = np.where(near, 0.5 * (found + expected), (found - expected) / np.where(near, 1.0, ratio))
-        return mean
-
-
-class Scores(NamedTuple):
-    """The likelihood of a model and its slope: by ln(variance) of the noise and of the offsets (3,), by
-    ln(correlation time) of these (3,), and by ln(jerk density) of each axis in each piece of the profile (m, 3)."""
-
-    log_likelihood: float
-    noise: Slope
-    wander: Slope
-    fade: FloatArray
-    jerk: Slope
-
-
 class _Swept(NamedTuple):
     """What sweeps leave behind: `Estimated` records of samples, where kept, and `Left` ones until the next sweep."""
 
@@ -249,12 +220,13 @@ class _Swept(NamedTuple):
     estimates: Any
     residuals: Any
     heads: tuple[Start, ...]
+    rates: FloatArray
 
 
 def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) -> _Swept:
     paths, wanted, n = wanted == PATHS, min(wanted, STATES), len(log.time_s)
     pacing.swept(n)
-    samples, profile = log.samples(model.noise_variance, scratch(SAMPLE, n)), model.profile(log.time_s)
+    samples, profile = log.samples(model.noise_variance, scratch(SAMPLE, n)), model.profile_of(log)
     sweep = _sweep_coloured if model.coloured else _sweep
     estimates = empty(ESTIMATED, n if wanted == STATES else 0)
     residuals = scratch(LEFT, n if wanted >= RESIDUALS else 0)
@@ -272,7 +244,7 @@ def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) ->
             covariance = back["cov"] if wanted == STATES else heads.smoothed_covariance(p, back["n_first"])
             found.append(Start(start.sample, back["state"][:9].copy(), covariance[:9, :9].copy()))
     slopes = (Slope(*noise), Slope(*wander), fade, Slope(jerk[:, 0] * model.jerk, jerk[:, 1] * model.jerk))
-    return _Swept(Scores(likelihood, *slopes), estimates, residuals, tuple(found))
+    return _Swept(Scores(likelihood, *slopes), estimates, residuals, tuple(found), profile.rates)
 
 
 def likelihood_of(log: Observations, model: Model, starts: list[Start]) -> float:
@@ -285,13 +257,20 @@ def score_log(log: Observations, model: Model, starts: list[Start]) -> Scores:
     return _swept(log, model, starts, SCORES).scores
 
 
+def rate_residuals(log: Observations, model: Model, starts: list[Start]) -> tuple[FloatArray, FloatArray, float]:
+    """(n,) leave-one-out residuals of the log's range rates, m/s, NaN where missing, their variances (n,), and the
+    log-likelihood."""
+    found = _swept(log, model, starts, RESIDUALS)
+    return found.rates[:, rates.RESIDUAL], found.rates[:, rates.SPREAD], found.scores.log_likelihood
+
+
 def smooth_log(log: Observations, model: Model, starts: list[Start], wanted: int = STATES) -> SmootherRun:
     """Smooth the whole log, on each side of a start separately; samples before the first start are extrapolated.
 
     wanted: HEADS leaves out states and sigmas (of no sample), which saves half of the time, RESIDUALS also all heads
     but that of a first start after the first sample; PATHS adds path_sigma, which is NaN without it.
     """
-    scores, estimates, residuals, starting = _swept(log, model, starts, wanted)
+    scores, estimates, residuals, starting, _ = _swept(log, model, starts, wanted)
     if (first := starts[0].sample) > 0:
         before, residuals[:first] = extrapolated(log, model, starting[0])
         estimates[:first] = before[: len(estimates)]

@@ -65,7 +65,14 @@ def merge(log: Observations, starts: list[Start], count: int) -> tuple[Observati
         size = np.bincount(group)[:, None]
         means = (np.stack([np.bincount(group, each[:, c]) for c in range(3)], 1) / size for each in log.uneven)
         uneven = Uneven(*means)
-    return Observations(time, z, number, uneven), moved
+    rates = None
+    if log.rates is not None:
+        used = log.rates.weight * np.isfinite(log.rates.value)
+        weight = np.bincount(group, used).astype(float)
+        total = np.bincount(group, np.where(used > 0, log.rates.value, 0.0) * used)
+        value = np.divide(total, weight, out=np.full(len(weight), np.nan), where=weight > 0)
+        rates = log.rates._replace(value=value, weight=weight)
+    return Observations(time, z, number, uneven, rates=rates), moved
 
 
 @kernel

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.filtering.initialization import find_starts
+from ftproc.core.filtering.memory import Scores
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import Scores, likelihood_of, score_log
+from ftproc.core.filtering.smoother import likelihood_of, score_log
 from ftproc.core.identification import optimizer
 from ftproc.core.identification.scales import EXACT, Scales, scales_of
 from ftproc.core.identification.stretches import stretches_of

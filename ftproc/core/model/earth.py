@@ -11,6 +11,8 @@ FloatArray = NDArray[np.float64]
 
 RADIUS_M, ECCENTRICITY2 = 6378137.0, 6.69437999014131705734e-3  # of the ellipsoid: equatorial, and e^2
 
+MEAN_RADIUS_M = 6.371e6
+
 ROUNDS = 8  # of the search for a latitude: each gains three digits
 
 Geodetic = tuple[float, float, float]  # latitude deg, longitude deg, height m

@@ -75,12 +75,14 @@ WHITE_JERK = Motion()
 
 class Profile(NamedTuple):
     """The process noise of a log: jerk (m, 3) densities along x, y and z, each row holding for knot_s
-    seconds from first_s on; and the motion that it drives."""
+    seconds from first_s on; the motion that it drives; and the rates (n, ...) that its samples have beside their
+    readings, without rows if they have none, see `filtering.rates`."""
 
     jerk: Matrix
     knot_s: float
     first_s: float
     motion: Motion = WHITE_JERK
+    rates: Matrix = np.zeros((0, 24))
 
 
 @part

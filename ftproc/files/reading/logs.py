@@ -13,7 +13,7 @@ from ftproc.errors import InputError
 from ftproc.files import conventions
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT, Condition, Extract, parse_columns, parse_units, parse_where
-from ftproc.files.reading import converting, large, proposal, understanding
+from ftproc.files.reading import converting, further, large, proposal, understanding
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
@@ -31,7 +31,7 @@ Found = Mapping[str, schema.Column]
 
 class _Plan(NamedTuple):
     """What is read of a table, and how. others: positions of the columns that are kept beside. notes: on what its
-    values have shown."""
+    values have shown. beside: range rates and heights. open: what may be such."""
 
     header: TableHeader
     found: Found
@@ -40,6 +40,8 @@ class _Plan(NamedTuple):
     others: tuple[int, ...] = ()
     extract: Extract = Extract()
     notes: tuple[str, ...] = ()
+    beside: tuple[further.Further, ...] = ()
+    open: tuple[str, ...] = ()
 
     def positions(self) -> list[int]:
         """Of the columns of all quantities, in their order."""
@@ -91,12 +93,14 @@ def read(
         index = proposal.the_moments(header, range(len(header.names)))
         column_of = column_of if index is None else {**column_of, "time": str(index + 1)}
     found = schema.resolve(header.source, header.names, unit_of, column_of, header.units, propose)
-    plan = _Plan(header, found, station, _conditions(header, extract), extract=extract)
+    beside = further.find(header, found, unit_of, column_of)
+    plan = _Plan(header, found, station, _conditions(header, extract), extract=extract, beside=beside)
+    plan = plan._replace(open=tuple(further.doubts(header, beside, column_of)))
     if keep_columns:
-        wanted = plan.positions()
+        wanted = [*plan.positions(), *(each.place for each in beside)]
         plan = plan._replace(others=tuple(place for place in range(len(header.names)) if place not in wanted))
         _check_others(header, plan.others)
-    whole = plan.others or plan.conditions or header.stated.target or header.stated.station
+    whole = plan.others or plan.conditions or beside or header.stated.target or header.stated.station
     if not whole and station.refraction is None:  # refraction needs ranges of other blocks
         log = _in_blocks(plan)
         if log is not None:
@@ -191,6 +195,8 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     if kept is not None:
         gone = tuple(int(kept[row]) for row in log.rows_without_time)
         log = replace(log, row=kept[log.row], rows_without_time=gone, rows_in_file=table.num_rows)
+    if plan.beside:
+        log = replace(log, **further.of_rows(plan.beside, header, log.row))
     plan = plan._replace(found=judged.found)
     if not choosing.is_one_target(header, plan.extract):
         several.refuse(header, judged.found, log)
@@ -254,12 +260,14 @@ def _explained(
     """The log with its station, and with remarks on how it was understood."""
     station = as_named(plan.station, plan.found)
     values = log.measurement if sample is None else sample
-    called = [] if plan.header.is_of_a_standard else plan.header.names
-    remarks = schema.remarks(called, plan.found, bool(clock.epoch))
-    doubtful = (*plan.notes, *judged.doubts, *plausibility.doubts(values, station))
+    beside = {each.place for each in plan.beside}
+    names = [] if plan.header.is_of_a_standard or log.heights is not None else plan.header.names
+    names = [name for place, name in enumerate(names) if place not in beside]
+    remarks = schema.remarks(names, plan.found, bool(clock.epoch))
+    doubtful = (*plan.notes, *judged.doubts, *plan.open, *plausibility.doubts(values, station))
     said = (*notes, *doubtful)
     axis = knows_axis(plan.station, plan.found)
-    understood = understanding.describe(plan.header, plan.found, clock, station, said, axis)
+    understood = understanding.describe(plan.header, plan.found, clock, station, said, axis, plan.beside)
     understood["assumed"] = list(judged.conditions)
     digest = plan.header.sha256()
     return replace(log, remarks=(*remarks, *said), understood=understood, station=station, sha256=digest)

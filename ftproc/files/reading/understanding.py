@@ -8,6 +8,7 @@ from typing import Any
 from ftproc.files import conventions
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.further import HEIGHT, Further
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.questions import answer, listed
 from ftproc.files.reading.meaning.schema import Column
@@ -26,17 +27,20 @@ _AXES = {
 
 def describe(
     header: TableHeader, found: Mapping[str, Column], clock: Clock, station: Station, doubts: Sequence[str],
-    axis_is_known: bool,
+    axis_is_known: bool,     beside: Sequence[Further] = (),
 ) -> dict[str, Any]:  # fmt: skip
     """file: kind and layout. columns: of each quantity its column, unit and why. not_used: the other columns. clock and
     epoch: of the times. conventions: of the angles, and what was corrected. axis_is_known: whether anything says from
     where the azimuth counts. doubts: each with the option that settles
     it."""
-    used = {place for column in found.values() for place in column.positions}
+    used = {place for column in found.values() for place in column.positions} | {each.place for each in beside}
     unused = [name for place, name in enumerate(header.names) if place not in used and name]
     return {
         "file": header.form or "table",
-        "columns": {quantity: _column(column, header) for quantity, column in found.items()},
+        "columns": {
+            **{quantity: _column(column, header) for quantity, column in found.items()},
+            **{each.quantity: each.described() for each in beside},
+        },
         "not_used": unused,
         "clock": clock.words,
         "epoch": clock.epoch,
@@ -44,7 +48,7 @@ def describe(
         "axis_is_known": axis_is_known,
         "doubts": [
             *_others(header.names, found),
-            *_absent(found, [] if header.is_of_a_standard else unused),
+            *_absent(found, [] if header.is_of_a_standard or HEIGHT in [each.quantity for each in beside] else unused),
             *doubts,
             *clock.doubts,
             *([] if header.is_of_a_standard or axis_is_known else [_AXIS]),

@@ -35,8 +35,10 @@ def write_log(
 def _log_table(log: MeasurementLog, units: Mapping[str, str], azimuth_from: str) -> pa.Table:
     """The log with its units in the column names, such as `range_km`; SI for quantities not in `units`."""
     arrays = {}
-    for index, quantity in enumerate(QUANTITIES):
-        values = log.time_s if index == 0 else log.measurement[:, index - 1]
+    of_log = [log.time_s, *log.measurement.T, *([] if log.range_rate is None else [log.range_rate])]
+    for quantity, values in zip((*QUANTITIES, "range_rate"), of_log, strict=False):
+        if quantity == "elevation" and np.isnan(values).all() and np.isfinite(log.measurement[:, :2]).any(0).all():
+            continue  # of an instrument that measures none
         if quantity == "azimuth" and azimuth_from == "north":
             values = np.mod(values, 2 * math.pi)
             values = np.where(values >= 2 * math.pi, 0.0, values)  # a tiny negative angle, rounded

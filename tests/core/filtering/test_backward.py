@@ -7,8 +7,9 @@ import pytest
 
 from ftproc.core.filtering import backward
 from ftproc.core.filtering.forward import ESTIMATED
+from ftproc.core.filtering.memory import Slope
 from ftproc.core.filtering.records import Model
-from ftproc.core.filtering.smoother import Slope, score_log, smooth_log
+from ftproc.core.filtering.smoother import score_log, smooth_log
 from ftproc.core.model import motion
 from tests import naive
 from tests.core.single import one

@@ -1,0 +1,172 @@
+"""What a log holds beside range, azimuth and elevation: range rates, and heights where no elevation is measured.
+
+Names and units are those of `words.FURTHER_ALIASES` and `units.UNITS`. Where neither the name nor
+`--units` says the unit, a height is asked about, because the positions rest on it, and a rate is left out with a word.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ftproc.errors import InputError, nearest
+from ftproc.files.options import ABSENT
+from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.meaning.names import Name, taken_apart
+from ftproc.files.reading.meaning.numbers import Origin, numbers
+from ftproc.files.reading.meaning.questions import answer, listed
+from ftproc.files.reading.meaning.readings import sentinel
+from ftproc.files.units import SPELLINGS, UNITS, Unit, unit_named
+from ftproc.files.words import FURTHER_ALIASES
+from ftproc.records import FloatArray, Heights
+
+HEIGHT, RANGE_RATE = "height", "range_rate"
+#: Words of names by which a height is geometric; any other is taken for a barometric one. And names of flight levels.
+_GEOMETRIC = ("geo", "gnss", "gps", "msl", "ellips", "height_m")
+_LEVELS = ("flightlevel", "fl", "modec", "flugflache", "эшелон", "飞行高度层")
+_CLOSING = ("closing", "closure")  # begin the names of rates that count inward
+_WHAT = {HEIGHT: "the height of the target", RANGE_RATE: "the range rate"}
+
+
+class Further(NamedTuple):
+    """The column of a quantity, its unit, and what its name says of it: a height may be barometric, a rate closing."""
+
+    quantity: str
+    place: int
+    name: str
+    unit: Unit
+    other_kind: bool
+
+    def read(self, header: TableHeader) -> FloatArray:
+        """(n,) in SI units, rates outward, NaN where missing. Raises InputError for a cell that is no number."""
+        origin = Origin(header.source, self.name, f"a {self.quantity} in {self.unit.name}", header.decimal_comma)
+        values = numbers(header.load([], [self.place]).column(0), origin)
+        while (number := sentinel(values)) is not None:
+            values = np.where(values == number, np.nan, values)
+        return self.unit.to_si(-values if self.quantity == RANGE_RATE and self.other_kind else values)
+
+    def described(self) -> dict[str, Any]:
+        """As `understanding` describes columns."""
+        kinds = ("geometric", "barometric") if self.quantity == HEIGHT else ("outward", "inward, by its name")
+        return {"column": self.name, "unit": self.unit.name, "unit_from": kinds[self.other_kind], "why": "its name"}
+
+
+def of_rows(beside: tuple[Further, ...], header: TableHeader, row: Any) -> dict[str, Any]:
+    """The fields of a `MeasurementLog` of these rows of the file."""
+    found = {each.quantity: each.read(header)[row] for each in beside}
+    height = next((each for each in beside if each.quantity == HEIGHT), None)
+    heights = Heights(found[HEIGHT], height.other_kind) if height else None
+    return {"heights": heights, "range_rate": found.get(RANGE_RATE)}
+
+
+def find(
+    header: TableHeader, found: Mapping[str, Any], units: Mapping[str, str], columns: Mapping[str, str]
+) -> tuple[Further, ...]:
+    """The range rate of a log with ranges, and its height, where it has ranges and azimuths, but no elevations.
+
+    found: the columns of the log by quantity. units, columns: as stated by the user. Raises InputError where the user
+    names a column that is not there, and, with a question, for a quantity whose unit is not known.
+    """
+    wanted = [RANGE_RATE] if "range" in found else []
+    wanted += [HEIGHT] if {"range", "azimuth"} <= set(found) and "elevation" not in found else []
+    taken = {place for column in found.values() for place in column.positions}
+    return tuple(_found(header, wanted, taken, units, columns))
+
+
+def doubts(header: TableHeader, beside: tuple[Further, ...], columns: Mapping[str, str]) -> list[str]:
+    """A word on a column that has the name of a range rate, but not its unit."""
+    if RANGE_RATE in columns or any(each.quantity == RANGE_RATE for each in beside) or header.is_of_a_standard:
+        return []
+    names = [name for name in header.names if not taken_apart(name).unit and _means(RANGE_RATE, taken_apart(name))]
+    return [f'"{name}" may be a range rate: if so, say --units {RANGE_RATE}=mps (or km/h, kt)' for name in names[:1]]
+
+
+def _found(
+    header: TableHeader, wanted: list[str], taken: set[int], units: Mapping[str, str], columns: Mapping[str, str]
+) -> Iterator[Further]:
+    row = list(header.units) or [""] * len(header.names)
+    for quantity in wanted:
+        stated = columns.get(quantity, "")
+        if stated == ABSENT:
+            continue
+        apart = [_apart(quantity, *each) for each in zip(header.names, row, strict=True)]
+        places = [k for k, name in enumerate(apart) if k not in taken and _means(quantity, name)]
+        places = [_stated(header, quantity, stated)] if stated else places
+        if len(places) > 1 and not header.is_of_a_standard:
+            both = listed([header.names[place] for place in places])
+            say = answer(header.names, {quantity: places[0]})
+            raise InputError(
+                f"{header.source}: columns {both} could each be {_WHAT[quantity]}. Say which one it is with {say}, or "
+                f"--columns {quantity}={ABSENT}."
+            )
+        if places and (stated or _has_numbers(header, places[0])):
+            known = _described(header, quantity, places[0], apart[places[0]], units.get(quantity))
+            if known is not None:
+                yield known
+
+
+def _described(header: TableHeader, quantity: str, place: int, name: Name, stated: str | None) -> Further | None:
+    text, words = header.names[place], {name.core(), name.stem}
+    level = quantity == HEIGHT and words & {*_LEVELS}
+    unit = unit_named(quantity, stated or name.unit or ("fl" if level else ""))
+    if unit is None and header.is_of_a_standard and quantity == RANGE_RATE:
+        unit = unit_named(quantity, "mps")
+    if unit is None and quantity == RANGE_RATE:
+        return None
+    if unit is None:
+        raise InputError(
+            f'{header.source}: column "{text}" is the height of the target in a unit that its name does not state. Say '
+            f"--units {HEIGHT}=ft (or {', '.join(UNITS[HEIGHT])}), or --columns {HEIGHT}={ABSENT} if it is something "
+            "else."
+        )
+    if quantity == HEIGHT:
+        kind = unit.name == "fl" or not any(word in text.lower() for word in _GEOMETRIC)
+    else:
+        kind = any(word.startswith(_CLOSING) for word in words)
+    return Further(quantity, place, text, unit, kind)
+
+
+def _apart(quantity: str, text: str, unit: str) -> Name:
+    """The name taken apart, with the units of this quantity, of which FL is a name too."""
+    if unit_named(quantity, unit):
+        return taken_apart(text)._replace(foreign=False, unit=unit)
+    plain, known = text.strip().rstrip(")]}> "), (*UNITS[quantity], *_SPELT[quantity])
+    ending = max((word for word in known if plain.lower().endswith(word)), key=len, default="")
+    before = plain[: len(plain) - len(ending)]
+    if not ending or (before and before[-1].isalnum()):
+        return taken_apart(text, unit)
+    found = taken_apart(before.rstrip(" _.,:([{</-"))
+    if ending == "fl" and found.stem not in FURTHER_ALIASES[HEIGHT]:
+        found = found._replace(stem="fl")
+    return found._replace(foreign=False, unit=ending)
+
+
+_SPELT = {quantity: [word for unit in UNITS[quantity] for word in SPELLINGS.get(unit, ())] for quantity in _WHAT}
+
+
+def _means(quantity: str, name: Name) -> bool:
+    unit = unit_named(quantity, name.unit) if name.unit else None
+    known = {name.stem, name.core()} & {*FURTHER_ALIASES[quantity]} != set()
+    return known and not name.foreign and (not name.unit or unit is not None)
+
+
+def _stated(header: TableHeader, quantity: str, name: str) -> int:
+    if name in header.names:
+        return header.names.index(name)
+    if name.isdecimal() and 1 <= int(name) <= len(header.names):
+        return int(name) - 1
+    raise InputError(
+        f'{header.source}: there is no column "{name}", which --columns names for the {quantity}'
+        f"{nearest(name, header.names) or '.'} Its columns are: {listed(header.names)}."
+    )
+
+
+def _has_numbers(header: TableHeader, place: int) -> bool:
+    """Whether a column that nobody names holds numbers at all."""
+    try:
+        values = numbers(header.load([], [place]).column(0), Origin(header.source, header.names[place], ""))
+    except InputError:
+        return False
+    return bool(np.isfinite(values).any())

@@ -1,0 +1,252 @@
+"""The height of a target in place of its elevation: surveillance radars and those of ships measure none.
+
+With a height h above the station at slant range R, over a round earth of radius R_e (R_e + h and R are two sides of the
+triangle with the earth's centre),
+
+    sin E = (h^2 + 2 h R_e - R^2) / (2 R R_e)        z = R sin E        g = R cos E
+
+with g the ground range. **Measured heights** become elevations by this formula, with noise sigma_h / g, and are edited
+and filtered as such. **Without**, what is known of the height is a prior, by the user or for all targets of a kind: the
+filter works in the plane of range and azimuth, and its estimate is moved to that height: z is the prior, its sigma
+that of the prior, and the sigmas of x and y allow for what the prior leaves open of g. What all heights of a log may be
+off by together (of barometric ones the pressure and the temperature of the air) is added likewise.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.by_hand import Accepted
+from ftproc.core.editing import alone
+from ftproc.core.editing.copies import rounding_step
+from ftproc.core.filtering.records import Uneven
+from ftproc.core.model import kinematics
+from ftproc.core.model.earth import MEAN_RADIUS_M as EARTH_M
+from ftproc.errors import InputError
+from ftproc.methods import anti_outlier, preparing
+from ftproc.methods.estimate import Recording
+from ftproc.order_statistics import median
+from ftproc.records import ISOLATED, MISSING, PATCH, FlagArray, FloatArray, MeasurementLog
+from ftproc.settings import FilterSettings
+
+ABSENT = (2,)  # components that are missing where a height stands in
+PRESSURE_M, TEMPERATURE = 80.0, 0.02  # 1-sigma of barometric heights: 10 hPa, and 5 K of 250 K as a share of the height
+SLOW_MPS = 30.0  # a target that is never faster is taken for a ship or a vehicle
+CHANGES_S = 300.0  # correlation time of an unknown height, for the sigmas of its rates
+LEAST_M = 0.1  # 1-sigma of a height: no instrument is so good
+STEEPEST = 0.9  # sine of the elevation: nearer to the vertical the azimuth says nothing of x and y
+MOST_OUTSIDE = 0.1  # share of heights that may be larger than the range
+FEWEST, BLOCKS = 3, 64  # readings in a block, and blocks, for the speed
+MOST_OF_BLOCKS = 0.9  # of the speeds between blocks
+
+
+class Prior(NamedTuple):
+    """What is known of the height of all targets: m above the station, and 1-sigma. why: in words."""
+
+    height_m: float
+    sigma_m: float
+    why: str
+
+
+SPECIFIED = "specified"
+SLOW = Prior(0.0, 100.0, "a target that is never faster than 30 m/s")
+FAST = Prior(6000.0, 3500.0, "an aircraft")
+ANY = Prior(0.0, 6000.0, "any target")
+
+
+class Common(NamedTuple):
+    """What stands for the elevation. prior: if no height is measured. sigma_m: (n,) that all heights may be off by
+    together. range_m: by which the noise of the elevations is that of single heights. rejected: (n,) heights that are
+    outliers."""
+
+    prior: Prior | None
+    sigma_m: FloatArray
+    range_m: float = 1.0
+    rejected: NDArray[np.bool_] | None = None
+
+    def figures(self) -> dict[str, Any]:
+        """For the summary, JSON-serialisable."""
+        if self.prior is None:
+            return {"height_common_sigma_m": median(self.sigma_m)}
+        return {"height_m": self.prior.height_m, "height_sigma_m": self.prior.sigma_m, "height_of": self.prior.why}
+
+
+def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings) -> tuple[Recording, Common | None]:
+    """The recording with elevations by the heights of the log, and what is known of these; None where a height would
+    not help, because more is missing than the elevation, or nothing is. Raises InputError for heights that cannot be
+    those of the target."""
+    if recording.absent != ABSENT:
+        return recording, None
+    heights, causal = log.heights, settings.editing in ("live", "forward")
+    if heights is None or causal or not np.isfinite(heights.above_m).any() or settings.height is not None:
+        return recording, Common(_prior(log, settings, causal), np.zeros(len(log)))
+    measurement = np.array(log.measurement)
+    station_m = settings.site[2] if settings.site is not None else 0.0
+    above, slant = heights.above_m - station_m, _cleaned_ranges(recording, settings)
+    step = rounding_step(heights.above_m)
+    scatter = _scatter(above)
+    own = max(step / math.sqrt(12) if scatter < step else scatter, LEAST_M)
+    good = alone.good(log.time_s, above, own)
+    rejected = np.isfinite(above) & ~good
+    above = np.where(good, above, np.nan)
+    with np.errstate(invalid="ignore"):
+        sine = _sine(above, slant)
+        measurement[:, 2] = np.where(np.abs(sine) <= 1, np.arcsin(np.clip(sine, -1, 1)), np.nan)
+    _check(log, np.isfinite(above) & np.isfinite(slant), measurement[:, 2])
+    ground = np.maximum(slant * np.cos(measurement[:, 2]), 1.0)
+    each = own / ground
+    typical = float(np.nanmedian(each))
+    common = np.hypot(PRESSURE_M, TEMPERATURE * above) if heights.barometric else np.zeros(len(above))
+    times = np.ones((len(log), 3))
+    times[:, 2] = np.where(np.isfinite(each), (each / typical) ** 2, 1.0)
+    assumed = recording.assumed_sigma.copy()
+    assumed[2] = typical
+    times_s = log.time_s - log.time_s[0]
+    accepted = Accepted((*(recording.accepted.times[:2] or (np.zeros(0),) * 2), times_s[good]))
+    uneven = Uneven(times, np.zeros_like(times))
+    found = replace(
+        recording, measurement=measurement, assumed_sigma=assumed, absent=(), accepted=accepted, uneven=uneven
+    )
+    known = np.where(np.isfinite(common), common, float(np.nanmedian(common)))
+    return found, Common(None, np.hypot(known, step / math.sqrt(12)), own / typical, rejected)
+
+
+def _check(log: MeasurementLog, both: NDArray[np.bool_], elevation: FloatArray) -> None:
+    outside = both & np.isnan(elevation)
+    if outside.sum() > MOST_OUTSIDE * both.sum():
+        row = int(log.row[int(np.argmax(outside))])
+        raise InputError(
+            f"{log.name}: {outside.sum()} of {both.sum()} heights are larger than the range (first: row {row}), so "
+            "they are not those of the target in this unit. Say --units height=ft or m or fl, or --columns height=none."
+        )
+
+
+def _sine(height_m: FloatArray, range_m: FloatArray) -> FloatArray:
+    """Of the elevation, of a target so high above the station over a round earth."""
+    found: FloatArray = (height_m**2 + 2 * height_m * EARTH_M - range_m**2) / (2 * range_m * EARTH_M)
+    return found
+
+
+def _cleaned_ranges(recording: Recording, settings: FilterSettings) -> FloatArray:
+    """(n,) by the readings of range and azimuth alone, edited and smoothed."""
+    plain = replace(settings, method=FilterSettings.method, editing="two-pass", smooth=True, parameters=())
+    found = np.empty(len(recording))
+    for part in anti_outlier.parts(recording, plain):
+        run = part.estimate.smoothed_run
+        state = run.state[part.low : part.high, :3]
+        found[part.first + part.low : part.first + part.high] = np.sqrt((state**2).sum(1))
+    return found
+
+
+def _scatter(values: FloatArray) -> float:
+    """Noise 1-sigma of single values, by their second differences."""
+    seen = values[np.isfinite(values)]
+    return median(np.abs(np.diff(seen, 2))) * 1.4826 / math.sqrt(6) if len(seen) > FEWEST else 0.0
+
+
+def _prior(log: MeasurementLog, settings: FilterSettings, causal: bool) -> Prior:
+    if settings.height is not None:
+        height, sigma = settings.height
+        return Prior(height, sigma, SPECIFIED)
+    if causal:
+        return ANY
+    return SLOW if _fastest(log.time_s, log.measurement) < SLOW_MPS else FAST
+
+
+def _fastest(time_s: FloatArray, measurement: FloatArray) -> float:
+    """m/s over the ground in nearly all of the log, by the medians of blocks of readings; infinite of too few."""
+    there = np.flatnonzero(np.isfinite(measurement[:, :2]).all(1))
+    if len(there) < FEWEST * FEWEST:
+        return math.inf
+    blocks = np.array_split(there, min(BLOCKS, len(there) // FEWEST))
+    x, y = measurement[:, 0] * np.cos(measurement[:, 1]), measurement[:, 0] * np.sin(measurement[:, 1])
+    t, east, north = (np.array([median(each[block]) for block in blocks]) for each in (time_s, x, y))
+    passed = np.diff(t) > 0
+    speed = np.hypot(np.diff(east), np.diff(north))[passed] / np.diff(t)[passed]
+    return float(np.quantile(speed, MOST_OF_BLOCKS)) if len(speed) else math.inf
+
+
+def placed(
+    common: Common, part: slice, state: FloatArray, sigma: FloatArray, path_sigma: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The states (n, 9), their sigmas (n, 9) and those of `kinematics` (n, 6) of some samples, with the prior of the
+    height in place of z, and with what the heights may be off by together."""
+    if common.prior is None:
+        found, wide = state, _widened(state, sigma, common.sigma_m[part])
+    else:
+        found, wide = _moved(common.prior, state, sigma)
+    return found, wide, kinematics.widened(found, path_sigma, sigma, np.maximum(wide, sigma))
+
+
+def elevated(common: Common, part: slice, cleaned: FloatArray, sigma: FloatArray) -> FloatArray:
+    """The sigmas (n, 3) of the cleaned readings (n, 3), with what the heights may be off by together."""
+    if common.prior is not None:
+        return sigma
+    ground = np.maximum(cleaned[:, 0] * np.cos(cleaned[:, 2]), 1.0)
+    return np.column_stack([sigma[:, :2], np.hypot(sigma[:, 2], common.sigma_m[part] / ground)])
+
+
+def relabelled(common: Common, part: slice, label: FlagArray) -> FlagArray:
+    """The labels (n, 3) of some samples of a log with heights, with those of the heights for the elevations."""
+    if common.rejected is None:
+        return label
+    rejected, found = common.rejected[part], label.copy()
+    there = np.flatnonzero(rejected | (label[:, 2] != MISSING))
+    used = np.ones((len(there), 3))
+    used[:, 2] = ~rejected[there] & ~np.isin(label[there, 2], (ISOLATED, PATCH))
+    found[there, 2] = preparing.labels(used, np.zeros_like(used))[:, 2]
+    return found
+
+
+def labelled(label: FlagArray) -> tuple[FlagArray, dict[str, FlagArray]]:
+    """The labels (n, 3) of a log with heights for elevations, whose elevations are missing, and the column of those of
+    the heights."""
+    alone = np.where([False, False, True], MISSING, label).astype(np.uint8)
+    return alone, {"outlier_height": np.ascontiguousarray(label[:, 2])}
+
+
+def _moved(prior: Prior, state: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The states (n, 9) of the plane of range and azimuth moved to a height, and their sigmas (n, 9)."""
+    slant = np.maximum(np.sqrt((state[:, :3] ** 2).sum(1)), 1e-9)
+    sine = np.clip(_sine(np.full(len(slant), prior.height_m), slant), -STEEPEST, STEEPEST)
+    ground, z = slant * np.sqrt(1 - sine**2), slant * sine
+    flat = np.maximum(np.hypot(state[:, 0], state[:, 1]), 1e-9)
+    along, across = state[:, :2] / flat[:, None], np.stack([-state[:, 1], state[:, 0]], 1) / flat[:, None]
+    v, turned, a, bent = ((state[:, k : k + 2] * axis).sum(1) for k in (3, 6) for axis in (along, across))
+    spin = turned / flat  # of the azimuth, rad/s
+    spun = (bent - 2 * v * spin) / flat
+    speed = slant / ground * (1 + z / EARTH_M) * v
+    growth = (v**2 + slant * (a + flat * spin**2) - speed**2) / ground
+    found, wide = np.zeros_like(state), sigma * (slant / ground)[:, None]
+    found[:, :2] = along * ground[:, None]
+    found[:, 2] = z
+    found[:, 3:5] = along * speed[:, None] + across * (ground * spin)[:, None]
+    found[:, 6:8] = along * (growth - ground * spin**2)[:, None] + across * (ground * spun + 2 * speed * spin)[:, None]
+    wide[:, [2, 5, 8]] = prior.sigma_m / CHANGES_S ** np.arange(3)
+    ends = np.stack([_ground(slant, z + sign * 2 * prior.sigma_m) for sign in (-1, 1)])
+    open_m = np.abs(ends - ground).max(0) / 2
+    _add(wide, 0, along, open_m)
+    _add(wide, 3, along, np.hypot(np.abs(speed) * open_m, np.abs(z) * prior.sigma_m / CHANGES_S) / ground)
+    return found, wide
+
+
+def _ground(slant: FloatArray, z: FloatArray) -> FloatArray:
+    return np.sqrt(np.maximum(slant**2 - z**2, 0.0))
+
+
+def _add(sigma: FloatArray, first: int, along: FloatArray, more: FloatArray) -> None:
+    """Add an independent error along the ground range to the sigmas of two axes, from a column on."""
+    sigma[:, first : first + 2] = np.hypot(sigma[:, first : first + 2], along * more[:, None])
+
+
+def _widened(state: FloatArray, sigma: FloatArray, off_m: FloatArray) -> FloatArray:
+    """The sigmas (n, 9) with an error (n,) that all heights have together."""
+    flat, wide = np.maximum(np.hypot(state[:, 0], state[:, 1]), 1e-9), sigma.copy()
+    wide[:, 2] = np.hypot(sigma[:, 2], off_m)
+    _add(wide, 0, state[:, :2] / flat[:, None], np.minimum(np.abs(state[:, 2]) / flat, 10.0) * off_m)
+    return wide

@@ -1,0 +1,105 @@
+"""The figures of each component of a run: how many readings have which label, and how large their innovations are."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.order_statistics import median
+from ftproc.quality import consistency
+from ftproc.records import ACCEPTED, GOOD, ISOLATED, MISSING, PATCH, REJECTED, FlagArray, FloatArray
+
+if TYPE_CHECKING:
+    from ftproc.methods.range_rates import Channel
+
+_LABELS = {"isolated": ISOLATED, "patch": PATCH, "missing": MISSING}
+
+
+class Component:
+    """Figures of range, azimuth or elevation. every: of so many innovation sigmas one is kept."""
+
+    def __init__(self, every: int) -> None:
+        self.every = every
+        self.labels = np.zeros(6, int)
+        self.longest_s, self.patch_from = 0.0, np.nan  # the longest patch, and the start of one that may continue
+        self.squares, self.count = 0.0, 0
+        self.innovation_sigma: list[FloatArray] = []
+
+    def add_innovations(self, squares: FloatArray, sigma: FloatArray, tested: NDArray[np.bool_]) -> None:
+        """Squares of the normalised innovations (n,), their sigmas (n,), and which of them count (n,)."""
+        self.squares += float(squares[tested].sum())
+        self.count += int(tested.sum())
+        self.innovation_sigma.append(sigma[:: self.every][tested[:: self.every]])
+
+    def add_labels(self, time_s: FloatArray, label: FlagArray) -> None:
+        """Missing readings inside a patch do not end it, nor do those rejected by hand, nor the end of a part."""
+        self.labels += np.bincount(label, minlength=6)
+        there = np.flatnonzero((label != MISSING) & (label != REJECTED))
+        if not there.size:
+            return
+        inside = np.r_[False, label[there] == PATCH, False]
+        edges = np.flatnonzero(inside[1:] != inside[:-1]).reshape(-1, 2)
+        starts, ends = time_s[there[edges[:, 0]]], time_s[there[edges[:, 1] - 1]]
+        if len(edges) and edges[0, 0] == 0 and np.isfinite(self.patch_from):
+            starts[0] = self.patch_from
+        self.longest_s = max(self.longest_s, float((ends - starts).max(initial=0.0)))
+        self.patch_from = starts[-1] if len(edges) and edges[-1, 1] == len(there) else np.nan
+
+    def counts(self) -> dict[str, Any]:
+        """How many readings have which label; those accepted by hand are good."""
+        counts = {name: int(self.labels[label]) for name, label in _LABELS.items()}
+        good, rejected, accepted = (int(self.labels[label]) for label in (GOOD, REJECTED, ACCEPTED))
+        by_hand = {"rejected_by_hand": rejected, "accepted_by_hand": accepted} if rejected or accepted else {}
+        return {"good": good + accepted, **counts, **by_hand, "longest_patch_s": self.longest_s}
+
+    def consistency(self, noise_sigma: float) -> dict[str, Any]:
+        sigmas = np.concatenate(self.innovation_sigma)
+        return {
+            "predicted_sigma_ratio": consistency.predicted_sigma_ratio(sigmas, noise_sigma),
+            **consistency.innovation_test(self.squares, self.count),
+        }
+
+
+class RangeRate:
+    """Figures of the range rates of a log, to which those of its parts are added."""
+
+    def __init__(self, every: int) -> None:
+        self.component, self.closing, self.why = Component(every), False, dict[str, None]()
+        self.variances: list[float] = []
+
+    @property
+    def used(self) -> bool:
+        """Whether some part uses them."""
+        return bool(self.variances)
+
+    def add(self, time_s: FloatArray, channel: Channel) -> None:
+        """Add a part with these times (n,)."""
+        self.component.add_labels(time_s, channel.label)
+        if channel.why:
+            self.why[channel.why] = None
+            return
+        self.closing |= channel.closing
+        self.variances.append(channel.rates.variance)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            squares = np.square(channel.innovation / channel.sigma)
+        self.component.add_innovations(squares, channel.sigma, channel.rates.weight > 0)
+
+    def remarks(self) -> list[str]:
+        """What was done with them, and why they are not used."""
+        said = ["the range rates count inward, as the motion shows, and are turned round"] if self.closing else []
+        return [*said, *self.why]
+
+    def figures(self) -> dict[str, Any]:
+        """As those of other components."""
+        noise = float(np.sqrt(median(np.array(self.variances))))
+        return {
+            **self.component.counts(),
+            "held": 0,
+            "interpolated": 0,
+            "computed": 0,
+            "noise_mps": noise,
+            "noise_correlation": 0.0,
+            **self.component.consistency(noise),
+        }

@@ -1,0 +1,60 @@
+"""What a simulated instrument measures beside range and azimuth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ftproc.core.model.earth import MEAN_RADIUS_M
+from ftproc.records import FloatArray, Heights, MeasurementLog
+
+ELEVATION, FLIGHT_LEVEL, RANGE_RATE = "elevation", "flight_level", "range_rate"
+RATE_MPS, WRONG_RATES, WRONG_MPS = 0.5, 0.02, (10.0, 200.0)  # 1-sigma of range rates, share of outliers, their sizes
+LEVEL_M, STEP = 30.48, 0.25  # of a flight level; to which a transponder rounds them
+OFFSET_M = 80.0  # 1-sigma: the pressure at sea level, which no transponder knows
+GARBLED, GARBLES, MISSED = 0.02, (10.0, 20.0, 50.0, 100.0, 200.0), 0.02  # shares of the replies, and flight levels
+
+
+def measured(
+    log: MeasurementLog,
+    position_m: FloatArray,
+    velocity_mps: FloatArray,
+    names: tuple[str, ...],
+    rng: np.random.Generator,
+) -> MeasurementLog:
+    """The log as it is with these quantities beside range and azimuth. position_m, velocity_mps: (n, 3) the truth, row
+    for row."""
+    if ELEVATION not in names:
+        measurement = log.measurement.copy()
+        measurement[:, 2] = np.nan
+        log = replace(log, measurement=measurement)
+    if RANGE_RATE in names:
+        return _with_rates(log, position_m, velocity_mps, rng)
+    if FLIGHT_LEVEL not in names:
+        return log
+    level = _levels(position_m, rng)
+    import pyarrow as pa
+
+    return replace(log, extra=pa.table({FLIGHT_LEVEL: level}), heights=Heights(level * LEVEL_M, barometric=True))
+
+
+def _with_rates(
+    log: MeasurementLog, position_m: FloatArray, velocity_mps: FloatArray, rng: np.random.Generator
+) -> MeasurementLog:
+    n = len(position_m)
+    rate = (position_m * velocity_mps).sum(1) / np.sqrt((position_m**2).sum(1)) + RATE_MPS * rng.standard_normal(n)
+    wrong = rng.random(n) < WRONG_RATES
+    rate = rate + np.where(wrong, rng.choice((-1.0, 1.0), n) * rng.uniform(*WRONG_MPS, n), 0.0)
+    return replace(log, range_rate=rate)
+
+
+def _levels(position_m: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """(n,) flight levels, in steps of 25 ft, a few of them garbled or missing; by standard pressure."""
+    x, y, z = position_m.T
+    height = np.sqrt(x**2 + y**2 + (z + MEAN_RADIUS_M) ** 2) - MEAN_RADIUS_M
+    level = np.round((height + OFFSET_M * rng.standard_normal()) / LEVEL_M / STEP) * STEP
+    n = len(level)
+    garbled = rng.random(n) < GARBLED
+    level = level + np.where(garbled, rng.choice((-1.0, 1.0), n) * rng.choice(GARBLES, n), 0.0)
+    return np.where(rng.random(n) < MISSED, np.nan, level)

@@ -1,0 +1,118 @@
+"""The height of the target beside range and azimuth, and range rates."""
+
+import numpy as np
+import pytest
+
+from ftproc.errors import InputError, UsageError
+from ftproc.files.reading import logs
+
+
+def table(tmp_path, head, cells=("350", "351", "")):
+    path = tmp_path / "log.csv"
+    rows = "\n".join(f"{k},{50000 + 100 * k},0.{k + 1},{cell}" for k, cell in enumerate(cells))
+    path.write_text(f"time_s,range_m,azimuth_rad,{head}\n{rows}\n")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("head", "metres", "barometric"),
+    [
+        ("flight_level", 30.48, True),
+        ("FL", 30.48, True),
+        ("Mode C", 30.48, True),
+        ("I090.FL", 30.48, True),
+        ("height (FL)", 30.48, True),
+        ("altitude_ft", 0.3048, True),
+        ("Altitude (m)", 1.0, True),
+        ("geo_height_ft", 0.3048, False),
+        ("height_m", 1.0, False),
+        ("target height [km]", 1000.0, True),
+    ],
+)
+def test_names_and_units(tmp_path, head, metres, barometric):
+    log = logs.read(table(tmp_path, head))
+    np.testing.assert_allclose(log.heights.above_m, [350 * metres, 351 * metres, np.nan])
+    assert log.heights.barometric == barometric
+    assert log.understood["columns"]["height"]["column"] == head
+    assert head not in log.understood["not_used"]
+
+
+def test_a_unit_that_nothing_states_is_asked_for(tmp_path):
+    path = table(tmp_path, "altitude")
+    with pytest.raises(InputError, match=r"--units height=ft .*--columns height=none"):
+        logs.read(path)
+    assert logs.read(path, units="height=ft").heights.above_m[0] == pytest.approx(350 * 0.3048)
+    assert logs.read(path, columns="height=none").heights is None
+
+
+def test_a_column_is_named(tmp_path):
+    path = table(tmp_path, "H1")
+    assert logs.read(path).heights is None
+    assert logs.read(path, columns="height=H1", units="height=fl").heights.above_m[0] == pytest.approx(10668)
+    with pytest.raises(InputError, match='there is no column "H2", which --columns names for the height'):
+        logs.read(path, columns="height=H2")
+    with pytest.raises(UsageError, match="expected time, range, azimuth, elevation, height"):
+        logs.read(path, columns="hight=H1")
+
+
+def test_two_heights_are_asked_about(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time_s,range_m,azimuth_rad,FL,geo_height_m\n0,50000,0.1,350,10700\n1,50100,0.1,350,10700\n")
+    with pytest.raises(InputError, match="FL, geo_height_m could each be the height"):
+        logs.read(path)
+    log = logs.read(path, columns="height=geo_height_m")
+    assert not log.heights.barometric
+
+
+def test_with_elevations_nobody_asks(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time_s,range_m,azimuth_rad,elevation_rad,altitude\n0,50000,0.1,0.1,350\n1,50100,0.1,0.1,350\n")
+    assert logs.read(path).heights is None
+
+
+def test_words_are_no_heights(tmp_path):
+    assert logs.read(table(tmp_path, "altitude", ("low", "high", ""))).heights is None
+
+
+def test_rows_stay_together(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time_s,range_m,azimuth_rad,FL,ok\n2,50200,0.1,352,1\n0,50000,0.1,350,1\n1,50100,0.1,351,0\n")
+    log = logs.read(path, extract=logs.Extract(where=logs.parse_where(["ok=1"])))
+    np.testing.assert_allclose(log.heights.above_m / 30.48, [350, 352])
+    assert log.stretch(slice(1, 2)).heights.above_m == pytest.approx([352 * 30.48])
+
+
+@pytest.mark.parametrize(
+    ("head", "mps"),
+    [
+        ("range_rate_mps", 1.0),
+        ("Doppler (m/s)", 1.0),
+        ("radial_velocity_kt", 1852 / 3600),
+        ("radialVelocity [km/h]", 1 / 3.6),
+        ("closing_speed_kmh", -1 / 3.6),
+        ("RDOT_ft/s", 0.3048),
+        ("target range rate, km/s", 1000.0),
+    ],
+)
+def test_names_and_units_of_range_rates(tmp_path, head, mps):
+    path = tmp_path / "log.csv"
+    path.write_text(f'time_s,range_m,azimuth_rad,elevation_rad,"{head}"\n0,50000,0.1,0.1,35\n1,50100,0.1,0.1,\n')
+    log = logs.read(path)
+    np.testing.assert_allclose(log.range_rate, [35 * mps, np.nan])
+    assert log.understood["columns"]["range_rate"]["column"] == head
+
+
+def test_a_range_rate_without_a_unit_is_left_out_with_a_word(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time_s,range_m,azimuth_rad,elevation_rad,doppler\n0,50000,0.1,0.1,35\n1,50100,0.1,0.1,36\n")
+    log = logs.read(path)
+    assert log.range_rate is None
+    assert "--units range_rate=mps" in " ".join(log.remarks)
+    assert logs.read(path, units="range_rate=kt").range_rate[0] == pytest.approx(35 * 1852 / 3600)
+    assert "--units range_rate" not in " ".join(logs.read(path, columns="range_rate=none").remarks)
+
+
+def test_doppler_in_hertz_is_no_range_rate(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time_s,range_m,azimuth_rad,elevation_rad,Doppler (Hz)\n0,50000,0.1,0.1,35\n1,50100,0.1,0.1,36\n")
+    assert logs.read(path).range_rate is None

@@ -1,0 +1,134 @@
+"""Range rates of a radar: better with them, whatever their noise and sense, and never worse."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ftproc.pipeline import filter_log
+from ftproc.quality import summary
+from ftproc.records import MISSING
+from ftproc.settings import FilterSettings
+from ftproc.simulation import simulate
+
+SMOOTH = FilterSettings(smooth=True)
+
+
+def true_rate(truth):
+    return (truth.position_m * truth.velocity_mps).sum(1) / np.sqrt((truth.position_m**2).sum(1))
+
+
+def errors(found, truth):
+    """RMS of position m and velocity m/s."""
+    off = (found.state[:, :3] - truth.position_m, found.state[:, 3:6] - truth.velocity_mps)
+    return np.array([np.sqrt((each**2).sum(1).mean()) for each in off])
+
+
+@pytest.fixture(scope="module")
+def plain():
+    flight = simulate("manoeuvre-clean", seed=1, duration_s=60.0)
+    return flight, errors(filter_log(flight.log, SMOOTH), flight.truth)
+
+
+def with_rates(flight, sigma, seed=0):
+    rng = np.random.default_rng(seed)
+    rate = true_rate(flight.truth) + sigma * rng.standard_normal(len(flight.log))
+    return replace(flight.log, range_rate=rate)
+
+
+@pytest.mark.parametrize(("sigma", "position", "velocity"), [(1.0, 0.95, 0.85), (0.3, 0.85, 0.75)])
+def test_better_with_them(plain, sigma, position, velocity):
+    flight, without = plain
+    found = filter_log(with_rates(flight, sigma), SMOOTH)
+    ratio = errors(found, flight.truth) / without
+    assert ratio[0] < position
+    assert ratio[1] < velocity
+    part = found.metadata["summary"]["components"]["range_rate"]
+    assert part["noise_mps"] == pytest.approx(sigma, rel=0.1)
+    assert found.metadata["summary"]["trust"]["verdict"] == "consistent"
+    assert "range_rate" in summary.text(found.metadata)
+
+
+def test_useless_ones_change_nothing(plain):
+    flight, without = plain
+    ratio = errors(filter_log(with_rates(flight, 100.0), SMOOTH), flight.truth) / without
+    assert ratio.max() < 1.02
+
+
+def test_the_other_sense_is_found_by_the_motion(plain):
+    flight, _ = plain
+    log = with_rates(flight, 1.0)
+    one, other = filter_log(log, SMOOTH), filter_log(replace(log, range_rate=-log.range_rate), SMOOTH)
+    np.testing.assert_array_equal(one.state, other.state)
+    assert "count inward" in " ".join(other.metadata["summary"]["remarks"])
+
+
+def test_outliers_are_found(plain):
+    flight, _ = plain
+    log = with_rates(flight, 1.0)
+    rng = np.random.default_rng(5)
+    rate = log.range_rate.copy()
+    bad = rng.random(len(rate)) < 0.03
+    rate[bad] += rng.choice([-1, 1], bad.sum()) * rng.uniform(8, 200, bad.sum())
+    bad[300:320] = True
+    rate[300:320] = 500.0
+    rate[50] = np.nan
+    found = filter_log(replace(log, range_rate=rate), SMOOTH)
+    label = np.asarray(found.extra.column("outlier_range_rate"))
+    assert np.isin(label[bad & np.isfinite(rate)], (1, 2)).mean() > 0.98
+    assert np.isin(label[~bad], (1, 2)).mean() < 0.005
+    assert label[50] == MISSING
+    assert (label[302:318] == 2).all()
+
+
+def test_the_cleaned_rate_has_its_sigma(plain):
+    flight, _ = plain
+    found = filter_log(with_rates(flight, 1.0), SMOOTH)
+    rate, sigma = (np.asarray(found.extra.column(name)) for name in ("range_rate_mps", "sigma_range_rate_mps"))
+    off = np.abs(rate - true_rate(flight.truth))
+    assert (off <= 3 * sigma).mean() > 0.97
+    assert np.median(sigma) < 1.0
+
+
+def test_rates_of_something_else_are_left_out(plain):
+    flight, without = plain
+    rng = np.random.default_rng(3)
+    log = replace(flight.log, range_rate=np.cumsum(rng.standard_normal(len(flight.log))) + 400.0)
+    found = filter_log(log, SMOOTH)
+    assert (errors(found, flight.truth) / without).max() < 1.02
+
+
+@pytest.mark.parametrize("fault", ["bias", "late", "scale", "held", "ambiguous"])
+def test_rates_that_hinder_are_left_out(plain, fault):
+    """The result is that without them, and the summary says so."""
+    flight, _ = plain
+    log = with_rates(flight, 1.0)
+    rate = log.range_rate
+    wrong = {
+        "bias": rate + 5.0,
+        "late": np.roll(rate, 6),
+        "scale": 1.02 * rate,
+        "held": np.repeat(rate[::8], 8)[: len(rate)],
+        "ambiguous": (rate + 25) % 50 - 25,
+    }[fault]
+    found = filter_log(replace(log, range_rate=wrong), SMOOTH)
+    np.testing.assert_array_equal(found.state, filter_log(flight.log, SMOOTH).state)
+    assert "none is used" in " ".join(found.metadata["summary"]["remarks"])
+
+
+def test_a_few_are_not_used(plain):
+    flight, _ = plain
+    rate = np.full(len(flight.log), np.nan)
+    rate[:5] = true_rate(flight.truth)[:5]
+    found = filter_log(replace(flight.log, range_rate=rate), SMOOTH)
+    np.testing.assert_array_equal(found.state, filter_log(flight.log, SMOOTH, None).state)
+    assert "too few range rates (5)" in " ".join(found.metadata["summary"]["remarks"])
+    assert "range_rate" not in found.metadata["summary"]["components"]
+
+
+def test_the_scenario_has_them():
+    flight = simulate("radar-doppler", seed=1)
+    found = filter_log(flight.log, SMOOTH)
+    without = filter_log(replace(flight.log, range_rate=None), SMOOTH)
+    assert (errors(found, flight.truth) <= 1.01 * errors(without, flight.truth)).all()
+    assert found.metadata["summary"]["components"]["range_rate"]["noise_mps"] == pytest.approx(0.5, rel=0.15)
