@@ -12,12 +12,12 @@ from tests.acceptance.reproduce import zuo2021 as reproduced
 
 CLEAN, DIRTY = zuo2021.SCENARIOS.values()
 BOUNDS = {  # m, of the mean over the trials
-    ("untuned, forward", CLEAN): 9.9,
-    ("untuned, forward", DIRTY): 12.0,
-    ("from the log, forward", CLEAN): 1.55,
-    ("from the log, forward", DIRTY): 1.75,
-    ("from the log, two-pass", CLEAN): 1.55,
-    ("from the log, two-pass", DIRTY): 1.65,
+    ("untuned, forward", CLEAN): 14.5,
+    ("untuned, forward", DIRTY): 15.0,
+    ("from the log, forward", CLEAN): 1.5,
+    ("from the log, forward", DIRTY): 1.65,
+    ("from the log, two-pass", CLEAN): 0.6,
+    ("from the log, two-pass", DIRTY): 0.65,
 }
 
 
@@ -42,10 +42,10 @@ def test_outliers_are_found_and_only_they(way):
 
 
 @pytest.mark.parametrize("scenario", zuo2021.SCENARIOS.values())
-def test_the_network_helps_the_untuned_filter_and_does_the_tuned_ones_no_harm(scenario):
+def test_a_network_that_has_not_seen_the_flight_does_no_harm(scenario):
     for way in zuo2021.WAYS:
         with_network, without = (np.mean(zuo2021.errors("ga-bpnn-ukf", scenario, way, c)) for c in (True, False))
-        assert with_network <= (0.85 if way == "untuned, forward" else 1.005) * without
+        assert with_network <= 1.005 * without
 
 
 def test_filters_without_editing_are_spoiled_by_outliers():
@@ -55,10 +55,11 @@ def test_filters_without_editing_are_spoiled_by_outliers():
         assert np.mean(errors[1]) > 10 * np.mean(errors[0])
 
 
-def test_table_one_is_of_the_papers_size():
-    for method, paper in zuo2021.PAPER.items():
-        ours = np.mean(zuo2021.errors(method, CLEAN, "untuned, forward"))
-        assert 0.5 < ours / np.mean(paper) < 1.5
+def test_errors_go_with_the_noise_that_is_specified():
+    """Errors of the paper's size come from 0.1 rad; they say nothing of what the paper specified."""
+    for method in zuo2021.PAPER:
+        sizes = [zuo2021.specified(method, angle) for angle in reproduced.ANGLES_RAD]
+        assert sizes[-1] > 5 * max(sizes[:-1])
 
 
 @pytest.fixture(scope="module")
@@ -69,11 +70,10 @@ def claims():
 def test_conclusions_are_those_of_the_results(claims):
     """Each is what its numbers say, not what a text once said; those of editing and of the average gradient hold."""
     for claim, (here, holds) in claims.items():
-        if claim.startswith(("section 3.2", "table 2", "table 1: errors")) and "forward" not in claim:
+        if claim.startswith(("section 3.2", "table 2")) and "forward" not in claim:
             assert holds, (claim, here)
         if claim.startswith("section 2.2"):
             assert holds == ("takes the error to" in here and float(here.split()[-2]) < 100)
-    assert claims["section 2.2: the network corrects the UKF (untuned, forward)"][1]
     assert not claims["section 2.2: the network corrects the UKF (from the log, two-pass)"][1]
 
 

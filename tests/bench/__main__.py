@@ -1,6 +1,6 @@
 """`python -m tests.bench [NAME...]`: tables of the README and the guide, as Markdown on standard output and in
-out/bench.md. The names: samples, accuracy, sigmas, ablation, methods, rivals, instruments, correction, speed, start,
-scale, live, pages, training."""
+out/bench.md. The names: samples, accuracy, sigmas, ablation, methods, rivals, instruments, correction, network,
+speed, start, scale, live, pages, training."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from tests.bench import (
     instruments,
     live,
     methods,
+    network,
     pages,
     rivals,
     samples,
@@ -35,6 +36,7 @@ TABLES = {
     "rivals": rivals,
     "instruments": instruments,
     "correction": correction,
+    "network": network,
     "speed": speed,
     "start": start,
     "scale": scale,

@@ -136,6 +136,7 @@ BLOCKS = {
     "instruments": table("python -m tests.bench instruments"),
     "zuo2021": table("python -m tests.acceptance.zuo2021"),
     "correction": table("python -m tests.bench correction", note=DIGITS),
+    "network": table("python -m tests.bench network", note=DIGITS),
     "starts": session(STUDY, slow=True),
     "speed": table("python -m tests.bench speed", note=TIMES, without="bound"),
     "start": table("python -m tests.bench start", note=TIMES, without="bound"),

@@ -16,6 +16,7 @@ from tests.acceptance.zuo2021 import PAPER, TRIALS, UNTUNED, WAYS, WITHOUT_NETWO
 
 ORDER = 1
 
+ANGLES_RAD = (2e-4, 1e-3, 1e-2, 1e-1)
 NOTHING = 0.005  # change of the error by a network that has learned nothing
 PAPER_GRADIENT = {"algorithm 1": (4.0753, 0.524, 0.0019), "algorithm 2": (1.0552, 0.521, 0.0013)}
 THEODOLITE = {"scenario": "manoeuvre", "seed": 7, "duration_s": 75.0}
@@ -26,9 +27,10 @@ RIVALS = ("wavelet-akf", "bpnn-ekf")  # of the theodolite's log, and the main me
 _TEXT = """## Zuo et al. 2021: GA-BPNN-UKF
 
 The networks are trained as in the paper's sections 2.1 and 2.2 (input: update minus prediction; target: truth minus
-estimate; gradient descent with momentum) on {flights} other flights of the same kind: BPNN-EKF's from random first
-weights, GA-BPNN-UKF's after the genetic search. Held-out flights decide how much of a network's answer is applied,
-output by output.
+estimate; gradient descent with momentum) on {flights} other flights of constant acceleration: BPNN-EKF's from random
+first weights, GA-BPNN-UKF's after the genetic search. Held-out flights decide how much of a network's answer is
+applied, output by output. None of them is the flight that it is tried on: its noise alone would be new. All methods
+are averaged over the same samples, those from which every filter has an estimate.
 
 The paper does not say what noise and process noise its filters assume. Rows `untuned`: 3.16 m, {angle:g} rad,
 {angle:g} rad and a jerk PSD of {jerk:g} m²/s⁵, as of someone who knows the range's noise only, for the paper adds none
@@ -69,6 +71,9 @@ def _trials(scenario: str) -> str:
             found = errors(method, scenario, way, method in PAPER)
             learned = _learned(method, scenario, way) if method in PAPER else "-"
             rows.append([_label(method, way), *found, float(np.mean(found)), learned])
+            if method == "ga-bpnn-ukf":
+                plain = errors(method, scenario, way, corrected=False)
+                rows.append([f"{_label(method, way)}, its filter alone", *plain, float(np.mean(plain)), "-"])
     return table(("", *(f"trial {i}" for i in TRIALS), "mean", "the network"), rows)
 
 
@@ -83,6 +88,15 @@ def _learned(method: str, scenario: str, way: str) -> str:
     return "has nothing to learn" if abs(change - 1) < NOTHING else f"takes the error to {100 * change:.0f} %"
 
 
+def _sweep() -> str:
+    """Mean errors by the noise of the angles that is specified, the paper's beside them."""
+    rows: list[list[object]] = [
+        [f"{angle:g} rad", *(zuo2021.specified(method, angle) for method in PAPER)] for angle in ANGLES_RAD
+    ]
+    rows.append(["the paper", *(float(np.mean(figures)) for figures in PAPER.values())])
+    return table(("specified", *(f"filter of {method}" for method in PAPER)), rows)
+
+
 def claims() -> list[tuple[str, str, bool]]:
     """(claim of the paper, what came out here, whether it holds)."""
     found = []
@@ -92,10 +106,6 @@ def claims() -> list[tuple[str, str, bool]]:
         below = sum(a < b for a, b in zip(own, other, strict=True))
         found.append((f"table 1: GA-BPNN-UKF is more accurate than BPNN-EKF ({way})", f"in {below} of 4 trials; means "
                       f"{np.mean(own):.2f} and {np.mean(other):.2f} m", below == 4))  # fmt: skip
-    untuned = [errors(method, "zuo2021", "untuned, forward") for method in PAPER]
-    size = [float(np.mean(e) / np.mean(p)) for e, p in zip(untuned, PAPER.values(), strict=True)]
-    found.append(("table 1: errors of that size", f"untuned, {size[0]:.2f} and {size[1]:.2f} times the paper's",
-                  all(0.5 < s < 2 for s in size)))  # fmt: skip
     for method in PAPER:
         for way in _ways(method):
             change = _change(method, "zuo2021", way)
@@ -209,11 +219,15 @@ _RANGES = """### Section 3.1, table 1 and figures 4 and 5: constant acceleration
 Mean length of the position error (the paper's "RMSE", eqs 20 and 21) in metres; the angles have the noise of a good
 theodolite, 0.2 mrad.
 """
+_SWEEP = """The paper does not say what noise of the angles its filters assume. That of 0.1 rad was chosen here because
+errors are then of the paper's size, so that they are confirms nothing.
+"""
 _LOG = """### Section 3.3, table 2 and figures 8 to 11: a theodolite's log
 
 The paper's log is its own; here a fighter is tracked at 20 Hz, with outliers and patches in every component. F is the
 average gradient (eq. 18), which measures motion as well as noise. The paper's algorithm 1 is its ref. 12 (adaptive
-Kalman filter and wavelets), algorithm 2 the GA-BPNN anti-outlier UKF.
+Kalman filter and wavelets), whose formulas it does not give: `wavelet-akf` is our reconstruction of it.
+Algorithm 2 is the GA-BPNN anti-outlier UKF.
 """
 
 
@@ -225,6 +239,8 @@ def section(page: Page) -> str:
             _TEXT.format(flights=zuo2021.FLIGHTS, angle=UNTUNED.noise[1], jerk=UNTUNED.jerk_psd_m2ps5),
             _RANGES,
             _trials("zuo2021"),
+            _SWEEP,
+            _sweep(),
             _ranges(page, "zuo2021", (("bpnn-ekf", "untuned, forward"), *own), (4, 5)),
             "### Section 3.2, figures 6 and 7: the same flight with outliers in range\n",
             _trials("zuo2021-outliers"),
