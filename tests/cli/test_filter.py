@@ -119,7 +119,10 @@ def test_reading_options(run, flight):
 
 @pytest.mark.parametrize(
     ("args", "text", "axes"),
-    [([], "x is taken as east, y as north", (0, 1)), (["--azimuth-from", "north"], "x is north, y is east", (1, 0))],
+    [
+        ([], "x is taken as east, y as north (unless the azimuth's name says north)", (0, 1)),
+        (["--azimuth-from", "north"], "x is north, y is east", (1, 0)),
+    ],
 )
 def test_site(run, flight, args, text, axes):
     result = run("filter", flight, "--site", "-33.9,18.4,100", *args, "-o", "a.parquet", "--summary", "none")

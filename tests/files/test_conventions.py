@@ -128,5 +128,5 @@ def test_a_zenith_angle_may_be_more_than_a_right_angle_but_not_two():
     station = Station(elevation_from="zenith")
     found = logs.read(table(elevation_rad=[1.7, 1.8]), station=station).measurement
     assert found[0, 2] == pytest.approx(math.pi / 2 - 1.7, rel=1e-12)
-    with pytest.raises(InputError, match="which is no zenith angle: it looks like degrees"):
+    with pytest.raises(InputError, match="which is no zenith angle"):
         logs.read(table(elevation_rad=[95.0, 96.0]), station=station)

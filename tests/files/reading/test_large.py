@@ -135,7 +135,7 @@ def test_unit_is_judged_by_the_whole(tmp_path, in_blocks):
     table["azimuth_rad"] = table.pop("azimuth_deg")
     path = tmp_path / "log.csv"
     path.write_text(text(table))
-    with pytest.raises(InputError, match="looks like degrees"):
+    with pytest.raises(InputError, match="Say --columns azimuth=azimuth_rad --units azimuth=deg"):
         logs.read(path)
 
 

@@ -14,18 +14,20 @@ from tests.files.conftest import Make, refused
     [
         (
             "t,A\n0,380\n",
-            '"A" lies beyond 380, which is no azimuth in rad. Say --units azimuth=grad.',
+            'no unit is stated for "A", and the motion of the target does not tell which it is. Say --units azimuth=gr',
         ),
         ("t,Hz,V\n0,180,15\n", "Say --units azimuth=deg,elevation=deg or --units azimuth=grad,elevation=grad"),
         (
             "t,A\n0,3200\n",
-            "Say --units azimuth=mil6000 or --units azimuth=mrad or --units azimuth=mil6300 or --units azimuth=mil.",
+            "Say --units azimuth=mil or --units azimuth=mrad or --units azimuth=mil6000.",
         ),
-        ("t,el_deg\n0,800\n", "lies beyond 800 deg, which is no elevation: it looks like mils"),
-        ("t,el_deg\n0,95\n", "it looks like a zenith angle; say --elevation-from zenith."),
-        ("t,el_deg\n0,80\n", "as zenith angles do. Say --elevation-from zenith if they are zenith angles, or"),
-        ("t,A\n0,1e9\n", "which is no azimuth in rad. Say --units azimuth=UNIT."),
-        ("t,azimuth_rad\n0,180\n", "use --columns azimuth=azimuth_rad --units azimuth=deg."),
+        ("t,el_deg\n0,800\n", "lies beyond 800 deg, which is no elevation. Say --columns elevation=el_deg --units"),
+        ("t,el_deg\n0,95\n", "lies beyond 95 deg, which is no elevation. Say --elevation-from zenith"),
+        (
+            "t,A\n0,1e9\n",
+            "is no azimuth in any unit that is known. Say --columns azimuth=A --units azimuth=UNIT.",
+        ),
+        ("t,azimuth_rad\n0,180\n", "no azimuth. Say --columns azimuth=azimuth_rad --units azimuth=deg or"),
     ],
 )
 def test_angles_whose_unit_is_open_are_asked_about(make: Make, text: str, expected: str) -> None:

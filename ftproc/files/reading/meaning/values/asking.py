@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from ftproc.errors import InputError, quoted
 from ftproc.files.reading.meaning.questions import named
+from ftproc.files.reading.meaning.values import plausibility
 from ftproc.files.reading.meaning.values.motion import Way
+from ftproc.files.reading.meaning.values.plausibility import Sizes
 from ftproc.files.reading.meaning.values.ways import Known
 from ftproc.files.words import QUANTITIES
 
@@ -20,16 +22,37 @@ class Choice(NamedTuple):
     odds: float
 
 
-def contradicted(log: Known, likely: Sequence[Choice], named_so: Sequence[Choice]) -> InputError:
-    """The question where the motion contradicts the names."""
-    ways = [choice.way for choice in (*likely, *named_so)]
-    answers = _answers(log, ways)
-    *first, last = answers if named_so else [*answers, ""]
-    names_are = f", or {last} if the names are right" if named_so else ""
+def impossible(log: Known, sizes: Mapping[str, Sizes]) -> InputError:
+    """Where no unit is possible."""
+    first = next(q for q in QUANTITIES[2:] if q in sizes)
+    column, half = log.found[first], sizes[first].half
     return InputError(
-        f"{log.source}: what the names say of {_differing_words(log, ways)} gives the target no likely motion, and "
-        f"another way does. Say {' or '.join(first)}{names_are}."
+        f'{log.source}: half of column "{column.name}" lies beyond {half:.4g}, which is no {first} in any unit that is '
+        f"known. Say --columns {quoted(f'{first}={named(column.name, column.position)}')} --units {first}=UNIT."
     )
+
+
+def contradicted(
+    log: Known, sizes: Mapping[str, Sizes], likely: Sequence[Choice], named_so: Sequence[Choice]
+) -> InputError:
+    """The question where the sizes of the angles or the motion contradict the names."""
+    ways = [choice.way for choice in (*likely, *named_so)]
+    *first, last = [*_answers(log, ways), *([] if named_so else [""])]
+    names_are = f", or {last} if the names are right" if named_so else ""
+    why = _impossible(log, sizes) or (
+        f"what the names say of {_differing_words(log, ways)} gives the target no likely motion, and another way does"
+    )
+    return InputError(f"{log.source}: {why}. Say {' or '.join(first)}{names_are}.")
+
+
+def _impossible(log: Known, sizes: Mapping[str, Sizes]) -> str:
+    """Which angle cannot be what its name says; or ""."""
+    for quantity, mine in sizes.items():
+        column, zenith = log.found[quantity], quantity == "elevation" and log.is_zenith
+        if not log.is_open(quantity) and not plausibility.fits(quantity, column.unit, mine, zenith, True):
+            what = "zenith angle" if zenith else quantity
+            return f'half of column "{column.name}" lies beyond {mine.half:.4g} {column.unit.name}, which is no {what}'
+    return ""
 
 
 def left_open(log: Known, likely: Sequence[Choice]) -> InputError:

@@ -15,6 +15,7 @@ from ftproc.files.reading.meaning.schema import Column
 from ftproc.files.reading.meaning.values import asking, motion, plausibility, ways
 from ftproc.files.reading.meaning.values.asking import Choice
 from ftproc.files.reading.meaning.values.motion import Way
+from ftproc.files.reading.meaning.values.plausibility import Sizes
 from ftproc.files.reading.meaning.values.ways import Known
 from ftproc.files.units import UNITS
 from ftproc.files.words import DEPRESSIONS, QUANTITIES
@@ -45,12 +46,11 @@ def judged(log: Known, quantities: Mapping[str, FloatArray]) -> Open:
     sizes = plausibility.sizes(quantities, log.found)
     turned, notes = plausibility.with_other_mil(log.found, sizes)
     log = log._replace(found=turned)
-    choices = [_choice(moved, *each) for each in ways.of(log, sizes)] if moved else []
+    choices = [_choice(moved, *each) for each in ways.of(log, sizes, moved is not None)]
     if not any(choice.odds for choice in choices):
-        by_size = plausibility.judged(log.source, quantities, log.found, log.station)
-        return _unpacked(log, quantities, Open(by_size.found, by_size.doubts, _assumed(log, by_size.found, None)))
+        raise asking.impossible(log, sizes)
     choices.sort(key=lambda choice: -choice.odds)
-    decided, conditions = _decided(log, choices)
+    decided, conditions = _decided(log, sizes, choices)
     if moved and _counts_down(moved, choices[0].way, decided.get("elevation")):
         conditions = (*conditions, "the elevation counts upwards")
     return _unpacked(log, quantities, Open(decided, tuple(notes), conditions))
@@ -77,18 +77,20 @@ def _unpacked(log: Known, quantities: Mapping[str, FloatArray], open_: Open) -> 
     return Open(found, (*open_.doubts, doubt), open_.conditions)
 
 
-def _choice(moved: motion.Motion, way: Way, prior: float) -> Choice:
-    fit = moved.likelihood(way)
+def _choice(moved: motion.Motion | None, way: Way, prior: float) -> Choice:
+    fit = moved.likelihood(way) if moved else 1.0
     return Choice(way, fit, prior * fit)
 
 
-def _decided(log: Known, choices: Sequence[Choice]) -> tuple[Mapping[str, Column], tuple[str, ...]]:
+def _decided(
+    log: Known, sizes: Mapping[str, Sizes], choices: Sequence[Choice]
+) -> tuple[Mapping[str, Column], tuple[str, ...]]:
     """The columns with the units of the likeliest way, and what is assumed. Raises InputError, a question."""
     best = choices[0]
     named_so = [choice for choice in choices if log.allows(choice.way)]
     contradicts = best.fit > _MOVES and not _in_own_names(log, best.way)
     if not named_so or (best.odds > _CLEARLY * named_so[0].odds and contradicts):
-        raise asking.contradicted(log, _likely(choices, best.odds), named_so[:1])
+        raise asking.contradicted(log, sizes, _likely(choices, best.odds), named_so[:1])
     usual = _usual(log, named_so)
     rest = max((choice.odds for choice in named_so if choice is not usual), default=0.0)
     taken = usual
@@ -118,7 +120,9 @@ def _usual(log: Known, choices: Sequence[Choice]) -> Choice:
     def unusual(choice: Choice) -> tuple[int, ...]:
         each = zip(QUANTITIES, choice.way.units, strict=True)
         ranks = [list(UNITS[q]).index(unit.name) if unit and log.is_open(q) else 0 for q, unit in each]
-        return (*ranks, choice.way.zenith != log.is_zenith)
+        azimuth, elevation = choice.way.units[2:]
+        mixed = azimuth is not None and elevation is not None and azimuth.name != elevation.name
+        return (mixed, *ranks, choice.way.zenith != log.is_zenith)
 
     return min(choices, key=unusual)
 
@@ -128,13 +132,13 @@ def _likely(choices: Sequence[Choice], odds: float) -> list[Choice]:
 
 
 def _without_the_usual(choices: Sequence[Choice], usual: Way) -> list[Choice]:
-    """The choices without those that a likelier one differs from in nothing but the usual unit of one quantity."""
+    """The choices without those that a likelier one differs from in nothing but units that are usual."""
 
     def is_beaten(choice: Choice, by: Choice) -> bool:
         each = zip(choice.way.units, by.way.units, usual.units, strict=True)
         differing = [second == third for first, second, third in each if first != second]
         alike = choice.way[1:] == by.way[1:]
-        return alike and differing == [True] and by.odds >= _STILL * choice.odds
+        return alike and any(differing) and all(differing) and by.odds >= _STILL * choice.odds
 
     return [choice for choice in choices if not any(is_beaten(choice, other) for other in choices)]
 

@@ -42,7 +42,6 @@ _NOISE_RAD = ((1e-6, 0.1), (1e-5, 0.2), (3e-5, 0.6), (5e-3, 1.0), (0.01, 0.3), (
 #: The noise of one angle over that of the other, which one instrument has alike.
 _UNLIKE = ((8.0, 1.0), (25.0, 0.2), (math.inf, 0.05))
 _LEAST_NOISE = 1e-7  # rad; less is no noise
-_STEEP_RAD, _STEEP = math.radians(60), 0.03  # few records have a median elevation above this
 _HEIGHT_M = ((2e4, 1.0), (5e4, 0.2), (math.inf, 0.1))
 #: Gravity, and a path that falls so: how near, and how likely it is then, however far and fast.
 _EARTH_M3PS2, _EARTH_M = 3.986e14, 6.371e6
@@ -101,8 +100,6 @@ class Motion:
         odds = math.prod(_at(_NOISE_RAD, noise) for noise in noises)
         if len(noises) == 2 and min(noises) > _LEAST_NOISE:
             odds *= _at(_UNLIKE, max(noises) / min(noises))
-        if way.units[3 - way.exchanged] is not None:
-            odds *= _STEEP if self.elevation(way) > _STEEP_RAD else 1.0
         return odds
 
     def _straight(self, way: Way) -> float:

@@ -4,6 +4,7 @@ its angles are exchanged; each with how likely it is before the motion is looked
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
@@ -20,7 +21,7 @@ from ftproc.settings import Station
 _PRIORS = {
     "time": dict.fromkeys(("s", "ms"), 1.0) | {"us": 0.3, "ns": 0.1, "min": 0.03, "h": 0.03, "d": 0.03},
     "range": {"m": 1.0, "km": 0.3, "ft": 0.1, "nmi": 0.1, "kft": 0.05, "kyd": 0.05, "mm": 0.03, "cm": 0.01},
-    "angle": {"rad": 1.0, "deg": 0.05, "grad": 2e-3, "mil": 1e-3, "mrad": 5e-4, "mil6000": 5e-4, "mil6300": 1e-4},
+    "angle": {"rad": 1.0, "deg": 0.05, "grad": 0.008, "mil": 1e-3, "mrad": 5e-4, "mil6000": 5e-4, "mil6300": 1e-4},
 }
 _SURVEYORS_GRAD = 0.03
 #: How likely another unit is than the one that a name states, and a few of these.
@@ -29,12 +30,15 @@ _OTHER = {
     "range": (3e-4, ("m", "km", "mm")),
     "angle": (0.02, ("rad", "deg", "grad", "mil")),
 }
+_OTHER_MIL = 0.08  # times as likely as the other angles
+_NEVER = 1e-9  # but where a name is impossible
 _CANONICAL = 0.3  # times as likely in a column of the program's own name
-_MIXED, _ONE_WRONG = 0.03, 0.2  # two angles in two units, where no name states one, and where names do
+_MIXED, _ONE_WRONG = 0.01, 0.2  # two angles in two units, where no name states one, and where names do
 _ZENITH, _ZENITH_BY_SURVEYORS, _EXCHANGED = 0.02, 0.5, 0.003
 _SMALL_RAD, _SMALL = 6.284, 0.05  # azimuths that are all below a turn in rad, in another unit
+_STEEP_RAD, _STEEP = math.radians(60), 0.03  # few records have a median elevation above this
 _LOW = 0.2  # elevations that are all below the zenith in rad, in another unit
-_UPRIGHT_RAD = 1.65  # beyond any elevation
+_UPRIGHT_RAD, _FEW = 1.65, 24  # beyond any elevation; angles, among which one is no rule
 _OTHER_TURN = 1e-3  # azimuths that jump by the turn of another unit
 
 
@@ -69,9 +73,10 @@ class Known(NamedTuple):
         return from_zero and not way.exchanged and all(self.found[q].unit == unit for q, unit in stated)
 
 
-def of(log: Known, sizes: Mapping[str, Sizes]) -> Iterator[tuple[Way, float]]:
-    """All ways that the sizes of the angles allow, and how likely each is."""
-    times, ranges = ([*_units(log, quantity)] for quantity in QUANTITIES[:2])
+def of(log: Known, sizes: Mapping[str, Sizes], moves: bool) -> Iterator[tuple[Way, float]]:
+    """All ways that the sizes of the angles allow, and how likely each is. moves: there is a motion, without which the
+    times and ranges are taken as usual."""
+    times, ranges = ([*_units(log, quantity)][: None if moves else 1] for quantity in QUANTITIES[:2])
     for (azimuth, elevation, zenith, exchanged), prior in _angles(log, sizes):
         for (time, a), (range_, b) in itertools.product(times, ranges):
             yield Way((time, range_, azimuth, elevation), zenith, exchanged), prior * a * b
@@ -93,10 +98,14 @@ def _units(log: Known, quantity: str) -> Iterator[tuple[Unit | None, float]]:
         return
     prior, others = _OTHER[kind]
     if is_canonical(column):
-        prior *= _CANONICAL if kind != "angle" else 0.0
+        prior *= _CANONICAL if kind != "angle" else _NEVER
     for name in others:
         if name != column.unit.name and not (name == "grad" and column.unit.name == "gon"):
-            yield UNITS[quantity][name], prior
+            yield UNITS[quantity][name], prior * (_OTHER_MIL if name == "mil" else 1.0)
+
+
+def _is_steep(half_rad: float, zenith: bool) -> bool:
+    return (math.pi / 2 - half_rad if zenith else half_rad) > _STEEP_RAD
 
 
 def _is_sure(column: Column) -> bool:
@@ -145,8 +154,9 @@ def _of_both(log: Known, azimuth: tuple[Unit | None, float], elevation: tuple[Un
         return prior_a * prior_e if alike else prior_a * prior_e * _MIXED
     if log.is_open("azimuth"):
         return max(prior_a, prior_e) if alike else min(prior_a, prior_e) * _MIXED
-    named = log.found["azimuth"].unit.name == log.found["elevation"].unit.name
-    return min(prior_a, prior_e) * (1.0 if alike or not named else _ONE_WRONG)
+    if log.found["azimuth"].unit.name != log.found["elevation"].unit.name:
+        return prior_a * prior_e
+    return min(prior_a, prior_e) * (1.0 if alike else _ONE_WRONG)
 
 
 def _fit(
@@ -161,14 +171,19 @@ def _fit(
         mine = sizes.get(column)
         if unit is None or mine is None:
             continue
+        if log.found[column].unit_stated_by_user:
+            continue
         stated = not log.is_open(column) and log.found[column].unit == unit
         if not plausibility.fits(quantity, unit, mine, zenith, stated):
             return 0.0
         small = _SMALL_RAD / (1 if quantity == "azimuth" else 4)
         if unit.name != "rad" and mine.most <= small:
             found *= _SMALL if quantity == "azimuth" else _LOW
-        if quantity == "elevation" and not zenith and mine.most * unit.multiply / unit.divide > _UPRIGHT_RAD:
+        upright = mine.rows < _FEW or zenith or mine.most * unit.multiply / unit.divide < _UPRIGHT_RAD
+        if quantity == "elevation" and not upright:
             found *= _SMALL
+        if quantity == "elevation" and _is_steep(mine.half * unit.multiply / unit.divide, zenith):
+            found *= _STEEP
         if quantity == "azimuth" and mine.turn and not plausibility.turns(unit, mine):
             found *= _OTHER_TURN
     return found
