@@ -16,7 +16,7 @@ from ftproc.config.recipe import Recipe
 from ftproc.errors import InputError
 from ftproc.files import conventions
 from ftproc.files.options import parse_columns, parse_units, parse_widths
-from ftproc.files.reading import converting, logs
+from ftproc.files.reading import converting, understanding
 from ftproc.files.reading.clocks import numeric
 from ftproc.files.reading.formats import layout
 from ftproc.files.reading.formats.csvtext import MISSING_WORDS
@@ -178,8 +178,8 @@ class _Table(NamedTuple):
                     "--follow when it is complete."
                 )
         above = frozenset(line.strip() for line in head[: text.first])
-        station = logs.as_named(recipe.station, found)
-        if recipe.settings.site and not logs.knows_axis(recipe.station, found):
+        station = understanding.as_named(recipe.station, found)
+        if recipe.settings.site and not understanding.knows_axis(recipe.station, found):
             raise conventions.axis_question(source, found["azimuth"].name)
         widths = parse_widths(recipe.widths)
         return cls(source, names, text.separator, widths, above, found, recipe.station, station)

@@ -11,14 +11,13 @@ import numpy as np
 
 from ftproc.errors import InputError
 from ftproc.files import conventions
-from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT, Condition, Extract, parse_columns, parse_units, parse_where
 from ftproc.files.reading import converting, further, large, proposal, understanding
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.formats.standards import choosing
-from ftproc.files.reading.meaning import names, rows, schema, several
+from ftproc.files.reading.meaning import rows, schema, several
 from ftproc.files.reading.meaning.values import deciding, plausibility, stamps
 from ftproc.records import FloatArray, IntArray, MeasurementLog
 from ftproc.settings import Station
@@ -159,7 +158,7 @@ def _in_blocks(plan: _Plan) -> MeasurementLog | None:
         clocks[:] = clocks or [clock._replace(time_s=clock.time_s[:0])]
         return converted.quantities, clock.epoch
 
-    station = as_named(plan.station, plan.found)
+    station = understanding.as_named(plan.station, plan.found)
     spooled = large.read(header.source, blocks, convert, station)
     if spooled is None:
         return None
@@ -234,31 +233,12 @@ def _kept(plan: _Plan, table: pa.Table, chosen: list[int]) -> tuple[IntArray | N
     return kept.astype(np.int64), (f"{left_out} of {len(mask)} rows are left out, which do not meet {said}",)
 
 
-def as_named(station: Station, found: Found) -> Station:
-    """The station with what the names of the angles' columns say."""
-    zenith = "elevation" in found and found["elevation"].zenith
-    north = "azimuth" in found and names.says_north(found["azimuth"].name)
-    return replace(
-        station,
-        elevation_from=station.elevation_from or ("zenith" if zenith else "horizon"),
-        azimuth_from=station.azimuth_from or ("north" if north else "x"),
-    )
-
-
-def knows_axis(station: Station, found: Found) -> bool:
-    """Whether anything says from where the azimuth counts: the user, its name, or that it is one of the program's own
-    names, whose azimuths count from x."""
-    azimuth = found.get("azimuth")
-    stated = station.azimuth_from or station.azimuth_sense
-    return bool(azimuth is None or stated or azimuth.name == CANONICAL["azimuth"] or names.says_north(azimuth.name))
-
-
 def _explained(
     plan: _Plan, log: MeasurementLog, clock: Clock, notes: Iterable[str], judged: deciding.Open,
     sample: FloatArray | None = None,
 ) -> MeasurementLog:  # fmt: skip
     """The log with its station, and with remarks on how it was understood."""
-    station = as_named(plan.station, plan.found)
+    station = understanding.as_named(plan.station, plan.found)
     values = log.measurement if sample is None else sample
     beside = {each.place for each in plan.beside}
     names = [] if plan.header.is_of_a_standard or log.heights is not None else plan.header.names
@@ -266,7 +246,7 @@ def _explained(
     remarks = schema.remarks(names, plan.found, bool(clock.epoch))
     doubtful = (*plan.notes, *judged.doubts, *plan.open, *plausibility.doubts(values, station))
     said = (*notes, *doubtful)
-    axis = knows_axis(plan.station, plan.found)
+    axis = understanding.knows_axis(plan.station, plan.found)
     understood = understanding.describe(plan.header, plan.found, clock, station, said, axis, plan.beside)
     understood["assumed"] = list(judged.conditions)
     digest = plan.header.sha256()

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from ftproc.files import conventions
+from ftproc.files.layout import CANONICAL
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.further import HEIGHT, Further
+from ftproc.files.reading.meaning import names
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.questions import answer, listed
 from ftproc.files.reading.meaning.schema import Column
@@ -108,3 +111,22 @@ def lines(understood: Understood) -> list[tuple[str, str]]:
         ("readings", "; ".join(understood["conventions"]) or "as they are"),
         ("doubtful", "; ".join([*understood["doubts"], *assumed]) or "nothing"),
     ]
+
+
+def as_named(station: Station, found: Mapping[str, Column]) -> Station:
+    """The station with what the names of the angles' columns say."""
+    zenith = "elevation" in found and found["elevation"].zenith
+    north = "azimuth" in found and names.says_north(found["azimuth"].name)
+    return replace(
+        station,
+        elevation_from=station.elevation_from or ("zenith" if zenith else "horizon"),
+        azimuth_from=station.azimuth_from or ("north" if north else "x"),
+    )
+
+
+def knows_axis(station: Station, found: Mapping[str, Column]) -> bool:
+    """Whether anything says from where the azimuth counts: the user, its name, or that it is one of the program's own
+    names, whose azimuths count from x."""
+    azimuth = found.get("azimuth")
+    stated = station.azimuth_from or station.azimuth_sense
+    return bool(azimuth is None or stated or azimuth.name == CANONICAL["azimuth"] or names.says_north(azimuth.name))
