@@ -7,6 +7,7 @@ condition of the verdict.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -25,6 +26,7 @@ DIGITS = "dms"  # the notation of degrees, minutes and seconds in the digits of 
 _CLEARLY = 10.0  # times likelier than any other is taken, or contradicts a name
 _STILL = 3.0  # times likelier must the usual be than any other, to be taken without a word
 _TOLD = 30.0  # times likelier is it told by the motion, and no condition
+_QUESTIONED = 1e-6  # times as likely as the best
 _BELOW_RAD = -0.02  # median elevation of a target below the station
 _MOVES = 0.02  # likelihood of a motion that contradicts a name
 _DOUBTED = 3.0  # times less likely than another is what a name says, to be a condition
@@ -46,7 +48,7 @@ def judged(log: Known, quantities: Mapping[str, FloatArray]) -> Open:
     sizes = plausibility.sizes(quantities, log.found)
     turned, notes = plausibility.with_other_mil(log.found, sizes)
     log = log._replace(found=turned)
-    choices = [_choice(moved, *each) for each in ways.of(log, sizes, moved is not None)]
+    choices = _choices(log, sizes, moved)
     if not any(choice.odds for choice in choices):
         raise asking.impossible(log, sizes)
     choices.sort(key=lambda choice: -choice.odds)
@@ -77,9 +79,17 @@ def _unpacked(log: Known, quantities: Mapping[str, FloatArray], open_: Open) -> 
     return Open(found, (*open_.doubts, doubt), open_.conditions)
 
 
-def _choice(moved: motion.Motion | None, way: Way, prior: float) -> Choice:
-    fit = moved.likelihood(way) if moved else 1.0
-    return Choice(way, fit, prior * fit)
+def _choices(log: Known, sizes: Mapping[str, Sizes], moved: motion.Motion | None) -> list[Choice]:
+    """The ways to understand a log, without those of the angles that are out of the question."""
+    angles = [(way, prior * (moved.of_angles(way) if moved else 1.0)) for way, prior in ways.of_angles(log, sizes)]
+    least = _QUESTIONED * max((odds for _, odds in angles), default=0.0)
+    found = []
+    for (way, odds), (time, length, prior) in itertools.product(angles, ways.of_scales(log, moved is not None)):
+        if odds > least:
+            whole = way._replace(units=(time, length, *way.units[2:]))
+            scales = moved.of_scales(whole) if moved else 1.0
+            found.append(Choice(whole, scales * (moved.of_angles(way) if moved else 1.0), odds * prior * scales))
+    return found
 
 
 def _decided(

@@ -78,12 +78,15 @@ class Motion:
 
     def likelihood(self, way: Way) -> float:
         """Of the readings, but for a factor that is the same for all ways."""
-        time, range_, *_ = way.units
+        return self.of_scales(way) * self.of_angles(way)
+
+    def of_scales(self, way: Way) -> float:
+        """What depends on the units of time and range."""
+        time, length, *_ = way.units
         odds = 1.0 if time is None else _at(_STEP_S, self._once(("rate", time), partial(self._rate, time)))
-        if range_ is not None and time is not None:
-            odds *= _FALLS if self.falls(way) else self._flies(way, range_)
-            odds *= self._straight(way)
-        return odds * self._of_angles(way)
+        if length is not None and time is not None:
+            odds *= _FALLS if self.falls(way) else self._flies(way, length)
+        return odds
 
     def _flies(self, way: Way, range_: Unit) -> float:
         """How likely the distance, the height and the speed are."""
@@ -95,12 +98,13 @@ class Motion:
         (low, high), slow, unlikely = _NO_FLIGHT
         return odds * _at(_SPEED, speed) * (unlikely if low < height < high and speed < slow else 1.0)
 
-    def _of_angles(self, way: Way) -> float:
+    def of_angles(self, way: Way) -> float:
+        """What does not depend on the units of time and range."""
         noises = self.noises(way)
         odds = math.prod(_at(_NOISE_RAD, noise) for noise in noises)
         if len(noises) == 2 and min(noises) > _LEAST_NOISE:
             odds *= _at(_UNLIKE, max(noises) / min(noises))
-        return odds
+        return odds * self._straight(way)
 
     def _straight(self, way: Way) -> float:
         """How likely a path so straight is."""
@@ -188,18 +192,30 @@ class Motion:
         return paths.speed(self._far.time, paths.positions(self._far.readings[:, 0], *_angles(self._far.readings, way)))
 
     def _bent(self, way: Way) -> float | None:
-        if way.units[1] is None or way.units[2] is None:
+        if way.units[2] is None or not np.isfinite(self._far.readings[0, 0]):
             return None
-        time, distance = self._far.time, self._far.readings[:, 0]
-        seen = (time, distance, *_angles(self._far.readings, way))
-        found = [paths.bent(*seen, count) for count in paths.STRAIGHT if len(time) >= count]
+        found = [paths.bent(*self._blocks(way, n)) for n in paths.STRAIGHT if len(self._far.time) >= n]
         return min((each for each in found if math.isfinite(each)), default=None)
 
     def _path(self, way: Way) -> tuple[FloatArray, FloatArray] | None:
         """The mean position and acceleration, (3,) each, in the units of the file."""
-        time, distance = self._far.time, self._far.readings[:, 0]
-        found = paths.medians(time, distance, *_angles(self._far.readings, way), paths.STRAIGHT[0])
-        return None if found is None else (found[1].mean(0), paths.derived(*found[:2])[1].mean(0))
+        moment, position, _ = self._blocks(way, paths.STRAIGHT[0])
+        past = (np.diff(moment) > 0).all()
+        return (position.mean(0), paths.derived(moment, position)[1].mean(0)) if past else None
+
+    def _blocks(self, way: Way, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Times (n,), positions (n, 3) and distances (n,), the medians of so many blocks of rows."""
+        moment, distance = (
+            self._once(("median", k, count), partial(paths.medians, values, count))
+            for k, values in enumerate((self._far.time, self._far.readings[:, 0]))
+        )
+        angles = [np.zeros(count) if u is None else self._middles(k, u, count) for k, u in enumerate(way.units[2:], 1)]
+        return moment, paths.positions(distance, *_turned(angles, way)), distance
+
+    def _middles(self, k: int, unit: Unit, count: int) -> FloatArray:
+        angle = self._far.readings[:, k]
+        found: FloatArray = self._once(("middle", k, unit, count), lambda: paths.middles(unit.to_si(angle), count))
+        return found
 
 
 def of(quantities: Mapping[str, FloatArray], units: Mapping[str, Unit]) -> Motion | None:
@@ -220,11 +236,13 @@ def _in_file_units(quantities: Mapping[str, FloatArray], units: Mapping[str, Uni
 
 def _angles(readings: FloatArray, way: Way) -> tuple[FloatArray, FloatArray]:
     """(n,) azimuth and elevation in rad, 0 where absent."""
-    found = [
-        np.zeros(len(readings)) if unit is None else unit.to_si(readings[:, k])
-        for k, unit in zip((1, 2), way.units[2:], strict=True)
-    ]
-    azimuth, elevation = found[::-1] if way.exchanged else found
+    each = enumerate(way.units[2:], 1)
+    return _turned([np.zeros(len(readings)) if u is None else u.to_si(readings[:, k]) for k, u in each], way)
+
+
+def _turned(angles: Sequence[FloatArray], way: Way) -> tuple[FloatArray, FloatArray]:
+    """Azimuth and elevation of the angles of two columns in rad."""
+    azimuth, elevation = angles[::-1] if way.exchanged else angles
     return azimuth, math.pi / 2 - elevation if way.zenith and way.units[3] is not None else elevation
 
 

@@ -36,18 +36,19 @@ def speed(time: FloatArray, position: FloatArray) -> float | None:
     return median(np.linalg.norm(np.diff(middle, axis=0), axis=1)[past] / np.diff(moment)[past])
 
 
-def medians(
-    time: FloatArray, distance: FloatArray, azimuth: FloatArray, elevation: FloatArray, count: int
-) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """Times (count,), positions (count, 3) and distances (count,), the medians of so many blocks of rows; None where
-    rows share their times."""
-    size = len(time) // count
-    t, r, e, a = (column[: count * size].reshape(count, size) for column in (time, distance, elevation, azimuth))
+def medians(values: FloatArray, count: int) -> FloatArray:
+    """(count,) of (n,) values, the medians of so many blocks of rows."""
+    size = len(values) // count
+    return np.asarray(np.median(values[: count * size].reshape(count, size), axis=1))
+
+
+def middles(angle: FloatArray, count: int) -> FloatArray:
+    """(count,) of (n,) angles in rad, the same round the circle."""
+    size = len(angle) // count
+    a = angle[: count * size].reshape(count, size)
     middle = np.arctan2(np.median(np.sin(a), axis=1), np.median(np.cos(a), axis=1))
     off = (a - middle[:, None] + np.pi) % (2 * np.pi) - np.pi
-    moment, far = np.median(t, axis=1), np.median(r, axis=1)
-    position = positions(far, middle + np.median(off, axis=1), np.median(e, axis=1))
-    return None if (np.diff(moment) <= 0).any() else (moment, position, far)
+    return np.asarray(middle + np.median(off, axis=1))
 
 
 def derived(moment: FloatArray, position: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -56,21 +57,20 @@ def derived(moment: FloatArray, position: FloatArray) -> tuple[FloatArray, Float
     return velocity, 2 * np.diff(velocity, axis=0) / (moment[2:] - moment[:-2])[:, None]
 
 
-def bent(time: FloatArray, distance: FloatArray, azimuth: FloatArray, elevation: FloatArray, count: int) -> float:
-    """The acceleration of a path, or what is left of it without its mean (gravity, thrust), in units of v^2 / r."""
-    found = medians(time, distance, azimuth, elevation, count)
-    if found is None:
+def bent(moment: FloatArray, position: FloatArray, distance: FloatArray) -> float:
+    """The acceleration of a path of n medians, or what is left of it without its mean (gravity, thrust), in units of
+    v^2 / r; infinite where rows share their times."""
+    if (np.diff(moment) <= 0).any():
         return math.inf
-    moment, position, far = found
     velocity, acceleration = derived(moment, position)
     squares = np.sum(((velocity[1:] + velocity[:-1]) / 2) ** 2, axis=1)
-    bending = float((squares / np.maximum(np.abs(far[1:-1]), 1e-9)).sum())
+    bending = float((squares / np.maximum(np.abs(distance[1:-1]), 1e-9)).sum())
     if not bending > 0:
         return math.inf
     least = float(np.linalg.norm(acceleration, axis=1).sum()) / bending
-    if count > STRAIGHT[0]:
+    if len(moment) > STRAIGHT[0]:
         left = np.linalg.norm(acceleration - acceleration.mean(0), axis=1).sum() / bending
-        least = min(least, float(left) * count / (count - 3))
+        least = min(least, float(left) * len(moment) / (len(moment) - 3))
     return least
 
 

@@ -73,13 +73,16 @@ class Known(NamedTuple):
         return from_zero and not way.exchanged and all(self.found[q].unit == unit for q, unit in stated)
 
 
-def of(log: Known, sizes: Mapping[str, Sizes], moves: bool) -> Iterator[tuple[Way, float]]:
-    """All ways that the sizes of the angles allow, and how likely each is. moves: there is a motion, without which the
-    times and ranges are taken as usual."""
+def of_scales(log: Known, moves: bool) -> list[tuple[Unit | None, Unit | None, float]]:
+    """The units of time and range, and how likely they are. moves: there is a motion, without which these are taken as
+    usual."""
     times, ranges = ([*_units(log, quantity)][: None if moves else 1] for quantity in QUANTITIES[:2])
-    for (azimuth, elevation, zenith, exchanged), prior in _angles(log, sizes):
-        for (time, a), (range_, b) in itertools.product(times, ranges):
-            yield Way((time, range_, azimuth, elevation), zenith, exchanged), prior * a * b
+    return [(time, length, a * b) for (time, a), (length, b) in itertools.product(times, ranges)]
+
+
+def of_angles(log: Known, sizes: Mapping[str, Sizes]) -> list[tuple[Way, float]]:
+    """The ways to understand the angles that their sizes allow, and how likely each is."""
+    return [(Way((None, None, a, e), *rest), prior) for (a, e, *rest), prior in _angles(log, sizes)]
 
 
 def _units(log: Known, quantity: str) -> Iterator[tuple[Unit | None, float]]:
