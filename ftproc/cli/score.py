@@ -100,6 +100,7 @@ def _run(job: Job) -> int:
     from ftproc.batch import plan
     from ftproc.errors import InputError
     from ftproc.files import layout
+    from ftproc.files.reading import trajectories as trajectory_files
     from ftproc.files.writing import atomic, outputs
     from ftproc.report.index import Entry, write
     from ftproc.scoring import limits
@@ -111,12 +112,13 @@ def _run(job: Job) -> int:
     beside = [found for name in job.trajectories if (found := layout.sidecar(name)) is not None]
     outputs.check(plan.pages_written(places, index), [*job.trajectories, *job.truths, *beside, *job.files()])
     scored, entries, failed = list[Scored](), [], False
-    known: dict[str, Truth] = {}
+    known: dict[Any, Truth] = {}
     for number, (name, place) in enumerate(zip(job.trajectories, places, strict=True)):
         try:
-            truth = _truth(job.truths[number % len(job.truths)], known) if job.truths else None
+            trajectory = trajectory_files.read(name)
+            truth = _truth(job.truths[number % len(job.truths)], trajectory, known) if job.truths else None
             first = scored[0].trajectory if scored and len(job.trajectories) == 2 else None
-            scored.append(_scored(name, truth, asked, first))
+            scored.append(_scored(trajectory, truth, asked, first))
             if place is not None:
                 with atomic.guarding([*job.trajectories, *job.truths]):
                     pages.write(scored[-1].trajectory, place, truth)
@@ -145,18 +147,16 @@ class Scored(NamedTuple):
     judged: str
 
 
-def _scored(name: str, truth: Truth | None, asked: Sequence[Limits], first: Trajectory | None) -> Scored:
+def _scored(trajectory: Trajectory, truth: Truth | None, asked: Sequence[Limits], first: Trajectory | None) -> Scored:
     """first: another trajectory, with which this one is compared. Raises InputError."""
-    from ftproc.files.reading import trajectories as trajectory_files
     from ftproc.scoring import compare, limits, score
     from ftproc.scoring.matching import exchanged_axes
 
-    trajectory = trajectory_files.read(name)
     found = score(trajectory, truth)
     if truth is not None and (doubt := exchanged_axes(trajectory, truth)):
         click.echo(f"ftproc: {doubt}", err=True)
     judged = [limits.judge(trajectory, truth, each.limits) for each in asked] if truth is not None else []
-    text = "".join(limits.text(name, each, one) for each, one in zip(asked, judged, strict=bool(judged)))
+    text = "".join(limits.text(trajectory.name, each, one) for each, one in zip(asked, judged, strict=bool(judged)))
     results = [result for one in judged for result in one]
     if results:
         found = replace(found, require=limits.as_dicts(results))
@@ -183,9 +183,13 @@ def _summary(trajectory: Trajectory) -> dict[str, Any]:
     return {"method": trajectory.metadata.get("method", ""), **summary_of(trajectory)}
 
 
-def _truth(name: str, known: dict[str, Truth]) -> Truth:
+def _truth(name: str, trajectory: Trajectory, known: dict[Any, Truth]) -> Truth:
+    from ftproc.derived.quantities import site_of
     from ftproc.files.reading import truth as truth_files
 
-    if name not in known:
-        known[name] = truth_files.read(name)
-    return known[name]
+    site = site_of(trajectory.metadata)
+    north = trajectory.metadata.get("frame") == "north-east-up"
+    frame = None if site is None else truth_files.Frame((site[0], site[1], site[2]), north)
+    if (name, frame) not in known:
+        known[name, frame] = truth_files.read(name, frame)
+    return known[name, frame]

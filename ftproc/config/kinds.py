@@ -99,6 +99,14 @@ def prior(value: object) -> tuple[float, float]:
     return height, sigma
 
 
+def vector(value: object) -> tuple[float, float, float]:
+    """Three finite numbers."""
+    if isinstance(value, list) and len(value) == 3 and not any(isinstance(each, bool) for each in value):
+        one = number()
+        return one(value[0]), one(value[1]), one(value[2])
+    raise ValueError("three numbers, such as [1.5, 0, 2]")
+
+
 def file_name(value: object) -> str:
     """A possible name of a file."""
     if "\0" in text(value):

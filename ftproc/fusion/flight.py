@@ -67,7 +67,7 @@ def fuse(
 
     Raises InputError for logs that cannot be read or have nothing in common, UsageError for settings without sense.
     """
-    read = logs.read(range_.instruments, decisions)
+    range_, read = logs.read(range_, decisions)
     if len(read) == 1:
         return _alone(range_, read[0], settings, model)
     seen, zero_s = logs.as_seen(range_.instruments, read)
@@ -96,7 +96,7 @@ def _flight(
     if not np.isfinite(track.state).all():
         raise InputError(f"{range_.path}: the fused filter diverged; check the places, the clocks and the conventions.")
     names = [station.name for station in fused.stations]
-    edited = {name: results.edited(fused, s, read[s]) for s, name in enumerate(names)}
+    edited = {name: results.edited(fused, s, read[s], range_.instruments[s]) for s, name in enumerate(names)}
     for s, (log, table) in enumerate(zip(read, edited.values(), strict=True)):
         effects.add(log.by_hand, *results.residuals(table, log, fused.noise[s]))
     assumed = [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import datetime
 
 import numpy as np
@@ -12,8 +13,9 @@ from ftproc.core.model.frames import wrap
 from ftproc.errors import InputError
 from ftproc.files.decisions import Decisions
 from ftproc.files.reading import logs
+from ftproc.fusion import positions
 from ftproc.fusion.estimation.events import Seen
-from ftproc.fusion.range_file import Instrument, Range
+from ftproc.fusion.range_file import POSITION, Instrument, Range
 from ftproc.quality import sanity
 from ftproc.records import ACCEPTED, REJECTED, FloatArray, MeasurementLog
 
@@ -21,15 +23,22 @@ HOUR_S = 3600.0
 ZONES = range(-14, 15)  # hours by which a clock of another time zone is off
 
 
-def read(instruments: Sequence[Instrument], decisions: Decisions | None = None) -> list[MeasurementLog]:
-    """The log of each, with the decisions by hand on it. Raises InputError, UsageError."""
-    found = [logs.read(each.log, **each.recipe.reading()) for each in instruments]
+def read(range_: Range, decisions: Decisions | None = None) -> tuple[Range, list[MeasurementLog]]:
+    """The log of each station, with the decisions by hand on it; and the range with the places from which positions are
+    seen. Raises InputError, UsageError."""
+    both = [
+        positions.read(each, range_.origin) if each.kind == POSITION
+        else (each, logs.read(each.log, **each.recipe.reading()))
+        for each in range_.instruments
+    ]  # fmt: skip
+    range_, found = replace(range_, instruments=tuple(each for each, _ in both)), [log for _, log in both]
+    instruments = range_.instruments
     if decisions is not None:
         decisions.check([each.name for each in instruments], same_clock=True)
         found = [decisions.applied(log, each.name) for log, each in zip(found, instruments, strict=True)]
     for log in found:
         sanity.check(log)
-    return found
+    return range_, found
 
 
 def as_seen(instruments: Sequence[Instrument], found: Sequence[MeasurementLog]) -> tuple[list[Seen], float]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ftproc.config import reading
 from ftproc.config.keys import KEYS, Key
-from ftproc.config.kinds import number, text
+from ftproc.config.kinds import number, text, vector, words
 from ftproc.config.recipe import Recipe
 from ftproc.core.model.earth import Geodetic, seen_from
 from ftproc.errors import UsageError, nearest
@@ -26,6 +26,7 @@ _WITHOUT_PARTS = (  # endings of files in which # names nothing
     *(".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".prn", ".gsi", ".parquet", ".feather"),
     *(".arrow", ".arrows", ".ipc", ".jsonl", ".ndjson", ".json", ".npy", ".npz"),
 )
+POSITION = "position"
 _SIGMA = "1-sigma of what is not known beforehand, 0: known"
 
 _DEGREES = {
@@ -47,6 +48,9 @@ STATION: Mapping[str, Key] = {
     "elevation_bias_sigma": Key("elevation", SMALLEST, 1.0, _SIGMA, quantity="elevation"),
     "level_sigma": Key("level", SMALLEST, 0.15, _SIGMA, quantity="elevation"),
     "clock_offset_sigma": Key("clock", SMALLEST, 0.0, _SIGMA, quantity="time"),
+    "kind": Key("kind", words("tracker", POSITION), "tracker", "position: GNSS on board, ADS-B"),
+    "sigma": Key("sigma", SMALLEST, 5.0, "of positions, 1-sigma; left out: estimated", quantity="range"),
+    "lever_arm_m": Key("lever_arm_m", vector, [0, 0, 0], "of its antenna: ahead, right, up"),
 }
 
 
@@ -54,7 +58,8 @@ STATION: Mapping[str, Key] = {
 class Instrument:
     """A station of the range. log: its file. recipe: how that is read. options: as in a station file. place (3,) east,
     north, up at the origin m; axes (3, 3) its own east, north, up. prior (6,): 1-sigma m, rad, rad, tilts rad, clock s.
-    config: its station file, or "".
+    config: its station file, or "". kind: tracker, or position, with sigma_m of its positions, 0 for one that is to be
+    estimated, and lever_arm_m of the antenna, see `positions`.
     """
 
     name: str
@@ -66,6 +71,9 @@ class Instrument:
     prior: FloatArray
     site: Geodetic | None
     config: str = ""
+    kind: str = "tracker"
+    sigma_m: float = 0.0
+    lever_arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -175,11 +183,25 @@ def _instrument(path: str, origin: Geodetic | None, name: str, keys: Any) -> Ins
     elif not Path(log.partition("#")[0]).exists():
         raise UsageError(f"{place}: there is no log {log}; correct log = ..., which is relative to {Path(path).name}.")
     site = options.get("site")
-    at, axes, site = _stand(place, origin, values, site)
+    kind = values.get("kind", "tracker")
+    if kind == POSITION:
+        _refuse_of_trackers(place, values)
+        at, axes, site = np.zeros(3), np.eye(3), None
+    else:
+        at, axes, site = _stand(place, origin, values, site)
     level = values.get("level_sigma", 0.0)
     named = ("range_bias_sigma", "azimuth_bias_sigma", "elevation_bias_sigma")
     prior = [*(values.get(each, 0.0) for each in named), level, level, values.get("clock_offset_sigma", 0.0)]
-    return Instrument(name, log, options, Recipe.of(options), at, axes, np.array(prior), site, config)
+    recipe = Recipe.of(options)
+    own_kind = (kind, values.get("sigma", 0.0), values.get("lever_arm_m", (0.0, 0.0, 0.0)))
+    return Instrument(name, log, options, recipe, at, axes, np.array(prior), site, config, *own_kind)
+
+
+def _refuse_of_trackers(place: str, values: Mapping[str, Any]) -> None:
+    """Raise UsageError for what a station that is the target itself has not."""
+    others = [name for name in values if name in (*_DEGREES, *_METRES) or name.endswith(("bias_sigma", "level_sigma"))]
+    if others:
+        raise UsageError(f'{place} has kind = "{POSITION}", so {others[0]} has no meaning there; leave it out.')
 
 
 def _split(place: str, keys: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:

@@ -21,7 +21,7 @@ from ftproc.fusion.estimation import constants as posterior
 from ftproc.fusion.estimation.constants import Constants
 from ftproc.fusion.estimation.events import CLOCK
 from ftproc.fusion.estimation.whole import Fused
-from ftproc.fusion.range_file import Instrument, Range
+from ftproc.fusion.range_file import POSITION, Instrument, Range
 from ftproc.methods.preparing import labels
 from ftproc.quality import by_hand
 from ftproc.records import COMPONENTS, MISSING, FloatArray, MeasurementLog, Trajectory
@@ -51,9 +51,10 @@ def stations_used(fused: Fused) -> FloatArray:
     return count
 
 
-def edited(fused: Fused, s: int, log: MeasurementLog) -> pa.Table:
+def edited(fused: Fused, s: int, log: MeasurementLog, instrument: Instrument) -> pa.Table:
     """A row for each row of a station's log, in its order and in its sense of the azimuth. Rows without a time are
-    missing. The cleaned reading is what the station would have read: its biases are in it."""
+    missing. The cleaned reading is what the station would have read: its biases are in it. One that gives positions has
+    these too, beside the ranges and angles of the place from which they are seen."""
     station, biases = fused.stations[s], fused.constants.estimate[s]
     cleaned = geometry.measured(fused.position[s], station.place, fused.axes[s]) + biases[:3]
     near = np.where(np.isfinite(station.measurement[:, 1]), station.measurement[:, 1], 0.0)
@@ -86,6 +87,9 @@ def edited(fused: Fused, s: int, log: MeasurementLog) -> pa.Table:
         columns[f"residual_sigma_{component}_{unit}"] = full(np.sqrt(variance[:, c]))
     for c, name in enumerate(layout.OUTLIER):
         columns[name] = full(label[:, c], MISSING)
+    if instrument.kind == POSITION:
+        columns |= {name: full(fused.position[s][:, c]) for c, name in enumerate(layout.POSITION)}
+        columns["outlier_position"] = full(np.where((label == MISSING).any(1), MISSING, label.max(1)), MISSING)
     return arrow.table(columns)
 
 
@@ -163,7 +167,8 @@ def places(range_: Range, output: str, folder: str | None) -> Places:
     """Where they go, by the name of the trajectory. folder: of the station files, if there are any. Raises
     OutputError."""
     names = [instrument.name for instrument in range_.instruments]
-    calibration = {} if folder is None else {name: remote.within(folder, f"{name}.toml") for name in names}
+    trackers = [each.name for each in range_.instruments if each.kind != POSITION]
+    calibration = {} if folder is None else {name: remote.within(folder, f"{name}.toml") for name in trackers}
     folders = () if folder is None else (folder,)
     if output == outputs.STREAM:
         return Places(None, {}, calibration, folders)
@@ -193,6 +198,8 @@ def write_calibration(range_: Range, constants: Constants, files: Mapping[str, s
     A station file has no tilts; what is seen of them in the readings of other flights depends on the direction.
     """
     for s, instrument in enumerate(range_.instruments):
+        if instrument.name not in files:
+            continue
         with atomic.replacing(files[instrument.name]) as stream:
             stream.write(calibration(instrument, constants, s).encode())
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -78,9 +79,13 @@ RANGES: Mapping[str, tuple[str, tuple[Kind, ...], tuple[tuple[str, float], ...]]
     ),
 }
 ANY = "range"
+#: A radar with unknown biases, and GNSS on board.
+GNSS, GNSS_S, GNSS_M = "range-gnss", 1.0, (2.0, 2.0, 4.0)  # name, between positions, 1-sigma east, north, up
+WRONG, WRONG_M = 0.02, 200.0  # share of wrong positions, and their size
 DESCRIPTIONS = {
     ANY: "several stations on one flight: one of the four below is drawn; -o names a directory",
     **{name: text for name, (text, _, _) in RANGES.items()},
+    GNSS: "a radar with unknown biases, and the positions of GNSS on board; an airliner or a cruiser",
 }
 
 
@@ -100,13 +105,22 @@ class SimulatedStation:
     sigma: FloatArray
 
 
+class Gnss(NamedTuple):
+    """time_s (n,), and (n, 3) latitude deg, longitude deg and height m."""
+
+    time_s: FloatArray
+    place: FloatArray
+
+
 @dataclass(frozen=True)
 class SimulatedRange:
-    """A flight, x east, y north, z up at the origin in true time, and the stations that saw it."""
+    """A flight, x east, y north, z up at the origin in true time, the stations that saw it, and the positions of GNSS
+    on board, if there are such."""
 
     origin: Geodetic
     truth: Truth
     stations: tuple[SimulatedStation, ...]
+    gnss: Gnss | None = None
 
 
 def simulate_range(scenario: str, seed: int = 0, duration_s: float | None = None) -> SimulatedRange:
@@ -116,22 +130,32 @@ def simulate_range(scenario: str, seed: int = 0, duration_s: float | None = None
     """
     rng = np.random.default_rng([seed, 21])
     name = scenario if scenario in RANGES else list(RANGES)[rng.integers(len(RANGES))]
-    _, kinds, flights = RANGES[name]
+    _, kinds, flights = RANGES["range-radars" if scenario == GNSS else name]
+    kinds = kinds[:1] if scenario == GNSS else kinds
     flight_name, usual_s = flights[rng.integers(len(flights))]
     lasts = usual_s if duration_s is None else duration_s
     if not 10.0 <= lasts <= 1e5:
         raise UsageError(f"A flight for several stations lasts 10 to 100000 s, not {lasts:g} s.")
     flight = FLIGHTS[flight_name](rng, lasts)
     origin = (float(rng.uniform(-55, 65)), float(rng.uniform(-180, 180)), float(rng.uniform(0, 1500)))
-    title = f"simulated {name}, seed {seed}"
+    title = f"simulated {scenario if scenario == GNSS else name}, seed {seed}"
     places = _places(flight, lasts, len(kinds), rng)
-    reference = -1 if name == "range-radars" else int(rng.integers(len(kinds)))
+    reference = -1 if scenario == GNSS or name == "range-radars" else int(rng.integers(len(kinds)))
     stations = tuple(
         _station(kind, _called(kinds, k), origin, places[k], flight, lasts, (k == reference, rng))
         for k, kind in enumerate(kinds)
     )
     time_s = np.arange(0.0, lasts + 0.5 * TRUTH_S, TRUTH_S)
-    return SimulatedRange(origin, Truth(title, time_s, *flight.at(time_s)), stations)
+    gnss = _gnss(flight, lasts, origin, rng) if scenario == GNSS else None
+    return SimulatedRange(origin, Truth(title, time_s, *flight.at(time_s)), stations, gnss)
+
+
+def _gnss(flight: Flight, lasts: float, origin: Geodetic, rng: np.random.Generator) -> Gnss:
+    time_s = np.arange(0.0, lasts, GNSS_S)
+    point = flight.at(time_s)[0] + rng.standard_normal((len(time_s), 3)) * GNSS_M
+    wrong = rng.random(len(time_s)) < WRONG
+    point = point + np.where(wrong[:, None], WRONG_M * rng.standard_normal((len(time_s), 3)), 0.0)
+    return Gnss(time_s, np.array([place_at(origin, each) for each in point]))
 
 
 def _called(kinds: tuple[Kind, ...], k: int) -> str:

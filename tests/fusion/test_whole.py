@@ -20,7 +20,7 @@ def stations(tmp_path_factory):
     folder = tmp_path_factory.mktemp("three")
     ranges.write(simulate_range("range-theodolites", 1, 120.0), str(folder), None)
     range_ = range_file.load(str(folder / "range.toml"))
-    return logs.as_seen(range_.instruments, logs.read(range_.instruments))[0]
+    return logs.as_seen(range_.instruments, logs.read(range_)[1])[0]
 
 
 def fused(stations, smooth=True):

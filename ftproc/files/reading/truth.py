@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from ftproc.errors import InputError, row_named
 from ftproc.files.layout import ACCELERATION, OUTLIER, POSITION, VELOCITY
-from ftproc.files.reading import columns
+from ftproc.files.reading import columns, positions
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning import readings
@@ -17,8 +18,16 @@ from ftproc.records import FloatArray, IntArray, Truth
 _FEWEST = 24  # rows by which a number is judged
 
 
-def read(source: tables.Source) -> Truth:
-    """Read a truth: `time_s` and x_m, y_m, z_m; velocity, acceleration and `outlier_*` where present.
+class Frame(NamedTuple):
+    """Where the frame of a trajectory stands: latitude deg, longitude deg, height m; and whether x is north."""
+
+    site: tuple[float, float, float]
+    north: bool
+
+
+def read(source: tables.Source, frame: Frame | None = None) -> Truth:
+    """Read a truth: `time_s` and x_m, y_m, z_m; velocity, acceleration and `outlier_*` where present. Or the time and
+    latitude, longitude and height, which are brought into the frame of a trajectory.
 
     source: as for `logs.read`. Rows are put in time order; other columns are ignored. An absent `outlier_*` column
     counts as 0 if another is present. Timestamps become seconds as in a log of the same day.
@@ -26,6 +35,8 @@ def read(source: tables.Source) -> Truth:
     unreadable file.
     """
     header = tables.read_header(source)
+    if positions.is_geodetic(header):
+        return _on_the_earth(source, header.source, frame)
     flag_names = [name for name in OUTLIER if name in header.names]
     needed = ["time_s", *POSITION, *_whole_group(header, VELOCITY), *_whole_group(header, ACCELERATION)]
     found, _ = columns.load(header, [*needed, *flag_names])
@@ -42,6 +53,18 @@ def read(source: tables.Source) -> Truth:
         acceleration_mps2=_stacked(found, ACCELERATION, order) if ACCELERATION[0] in found else None,
         outlier=columns.outlier_flags(header, found, highest=255)[order] if flag_names else None,
     )
+
+
+def _on_the_earth(source: tables.Source, name: str, frame: Frame | None) -> Truth:
+    if frame is None:
+        raise InputError(
+            f"{name}: it has latitudes and longitudes, and the trajectory has no site; filter the log with --site "
+            "LAT,LON,HEIGHT of the station."
+        )
+    found = positions.read(source)
+    known = np.isfinite(found.place).all(1)
+    place = positions.local(found.place[known], frame.site)
+    return Truth(name, found.time_s[known], place[:, [1, 0, 2]] if frame.north else place)
 
 
 def _refuse_sentinel(header: TableHeader, column: FloatArray, name: str) -> None:

@@ -6,12 +6,16 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from ftproc.errors import OutputError
+from ftproc.files import arrow
 from ftproc.files.writing import atomic, flights, outputs, tables
 from ftproc.files.writing.outputs import Output
 from ftproc.records import MeasurementLog, Truth
 from ftproc.simulation.ranges import SimulatedRange, SimulatedStation
 
+_GNSS = "gnss.csv"
 _PARAMETERS = ("range_m", "azimuth_rad", "elevation_rad", "tilt_east_rad", "tilt_north_rad", "clock_s")
 
 
@@ -33,6 +37,10 @@ def write(simulated: SimulatedRange, directory: str, truth: str | None) -> None:
         flights.write_log(log, str(folder / f"{station.name}.csv"), azimuth_from=station.azimuth_from)
         if truth is not None:
             flights.write_truth(seen, str(folder / f"{station.name}.truth.csv"))
+    if simulated.gnss is not None:
+        names = ("time_s", "lat_deg", "lon_deg", "height_m")
+        columns = (simulated.gnss.time_s, *np.ascontiguousarray(simulated.gnss.place.T))
+        tables.write_table(arrow.table(dict(zip(names, columns, strict=True))), str(folder / _GNSS))
     with atomic.replacing(folder / "range.toml") as stream:
         stream.write(range_file(simulated).encode())
 
@@ -40,6 +48,7 @@ def write(simulated: SimulatedRange, directory: str, truth: str | None) -> None:
 def _written(simulated: SimulatedRange, folder: Path, truth: str | None) -> list[Output]:
     kinds = (".csv",) if truth is None else (".csv", ".truth.csv")
     names = ["range.toml", *(f"{station.name}{kind}" for station in simulated.stations for kind in kinds)]
+    names += [_GNSS] if simulated.gnss is not None else []
     found = [Output(folder / name, made=True) for name in names]
     return found if truth is None else [*found, *(Output(name, "--truth") for name in (truth, _biases(truth)))]
 
@@ -68,7 +77,9 @@ def range_file(simulated: SimulatedRange) -> str:
     """The text of the range file: what a user would know beforehand."""
     names = ("lat_deg", "lon_deg", "height_m")
     origin = "".join(f"{name} = {value!r}\n" for name, value in zip(names, simulated.origin, strict=True))
-    return f"[origin]\n{origin}" + "".join(_section(station) for station in simulated.stations)
+    sections = "".join(_section(station) for station in simulated.stations)
+    gnss = f'\n[station.gnss]\nkind = "position"\nlog = "{_GNSS}"\n' if simulated.gnss is not None else ""
+    return f"[origin]\n{origin}{sections}{gnss}"
 
 
 def _section(station: SimulatedStation) -> str:

@@ -1,0 +1,137 @@
+"""Positions of the target in: GNSS on board, ADS-B, a reference trajectory in geodetic form.
+
+They are latitude, longitude and height above the ellipsoid, or x, y, z in m in the frame of the range.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ftproc.errors import InputError
+from ftproc.files.reading.clocks.times import seconds
+from ftproc.files.reading.formats import tables
+from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.meaning.names import taken_apart
+from ftproc.files.reading.meaning.numbers import Origin, numbers
+from ftproc.files.reading.meaning.questions import listed
+from ftproc.files.units import Unit, unit_named
+from ftproc.records import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+GEODETIC, LOCAL = ("lat_deg", "lon_deg", "height_m"), ("x_m", "y_m", "z_m")
+_NAMES: Mapping[str, tuple[str, ...]] = {
+    "lat_deg": ("lat", "latitude"),
+    "lon_deg": ("lon", "long", "lng", "longitude"),
+    "height_m": ("height", "altitude", "alt", "geoheight", "geoaltitude", "hae", "ellipsoidalheight"),
+    "x_m": ("x", "east"),
+    "y_m": ("y", "north"),
+    "z_m": ("z", "up"),
+}
+
+
+class Positions(NamedTuple):
+    """time_s (n,), in order; place (n, 3) latitude deg, longitude deg, height m, or x, y, z m, NaN where missing; which
+    of the two; the row (n,) of the file of each, the number of its rows, the instant of time zero or "", and its
+    SHA-256."""
+
+    name: str
+    time_s: FloatArray
+    place: FloatArray
+    geodetic: bool
+    row: IntArray
+    rows_in_file: int
+    epoch: str
+    sha256: str
+
+
+def is_geodetic(header: TableHeader) -> bool:
+    """Whether a table has latitudes and longitudes, but no x, y, z."""
+    return not set(LOCAL) <= set(header.names) and all(_place(header, name) is not None for name in GEODETIC[:2])
+
+
+def read(source: tables.Source, stated: Mapping[str, str] | None = None) -> Positions:
+    """The positions of a file, as `logs.read` takes it. stated: names of columns by quantity: time, lat_deg, ... Raises
+    InputError for a column that is missing, and a cell that is no number."""
+    header, stated = tables.read_header(source), stated or {}
+    geodetic = is_geodetic(header) or any(name in stated for name in GEODETIC)
+    wanted = GEODETIC if geodetic else LOCAL
+    places = [_needed(header, name, stated.get(name, "")) for name in wanted]
+    clock = _time(header, stated.get("time", ""))
+    table = header.load([], [clock, *places])
+    if table.num_rows == 0:
+        raise InputError(f"{header.source}: there are column names but no rows.")
+    unit = unit_named("time", taken_apart(header.names[clock]).unit) or Unit("s")
+    time_s, epoch = seconds(table.column(0), _origin(header, clock, "seconds or an ISO-8601 timestamp"), unit.to_si)
+    place = np.column_stack([_values(header, at, table.column(k + 1), wanted[k]) for k, at in enumerate(places)])
+    timed = np.flatnonzero(np.isfinite(time_s))
+    row = timed[np.argsort(time_s[timed], kind="stable")]
+    if geodetic and (np.abs(place[:, 0]) > 90).any():
+        bad = int(np.argmax(np.abs(place[:, 0]) > 90))
+        raise InputError(f"{header.source}: row {bad}: a latitude lies in -90..90 degrees; correct the cell.")
+    return Positions(
+        header.source, time_s[row], place[row], geodetic, row.astype(np.int64), len(time_s), epoch, header.sha256()
+    )
+
+
+def _place(header: TableHeader, name: str) -> int | None:
+    """The column of a quantity: by its own name, or one of its other ones."""
+    if name in header.names:
+        return header.names.index(name)
+    apart = [taken_apart(each) for each in header.names]
+    fits = [k for k, each in enumerate(apart) if each.stem in _NAMES[name] or each.core() in _NAMES[name]]
+    return fits[0] if len(fits) == 1 else None
+
+
+def _needed(header: TableHeader, name: str, stated: str) -> int:
+    place = header.names.index(stated) if stated in header.names else None if stated else _place(header, name)
+    if place is None:
+        raise InputError(
+            f"{header.source}: there is no column for {stated or name}. Its columns are: {listed(header.names)}. "
+            "Positions are lat_deg, lon_deg, height_m, or x_m, y_m, z_m; rename the right ones."
+        )
+    return place
+
+
+def _time(header: TableHeader, stated: str) -> int:
+    if stated in header.names:
+        return header.names.index(stated)
+    for names in (["time_s"], [each for each in header.names if taken_apart(each).means("time") == 1]):
+        if len(set(names) & set(header.names)) == 1:
+            return header.names.index(names[0])
+    raise InputError(
+        f"{header.source}: no column, or more than one, is the time. Its columns are: {listed(header.names)}. Rename "
+        "it to time_s."
+    )
+
+
+def _origin(header: TableHeader, place: int, expected: str) -> Origin:
+    return Origin(header.source, header.names[place], expected, header.decimal_comma)
+
+
+def _values(header: TableHeader, place: int, column: pa.ChunkedArray, name: str) -> FloatArray:
+    """(n,) in degrees or m."""
+    values = numbers(column, _origin(header, place, "a number"))
+    unit = taken_apart(header.names[place]).unit or name.rpartition("_")[2]
+    if name not in GEODETIC[:2]:
+        return (unit_named("height", unit) or Unit("m")).to_si(values)
+    angle = unit_named("azimuth", unit)
+    return values if angle is None or angle.name == "deg" else np.degrees(angle.to_si(values))
+
+
+def local(place: FloatArray, origin: Sequence[float]) -> FloatArray:
+    """(n, 3) latitude deg, longitude deg, height m -> (n, 3) east, north, up m at an origin of the same kind."""
+    from ftproc.core.model import earth
+
+    start = (float(origin[0]), float(origin[1]), float(origin[2]))
+    latitude, longitude = np.radians(place[:, 0]), np.radians(place[:, 1])
+    normal = earth.RADIUS_M / np.sqrt(1 - earth.ECCENTRICITY2 * np.sin(latitude) ** 2)
+    across = (normal + place[:, 2]) * np.cos(latitude)
+    up = (normal * (1 - earth.ECCENTRICITY2) + place[:, 2]) * np.sin(latitude)
+    there = np.stack([across * np.cos(longitude), across * np.sin(longitude), up], 1)
+    found: FloatArray = (there - earth.earth_centred(start)) @ earth.verticals(start).T
+    return found
