@@ -75,8 +75,8 @@ def test_an_ignored_column_may_hold_anything(make: Make) -> None:
         ),
         (
             "a,b\n0,1\n",
-            "no time column (expected time_s or time or t). Its columns are: a, b. Name the right ones with "
-            "--columns time=NAME,range=NAME,elevation=NAME.",
+            "no time column (expected time_s or time or t). Its columns are: a, b. Its columns hold, in two rows: "
+            '2 "b": 1, from 1 to 1. Name the right ones with --columns time=NAME.',
         ),
         ("t,R\n".encode("utf-16"), "there are column names but no rows."),
         (b"t,R\n0,1\n\0\0\0", "this is not text in UTF-8 (it has NUL bytes)"),

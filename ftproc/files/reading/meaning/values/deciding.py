@@ -81,7 +81,10 @@ def _unpacked(log: Known, quantities: Mapping[str, FloatArray], open_: Open) -> 
 
 def _choices(log: Known, sizes: Mapping[str, Sizes], moved: motion.Motion | None) -> list[Choice]:
     """The ways to understand a log, without those of the angles that are out of the question."""
-    angles = [(way, prior * (moved.of_angles(way) if moved else 1.0)) for way, prior in ways.of_angles(log, sizes)]
+    angles = [
+        (way, prior * (moved.of_angles(way) if moved else 1.0))
+        for way, prior in ways.of_angles(log, sizes, moved is not None)
+    ]
     least = _QUESTIONED * max((odds for _, odds in angles), default=0.0)
     found = []
     for (way, odds), (time, length, prior) in itertools.product(angles, ways.of_scales(log, moved is not None)):

@@ -33,7 +33,7 @@ _OTHER = {
 _OTHER_MIL = 0.08  # times as likely as the other angles
 _NEVER = 1e-9  # but where a name is impossible
 _CANONICAL = 0.3  # times as likely in a column of the program's own name
-_MIXED, _ONE_WRONG = 0.01, 0.2  # two angles in two units, where no name states one, and where names do
+_MIXED, _ONE_WRONG = 0.03, 0.2  # two angles in two units, where no name states one, and where names do
 _ZENITH, _ZENITH_BY_SURVEYORS, _EXCHANGED = 0.02, 0.5, 0.003
 _SMALL_RAD, _SMALL = 6.284, 0.05  # azimuths that are all below a turn in rad, in another unit
 _STEEP_RAD, _STEEP = math.radians(60), 0.03  # few records have a median elevation above this
@@ -80,9 +80,15 @@ def of_scales(log: Known, moves: bool) -> list[tuple[Unit | None, Unit | None, f
     return [(time, length, a * b) for (time, a), (length, b) in itertools.product(times, ranges)]
 
 
-def of_angles(log: Known, sizes: Mapping[str, Sizes]) -> list[tuple[Way, float]]:
-    """The ways to understand the angles that their sizes allow, and how likely each is."""
-    return [(Way((None, None, a, e), *rest), prior) for (a, e, *rest), prior in _angles(log, sizes)]
+def of_angles(log: Known, sizes: Mapping[str, Sizes], moves: bool) -> list[tuple[Way, float]]:
+    """The ways to understand the angles that their sizes allow, and how likely each is. Without a motion, bare angles
+    are in one unit if they can be."""
+    found = [(Way((None, None, a, e), *rest), prior) for (a, e, *rest), prior in _angles(log, sizes)]
+    bare = log.is_open("azimuth") and log.is_open("elevation") and not moves
+    alike = [
+        (way, prior) for way, prior in found if way.units[2] and way.units[3] and way.units[2][0] == way.units[3][0]
+    ]
+    return alike if bare and alike else found
 
 
 def _units(log: Known, quantity: str) -> Iterator[tuple[Unit | None, float]]:
