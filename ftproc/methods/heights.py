@@ -22,13 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.by_hand import Accepted
-from ftproc.core.editing import alone
 from ftproc.core.editing.copies import rounding_step
 from ftproc.core.filtering.records import Uneven
 from ftproc.core.model import kinematics
 from ftproc.core.model.earth import MEAN_RADIUS_M as EARTH_M
 from ftproc.errors import InputError
-from ftproc.methods import anti_outlier, preparing
+from ftproc.methods import alone, anti_outlier, preparing
 from ftproc.methods.estimate import Recording
 from ftproc.order_statistics import median
 from ftproc.records import ISOLATED, MISSING, PATCH, FlagArray, FloatArray, MeasurementLog

@@ -38,9 +38,11 @@ class FaultStatistics:
             found |= {f"{what}_{UNITS[step.component]}": size for what, size in sizes.items()}
             (self.steps if step.sure else self.doubtful).append(found)
         for rival in faults.rivals:
-            times = {"from_s": float(time_s[rival.begin]), "to_s": float(time_s[rival.end - 1])}
-            chosen = {"chosen": "motion" if rival.motion else "patch", "gain": rival.gain}
-            self.rivals.append({"component": NAMES[rival.component], **times, **chosen})
+            name, from_s, to_s = NAMES[rival.component], float(time_s[rival.begin]), float(time_s[rival.end - 1])
+            chosen, other = ("motion", "a patch of outliers")[:: 1 if rival.motion else -1]
+            what = f"the {name} from {from_s:.6g} to {to_s:.6g} s, taken for {chosen}, may be {other}"
+            place = {"component": name, "from_s": from_s, "to_s": to_s}
+            self.rivals.append({"what": what, "nats": rival.gain, **place, "chosen": chosen})
         for one in faults.one_sided:
             name, unit = NAMES[one.component], UNITS[one.component]
             found = {"component": name, "share": one.share, f"error_{unit}": one.error, f"shift_{unit}": one.shift}
@@ -86,12 +88,7 @@ def suspicious(s: Mapping[str, Any]) -> Iterator[str]:
         named = "; ".join(step_in_words(step, s) for step in s["doubtful_steps"][:MOST_STEPS])
         yield f"either {named}, or readings beside it are a patch of outliers: the estimate takes them for good"
     for rival in s["rivals"][:MOST_STEPS]:
-        other = "a patch of outliers" if rival["chosen"] == "motion" else "motion of the target"
-        yield (
-            f"the {rival['component']} from {rival['from_s']:.6g} to {rival['to_s']:.6g} s was taken for "
-            f"{'motion' if rival['chosen'] == 'motion' else 'a patch of outliers'}, and may be {other}: that is less "
-            f"likely by {rival['gain']:.1f} in log-probability only"
-        )
+        yield f"{rival['what']}: that is less likely by {rival['nats']:.1f} in log-probability only"
     if s["clock_set_back"]:
         back = s["clock_set_back"]
         yield f"the time goes back by {-back['by_s']:.3g} s at row {back['row']}, and rows before and after it overlap"

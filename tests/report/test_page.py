@@ -162,11 +162,11 @@ def test_what_is_long_is_folded(text):
 
 def test_rival_understandings_are_listed_where_there_are_some(text):
     assert "nearly as likely" not in text
-    rivals = [{"what": "a step of the azimuth at 12 s", "nats": 1.5}, {"what": "a manoeuvre"}]
+    rivals = [{"what": "a step of the azimuth at 12 s", "nats": 1.5}, {"what": "a manoeuvre", "nats": 2.5}]
     summary = {**filtered().metadata["summary"], "rivals": rivals}
     found = page(replace(filtered(), metadata={**filtered().metadata, "summary": summary}))
     assert "<th>what</th><th>nats</th>" in found
-    assert "<td>a manoeuvre</td><td>-</td>" in found
+    assert "<td>a manoeuvre</td><td>2.5</td>" in found
 
 
 def test_decisions_name_the_log_and_every_patch_has_its_buttons(text):

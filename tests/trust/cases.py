@@ -199,11 +199,13 @@ _READ: dict[str, Callable[[Path, dict[str, Any]], Any]] = {
 
 
 def judge_trajectory(trajectory: Trajectory) -> None:
-    """Finite states and positive, finite sigmas throughout; of a log without a component, of the cleaned others."""
+    """Finite states and positive, finite sigmas throughout; of a log without a component for which nothing stands, of
+    the cleaned others."""
     cleaned, sigma = np.isfinite(trajectory.measurement), trajectory.measurement_sigma
     assert (np.isfinite(sigma) == cleaned).all(), "cleaned readings without sigmas, or sigmas without these"
     assert (sigma[cleaned] > 0).all(), "sigmas of cleaned readings that are not positive"
-    if trajectory.metadata["summary"]["not_observable"]:
+    summary = trajectory.metadata["summary"]
+    if summary["not_observable"] and summary.get("height_m") is None:
         assert np.isnan(trajectory.state).all(), "states without all three components"
         return
     assert np.isfinite(trajectory.state).all(), "states that are not finite"

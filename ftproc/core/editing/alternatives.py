@@ -85,8 +85,8 @@ class Work:
     in samples that are smoothed, not in seconds, so that a result does not depend on the machine."""
 
     def __init__(self, samples: int, at_least: int = WORK) -> None:
-        """at_least: how much work any log is worth."""
-        self.left = at_least + WORK_PER_SAMPLE * samples
+        """at_least: how much work any log is worth; a window that moves on is worth none."""
+        self.left, self.of_window = at_least + WORK_PER_SAMPLE * samples, at_least == 0
 
 
 class Search:
@@ -113,7 +113,8 @@ class Step(NamedTuple):
 
 def try_alternatives(log: Neighbourhood, weight: FloatArray, search: Search) -> FloatArray:
     """The decisions (n, 3), replaced by others where these are likelier."""
-    result = _one_sided(log, weight, search)
+    # Where a window ends, a patch may look like motion, and motion like a patch.
+    result = weight.copy() if search.work.of_window else _one_sided(log, weight, search)
     new = [island for island in islands(log.time_s, weight, log.possible) if island not in search.tried]
     search.unexamined.update(new[MOST:])
     for island in new[:MOST]:

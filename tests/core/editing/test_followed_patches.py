@@ -48,7 +48,7 @@ def test_what_may_be_motion_or_a_patch_is_named():
     (rival,) = summary["rivals"]
     assert (rival["component"], rival["chosen"]) == ("range", "motion")
     assert 54 < rival["from_s"] < rival["to_s"] < 61
-    assert 0 < rival["gain"] < 5
+    assert 0 < rival["nats"] < 5
     assert summary["trust"]["verdict"] != CONSISTENT
     assert any("may be a patch of outliers" in reason for reason in summary["trust"]["reasons"])
 
