@@ -53,8 +53,8 @@ class Derived:
         """Of any trajectory that has velocities; of one from a file the sigmas are those of its columns, if there are
         any."""
         metadata, unknown = trajectory.metadata, np.full((len(trajectory), len(QUANTITIES)), np.nan)
-        north = compass(metadata)
-        value = np.stack(_values(_along_compass(trajectory, north)), 1) * _FACTOR
+        north = axes_of_north(metadata)
+        value = np.stack(_values(_along_north_and_east(trajectory, north)), 1) * _FACTOR
         value[:, TRACK] %= 360.0
         sigma = _published(trajectory, unknown) if trajectory.path_sigma is None else trajectory.path_sigma * _FACTOR
         sigma = np.where(np.isfinite(value), sigma, np.nan)
@@ -75,7 +75,7 @@ _FACTOR = np.array([q.factor for q in QUANTITIES])
 _IS_HEADING = np.isin(np.arange(len(QUANTITIES)), (TRACK, TURN))
 
 
-def compass(metadata: Mapping[str, Any]) -> tuple[int, int] | None:
+def axes_of_north(metadata: Mapping[str, Any]) -> tuple[int, int] | None:
     """The axes that point north and east; None where they are not known."""
     if metadata.get("frame") == "north-east-up":
         return 0, 1
@@ -89,7 +89,7 @@ def site_of(metadata: Mapping[str, Any]) -> Sequence[float] | None:
     return site if isinstance(site, list | tuple) and len(site) == 3 else None
 
 
-def _along_compass(trajectory: Trajectory, north: tuple[int, int] | None) -> FloatArray:
+def _along_north_and_east(trajectory: Trajectory, north: tuple[int, int] | None) -> FloatArray:
     """(n, 6) velocity and acceleration along north, east and up at the target, or along x, y and z."""
     vectors = trajectory.state[:, 3:9].reshape(-1, 2, 3)
     if north is None:

@@ -6,7 +6,7 @@ import html
 
 import numpy as np
 
-from ftproc.derived.quantities import compass
+from ftproc.derived.quantities import axes_of_north
 from ftproc.quality import summary
 from ftproc.records import FloatArray, Trajectory
 from ftproc.report import style
@@ -28,7 +28,7 @@ def as_html(trajectory: Trajectory) -> str:
 
 def picture(trajectory: Trajectory) -> str:
     """The track over the ground as SVG, equal scales; empty without positions."""
-    north = compass(trajectory.metadata)
+    north = axes_of_north(trajectory.metadata)
     across, up = (0, 1) if north is None else north[::-1]
     place = trajectory.state[:, [across, up]]
     if not np.isfinite(place).all(1).any():

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ftproc.derived.quantities import compass
+from ftproc.derived.quantities import axes_of_north
 from ftproc.records import FloatArray
 from ftproc.report import style
 from ftproc.report.drawing import Drawn, span
@@ -69,7 +69,7 @@ def ground(view: View) -> Drawn:
     latitude and longitude where the site is known."""
     if not view.has_position:
         return Drawn(None, NOTHING)
-    path, names, north = _path(view), axis_names(view), compass(view.trajectory.metadata)
+    path, names, north = _path(view), axis_names(view), axes_of_north(view.trajectory.metadata)
     across, up = (0, 1) if north is None else north[::-1]
     go = require_plotly()
     figure = go.Figure()
@@ -112,7 +112,7 @@ def ground(view: View) -> Drawn:
 
 def axis_names(view: View) -> dict[str, str]:
     """The titles of the axes, with their directions as far as they are known."""
-    north = compass(view.trajectory.metadata)
+    north = axes_of_north(view.trajectory.metadata)
     said = {} if north is None else {"xy"[north[0]]: "north", "xy"[north[1]]: "east"}
     return {axis: f"{axis} ({said[axis]}), m" if axis in said else f"{axis}, m" for axis in "xy"} | {"z": "z (up), m"}
 
