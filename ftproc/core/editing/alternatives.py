@@ -32,7 +32,7 @@ GAP_INTERVALS = 8.0  # median intervals without a reading, which a patch may end
 AROUND = 80  # samples on each side that the comparison looks at
 ROUNDS = 5
 MARGIN = 5.0  # by which the log-probability of another decision must be better,
-ONE_SIDED = 25.0  # and of a patch with one edge: a start in a turn gains 21 without one, patches that were missed 43
+AT_EDGE = 25.0  # and of a patch with one edge: a start in a turn gains 21 without one, patches that were missed 43
 MOST = 100  # comparisons in one look
 WORK, WORK_PER_SAMPLE = 250_000, 60  # samples that may be smoothed for a log, and for each of its samples
 STEPS = 14  # of filling a hole, or of taking out what stands out most
@@ -114,7 +114,7 @@ class Step(NamedTuple):
 def try_alternatives(log: Neighbourhood, weight: FloatArray, search: Search) -> FloatArray:
     """The decisions (n, 3), replaced by others where these are likelier."""
     # Where a window ends, a patch may look like motion, and motion like a patch.
-    result = weight.copy() if search.work.of_window else _one_sided(log, weight, search)
+    result = weight.copy() if search.work.of_window else _at_edges(log, weight, search)
     new = [island for island in islands(log.time_s, weight, log.possible) if island not in search.tried]
     search.unexamined.update(new[MOST:])
     for island in new[:MOST]:
@@ -134,7 +134,7 @@ def try_alternatives(log: Neighbourhood, weight: FloatArray, search: Search) -> 
     return result
 
 
-def _one_sided(log: Neighbourhood, weight: FloatArray, search: Search) -> FloatArray:
+def _at_edges(log: Neighbourhood, weight: FloatArray, search: Search) -> FloatArray:
     """The decisions (n, 3), replaced where it is likelier that a rejected run, or an end of the log, is the edge of a
     patch that was followed: a ramp begins without a jump, and at an end of the log there is no other edge. Of several
     in the same place, the likeliest."""
@@ -149,7 +149,7 @@ def _one_sided(log: Neighbourhood, weight: FloatArray, search: Search) -> FloatA
             continue
         search.work.left -= sum(len(step.weight) for step in steps)
         best = max(steps, key=lambda step: step.likelihood)
-        if best.likelihood > steps[0].likelihood + ONE_SIDED:
+        if best.likelihood > steps[0].likelihood + AT_EDGE:
             found.append((best.likelihood - steps[0].likelihood, edge, near, best.weight))
     result, changed = weight.copy(), np.zeros(len(weight), bool)
     for _, edge, near, other in sorted(found, key=lambda each: -each[0]):

@@ -139,8 +139,7 @@ def _until_settled(record: Record, decision: Decision, profile: Model) -> Decisi
             break
         again = decide(record, decision._replace(weight=weight, model=calm), tune_first=False)
         again = again._replace(model=_profile(record, again))
-        if (weight != decision.weight).any():  # of which a single level of the jerk may lead away again
-            again = max(again, _as_they_are(record, decision, weight), key=partial(_likelihood, record))
+        again = _or_as_they_are(record, again, decision._replace(weight=record.with_accepted(weight)), decision)
         if (again.weight == decision.weight).all() or (again.weight.sum(0) < LEAST_KEPT * first.weight.sum(0)).any():
             break
         decision, profile = again, again.model
@@ -150,11 +149,13 @@ def _until_settled(record: Record, decision: Decision, profile: Model) -> Decisi
     return found
 
 
-def _as_they_are(record: Record, decision: Decision, weight: FloatArray) -> Decision:
-    """Other decisions, with a jerk profile of their own."""
-    weight = record.with_accepted(weight)
-    other = decision._replace(weight=weight, starts=_starts(record, weight, median_level(decision.model)))
-    return other._replace(model=_profile(record, other))
+def _or_as_they_are(record: Record, again: Decision, tried: Decision, before: Decision) -> Decision:
+    """The decisions made again from those that were tried, or these as they are, with a jerk profile of their own,
+    where that is likelier: deciding with a single level of the jerk may lead away from them."""
+    if (tried.weight == before.weight).all():
+        return again
+    tried = tried._replace(starts=_starts(record, tried.weight, median_level(before.model)))
+    return max(again, tried._replace(model=_profile(record, tried)), key=partial(_likelihood, record))
 
 
 def with_motion(record: Record, decision: Decision) -> tuple[Decision, tuple[Rival, ...]]:
