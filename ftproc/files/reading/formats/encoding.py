@@ -78,13 +78,14 @@ def as_utf8(source: str, data: bytes, cut: bool = False) -> Utf8:
             return Utf8(decoded.encode(), len(mark), word or name[:6].upper())
         except UnicodeDecodeError as error:
             raise InputError(f"{source}: this is damaged {name[:6].upper()} text; save it as UTF-8.") from error
+    no_text = f"{source}: this is not text in UTF-8 (it has NUL bytes or the like); save it as UTF-8 CSV."
     if b"\0" in data[:_SAMPLE]:
-        raise InputError(f"{source}: this is not text in UTF-8 (it has NUL bytes); save it as UTF-8 CSV.")
+        raise InputError(no_text)
     text = data[len(mark) :]
     if text.isascii() or _is_utf8(text, cut):
         return Utf8(text, len(mark))
     if _CONTROL.search(text[:_SAMPLE]):
-        raise InputError(f"{source}: this is not text, or a damaged file; save it as UTF-8 CSV.")
+        raise InputError(no_text)
     national = max(_NATIONAL, key=lambda each: _known_words(text[:_WORDS], each))
     return Utf8(text.decode(national, "replace").replace("\ufffd", "?").encode(), 0, _NATIONAL[national])
 

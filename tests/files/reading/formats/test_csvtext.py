@@ -79,7 +79,7 @@ def test_an_ignored_column_may_hold_anything(make: Make) -> None:
             '2 "b": 1, from 1 to 1. Name the right ones with --columns time=NAME.',
         ),
         ("t,R\n".encode("utf-16"), "there are column names but no rows."),
-        (b"t,R\n0,1\n\0\0\0", "this is not text in UTF-8 (it has NUL bytes)"),
+        (b"t,R\n0,1\n\0\0\0", "this is not text in UTF-8 (it has NUL bytes or the like)"),
         (b"PAR1....", "this is a Parquet file; give it the name .parquet."),
         (b"PK\x03\x04....", "this is a zip archive or an Excel workbook"),
     ],
