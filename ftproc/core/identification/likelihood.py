@@ -16,7 +16,7 @@ from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.memory import Scores
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import likelihood_of, score_log
-from ftproc.core.identification import optimizer
+from ftproc.core.identification import decimation, optimizer
 from ftproc.core.identification.scales import EXACT, Scales, scales_of
 from ftproc.core.identification.stretches import stretches_of
 from ftproc.core.model.motion import isotropic
@@ -177,7 +177,10 @@ def of_level(found: Scores, log_ratio: float) -> optimizer.Point:
 
 def fit_jerk(log: Observations, starts: list[Start], model: Model) -> Model:
     """The likeliest single jerk level with its vertical share, from the model's; the noise stays."""
-    lower, upper = jerk_bounds(scales_of(log, model.noise_variance))
+    scales = scales_of(log, model.noise_variance)
+    lower, upper = jerk_bounds(scales)
+    if log.sites is None:
+        log, starts = decimation.merged(log, starts, decimation.how_many(scales, model, math.inf))
 
     def cost(theta: FloatArray) -> optimizer.Point:
         return of_level(score_log(log, model._replace(jerk=shaped(theta[:1], theta[1])), starts), theta[1])

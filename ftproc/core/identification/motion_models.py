@@ -116,7 +116,9 @@ def _fitted(
             continue
         begin = likeliest._replace(motion=motion.about(course))
         if name == ORBITAL:
-            model, likelihood = orbits.fit(orbits.Track(*short[:2], known), begin)
+            model, likelihood = orbits.fit(
+                orbits.Track(*short[:2], known), begin, base if len(names) > 1 else -math.inf
+            )
             motion = model.motion
         else:
             model, likelihood = (_unsteered if motion.pressed else _steered)(short, begin)

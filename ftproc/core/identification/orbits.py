@@ -31,6 +31,7 @@ EARTH_RADPS = 7.292115e-5  # its rotation
 LATITUDES, NORTHS = np.radians([-60, -30, 0, 30, 60]), np.radians(np.arange(0, 360, 45))
 CALMER = (1.0, 1e-2, 1e-4)  # times the jerk that stands in for the earth's rotation while it is not known
 STEPS, ROUNDS, TURNS = 12, 3, 16  # of the search for noise and jerk; of both searches; of that for the rotation
+HOPELESS = 200.0  # in log-likelihood: a still earth that is so far behind is no start (a satellite's is ahead, by 65)
 NARROWER = 0.5  # times the angle of a turn, after one that leads nowhere
 FARTHEST = 12.0, 25.0  # ln of times: less noise variance, and less jerk, than white jerk leaves
 
@@ -58,10 +59,12 @@ def may_be(course: FloatArray) -> bool:
     return bool(np.median(height) > ABOVE_M)
 
 
-def fit(track: Track, model: Model) -> tuple[Model, float]:
+def fit(track: Track, model: Model, rival: float = -math.inf) -> tuple[Model, float]:
     """The likeliest noise, jerk and rotation of the earth, from the noise and the jerk of a model and the course about
-    which it is linearised on, and the log-likelihood."""
+    which it is linearised on, and the log-likelihood. rival: that of another motion; far from it no more is tried."""
     still = _settled(track, median_level(model)._replace(motion=Motion(acts=True).about(model.motion.course)))
+    if (likelihood := track.likelihood(still)) < rival - HOPELESS:
+        return still, likelihood
     turning = [
         still._replace(jerk=times * still.jerk, motion=still.motion._replace(rotation=_rotation(np.array(direction))))
         for direction in itertools.product(LATITUDES, NORTHS)

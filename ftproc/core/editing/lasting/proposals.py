@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ PER_TERM = 5.0  # in log-likelihood, for a scan to prefer a stretch of more term
 TERMS = (1, 2, 3, 5)
 LONGEST, FARTHEST = 0.5, 5000  # of the log, and samples: what is off for longer is off for good
 CELLS, SHORTEST = 200, 3  # cells of a scan, and samples that are off
+PLACES = 13  # of a jump that is about there, where they need not be exact
 
 
 class Place(NamedTuple):
@@ -46,7 +47,7 @@ def proposals(scene: Scene, place: Place) -> Iterator[list[Curve]]:
     near = place._replace(sample=at - here.start)
     marks = [near.sample, *(mark - here.start for mark in place.marks if abs(mark - at) > 2 * place.width)]
     edges = scan.spread(marks, max(place.width, length // CELLS), length)
-    for more, edge in _likeliest_spans(gains_of(part, place.channels, place.calm, edges), edges, near.sample):
+    for more, edge in _likeliest_spans(gains_of(part, place, edges), edges, near.sample):
         other = edge if more else other_end(part, near, edge, place.width, more)
         begin, end = here.start + min(near.sample, other), here.start + max(near.sample, other)
         for terms in TERMS:
@@ -89,30 +90,44 @@ def _peaks(values: FloatArray, inside: slice) -> Iterator[int]:
         left[max(j - APART, 0) : j + APART + 1] = 0.0
 
 
-def gains_of(part: Scene, channels: Channels, calm: Model, edges: IntArray) -> FloatArray:
-    """The gains of `scan.gains` of several channels, as if each were off alone."""
-    whole = [Curve(c, 0, len(part.possible), (), s) for c, s in channels]
+def gains_of(part: Scene, place: Place, edges: IntArray, of_one: Callable[..., FloatArray] = scan.gains) -> FloatArray:
+    """The gains, as `of_one` has them of one, of all channels of a place, as if each were off alone."""
+    whole = [Curve(c, 0, len(part.possible), (), s) for c, s in place.channels]
     log = part.log._replace(weight=part.taking_in(whole))
     starts = part.starts(log)
-    found: FloatArray = np.sum([scan.gains(log, calm, starts, part.setting, each, edges) for each in channels], 0)
+    found: FloatArray = np.sum(
+        [of_one(log, place.calm, starts, part.setting, each, edges) for each in place.channels], 0
+    )
     return found
 
 
 def exactly(part: Scene, place: Place) -> int:
-    """The sample of a jump that is about there."""
-    edges = _fine(len(part.possible), place.sample, place.width)
-    gain = gains_of(part, place.channels, place.calm, edges)[0, :, -1]
-    return int(edges[1 + int(gain[1:-1].argmax())]) if len(edges) > 2 else place.sample
+    """The sample of a jump that is about there: first in steps, then by the sample."""
+    found, within = place.sample, place.width
+    while within:
+        edges = places_about(len(part.possible), found, within)
+        if len(edges) <= 2:
+            break
+        gain = gains_of(part, place, edges, scan.steps_of)
+        found = int(edges[1 + int(gain[1:].argmax())])
+        within //= PLACES // 2
+    return found
 
 
 def other_end(part: Scene, place: Place, about: int, within: int, more: bool) -> int:
     """The other end of a stretch that begins or ends with a jump, to the sample, about where it is."""
     n = len(part.possible)
     edges = _fine(n, about, within, place.sample)
-    gain = gains_of(part, place.channels, place.calm, edges)[int(more)]
+    gain = gains_of(part, place, edges)[int(more)]
     along = _from(gain, int(np.searchsorted(edges, place.sample)))
     along[(edges == 0) | (edges == n) | (np.abs(edges - place.sample) < SHORTEST)] = 0.0
     return int(edges[int(along.argmax())])
+
+
+def places_about(n: int, sample: int, within: int) -> IntArray:
+    """Edges at some of the samples within so many of one, and at the ends of n."""
+    places = np.linspace(sample - within, sample + within, PLACES).astype(np.int64)
+    return np.unique(np.clip([0, *places, n], 0, n))
 
 
 def _fine(n: int, about: int, within: int, *others: int) -> IntArray:

@@ -187,6 +187,15 @@ def _within(off: FloatArray) -> Iterator[tuple[int, float]]:
         yield n, -last
 
 
+def distinct(jumps: Sequence[Jump]) -> list[Jump]:
+    """The jumps, the largest first, and each once, with all its ways."""
+    found = dict[tuple[int, int], Jump]()
+    for jump in sorted(jumps, key=lambda jump: -jump.gain):
+        known = found.setdefault((jump.station, jump.sample), jump)
+        found[jump.station, jump.sample] = known._replace(ways=tuple(dict.fromkeys((*known.ways, *jump.ways))))
+    return list(found.values())
+
+
 def _ways(near: FloatArray, least: float, together: float) -> tuple[tuple[int, ...], ...]:
     """The sets of channels of a station that may jump where their gains are near (4,)."""
     components = [int(i) for i in np.argsort(-near[:CLOCK]) if near[i] > 0]

@@ -19,7 +19,16 @@ from numpy.typing import NDArray
 from ftproc.core.editing.lasting import scan
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.faults import Step
-from ftproc.core.editing.lasting.proposals import CELLS, SHORTEST, Place, exactly, other_end, proposals, steps
+from ftproc.core.editing.lasting.proposals import (
+    CELLS,
+    SHORTEST,
+    Place,
+    exactly,
+    other_end,
+    places_about,
+    proposals,
+    steps,
+)
 from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.weighing import Scene, Weighed, weighed
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
@@ -31,6 +40,7 @@ FloatArray = NDArray[np.float64]
 
 ROUNDS, JUMPS = 8, 5  # of looking at a log, and jumps that are looked at in one, by either set of weights
 LEAST_GAIN, TOGETHER = 18.0, 0.03  # of a jump, in log-likelihood; of the largest: components that jump with it
+LEFT = 6.0  # the same by the model of the part around a jump; up to 4 where there is none, from 12 on where there is
 LEAST_OFF = 10.0  # the same of a jump in a rejected run, by the noise alone
 CERTAIN = 4.0  # sigmas of its size from which a component takes part in a step of several
 AROUND, MEMORIES = (150, 2000), 12.0  # samples on each side of what is weighed, and memories
@@ -117,7 +127,7 @@ def look_at(scene: Scene) -> Look:
         found += scan.jumps(sums, LEAST_GAIN, JUMPS, 3 * width, TOGETHER)
     off = scene.residual / np.sqrt(scene.calm.noise_variance)
     found += scan.beside_runs(scene.log.weight, scene.possible, off, LEAST_OFF)[:JUMPS]
-    return Look(scene, around, width, sorted(found, key=lambda jump: -jump.gain))
+    return Look(scene, around, width, scan.distinct(found))
 
 
 def _likeliest(look: Look, rejected: list[Jump]) -> Found | None:
@@ -144,7 +154,11 @@ def _tried(look: Look, jump: Jump) -> Found | None:
 def _at(look: Look, jump: Jump) -> Found | None:
     """What happened at a jump; None if it is motion."""
     n, near = look.samples, look.near(jump.sample, jump.sample)
-    null = _without_fault(look.scene.part(near))
+    part = look.scene.part(near)
+    without = _weighed(part, near, ())
+    if not (part.taken_in != part.log.weight).any() and not _leaves_a_jump(look, jump, part, without):
+        return None
+    null = without.log_probability
     gain, place, step = max((_as_step(look, jump, way, null) for way in jump.ways), key=lambda each: each[0])
     moves = [c.component for c, s in zip(step.curves, step.sigma, strict=True) if abs(c.size[0]) > CERTAIN * s]
     if 0 < len(moves) < len(step.curves):
@@ -158,13 +172,26 @@ def _at(look: Look, jump: Jump) -> Found | None:
     return _best(look, proposed, look.near(min(ends), max(ends)), place)
 
 
+def _leaves_a_jump(look: Look, jump: Jump, part: Scene, without: Weighed) -> bool:
+    """Whether the channels jump by what the part around a jump is without a fault: the process noise is its own there,
+    and may explain what that of the whole log does not. A step that hides in it has rejected readings beside it."""
+    edges = places_about(len(part.possible), jump.sample - look.near(jump.sample, jump.sample).start, look.width)
+    log = part.log._replace(weight=without.weight)
+    starts = part.starts(log)
+    of_each = {
+        channel: scan.steps_of(log, without.model, starts, part.setting, (channel, jump.station), edges)[1:].max()
+        for channel in {channel for way in jump.ways for channel in way}
+    }
+    return max(sum(of_each[channel] for channel in way) for way in jump.ways) > LEFT
+
+
 def _as_step(look: Look, jump: Jump, way: Sequence[int], null: float) -> tuple[float, Place, Weighed]:
     """A jump as a step of some components, or of the clock: its gain, its place, and the log around it. null:
     log-probability without it."""
     n, near = look.samples, look.near(jump.sample, jump.sample)
     part, channels = look.scene.part(near), [(c, jump.station) for c in way]
-    about = Place(channels, jump.sample - near.start, [each.sample for each in look.jumps], look.width, part.calm)
-    place = about._replace(sample=near.start + exactly(part, about))
+    there = Place(channels, jump.sample - near.start, [each.sample for each in look.jumps], look.width, part.calm)
+    place = there._replace(sample=near.start + exactly(part, there))
     sides = steps(look.scene, channels, place.sample)
     step = max((_weighed(part, near, side) for side in sides), key=lambda each: each.log_probability)
     return step.log_probability - null + _prior(sides[0], n), place, step
@@ -173,7 +200,7 @@ def _as_step(look: Look, jump: Jump, way: Sequence[int], null: float) -> tuple[f
 def _best(look: Look, proposed: Sequence[Sequence[Curve]], here: slice, place: Place) -> Found | None:
     """The likeliest of what was proposed, all weighed on the same part of the log."""
     part, n = look.scene.part(here), look.samples
-    null = _without_fault(part)
+    null = _weighed(part, here, ()).log_probability
 
     def outcome(curves: Sequence[Curve]) -> Found:
         found = _weighed(part, here, curves)
@@ -186,8 +213,8 @@ def _best(look: Look, proposed: Sequence[Sequence[Curve]], here: slice, place: P
         return None
     if len(best.curves[0].size) > 1:  # its other end is known to a cell
         one = best.curves[0]
-        about, at = (one.begin if one.end == place.sample else one.end), place.sample - here.start
-        edge = here.start + other_end(part, place._replace(sample=at), about - here.start, 2 * look.width, True)
+        other, at = (one.begin if one.end == place.sample else one.end), place.sample - here.start
+        edge = here.start + other_end(part, place._replace(sample=at), other - here.start, 2 * look.width, True)
         ends = {"begin": min(place.sample, edge), "end": max(place.sample, edge)}
         if ends["end"] - ends["begin"] >= SHORTEST:
             sharper = outcome([curve.of(len(curve.size))._replace(**ends) for curve in best.curves])
@@ -200,11 +227,6 @@ def _weighed(part: Scene, near: slice, curves: Sequence[Curve]) -> Weighed:
     own = [curve.within(near) for curve in curves]
     starts = {weight.tobytes(): weight for weight in (part.log.weight, part.taking_in(own), part.taken_in)}.values()
     return max((weighed(part, weight, own) for weight in starts), key=lambda each: each.log_probability)
-
-
-def _without_fault(part: Scene) -> float:
-    """Log-probability of a part without a fault that lasts."""
-    return max(weighed(part, weight, ()).log_probability for weight in (part.log.weight, part.taken_in))
 
 
 def _in_whole(found: Weighed, near: slice, n: int) -> tuple[Curve, ...]:

@@ -106,7 +106,7 @@ class Weighed(NamedTuple):
 def weighed(scene: Scene, weight: FloatArray, curves: Sequence[Curve]) -> Weighed:
     """The scene with these curves, decided on from these weights on. Raises ValueError where a component has too few
     readings."""
-    model, known = scene.calm, tuple(curves)
+    model, known, settled = scene.calm, tuple(curves), False
     for _ in range(SETTLED):
         found = _fitted(scene, scene.log._replace(weight=weight), model, known)
         known = found.curves
@@ -116,9 +116,13 @@ def weighed(scene: Scene, weight: FloatArray, curves: Sequence[Curve]) -> Weighe
         smoothed = smooth_log(found.log, model, starts, STATES if clock else RESIDUALS)
         if clock:  # with it, the track goes another way there
             scene = scene._replace(setting=scene.setting._replace(late=late_of(scene.log, smoothed.state)))
-        weight = _decided(scene, smoothed, model)
-    found = _fitted(scene, scene.log._replace(weight=weight), model, known)
-    smoothed = smooth_log(found.log, model, scene.starts(found.log), RESIDUALS)
+        before, weight = weight, _decided(scene, smoothed, model)
+        settled = not clock and bool((weight == before).all())
+        if settled:
+            break
+    if curves or not settled:
+        found = _fitted(scene, scene.log._replace(weight=weight), model, known)
+        smoothed = smooth_log(found.log, model, scene.starts(found.log), RESIDUALS)
     likely = found.log_probability if curves else smoothed.log_likelihood
     likely += _rejections(scene, weight, smoothed, model) - roughness(model)
     first = np.cumsum([0, *(len(curve.size) for curve in found.curves)])[:-1]
