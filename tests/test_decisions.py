@@ -13,8 +13,8 @@ import ftproc
 from ftproc import pipeline
 from ftproc.core.by_hand import Accepted
 from ftproc.core.editing import two_pass
-from ftproc.core.editing.alternatives import Work
 from ftproc.core.editing.decisions import Decision, Record
+from ftproc.core.work import Work
 from ftproc.errors import InputError
 from ftproc.files import decisions
 from ftproc.files.decisions import ENDS, Decisions, Line

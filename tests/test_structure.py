@@ -17,7 +17,15 @@ MOST_FILES, MOST_LINES, MOST_PARAMETERS = 14, 300, 7
 FLOORS = (
     ("errors", "settings"),
     ("records", "order_statistics", "__init__"),
-    ("core.by_hand", "core.signatures", "core.components", "core.threads", "core.processes", "core.pacing"),
+    (
+        "core.by_hand",
+        "core.signatures",
+        "core.components",
+        "core.threads",
+        "core.processes",
+        "core.pacing",
+        "core.work",
+    ),
     ("core.compiled",),
     ("core.model",),
     ("core.filtering",),

@@ -37,6 +37,7 @@ Run = TypeVar("Run", FilterRun, SmootherRun)
 LONGEST_WHOLE = 60_000  # samples of a log that is edited as a whole
 KEPT = 60_000  # samples of a segment, without its margins,
 KEPT_MARGINS = 12  # or so many times its margin
+MOST_PIECES = 20  # of a track: what begins anew so often tells no motion (two targets in turn: 115)
 MARGIN_S, LEAST_MARGIN, MOST_MARGIN = 60.0, 1_000, 10_000  # s and samples on each side of a segment
 
 
@@ -69,7 +70,10 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     if readings.range_rate is not None:
         fixed = settings.jerk_psd_m2ps5 is not None
         log, model, channel = range_rates.fit(log, model, edited.starts, readings.range_rate, settings.gate, fixed)
-    motion = motion_models.choose(log, edited.starts, model, preparing.motions(settings), specified)
+    names = preparing.motions(settings)
+    if len(edited.starts) > MOST_PIECES and motion_models.WHITE in names:
+        names = (motion_models.WHITE,)
+    motion = motion_models.choose(log, edited.starts, model, names, specified)
     if channel is not None and channel.used is not None:
         motion = motion.with_rates(channel.used)
     both = settings.smooth or usual is None  # cheap, and says what could be had

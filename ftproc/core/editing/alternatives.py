@@ -21,6 +21,7 @@ from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import RESIDUALS, SmootherRun, smooth_log
 from ftproc.core.identification.stretches import runs_of
+from ftproc.core.work import Work
 from ftproc.order_statistics import typical
 
 FloatArray = NDArray[np.float64]
@@ -34,7 +35,6 @@ ROUNDS = 5
 MARGIN = 5.0  # by which the log-probability of another decision must be better,
 AT_EDGE = 25.0  # and of a patch with one edge: a start in a turn gains 21 without one, patches that were missed 43
 MOST = 100  # comparisons in one look
-WORK, WORK_PER_SAMPLE = 250_000, 60  # samples that may be smoothed for a log, and for each of its samples
 STEPS = 14  # of filling a hole, or of taking out what stands out most
 FITS = 2.5  # sigmas off at which a reading is taken into a hole
 SURE, ALMOST = 1.5, 1.3  # times the noise, or the smallest sigma in the hole: where the track is known well enough
@@ -78,15 +78,6 @@ class Island(NamedTuple):
     def shifted(self, samples: int) -> Island:
         """With samples counted from a later one."""
         return Island(self.component, *(place - samples for place in self[1:]))
-
-
-class Work:
-    """What the search for alternatives in a log of so many samples may still cost, in all hypotheses about it: counted
-    in samples that are smoothed, not in seconds, so that a result does not depend on the machine."""
-
-    def __init__(self, samples: int, at_least: int = WORK) -> None:
-        """at_least: how much work any log is worth; a window that moves on is worth none."""
-        self.left, self.of_window = at_least + WORK_PER_SAMPLE * samples, at_least == 0
 
 
 class Search:

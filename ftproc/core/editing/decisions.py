@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ftproc.core.components import any_of, totals
 from ftproc.core.editing import outlier_chain
-from ftproc.core.editing.alternatives import Work
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
@@ -20,6 +19,7 @@ from ftproc.core.identification.likelihood import Fixed, fit_level, representati
 from ftproc.core.identification.nearby import samples_around, smoothed_near
 from ftproc.core.identification.profile import median_level
 from ftproc.core.identification.stretches import widened
+from ftproc.core.work import Work
 
 FloatArray = NDArray[np.float64]
 

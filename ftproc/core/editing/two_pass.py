@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from ftproc.core.by_hand import NOTHING, Accepted
 from ftproc.core.editing import outlier_chain
-from ftproc.core.editing.alternatives import WORK, Work
 from ftproc.core.editing.copies import without_copies
 from ftproc.core.editing.decisions import (
     IMPRECISE,
@@ -45,6 +44,7 @@ from ftproc.core.identification.profile import fit_profile, median_level, with_a
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.measurement import NO_RANGE_M
 from ftproc.core.model.motion import isotropic
+from ftproc.core.work import WORK, Work, for_lasting_faults
 
 FloatArray = NDArray[np.float64]
 
@@ -117,11 +117,12 @@ def edit(
     banned = np.zeros(measurement.shape, bool)
     record, decision = decided(measurement, banned=banned)
     scene, found, doubtful = None, tuple[Step, ...](), list[Step]()
+    for_lasting = for_lasting_faults(len(time_s))
     for _ in range(0 if live else LASTING_ROUNDS):
         # Noise that wanders looks like many steps, and so do patches that there was no time to understand.
         if decision.model.coloured or decision.unexamined:
             break
-        scene = scene_of(record, decision)
+        scene = scene_of(record, decision, for_lasting)
         new = sorted_out(scene, search(scene))
         doubtful = new.doubtful
         if not new.steps and not new.banned.any():
@@ -134,6 +135,7 @@ def edit(
         if new.steps and _may_be_late_stamps((record, decision), other):
             break
         (record, decision), found, banned = other, steps, banned | new.banned
+    decision = decision._replace(unexamined=decision.unexamined + for_lasting.passed)
     if decision.stamp_s > 0:  # which explains a clock that seems to jump
         doubtful = [step for step in doubtful if step.component != CLOCK]
     rivals: tuple[Rival, ...] = ()

@@ -7,6 +7,7 @@ import pytest
 
 from ftproc.core.editing import alternatives, outlier_chain
 from ftproc.core.editing.alternatives import Neighbourhood
+from ftproc.core.work import Work
 from tests.core.tracks import matched
 
 RATES = np.tile(np.array(outlier_chain.START_RATES), (3, 1))
@@ -28,7 +29,7 @@ def followed(component=0, begin=190, end=215, flank=8, sigmas=12.0):
 @pytest.mark.parametrize("component", range(3))
 def test_patch_that_was_followed_is_given_up(component):
     log, wrong, right = followed(component)
-    found = alternatives.try_alternatives(log, wrong, alternatives.Search(alternatives.Work(len(wrong))))
+    found = alternatives.try_alternatives(log, wrong, alternatives.Search(Work(len(wrong))))
     np.testing.assert_array_equal(found[190:215, component], 0.0)
     assert (found == right).mean() > 0.998
 
@@ -45,13 +46,13 @@ def test_far_patch_beside_other_outliers_is_given_up(component):
         right[outlier, component] = wrong[outlier, component] = 0.0
     log.measurement[240:250, component] += noise * np.array([70, -40, 55, -80, 30, 90, -60, 45, -75, 65])
     right[240:250, component] = wrong[240:250, component] = 0.0
-    found = alternatives.try_alternatives(log, wrong, alternatives.Search(alternatives.Work(len(wrong))))
+    found = alternatives.try_alternatives(log, wrong, alternatives.Search(Work(len(wrong))))
     np.testing.assert_array_equal(found[165:255, component], right[165:255, component])
 
 
 def test_islands_are_tried_once():
     log, wrong, _ = followed()
-    search = alternatives.Search(alternatives.Work(len(wrong)))
+    search = alternatives.Search(Work(len(wrong)))
     (again,) = alternatives.islands(log.time_s, wrong, log.possible)
     edges = alternatives._edges(wrong, log.possible)
     search.tried = {again, *edges}
@@ -63,7 +64,7 @@ def test_islands_are_tried_once():
 
 def test_the_searches_in_a_log_end_when_its_work_is_done(monkeypatch):
     log, wrong, _ = followed()
-    work = alternatives.Work(len(wrong))
+    work = Work(len(wrong))
     before, search = work.left, alternatives.Search(work)
     alternatives.try_alternatives(log, wrong, search)
     assert before - 150 * len(wrong) < work.left < before
@@ -108,14 +109,12 @@ def test_hole_is_filled_from_its_edges_and_not_with_the_patch(component):
 def test_right_decisions_stay(component):
     log, _, right = followed(component)
     np.testing.assert_array_equal(
-        alternatives.try_alternatives(log, right, alternatives.Search(alternatives.Work(len(right)))), right
+        alternatives.try_alternatives(log, right, alternatives.Search(Work(len(right)))), right
     )
     two = right.copy()  # good readings between two real patches are no patch
     two[225:235, component] = 0.0
     log.measurement[225:235, component] += 20 * np.sqrt(log.model.noise_variance[component])
-    np.testing.assert_array_equal(
-        alternatives.try_alternatives(log, two, alternatives.Search(alternatives.Work(len(two)))), two
-    )
+    np.testing.assert_array_equal(alternatives.try_alternatives(log, two, alternatives.Search(Work(len(two)))), two)
 
 
 def test_islands_lie_between_two_rejected_runs():
@@ -159,7 +158,7 @@ def test_neighbourhood_that_says_too_little_is_left():
     log = log._replace(possible=np.isfinite(log.measurement))
     wrong = wrong * log.possible
     np.testing.assert_array_equal(
-        alternatives.try_alternatives(log, wrong, alternatives.Search(alternatives.Work(len(wrong)))), wrong
+        alternatives.try_alternatives(log, wrong, alternatives.Search(Work(len(wrong)))), wrong
     )
 
 

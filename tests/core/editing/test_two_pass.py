@@ -10,6 +10,7 @@ import pytest
 from ftproc.core.editing import alternatives, decisions, reassessment, screened, two_pass
 from ftproc.core.filtering.initialization import first_state
 from ftproc.core.filtering.records import Observations
+from ftproc.core.work import WORK, Work
 from tests.core.tracks import matched, position_error
 from tests.simulated import codes, deviation, simulate
 
@@ -199,7 +200,7 @@ def test_alternatives_are_worth_more_work_in_a_log_that_was_flown_than_in_a_live
     flight, made, used = simulate("manoeuvre", seed=2, duration_s=40.0, outliers="offset=6:8-20:8-100"), [], set()
 
     def work(samples, at_least):
-        made.append((samples, at_least, alternatives.Work(samples, at_least)))
+        made.append((samples, at_least, Work(samples, at_least)))
         return made[0][2]
 
     def search(of):
@@ -209,5 +210,5 @@ def test_alternatives_are_worth_more_work_in_a_log_that_was_flown_than_in_a_live
     monkeypatch.setattr(two_pass, "Work", work)
     monkeypatch.setattr(reassessment, "alternatives", SimpleNamespace(**{**vars(alternatives), "Search": search}))
     two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN, live=live)
-    assert [each[:2] for each in made] == [(len(flight.log), 0 if live else alternatives.WORK)]
+    assert [each[:2] for each in made] == [(len(flight.log), 0 if live else WORK)]
     assert used == {made[0][2]}

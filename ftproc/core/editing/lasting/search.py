@@ -136,6 +136,9 @@ def _likeliest(look: Look, rejected: list[Jump]) -> Found | None:
     for jump in look.jumps:
         if any(abs(jump.sample - old.sample) < look.width and jump.station == old.station for old in rejected):
             continue
+        if look.scene.work is not None and look.scene.work.left <= 0:
+            look.scene.work.passed += 1
+            return None
         here = [each for each in look.jumps if abs(each.sample - jump.sample) <= look.width]
         found = [each for each in (_tried(look, each) for each in here) if each is not None]
         if found:
@@ -182,7 +185,7 @@ def _leaves_a_jump(look: Look, jump: Jump, part: Scene, without: Weighed) -> boo
         channel: scan.steps_of(log, without.model, starts, part.setting, (channel, jump.station), edges)[1:].max()
         for channel in {channel for way in jump.ways for channel in way}
     }
-    return max(sum(of_each[channel] for channel in way) for way in jump.ways) > LEFT
+    return bool(max(sum(of_each[channel] for channel in way) for way in jump.ways) > LEFT)
 
 
 def _as_step(look: Look, jump: Jump, way: Sequence[int], null: float) -> tuple[float, Place, Weighed]:

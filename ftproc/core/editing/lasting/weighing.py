@@ -23,12 +23,13 @@ from ftproc.core.identification.profile import fit_profile, median_level, roughn
 from ftproc.core.identification.stretches import runs_of
 from ftproc.core.identification.uneven_noise import rates
 from ftproc.core.model import stations
+from ftproc.core.work import Work
 from ftproc.order_statistics import median
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-SETTLED = 2  # rounds of deciding
+SETTLED = 2  # rounds of deciding, at most
 TAKEN_IN, EVEN = 3, 5.0  # readings in a rejected run, and second differences in sigmas, that may be a track
 PROFILE_STEPS = 2  # of the search for the process noise
 FREE, WIDER = (50.0, 20.0, 20.0), 3.0  # m, m/s, m/s2, and times its own: 1-sigma of the state where a part begins
@@ -41,7 +42,7 @@ class Scene(NamedTuple):
     rejected runs that may be a track. setting: see `curves`. calm: a model with a single level of jerk; fixed: whether
     that is known. rates (stations, 3, 3) of outliers. gate: in sigmas. residual (n, 3): leave-one-out, as decided.
     track, doubt: (n, 9) states about which a filter may start, and their 1-sigma; None where a start is to be found in
-    the readings.
+    the readings. work: what weighing may still cost; None without a bound.
     """
 
     log: Observations
@@ -55,6 +56,7 @@ class Scene(NamedTuple):
     residual: FloatArray
     track: FloatArray | None = None
     doubt: FloatArray | None = None
+    work: Work | None = None
 
     def part(self, near: slice) -> Scene:
         """Some of the samples."""
@@ -106,6 +108,8 @@ class Weighed(NamedTuple):
 def weighed(scene: Scene, weight: FloatArray, curves: Sequence[Curve]) -> Weighed:
     """The scene with these curves, decided on from these weights on. Raises ValueError where a component has too few
     readings."""
+    if scene.work is not None:
+        scene.work.left -= len(scene.possible)
     model, known, settled = scene.calm, tuple(curves), False
     for _ in range(SETTLED):
         found = _fitted(scene, scene.log._replace(weight=weight), model, known)
@@ -168,7 +172,7 @@ def _rejections(scene: Scene, weight: FloatArray, smoothed: SmootherRun, model: 
     )  # fmt: skip
 
 
-def scene_of(record: Record, decision: Decision) -> Scene:
+def scene_of(record: Record, decision: Decision, work: Work) -> Scene:
     """A log as it has been decided on, in which to look for faults that last."""
     log, calm = record.weighted(decision.weight), median_level(decision.model)
     smoothed = smooth_log(log, decision.model, decision.starts)
@@ -176,7 +180,7 @@ def scene_of(record: Record, decision: Decision) -> Scene:
     setting = Setting(record.time_s, late_of(log, smoothed.state))
     return Scene(
         log, record.possible, weight, setting, calm, record.fixed.jerk, decision.rates[None], record.gate,
-        smoothed.residual,
+        smoothed.residual, work=work,
     )  # fmt: skip
 
 

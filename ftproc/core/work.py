@@ -1,0 +1,22 @@
+"""What the search for other understandings of a log may cost: counted in samples, not in seconds, so that a result does
+not depend on the machine."""
+
+from __future__ import annotations
+
+WORK, WORK_PER_SAMPLE = 250_000, 60  # samples that may be smoothed for a log, and for each of its samples
+LASTING, LASTING_PER_SAMPLE = 200_000, 10  # the same of samples that are weighed with faults that last, a dozen sweeps
+# each: flights with three long patches take up to 180,000, logs with sixty steps would take three million
+
+
+class Work:
+    """What a search in a log of so many samples may still cost, in all hypotheses about it: `left`. passed: places that
+    no work was left for."""
+
+    def __init__(self, samples: int, at_least: int = WORK, each: int = WORK_PER_SAMPLE) -> None:
+        """at_least: how much work any log is worth; a window that moves on is worth none."""
+        self.left, self.of_window, self.passed = at_least + each * samples, at_least == 0, 0
+
+
+def for_lasting_faults(samples: int) -> Work:
+    """What the search for faults that last may cost."""
+    return Work(samples, LASTING, LASTING_PER_SAMPLE)

@@ -1,0 +1,72 @@
+"""The search for faults that last: what it may cost, and what it need not look at."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.core import work
+from ftproc.core.editing import two_pass
+from ftproc.core.editing.lasting import search
+from tests.simulated import simulate
+
+pytestmark = pytest.mark.compiled
+
+UNKNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
+
+
+def flown(steps=0, seed=4):
+    """A flight with so many steps of the range."""
+    flight = simulate("manoeuvre-clean", seed=seed, duration_s=120.0, dt_s=0.1)
+    z, draw = flight.log.measurement.copy(), np.random.default_rng(seed)
+    for k in draw.integers(50, len(z) - 50, steps):
+        z[k:, 0] += draw.choice([-1, 1]) * draw.uniform(10, 60) * flight.sigma[0]
+    return flight.log.time_s, z
+
+
+def test_where_no_work_is_left_the_places_that_were_not_examined_are_counted(monkeypatch):
+    full = two_pass.edit(*flown(steps=3), UNKNOWN)
+    monkeypatch.setattr(work, "LASTING", 0)
+    monkeypatch.setattr(work, "LASTING_PER_SAMPLE", 0)
+    without = two_pass.edit(*flown(steps=3), UNKNOWN)
+    assert full.faults.steps
+    assert not full.decision.unexamined
+    assert not without.faults.steps
+    assert without.decision.unexamined
+
+
+def test_the_work_is_charged_with_each_sample_that_is_weighed(monkeypatch):
+    weighed, made = [], []
+    real, budget = search.weighed, work.for_lasting_faults
+
+    def counted(scene, *of):
+        weighed.append(len(scene.possible))
+        return real(scene, *of)
+
+    def noted(samples):
+        made.append((budget(samples), budget(samples).left))
+        return made[-1][0]
+
+    monkeypatch.setattr(search, "weighed", counted)
+    monkeypatch.setattr(two_pass, "for_lasting_faults", noted)
+    two_pass.edit(*flown(steps=2), UNKNOWN)
+    (used, first), = made  # fmt: skip
+    assert weighed
+    assert first - used.left == sum(weighed)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_jump_that_the_part_around_it_does_not_leave_is_not_weighed_as_a_step(monkeypatch, seed):
+    """A turn jumps by the process noise of the whole flight; by that of the part around it it does not."""
+    looked, weighed = [], []
+    jumps, step = search._leaves_a_jump, search._as_step
+    monkeypatch.setattr(search, "_leaves_a_jump", lambda *of: looked.append(jumps(*of)) or looked[-1])
+    monkeypatch.setattr(search, "_as_step", lambda *of: weighed.append(1) or step(*of))
+    two_pass.edit(*flown(seed=seed), UNKNOWN)
+    assert looked
+    assert not any(looked)
+    assert not weighed
+    monkeypatch.setattr(search, "_leaves_a_jump", lambda *of: True)
+    found = two_pass.edit(*flown(seed=seed), UNKNOWN)
+    assert weighed
+    assert found.faults.steps == ()
