@@ -39,6 +39,7 @@ class Station:
     bias: reading minus truth of range m, azimuth rad, elevation rad; subtracted from every reading.
     time_offset_s: added to every time.
     refraction: the air, for the elevation of an optical instrument; None: no correction.
+    range_rate_interval_mps: in which range rates are ambiguous, m/s: they read between minus and plus half of it.
     """
 
     azimuth_from: str | None = None
@@ -48,6 +49,7 @@ class Station:
     bias: tuple[float, float, float] = (0.0, 0.0, 0.0)
     time_offset_s: float = 0.0
     refraction: Air | None = None
+    range_rate_interval_mps: float = 0.0
 
 
 @dataclass(frozen=True)

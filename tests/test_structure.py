@@ -31,6 +31,7 @@ FLOORS = (
     ("core.filtering",),
     ("core.identification",),
     ("core.editing",),
+    ("core.beside",),
     ("core.comparators", "core.live"),
     ("files", "simulation"),
     ("files.reading", "files.writing"),

@@ -33,6 +33,7 @@ class Job(NamedTuple):
     form: str
     require: Sequence[str]
     report: str | None
+    site: tuple[float, float, float] | None = None
 
     def files(self) -> list[str]:
         """The files of limits, which are inputs."""
@@ -68,10 +69,17 @@ def _standards() -> str:
     help="Limits on the errors: a file of [[require]], or one of the standards below; prints PASS or FAIL of each, and "
     "the exit code is 1 if one of them is not met. May be given several times.",
 )
+@click.option(
+    "--site",
+    type=options.site,
+    metavar="LAT,LON,HEIGHT",
+    help="The station's position, for a truth in latitude, longitude and height. [default: that of the trajectory]",
+)
 @options.report("a trajectory and, with a truth, its errors beside their sigmas")
 def command(
-    trajectories: tuple[str, ...], truths: tuple[str, ...], form: str, require: tuple[str, ...], report: str | None
-) -> None:
+    trajectories: tuple[str, ...], truths: tuple[str, ...], form: str, require: tuple[str, ...], report: str | None,
+    site: tuple[float, float, float] | None,
+) -> None:  # fmt: skip
     """Print the scores of trajectories, a column for each.
 
     A TRAJECTORY is a file that `filter` wrote, any table with time_s, x_m, y_m, z_m, or - for CSV on standard input.
@@ -91,7 +99,7 @@ def command(
         raise click.UsageError(
             "--require needs the --truth that the errors are measured from.", click.get_current_context()
         )
-    click.get_current_context().exit(_run(Job(trajectories, truths, form, require, report)))
+    click.get_current_context().exit(_run(Job(trajectories, truths, form, require, report, site)))
 
 
 def _run(job: Job) -> int:
@@ -116,7 +124,7 @@ def _run(job: Job) -> int:
     for number, (name, place) in enumerate(zip(job.trajectories, places, strict=True)):
         try:
             trajectory = trajectory_files.read(name)
-            truth = _truth(job.truths[number % len(job.truths)], trajectory, known) if job.truths else None
+            truth = _truth(job.truths[number % len(job.truths)], trajectory, known, job.site) if job.truths else None
             first = scored[0].trajectory if scored and len(job.trajectories) == 2 else None
             scored.append(_scored(trajectory, truth, asked, first))
             if place is not None:
@@ -183,13 +191,16 @@ def _summary(trajectory: Trajectory) -> dict[str, Any]:
     return {"method": trajectory.metadata.get("method", ""), **summary_of(trajectory)}
 
 
-def _truth(name: str, trajectory: Trajectory, known: dict[Any, Truth]) -> Truth:
+def _truth(
+    name: str, trajectory: Trajectory, known: dict[Any, Truth], site: tuple[float, float, float] | None
+) -> Truth:
+    """site: of the station, where the user states it."""
     from ftproc.derived.quantities import site_of
     from ftproc.files.reading import truth as truth_files
 
-    site = site_of(trajectory.metadata)
+    where = site or site_of(trajectory.metadata)
     north = trajectory.metadata.get("frame") == "north-east-up"
-    frame = None if site is None else truth_files.Frame((site[0], site[1], site[2]), north)
+    frame = None if where is None else truth_files.Frame((where[0], where[1], where[2]), north)
     if (name, frame) not in known:
         known[name, frame] = truth_files.read(name, frame)
     return known[name, frame]

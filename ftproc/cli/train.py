@@ -40,6 +40,12 @@ def _number(name: str, least: int, default: int, text: str) -> Callable[[options
     help="The truth of the --log at the same position. Without any, the smoother is the teacher of the filter.",
 )
 @click.option("--config", type=options.FILE, metavar="FILE", help="The station file of the logs.")
+@click.option(
+    "--site",
+    type=options.site,
+    metavar="LAT,LON,HEIGHT",
+    help="The station's position, for a truth in latitude, longitude and height. [default: that of --config]",
+)
 @options.scenario(False, "Train on simulated flights instead; the names are in `ftproc simulate -h`.")
 @_number("flights", 1, TrainSettings.flights, "Number of simulated flights.")
 @options.output("The model file to write (safetensors).", "MODEL")

@@ -11,6 +11,8 @@ import numpy as np
 from ftproc import api
 from ftproc.cli import process
 from ftproc.cli.progress import Progress
+from ftproc.config.reading import load
+from ftproc.config.recipe import Recipe
 from ftproc.core import compiled
 from ftproc.correction import model, model_file
 from ftproc.correction.training import stages, study
@@ -30,6 +32,7 @@ class Request(NamedTuple):
     logs: Sequence[str]
     truths: Sequence[str]
     config: str | None
+    site: tuple[float, float, float] | None
     scenario: str | None
     output: str | None
     compare_starts: bool
@@ -93,8 +96,12 @@ def _read(request: Request) -> list[tuple[MeasurementLog, Truth | None]]:
     """The logs with their truths, or with None where none are given."""
     stated = {name: text for name in ("units", "columns") if (text := getattr(request, name)) is not None}
     logs = [api.read_log(log, config=request.config, **stated) for log in request.logs]
-    truths: list[Truth | None] = [truth_files.read(truth) for truth in request.truths]
-    return list(zip(logs, truths or [None] * len(logs), strict=True))
+    site = request.site or (Recipe.of(load(request.config)).settings.site if request.config else None)
+    truths: list[Truth | None] = [None] * len(logs)
+    for k, (name, log) in enumerate(zip(request.truths, logs, strict=False)):
+        frame = None if site is None else truth_files.Frame(site, log.frame == "north-east-up")
+        truths[k] = truth_files.read(name, frame)
+    return list(zip(logs, truths, strict=True))
 
 
 def _simulated(scenario: str, settings: TrainSettings, progress: Progress) -> list[tuple[MeasurementLog, Truth | None]]:

@@ -87,6 +87,7 @@ _SENSE = "seen from above; left out: clockwise from north, anticlockwise from x"
 _OFFSET = "added to every time"
 _ZERO = "azimuth where it reads zero"
 _WIDTHS = "of fixed-width columns, in characters"
+_TURN = "in which range rates are ambiguous; left out: they are not"
 _PRIOR = "of the target above the station, and 1 sigma, where no elevation is measured"
 _GEOID = "height of the geoid above the ellipsoid, for KML"
 _MODEL = "packaged, none, or a file beside this one"
@@ -105,7 +106,11 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
         **_column("time", "UTC"),
         "offset": Key("time_offset_s", number(), 12.0, _OFFSET, None, "time", 0.0, "ms", -_MOST_S, _MOST_S),
     },
-    "range": {**_column("range", "RNG"), **_errors("range", 3.0, 2.5)},
+    "range": {
+        **_column("range", "RNG"),
+        **_errors("range", 3.0, 2.5),
+        "rate_interval_mps": Key("range_rate_interval_mps", positive(), 60.0, _TURN, default=0.0),
+    },
     "azimuth": {
         **_column("azimuth", "AZ"),
         "from": Key("azimuth_from", words("x", "north"), "north", _FROM_X),

@@ -15,6 +15,8 @@ Target = str | Path
 #: Columns of a log, by quantity: `time_s`, `range_m`, `azimuth_rad`, `elevation_rad`.
 CANONICAL: Mapping[str, str] = {quantity: f"{quantity}_{si_unit(quantity).name}" for quantity in QUANTITIES}
 
+#: Units of what is measured beside the readings, by quantity.
+BESIDE: Mapping[str, str] = {quantity: si_unit(quantity).name for quantity in ("range_rate", "height")}
 POSITION = ("x_m", "y_m", "z_m")
 VELOCITY = ("vx_mps", "vy_mps", "vz_mps")
 ACCELERATION = ("ax_mps2", "ay_mps2", "az_mps2")

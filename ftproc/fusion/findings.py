@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.identification.stretches import runs_of
+from ftproc.files import layout
 from ftproc.fusion.estimation import constants as posterior
 from ftproc.fusion.estimation.events import CLOCK
 from ftproc.fusion.estimation.whole import Fused
@@ -101,6 +102,18 @@ def component_figures(fused: Fused, s: int) -> dict[str, Any]:
             f"noise_{unit}": float(fused.noise[s, c]),
             "residual_ratio": float(np.sqrt(squares.mean())) if len(squares) else None,
         }
+    for name, each in fused.beside[s].items() if fused.beside else ():
+        seen, used = np.isfinite(each.side.value), (each.side.weight > 0) & each.side.used
+        if not each.side.used and each.side.why:
+            continue
+        squares = each.residual[used] ** 2 / each.variance[used]
+        found[name] = {
+            "good": int((each.side.weight[seen] > 0).sum()),
+            "rejected": int((each.side.weight[seen] <= 0).sum()),
+            "missing": int((~seen).sum()),
+            f"noise_{layout.BESIDE[name]}": each.side.sigma,
+            "residual_ratio": float(np.sqrt(squares.mean())) if len(squares) else None,
+        }
     return found
 
 
@@ -108,6 +121,7 @@ def remarks(fused: Fused, zero_s: float) -> list[Remark]:
     """All remarks on a fused flight. zero_s: the logs' time of the first reading."""
     return [
         *_clocks(fused),
+        *_beside(fused),
         *_steps(fused, zero_s),
         *_unobserved(fused),
         *_improbable(fused),
@@ -132,6 +146,17 @@ def _clocks(fused: Fused) -> Iterator[Remark]:
             "no clock is the reference (clock_offset_sigma_s = 0): the time of all is known as well as the best of them"
         )
         yield Remark(CONSISTENT, text)
+
+
+def _beside(fused: Fused) -> Iterator[Remark]:
+    """What was done with what stands beside the readings."""
+    for station, sides in zip(fused.stations, fused.beside, strict=False):
+        for each in sides.values():
+            if each.side.why:
+                yield Remark(CONSISTENT, f"{station.name}: {each.side.why}")
+            elif each.side.closing:
+                text = "the range rates count inward, as the motion shows, and are turned round"
+                yield Remark(CONSISTENT, f"{station.name}: {text}")
 
 
 def _unobserved(fused: Fused) -> Iterator[Remark]:

@@ -70,7 +70,7 @@ def fuse(
     range_, read = logs.read(range_, decisions)
     if len(read) == 1:
         return _alone(range_, read[0], settings, model)
-    seen, zero_s = logs.as_seen(range_.instruments, read)
+    seen, zero_s = logs.as_seen(range_.instruments, read, range_.origin)
     logs.check_overlap(range_, seen)
     try:
         fused = whole.fuse(seen, settings.gate, settings.jerk_psd_m2ps5, settings.smooth, say)

@@ -9,11 +9,13 @@ from datetime import datetime
 
 import numpy as np
 
+from ftproc.core.model.earth import Geodetic
 from ftproc.core.model.frames import wrap
 from ftproc.errors import InputError
 from ftproc.files.decisions import Decisions
 from ftproc.files.reading import logs
 from ftproc.fusion import positions
+from ftproc.fusion.estimation import beside
 from ftproc.fusion.estimation.events import Seen
 from ftproc.fusion.range_file import POSITION, Instrument, Range
 from ftproc.quality import sanity
@@ -41,7 +43,9 @@ def read(range_: Range, decisions: Decisions | None = None) -> tuple[Range, list
     return range_, found
 
 
-def as_seen(instruments: Sequence[Instrument], found: Sequence[MeasurementLog]) -> tuple[list[Seen], float]:
+def as_seen(
+    instruments: Sequence[Instrument], found: Sequence[MeasurementLog], origin: Geodetic | None = None
+) -> tuple[list[Seen], float]:
     """What the stations have seen, with the time of the first reading taken as zero, and that time. Raises InputError
     if their dates contradict each other."""
     shifts = _shifts(instruments, found)
@@ -57,11 +61,17 @@ def as_seen(instruments: Sequence[Instrument], found: Sequence[MeasurementLog]) 
         z[:, 1] = wrap(z[:, 1])
         of_range, azimuth, elevation = (bool(np.isfinite(z[:, c]).any()) for c in range(3))
         tilts = azimuth or elevation
+        sides, of_heights = beside.sides(log, instrument.place, origin)
         prior = np.where([of_range, azimuth, elevation, tilts, tilts, True], instrument.prior, 0.0)
+        if instrument.height_sigma_m is not None:
+            of_heights = np.array([instrument.height_sigma_m, of_heights[1] * (instrument.height_sigma_m > 0)])
+        prior = np.concatenate([prior, of_heights])
         stated = instrument.options.get("noise") or (None, None, None)
         time_s = np.array(log.time_s) + shift - zero
         place = instrument.place, instrument.axes
-        seen.append(Seen(instrument.name, time_s, z, *place, prior, np.array(stated, float), accepted))
+        seen.append(
+            Seen(instrument.name, time_s, z, *place, prior, np.array(stated, float), accepted, sides, instrument.times)
+        )
     return seen, zero
 
 

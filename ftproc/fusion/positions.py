@@ -51,7 +51,8 @@ def read(instrument: Instrument, origin: Geodetic | None) -> tuple[Instrument, M
         rows_without_time=tuple(sorted(set(range(found.rows_in_file)) - set(found.row.tolist()))),
         duplicate_times=int((np.diff(time_s) == 0).sum()), epoch=found.epoch, sha256=found.sha256,
     )  # fmt: skip
-    return replace(instrument, place=place, axes=np.eye(3), options=options, site=None), log
+    accuracy = None if found.accuracy is None else (found.accuracy / np.median(found.accuracy[known])) ** 2
+    return replace(instrument, place=place, axes=np.eye(3), options=options, site=None, times=accuracy), log
 
 
 def _levered(time_s: FloatArray, point: FloatArray, arm_m: tuple[float, float, float]) -> FloatArray:

@@ -46,6 +46,7 @@ STATION: Mapping[str, Key] = {
     "range_bias_sigma": Key("range", SMALLEST, 20.0, _SIGMA, quantity="range"),
     "azimuth_bias_sigma": Key("azimuth", SMALLEST, 1.0, _SIGMA, quantity="azimuth"),
     "elevation_bias_sigma": Key("elevation", SMALLEST, 1.0, _SIGMA, quantity="elevation"),
+    "height_bias_sigma": Key("height", SMALLEST, 80.0, "of all its heights together, 1-sigma", quantity="range"),
     "level_sigma": Key("level", SMALLEST, 0.15, _SIGMA, quantity="elevation"),
     "clock_offset_sigma": Key("clock", SMALLEST, 0.0, _SIGMA, quantity="time"),
     "kind": Key("kind", words("tracker", POSITION), "tracker", "position: GNSS on board, ADS-B"),
@@ -59,7 +60,8 @@ class Instrument:
     """A station of the range. log: its file. recipe: how that is read. options: as in a station file. place (3,) east,
     north, up at the origin m; axes (3, 3) its own east, north, up. prior (6,): 1-sigma m, rad, rad, tilts rad, clock s.
     config: its station file, or "". kind: tracker, or position, with sigma_m of its positions, 0 for one that is to be
-    estimated, and lever_arm_m of the antenna, see `positions`.
+    estimated, and lever_arm_m of the antenna, see `positions`. height_sigma_m: of what its heights are
+    off by together, if stated. times: (n,) of the variance of its noise, by row, where its log states an accuracy.
     """
 
     name: str
@@ -74,6 +76,8 @@ class Instrument:
     kind: str = "tracker"
     sigma_m: float = 0.0
     lever_arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    height_sigma_m: float | None = None
+    times: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -193,7 +197,8 @@ def _instrument(path: str, origin: Geodetic | None, name: str, keys: Any) -> Ins
     named = ("range_bias_sigma", "azimuth_bias_sigma", "elevation_bias_sigma")
     prior = [*(values.get(each, 0.0) for each in named), level, level, values.get("clock_offset_sigma", 0.0)]
     recipe = Recipe.of(options)
-    own_kind = (kind, values.get("sigma", 0.0), values.get("lever_arm_m", (0.0, 0.0, 0.0)))
+    arm = values.get("lever_arm_m", (0.0, 0.0, 0.0))
+    own_kind = (kind, values.get("sigma", 0.0), arm, values.get("height_bias_sigma"))
     return Instrument(name, log, options, recipe, at, axes, np.array(prior), site, config, *own_kind)
 
 

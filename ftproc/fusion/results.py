@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.config import writing
+from ftproc.core import beside
 from ftproc.core.model import stations as geometry
 from ftproc.core.model.frames import wrap
 from ftproc.errors import OutputError
@@ -87,6 +88,12 @@ def edited(fused: Fused, s: int, log: MeasurementLog, instrument: Instrument) ->
         columns[f"residual_sigma_{component}_{unit}"] = full(np.sqrt(variance[:, c]))
     for c, name in enumerate(layout.OUTLIER):
         columns[name] = full(label[:, c], MISSING)
+    for name, each in fused.beside[s].items() if fused.beside else ():
+        unit = layout.BESIDE[name]
+        columns[f"{name}_{unit}"] = full(each.cleaned)
+        columns[f"residual_{name}_{unit}"] = full(each.residual)
+        columns[f"residual_sigma_{name}_{unit}"] = full(np.sqrt(each.variance))
+        columns[f"outlier_{name}"] = full(beside.labels_of(each.side.weight, each.side.value), MISSING)
     if instrument.kind == POSITION:
         columns |= {name: full(fused.position[s][:, c]) for c, name in enumerate(layout.POSITION)}
         columns["outlier_position"] = full(np.where((label == MISSING).any(1), MISSING, label.max(1)), MISSING)

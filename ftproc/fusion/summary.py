@@ -11,7 +11,7 @@ from ftproc.quality.summary import counted, line
 
 COMPONENT_HEADER = ("station", "component", "good", "rejected", "missing", "noise (1 sigma)")
 BIAS_HEADER = ("station", "bias", "estimate", "1 sigma", "before", "")
-_UNIT = {"m": (1.0, "m"), "rad": (1e3, "mrad"), "s": (1e3, "ms")}
+_UNIT = {"m": (1.0, "m"), "rad": (1e3, "mrad"), "s": (1e3, "ms"), "mps": (1.0, "m/s"), "scale": (100.0, "%")}
 
 
 def text(metadata: Mapping[str, Any]) -> str:
@@ -40,7 +40,7 @@ def component_rows(s: Mapping[str, Any]) -> list[tuple[str, ...]]:
     found = []
     for station, part in s["stations"].items():
         for k, (component, figures) in enumerate(part["components"].items()):
-            unit = "m" if component == "range" else "rad"
+            unit = next(key.removeprefix("noise_") for key in figures if key.startswith("noise_"))
             counts = (str(figures[key]) for key in ("good", "rejected", "missing"))
             found.append((station if k == 0 else "", component, *counts, amount(figures[f"noise_{unit}"], unit)))
     return found

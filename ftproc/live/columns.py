@@ -6,6 +6,7 @@ a unit that nobody stated, is assumed and said.
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
@@ -16,14 +17,15 @@ from ftproc.config.recipe import Recipe
 from ftproc.errors import InputError
 from ftproc.files import conventions
 from ftproc.files.options import parse_columns, parse_units, parse_widths
-from ftproc.files.reading import converting, understanding
+from ftproc.files.reading import converting, further, understanding
 from ftproc.files.reading.clocks import numeric
 from ftproc.files.reading.formats import layout
 from ftproc.files.reading.formats.csvtext import MISSING_WORDS
+from ftproc.files.reading.further import Further
 from ftproc.files.reading.meaning import schema
 from ftproc.files.units import UNITS
 from ftproc.files.words import DEPRESSIONS, QUANTITIES
-from ftproc.live.growing import Block, Say
+from ftproc.live.growing import Block, Say, no_row, no_table
 from ftproc.quality.sanity import LATEST_S
 from ftproc.records import FloatArray, MeasurementLog
 from ftproc.settings import Station
@@ -34,6 +36,7 @@ _SAMPLE = 100  # rows that judge assumptions
 _OTHERS = {"time": "ms", "range": "km", "azimuth": "deg", "elevation": "deg"}  # units, as examples
 _MISSING = frozenset(MISSING_WORDS)
 
+RATE = len(QUANTITIES)  # the column of range rates, after those of all logs
 Found = Mapping[str, schema.Column]
 Rows = tuple[FloatArray, InputError | None]
 
@@ -46,16 +49,16 @@ class Reader:
         self._head, self._size = list[str](), 0
         self._why: InputError | None = None
         self._table: _Table | None = None
-        self._sample: FloatArray | None = np.empty((0, 4))
+        self._sample: FloatArray | None = np.empty((0, 5))
 
     def read(self, block: Block) -> Rows:
-        """(n, 4) time s, range m, azimuth rad, elevation rad in the canonical convention, NaN where missing, of the
-        rows up to the first one that is not understood; and the error for that row. Raises InputError for a table that
-        is not understood."""
+        """(n, 5) time s, range m, azimuth rad, elevation rad, range rate m/s in the canonical convention, NaN where
+        missing, of the rows up to the first one that is not understood; and the error for that row. Raises InputError
+        for a table that is not understood."""
         if self._table is None:
             rows = self._begun(block)
             if rows is None:
-                return np.empty((0, 4)), None
+                return np.empty((0, 5)), None
             block = rows
         assert self._table is not None
         readings, fault = self._table.read(block)
@@ -64,6 +67,11 @@ class Reader:
             if len(self._sample) == _SAMPLE:
                 self._judge()
         return self._table.converted(readings), fault
+
+    @property
+    def has_rates(self) -> bool:
+        """Whether the table has range rates, once it is known."""
+        return self._table is not None and self._table.rate is not None
 
     @property
     def station(self) -> Station:
@@ -84,7 +92,7 @@ class Reader:
     def finish(self) -> None:
         """When no more lines come. Raises InputError when there was no table."""
         if self._table is None:
-            raise self._why or _no_table(self._source, self._head)
+            raise self._why or no_table(self._source, self._head)
         self._judge()
 
     def _begun(self, block: Block) -> Block | None:
@@ -96,7 +104,7 @@ class Reader:
             self._head.append(line)
             self._size += len(line)
             if len(self._head) > _MOST_HEAD or self._size > _LARGEST_HEAD:
-                raise self._why or _no_row(self._source, self._head)
+                raise self._why or no_row(self._source, self._head)
             if not line.strip() or layout.is_comment(line):
                 continue
             first = self._understood()
@@ -108,7 +116,7 @@ class Reader:
                     self._say(f"{self._source}: {remark}.")
                 return rows
             if sum(bool(each.strip()) and not layout.is_comment(each) for each in self._head) >= _MOST_LINES:
-                raise self._why or _no_row(self._source, self._head)
+                raise self._why or no_row(self._source, self._head)
         return None
 
     def _understood(self) -> int | None:
@@ -133,25 +141,6 @@ class Reader:
         self._sample = None
 
 
-def _no_table(source: str, head: Sequence[str]) -> InputError:
-    if not any(line.strip() for line in head):
-        return InputError(f"{source}: there is no line; expected a line of names and rows.")
-    filled = [line for line in head if line.strip() and not layout.is_comment(line)]
-    if len(filled) < 2:
-        return InputError(
-            f"{source}: no row came after the line of names, so nothing is written. Follow it again when there are "
-            "rows."
-        )
-    return _no_row(source, head)
-
-
-def _no_row(source: str, head: Sequence[str]) -> InputError:
-    return InputError(
-        f"{source}: none of its first {len(head)} lines looks like a row of a log; expected a line of names, and below "
-        "it rows of numbers that commas, semicolons, tabs or blanks separate."
-    )
-
-
 class _Table(NamedTuple):
     """The columns of a text. above: lines over the table, which are no rows where they stand again. station: with what
     the names say of the convention; given: without."""
@@ -164,6 +153,7 @@ class _Table(NamedTuple):
     found: Found
     given: Station
     station: Station
+    rate: Further | None
 
     @classmethod
     def of(cls, source: str, text: layout.Layout, head: Sequence[str], recipe: Recipe) -> _Table:
@@ -182,11 +172,14 @@ class _Table(NamedTuple):
         if recipe.settings.site and not understanding.knows_axis(recipe.station, found):
             raise conventions.axis_question(source, found["azimuth"].name)
         widths = parse_widths(recipe.widths)
-        return cls(source, names, text.separator, widths, above, found, recipe.station, station)
+        rate = further.rate_of(names, text.units, parse_units(recipe.units), parse_columns(recipe.columns))
+        return cls(source, names, text.separator, widths, above, found, recipe.station, station, rate)
 
     def read(self, block: Block) -> Rows:
-        """(n, 4) in SI units as the instrument counts, see `Reader.read`."""
+        """(n, 5) in SI units as the instrument counts, see `Reader.read`."""
         readings, fault = self._numbers(block)
+        if self.rate is not None:
+            readings[:, RATE] = self.rate.unit.to_si(-readings[:, RATE] if self.rate.other_kind else readings[:, RATE])
         for k, quantity in enumerate(QUANTITIES):
             if quantity in self.found:
                 column = self.found[quantity]
@@ -195,13 +188,13 @@ class _Table(NamedTuple):
         return readings, fault
 
     def converted(self, readings: FloatArray) -> FloatArray:
-        """(n, 4) in the canonical convention, without the station's known errors."""
-        log = MeasurementLog(self.source, readings[:, 0], readings[:, 1:], np.arange(len(readings)))
+        """(n, 5) in the canonical convention, without the station's known errors."""
+        log = MeasurementLog(self.source, readings[:, 0], readings[:, 1:RATE], np.arange(len(readings)))
         log = conventions.apply(log, self.station)
-        return np.column_stack([log.time_s, log.measurement])
+        return np.column_stack([log.time_s, log.measurement, readings[:, RATE]])
 
     def _numbers(self, block: Block) -> Rows:
-        """(n, 4) in the units of the log."""
+        """(n, 5) in the units of the log."""
         rows: list[list[float]] = []
         fault = None
         try:
@@ -210,7 +203,7 @@ class _Table(NamedTuple):
                     rows.append(self._row(number, cells))
         except InputError as error:
             fault = error
-        return np.array(rows, float).reshape(-1, len(QUANTITIES)), fault
+        return np.array(rows, float).reshape(-1, RATE + 1), fault
 
     def _cells(self, line: str) -> list[str] | None:
         """None for what is no row: an empty line, a comment, a line that stands above the table too."""
@@ -230,7 +223,10 @@ class _Table(NamedTuple):
                 f"{place} has {len(cells)} {what} where the header has {len(self.names)}. Complete the row, or delete "
                 "it."
             )
-        row = [np.nan] * len(QUANTITIES)
+        row = [np.nan] * (RATE + 1)
+        if self.rate is not None:
+            with contextlib.suppress(ValueError):  # "n/a" and the like
+                row[RATE] = float(cells[self.rate.place])
         for k, quantity in enumerate(QUANTITIES):
             column = self.found.get(quantity)
             if column is None or (text := cells[column.position]) in _MISSING:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 from ftproc.errors import InputError
-from ftproc.files.reading.formats import packing
+from ftproc.files.reading.formats import layout, packing
 
 MOST = 1 << 18  # bytes of a line
 LINES = 4096  # that are taken at once, of those that are there
@@ -74,3 +74,22 @@ def _refuse_other_kinds(source: str, data: bytes) -> None:
             f"{source}: --follow reads text in lines (UTF-8), such as CSV, and this is something else. Filter it "
             "without --follow when it is complete."
         )
+
+
+def no_table(source: str, head: Sequence[str]) -> InputError:
+    if not any(line.strip() for line in head):
+        return InputError(f"{source}: there is no line; expected a line of names and rows.")
+    filled = [line for line in head if line.strip() and not layout.is_comment(line)]
+    if len(filled) < 2:
+        return InputError(
+            f"{source}: no row came after the line of names, so nothing is written. Follow it again when there are "
+            "rows."
+        )
+    return no_row(source, head)
+
+
+def no_row(source: str, head: Sequence[str]) -> InputError:
+    return InputError(
+        f"{source}: none of its first {len(head)} lines looks like a row of a log; expected a line of names, and below "
+        "it rows of numbers that commas, semicolons, tabs or blanks separate."
+    )

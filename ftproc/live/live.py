@@ -17,8 +17,10 @@ from ftproc.core.live.editor import LiveEditor
 from ftproc.core.model import kinematics
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.errors import InputError, UsageError
+from ftproc.files import arrow
 from ftproc.live.order import Left, Order
 from ftproc.methods import live, registry
+from ftproc.methods import range_rates as rates_of
 from ftproc.methods.estimate import FARTHEST, Estimate
 from ftproc.order_statistics import median
 from ftproc.quality import sanity
@@ -44,9 +46,11 @@ class Live:
     they are counted, not published.
     """
 
-    def __init__(self, settings: FilterSettings | None = None, late_s: float | None = None) -> None:
+    def __init__(
+        self, settings: FilterSettings | None = None, late_s: float | None = None, range_rates: bool = False
+    ) -> None:
         """settings: editing `live` (also where they say `two-pass`, the default) or `forward`. late_s: at most the lag;
-        None for the lag. Raises UsageError."""
+        None for the lag. range_rates: whether the rows have columns of range rates. Raises UsageError."""
         self.resume(settings or FilterSettings())
         self.late, editor = 0, live.editor(self.settings)
         self._lag_s = editor.lag_s
@@ -55,7 +59,7 @@ class Live:
         self._time_s: list[float] = []  # of the rows that have not been published, in the order of their times,
         self._row: list[int] = []  # their numbers,
         self._came_s: list[float] = []  # and when each came, or the one after it
-        self._taken, self._left_s = 0, -math.inf
+        self._taken, self._left_s, self._rates = 0, -math.inf, range_rates
 
     def resume(self, settings: FilterSettings) -> None:
         """Go on with these settings, when all else is as it was kept."""
@@ -85,13 +89,14 @@ class Live:
         elevation_rad: ArrayLike,
         row: ArrayLike | None = None,
         came_s: float = math.inf,
+        range_rate_mps: ArrayLike = math.nan,
     ) -> Trajectory:
-        """Take one reading, or several: numbers or arrays (n,), s, m, rad, rad; NaN where a component is missing. row:
-        their numbers, by which they are published; without, they are counted from 0. came_s: when they came, by any
-        clock in seconds that goes on evenly, if `due` is called too. Returns the rows published now, of which there may
-        be none. Raises InputError for a time that is not a number or not that of a flight.
+        """Take one reading, or several: numbers or arrays (n,), s, m, rad, rad, m/s; NaN where a component is missing.
+        row: their numbers, by which they are published; without, they are counted from 0. came_s: when they came, by
+        any clock in seconds that goes on evenly, if `due` is called too. Returns the rows published now, of which there
+        may be none. Raises InputError for a time that is not a number or not that of a flight.
         """
-        components = (range_m, azimuth_rad, elevation_rad)
+        components = (range_m, azimuth_rad, elevation_rad, range_rate_mps)
         readings = np.broadcast_arrays(*(np.atleast_1d(np.asarray(each, float)) for each in components))
         times = np.atleast_1d(np.asarray(time_s, float))
         measurement = np.clip(np.stack(readings, 1), -FARTHEST, FARTHEST)
@@ -145,7 +150,7 @@ class Live:
             self._coasting = copy.deepcopy(self._order.editor)
             self._coasting.tick(math.inf)
         time_s = self.newest_s + after_s
-        at_s, none = time_s - self._order.begins_s, np.full((1, 3), np.nan)
+        at_s, none = time_s - self._order.begins_s, np.full((1, 4), np.nan)
         found = self._coasting.push(np.array([at_s]), none)
         found += self._coasting.tick(math.nextafter(at_s + self._lag_s, math.inf))
         left = [Left(each, self._coasting.absent) for each in found]
@@ -202,13 +207,13 @@ class Live:
             found = [each.rows for each in some]
             high = low + sum(len(each.rows) for each in found)
             estimate = live.estimate(self._order.editor, found, time_s[low:high])._replace(absent=absent)
-            parts.append(_trajectory(row[low:high], time_s[low:high], estimate))
+            parts.append(_trajectory(row[low:high], time_s[low:high], estimate, self._rates))
             low = high
         return joined(parts) if parts else _trajectory(row[:0], time_s[:0], None)
 
 
-def _trajectory(row: IntArray, time_s: FloatArray, estimate: Estimate | None) -> Trajectory:
-    """The rows of an estimate; none without one."""
+def _trajectory(row: IntArray, time_s: FloatArray, estimate: Estimate | None, rates: bool = False) -> Trajectory:
+    """The rows of an estimate; none without one. rates: whether they have columns of range rates."""
     n = len(row)
     if estimate is None:
         none = np.empty((0, 3))
@@ -222,7 +227,21 @@ def _trajectory(row: IntArray, time_s: FloatArray, estimate: Estimate | None) ->
     if absent:  # the filter ran on stand-ins; what depends on them is not published
         state[:], sigma[:], path_sigma[:], label[:, absent] = np.nan, np.nan, np.nan, MISSING
         cleaned[:, absent], cleaned_sigma[:, absent] = np.nan, np.nan
-    none = np.zeros((n, 6))
+    none, extra = np.zeros((n, 6)), None
+    if rates:
+        found = estimate.range_rate.label if estimate.range_rate is not None else np.full(n, MISSING, np.uint8)
+        extra = arrow.table(rates_of.columns(state, los_sigma, found))
     return Trajectory(
-        "live", row, time_s, cleaned, state, sigma, cleaned_sigma, label, run.nis, none, path_sigma=path_sigma
+        "live",
+        row,
+        time_s,
+        cleaned,
+        state,
+        sigma,
+        cleaned_sigma,
+        label,
+        run.nis,
+        none,
+        extra=extra,
+        path_sigma=path_sigma,
     )

@@ -187,7 +187,7 @@ class Stream:
         except InputError as error:
             if not self._begun:
                 raise
-            return np.empty((0, 4)), error, ""
+            return np.empty((0, 5)), error, ""
         self._begun |= len(readings) > 0
         return readings, fault, table.texts[-1]
 
@@ -214,7 +214,7 @@ class Stream:
             if len(self.tracks) >= MOST_TARGETS:
                 self.others += len(timed)
                 return
-            self.tracks[name] = Live(self.recipe.settings)
+            self.tracks[name] = Live(self.recipe.settings, range_rates=self._reader.has_rates)
         self._came_s[name], self._coasted[name] = now_s, 0
         for part in self._push(self.tracks[name], readings[timed], numbers, now_s, stop):
             yield from self._named(name, part)
@@ -226,8 +226,9 @@ class Stream:
         low = 0
         while low < len(readings) and not stop.overdue:
             began_s, high = time.monotonic(), low + self._at_once
-            time_s, range_m, azimuth_rad, elevation_rad = readings[low:high].T
-            yield track.push(time_s, range_m, azimuth_rad, elevation_rad, numbers[low:high], now_s)
+            time_s, range_m, azimuth_rad, elevation_rad, rate_mps = readings[low:high].T
+            number = numbers[low:high]
+            yield track.push(time_s, range_m, azimuth_rad, elevation_rad, number, now_s, range_rate_mps=rate_mps)
             slow = time.monotonic() - began_s > AT_ONCE_S
             self._at_once = max(self._at_once // 2, 1) if slow else min(2 * self._at_once, LINES)
             low = high
@@ -245,7 +246,11 @@ class Stream:
             if self.target and not self._only:
                 import pyarrow as pa
 
-                part = replace(part, extra=pa.table({self.target: [name] * len(part)}))
+                names = pa.array([name] * len(part))
+                both = pa.table({self.target: names})
+                if part.extra is not None:
+                    both = part.extra.append_column(self.target, names)
+                part = replace(part, extra=both)
             yield part
 
     # -- pauses -----------------------------------------------------------------------------------------------------

@@ -21,6 +21,7 @@ from ftproc.core import threads
 from ftproc.core.editing import two_pass
 from ftproc.core.editing.lasting.faults import Shift, spread
 from ftproc.core.filtering import forward
+from ftproc.core.filtering.beside import WIDTH
 from ftproc.core.filtering.records import FilterRun, Model
 from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
 from ftproc.core.identification import likelihood, motion_models
@@ -68,14 +69,15 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     specified = np.isfinite(known.sigma)
     log, model, channel = edited.log, edited.model, None
     if readings.range_rate is not None:
-        fixed = settings.jerk_psd_m2ps5 is not None
-        log, model, channel = range_rates.fit(log, model, edited.starts, readings.range_rate, settings.gate, fixed)
+        how = settings.gate, settings.jerk_psd_m2ps5 is not None
+        given = readings.range_rate, readings.rate_interval_mps
+        log, model, channel = range_rates.fit(log, model, edited.starts, given, how)
     names = preparing.motions(settings)
     if len(edited.starts) > MOST_PIECES and motion_models.WHITE in names:
         names = (motion_models.WHITE,)
     motion = motion_models.choose(log, edited.starts, model, names, specified)
     if channel is not None and channel.used is not None:
-        motion = motion.with_rates(channel.used)
+        motion = motion.with_beside(channel.used)
     both = settings.smooth or usual is None  # cheap, and says what could be had
     run, smoothed, left = _with_motion(motion, both, motion.model)
     for other in _as_likely(edited, known, run):
@@ -103,9 +105,10 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
 
 def _with_motion(motion: Chosen, smooth: bool, model: Model) -> tuple[FilterRun, SmootherRun | None, FloatArray]:
     """The filter and, if asked, the smoother over an edited log, by a model; and what the filter leaves of its range
-    rates, see `core.filtering.rates`."""
+    rates, see `core.filtering.beside`."""
     starts = preparing.smoothed_starts(motion.log, model, motion.starts)
-    run, left = forward.filter_with_rates(motion.log, model.causal, starts)
+    run, beside = forward.filter_with_beside(motion.log, model.causal, starts)
+    left = beside[0] if len(beside) else np.zeros((0, WIDTH))
     left = left if motion.row is None or not len(left) else left[motion.row]
     smoothed = motion.of_rows(smooth_log(motion.log, model, motion.starts, PATHS)) if smooth else None
     return motion.of_rows(run), smoothed, left

@@ -18,7 +18,7 @@ from ftproc.order_statistics import median
 from ftproc.records import FlagArray, FloatArray, IntArray, forget, thinned
 
 if TYPE_CHECKING:
-    from ftproc.methods.range_rates import Channel
+    from ftproc.core.beside import Channel
 
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: stands in for a component that is missing throughout
 Run = TypeVar("Run", FilterRun, SmootherRun)
@@ -32,7 +32,8 @@ class Readings(NamedTuple):
     """A log as the methods see it: time_s (n,) from zero, measurement (n, 3) with NaN where missing, and which
     components' noise cannot be had from the log, with what is assumed for it: (3,) 1-sigma m, rad, rad, NaN where
     the log tells; the times of the readings of each component that are accepted by hand; and how the noise of single
-    readings is known to differ, if it is. range_rate: (n,) m/s, NaN where missing, if there are such."""
+    readings is known to differ, if it is. range_rate: (n,) m/s, NaN where missing, if there are such, and the interval
+    in which they are ambiguous, zero if they are not."""
 
     time_s: FloatArray
     measurement: FloatArray
@@ -40,6 +41,7 @@ class Readings(NamedTuple):
     accepted: Accepted = NOTHING
     uneven: Uneven | None = None
     range_rate: FloatArray | None = None
+    rate_interval_mps: float = 0.0
 
     def unedited(self) -> Observations:
         """The log with every reading used."""
@@ -55,7 +57,8 @@ class Recording:
     """A whole log, of which the methods ask for one stretch at a time; its arrays may lie on a disk.
 
     time_s: (n,). measurement: (n, 3). assumed_sigma: as in `Readings`. absent: components that are missing throughout.
-    rejected: (n, 3) readings that are not to be used, if there are any. accepted, uneven, range_rate: as in `Readings`.
+    rejected: (n, 3) readings that are not to be used, if there are any. accepted, uneven, range_rate,
+    rate_interval_mps: as in `Readings`.
     """
 
     time_s: FloatArray
@@ -66,6 +69,7 @@ class Recording:
     accepted: Accepted = NOTHING
     uneven: Uneven | None = None
     range_rate: FloatArray | None = None
+    rate_interval_mps: float = 0.0
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -81,7 +85,9 @@ class Recording:
         forget(self.time_s, self.measurement)
         uneven = None if self.uneven is None else self.uneven.part(rows)
         rate = None if self.range_rate is None else np.ascontiguousarray(self.range_rate[rows])
-        return Readings(time_s, np.ascontiguousarray(measurement), self.assumed_sigma, self.accepted, uneven, rate)
+        measurement = np.ascontiguousarray(measurement)
+        beside = uneven, rate, self.rate_interval_mps
+        return Readings(time_s, measurement, self.assumed_sigma, self.accepted, *beside)
 
     def spans(self) -> list[slice]:
         """SPANS stretches of SPAN samples, spread evenly: what noise and usual jerk of a long log are found from."""

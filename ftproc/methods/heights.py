@@ -88,14 +88,12 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
     station_m = settings.site[2] if settings.site is not None else 0.0
     above, slant = heights.above_m - station_m, _cleaned_ranges(recording, settings)
     step = rounding_step(heights.above_m)
-    scatter = _scatter(above)
-    own = max(step / math.sqrt(12) if scatter < step else scatter, LEAST_M)
-    good = alone.good(log.time_s, above, own)
+    own, good = screened(log.time_s, above, step)
     rejected = np.isfinite(above) & ~good
     above = np.where(good, above, np.nan)
     with np.errstate(invalid="ignore"):
-        sine = _sine(above, slant)
-        measurement[:, 2] = np.where(np.abs(sine) <= 1, np.arcsin(np.clip(sine, -1, 1)), np.nan)
+        ratio = sine(above, slant)
+        measurement[:, 2] = np.where(np.abs(ratio) <= 1, np.arcsin(np.clip(ratio, -1, 1)), np.nan)
     _check(log, np.isfinite(above) & np.isfinite(slant), measurement[:, 2])
     ground = np.maximum(slant * np.cos(measurement[:, 2]), 1.0)
     each = own / ground
@@ -115,6 +113,13 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
     return found, Common(None, np.hypot(known, step / math.sqrt(12)), own / typical, rejected)
 
 
+def screened(time_s: FloatArray, above_m: FloatArray, step: float) -> tuple[float, NDArray[np.bool_]]:
+    """The noise 1-sigma of heights (n,) m in such steps, and (n,) which are no outliers."""
+    scatter = _scatter(above_m)
+    own = max(step / math.sqrt(12) if scatter < step else scatter, LEAST_M)
+    return own, alone.good(time_s, above_m, own)
+
+
 def _check(log: MeasurementLog, both: NDArray[np.bool_], elevation: FloatArray) -> None:
     outside = both & np.isnan(elevation)
     if outside.sum() > MOST_OUTSIDE * both.sum():
@@ -125,7 +130,7 @@ def _check(log: MeasurementLog, both: NDArray[np.bool_], elevation: FloatArray) 
         )
 
 
-def _sine(height_m: FloatArray, range_m: FloatArray) -> FloatArray:
+def sine(height_m: FloatArray, range_m: FloatArray) -> FloatArray:
     """Of the elevation, of a target so high above the station over a round earth."""
     found: FloatArray = (height_m**2 + 2 * height_m * EARTH_M - range_m**2) / (2 * range_m * EARTH_M)
     return found
@@ -212,8 +217,8 @@ def labelled(label: FlagArray) -> tuple[FlagArray, dict[str, FlagArray]]:
 def _moved(prior: Prior, state: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The states (n, 9) of the plane of range and azimuth moved to a height, and their sigmas (n, 9)."""
     slant = np.maximum(np.sqrt((state[:, :3] ** 2).sum(1)), 1e-9)
-    sine = np.clip(_sine(np.full(len(slant), prior.height_m), slant), -STEEPEST, STEEPEST)
-    ground, z = slant * np.sqrt(1 - sine**2), slant * sine
+    ratio = np.clip(sine(np.full(len(slant), prior.height_m), slant), -STEEPEST, STEEPEST)
+    ground, z = slant * np.sqrt(1 - ratio**2), slant * ratio
     flat = np.maximum(np.hypot(state[:, 0], state[:, 1]), 1e-9)
     along, across = state[:, :2] / flat[:, None], np.stack([-state[:, 1], state[:, 0]], 1) / flat[:, None]
     v, turned, a, bent = ((state[:, k : k + 2] * axis).sum(1) for k in (3, 6) for axis in (along, across))

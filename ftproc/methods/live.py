@@ -9,22 +9,25 @@ from dataclasses import replace
 
 import numpy as np
 
+from ftproc.core.beside import Channel
 from ftproc.core.by_hand import NOTHING, Accepted
 from ftproc.core.editing.two_pass import Known
 from ftproc.core.filtering.initialization import find_starts, first_state
-from ftproc.core.filtering.records import FilterRun, Model
+from ftproc.core.filtering.records import FilterRun, Model, Scalars
 from ftproc.core.filtering.smoother import PATHS, smooth_log
 from ftproc.core.identification.likelihood import Fixed, first_jerk, fit_level
+from ftproc.core.live import beside
 from ftproc.core.live.editor import LiveEditor
 from ftproc.core.live.recursive import Gating
 from ftproc.core.live.rows import Published
 from ftproc.core.model.motion import isotropic
 from ftproc.methods import preparing
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording
-from ftproc.records import GOOD, FloatArray, chunks
+from ftproc.records import GOOD, MISSING, FlagArray, FloatArray, chunks
 from ftproc.settings import FilterSettings
 
 BLOCK = 4096  # samples that are taken at once
+NOT_USED = "the range rates are not used by now: too few, or they contradict the readings or do not add to them"
 HISTORY = 256  # samples before a stretch that go with it: the network looks back
 
 
@@ -44,7 +47,10 @@ def parts(record: Recording, settings: FilterSettings, block: int = BLOCK) -> It
     live, history = editor(settings, record.accepted), list[Published]()
     for rows in chunks(len(record), block):
         readings = record.part(rows)
-        found = live.push(readings.time_s, readings.measurement)
+        came = readings.measurement
+        if readings.range_rate is not None:
+            came = np.column_stack([came, readings.range_rate])
+        found = live.push(readings.time_s, came)
         if rows.stop == len(record):
             found += live.finish()
             if not live.confirmed_once:
@@ -63,11 +69,23 @@ def parts(record: Recording, settings: FilterSettings, block: int = BLOCK) -> It
 def estimate(live: LiveEditor, found: Sequence[Published], time_s: FloatArray) -> Estimate:
     """The rows that have left the editor, one after the other, with their times (n,)."""
     rows = np.concatenate([each.rows for each in found])
-    label = np.concatenate([each.label for each in found]).astype(np.uint8)
+    labels = np.concatenate([each.label for each in found]).astype(np.uint8)
+    label, of_rates = np.ascontiguousarray(labels[:, : beside.RATE]), labels[:, beside.RATE]
     known = np.concatenate([each.known for each in found])
     again = np.concatenate([each.reacquired for each in found])
     run, lost = FilterRun.of(time_s, rows, 0.0), tuple(np.flatnonzero(again).tolist())
-    return Estimate(run, label, live.model, reacquired=lost, known=known, absent=live.absent)
+    rates = _rates(live, of_rates) if (of_rates != MISSING).any() else None
+    return Estimate(run, label, live.model, reacquired=lost, known=known, absent=live.absent, range_rate=rates)
+
+
+def _rates(live: LiveEditor, label: FlagArray) -> Channel:
+    """What is known of the range rates by now, of rows with these labels (n,)."""
+    side = beside.Rates() if live.window is None else live.window.side
+    n = len(label)
+    rates = Scalars.rates(np.full(n, np.nan), side.sigma_mps**2, np.zeros(n))
+    why = "" if side.used else NOT_USED
+    unknown = np.full((2, n), np.nan)
+    return Channel(rates, np.ascontiguousarray(label), side.sign < 0, why=why, innovation=unknown[0], sigma=unknown[1])
 
 
 def _last(found: Sequence[Published], count: int) -> Published:
@@ -78,7 +96,7 @@ def _last(found: Sequence[Published], count: int) -> Published:
 
 def whole(readings: Readings, settings: FilterSettings) -> Estimate:
     """The estimate of a whole log. Errors as in `parts`."""
-    record = Recording(*readings[:3], accepted=readings.accepted)
+    record = Recording(*readings[:3], accepted=readings.accepted, range_rate=readings.range_rate)
     (part,) = parts(record, settings, len(record))
     return part.estimate
 

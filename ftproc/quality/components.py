@@ -12,7 +12,7 @@ from ftproc.quality import consistency
 from ftproc.records import ACCEPTED, GOOD, ISOLATED, MISSING, PATCH, REJECTED, FlagArray, FloatArray
 
 if TYPE_CHECKING:
-    from ftproc.methods.range_rates import Channel
+    from ftproc.core.beside import Channel
 
 _LABELS = {"isolated": ISOLATED, "patch": PATCH, "missing": MISSING}
 
@@ -67,12 +67,12 @@ class RangeRate:
 
     def __init__(self, every: int) -> None:
         self.component, self.closing, self.why = Component(every), False, dict[str, None]()
-        self.variances: list[float] = []
+        self.noises: list[float] = []
 
     @property
     def used(self) -> bool:
         """Whether some part uses them."""
-        return bool(self.variances)
+        return bool(self.noises)
 
     def add(self, time_s: FloatArray, channel: Channel) -> None:
         """Add a part with these times (n,)."""
@@ -81,7 +81,7 @@ class RangeRate:
             self.why[channel.why] = None
             return
         self.closing |= channel.closing
-        self.variances.append(channel.rates.variance)
+        self.noises.append(channel.noise_mps)
         with np.errstate(invalid="ignore", divide="ignore"):
             squares = np.square(channel.innovation / channel.sigma)
         self.component.add_innovations(squares, channel.sigma, channel.rates.weight > 0)
@@ -93,7 +93,7 @@ class RangeRate:
 
     def figures(self) -> dict[str, Any]:
         """As those of other components."""
-        noise = float(np.sqrt(median(np.array(self.variances))))
+        noise = median(np.array(self.noises))
         return {
             **self.component.counts(),
             "held": 0,

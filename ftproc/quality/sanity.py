@@ -45,7 +45,10 @@ def recording(log: MeasurementLog) -> Recording:
     absent = tuple(np.flatnonzero(count == 0).tolist())
     if len(absent) == len(COMPONENTS):
         raise InputError(f"{log.name}: every reading is rejected by hand; check the decisions.")
-    return Recording(log.time_s, log.measurement, assumed, absent, rejected, accepted, range_rate=log.range_rate)
+    return Recording(
+        log.time_s, log.measurement, assumed, absent, rejected, accepted, range_rate=log.range_rate,
+        rate_interval_mps=log.station.range_rate_interval_mps,
+    )  # fmt: skip
 
 
 def check_settings(settings: FilterSettings) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,8 @@ from ftproc.errors import UsageError
 from ftproc.records import FlagArray, FloatArray, MeasurementLog, Truth
 from ftproc.simulation.contamination import CODES, contaminate
 from ftproc.simulation.flights import FLIGHTS
+from ftproc.simulation.further import OFFSET_M
+from ftproc.simulation.further import measured as measured_beside
 from ftproc.simulation.instrument import readable, unit_noise
 from ftproc.simulation.kinematics import Flight
 from ftproc.simulation.outlier_spec import parse_outliers
@@ -31,7 +33,7 @@ OTHER_TARGET_S = (12.0, 25.0)
 class Kind:
     """An instrument. measures: its components. rate_hz: range of its rate. noise: ranges of its noise, m and rad.
     range_prior_m: 1-sigma of its range bias. outliers: one specification is drawn. other_target: share of flights in
-    which it follows another target for a while."""
+    which it follows another target for a while. further: what it measures beside range and azimuth, see `further`."""
 
     name: str
     measures: tuple[int, ...]
@@ -41,6 +43,7 @@ class Kind:
     range_prior_m: float
     outliers: tuple[str, ...]
     other_target: float = 0.0
+    further: tuple[str, ...] = ()
 
 
 _OPTICAL = (
@@ -53,6 +56,11 @@ _RADIO = (
 )
 THEODOLITE = Kind("theodolite", ANGLES, (10.0, 30.0), (1.0, 1.0), (1e-4, 2.5e-4), 0.0, _OPTICAL)
 RADAR = Kind("radar", ALL, (2.0, 8.0), (4.0, 10.0), (2.5e-4, 8e-4), 25.0, _RADIO, 0.4)
+DOPPLER = replace(RADAR, other_target=0.0, further=("elevation", "range_rate"))
+FLAT = Kind(
+    "surveillance", (0, 1), (0.2, 0.3), (20.0, 40.0), (6e-4, 1.2e-3), 40.0, ("isolated=0.02:6-200,nan=0.01",),
+    further=("flight_level",),
+)  # fmt: skip
 DME = Kind("dme", RANGE, (1.5, 3.0), (4.0, 10.0), (1.0, 1.0), 10.0, ("isolated=0.06:6-300,nan=0.01",))
 
 #: Scenario -> its description, its stations, and the flights of which one is drawn with its duration.
@@ -82,9 +90,16 @@ ANY = "range"
 #: A radar with unknown biases, and GNSS on board.
 GNSS, GNSS_S, GNSS_M = "range-gnss", 1.0, (2.0, 2.0, 4.0)  # name, between positions, 1-sigma east, north, up
 WRONG, WRONG_M = 0.02, 200.0  # share of wrong positions, and their size
+#: Two radars without elevations that hear flight levels, and one with range rates. Is not drawn by ANY.
+SURVEILLANCE = "range-surveillance"
+APART = {
+    GNSS: ((RADAR,), RANGES["range-radars"][2]),
+    SURVEILLANCE: ((FLAT, FLAT, DOPPLER), (("airliner", 400.0),)),
+}
 DESCRIPTIONS = {
     ANY: "several stations on one flight: one of the four below is drawn; -o names a directory",
     **{name: text for name, (text, _, _) in RANGES.items()},
+    SURVEILLANCE: "two radars with flight levels in place of elevations, and one with range rates; an airliner",
     GNSS: "a radar with unknown biases, and the positions of GNSS on board; an airliner or a cruiser",
 }
 
@@ -130,23 +145,24 @@ def simulate_range(scenario: str, seed: int = 0, duration_s: float | None = None
     """
     rng = np.random.default_rng([seed, 21])
     name = scenario if scenario in RANGES else list(RANGES)[rng.integers(len(RANGES))]
-    _, kinds, flights = RANGES["range-radars" if scenario == GNSS else name]
-    kinds = kinds[:1] if scenario == GNSS else kinds
+    kinds, flights = APART[scenario] if scenario in APART else RANGES[name][1:]
+    name = scenario if scenario in APART else name
     flight_name, usual_s = flights[rng.integers(len(flights))]
     lasts = usual_s if duration_s is None else duration_s
     if not 10.0 <= lasts <= 1e5:
         raise UsageError(f"A flight for several stations lasts 10 to 100000 s, not {lasts:g} s.")
     flight = FLIGHTS[flight_name](rng, lasts)
     origin = (float(rng.uniform(-55, 65)), float(rng.uniform(-180, 180)), float(rng.uniform(0, 1500)))
-    title = f"simulated {scenario if scenario == GNSS else name}, seed {seed}"
+    title = f"simulated {name}, seed {seed}"
     places = _places(flight, lasts, len(kinds), rng)
-    reference = -1 if scenario == GNSS or name == "range-radars" else int(rng.integers(len(kinds)))
+    reference = -1 if name in (GNSS, "range-radars") else int(rng.integers(len(kinds)))
+    pressure_m = OFFSET_M * float(rng.standard_normal()) if name == SURVEILLANCE else 0.0
     stations = tuple(
-        _station(kind, _called(kinds, k), origin, places[k], flight, lasts, (k == reference, rng))
+        _station(kind, _called(kinds, k), origin, places[k], flight, lasts, (k == reference, pressure_m, rng))
         for k, kind in enumerate(kinds)
     )
     time_s = np.arange(0.0, lasts + 0.5 * TRUTH_S, TRUTH_S)
-    gnss = _gnss(flight, lasts, origin, rng) if scenario == GNSS else None
+    gnss = _gnss(flight, lasts, origin, rng) if name == GNSS else None
     return SimulatedRange(origin, Truth(title, time_s, *flight.at(time_s)), stations, gnss)
 
 
@@ -180,9 +196,9 @@ def _places(flight: Flight, lasts: float, count: int, rng: np.random.Generator) 
 
 def _station(
     kind: Kind, name: str, origin: Geodetic, ground: FloatArray, flight: Flight, lasts: float,
-    draw: tuple[bool, np.random.Generator],
+    draw: tuple[bool, float, np.random.Generator],
 ) -> SimulatedStation:  # fmt: skip
-    is_reference, rng = draw
+    is_reference, pressure_m, rng = draw
     ground = ground.copy()
     ground[2] -= (ground[0] ** 2 + ground[1] ** 2) / 2 / 6.378e6  # the earth is round
     site = tuple(round(value, digits) for value, digits in zip(place_at(origin, ground), (7, 7, 2), strict=True))
@@ -195,7 +211,8 @@ def _station(
     range_m, angle = (low * (high / low) ** rng.random() for low, high in (kind.range_noise_m, kind.angle_noise_rad))
     sigma = np.array([range_m, angle, angle * rng.uniform(0.8, 1.3)])
     spec = parse_outliers(str(rng.choice(kind.outliers)))
-    time = sample_times(lasts, 1 / float(np.round(rng.uniform(*kind.rate_hz))), spec.jitter, rng)
+    rate_hz = rng.uniform(*kind.rate_hz)
+    time = sample_times(lasts, 1 / float(np.round(rate_hz, 0 if rate_hz > 1 else 2)), spec.jitter, rng)
     if rng.random() < 0.25:
         time = time[time > rng.uniform(0.1, 0.3) * lasts]  # joins late
     time = time[kept_rows(time, spec, rng)]
@@ -213,6 +230,8 @@ def _station(
         np.arange(len(time)), rows_in_file=len(time),
     )  # fmt: skip
     local = model.local(position, place, axes)
+    if kind.further:
+        log = measured_beside(log, local, velocity @ axes.T, kind.further, rng, (site[2], pressure_m))
     truth = Truth(name, log.time_s, local, velocity @ axes.T, acceleration @ axes.T, code.astype(np.uint8))
     where = (site[0], site[1], site[2])
     return SimulatedStation(name, log, truth, where, "north" if north else "x", prior, biases, sigma)

@@ -115,6 +115,12 @@ _DOPPLER = replace(
     description="the radar with range rates too, 0.5 m/s (1 sigma), 2 % of them wrong",
     further=("elevation", "range_rate"),
 )
+_AMBIGUOUS = replace(
+    _DOPPLER,
+    name="radar-ambiguous",
+    description="the same, its range rates known but for whole turns of 60 m/s: [range] rate_interval_mps = 60",
+    further=("elevation", "range_rate", "ambiguous"),
+)
 _MARINE = Scenario(
     "marine",
     "a ship's radar without elevation, every 2.5 s; another ship at 1-10 km, cells of 22 m; 2 % outliers",
@@ -231,6 +237,7 @@ _SCENARIOS: dict[str, Scenario] = {
         ),
         _RADAR,
         _DOPPLER,
+        _AMBIGUOUS,
         _SURVEILLANCE,
         _MARINE,
         _OVERHEAD,

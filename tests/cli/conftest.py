@@ -9,10 +9,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from click.testing import CliRunner
 
 from ftproc.cli.main import cli
+from ftproc.core.model.earth import place_at
 
 BIN = Path(sys.prefix) / "bin"
 
@@ -63,3 +65,12 @@ def flight(here: Path, run: Callable[..., Result]) -> Path:
     made = run("simulate", "--scenario", "zuo2021-outliers", "-o", "flight.csv", "--truth", "flight.truth.csv")
     assert made == Result(0, "", "")
     return here / "flight.csv"
+
+
+def on_the_earth(truth: str, site: tuple[float, float, float]) -> str:
+    """The file of a truth written again as latitude, longitude and height, x being east at the site."""
+    frame = pd.read_csv(truth)
+    places = [place_at(site, row) for row in frame[["x_m", "y_m", "z_m"]].to_numpy()]
+    table = pd.DataFrame(places, columns=["lat_deg", "lon_deg", "height_m"]).assign(time_s=frame.time_s)
+    table.to_csv(f"earth-{truth}", index=False)
+    return f"earth-{truth}"

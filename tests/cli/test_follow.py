@@ -55,6 +55,25 @@ def test_zenith_angles_are_known_by_the_name_of_their_column(run, here, rows):
     assert table(followed.out)["elevation_rad"].mean() < 1
 
 
+@pytest.mark.parametrize("lag", ["0", "1"])
+def test_range_rates_are_used_as_of_a_complete_log(run, here, lag):
+    flight = simulate("manoeuvre", seed=1, duration_s=30.0, dt_s=0.1)
+    slant = np.sqrt((flight.truth.position_m**2).sum(1))
+    rate = (flight.truth.position_m * flight.truth.velocity_mps).sum(1) / slant
+    rate += 0.3 * np.random.default_rng(0).standard_normal(len(rate))
+    rate[200] += 80.0
+    pairs = zip(flight.log.time_s.tolist(), flight.log.measurement.tolist(), rate.tolist(), strict=True)
+    log = text(f"{HEADER},range_rate_mps", *(",".join(map(repr, (t, *z, r))) for t, z, r in pairs))
+    followed = run("filter", "-", "--follow", "--lag", lag, stdin=log)
+    assert followed.code == 0
+    Path("a.csv").write_text(log)
+    whole = run("filter", "a.csv", "--editing", "live", "--lag", lag, "--summary", "none", "-o", "-")
+    pd.testing.assert_frame_equal(table(followed.out), table(whole.out))
+    found = table(followed.out)
+    assert found.outlier_range_rate[200] == 1
+    assert found.sigma_range_rate_mps[250:].median() < 0.3
+
+
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [

@@ -9,7 +9,7 @@ import json
 import pandas as pd
 import pytest
 
-from tests.cli.conftest import Result
+from tests.cli.conftest import Result, on_the_earth
 
 
 @pytest.fixture
@@ -34,6 +34,16 @@ def test_json_has_the_promised_keys(run, clean):
     for key in ("rmse_seed_m", "rmse_3d_m", "rmse_x_m", "rmse_v_mps", "max_error_m"):
         assert found[key] >= 0
     assert found["outliers"]["range"].keys() >= {"precision", "recall", "f1"}
+
+
+def test_a_truth_on_the_earth_is_brought_into_the_frame_of_the_site(run, clean):
+    earth = on_the_earth("flight.truth.csv", (48.0, 11.0, 500.0))
+    refused = run("score", clean, "--truth", earth)
+    assert refused.code == 1
+    assert "no site is known; say --site" in refused.err
+    found = run("score", clean, "--truth", earth, "--site", "48,11,500", "--format", "json")
+    local = run("score", clean, "--truth", "flight.truth.csv", "--format", "json")
+    assert json.loads(found.out)["rmse_3d_m"] == pytest.approx(json.loads(local.out)["rmse_3d_m"], rel=1e-3)
 
 
 def test_exchanged_axes_are_reported(run, clean):

@@ -8,7 +8,7 @@ import pandas
 import pytest
 
 from ftproc.correction.training import descent, study
-from tests.cli.conftest import Result
+from tests.cli.conftest import Result, on_the_earth
 
 PROJECT = Path(__file__).parents[2]
 SMALL = ("--population", 6, "--generations", 2, "--epochs", 5, "--hidden", 4)
@@ -28,6 +28,16 @@ def test_from_logs_with_truth(run, here):
     assert trained.out.startswith("Correction model, schema 2\ntraining: editing two-pass, epochs 5, features auto, ")
     assert run("train", "--show", "model.safetensors") == Result(0, trained.out, "")
     assert run("filter", "0.parquet", "--model", "model.safetensors", "-o", "clean.csv").code == 0
+
+
+def test_a_truth_on_the_earth_needs_the_site(run, here):
+    pairs = [part for number in range(3) for part in simulate(run, number)]
+    earth = [on_the_earth(part, (48.0, 11.0, 500.0)) if part.endswith("truth.csv") else part for part in pairs]
+    refused = run("train", *earth, *SMALL, "-o", "model.safetensors")
+    assert refused.code == 1
+    assert "say --site LAT,LON,HEIGHT" in refused.err
+    trained = run("train", *earth, *SMALL, "--site", "48,11,500", "-o", "model.safetensors")
+    assert trained.code == 0, trained.err
 
 
 def test_from_past_logs_without_truth(run, here):

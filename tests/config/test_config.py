@@ -31,6 +31,7 @@ column = "RNG"
 unit = "km"
 sigma_ft = 10
 bias_km = 0.002
+rate_interval_mps = 60
 [azimuth]
 from = "north"
 sense = "anticlockwise"
@@ -88,7 +89,7 @@ def test_every_key_is_understood():
     )  # fmt: skip
     assert found.station == Station(
         "north", "anticlockwise", pytest.approx(math.pi / 2), "zenith",
-        (2.0, pytest.approx(0.002 * math.pi / 200), pytest.approx(math.radians(-0.5))), -0.02, Air(-3.0, 900.0),
+        (2.0, pytest.approx(0.002 * math.pi / 200), pytest.approx(math.radians(-0.5))), -0.02, Air(-3.0, 900.0), 60.0,
     )  # fmt: skip
     assert (found.model, found.keep_columns) == ("none", True)
     assert found.units == {"time": "ms", "range": "km", "height": "ft"}
@@ -128,6 +129,7 @@ OPTIONS = st.fixed_dictionaries(
         "columns": st.dictionaries(st.sampled_from(["time", "range", "azimuth"]), names, min_size=1),
         "units": st.just({"range": "km"}) | st.just({"time": "us", "azimuth": "mil", "elevation": "gon"}),
         "time_offset_s": numbers,
+        "range_rate_interval_mps": numbers,
         "azimuth_from": st.just("north"),
         "azimuth_sense": st.sampled_from(["clockwise", "anticlockwise"]),
         "azimuth_zero_rad": angles,
@@ -179,7 +181,7 @@ def test_a_model_lies_beside_its_file(tmp_path, monkeypatch):
     ("text", "sentence"),
     [
         ("[range]\nbais_m = 1", '[range] has no key "bais_m"; did you mean "bias_m"? Its keys are: column, unit, '
-         "sigma_UNIT, bias_UNIT."),
+         "sigma_UNIT, bias_UNIT, rate_interval_mps."),
         ("[azimut]\nzero_deg = 1", 'there is no section "azimut"; did you mean "azimuth"? The sections: [site], '
          "[file], [time], [range], [azimuth], [elevation], [height], [refraction], [filter]."),
         ("[file]\nwidths = '8,x'", '[file] widths = "8,x": expected widths such as "10,12,12,12".'),

@@ -23,7 +23,7 @@ def seen(name, place, components, during=(0.0, 60.0), offset_m=0.0, away=None):
     place = np.array(place, float)
     z = geometry.measured(path, place, np.eye(3)) + SIGMA * np.random.default_rng(1).standard_normal((len(path), 3))
     z[:, [c for c in range(3) if c not in components]] = np.nan
-    return Seen(name, TIME_S[here], z, place, np.eye(3), np.zeros(6), np.full(3, np.nan), np.zeros(z.shape, bool))
+    return Seen(name, TIME_S[here], z, place, np.eye(3), np.zeros(8), np.full(3, np.nan), np.zeros(z.shape, bool))
 
 
 def error_m(stations):

@@ -30,7 +30,7 @@ def fused(tmp_path_factory):
 def test_biases_of_the_radar_are_found(fused):
     simulated, found = fused
     (radar,) = simulated.stations
-    off = np.abs(found.constants.estimate[0] - radar.biases) / found.constants.sigma[0]
+    off = np.abs(found.constants.estimate[0, :6] - radar.biases) / found.constants.sigma[0, :6]
     assert (off < 3.5).all()
     assert (found.constants.sigma[0, :3] < 0.5 * radar.prior[:3]).all()
     assert found.constants.sigma[0, 5] < 0.5 * radar.prior[5]
@@ -43,6 +43,27 @@ def test_the_trajectory_is_inside_its_sigmas(fused):
     at = np.stack([np.interp(track.time_s, truth.time_s, axis) for axis in truth.position_m.T], 1)
     assert (np.abs(track.state[:, :3] - at) <= 3 * track.sigma[:, :3]).mean() > 0.97
     assert np.sqrt(((track.state[:, :3] - at) ** 2).sum(1).mean()) < 3.0
+
+
+@pytest.mark.parametrize("column", ["nacp", "hdop"])
+def test_a_stated_accuracy_weighs_each_position(tmp_path, column):
+    """Half of the positions are ten times as noisy, and say so: that is better than not knowing which."""
+    simulated = simulate_range("range-gnss", seed=5, duration_s=120.0)
+    time_s, place = simulated.gnss
+    bad = (time_s // 10) % 2 == 1
+    noise = 30.0 * np.random.default_rng(1).standard_normal((len(place), 3)) * bad[:, None]
+    point = positions.local(place, simulated.origin) + noise
+    place = np.array([place_at(simulated.origin, each) for each in point])
+    stated = {"nacp": np.where(bad, 8, 10), "hdop": np.where(bad, 10.0, 1.0)}[column]
+    off = []
+    for more in ({}, {column: stated}):
+        ranges.write(simulated, str(tmp_path), None)
+        table = pd.DataFrame(place, columns=["lat_deg", "lon_deg", "height_m"]).assign(time_s=time_s, **more)
+        table.to_csv(tmp_path / "gnss.csv", index=False)
+        found = flight.fuse(range_file.load(str(tmp_path / "range.toml")), FilterSettings(smooth=True)).trajectory
+        at = np.stack([np.interp(found.time_s, simulated.truth.time_s, x) for x in simulated.truth.position_m.T], 1)
+        off.append(np.sqrt(((found.state[:, :3] - at) ** 2).sum(1).mean()))
+    assert off[1] < 0.9 * off[0]
 
 
 def test_the_edited_positions_stand_beside(fused):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ftproc.core.filtering.biases import PARAMETERS
 from ftproc.files.writing import ranges
 from ftproc.fusion import logs, range_file
 from ftproc.fusion.estimation import engine, whole
@@ -106,7 +107,7 @@ def test_what_other_stretches_have_said_narrows_the_biases(stations):
                 for each in stations]  # fmt: skip
         return engine.fuse(part, FilterSettings().gate, None, known, lambda number: None)
 
-    nothing = Said.nothing(6 * len(stations))
+    nothing = Said.nothing(PARAMETERS * len(stations))
     first, alone = half(nothing, 0.0, 60.0), half(nothing, 60.0, 121.0)
     second = half(engine.said(first), 60.0, 121.0)
     ratio = second.constants.sigma / np.maximum(alone.constants.sigma, SILENT)
@@ -127,7 +128,7 @@ def said_of(readings, k, seed):
 
 
 def test_what_is_said_adds_up_and_can_be_taken_of_some():
-    prior = np.array([[2.0, 1e-3, 1e-3, 0, 0, 0.1], [0, 1e-3, 2e-3, 1e-4, 1e-4, 0.0]])
+    prior = np.array([[2.0, 1e-3, 1e-3, 0, 0, 0.1, 0, 0], [0, 1e-3, 2e-3, 1e-4, 1e-4, 0.0, 0, 0]])
     free = np.flatnonzero(prior.ravel() > 0)
     said, design, z = said_of(50, len(free), 1)
     one, other = (Said(design[h].T @ z[h], design[h].T @ design[h]) for h in (slice(20), slice(20, None)))

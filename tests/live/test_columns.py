@@ -20,6 +20,12 @@ HEADER = "time_s,range_m,azimuth_rad,elevation_rad\n"
 
 def followed(text, recipe=None, at_once=3):
     """The readings (n, 4), the error of the row after them, and what is said; so many lines come at once."""
+    readings, *others = followed_with_rates(text, recipe, at_once)
+    return readings[:, :4], *others
+
+
+def followed_with_rates(text, recipe=None, at_once=3):
+    """The same with range rates, (n, 5)."""
     said = []
     reader = Reader("a.csv", recipe or Recipe(), said.append)
     texts = text.splitlines()
@@ -128,3 +134,24 @@ def test_a_head_that_does_not_end_is_refused_before_it_fills_the_memory(line):
 def test_a_long_head_may_have_a_table_below_it():
     readings, fault, _ = followed("# note\n" * 1900 + HEADER + ROWS, at_once=1000)
     assert (len(readings), fault) == (3, None)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "expected"),
+    [
+        ("range_rate_mps", {}, [-30.0, np.nan]),
+        ("Doppler (km/h)", {}, [-30 / 3.6, np.nan]),
+        ("closing_speed_mps", {}, [30.0, np.nan]),
+        ("RR", {"columns": "range_rate=RR", "units": "range_rate=kt"}, [-30 * 1852 / 3600, np.nan]),
+        ("remark", {}, [np.nan, np.nan]),
+    ],
+)
+def test_range_rates_are_read_as_in_a_complete_log(tmp_path, name, options, expected):
+    text = f"time_s,range_m,azimuth_rad,elevation_rad,{name}\n0,1000,0.1,0.2,-30\n1,970,0.1,0.2,\n"
+    recipe = Recipe(**options)
+    readings, _, _ = followed_with_rates(text, recipe)
+    np.testing.assert_allclose(readings[:, 4], expected)
+    (tmp_path / "a.csv").write_text(text)
+    whole = logs.read(tmp_path / "a.csv", **recipe.reading())
+    if whole.range_rate is not None:
+        np.testing.assert_allclose(whole.range_rate, expected)

@@ -126,9 +126,78 @@ def test_a_few_are_not_used(plain):
     assert "range_rate" not in found.metadata["summary"]["components"]
 
 
+def test_ambiguous_ones_are_unwrapped(plain):
+    flight, without = plain
+    log = with_rates(flight, 0.5)
+    turned = log.range_rate - 60.0 * np.round(log.range_rate / 60.0)
+    assert (turned != log.range_rate).mean() > 0.5
+    wrapped = replace(log, range_rate=turned, station=replace(log.station, range_rate_interval_mps=60.0))
+    found, known = filter_log(wrapped, SMOOTH), filter_log(log, SMOOTH)
+    np.testing.assert_allclose(errors(found, flight.truth), errors(known, flight.truth), rtol=0.02)
+    assert (errors(found, flight.truth) < 0.9 * without).all()
+
+
+def test_the_scenario_of_ambiguous_ones_is_as_good_as_the_other():
+    both = [simulate(name, seed=2, duration_s=400.0) for name in ("radar-doppler", "radar-ambiguous")]
+    assert np.nanmax(np.abs(both[1].log.range_rate)) <= 30.0
+    one, other = (errors(filter_log(flight.log, SMOOTH), flight.truth) for flight in both)
+    np.testing.assert_allclose(one, other, rtol=0.03)
+
+
 def test_the_scenario_has_them():
     flight = simulate("radar-doppler", seed=1)
     found = filter_log(flight.log, SMOOTH)
     without = filter_log(replace(flight.log, range_rate=None), SMOOTH)
     assert (errors(found, flight.truth) <= 1.01 * errors(without, flight.truth)).all()
     assert found.metadata["summary"]["components"]["range_rate"]["noise_mps"] == pytest.approx(0.5, rel=0.15)
+
+
+LIVE = FilterSettings(editing="live", lag_s=0.0)
+
+
+@pytest.fixture(scope="module")
+def live(plain):
+    flight, _ = plain
+    return filter_log(flight.log, LIVE)
+
+
+def causal_errors(found, truth):
+    known = np.isfinite(found.state).all(1) & (found.time_s > 15)
+    off = (found.state[:, :3] - truth.position_m, found.state[:, 3:6] - truth.velocity_mps)
+    return np.array([np.sqrt((each[known] ** 2).sum(1).mean()) for each in off])
+
+
+def test_live_is_better_with_them(plain, live):
+    flight, _ = plain
+    found = filter_log(with_rates(flight, 0.5), LIVE)
+    ratio = causal_errors(found, flight.truth) / causal_errors(live, flight.truth)
+    assert ratio[0] < 0.95
+    assert ratio[1] < 0.8
+    assert found.metadata["summary"]["components"]["range_rate"]["noise_mps"] == pytest.approx(0.5, rel=0.2)
+
+
+def test_live_a_useless_one_changes_nothing(plain, live):
+    flight, _ = plain
+    found = filter_log(with_rates(flight, 100.0), LIVE)
+    settled = found.time_s > 10  # before, the velocity is vague, and they do tell something of it
+    np.testing.assert_array_equal(found.state[settled], live.state[settled])
+    turned = filter_log(replace(flight.log, range_rate=-with_rates(flight, 0.5).range_rate), LIVE)
+    assert causal_errors(turned, flight.truth)[1] < 0.8 * causal_errors(live, flight.truth)[1]
+
+
+def test_live_knows_no_rate_of_the_future(plain):
+    flight, _ = plain
+    log = with_rates(flight, 0.5)
+    first = filter_log(log, LIVE)
+    rate = log.range_rate.copy()
+    rate[700:715] += 100.0
+    other = filter_log(replace(log, range_rate=rate), LIVE)
+    np.testing.assert_array_equal(first.state[:700], other.state[:700])
+    assert np.isin(np.asarray(other.extra.column("outlier_range_rate"))[700:715], (1, 2)).all()
+
+
+def test_the_paper_s_recursion_has_no_rates(plain):
+    flight, _ = plain
+    forward = FilterSettings(editing="forward")
+    one, other = (filter_log(log, forward) for log in (flight.log, with_rates(flight, 0.5)))
+    np.testing.assert_array_equal(one.state, other.state)

@@ -1,8 +1,8 @@
 """Unknown constants of the measurements beside the smoother: Friedland's separate-bias form.
 
-The biases b of the stations (range, azimuth, elevation, tilts, clock) are few and constant. The filter runs without
-them; what it would do otherwise is linear in them (Friedland 1969), so that only columns are carried along: with
-design D = d(reading)/db and the whitened quantities of `smoother`,
+The biases b of the stations (range, azimuth, elevation, tilts, clock; of heights offset and scale) are few and
+constant. The filter runs without them; what it would do otherwise is linear in them (Friedland 1969), so that only
+columns are carried along: with design D = d(reading)/db and the whitened quantities of `smoother`,
 
     S <- Phi S       C = L^-1 (D + H S)     S <- S - U' C          forward: S = dx/db, C = -dy/db
     info += C' C     score += C' y                                 of the likelihood with the trajectory integrated out
@@ -11,7 +11,7 @@ design D = d(reading)/db and the whitened quantities of `smoother`,
 
 Columns are directions of the space of biases, scaled so that the biases' covariance in them is the unit matrix. So S^s
 S^s' is what they add to the covariance of the state; a leave-one-out residual u / M becomes u / (M - c c') where c is
-its row of L^-T V.
+its row of L^-T V. Scalars beside the readings (`beside`) are updates of their own, before them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import empty, kernel, part, variant, zeros
-from ftproc.core.filtering import backward, smoother
+from ftproc.core.filtering import backward, beside, smoother
 from ftproc.core.filtering.filters import (
     FILTER,
     POSTERIOR,
@@ -45,25 +45,28 @@ from ftproc.core.signatures import Cube, Indices, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
 
-PARAMETERS = 6  # of a station: range, azimuth, elevation, tilt about its x and about its y, clock
+PARAMETERS = 8  # of a station: range, azimuth, elevation, tilt about its x and about its y, clock; height and its scale
+UNKNOWN = 5  # the first of those on which scalars beside the readings depend, see `beside`
 BLOCK = 1024  # samples of which S and C are kept
-LEAST_LEFT = 1e-6  # of a reading's information: what biases leave of it at least
 
 
 class Directions(NamedTuple):
     """How the readings depend on the biases. design: (n, 3, 3) derivative of each component by the two tilts and the
     clock offset of its station, m or rad per rad and s; by its own bias it is one. columns: (PARAMETERS * stations, m)
-    directions, each a set of biases."""
+    directions, each a set of biases. beside: (kinds, n, UNKNOWNS) derivative of each scalar beside the readings by the
+    last of the biases."""
 
     design: FloatArray
     columns: FloatArray
+    beside: FloatArray = np.zeros((0, 0, beside.UNKNOWNS))
 
 
 class Memory(NamedTuple):
     """`smoother.Memory`, and for m columns: station (n,) of each sample; design (n, 3, 3), columns of `Directions`;
     by: the motion; state (9, m) S; adjoint (9, m) l; at_block (blocks, 9, m) S before each block; in_block
     (BLOCK, 9, m) S after each sample and white (BLOCK, 3, m) C; score (m,), info (m, m); spread (n, 9) the variance
-    that biases add to the filter's state."""
+    that biases add to the filter's state. scalars (kinds, n, WIDTH) beside the readings, and their white_beside
+    (kinds * BLOCK, m) C."""
 
     filters: Filters
     before: Filters
@@ -84,17 +87,21 @@ class Memory(NamedTuple):
     score: Vector
     info: Matrix
     spread: Matrix
+    scalars: Cube
+    white_beside: Matrix
 
 
 class Biased(NamedTuple):
     """A smoother run that allows for biases. run: of `smoother`; its sigmas and residuals include them. spread: (n, 9)
     the variance that they add to the filter's state, m2 and so on. score (m,), info (m, m): of the log-likelihood by
-    the biases in the directions given."""
+    the biases in the directions given. beside: (kinds, n, 2) leave-one-out residuals of the scalars beside the
+    readings, and their variances."""
 
     run: SmootherRun
     spread: FloatArray
     score: FloatArray
     info: FloatArray
+    beside: FloatArray = np.zeros((0, 0, 2))
 
 
 @part
@@ -119,6 +126,14 @@ def _derivative(memory: Any, k: int, i: int, c: int) -> float:
 
 
 @part
+def _of_scalars(memory: Any, k: int) -> FloatArray:
+    """(UNKNOWNS, m) the columns on which the scalars beside the readings of a sample depend."""
+    at = PARAMETERS * memory.station[k] + UNKNOWN
+    found: FloatArray = memory.columns[at : at + beside.UNKNOWNS]
+    return found
+
+
+@part
 def _carry(memory: Any, f: Filter, k: int, interval: float, place: int) -> None:
     s, g, u, root, y, h = memory.state, f.g, f.u, f.root, f.y, 0.5 * interval * interval
     white, m = memory.white[max(place, 0)], s.shape[1]
@@ -130,6 +145,11 @@ def _carry(memory: Any, f: Filter, k: int, interval: float, place: int) -> None:
             s[i + 3, c] += interval * s[i + 6, c]
     if memory.by.acts:
         forces.kick_columns(s, f, memory.by, k, interval)
+    for kind in range(len(memory.scalars)):
+        row, at = memory.scalars[kind, k], kind * len(memory.white) + max(place, 0)
+        beside.carry(s, row, _of_scalars(memory, k), memory.white_beside[at])
+        if place >= 0:
+            beside.count(row, memory.white_beside[at], memory.score, memory.info)
     for i in range(3):
         g0, g1, g2 = g[i, 0], g[i, 1], g[i, 2]
         for c in range(m):
@@ -212,13 +232,16 @@ def _carry_back(memory: Any, update: Update, sample: Sample, k: int, interval: f
             left.residual_variance[i] += lost
         else:
             known = 1 / (left.residual_variance[i] - sample.noise[i] * (1 - 1 / update.used[i]))
-            rest = max(known - lost, LEAST_LEFT * known)
+            rest = max(known - lost, beside.LEAST_LEFT * known)
             left.residual[i] *= known / rest
             left.residual_variance[i] = 1 / rest + sample.noise[i] * (1 - 1 / update.used[i])
     for i in range(3):
         g0, g1, g2 = g[0, i], g[1, i], g[2, i]
         for c in range(m):
             a[i, c] += g0 * white[0, c] + g1 * white[1, c] + g2 * white[2, c]
+    for kind in range(len(memory.scalars) - 1, -1, -1):
+        row, at = memory.scalars[kind, k], kind * len(memory.white) + place
+        beside.carry_back(a, row, _of_scalars(memory, k), memory.white_beside[at], smoothed)
     if memory.by.acts:
         forces.kick_columns_back(a, memory.filters[0], memory.by, k, interval)
     for i in range(3):
@@ -249,6 +272,10 @@ def smooth_biased(log: Observations, model: Model, start: Start, directions: Dir
     n, m, first = len(log.time_s), directions.columns.shape[1], start.sample
     blocks, rows = -(-(n - first) // BLOCK), min(n - first, BLOCK)
     estimates, residuals = zeros(ESTIMATED, n), zeros(LEFT, n)
+    samples, profile = log.samples(model.noise_variance), model.profile_of(log)
+    kinds = len(profile.beside)
+    if kinds:
+        profile.beside[:, :, beside.UNKNOWN :] = directions.beside
     memory = Memory(
         model.filter(start), empty(FILTER, blocks), scratch(UPDATE, rows), scratch(POSTERIOR, rows),
         zeros(backward.BACKWARD), estimates, residuals,
@@ -256,10 +283,10 @@ def smooth_biased(log: Observations, model: Model, start: Start, directions: Dir
         np.ascontiguousarray(directions.columns), model.motion,
         np.zeros((9, m)), np.zeros((9, m)), np.zeros((blocks, 9, m)), np.zeros((rows, 9, m)),
         np.zeros((rows, 3, m)), np.zeros(m), np.zeros((m, m)), np.zeros((n, 9)),
+        profile.beside, np.zeros((kinds * rows, m)),
     )  # fmt: skip
     memory.back["paths"] = 1.0
     jerk = np.zeros((len(model.jerk), 2, 3))
-    samples, profile = log.samples(model.noise_variance), model.profile(log.time_s)
     likelihood = _sweep_biased(Span(first, n, first), samples, profile, memory, jerk, STATES)
     covariance = memory.back["cov"][0] + memory.state @ memory.state.T
     head = Start(first, memory.back["state"][0, :9].copy(), covariance)
@@ -268,4 +295,6 @@ def smooth_biased(log: Observations, model: Model, start: Start, directions: Dir
     fields |= {name: np.ascontiguousarray(residuals[name]) for name in LEFT.names or ()}
     run = SmootherRun(**fields, log_likelihood=likelihood, heads=(head,))
     info = memory.info + np.tril(memory.info, -1).T
-    return Biased(run, memory.spread, memory.score, info)
+    left = profile.beside[:, :, beside.RESIDUAL : beside.SPREAD + 1]
+    left[:, :first] = np.nan
+    return Biased(run, memory.spread, memory.score, info, left)

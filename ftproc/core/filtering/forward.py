@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import empty, kernel, part, record, variant, zeros
-from ftproc.core.filtering import rates, ukf
+from ftproc.core.filtering import beside, ukf
 from ftproc.core.filtering.filters import ColouredFilters, Filter, Filters
 from ftproc.core.filtering.records import (
     ROW,
@@ -116,8 +116,8 @@ def _loop(
         for i in range(9):
             row.predicted[i] = f.x[i]
         row.nis = math.nan
-        if len(profile.rates) > 0:
-            likelihood += rates.take(f.x, f.p, profile.rates, k)
+        if len(profile.beside) > 0:
+            likelihood += beside.take(f.x, f.p, profile.beside, k)
         gained, lost = _update(f, sample, extra, row)
         likelihood += gained
         store(f, row)
@@ -215,27 +215,27 @@ def filter_log(log: Observations, model: Model, starts: list[Start], extended: b
     return run_log(_run_coloured if model.coloured else run_weighted, log, model, starts, extended)
 
 
-def filter_with_rates(log: Observations, model: Model, starts: list[Start]) -> tuple[FilterRun, FloatArray]:
-    """The same, and what `rates` leaves of the log's range rates; without rows if it has none."""
-    return run_with_rates(_run_coloured if model.coloured else run_weighted, log, model, starts, False)
+def filter_with_beside(log: Observations, model: Model, starts: list[Start]) -> tuple[FilterRun, FloatArray]:
+    """The same, and what `beside` leaves of the log's scalars (kinds, n, WIDTH)."""
+    return run_with_beside(_run_coloured if model.coloured else run_weighted, log, model, starts, False)
 
 
 def run_log(run: Recursion, log: Observations, model: Model, starts: list[Start], extra: Any) -> FilterRun:
     """A run over the whole log by a recursion that is re-initialized at each start; extra: see `recursion`."""
-    return run_with_rates(run, log, model, starts, extra)[0]
+    return run_with_beside(run, log, model, starts, extra)[0]
 
 
-def run_with_rates(
+def run_with_beside(
     run: Recursion, log: Observations, model: Model, starts: list[Start], extra: Any
 ) -> tuple[FilterRun, FloatArray]:
-    """The same, with what `rates` leaves of the log's range rates."""
+    """The same, with what `beside` leaves of the log's scalars."""
     samples, profile = log.samples(model.noise_variance), model.profile_of(log)
     rows = empty(ROW, len(log.time_s))
     likelihood = 0.0
     for start, stop in between(starts, len(log.time_s)):
         likelihood += run(Span(start.sample, stop, start.sample), samples, profile, model.filter(start), extra, rows)[1]
     lead_in(log, model, starts[0], rows)
-    return FilterRun.of(log.time_s, rows, likelihood), profile.rates
+    return FilterRun.of(log.time_s, rows, likelihood), profile.beside
 
 
 def lead_in(log: Observations, model: Model, start: Start, rows: Any) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import empty, kernel, record, zeros
-from ftproc.core.filtering import rates
+from ftproc.core.filtering import beside as layout
 from ftproc.core.filtering.filters import COLOURED, FILTER
 from ftproc.core.model.motion import WHITE_JERK, Motion, Profile
 from ftproc.core.signatures import Layout, Matrix, Vector
@@ -87,49 +87,65 @@ class Sites(NamedTuple):
         return self._replace(station=self.station[rows])
 
 
-class Rates(NamedTuple):
-    """Range rates beside the readings of a log: value (n,) m/s, NaN where missing, the variance of their noise and
-    their weight (n,), zero for one that is not used."""
+class Scalars(NamedTuple):
+    """One scalar of each sample beside its readings, see `beside`, such as range rates: value (n,) m/s or m, NaN where
+    missing, the variance (n,) of their noise and their weight (n,), zero for one that is not used; the kind, and the
+    point, (3,) or of each sample (n, 3)."""
 
     value: FloatArray
-    variance: float
+    variance: FloatArray
     weight: FloatArray
+    kind: float = layout.RATE
+    point: FloatArray = np.zeros(3)
 
-    def part(self, rows: slice | IntArray) -> Rates:
+    @classmethod
+    def rates(cls, value: FloatArray, variance: float, weight: FloatArray) -> Scalars:
+        """Range rates of a station at the origin, all of the same noise."""
+        return cls(value, np.full(len(value), variance), weight)
+
+    def part(self, rows: slice | IntArray) -> Scalars:
         """Of some of the samples."""
-        return self._replace(value=self.value[rows], weight=self.weight[rows])
+        point = self.point if self.point.ndim == 1 else self.point[rows]
+        return self._replace(
+            value=self.value[rows], variance=self.variance[rows], weight=self.weight[rows], point=point
+        )
 
-    def spread(self, row: IntArray, samples: int) -> Rates:
+    def spread(self, row: IntArray, samples: int) -> Scalars:
         """Of so many samples, among which the own ones are at rows (n,)."""
-        value, weight = np.full(samples, np.nan), np.zeros(samples)
-        value[row], weight[row] = self.value, self.weight
-        return self._replace(value=value, weight=weight)
+        value, variance, weight = np.full(samples, np.nan), np.ones(samples), np.zeros(samples)
+        value[row], variance[row], weight[row] = self.value, self.variance, self.weight
+        point = self.point
+        if point.ndim > 1:
+            point = np.zeros((samples, 3))
+            point[row] = self.point
+        return self._replace(value=value, variance=variance, weight=weight, point=point)
 
     def rows(self) -> FloatArray:
-        """What the sweeps work on, see `rates`."""
-        found = np.full((len(self.value), rates.WIDTH), np.nan)
-        found[:, rates.VALUE], found[:, rates.VARIANCE] = self.value, self.variance
-        found[:, rates.WEIGHT] = self.weight
+        """What the sweeps work on, see `beside`; without the derivatives."""
+        found = np.full((len(self.value), layout.WIDTH), np.nan)
+        found[:, layout.VALUE], found[:, layout.VARIANCE] = self.value, self.variance
+        found[:, layout.WEIGHT], found[:, layout.KIND] = self.weight, self.kind
+        found[:, layout.POINT : layout.POINT + 3] = self.point
         return found
 
 
 class Observations(NamedTuple):
     """A log as the filters see it: time_s (n,), measurement (n, 3) slant range m, azimuth and elevation rad, NaN where
     missing, the weight (n, 3) in [0, 1] of each reading, zero for one that is not used, how the noise of single
-    readings differs, if it does, who took them, if not the one station at the origin, and the range rates beside."""
+    readings differs, if it does, who took them, if not the one station at the origin, and what is measured beside."""
 
     time_s: FloatArray
     measurement: FloatArray
     weight: FloatArray
     uneven: Uneven | None = None
     sites: Sites | None = None
-    rates: Rates | None = None
+    beside: tuple[Scalars, ...] = ()
 
     def part(self, rows: slice | IntArray) -> Observations:
         """Some of the samples."""
         uneven = None if self.uneven is None else self.uneven.part(rows)
         sites = None if self.sites is None else self.sites.part(rows)
-        beside = None if self.rates is None else self.rates.part(rows)
+        beside = tuple(each.part(rows) for each in self.beside)
         return Observations(self.time_s[rows], self.measurement[rows], self.weight[rows], uneven, sites, beside)
 
     def samples(self, noise_variance: FloatArray, made: Any = None) -> Any:
@@ -220,9 +236,9 @@ class Model(NamedTuple):
         return Profile(self.jerk, self.knot_s, float(time_s[0]), self.motion)
 
     def profile_of(self, log: Observations) -> Profile:
-        """The same with the range rates of the log."""
+        """The same with what the log has beside its readings."""
         found = self.profile(log.time_s)
-        return found if log.rates is None else found._replace(rates=log.rates.rows())
+        return found._replace(beside=np.stack([each.rows() for each in log.beside])) if log.beside else found
 
     def filter(self, start: Start) -> Any:
         """An array of one `filters.Filter` record at a start; of one `filters.Coloured` if some noise is correlated."""

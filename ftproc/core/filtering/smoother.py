@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from ftproc.core import pacing
 from ftproc.core.compiled import empty, kernel, part, variant
-from ftproc.core.filtering import backward, heads, rates, ukf
+from ftproc.core.filtering import backward, beside, heads, ukf
 from ftproc.core.filtering.filters import OFFSETS, Filter, Update, retain, retain_linearised, retain_state
 from ftproc.core.filtering.forward import ESTIMATED, LEFT, Span, advance, extrapolated
 from ftproc.core.filtering.memory import ColouredMemory, Memory, Scores, Slope, memory_of, scratch
@@ -160,8 +160,8 @@ def _swept_through(
             sample, interval = samples[k], samples[k].time_s - samples[max(k - 1, span.first)].time_s
             if k > span.first:
                 advance(f, samples, k, profile)
-            if len(profile.rates) > 0:
-                gain = rates.take(f.x, f.p, profile.rates, k)
+            if len(profile.beside) > 0:
+                gain = beside.take(f.x, f.p, profile.beside, k)
                 likelihood += gain if turn <= last else 0.0
             nis, gained = take_in(f, sample)
             _carry(memory, f, k, interval, k - low if turn >= last else -1)
@@ -192,8 +192,8 @@ def _swept_through(
                 for i in range(3):
                     residuals[k].residual[i] = back.residual[i]
                     residuals[k].residual_variance[i] = back.variance[i]
-            if len(profile.rates) > 0:
-                rates.absorb(back.r, back.n, back.pn, profile.rates, k)
+            if len(profile.beside) > 0:
+                beside.absorb(back.r, back.n, back.pn, profile.beside, k)
             _carry_back(memory, update, sample, k, interval, k - low, wanted)
             if k > span.first:
                 backward.score_wander(back, f, interval)
@@ -220,7 +220,7 @@ class _Swept(NamedTuple):
     estimates: Any
     residuals: Any
     heads: tuple[Start, ...]
-    rates: FloatArray
+    beside: FloatArray
 
 
 def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) -> _Swept:
@@ -244,7 +244,7 @@ def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) ->
             covariance = back["cov"] if wanted == STATES else heads.smoothed_covariance(p, back["n_first"])
             found.append(Start(start.sample, back["state"][:9].copy(), covariance[:9, :9].copy()))
     slopes = (Slope(*noise), Slope(*wander), fade, Slope(jerk[:, 0] * model.jerk, jerk[:, 1] * model.jerk))
-    return _Swept(Scores(likelihood, *slopes), estimates, residuals, tuple(found), profile.rates)
+    return _Swept(Scores(likelihood, *slopes), estimates, residuals, tuple(found), profile.beside)
 
 
 def likelihood_of(log: Observations, model: Model, starts: list[Start]) -> float:
@@ -257,11 +257,9 @@ def score_log(log: Observations, model: Model, starts: list[Start]) -> Scores:
     return _swept(log, model, starts, SCORES).scores
 
 
-def rate_residuals(log: Observations, model: Model, starts: list[Start]) -> tuple[FloatArray, FloatArray, float]:
-    """(n,) leave-one-out residuals of the log's range rates, m/s, NaN where missing, their variances (n,), and the
-    log-likelihood."""
-    found = _swept(log, model, starts, RESIDUALS)
-    return found.rates[:, rates.RESIDUAL], found.rates[:, rates.SPREAD], found.scores.log_likelihood
+def residuals_beside(log: Observations, model: Model, starts: list[Start]) -> FloatArray:
+    """(kinds, n, 2) leave-one-out residuals of the log's scalars, NaN where missing, and their variances."""
+    return _swept(log, model, starts, RESIDUALS).beside[:, :, beside.RESIDUAL : beside.SPREAD + 1]
 
 
 def smooth_log(log: Observations, model: Model, starts: list[Start], wanted: int = STATES) -> SmootherRun:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel
 from ftproc.core.components import totals
-from ftproc.core.filtering.records import Model, Observations, Start, Uneven
+from ftproc.core.filtering.records import Model, Observations, Scalars, Start, Uneven
 from ftproc.core.identification.scales import Scales
 from ftproc.core.model.measurement import wrapped
 from ftproc.core.signatures import Flags, Indices, Matrix, Vector
@@ -65,14 +65,21 @@ def merge(log: Observations, starts: list[Start], count: int) -> tuple[Observati
         size = np.bincount(group)[:, None]
         means = (np.stack([np.bincount(group, each[:, c]) for c in range(3)], 1) / size for each in log.uneven)
         uneven = Uneven(*means)
-    rates = None
-    if log.rates is not None:
-        used = log.rates.weight * np.isfinite(log.rates.value)
-        weight = np.bincount(group, used).astype(float)
-        total = np.bincount(group, np.where(used > 0, log.rates.value, 0.0) * used)
-        value = np.divide(total, weight, out=np.full(len(weight), np.nan), where=weight > 0)
-        rates = log.rates._replace(value=value, weight=weight)
-    return Observations(time, z, number, uneven, rates=rates), moved
+    beside = tuple(_mean_scalars(each, group) for each in log.beside)
+    return Observations(time, z, number, uneven, beside=beside), moved
+
+
+def _mean_scalars(scalars: Scalars, group: IntArray) -> Scalars:
+    """The means of those that are used, of each group; of one point."""
+    used = scalars.weight * np.isfinite(scalars.value)
+    weight = np.bincount(group, used).astype(float)
+
+    def mean(values: FloatArray) -> FloatArray:
+        total = np.bincount(group, np.where(used > 0, values, 0.0) * used)
+        found: FloatArray = np.divide(total, weight, out=np.full(len(weight), np.nan), where=weight > 0)
+        return found
+
+    return scalars._replace(value=mean(scalars.value), variance=mean(scalars.variance), weight=weight)
 
 
 @kernel

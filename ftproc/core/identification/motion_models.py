@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.filtering.records import FilterRun, Model, Observations, Rates, Start, Uneven
+from ftproc.core.filtering.records import FilterRun, Model, Observations, Scalars, Start, Uneven
 from ftproc.core.filtering.smoother import SmootherRun, likelihood_of, smooth_log
 from ftproc.core.identification import decimation, orbits
 from ftproc.core.identification.profile import ALLOWANCE, climbed, median_level, with_allowance
@@ -60,10 +60,10 @@ class Chosen(NamedTuple):
         """What such a share of the samples has of the gain."""
         return self._replace(gain=of * self.gain)
 
-    def with_rates(self, rates: Rates) -> Chosen:
-        """The same with these range rates of the log's own samples."""
-        spread = rates if self.row is None else rates.spread(self.row, len(self.log.time_s))
-        return self._replace(log=self.log._replace(rates=spread))
+    def with_beside(self, scalars: Scalars) -> Chosen:
+        """The same with these scalars of the log's own samples in place of its own."""
+        spread = scalars if self.row is None else scalars.spread(self.row, len(self.log.time_s))
+        return self._replace(log=self.log._replace(beside=(spread,)))
 
     def of_rows(self, run: Run) -> Run:
         """A run over the log with its steps, of the log's own samples."""
@@ -203,5 +203,5 @@ def with_steps(
     if log.sites is not None:
         sites = log.sites.part(np.searchsorted(row, number, "right") - 1)
     moved = [start._replace(sample=int(row[start.sample])) for start in starts]
-    rates = None if log.rates is None else log.rates.spread(row, len(number))
-    return Observations(time_s, measurement, weight, uneven, sites, rates), moved, row
+    beside = tuple(each.spread(row, len(number)) for each in log.beside)
+    return Observations(time_s, measurement, weight, uneven, sites, beside), moved, row

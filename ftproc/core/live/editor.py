@@ -18,6 +18,7 @@ from ftproc.core.editing.two_pass import Known
 from ftproc.core.filtering.initialization import FEWEST_READINGS
 from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.smoother import SmootherRun
+from ftproc.core.live import beside
 from ftproc.core.live.doubt import Doubt, is_track
 from ftproc.core.live.pace import WINDOW_SAMPLES, Clock, pace_of
 from ftproc.core.live.pieces import BLOCK, CROWD
@@ -51,7 +52,7 @@ class LiveEditor:
         self.known, self.lag_s, self.kind = known, lag_s, window
         self.window: Window | None = None
         self.confirmed_once = False
-        self.waiting = Waiting(np.empty(0), np.empty((0, 3)))
+        self.waiting = Waiting.nothing()
         self.absent: tuple[int, ...] = ()
         self.count = self.published = 0  # rows taken, and rows that have left
         self.next_edit, self.next_refresh, self.next_work = FEWEST, 0, 0
@@ -68,7 +69,9 @@ class LiveEditor:
         return Model(np.full(3, np.nan), np.empty((0, 3))) if self.window is None else self.window.allowed
 
     def push(self, time_s: FloatArray, measurement: FloatArray) -> list[Published]:
-        """Take the next rows, time_s (n,) never decreasing, measurement (n, 3); the rows that leave."""
+        """Take the next rows, time_s (n,) never decreasing, measurement (n, 3), or (n, 4) with range rates; the rows
+        that leave."""
+        measurement = beside.widened(measurement)
         found: list[Published] = []
         low = 0
         while low < len(time_s):
@@ -124,7 +127,7 @@ class LiveEditor:
         """Begin a track, if the readings so far agree on one."""
         self.next_edit = self.count + int(len(self.waiting.time_s) * (GROWTH - 1)) + 1
         self.pace = pace_of(self.waiting.time_s, self.lag_s)
-        seen = np.isfinite(self.waiting.measurement).sum(0)
+        seen = np.isfinite(self.waiting.measurement[:, : beside.RATE]).sum(0)
         few = seen < FEWEST_READINGS
         if seen.sum() < 2 * FEWEST_READINGS or ((few & (seen > 0)).any() and len(self.waiting.time_s) < PATIENCE):
             return
@@ -139,7 +142,7 @@ class LiveEditor:
         if not is_track(window):
             return
         self.window, self.confirmed_once = window, True
-        self.waiting = Waiting(np.empty(0), np.empty((0, 3)))
+        self.waiting = Waiting.nothing()
         self.next_edit = self.count + self._samples_between_edits(window)
         self._edited(window)
 
@@ -148,7 +151,7 @@ class LiveEditor:
         assert self.window is not None
         window = self.window
         low = max(min(len(window) - window.sizes.near, self.published - self._first), 0)
-        measurement = window.measurement[low:].copy()
+        measurement = window.came[low:]
         measurement[:, list(self.absent)] = np.nan
         self.waiting = Waiting(window.time_s[low:].copy(), measurement)
         self.window, self.absent, self.next_edit = None, (), self.count + FEWEST_READINGS
@@ -266,7 +269,7 @@ class LiveEditor:
     def _without_estimate(self, stop: int) -> Iterator[Published]:
         low, n = self.published - self._first, stop - self.published
         if n > 0:
-            kept = self.waiting.measurement if self.window is None else self.window.measurement
+            kept = self.waiting.measurement if self.window is None else self.window.came
             yield without_estimate(self.published, kept[low : low + n])
             self.published = stop
 

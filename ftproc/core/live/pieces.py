@@ -7,9 +7,15 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ftproc.core.filtering.records import Model, Start
+from ftproc.core.filtering.beside import WEIGHT
+from ftproc.core.filtering.forward import Span
+from ftproc.core.filtering.records import Model, Observations, Start, empty_rows
 from ftproc.core.identification.profile import MAX_KNOTS
+from ftproc.core.live.predictive_chain import run_predictive, run_predictive_coloured
+
+FloatArray = NDArray[np.float64]
 
 BLOCK = 4096  # samples between looks at a window that has nothing to learn
 CROWD = 1024  # samples between looks at a window whose clock stands still
@@ -46,3 +52,15 @@ def stretched(model: Model, span_s: float) -> Model:
     longer = knot_s / model.knot_s if knot_s > model.knot_s else 1.0
     before = np.minimum(longer * np.arange(max(math.ceil(span_s / knot_s), 1)), len(model.jerk) - 1).astype(int)
     return model._replace(jerk=model.jerk[before], knot_s=knot_s)
+
+
+def filtered(
+    log: Observations, span: Span, model: Model, filters: Any, chains: Any, first_s: float
+) -> tuple[Any, FloatArray]:
+    """`Row` records of a span of a log, filtered from a state, which is changed, and the weights of its range rates.
+    chains: of the decisions, which follow. first_s: where the jerk profile begins; NaN with the log."""
+    rows, profile = empty_rows(len(log.time_s)), model.profile_of(log)
+    profile = profile if math.isnan(first_s) else profile._replace(first_s=first_s)
+    run = run_predictive_coloured if model.coloured else run_predictive
+    run(span, log.samples(model.noise_variance), profile, filters, chains, rows)
+    return rows, profile.beside[0, :, WEIGHT] if log.beside else np.ones(len(rows))

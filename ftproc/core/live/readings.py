@@ -3,12 +3,14 @@ readings merely repeat the one before."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.core.editing import outlier_chain
 from ftproc.core.editing.screening import SHORTEST_STUCK, STUCK_ODDS
 from ftproc.order_statistics import medians
 
@@ -55,12 +57,12 @@ class Labels:
     """Good, isolated, patch or missing (0 to 3) for each reading as it comes, from the decisions so far."""
 
     def __init__(self) -> None:
-        self.run = np.zeros(3, int)  # of rejected readings, up to the newest
+        self.run = np.zeros(4, int)  # of rejected readings, up to the newest, of three components and range rates
 
     def add(self, used: FloatArray, measurement: FloatArray) -> FloatArray:
-        """(n, 3) of the next readings; used (n, 3) above zero for those that are good."""
+        """(n, c) of the next readings; used (n, c) above zero for those that are good."""
         label = np.full(used.shape, 3.0)
-        for c in range(3):
+        for c in range(used.shape[1]):
             there = np.flatnonzero(np.isfinite(measurement[:, c]))
             good = used[there, c] > 0
             rejected = np.cumsum(~good) + self.run[c]  # up to each reading, less those up to the last good one
@@ -70,11 +72,20 @@ class Labels:
         return label
 
     def reset(self, used: FloatArray, measurement: FloatArray) -> None:
-        """Count again from the decisions (n, 3) on the readings so far."""
-        for c in range(3):
+        """Count again from the decisions (n, c) on the readings so far."""
+        for c in range(used.shape[1]):
             good = used[np.isfinite(measurement[:, c]), c] > 0
             last = np.flatnonzero(good)
             self.run[c] = len(good) - 1 - last[-1] if len(last) else len(good)
+
+
+def labelled(used: FloatArray, measurement: FloatArray) -> FloatArray:
+    """(n, 4) labels of readings and range rates from the decisions (n, 4) on them."""
+    of_all = [
+        (np.ascontiguousarray(used[:, of]), np.ascontiguousarray(measurement[:, of])) for of in ([0, 1, 2], [3, 3, 3])
+    ]
+    first, rates = (outlier_chain.label_runs(weight, z, LONGEST_ISOLATED) for weight, z in of_all)
+    return np.column_stack([first, rates[:, 0]])
 
 
 class Repeats:
@@ -108,6 +119,18 @@ class Repeats:
                 if self.run[c] >= self._unlikely(c):
                     found.append((k, c, int(self.run[c])))
         return found
+
+    def runs(
+        self, new: FloatArray, measurement: FloatArray
+    ) -> tuple[list[tuple[int, int]], list[tuple[NDArray[np.int64], int]]]:
+        """Row and component of such repeats among the next rows (n, 3); and the samples of their runs, with those
+        before, among all readings (m, 3), and component."""
+        found, n = self.stuck(new), len(measurement) - len(new)
+        repeated = []
+        for (k, c, run), after in itertools.zip_longest(found, found[1:]):
+            if after is None or after[1:] != (c, run + 1):  # the run ends here, and holds those before
+                repeated.append((np.flatnonzero(np.isfinite(measurement[: n + k + 1, c]))[-run:], c))
+        return [each[:2] for each in found], repeated
 
     def _unlikely(self, c: int) -> float:
         """Repeats in a row that chance does not make, where so many of the earlier readings were repeats."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ftproc.core.editing import gate, two_pass
 from ftproc.core.editing.track import REACQUIRE_SAMPLES, GatedRecursion, Track
 from ftproc.core.filtering.records import Model, Observations, empty_rows
+from ftproc.core.live import beside
 from ftproc.core.live.pieces import Sizes
 from ftproc.core.live.readings import Columns, Labels
 from ftproc.core.live.window import Window
@@ -70,6 +71,9 @@ class GatedWindow(Window):
             self.gated_labels.reset(super().decided, self.measurement)
             self.track = Track(0, self.filters.copy(), gate.gate_of(self.how))
 
+    def _take(self, time_s: FloatArray, measurement: FloatArray) -> list[tuple[IntArray, int]]:
+        return super()._take(time_s, beside.widened(measurement[:, : beside.RATE]))  # the paper has no range rates
+
     def refresh(self) -> None:
         if self.learns:
             super().refresh()
@@ -92,7 +96,8 @@ class GatedWindow(Window):
         self.track = recursion.run(self.track.shifted(low), n - low, []).shifted(-low)
         new = rows[n - low :]
         kept = np.where(new["weight"] > gate.rejection_weight(self.how.gate), 1.0, 0.0)
-        self.gated.append(rows=new, used=kept, label=self.gated_labels.add(kept, measurement))
+        label = self.gated_labels.add(kept, measurement)
+        self.gated.append(rows=new, used=kept, label=np.column_stack([label, np.full(len(label), 3.0)]))
         self.reacquired += [low + start.sample for start in recursion.starts]
 
     def _gateable(self, low: int) -> FloatArray:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import ROW, empty_rows
+from ftproc.core.live.beside import WIDTH
 
 FloatArray = NDArray[np.float64]
 
@@ -17,8 +18,8 @@ LATELY = 8  # samples whose innovations tell whether the sigmas hold
 
 class Published(NamedTuple):
     """Rows that leave. first: number of the first, from zero. rows: `Row` records (n,), NaN where there is no estimate.
-    label: (n, 3) as of `outlier_chain.label_runs`. known: (n,) whether there is an estimate. reacquired: (n,) whether a
-    lost track was found again there."""
+    label: (n, 4) as of `outlier_chain.label_runs`, and of range rates. known: (n,) whether there is an estimate.
+    reacquired: (n,) whether a lost track was found again there."""
 
     first: int
     rows: Any
@@ -28,10 +29,14 @@ class Published(NamedTuple):
 
 
 class Waiting(NamedTuple):
-    """Rows before there is a track."""
+    """Rows before there is a track: time_s (n,), measurement (n, 4)."""
 
     time_s: FloatArray
     measurement: FloatArray
+
+    @classmethod
+    def nothing(cls) -> Waiting:
+        return cls(np.empty(0), np.empty((0, WIDTH)))
 
     def with_row(self, time_s: FloatArray, measurement: FloatArray) -> Waiting:
         return Waiting(np.concatenate([self.time_s, time_s]), np.concatenate([self.measurement, measurement]))
@@ -43,7 +48,7 @@ class Waiting(NamedTuple):
 
 
 def with_stand_ins(measurement: FloatArray, absent: tuple[int, ...]) -> FloatArray:
-    """The readings (n, 3) with constants for components that were never seen; they keep the filter upright, and nothing
+    """The readings (n, 4) with constants for components that were never seen; they keep the filter upright, and nothing
     that rests on them is published."""
     readings = measurement.copy()
     for c in absent:

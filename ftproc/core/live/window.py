@@ -8,7 +8,6 @@ profile follow; and brings the filter to the newest sample.
 
 from __future__ import annotations
 
-import itertools
 import math
 from functools import partial
 from typing import Any
@@ -16,18 +15,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.core.editing import outlier_chain, two_pass
+from ftproc.core.editing import two_pass
+from ftproc.core.filtering.beside import OPEN as RATE_OPEN
 from ftproc.core.filtering.forward import Span
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven, empty_rows
 from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
 from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.identification.scales import Scales, scales_of
-from ftproc.core.live.pieces import BLOCK, Sizes, piece, predicted, stretched
-from ftproc.core.live.predictive_chain import OPEN, chains_of, run_predictive, run_predictive_coloured
-from ftproc.core.live.readings import LONGEST_ISOLATED, Columns, Labels, Repeats, typical, used_lately
+from ftproc.core.live import beside
+from ftproc.core.live.pieces import BLOCK, Sizes, filtered, piece, predicted, stretched
+from ftproc.core.live.predictive_chain import OPEN, chains_of
+from ftproc.core.live.readings import Columns, Labels, Repeats, labelled, typical, used_lately
 from ftproc.core.live.readmission import Open, readmitted, settled
 from ftproc.core.live.whole import Whole
-from ftproc.core.model.motion import Profile
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -41,7 +41,8 @@ SLIDES = 0.25  # of the newest part that it is longer before it is cut
 
 class Window:
     """A track and the readings it rests on. white: whether its noise is taken for white and even. refresh_every: so
-    many times less often than usual. stand_ins: components whose readings are constants."""
+    many times less often than usual. stand_ins: components whose readings are constants. Readings come as (n, 4), the
+    last column being range rates."""
 
     white, refresh_every = False, 1
 
@@ -55,10 +56,10 @@ class Window:
         # Samples of re-acquisition; how many left before their lag, are kept no more, came before the track's start.
         self.reacquired, self.left, self.forgotten, self.begun = list[int](), 0, 0, -1
         self.under_way: Whole | None = None
-        nothing, ones = np.zeros((0, 3)), np.ones((0, 3))
+        nothing, ones, self.side = np.zeros((0, 3)), np.ones((0, 3)), beside.Rates()
         self.kept = Columns(
-            time_s=np.empty(0), measurement=nothing, possible=nothing > 0, weight=nothing, label=nothing, times=ones,
-            late=nothing, rows=empty_rows(0),
+            time_s=np.empty(0), measurement=nothing, possible=nothing > 0, weight=nothing, times=ones, late=nothing,
+            label=np.zeros((0, beside.WIDTH)), rate=np.empty(0), rate_weight=np.empty(0), rows=empty_rows(0),
         )  # fmt: skip
         self._bar(self._take(time_s, measurement))
 
@@ -76,6 +77,11 @@ class Window:
         return self.kept["measurement"]  # type: ignore[no-any-return]
 
     @property
+    def came(self) -> FloatArray:
+        """(n, 4) these with the range rates."""
+        return np.column_stack([self.measurement, self.kept["rate"]])
+
+    @property
     def decided(self) -> FloatArray:
         """(n, 3) one for the readings that are used, else zero."""
         return self.kept["weight"]  # type: ignore[no-any-return]
@@ -86,7 +92,7 @@ class Window:
         return True
 
     def shown(self, low: int, high: int) -> tuple[Any, FloatArray]:
-        """Copies of the `Row` records and of the labels (m, 3) of some samples."""
+        """Copies of the `Row` records and of the labels (m, 4) of some samples."""
         return self.kept["rows"][low:high].copy(), self.kept["label"][low:high].copy()
 
     def smoothed(self) -> SmootherRun:
@@ -94,7 +100,6 @@ class Window:
         return smooth_log(self._observed(slice(self.near, len(self))), self.allowed, [self.anchor], PATHS)
 
     def used_lately(self, count: int) -> FloatArray:
-        """See `readings.used_lately`."""
         return used_lately(self.measurement, self.kept["weight"], count)
 
     def in_doubt(self) -> bool:
@@ -137,11 +142,14 @@ class Window:
         kept["times"][samples], kept["late"][samples] = uneven
         kept["weight"][~kept["possible"]] = 0.0
         kept["weight"][self.known.accepted.of(self.time_s, self.measurement)] = 1.0
+        kept["rate_weight"][new], rate = RATE_OPEN, kept["rate"][samples]
+        self.side, kept["rate_weight"][samples] = beside.learned(found.log, found.model, found.starts, rate)
         starts = [start._replace(sample=int(samples[start.sample])) for start in found.starts]
         if len(new):
             log, start = self._observed(slice(0, len(self))), starts[-1]
             span = Span(start.sample, len(self), start.sample)
-            kept["weight"][new] = self._filtered(log, span, found.model, found.model.filter(start))["weight"][new]
+            rows, left = self._filtered(log, span, found.model, found.model.filter(start))
+            kept["weight"][new], kept["rate_weight"][new] = rows["weight"][new], left[new]
         model = found.model
         self.near = max(min(len(self) - self.sizes.near, self._waiting()), starts[0].sample, 0)
         self._count_from(starts)
@@ -160,8 +168,7 @@ class Window:
     def _ahead(self, starts: list[Start], model: Model, sample: int) -> Start:
         """The prediction at a sample, from the last start that is not after it."""
         start = [s for s in starts if s.sample <= sample][-1]
-        log, filters = self._observed(slice(0, sample + 1)), model.filter(start)
-        log.weight[sample] = 0.0
+        log, filters = beside.without(self._observed(slice(0, sample + 1)), sample), model.filter(start)
         self._filtered(log, Span(start.sample, sample + 1, start.sample), model, filters)
         return predicted(filters)
 
@@ -185,32 +192,32 @@ class Window:
         n = len(self)
         stuck = self._take(time_s, measurement)
         first_s = float(self.time_s[self.near])
-        rows = self._filtered(
+        rows, left = self._filtered(
             self._observed(slice(n - 1, len(self))), Span(1, 1 + len(time_s), 0), self.allowed, self.filters,
             self.chains, first_s,
         )  # fmt: skip
         rows["since_start"] += self.kept["rows"]["since_start"][n - 1]
-        self.kept["weight"][n:], self.kept["rows"][n:] = rows["weight"][1:], rows[1:]
-        self.kept["label"][n:] = self.labels.add(rows["weight"][1:], measurement)
+        used, kept = np.column_stack([rows["weight"], left])[1:], self.kept
+        kept["weight"][n:], kept["rate_weight"][n:], kept["rows"][n:] = used[:, :-1], used[:, -1], rows[1:]
+        kept["label"][n:] = self.labels.add(used, self.came[n:])
         self._bar(stuck)
 
     def _take(self, time_s: FloatArray, measurement: FloatArray) -> list[tuple[IntArray, int]]:
         """Keep the next readings, undecided where they may be good at all: no target is at the station, or behind it,
         and none stands still to the last digit. Samples and component of the readings that were repeated so."""
         n, m = len(self), len(time_s)
+        measurement, rate = np.split(beside.widened(measurement), [beside.RATE], axis=1)
         accepted, possible = self.known.accepted.of(time_s, measurement), np.isfinite(measurement)
         possible[:, 0] &= measurement[:, 0] > 0
         self.kept.append(
             time_s=time_s, measurement=measurement, possible=possible, weight=np.zeros((m, 3)),
-            label=np.zeros((m, 3)), times=np.tile(self.next_times, (m, 1)), late=np.tile(self.next_late, (m, 1)),
-            rows=empty_rows(m),
+            times=np.tile(self.next_times, (m, 1)), late=np.tile(self.next_late, (m, 1)), rows=empty_rows(m),
+            label=np.zeros((m, beside.WIDTH)), rate=rate[:, 0], rate_weight=np.full(m, RATE_OPEN),
         )  # fmt: skip
         moving = measurement.copy()
         moving[:, self.stand_ins] = np.nan
-        repeated, stuck = [], self.repeats.stuck(moving)
-        for (k, c, run), after in itertools.zip_longest(stuck, stuck[1:]):
-            if after is None or after[1:] != (c, run + 1):  # the run ends here, and holds those before
-                repeated.append((np.flatnonzero(np.isfinite(self.measurement[: n + k + 1, c]))[-run:], c))
+        stuck, repeated = self.repeats.runs(moving, self.measurement)
+        for k, c in stuck:
             self.kept["possible"][n + k, c] = False
         self.kept["weight"][n:][self.kept["possible"][n:]] = OPEN
         self.kept["weight"][n:][accepted] = 1.0
@@ -227,19 +234,13 @@ class Window:
         time_s, measurement, weight, times, late = (
             self.kept[name][span].copy() for name in ("time_s", "measurement", "weight", "times", "late")
         )
-        return Observations(time_s, measurement, weight, Uneven(times, late))
+        sides = self.side.scalars(self.kept["rate"][span].copy(), self.kept["rate_weight"][span].copy())
+        return Observations(time_s, measurement, weight, Uneven(times, late), beside=sides)
 
     def _filtered(
         self, log: Observations, span: Span, model: Model, filters: Any, chains: Any = None, first_s: float = math.nan
-    ) -> Any:
-        """`Row` records of a span of a log, filtered from a state, which is changed. first_s: where the jerk profile
-        begins, if not with the log."""
-        rows = empty_rows(len(log.time_s))
-        chains = self._chains(model) if chains is None else chains
-        profile = model.profile(log.time_s) if math.isnan(first_s) else Profile(model.jerk, model.knot_s, first_s)
-        run = run_predictive_coloured if model.coloured else run_predictive
-        run(span, log.samples(model.noise_variance), profile, filters, chains, rows)
-        return rows
+    ) -> tuple[Any, FloatArray]:
+        return filtered(log, span, model, filters, self._chains(model) if chains is None else chains, first_s)
 
     # -- the newest part --------------------------------------------------------------------------------------------
 
@@ -256,18 +257,20 @@ class Window:
         other = readmitted(case)
         if other is not None:
             case = settled(case._replace(log=log._replace(weight=other)), gate)
-        log = case.log
+        log = beside.decided(case.log, self.allowed, self.anchor)
         self.kept["weight"][near] = log.weight
         if self.known.jerk_psd is None:
             self.model = fit_profile(log, [self.anchor], self.model, JERK_STEPS, scales)
             self.allowed = self._with_allowance(log, scales)
         self.filters, self.chains = self.allowed.filter(self.anchor), self._chains(self.allowed)
         span = Span(0, len(log.time_s), 0)
-        rows = self._filtered(log, span, self.allowed, self.filters, self.chains)
+        rows, left = self._filtered(log, span, self.allowed, self.filters, self.chains)
         rows["since_start"] += self.forgotten + self.near - self.begun
         self.kept["rows"][near] = rows
-        self.kept["label"][near] = outlier_chain.label_runs(log.weight, log.measurement, LONGEST_ISOLATED)
-        self.labels.reset(log.weight, log.measurement)
+        self.kept["rate_weight"][near] = left
+        used, came = np.column_stack([log.weight, left]), self.came[near]
+        self.kept["label"][near] = labelled(used, came)
+        self.labels.reset(used, came)
         self.next_times, self.next_late = typical(self.kept["times"], self.kept["late"])
 
     def _chains(self, model: Model) -> Any:
@@ -288,8 +291,7 @@ class Window:
             ahead = min(ahead, int(np.searchsorted(times, first_s + pieces * self.model.knot_s)))
         if ahead <= self.near:
             return
-        log = self._observed(slice(self.near, ahead + 1))
-        log.weight[-1] = 0.0
+        log = beside.without(self._observed(slice(self.near, ahead + 1)), -1)
         filters = self.allowed.filter(self.anchor)
         self._filtered(log, Span(0, len(log.time_s), 0), self.allowed, filters)
         self.anchor, self.near = predicted(filters), ahead

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import part
-from ftproc.core.signatures import Matrix
+from ftproc.core.signatures import Cube, Matrix
 
 FloatArray = NDArray[np.float64]
 
@@ -75,14 +75,14 @@ WHITE_JERK = Motion()
 
 class Profile(NamedTuple):
     """The process noise of a log: jerk (m, 3) densities along x, y and z, each row holding for knot_s
-    seconds from first_s on; the motion that it drives; and the rates (n, ...) that its samples have beside their
-    readings, without rows if they have none, see `filtering.rates`."""
+    seconds from first_s on; the motion that it drives; and the scalars (kinds, n, ...) that its samples
+    have beside their readings, of no kind if they have none, see `filtering.beside`."""
 
     jerk: Matrix
     knot_s: float
     first_s: float
     motion: Motion = WHITE_JERK
-    rates: Matrix = np.zeros((0, 24))
+    beside: Cube = np.zeros((0, 0, 32))
 
 
 @part

@@ -6,7 +6,7 @@ Names and units are those of `words.FURTHER_ALIASES` and `units.UNITS`. Where ne
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -86,12 +86,11 @@ def doubts(header: TableHeader, beside: tuple[Further, ...], columns: Mapping[st
 def _found(
     header: TableHeader, wanted: list[str], taken: set[int], units: Mapping[str, str], columns: Mapping[str, str]
 ) -> Iterator[Further]:
-    row = list(header.units) or [""] * len(header.names)
     for quantity in wanted:
         stated = columns.get(quantity, "")
         if stated == ABSENT:
             continue
-        apart = [_apart(quantity, *each) for each in zip(header.names, row, strict=True)]
+        apart = _all_apart(quantity, header.names, header.units)
         places = [k for k, name in enumerate(apart) if k not in taken and _means(quantity, name)]
         places = [_stated(header, quantity, stated)] if stated else places
         if len(places) > 1 and not header.is_of_a_standard:
@@ -105,6 +104,25 @@ def _found(
             known = _described(header, quantity, places[0], apart[places[0]], units.get(quantity))
             if known is not None:
                 yield known
+
+
+def rate_of(
+    names: Sequence[str], row: Sequence[str], units: Mapping[str, str], columns: Mapping[str, str]
+) -> Further | None:
+    """The range rate by the names of columns alone, and the row of units below them, where there is one."""
+    stated = columns.get(RANGE_RATE, "")
+    apart = _all_apart(RANGE_RATE, names, row)
+    places = [k for k, name in enumerate(apart) if (names[k] == stated if stated else _means(RANGE_RATE, name))]
+    if len(places) != 1:
+        return None
+    name = apart[places[0]]
+    unit = unit_named(RANGE_RATE, units.get(RANGE_RATE) or name.unit or "")
+    closing = any(word.startswith(_CLOSING) for word in (name.core(), name.stem))
+    return None if unit is None else Further(RANGE_RATE, places[0], names[places[0]], unit, closing)
+
+
+def _all_apart(quantity: str, names: Sequence[str], row: Sequence[str]) -> list[Name]:
+    return [_apart(quantity, *each) for each in zip(names, row or [""] * len(names), strict=True)]
 
 
 def _described(header: TableHeader, quantity: str, place: int, name: Name, stated: str | None) -> Further | None:

@@ -34,10 +34,19 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
 }
 
 
+#: Columns that state an accuracy: a category of navigation accuracy, or a length or a dilution of precision.
+_ACCURACY: Mapping[str, tuple[str, ...]] = {
+    "category": ("nacp", "nac_p", "nac"),
+    "number": ("sigma", "accuracy", "hacc", "eph", "epu", "hdop", "pdop"),
+}
+#: Estimated position uncertainty, 95 %, m, of NACp 0 (unknown) to 11 (DO-260B, table 2-71).
+NACP_M = (37040.0, 18520.0, 7408.0, 3704.0, 1852.0, 926.0, 555.6, 185.2, 92.6, 30.0, 10.0, 3.0)
+
+
 class Positions(NamedTuple):
     """time_s (n,), in order; place (n, 3) latitude deg, longitude deg, height m, or x, y, z m, NaN where missing; which
     of the two; the row (n,) of the file of each, the number of its rows, the instant of time zero or "", and its
-    SHA-256."""
+    SHA-256. accuracy: (n,) as a column states it, in m or relative; None without."""
 
     name: str
     time_s: FloatArray
@@ -47,6 +56,7 @@ class Positions(NamedTuple):
     rows_in_file: int
     epoch: str
     sha256: str
+    accuracy: FloatArray | None = None
 
 
 def is_geodetic(header: TableHeader) -> bool:
@@ -73,9 +83,26 @@ def read(source: tables.Source, stated: Mapping[str, str] | None = None) -> Posi
     if geodetic and (np.abs(place[:, 0]) > 90).any():
         bad = int(np.argmax(np.abs(place[:, 0]) > 90))
         raise InputError(f"{header.source}: row {bad}: a latitude lies in -90..90 degrees; correct the cell.")
+    stated_m = _accuracy(header)
     return Positions(
-        header.source, time_s[row], place[row], geodetic, row.astype(np.int64), len(time_s), epoch, header.sha256()
-    )
+        header.source, time_s[row], place[row], geodetic, row.astype(np.int64), len(time_s), epoch, header.sha256(),
+        None if stated_m is None else stated_m[row],
+    )  # fmt: skip
+
+
+def _accuracy(header: TableHeader) -> FloatArray | None:
+    """(n,) what the first column that states an accuracy says of each position."""
+    for kind, names in _ACCURACY.items():
+        for place, name in enumerate(header.names):
+            if {taken_apart(name).stem, taken_apart(name).core()} & {*names}:
+                values = numbers(header.load([], [place]).column(0), _origin(header, place, "a number"))
+                if kind == "category":
+                    known = np.clip(np.where(np.isfinite(values), values, 0.0), 0, len(NACP_M) - 1).astype(int)
+                    radii: FloatArray = np.array(NACP_M)[known]
+                    return radii
+                good = np.isfinite(values) & (values > 0)
+                return np.where(good, values, np.nanmax(values, where=good, initial=1.0))
+    return None
 
 
 def _place(header: TableHeader, name: str) -> int | None:

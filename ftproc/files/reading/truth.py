@@ -58,8 +58,7 @@ def read(source: tables.Source, frame: Frame | None = None) -> Truth:
 def _on_the_earth(source: tables.Source, name: str, frame: Frame | None) -> Truth:
     if frame is None:
         raise InputError(
-            f"{name}: it has latitudes and longitudes, and the trajectory has no site; filter the log with --site "
-            "LAT,LON,HEIGHT of the station."
+            f"{name}: it has latitudes and longitudes, and no site is known; say --site LAT,LON,HEIGHT of the station."
         )
     found = positions.read(source)
     known = np.isfinite(found.place).all(1)

@@ -3,7 +3,8 @@
 The likelihood is quadratic about the biases it was linearised at (Friedland's columns, `core.filtering.biases`). A
 common shift of all clocks is the same flight a little later: the likelihood is flat along it, but not the linearised
 one, which takes the shift for jerk; so its information along that direction is taken out. Other directions of which
-the readings say next to nothing are left to the prior.
+the readings say next to nothing are left to the prior. Barometric heights are those of one transponder, whoever hears
+it: their offset and scale, which are common to all stations, are those of the first.
 """
 
 from __future__ import annotations
@@ -14,11 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.filtering.biases import PARAMETERS, Biased, Directions
-from ftproc.fusion.estimation.events import CLOCK
+from ftproc.fusion.estimation.events import CLOCK, OFFSET
 from ftproc.records import FloatArray, IntArray
 
-NAMES = ("range_m", "azimuth_rad", "elevation_rad", "tilt_east_rad", "tilt_north_rad", "clock_s")
-WORDS = ("range bias", "azimuth zero", "elevation zero", "tilt about east", "tilt about north", "clock offset")
+NAMES = (
+    *("range_m", "azimuth_rad", "elevation_rad", "tilt_east_rad", "tilt_north_rad", "clock_s"),
+    *("height_m", "height_scale"),
+)
+WORDS = (
+    *("range bias", "azimuth zero", "elevation zero", "tilt about east", "tilt about north", "clock offset"),
+    *("height offset", "height scale"),
+)
 ALLOWANCE = 1.95  # on the variance that the readings leave: manoeuvres are not white jerk, noise is not quite white
 LEAST_SEEN = 0.05  # of the prior's information: less in a direction says nothing
 OBSERVED = 0.9  # of the prior's 1-sigma: a parameter that stays above it is not observable
@@ -62,20 +69,23 @@ class Said(NamedTuple):
 class Constants(NamedTuple):
     """estimate (m, PARAMETERS) and covariance (m * PARAMETERS, m * PARAMETERS) of all biases, prior (m, PARAMETERS)
     their 1-sigma before; known: what other readings of the flight have said. moved: the largest step of the last
-    update, in its sigmas."""
+    update, in its sigmas. shared: places of the biases of heights (k, 2) that are those of the first."""
 
     estimate: FloatArray
     covariance: FloatArray
     prior: FloatArray
     known: Said
     moved: float = np.inf
+    shared: IntArray = np.zeros((0, 2), np.int64)
 
     @classmethod
     def before(cls, prior: FloatArray, known: Said | None = None) -> Constants:
         """Before any reading, or with what others have said."""
-        if known is None:
-            known = Said.nothing(prior.size)
-        return cls(*_posterior(prior, known), prior, known)
+        known = Said.nothing(prior.size) if known is None else known
+        heard, prior = np.flatnonzero(prior[:, OFFSET] > 0), prior.copy()
+        shared: IntArray = parameters(heard.tolist()).reshape(-1, PARAMETERS)[:, OFFSET:]
+        prior.ravel()[shared[1:]] = 0.0
+        return cls(*_posterior(prior, known, shared), prior, known, shared=shared)
 
     @property
     def sigma(self) -> FloatArray:
@@ -96,27 +106,34 @@ class Constants(NamedTuple):
             scale = self.prior.ravel()[free]
             size, turn = np.linalg.eigh(self.covariance[np.ix_(free, free)] / np.outer(scale, scale))
             found[free] = scale[:, None] * turn * np.sqrt(np.maximum(size, 1e-14))
+        found[self.shared[1:]] = found[self.shared[:1]]
         return found
 
     def of(self, stations: list[int]) -> Constants:
         """Those of some of the stations."""
         some = parameters(stations)
+        own = np.flatnonzero(np.isin(some, self.shared))
+        first = some.copy()
+        first[own[:2]] = self.shared[:1].ravel()
         return Constants(
-            self.estimate[stations], self.covariance[np.ix_(some, some)], self.prior[stations], self.known.of(some)
-        )
+            self.estimate[stations], self.covariance[np.ix_(first, first)],
+            self.prior.ravel()[first].reshape(-1, PARAMETERS), self.known.of(some), shared=own.reshape(-1, 2),
+        )  # fmt: skip
 
 
 def parameters(stations: list[int]) -> IntArray:
     """Places of all biases of some stations among those of all."""
-    return (PARAMETERS * np.array(stations)[:, None] + np.arange(PARAMETERS)).ravel()
+    return (PARAMETERS * np.array(stations, np.int64)[:, None] + np.arange(PARAMETERS)).ravel()
 
 
 def update(constants: Constants, found: Biased, directions: Directions) -> Constants:
     """The posterior from a run that was linearised at the constants."""
-    estimate, covariance = _posterior(constants.prior, constants.known.with_(said(constants, found, directions)))
+    known = constants.known.with_(said(constants, found, directions))
+    estimate, covariance = _posterior(constants.prior, known, constants.shared)
     sigma = np.sqrt(np.diag(covariance)).reshape(estimate.shape)
     step = np.abs(estimate - constants.estimate)[constants.prior > 0] / sigma[constants.prior > 0]
-    return Constants(estimate, covariance, constants.prior, constants.known, float(step.max(initial=0.0)))
+    moved = float(step.max(initial=0.0))
+    return constants._replace(estimate=estimate, covariance=covariance, moved=moved)
 
 
 def said(constants: Constants, found: Biased, directions: Directions) -> Said:
@@ -130,7 +147,7 @@ def said(constants: Constants, found: Biased, directions: Directions) -> Said:
     return Said(score + information @ here, information).among(free, len(prior))
 
 
-def _posterior(prior: FloatArray, known: Said) -> tuple[FloatArray, FloatArray]:
+def _posterior(prior: FloatArray, known: Said, shared: IntArray) -> tuple[FloatArray, FloatArray]:
     """Estimate (m, PARAMETERS) and covariance with the prior; of directions of which next to nothing is said, the
     prior's."""
     scale = prior.ravel()
@@ -141,6 +158,7 @@ def _posterior(prior: FloatArray, known: Said) -> tuple[FloatArray, FloatArray]:
     size, along = np.where(seen, size, 0.0), np.where(seen, turn.T @ known.pull[free], 0.0)
     estimate, covariance = np.zeros(len(scale)), np.zeros((len(scale), len(scale)))
     estimate[free] = scale[free] * np.clip(turn @ (along / (1 + size)), -FARTHEST, FARTHEST)
+    estimate[shared[1:]] = estimate[shared[:1]]
     covariance[block] = np.outer(scale[free], scale[free]) * ((turn / (1 + size)) @ turn.T)
     return estimate.reshape(prior.shape), covariance
 

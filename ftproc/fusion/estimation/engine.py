@@ -17,12 +17,12 @@ import numpy as np
 from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.biases import Biased, Directions, smooth_biased
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
+from ftproc.core.filtering.smoother import PATHS, residuals_beside, smooth_log
 from ftproc.core.identification.likelihood import fit_jerk
 from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import isotropic
-from ftproc.fusion.estimation import alternatives, first_track, lasting, places, process_noise, screening
+from ftproc.fusion.estimation import alternatives, beside, first_track, lasting, places, process_noise, screening
 from ftproc.fusion.estimation import constants as posterior
 from ftproc.fusion.estimation.constants import Constants, Said
 from ftproc.fusion.estimation.events import Events, Seen, merge, moved_to
@@ -76,8 +76,7 @@ class Alone(Exception):
 def fuse(
     stations: list[Seen], gate: float, jerk_psd: float | None, known: Said, progress: Callable[[int], None]
 ) -> Current:  # fmt: skip
-    """The fused flight of the stations, or a stretch of it. known: what other stretches have said of the biases.
-    progress is called with the number of each round. Raises Alone."""
+    """The fused flight, or a stretch. known: what others have said. progress: takes each round. Raises Alone."""
     readings = lasting.Readings.of(stations)
     current = _settled(readings, gate, jerk_psd, known, progress)
     for _ in range(LASTING_ROUNDS):
@@ -94,7 +93,7 @@ def fuse(
         if lasting.contradicted(without.stations, without.weight):
             break
         current = without
-    return _last(current)
+    return _last(beside.fitted(current, gate, lambda each: at(each, each.constants)))
 
 
 def _settled(
@@ -104,7 +103,7 @@ def _settled(
     stations = readings.stations
     screened = [screening.screen(station, banned) for station, banned in zip(*readings[:2], strict=True)]
     sigma = np.stack([each.sigma for each in screened])
-    track = first_track.find(stations, [each.trusted for each in screened], sigma)
+    track = first_track.find(*beside.with_elevations(stations, [each.trusted for each in screened], sigma))
     if track is None:
         raise Alone
     trusted = [screening.agreeing(s, each, track) for s, each in zip(stations, screened, strict=True)]
@@ -157,7 +156,7 @@ def _begin(
 
 
 def _directions(events: Events, state: FloatArray, constants: Constants) -> Directions:
-    return Directions(screening.design(events, state), constants.columns())
+    return Directions(screening.design(events, state), constants.columns(), beside.design(events, state))
 
 
 def _round(
@@ -266,35 +265,36 @@ def _directions_of(current: Current) -> Directions:
 
 def at(current: Current, constants: Constants) -> Current:
     """The same smoothed with these biases."""
-    old, state = current.events, current.found.run.state
+    old = current.events
     events = merge(current.stations, constants.estimate, old.sites.range_m)
-    state = moved_to(old.time_s, state, events.time_s)
+    state = moved_to(old.time_s, current.found.run.state, events.time_s)
     head = current.found.run.heads[0]
     first = min(head.sample, len(events.time_s) - 1)
     start = Start(first, state[first], START_INFLATION * head.covariance + np.diag(np.repeat(START_SIGMA, 3) ** 2))
     log = events.weighted(current.weight)
     found = smooth_biased(log, current.model, start, _directions(events, state, constants))
-    _lead_in(log, current.model, found.run)
+    _lead_in(log, current.model, found)
     return current._replace(events=events, constants=constants, start=start, found=found)
 
 
-def _lead_in(log: Observations, model: Model, run: SmootherRun) -> None:
+def _lead_in(log: Observations, model: Model, found: Biased) -> None:
     """Smooth the events before the start too, in place: back in time from the smoothed state there."""
-    head = run.heads[0]
+    head = found.run.heads[0]
     if head.sample == 0:
         return
     back = log.part(slice(head.sample, None, -1))
     back.weight[0] = 0.0  # is in the head
-    first = model._replace(jerk=model.jerk[:1], knot_s=math.inf)
-    found = smooth_log(back, first, [head._replace(sample=0)], PATHS)
-    for filled, values in zip(run[:7], found[:7], strict=True):
+    back = back._replace(beside=tuple(each._replace(weight=np.r_[0.0, each.weight[1:]]) for each in back.beside))
+    given = back, model._replace(jerk=model.jerk[:1], knot_s=math.inf), [head._replace(sample=0)]
+    for filled, values in zip(found.run[:7], smooth_log(*given, PATHS)[:7], strict=True):
         filled[: head.sample] = values[:0:-1]
+    if back.beside:
+        found.beside[:, : head.sample] = residuals_beside(*given)[:, :0:-1]
 
 
 def _last(current: Current) -> Current:
     """The run to publish: with a little more process noise than is likeliest."""
     if math.isfinite(current.model.knot_s):
-        log = current.log
-        polished = fit_profile(log, [current.start], process_noise.on_knots(log, current.model), LAST_STEPS)
-        current = current._replace(model=with_allowance(log, polished))
+        log, begun = current.log, process_noise.on_knots(current.log, current.model)
+        current = current._replace(model=with_allowance(log, fit_profile(log, [current.start], begun, LAST_STEPS)))
     return _smoothed(_smoothed(current))

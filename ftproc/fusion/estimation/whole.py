@@ -19,6 +19,7 @@ from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.model import kinematics
 from ftproc.core.model.stations import levelled
 from ftproc.fusion.estimation import engine
+from ftproc.fusion.estimation.beside import Aside, expected
 from ftproc.fusion.estimation.constants import FARTHEST, Constants, Said, parameters
 from ftproc.fusion.estimation.engine import Current
 from ftproc.fusion.estimation.events import CLOCK, Seen
@@ -44,7 +45,8 @@ class Fused(NamedTuple):
     """By station, row for row with its log: weight and possible (rows, 3), leave-one-out residual and residual_variance
     (rows, 3), position (rows, 3) of the track in m. noise (m, 3) 1-sigma, own (m, 3) the noise that each component
     shows alone; axes (m, 3, 3) with the tilts; jerk (k, 3) each for knot_s seconds; rounds, settled: of the decisions;
-    unexamined: places where no work was left to look for other hypotheses; steps: that were taken out."""
+    unexamined: places where no work was left to look for other hypotheses; steps: that were taken out; beside: of each
+    station by name, what it measures beside its readings."""
 
     stations: list[Seen]
     weight: list[FloatArray]
@@ -63,6 +65,7 @@ class Fused(NamedTuple):
     settled: bool
     unexamined: int
     steps: tuple[Step, ...] = ()
+    beside: tuple[dict[str, Aside], ...] = ()
 
 
 class Stretch(NamedTuple):
@@ -124,7 +127,11 @@ def _rows(stations: list[Seen], times: FloatArray, first_s: float, stop_s: float
 
 def _part(station: Seen, rows: slice) -> Seen:
     return station._replace(
-        time_s=station.time_s[rows], measurement=station.measurement[rows], accepted=station.accepted[rows]
+        time_s=station.time_s[rows],
+        measurement=station.measurement[rows],
+        accepted=station.accepted[rows],
+        beside=tuple(side.part(rows) for side in station.beside),
+        times=None if station.times is None else station.times[rows],
     )
 
 
@@ -140,6 +147,7 @@ def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, sm
     """The stretches one after the other; smoothed with these biases if they are several."""
     sizes = [len(station.time_s) for station in stations]
     weight, possible, residual, variance, position = ([np.full((n, 3), np.nan) for n in sizes] for _ in range(5))
+    beside = tuple({side.name: Aside.before(side) for side in station.beside} for station in stations)
     tracks, noise, own = [], np.zeros((len(stations), 3)), np.full((len(stations), 3), np.inf)
     for each in found:
         current = each.current
@@ -154,6 +162,10 @@ def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, sm
             weight[s][rows], possible[s][rows] = current.weight[k][near], current.possible[k][near]
             residual[s][rows], variance[s][rows] = run.residual[at], run.residual_variance[at]
             position[s][rows] = best.state[at, :3]
+            for side in current.stations[k].beside:
+                left = current.found.beside[events.names.index(side.name), at]
+                cleaned = expected(side, best.state[at], current.constants.estimate[k])
+                beside[s][side.name] = beside[s][side.name].with_(rows, side, near, left, cleaned)
             noise[s] += len(rows) / sizes[s] * current.sigma[k] ** 2
             own[s] = np.minimum(own[s], current.own[k])
         last = here.start + distinct(events.time_s[here])
@@ -166,7 +178,7 @@ def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, sm
         levelled(np.stack([each.axes for each in stations]), constants.estimate[:, 3:CLOCK]), jerk, knot_s,
         max(each.current.rounds for each in found), all(each.current.settled for each in found),
         sum(each.current.unexamined for each in found),
-        tuple(step for each in found for step in each.current.steps),
+        tuple(step for each in found for step in each.current.steps), beside,
     )  # fmt: skip
 
 
@@ -204,7 +216,9 @@ def without_run(current: Current) -> Current:
     """The same, of whose smoother run nothing is kept but what `at` needs."""
     run = current.found.run
     slim = SmootherRun._make([run.state.copy(), *(each[:0].copy() for each in run[1:7]), *run[7:]])
-    return current._replace(found=current.found._replace(run=slim, spread=run.state[:0].copy()))
+    return current._replace(
+        found=current.found._replace(run=slim, spread=run.state[:0].copy(), beside=current.found.beside[:0])
+    )
 
 
 def published(current: Current, smooth: bool) -> FilterRun | SmootherRun:

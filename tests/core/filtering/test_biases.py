@@ -9,19 +9,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ftproc.core.filtering.beside import DISTANCE, RATE
 from ftproc.core.filtering.biases import PARAMETERS, Directions, smooth_biased
 from ftproc.core.filtering.forward import filter_log
-from ftproc.core.filtering.records import Model, Observations, Sites, Start
-from ftproc.core.filtering.smoother import smooth_log
+from ftproc.core.filtering.records import Model, Observations, Scalars, Sites, Start
+from ftproc.core.filtering.smoother import residuals_beside, smooth_log
 from ftproc.core.model import stations
+from ftproc.core.model.earth import MEAN_RADIUS_M as EARTH_M
 from ftproc.core.model.frames import from_cartesian
 from ftproc.core.model.motion import isotropic
 
 pytestmark = pytest.mark.compiled
 
 PLACES = np.array([[0.0, 0.0, 0.0], [9000.0, 2000.0, 100.0], [3000.0, -8000.0, 50.0]])
+CENTRE = np.array([0.0, 0.0, -EARTH_M])
 NOISE = np.array([3.0, 1e-4, 1e-4])
-SCALE = np.array([2.0, 1e-4, 1e-4, 1e-4, 1e-4, 2e-3])  # of a small bias of each kind
+SCALE = np.array([2.0, 1e-4, 1e-4, 1e-4, 1e-4, 2e-3, 5.0, 3e-3])  # of small biases
 
 
 def flown(time_s):
@@ -48,7 +51,37 @@ def observed(biases, n=240, seed=1):
     tilted = stations.levelled(axes, biases[:, 3:5])
     sites = Sites(station, PLACES, tilted, np.full(3, 1e4))
     weight = np.isfinite(z) * (rng.random((n, 3)) > 0.1)
-    return Observations(time_s - biases[station, 5], z - biases[station, :3], weight.astype(float), None, sites)
+    readings = time_s - biases[station, 5], z - biases[station, :3], weight.astype(float), None, sites
+    return Observations(*readings, beside(time_s, station, biases, rng))
+
+
+def beside(time_s, station, biases, rng):
+    """Range rates of the last station, heights of the second."""
+    state = flown(time_s)
+    seen = state[:, :3] - PLACES[station]
+    rate = (seen * state[:, 3:6]).sum(1) / np.linalg.norm(seen, axis=1) + 0.5 * rng.normal(size=len(seen))
+    height = np.linalg.norm(state[:, :3] - CENTRE, axis=1) + 4.0 * rng.normal(size=len(seen))
+    height -= biases[station, 6] + biases[station, 7] * (height - EARTH_M)
+    weight = (rng.random(len(seen)) > 0.1).astype(float)
+    rates = Scalars(np.where(station == 2, rate, np.nan), np.full(len(seen), 0.25), weight, RATE, PLACES[station])
+    return rates, Scalars(np.where(station == 1, height, np.nan), np.full(len(seen), 16.0), weight, DISTANCE, CENTRE)
+
+
+def unknown(log):
+    """(2, n, 3) derivatives of the scalars by clock, offset and scale."""
+    state = flown(log.time_s)
+    found = np.zeros((2, len(state), 3))
+    for k, scalars in enumerate(log.beside):
+        late = np.diff([value_of(scalars, flown(log.time_s + step)) for step in (-1e-3, 1e-3)], axis=0)[0] / 2e-3
+        found[k, :, 0] = -late
+    found[1, :, 1], found[1, :, 2] = 1.0, np.linalg.norm(state[:, :3] - CENTRE, axis=1) - EARTH_M
+    return found
+
+
+def value_of(scalars, state):
+    seen = state[:, :3] - scalars.point
+    far = np.linalg.norm(seen, axis=1)
+    return far if scalars.kind == DISTANCE else (seen * state[:, 3:6]).sum(1) / far
 
 
 MODEL = Model(np.tile(NOISE**2, (3, 1)), isotropic(30.0))
@@ -57,7 +90,8 @@ START = Start(0, flown([0.0])[0], np.diag([1e6] * 3 + [1e4] * 3 + [1e3] * 3))
 
 def directions(log, columns):
     station = log.sites.station
-    return Directions(stations.design(flown(log.time_s), PLACES[station], log.sites.axes[station]), columns)
+    design = stations.design(flown(log.time_s), PLACES[station], log.sites.axes[station])
+    return Directions(design, columns, unknown(log))
 
 
 def test_a_station_elsewhere_sees_what_it_would_see_from_its_own_frame():
@@ -99,25 +133,27 @@ def test_without_columns_it_is_the_smoother():
     np.testing.assert_allclose(found.run.residual, plain.residual, rtol=1e-9, atol=1e-9)
     assert found.run.log_likelihood == pytest.approx(plain.log_likelihood, rel=1e-12)
     assert not found.spread.any()
+    np.testing.assert_allclose(found.beside, residuals_beside(log, MODEL, [START]), rtol=1e-9, atol=1e-7)
 
 
 def test_several_blocks_are_as_one(monkeypatch):
     log = observed(np.zeros((3, PARAMETERS)))
-    columns = np.eye(3 * PARAMETERS)[:, [0, 7, 13]]
+    columns = np.eye(3 * PARAMETERS)[:, [0, 9, 17]]
     one = smooth_biased(log, MODEL, START, directions(log, columns))
     monkeypatch.setattr("ftproc.core.filtering.biases.BLOCK", 50)
     found = smooth_biased(log, MODEL, START, directions(log, columns))
     for name in ("state", "sigma", "residual", "residual_variance"):
         np.testing.assert_array_equal(getattr(found.run, name), getattr(one.run, name), err_msg=name)
     np.testing.assert_array_equal(found.spread, one.spread)
+    np.testing.assert_array_equal(found.beside, one.beside)
     np.testing.assert_allclose(found.info, one.info, rtol=1e-12)
 
 
 @pytest.mark.parametrize("parameter", range(PARAMETERS))
 @pytest.mark.parametrize("station", range(3))
 def test_the_score_is_the_slope_of_the_likelihood(station, parameter):
-    if station > 0 and parameter == 0:
-        return  # no range
+    if (station > 0 and parameter == 0) or (station != 1 and parameter > 5):
+        return  # no range, no heights
     column = np.zeros((3 * PARAMETERS, 1))
     column[station * PARAMETERS + parameter] = SCALE[parameter]
     log = observed(np.zeros((3, PARAMETERS)))
@@ -130,7 +166,7 @@ def test_the_score_is_the_slope_of_the_likelihood(station, parameter):
 
 def test_columns_are_the_derivative_of_the_smoothed_state():
     column = np.zeros((3 * PARAMETERS, 1))
-    column[[0, 7, 8, 12 + 2, 6 + 3, 12 + 4], 0] = SCALE[[0, 1, 2, 2, 3, 4]]
+    column[[0, 9, 10, 16 + 2, 8 + 3, 16 + 4], 0] = SCALE[[0, 1, 2, 2, 3, 4]]
     log = observed(np.zeros((3, PARAMETERS)))
     plain = smooth_log(log, MODEL, [START])
     found = smooth_biased(log, MODEL, START, directions(log, column))
@@ -152,6 +188,8 @@ def test_left_out_residuals_allow_for_the_biases():
     own = (log.sites.station == 1) & (log.weight[:, 1] > 0)
     assert (found.run.residual_variance[own, 1] > plain.residual_variance[own, 1]).all()
     assert (found.run.residual_variance[own, 1] < 2 * plain.residual_variance[own, 1]).all()
+    heights = np.isfinite(log.beside[1].value)
+    assert (found.beside[1, heights, 1] >= residuals_beside(log, MODEL, [START])[1, heights, 1]).all()
     unused = (log.weight == 0) & np.isfinite(log.measurement)
     assert (found.run.residual_variance[unused] >= plain.residual_variance[unused]).all()
 

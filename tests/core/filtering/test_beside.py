@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from ftproc.core.filtering.forward import filter_log, filter_with_rates
-from ftproc.core.filtering.rates import RESIDUAL, SPREAD, WIDTH
-from ftproc.core.filtering.records import Model, Observations, Rates, Start
-from ftproc.core.filtering.smoother import likelihood_of, rate_residuals, score_log, smooth_log
+from ftproc.core.filtering.beside import RESIDUAL, SPREAD, WIDTH
+from ftproc.core.filtering.forward import filter_log, filter_with_beside
+from ftproc.core.filtering.records import Model, Observations, Scalars, Start
+from ftproc.core.filtering.smoother import likelihood_of, residuals_beside, score_log, smooth_log
 from ftproc.core.model.frames import from_cartesian
 from ftproc.core.model.motion import Profile, isotropic
 
@@ -47,7 +47,7 @@ def textbook(log, start, weight):
         if weight[k] > 0:
             h = slope(rate, x)
             s = h @ p @ h + RATE_VARIANCE
-            x, p = x + p @ h * (log.rates.value[k] - rate(x)) / s, p - np.outer(p @ h, p @ h) / s
+            x, p = x + p @ h * (log.beside[0].value[k] - rate(x)) / s, p - np.outer(p @ h, p @ h) / s
         on = np.flatnonzero(log.weight[k] > 0)
         h = slope(reading, x)[on]
         s = h @ p @ h.T + np.diag(NOISE[on])
@@ -77,7 +77,7 @@ def scene():
     rates[7] += 40
     used, weight = np.ones((40, 3)), np.ones(40)
     used[9, 0], weight[[5, 7]] = 0, 0
-    log = Observations(t, z, used, rates=Rates(rates, RATE_VARIANCE, weight))
+    log = Observations(t, z, used, beside=(Scalars.rates(rates, RATE_VARIANCE, weight),))
     spread = np.repeat([5.0, 2.0, 0.3], 3)
     start = Start(0, true[0] + rng.standard_normal(9) * spread, np.diag(spread**2))
     return log, start, Model(NOISE, isotropic(JERK))
@@ -85,7 +85,7 @@ def scene():
 
 def test_filter_and_smoother_are_the_textbook_s(scene):
     log, start, model = scene
-    after, back = textbook(log, start, log.rates.weight)
+    after, back = textbook(log, start, log.beside[0].weight)
     run, smoothed = filter_log(log, model, [start]), smooth_log(log, model, [start])
     for k, ((x, _), (s, p)) in enumerate(zip(after, back, strict=True)):
         assert np.abs((run.state[k] - x) / run.sigma[k]).max() < 0.01
@@ -96,12 +96,12 @@ def test_filter_and_smoother_are_the_textbook_s(scene):
 @pytest.mark.parametrize("k", [0, 3, 7, 20, 39])
 def test_a_residual_is_that_of_all_the_rest(scene, k):
     log, start, model = scene
-    residual, variance, _ = rate_residuals(log, model, [start])
-    weight = log.rates.weight.copy()
+    residual, variance = residuals_beside(log, model, [start])[0].T
+    weight = log.beside[0].weight.copy()
     weight[k] = 0
     x, p = textbook(log, start, weight)[1][k]
     h = slope(rate, x)
-    assert residual[k] == pytest.approx(log.rates.value[k] - rate(x), abs=0.01)
+    assert residual[k] == pytest.approx(log.beside[0].value[k] - rate(x), abs=0.01)
     assert variance[k] == pytest.approx(h @ p @ h + RATE_VARIANCE, rel=1e-3)
     assert np.isnan(residual[5])
 
@@ -124,28 +124,30 @@ def test_scores_are_the_slopes_of_the_likelihood(scene, component):
 
 def test_innovations_of_the_filter(scene):
     log, start, model = scene
-    _, left = filter_with_rates(log, model, [start])
-    assert left.shape == (len(log.time_s), WIDTH)
+    _, left = filter_with_beside(log, model, [start])
+    assert left.shape == (1, len(log.time_s), WIDTH)
+    left = left[0]
     ratio = left[:, RESIDUAL] / np.sqrt(left[:, SPREAD])
     assert np.isnan(ratio[5])
     assert ratio[7] > 20
-    used = log.rates.weight > 0
+    used = log.beside[0].weight > 0
     assert 0.5 < np.sqrt(np.mean(ratio[used] ** 2)) < 1.5
 
 
 def test_without_rates_nothing_is_different(scene):
     log, start, model = scene
-    alone, unused = log._replace(rates=None), log._replace(rates=log.rates._replace(weight=np.zeros(len(log.time_s))))
+    silent = log.beside[0]._replace(weight=np.zeros(len(log.time_s)))
+    alone, unused = log._replace(beside=()), log._replace(beside=(silent,))
     one, other = smooth_log(alone, model, [start]), smooth_log(unused, model, [start])
     for name in ("state", "sigma", "residual", "residual_variance"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-    assert Profile(model.jerk, 1.0, 0.0).rates.shape == (0, WIDTH)
-    assert len(filter_with_rates(alone, model, [start])[1]) == 0
+    assert Profile(model.jerk, 1.0, 0.0).beside.shape == (0, 0, WIDTH)
+    assert len(filter_with_beside(alone, model, [start])[1]) == 0
 
 
 def test_parts_and_spread_rates(scene):
     log, _, _ = scene
-    assert len(log.part(slice(3, 9)).rates.value) == 6
-    spread = log.rates.part(slice(0, 2)).spread(np.array([1, 4]), 6)
+    assert len(log.part(slice(3, 9)).beside[0].value) == 6
+    spread = log.beside[0].part(slice(0, 2)).spread(np.array([1, 4]), 6)
     np.testing.assert_array_equal(np.isfinite(spread.value), [False, True, False, False, True, False])
     np.testing.assert_array_equal(spread.weight, [0, 1, 0, 0, 1, 0])

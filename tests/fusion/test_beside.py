@@ -1,0 +1,130 @@
+"""Range rates and heights of the stations of a range: used, edited, their noise and their biases estimated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ftproc.files.writing import ranges
+from ftproc.fusion import flight, range_file
+from ftproc.settings import FilterSettings
+from ftproc.simulation import simulate_range
+from ftproc.simulation.ranges import SURVEILLANCE
+
+SMOOTH = FilterSettings(smooth=True)
+
+
+def fused(simulated, folder):
+    ranges.write(simulated, str(folder), None)
+    return flight.fuse(range_file.load(str(folder / "range.toml")), SMOOTH)
+
+
+def errors(simulated, found):
+    """RMS of position m and velocity m/s; and shares inside 3 sigma."""
+    truth, track = simulated.truth, found.trajectory
+    both = truth.position_m, truth.velocity_mps
+    at = np.hstack([np.stack([np.interp(track.time_s, truth.time_s, axis) for axis in each.T], 1) for each in both])
+    off = track.state[:, :6] - at
+    inside = (np.abs(off) <= 3 * track.sigma[:, :6]).mean()
+    return np.array([np.sqrt((part**2).sum(1).mean()) for part in (off[:, :3], off[:, 3:])]), inside
+
+
+def rate_of(station):
+    position, velocity = station.truth.position_m, station.truth.velocity_mps
+    return (position * velocity).sum(1) / np.sqrt((position**2).sum(1))
+
+
+def with_rates(simulated, sigma, seed=0, **changed):
+    rng, stations = np.random.default_rng(seed), []
+    for station in simulated.stations:
+        rate = rate_of(station) + sigma * rng.standard_normal(len(station.log))
+        stations.append(replace(station, log=replace(station.log, range_rate=changed.get("of", lambda r: r)(rate))))
+    return replace(simulated, stations=tuple(stations))
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    simulated = simulate_range("range-radar", seed=3, duration_s=60.0)
+    found = fused(simulated, tmp_path_factory.mktemp("plain"))
+    return simulated, found, errors(simulated, found)[0]
+
+
+def test_better_with_range_rates(plain, tmp_path):
+    simulated, _, without = plain
+    found = fused(with_rates(simulated, 0.5), tmp_path)
+    ratio = errors(simulated, found)[0] / without
+    assert ratio[0] < 0.8
+    assert ratio[1] < 0.8
+    for part in found.trajectory.metadata["summary"]["stations"].values():
+        assert part["components"]["range_rate"]["noise_mps"] == pytest.approx(0.5, rel=0.15)
+        assert part["components"]["range_rate"]["residual_ratio"] == pytest.approx(1.0, abs=0.1)
+
+
+def test_useless_ones_change_nothing(plain, tmp_path):
+    simulated, _, without = plain
+    found = fused(with_rates(simulated, 100.0), tmp_path)
+    assert (errors(simulated, found)[0] / without).max() < 1.01
+
+
+def test_the_other_sense_is_found(plain, tmp_path):
+    simulated, _, without = plain
+    found = fused(with_rates(simulated, 0.5, of=np.negative), tmp_path)
+    assert errors(simulated, found)[0][1] < 0.8 * without[1]
+    assert "count inward" in " ".join(found.trajectory.metadata["summary"]["notes"])
+
+
+def test_rates_that_hinder_are_left_out(plain, tmp_path):
+    simulated, reference, _ = plain
+    found = fused(with_rates(simulated, 0.5, of=lambda rate: rate + 8.0), tmp_path)
+    off = np.abs(found.trajectory.state[:, :3] - reference.trajectory.state[:, :3])
+    assert (off < 0.2 * reference.trajectory.sigma[:, :3]).all()
+    assert "none is used" in " ".join(found.trajectory.metadata["summary"]["notes"])
+
+
+@pytest.fixture(scope="module")
+def surveillance(tmp_path_factory):
+    simulated = simulate_range(SURVEILLANCE, seed=1, duration_s=250.0)
+    return simulated, fused(simulated, tmp_path_factory.mktemp("surveillance"))
+
+
+def test_heights_have_one_offset_that_the_others_tell(surveillance):
+    simulated, found = surveillance
+    constants = found.constants
+    assert (constants.prior[:, 6] > 0).sum() == 1
+    assert constants.sigma[0, 6] < 80
+    assert found.trajectory.metadata["summary"]["stations"]["surveillance1"]["components"]["height"]["good"] > 20
+    assert errors(simulated, found)[1] > 0.95
+
+
+def test_outliers_beside_are_labelled(surveillance):
+    simulated, found = surveillance
+    wrong, fine = [], []
+    for station in simulated.stations:
+        edited = found.edited[station.name].to_pandas()
+        if station.log.range_rate is not None:
+            reading, label = station.log.range_rate, edited.outlier_range_rate
+            far = np.abs(reading - rate_of(station)) > 8 * 0.5
+            assert edited.range_rate_mps.notna().all()
+        else:
+            reading, label = station.log.heights.above_m, edited.outlier_height
+            far = np.abs(reading - edited.height_m) > 100
+            assert (label[~np.isfinite(reading)] == 3).all()
+        seen = np.isfinite(reading)
+        wrong += label[far & seen].tolist()
+        fine += label[~far & seen].tolist()
+    assert len(wrong) > 5
+    assert np.isin(wrong, (1, 2)).mean() > 0.95
+    assert np.isin(fine, (1, 2)).mean() < 0.01
+
+
+def test_flight_levels_alone_give_a_place(tmp_path):
+    """Two radars without elevations: the offset of their common transponder stays as it was known."""
+    simulated = simulate_range(SURVEILLANCE, seed=2, duration_s=250.0)
+    simulated = replace(simulated, stations=simulated.stations[:2])
+    found = fused(simulated, tmp_path)
+    (horizontal, _), inside = errors(simulated, found)
+    assert inside > 0.95
+    assert horizontal < 400
+    assert np.median(found.trajectory.sigma[:, 2]) > 60
