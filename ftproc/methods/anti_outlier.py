@@ -67,8 +67,9 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     specified = np.isfinite(known.sigma)
     log, model, channel = edited.log, edited.model, None
     if readings.range_rate is not None:
-        fixed = settings.jerk_psd_m2ps5 is not None
-        log, model, channel = range_rates.fit(log, model, edited.starts, readings.range_rate, settings.gate, fixed)
+        fixed, accepted = settings.jerk_psd_m2ps5 is not None, readings.accepted.rates(readings.time_s)
+        rate = readings.range_rate
+        log, model, channel = range_rates.fit(log, model, edited.starts, rate, settings.gate, fixed, accepted)
     motion = motion_models.choose(log, edited.starts, model, preparing.motions(settings), specified)
     if channel is not None and channel.used is not None:
         motion = motion.with_rates(channel.used)

@@ -64,10 +64,16 @@ class Channel(NamedTuple):
 
 
 def fit(
-    log: Observations, model: Model, starts: list[Start], value: FloatArray, gate: float, jerk_fixed: bool
+    log: Observations,
+    model: Model,
+    starts: list[Start],
+    value: FloatArray,
+    gate: float,
+    jerk_fixed: bool,
+    accepted: NDArray[np.bool_],
 ) -> tuple[Observations, Model, Channel]:
     """A log whose readings are edited, with its range rates value (n,) m/s, NaN where missing; the model, and what is
-    known of the rates."""
+    known of the rates. accepted: (n,) rates that are good by hand."""
     there = np.isfinite(value)
     unused = Rates(value, 1.0, np.zeros(len(value)))
     label = _labels(there.astype(float), value)
@@ -81,9 +87,9 @@ def fit(
     off = np.where(there, value - expected, np.nan)
     floor = max(rounding_step(value) / math.sqrt(12), LEAST_MPS)
     sigma = max(min(SCALE * median(np.abs(off[there])), _scatter(value)), floor)
-    weight = np.where(there & (np.abs(off) <= FAR * np.sqrt(vague + sigma**2)), 1.0, 0.0)
-    found = Rates(value, sigma**2, weight)
-    found = _decided(log, model, starts, found, gate, floor)
+    weight = np.where(there & (accepted | (np.abs(off) <= FAR * np.sqrt(vague + sigma**2))), 1.0, 0.0)
+    found, known = Rates(value, sigma**2, weight), (gate, floor, accepted)
+    found = _decided(log, model, starts, found, *known)
     if found.weight.sum() < (1 - MOST_REJECTED) * there.sum():
         return log, model, Channel(unused, label, why="most of the range rates contradict the readings: none is used")
     without = model
@@ -95,7 +101,7 @@ def fit(
     if not jerk_fixed:
         fitted = fit_profile(log._replace(rates=found), starts, model._replace(jerk=model.jerk / ALLOWANCE), STEPS)
         model = with_allowance(log, fitted)
-        found = _decided(log, model, starts, found, gate, floor)
+        found = _decided(log, model, starts, found, *known)
     both = log._replace(rates=found)
     if _of_readings(both, model, starts) < _of_readings(log, without, starts) - CONTRADICTS:
         why = "the range rates make the readings less likely (biased, late, or not measured): none is used"
@@ -121,7 +127,15 @@ def columns(state: FloatArray, los_sigma: FloatArray, label: FlagArray) -> dict[
     return {"range_rate_mps": rate, "sigma_range_rate_mps": sigma, "outlier_range_rate": label}
 
 
-def _decided(log: Observations, model: Model, starts: list[Start], rates: Rates, gate: float, floor: float) -> Rates:
+def _decided(
+    log: Observations,
+    model: Model,
+    starts: list[Start],
+    rates: Rates,
+    gate: float,
+    floor: float,
+    accepted: NDArray[np.bool_],
+) -> Rates:
     """Noise and weights in turn, until they stand still."""
     chances = np.tile(np.array(outlier_chain.START_RATES), (3, 1))
     n = len(rates.value)
@@ -133,7 +147,7 @@ def _decided(log: Observations, model: Model, starts: list[Start], rates: Rates,
         alone, wide = np.full((n, 3), np.nan), np.ones((n, 3))
         alone[:, 0], wide[:, 0] = residual, spread - rates.variance + variance
         good = outlier_chain.classify(alone, wide, np.array([variance, 1.0, 1.0]), chances, gate)[:, 0]
-        weight = (good > 0.5).astype(float)
+        weight = ((good > 0.5) | accepted).astype(float)
         still = (weight == rates.weight).all() and abs(math.log(variance / rates.variance)) < STILL
         rates = rates._replace(variance=variance, weight=weight)
         if still:

@@ -4,10 +4,15 @@ file that `ftproc filter --decisions` reads. All of it happens in the browser, w
 from __future__ import annotations
 
 import html
+import shlex
+from itertools import pairwise
 from pathlib import PurePath
 
+import numpy as np
+
 from ftproc.errors import quoted
-from ftproc.records import COMPONENTS
+from ftproc.files import decisions
+from ftproc.files.writing.decisions import text
 from ftproc.report.patches import Patch
 from ftproc.report.view import View
 
@@ -24,18 +29,37 @@ def section(view: View, name: str) -> str:
     """The lines so far, what adds some, and the command that uses them. name: of the log."""
     if not view.summary:
         return ""
-    components = "".join(f'<option value="{each}">{each}</option>' for each in (*COMPONENTS, "all"))
+    names = [channel.name for channel in view.channels if np.isfinite(channel.drawn).any()]
+    components = "".join(f'<option value="{each}">{each}</option>' for each in (*names, "all"))
     uses = "".join(f'<option value="{use}">{use}</option>' for use in ("bad", "good", "auto"))
     file = f"{PurePath(name).name.split('.')[0] or 'log'}.decisions.csv"
-    smooth = " --smooth" if view.trajectory.metadata.get("settings", {}).get("smooth") else ""
-    command = f"ftproc filter {quoted(name)} --decisions {quoted(file)}{smooth}"
+    command, lines = _command(view, name, file), html.escape(_so_far(view))
     return (
         '<section class="deciding"><h2>Decisions</h2><p class="note">You know the flight: a click on a reading, or on '
         "<em>good</em> or <em>bad</em> beside a patch, writes a line, and a second click takes it back. Readings named "
         "good are used whatever the editor thinks, bad ones never.</p>"
         f'<p>The stretch that the figures show: <select id="component">{components}</select> is '
         f'<select id="use">{uses}</select> <button id="stretch">Add a line.</button></p>'
-        f'<textarea id="decisions" rows="6" spellcheck="false" aria-label="decisions">{HEADER}\n</textarea>'
+        f'<textarea id="decisions" rows="6" spellcheck="false" aria-label="decisions">{lines}</textarea>'
         f'<p><button id="keep" data-file="{html.escape(file)}">Keep {html.escape(file)}</button>, then '
         f"<code>{html.escape(command)}</code></p></section>"
     )
+
+
+def _command(view: View, name: str, file: str) -> str:
+    """The command of the run with these decisions."""
+    meta = view.trajectory.metadata
+    settings = meta.get("settings", {})
+    known = meta.get("command") or f"ftproc filter {quoted(name)}{' --smooth' if settings.get('smooth') else ''}"
+    words = shlex.split(known)
+    kept = [word for before, word in pairwise(["", *words]) if "--decisions" not in (before, word.partition("=")[0])]
+    return shlex.join([*kept, "--decisions", file])
+
+
+def _so_far(view: View) -> str:
+    """The decisions that the trajectory was computed with, to which lines are added."""
+    found = view.trajectory.metadata.get("decisions")
+    if not found:
+        return f"{HEADER}\n"
+    lines = [line._replace(station="") for line in decisions.from_metadata(found).lines]
+    return text(lines, timed=True)

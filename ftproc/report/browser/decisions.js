@@ -3,10 +3,11 @@
   const text = document.getElementById("decisions");
   if (!text) return;
   const header = text.value.split("\n")[0];
+  const rows = header.includes("from_row") ? ",," : ""; // such lines name rows in these columns
 
   // A line is added; the same line again is taken back, and so is one of another use on the same stretch.
   function decide(component, from, to, use) {
-    const stretch = [component, from, to].join(",") + ",";
+    const stretch = [component, from, to].join(",") + rows + ",";
     const lines = text.value.split("\n").filter(function (line) { return line.trim() !== ""; });
     if (!lines.length) lines.push(header);
     const line = stretch + use + ",";
@@ -20,7 +21,7 @@
   function shown() {
     for (const button of document.querySelectorAll("button.decide")) {
       const data = button.dataset;
-      const line = [data.component, data.start, data.end, data.use].join(",") + ",";
+      const line = [data.component, data.start, data.end + rows, data.use].join(",") + ",";
       button.setAttribute("aria-pressed", text.value.includes("\n" + line));
     }
   }

@@ -76,7 +76,8 @@ def ground(view: View) -> Drawn:
     low, high = _room(path[[across, up]])
     extent = (low, high)
     graticule.add(figure, view, extent)
-    for raw, name, look in _raw(view, across, up, extent):
+    dots = _raw(view, across, up, extent)
+    for raw, name, look in dots:
         figure.add_scatter(
             x=raw[0].astype(np.float32),
             y=raw[1].astype(np.float32),
@@ -106,7 +107,7 @@ def ground(view: View) -> Drawn:
             title={"text": names[axes[up]], **title}, nticks=8, scaleanchor="x", scaleratio=1, range=[low[1], high[1]]
         )
     )
-    known = "" if view.reading is None else " Dots: the position that each row of the log shows; some lie outside."
+    known = " Dots: the position that each row of the log shows; some lie outside." if dots else ""
     return Drawn(figure, f"Over the ground: equal scales; circle: start, square: end, triangle: station.{known}")
 
 
