@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import html
 import shlex
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import PurePath
 
@@ -16,34 +17,44 @@ from ftproc.files.writing.decisions import text
 from ftproc.report.patches import Patch
 from ftproc.report.view import View
 
-HEADER = "component,from_s,to_s,use,reason"
 
-
-def buttons(patch: Patch) -> str:
-    """For a patch of outliers: it is good after all, or bad whatever the editor thinks."""
+def buttons(view: View, patch: Patch) -> str:
+    """For a patch of outliers: it is good after all, or bad whatever the editor thinks; "" without `section`."""
+    if not view.summary:
+        return ""
     stretch = f'data-component="{patch.component}" data-start="{patch.start_s!r}" data-end="{patch.end_s!r}"'
     return "".join(f'<button class="decide" {stretch} data-use="{use}">{use}</button> ' for use in ("good", "bad"))
 
 
-def section(view: View, name: str) -> str:
-    """The lines so far, what adds some, and the command that uses them. name: of the log."""
+def section(view: View, name: str, clocks: Mapping[str, float] | None = None) -> str:
+    """The lines so far, what adds some, and the command that uses them. name: of the log, or of the range file. clocks:
+    of several stations, s from the page's times to those of its log."""
     if not view.summary:
         return ""
-    names = [channel.name for channel in view.channels if np.isfinite(channel.drawn).any()]
-    components = "".join(f'<option value="{each}">{each}</option>' for each in (*names, "all"))
-    uses = "".join(f'<option value="{use}">{use}</option>' for use in ("bad", "good", "auto"))
+    names = [channel.name for channel in view.channels if clocks is not None or np.isfinite(channel.drawn).any()]
+    choices = {"component": dict.fromkeys((*names, "all"), ""), "use": dict.fromkeys(("bad", "good", "auto"), "")}
+    if clocks is not None:
+        choices = {"station": {each: f' data-clock="{clock!r}"' for each, clock in clocks.items()}, **choices}
+    chosen = {what: _select(what, options) for what, options in choices.items()}
     file = f"{PurePath(name).name.split('.')[0] or 'log'}.decisions.csv"
-    command, lines = _command(view, name, file), html.escape(_so_far(view))
+    command, lines = _command(view, name, file), html.escape(_so_far(view, clocks is not None))
+    patch = "" if clocks is not None else ", or on <em>good</em> or <em>bad</em> beside a patch,"
     return (
-        '<section class="deciding"><h2>Decisions</h2><p class="note">You know the flight: a click on a reading, or on '
-        "<em>good</em> or <em>bad</em> beside a patch, writes a line, and a second click takes it back. Readings named "
-        "good are used whatever the editor thinks, bad ones never.</p>"
-        f'<p>The stretch that the figures show: <select id="component">{components}</select> is '
-        f'<select id="use">{uses}</select> <button id="stretch">Add a line.</button></p>'
+        '<section class="deciding"><h2>Decisions</h2><p class="note">You know the flight: a click on a reading'
+        f"{patch} writes a line, and a second click takes it back. Readings named good are used whatever the editor "
+        "thinks, bad ones never.</p>"
+        f"<p>The stretch that the figures show: {chosen.get('station', '')} {chosen['component']} is "
+        f'{chosen["use"]} <button id="stretch">Add a line.</button></p>'
         f'<textarea id="decisions" rows="6" spellcheck="false" aria-label="decisions">{lines}</textarea>'
         f'<p><button id="keep" data-file="{html.escape(file)}">Keep {html.escape(file)}</button>, then '
         f"<code>{html.escape(command)}</code></p></section>"
     )
+
+
+def _select(what: str, options: Mapping[str, str]) -> str:
+    """options: names with their further attributes."""
+    parts = "".join(f"<option{more}>{html.escape(each)}</option>" for each, more in options.items())
+    return f'<select id="{what}">{parts}</select>'
 
 
 def _command(view: View, name: str, file: str) -> str:
@@ -56,10 +67,10 @@ def _command(view: View, name: str, file: str) -> str:
     return shlex.join([*kept, "--decisions", file])
 
 
-def _so_far(view: View) -> str:
+def _so_far(view: View, stations: bool) -> str:
     """The decisions that the trajectory was computed with, to which lines are added."""
     found = view.trajectory.metadata.get("decisions")
-    if not found:
-        return f"{HEADER}\n"
-    lines = [line._replace(station="") for line in decisions.from_metadata(found).lines]
-    return text(lines, timed=True)
+    lines = decisions.from_metadata(found).lines if found else ()
+    if stations:
+        return text(lines, more=(*decisions.ENDS[0], "station"))
+    return text([line._replace(station="") for line in lines], more=decisions.ENDS[0])

@@ -26,7 +26,7 @@ _MARKED = {ISOLATED: "good", PATCH: "good", REJECTED: "auto", ACCEPTED: "auto"}
 CLOCK = "clock"  # a step of it
 
 NO_RESIDUALS = "This method publishes no residuals with sigmas."
-NOT_KNOWN = "A trajectory file does not hold the raw readings; the page of `ftproc filter --report` shows them."
+NOT_KNOWN = "Trajectory files and streams do not keep the raw readings; `ftproc filter LOG --report` shows them."
 _WHAT = {
     "innovation": "Innovation: the reading minus its prediction from the readings before it",
     "leave-one-out residual": "Leave-one-out residual: the reading minus its estimate from all other readings",

@@ -87,7 +87,7 @@ def test_decisions_on_it_hold_and_stand_on_the_page(scenario: str) -> None:
     assert lines[0]["readings"] == there[100:120].sum()
     assert lines[0]["inside_gate"] >= 0.8 * lines[0]["readings"], "they are good"
     text = page(found)
-    assert f'<option value="{name}">' in text
+    assert f"<option>{name}</option>" in text
     area = re.search(r"<textarea[^>]*>(.*?)</textarea>", text, re.DOTALL)
     assert area is not None
     kept = html.unescape(area[1])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from ftproc.files.decisions import COLUMNS, ENDS, Line
 from ftproc.files.layout import Target
@@ -18,13 +18,12 @@ def write(lines: Sequence[Line], target: Target) -> None:
         stream.write(text(lines).encode())
 
 
-def text(lines: Sequence[Line], timed: bool = False) -> str:
-    """The file of these lines, with the columns that they need. timed: also those of times."""
+def text(lines: Sequence[Line], more: Collection[str] = ()) -> str:
+    """The file of these lines, with the columns that they need, and more."""
     ends = {end for line in lines for end in line.ends} or set(ENDS[0])
-    ends |= set(ENDS[0]) if timed else set()
     station = {"station"} if any(line.station for line in lines) else set()
     found = io.StringIO()
-    named = [column for column in COLUMNS if column in {"component", "use", "reason", *ends, *station}]
+    named = [column for column in COLUMNS if column in {"component", "use", "reason", *ends, *station, *more}]
     writer = csv.DictWriter(found, named, restval="", extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
     for line in lines:
