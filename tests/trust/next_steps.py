@@ -65,7 +65,7 @@ class Outcome(NamedTuple):
     @property
     def helps(self) -> bool:
         """The error is smaller, or the verdict rightly better."""
-        if self.after is None:
+        if self.after is None or self.deceives:
             return False
         smaller = self.error_after_m < BETTER * self.error_m
         better = LEVELS.index(self.after) < LEVELS.index(self.verdict) and not self.far
