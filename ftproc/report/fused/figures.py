@@ -102,8 +102,8 @@ def residuals(flight: Flight, fused: Fused) -> Drawn:
         time_s = fused.stations[s].time_s - fused.constants.estimate[s, CLOCK] + flight.zero_s
         scaled = fused.residual[s][:, c] / np.sqrt(fused.residual_variance[s][:, c])
         used = fused.weight[s][:, c] > 0
-        own, whose = Timeline.of(time_s), {"component": COMPONENTS[c], "station": fused.stations[s].name}
-        whose["clock"] = clocks[fused.stations[s].name]
+        own, name = Timeline.of(time_s), fused.stations[s].name
+        whose = {"component": COMPONENTS[c], "station": name, "clock": clocks[name]}
         trace = dots(own, np.where(used, scaled, np.nan), "used", style.GREY)
         trace.meta = {**whose, "use": "bad"}
         add(figure, trace, row, first=row == 0)
