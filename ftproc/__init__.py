@@ -45,5 +45,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """The public names, also those that are not loaded yet."""
-    return sorted({*globals(), *__all__})
+    """The public names, and nothing else."""
+    return sorted(__all__)

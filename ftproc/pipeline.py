@@ -15,10 +15,10 @@ from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import heights, range_rates, registry, simultaneous
 from ftproc.methods.estimate import Estimate, Part
-from ftproc.quality import by_hand, next_steps, provenance, sanity
+from ftproc.quality import beside, by_hand, next_steps, provenance, sanity
 from ftproc.quality.next_steps import Step
 from ftproc.quality.statistics import RunStatistics
-from ftproc.records import COMPONENTS, MISSING, Diagnostics, FloatArray, MeasurementLog, Trajectory, joined
+from ftproc.records import COMPONENTS, MISSING, Beside, Diagnostics, FloatArray, MeasurementLog, Trajectory, joined
 from ftproc.settings import FilterSettings
 
 if TYPE_CHECKING:
@@ -137,11 +137,17 @@ class Filtering:
         known = slice(None) if estimate.known is None else estimate.known
         cleaned = from_cartesian(state[:, :3]) if estimate.cleaned is None else estimate.cleaned
         cleaned_sigma = measurement_sigma(cleaned, los_sigma[:, :3])
-        beside: dict[str, Any] = {}
-        if self.log.range_rate is not None:
-            labels = np.full(len(state), MISSING, np.uint8)
-            channel = estimate.range_rate
-            beside = range_rates.columns(state, los_sigma, labels if channel is None else channel.label)
+        log, channels = self.log.stretch(rows), dict[str, Beside]()
+        columns: dict[str, Any] = {}
+        if log.range_rate is not None:
+            channel, labels = estimate.range_rate, np.full(len(state), MISSING, np.uint8)
+            if channel is not None:
+                labels = by_hand.labelled(channel.label, log.by_hand, "range_rate")
+                estimate = estimate._replace(range_rate=channel._replace(label=labels))
+            columns = range_rates.columns(state, los_sigma, labels)
+            if estimate.range_rate is not None:
+                rate, spread, _ = columns.values()
+                channels["range_rate"] = beside.of_rates(log, estimate.range_rate, rate, spread)
         if self.height is not None and tuple(absent) in ((), heights.ABSENT):
             state, sigma, path_sigma = heights.placed(self.height, rows, state, sigma, path_sigma)
             cleaned_sigma = heights.elevated(self.height, rows, cleaned, cleaned_sigma)
@@ -153,21 +159,24 @@ class Filtering:
         elif np.isinf(state).any() or (estimate.cleaned is None and np.isnan(state[known]).any()):
             name = self.method.name
             raise InputError(f"{self.log.name}: {name} diverged; give --noise and --jerk, or check the log's units")
-        log = self.log.stretch(rows)
         estimate = estimate._replace(label=by_hand.labelled(estimate.label, log.by_hand))
-        if self.height is not None:
-            estimate = estimate._replace(label=heights.relabelled(self.height, rows, estimate.label))
-        shown, variance = _diagnostics(log.measurement, estimate), cleaned_sigma**2 + estimate.model.reading_variance
-        shown = by_hand.with_rejected(shown, estimate.label, cleaned, variance)
-        self.effects.add(log.by_hand, shown.residual, shown.residual_sigma)
-        self.statistics.add(log.time_s, estimate, cleaned, correction, outside)
-        label = estimate.label
+        label, variance = estimate.label, cleaned_sigma**2 + estimate.model.reading_variance
         if self.height is not None and not absent:
-            label, own = heights.labelled(label)
-            beside |= own
+            label = heights.relabelled(self.height, rows, label)
+            label[:, 2] = by_hand.labelled(label[:, 2], log.by_hand, "height")
+            estimate = estimate._replace(label=label)
+            stand_in, own = self.record.measurement[rows], np.sqrt(variance[:, 2])
+            residuals = _diagnostics(stand_in, estimate)
+            channels["height"] = beside.of_heights(log, self.height, residuals, cleaned, own, label[:, 2])
+            label, column = heights.labelled(label)
+            columns |= column
+        shown = by_hand.with_rejected(_diagnostics(log.measurement, estimate), label, cleaned, variance)
+        shown = replace(shown, beside=channels)
+        self.effects.add(log.by_hand, *beside.stacked(shown))
+        self.statistics.add(log.time_s, estimate, cleaned, correction, outside)
         return Trajectory(
             log.name, log.row, log.time_s, cleaned, state, sigma, cleaned_sigma, label, best.nis, correction,
-            metadata={"frame": log.frame}, extra=_beside(log.extra, beside), diagnostics=shown, path_sigma=path_sigma,
+            metadata={"frame": log.frame}, extra=_beside(log.extra, columns), diagnostics=shown, path_sigma=path_sigma,
         )  # fmt: skip
 
 
@@ -194,7 +203,8 @@ def _corrected(estimate: Estimate, model: Model) -> Correction:
 
 
 def _diagnostics(reading: FloatArray, estimate: Estimate) -> Diagnostics:
-    missing = ~np.isfinite(reading)  # also where the filter ran on a stand-in
+    """Residuals of the readings (n, 3); none of what stands in for a component."""
+    missing = ~np.isfinite(reading)
     if estimate.smoothed is None:
         residual, sigma = estimate.run.innovation, estimate.run.innovation_sigma
         return Diagnostics(reading, np.where(missing, np.nan, residual), sigma, "innovation")

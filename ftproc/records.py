@@ -27,6 +27,7 @@ IntArray = NDArray[np.int64]
 FlagArray = NDArray[np.uint8]
 
 COMPONENTS = ("range", "azimuth", "elevation")
+BESIDE = ("range_rate", "height")  # what a log may have beside them
 
 #: Values of the trajectory's `outlier_*` columns.
 GOOD, ISOLATED, PATCH, MISSING, REJECTED, ACCEPTED = range(6)  # the last two by hand
@@ -126,6 +127,17 @@ class Truth:
         return f"<Truth {self.name}: {_length(self.time_s)}>"
 
 
+class Beside(NamedTuple):
+    """Readings of a channel beside range, azimuth and elevation: reading, cleaned, residual and residual_sigma (n,) in
+    its unit (m/s, m), as in `Diagnostics`; label (n,) as in `Trajectory.outlier`."""
+
+    reading: FloatArray
+    cleaned: FloatArray
+    residual: FloatArray
+    residual_sigma: FloatArray
+    label: FlagArray
+
+
 @dataclass(frozen=True, repr=False)
 class Diagnostics:
     """Readings and residuals of a trajectory, row for row with it; not part of its file.
@@ -134,12 +146,14 @@ class Diagnostics:
     residual: (n, 3) reading minus its prediction from other readings, NaN where missing: the innovation (from all
     earlier readings), or after smoothing the leave-one-out residual (from all others).
     residual_sigma: (n, 3) 1-sigma that the filter expects of the residual.
+    beside: the same of channels in BESIDE that the log has.
     """
 
     reading: FloatArray
     residual: FloatArray
     residual_sigma: FloatArray
     residual_kind: Literal["innovation", "leave-one-out residual"]
+    beside: Mapping[str, Beside] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"<Diagnostics: {len(self.reading)} rows, {self.residual_kind}>"
@@ -262,7 +276,12 @@ def joined(parts: Sequence[Trajectory]) -> Trajectory:
 
         extra = pa.concat_tables([part.extra for part in parts])
     present = [part.diagnostics for part in parts if part.diagnostics is not None]
-    whole = _concatenated(present, "reading", "residual", "residual_sigma") if len(present) == len(parts) else None
+    whole = None
+    if len(present) == len(parts):
+        names = present[0].beside
+        beside = {each: Beside._make(map(np.concatenate, zip(*(d.beside[each] for d in present), strict=True)))
+                  for each in names}  # fmt: skip
+        whole = replace(_concatenated(present, "reading", "residual", "residual_sigma"), beside=beside)
     arrays: tuple[str, ...] = (
         "row", "time_s", "measurement", "state", "sigma", "measurement_sigma", "outlier", "nis", "correction",
     )  # fmt: skip

@@ -15,7 +15,7 @@ from ftproc.errors import UsageError
 
 
 def test_dir_shows_the_public_names_and_each_is_there():
-    assert set(ftproc.__all__) <= set(dir(ftproc))
+    assert dir(ftproc) == sorted(ftproc.__all__)
     assert all(getattr(ftproc, name) is not None for name in ftproc.__all__)
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         _ = ftproc.nothing

@@ -16,11 +16,11 @@ from ftproc.files.writing import atomic
 from ftproc.files.writing.csvtext import no_formula
 from ftproc.files.writing.trajectories import plain
 from ftproc.quality import verdict
-from ftproc.quality.statistics import UNITS
 from ftproc.quality.summary import counted
 from ftproc.records import COMPONENTS
 from ftproc.report import index
 
+UNITS = {"range": "m", "azimuth": "rad", "elevation": "rad", "range_rate": "mps", "height": "m"}  # of noise
 KINDS = (".csv", ".json", ".html")
 
 
@@ -36,18 +36,18 @@ def write(outcomes: Sequence[Outcome], target: Target) -> None:
     if kind == ".html":
         index.write(entries(outcomes), target)
         return
-    rows = [plain(row(outcome)) for outcome in outcomes]
+    there = {name for each in outcomes if not each.failure for name in each.summary["components"]}
+    rows = [plain(row(outcome, index.shown(there))) for outcome in outcomes]
     text = json.dumps(rows, indent=2, ensure_ascii=False) + "\n" if kind == ".json" else _csv(rows)
     with atomic.replacing(target) as stream:
         stream.write(encodable(text).encode())
 
 
-def row(outcome: Outcome) -> dict[str, Any]:
+def row(outcome: Outcome, channels: Sequence[str] = COMPONENTS) -> dict[str, Any]:
     """What the table says of a log. Percentages are of the readings that are not missing; of a log that failed only its
-    error is known."""
+    error is known. channels: that have columns."""
     task, s, failure = outcome.task, outcome.summary, outcome.failure
     parts = s["components"] if failure is None else {}
-    noise = {name: f"noise_{unit}" for name, unit in zip(COMPONENTS, UNITS, strict=True)}
     return {
         "log": task.log,
         "target": task.recipe.target or None,
@@ -56,8 +56,8 @@ def row(outcome: Outcome) -> dict[str, Any]:
         "reasons": [] if failure else list(s["trust"]["reasons"]),
         "rows": s.get("rows"),
         "duration_s": s.get("duration_s"),
-        **{f"outliers_{name}_percent": _percent(parts.get(name)) for name in COMPONENTS},
-        **{f"noise_{name}_{noise[name][6:]}": parts.get(name, {}).get(noise[name]) for name in COMPONENTS},
+        **{f"outliers_{name}_percent": _percent(parts.get(name)) for name in channels},
+        **{f"noise_{name}_{UNITS[name]}": parts.get(name, {}).get(f"noise_{UNITS[name]}") for name in channels},
         "output": None if failure else task.output,
         "report": None if failure else task.report,
         "error": failure.message if failure else None,
@@ -91,11 +91,11 @@ def entries(outcomes: Sequence[Outcome]) -> list[index.Entry]:
 
 def line(outcome: Outcome) -> str:
     """An outcome without a failure in one line."""
-    s, found = outcome.summary, row(outcome)
-    rates = " ".join(f"{found[f'outliers_{name}_percent']:.2f}" for name in COMPONENTS)
-    why = "; ".join(found["reasons"])
+    s = outcome.summary
+    rates = " ".join(f"{_percent(part):.2f}" for part in s["components"].values())
+    why = "; ".join(s["trust"]["reasons"])
     when = ", finished before" if outcome.before else ""
-    text = f"{outcome.task.log}: {counted(s['rows'], 'row')}, {rates} % outliers{when}, {found['verdict']}"
+    text = f"{outcome.task.log}: {counted(s['rows'], 'row')}, {rates} % outliers{when}, {s['trust']['verdict']}"
     return printable(f"{text}{': ' if why else ''}{why} -> {outcome.task.output}")
 
 

@@ -18,7 +18,7 @@ from ftproc.config.recipe import Recipe
 from ftproc.errors import Failure, FtprocWarning, failure, interruption, printable
 from ftproc.files import decisions, layout, remote
 from ftproc.files.decisions import Line
-from ftproc.records import Trajectory, joined
+from ftproc.records import BESIDE, MISSING, Trajectory, joined
 from ftproc.settings import PACKAGED
 
 if TYPE_CHECKING:
@@ -159,7 +159,10 @@ def _noting(parts: Iterable[Trajectory], station: str, taken: list[Line]) -> Ite
     """The parts of a trajectory, with the decisions on all of their readings noted behind the last."""
     found = []
     for part in parts:
-        found.append((part.time_s, part.row, part.outlier))
+        beside = {} if part.diagnostics is None else part.diagnostics.beside
+        missing = np.full(len(part), MISSING, np.uint8)
+        others = [beside[name].label if name in beside else missing for name in BESIDE]
+        found.append((part.time_s, part.row, np.column_stack([part.outlier, *others])))
         yield part
     time_s, row, outlier = map(np.concatenate, zip(*found, strict=True))
     taken += decisions.taken(time_s, row, outlier, station)

@@ -214,7 +214,8 @@ def command(list_methods: str | None, write_config: bool, explain: bool, follow:
 
         options["logs"], others = plan.chosen(options["logs"])
         if others:
-            filtering.notify(f"left out: {len(others)} truths and trajectories, such as {others[0]}")
+            what = f"{len(others)} truths and trajectories, such as " if len(others) > 1 else "a truth or trajectory, "
+            filtering.notify(f"left out: {what}{others[0]}")
         request = filtering.Request._make(options[name] for name in filtering.Request._fields)
         ctx.exit(filtering.filter_logs(request, recipes.of_logs(ctx, request.logs), ctx.meta[DEBUG]))
 

@@ -9,7 +9,7 @@ import click
 
 from ftproc.cli import options
 from ftproc.cli.command import Command, refuse_with, stated
-from ftproc.settings import EPOCHS, TrainSettings
+from ftproc.settings import EPOCHS, PACKAGED, TrainSettings
 
 _EXAMPLES = """
 ftproc train --scenario radar --flights 4 --population 10 --generations 5 --epochs 30 -o radar.safetensors
@@ -91,7 +91,7 @@ def _number(name: str, least: int, default: int, text: str) -> Callable[[options
 @options.units("Units of the logs' columns whose names state none, such as range=km. [default: s, m, rad]")
 @click.option("--columns", metavar="NAME=COLUMN,...", help="Names of columns of the logs, such as time=T0,range=RNG.")
 @_number("jobs", 1, 1, "Worker processes; the model is bit for bit the same for any number.")
-@click.option("--show", type=options.FILE, metavar="MODEL", help="Print the card of a model file, and train nothing.")
+@click.option("--show", type=options.FILE, metavar="MODEL", help="Print the card of a model file, or of packaged.")
 @click.option(
     "--compare-starts",
     is_flag=True,
@@ -107,7 +107,9 @@ def command(show: str | None, **options: Any) -> None:
     if show is not None:
         from ftproc.correction import model, model_file
 
-        click.echo(model.card(model_file.load(show)))
+        found = model_file.named(PACKAGED) if show == PACKAGED else model_file.load(show)
+        assert found is not None
+        click.echo(model.card(found))
         return
     _check(options)
     _refuse_idle(ctx)

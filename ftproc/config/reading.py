@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -103,7 +103,7 @@ def _check_section(name: str, section: str, keys: object) -> None:
         raise UsageError(f'{name}: "{section}" stands outside of its section; write it below [{"] or [".join(homes)}].')
     kind = "section" if isinstance(keys, Mapping) else "key"
     sections = ", ".join(f"[{known}]" for known in KEYS)
-    hint = nearest(section, KEYS) or "."
+    hint = _of_option(section) or nearest(section, KEYS) or "."
     raise UsageError(f'{name}: there is no {kind} "{section}"{hint} The sections: {sections}.')
 
 
@@ -125,11 +125,17 @@ def _key_of(place: str, keys: Mapping[str, Key], written: str) -> tuple[str, Cal
         )
     all_names = [form for known, its in keys.items() for form in _spelt(known, its)]
     short = ", ".join(f"{known}_UNIT" if its.quantity else known for known, its in keys.items())
-    hint = nearest(written, all_names) or "."
+    hint = _of_option(written) or nearest(written, all_names) or "."
     raise UsageError(f'{place} has no key "{written}"{hint} Its keys are: {short}.')
 
 
-def _spelt(name: str, key: Key) -> Iterable[str]:
+def _of_option(name: str) -> str:
+    """Where the keys stand that say what the option of this name says; "" of no option."""
+    found = [f"{_spelt(key_name, key)[0]} under [{home}]" for home, key_name, key in every() if key.option == name]
+    return f"; what --{name.replace('_', '-')} says is {', '.join(found)}." if found else ""
+
+
+def _spelt(name: str, key: Key) -> list[str]:
     return [f"{name}_{unit}" for unit in key.units] or [name]
 
 

@@ -38,6 +38,7 @@ USEFUL = 5e-4  # variance with which the readings predict a scalar, of its own: 
 # memory of the filter make it better by less than 1 %
 LONGEST_ISOLATED = 2  # rejected in a row; more make a patch
 SCALE = 1.4826
+NONE = np.zeros(1, bool)  # is good by hand
 
 
 class Channel(NamedTuple):
@@ -85,9 +86,11 @@ class Channel(NamedTuple):
 Residuals = Callable[[Scalars], tuple[FloatArray, FloatArray]]
 
 
-def understood(unused: Scalars, residuals: Residuals, gate: float, interval: float = 0.0) -> Channel:
+def understood(
+    unused: Scalars, residuals: Residuals, gate: float, interval: float = 0.0, accepted: NDArray[np.bool_] = NONE
+) -> Channel:
     """What a record whose readings are edited shows of range rates, none of which is used yet, with variance 1.
-    interval: in which they are ambiguous, m/s; zero if they are not."""
+    interval: in which they are ambiguous, m/s; zero if they are not. accepted: (n,) that are good by hand."""
     value, there = unused.value, np.isfinite(unused.value)
     channel = Channel(unused, labels_of(there, value))
     if there.sum() < FEWEST:
@@ -103,9 +106,9 @@ def understood(unused: Scalars, residuals: Residuals, gate: float, interval: flo
     off = np.where(there, inward if closing else outward, np.nan)
     value = expected + off if interval > 0 else -value if closing else value
     sigma = max(min(SCALE * median(np.abs(off[there])), _scatter(value)), _least(value))
-    weight = np.where(there & (np.abs(off) <= FAR * np.sqrt(vague + sigma**2)), 1.0, 0.0)
+    weight = np.where(there & (accepted | (np.abs(off) <= FAR * np.sqrt(vague + sigma**2))), 1.0, 0.0)
     rates = unused._replace(value=value, variance=np.full(len(value), sigma**2), weight=weight)
-    rates = decided(rates, residuals, gate)
+    rates = decided(rates, residuals, gate, accepted & there)
     if rates.weight.sum() < (1 - MOST_REJECTED) * there.sum():
         return channel.left_out("most of the range rates contradict the readings: none is used")
     told = median(vague[there]) / float(rates.variance[0])
@@ -122,8 +125,8 @@ def of_the_rest(log: Observations, model: Model, starts: list[Start], kind: int 
     return run.log_likelihood + 0.5 * float((np.log(spread) + residual**2 / spread).sum())
 
 
-def decided(rates: Scalars, residuals: Residuals, gate: float) -> Scalars:
-    """Noise and weights in turn, until they stand still."""
+def decided(rates: Scalars, residuals: Residuals, gate: float, accepted: NDArray[np.bool_] = NONE) -> Scalars:
+    """Noise and weights in turn, until they stand still. accepted: (n,) that are good by hand."""
     chances = np.tile(np.array(outlier_chain.START_RATES), (3, 1))
     n, least = len(rates.value), _least(rates.value) ** 2
     for _ in range(ROUNDS):
@@ -131,7 +134,7 @@ def decided(rates: Scalars, residuals: Residuals, gate: float) -> Scalars:
         used, before = rates.weight > 0, float(rates.variance[0])
         ratio = float(((residual / spread) ** 2)[used].sum() / (1 / spread)[used].sum()) if used.any() else 1.0
         variance = max(before * min(max(ratio, 0.1), 10.0), least)
-        weight = good(residual, spread - before + variance, variance, gate, chances)
+        weight = np.where(accepted, 1.0, good(residual, spread - before + variance, variance, gate, chances))
         still = (weight == rates.weight).all() and abs(math.log(variance / before)) < STILL
         rates = rates._replace(variance=np.full(n, variance), weight=weight)
         if still:

@@ -11,8 +11,8 @@ FloatArray = NDArray[np.float64]
 
 
 class Accepted(NamedTuple):
-    """times: those of the readings of each component that are good whatever an editor finds, (m,) s by component;
-    nothing if there are none."""
+    """times: those of the readings of each component, and of the range rates behind them, that are good whatever an
+    editor finds, (m,) s each; nothing if there are none."""
 
     times: tuple[FloatArray, ...] = ()
 
@@ -22,6 +22,10 @@ class Accepted(NamedTuple):
         for c in range(3):
             found[:, c] &= np.isin(time_s, self.times[c]) if self.times else False
         return found
+
+    def rates(self, time_s: FloatArray) -> NDArray[np.bool_]:
+        """(n,) which of the range rates at some times (n,) these are."""
+        return np.isin(time_s, self.times[3]) if len(self.times) > 3 else np.zeros(len(time_s), bool)
 
 
 NOTHING = Accepted()

@@ -4,7 +4,7 @@
     range,412.0,418.5,bad,multipath off the hangar
     all,500.2,500.2,good,
 
-`component` is one of COMPONENTS or `all`; `use` is `bad` (never used), `good` (used whatever the editor thinks) or
+`component` is one of CHANNELS or `all`; `use` is `bad` (never used), `good` (used whatever the editor thinks) or
 `auto` (the editor decides). Instead of times a line may name rows of the log, `from_row` and `to_row`, counted from 0
 without the header. Both ends belong to it. Of lines that name the same reading the last counts. With several logs the
 column `station` says which one a line is for.
@@ -28,6 +28,7 @@ import numpy as np
 from ftproc.errors import InputError, UsageError, nearest
 from ftproc.records import (
     ACCEPTED,
+    BESIDE,
     COMPONENTS,
     GOOD,
     ISOLATED,
@@ -40,6 +41,7 @@ from ftproc.records import (
     MeasurementLog,
 )
 
+CHANNELS = (*COMPONENTS, *BESIDE)
 ALL = "all"
 USES = {"auto": GOOD, "bad": REJECTED, "good": ACCEPTED}
 ENDS = (("from_s", "to_s"), ("from_row", "to_row"))
@@ -76,17 +78,24 @@ class Line(NamedTuple):
 
 
 class ByHand(NamedTuple):
-    """The decisions on the readings of one log. line: (n, 3) which of the lines decides on each reading, from 1; 0 for
-    none."""
+    """The decisions on the readings of one log. line: (n, 5) which of the lines, from 1, decides on each reading of
+    CHANNELS; 0 for none."""
 
     decisions: Decisions
     line: IntArray
 
     @property
     def flags(self) -> FlagArray:
-        """(n, 3) REJECTED, ACCEPTED, or GOOD where the editor decides."""
+        """(n, 3) of COMPONENTS: REJECTED, ACCEPTED, or GOOD where the editor decides."""
+        return self._uses(slice(len(COMPONENTS)))
+
+    def of(self, channel: str) -> FlagArray:
+        """(n,) the same of one of CHANNELS."""
+        return self._uses(CHANNELS.index(channel))
+
+    def _uses(self, columns: int | slice) -> FlagArray:
         uses = np.array([GOOD, *(USES[line.use] for line in self.decisions.lines)], np.uint8)
-        found: FlagArray = uses[self.line]
+        found: FlagArray = uses[self.line[:, columns]]
         return found
 
     def stretch(self, rows: slice) -> ByHand:
@@ -125,14 +134,15 @@ class Decisions:
         own = self.of(station)
         if not own.lines:
             return log
-        line = np.zeros(log.measurement.shape, np.int64)
+        there = np.isfinite(readings(log))
+        line = np.zeros(there.shape, np.int64)
         by_row = np.argsort(log.row, kind="stable")
         for number, each in enumerate(own.lines, 1):
             order = log.row[by_row] if each.by_row else log.time_s
             low, high = np.searchsorted(order, each.first), np.searchsorted(order, each.last, side="right")
             rows = by_row[low:high] if each.by_row else slice(low, high)
             line[rows, component_slice(each.component)] = number
-        line[~np.isfinite(log.measurement)] = 0
+        line[~there] = 0
         if not line.any():
             raise InputError(self._names_nothing(log, station))
         found = ByHand(own, line)
@@ -150,9 +160,16 @@ class Decisions:
 
 
 def component_slice(component: str) -> slice:
-    """The columns of an (n, 3) array that a component names."""
-    c = 0 if component == ALL else COMPONENTS.index(component)
+    """The columns of an (n, 5) array that a component names."""
+    c = 0 if component == ALL else CHANNELS.index(component)
     return slice(None) if component == ALL else slice(c, c + 1)
+
+
+def readings(log: MeasurementLog) -> FloatArray:
+    """(n, 5) of CHANNELS, NaN where missing."""
+    missing = np.full(len(log), np.nan)
+    rate, height = log.range_rate, None if log.heights is None else log.heights.above_m
+    return np.column_stack([log.measurement, *(missing if each is None else each for each in (rate, height))])
 
 
 def _check_same_times(name: str, log: MeasurementLog, flags: FlagArray) -> None:
@@ -236,7 +253,7 @@ def _check_header(name: str, header: Sequence[str]) -> None:
 
 def _line(place: str, number: int, row: Mapping[str, str], decimal_comma: bool) -> Line:
     component, use = (row.get(column, "").lower() for column in ("component", "use"))
-    for column, word, known in (("component", component, (*COMPONENTS, ALL)), ("use", use, tuple(USES))):
+    for column, word, known in (("component", component, (*CHANNELS, ALL)), ("use", use, tuple(USES))):
         if word not in known:
             hint = nearest(word, known) or "."
             raise UsageError(f'{place}: {column} is "{word}", expected one of {", ".join(known)}{hint}')
@@ -263,8 +280,8 @@ def _end(place: str, column: str, cell: str, decimal_comma: bool) -> float:
 
 def taken(time_s: FloatArray, row: IntArray, outlier: FlagArray, station: str = "") -> Iterator[Line]:
     """The editor's decisions in a trajectory as lines that give them again, without those by hand. time_s, row: (n,);
-    outlier: (n, 3)."""
-    for c, component in enumerate(COMPONENTS):
+    outlier: (n, 3), or (n, 5) with that of all CHANNELS."""
+    for c, component in enumerate(CHANNELS[: outlier.shape[1]]):
         there = np.flatnonzero(outlier[:, c] != MISSING)
         times, flags = time_s[there], outlier[there, c]
         edges = np.r_[0, np.flatnonzero(flags[1:] != flags[:-1]) + 1, len(flags)]

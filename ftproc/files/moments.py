@@ -15,25 +15,27 @@ NEAR_ZERO_S = 1.0  # a log that begins so near to its time zero counts from its 
 
 
 class Moments(NamedTuple):
-    """epoch: the instant of time zero (ISO 8601, UTC), or "". start_s, end_s: the first and the last time of the
-    log."""
+    """epoch: the instant of time zero (ISO 8601, UTC), or "". start_s, end_s: the first and the last time of the log.
+    zone: behind a clock time; "" where the log states no time zone, and nobody knows whether it is UTC."""
 
     epoch: str
     start_s: float
     end_s: float
+    zone: str = " UTC"
 
     @classmethod
     def of(cls, metadata: Mapping[str, Any], time_s: FloatArray) -> Moments:
         """Those of a trajectory with these metadata and times (n,), in their order."""
         epoch = metadata.get("epoch")
         known = time_s if len(time_s) else np.zeros(1)
-        return cls(epoch if isinstance(epoch, str) else "", float(known[0]), float(known[-1]))
+        zone = _zone(metadata.get("summary"))
+        return cls(epoch if isinstance(epoch, str) else "", float(known[0]), float(known[-1]), zone)
 
     @classmethod
     def of_summary(cls, s: Mapping[str, Any]) -> Moments:
         """Those of the log of a summary; of one of an older version, which says nothing of it, as if from zero."""
         start_s = float(s.get("start_s") or 0.0)
-        return cls(str(s.get("epoch") or ""), start_s, start_s + float(s.get("duration_s") or 0.0))
+        return cls(str(s.get("epoch") or ""), start_s, start_s + float(s.get("duration_s") or 0.0), _zone(s))
 
     def utc(self, time_s: float) -> np.datetime64 | None:
         """The clock time in UTC, to the microsecond; None where the clock is not known."""
@@ -55,7 +57,7 @@ class Moments(NamedTuple):
     def begins(self) -> str:
         """Date and clock time of the first row, such as 2024-05-25 12:00:00.10 UTC; "" where they are not known."""
         start = self.utc(self.start_s)
-        return "" if start is None else f"{_rounded(start, 2).replace('T', ' ')} UTC"
+        return "" if start is None else f"{_rounded(start, 2).replace('T', ' ')}{self.zone}"
 
     @property
     def counts_from_elsewhere(self) -> bool:
@@ -79,8 +81,13 @@ class Moments(NamedTuple):
         `50702.9 s (T+61.00 s)`."""
         plain = f"{time_s:.6g} s" if abs(time_s) < 1e5 else f"{time_s:.2f} s"
         if self.utc(time_s) is not None:
-            return f"{plain} ({self.clock(time_s)} UTC)"
+            return f"{plain} ({self.clock(time_s)}{self.zone})"
         return f"{plain} ({self.since(time_s)} s)" if self.counts_from_elsewhere else plain
+
+
+def _zone(s: object) -> str:
+    """Of the log of a summary."""
+    return "" if isinstance(s, Mapping) and s.get("zone_stated") is False else Moments._field_defaults["zone"]
 
 
 def _rounded(moment: np.datetime64, decimals: int) -> str:

@@ -34,8 +34,9 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "range": _split(
         """
         range r slantrange sr rng rho slrange slrng slantrng srange srng entfernung schragentfernung
-        schragdistanz distanceoblique distanciainclinada distanciaobliqua egikmesafe egikmenzil дальность
-        наклоннаядальность дальністьпохила дальність 斜距 斜距离 斜距離 경사거리
+        schragdistanz schragdist schraegentfernung schraegdistanz schraegdist distanceoblique
+        distanciainclinada distanciaobliqua egikmesafe egikmenzil дальность наклоннаядальность
+        дальністьпохила дальність 斜距 斜距离 斜距離 경사거리
         """
     ),
     "azimuth": _split(
@@ -46,7 +47,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     ),
     "elevation": _split(
         """
-        elevation el e elevationangle elangle elev elevangle altitudeangle hohenwinkel elevationswinkel
+        elevation el e elevationangle elangle elev elevangle altitudeangle hohenwinkel hoehenwinkel elevationswinkel
         elevacion elevazione elevacao elevatie elewacja elevace hojdvinkel yukselis yukselisacisi уголместа
         кутмісця 俯仰角 俯仰 仰角 高低角 高度角 고각 앙각
         """
@@ -82,7 +83,9 @@ WEAK_ALIASES: Mapping[str, tuple[str, ...]] = {
         avstand afstand mesafe d 距离 距離 거리
         """
     ),
-    "azimuth": _split("theta hz horizontalangle horizontaldirection hzangle hangle ha horangle horizangle аз β"),
+    "azimuth": _split(
+        "theta hz richtung horizontalangle horizontaldirection hzangle hangle ha horangle horizangle аз β"
+    ),
     "elevation": _split("v verticalangle vertangle vangle va elv alt altitude site depression depressionangle ум ε"),
 }
 
@@ -98,7 +101,7 @@ GERMAN = frozenset(_split("zeit uhrzeit entfernung schragentfernung schragdistan
 #: Names of zenith angles, which are 90 degrees minus the elevation.
 ZENITH_ALIASES = _split(
     """
-    zenith zenithangle zenithdistance zen zd za zendist zenang zenithdist zenitdistanz zenitwinkel coelevation
+    zenith zenithangle zenithdistance zen zd za zendist zenang zenithdist zenit zenitdistanz zenitwinkel coelevation
     coelevationangle offzenithangle offzenith colatitude зенитноерасстояние 天顶距
     """
 )

@@ -71,7 +71,8 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     if readings.range_rate is not None:
         how = settings.gate, settings.jerk_psd_m2ps5 is not None
         given = readings.range_rate, readings.rate_interval_mps
-        log, model, channel = range_rates.fit(log, model, edited.starts, given, how)
+        accepted = readings.accepted.rates(readings.time_s)
+        log, model, channel = range_rates.fit(log, model, edited.starts, given, how, accepted)
     names = preparing.motions(settings)
     if len(edited.starts) > MOST_PIECES and motion_models.WHITE in names:
         names = (motion_models.WHITE,)

@@ -30,7 +30,7 @@ from ftproc.errors import InputError
 from ftproc.methods import alone, anti_outlier, preparing
 from ftproc.methods.estimate import Recording
 from ftproc.order_statistics import median
-from ftproc.records import ISOLATED, MISSING, PATCH, FlagArray, FloatArray, MeasurementLog
+from ftproc.records import ACCEPTED, ISOLATED, MISSING, PATCH, REJECTED, FlagArray, FloatArray, MeasurementLog
 from ftproc.settings import FilterSettings
 
 ABSENT = (2,)  # components that are missing where a height stands in
@@ -61,12 +61,13 @@ ANY = Prior(0.0, 6000.0, "any target")
 class Common(NamedTuple):
     """What stands for the elevation. prior: if no height is measured. sigma_m: (n,) that all heights may be off by
     together. range_m: by which the noise of the elevations is that of single heights. rejected: (n,) heights that are
-    outliers."""
+    outliers. station_m: the station's own height, m."""
 
     prior: Prior | None
     sigma_m: FloatArray
     range_m: float = 1.0
     rejected: NDArray[np.bool_] | None = None
+    station_m: float = 0.0
 
     def figures(self) -> dict[str, Any]:
         """For the summary, JSON-serialisable."""
@@ -81,14 +82,18 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
     those of the target."""
     if recording.absent != ABSENT:
         return recording, None
-    heights, causal = log.heights, settings.editing in ("live", "forward")
+    heights, causal, by_hand = log.heights, settings.editing in ("live", "forward"), np.zeros(len(log), np.uint8)
+    if log.by_hand is not None:
+        by_hand = log.by_hand.of("height")
     if heights is None or causal or not np.isfinite(heights.above_m).any() or settings.height is not None:
         return recording, Common(_prior(log, settings, causal), np.zeros(len(log)))
     measurement = np.array(log.measurement)
     station_m = settings.site[2] if settings.site is not None else 0.0
     above, slant = heights.above_m - station_m, _cleaned_ranges(recording, settings)
     step = rounding_step(heights.above_m)
+    above = np.where(by_hand == REJECTED, np.nan, above)
     own, good = screened(log.time_s, above, step)
+    good |= by_hand == ACCEPTED
     rejected = np.isfinite(above) & ~good
     above = np.where(good, above, np.nan)
     with np.errstate(invalid="ignore"):
@@ -104,13 +109,14 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
     assumed = recording.assumed_sigma.copy()
     assumed[2] = typical
     times_s = log.time_s - log.time_s[0]
-    accepted = Accepted((*(recording.accepted.times[:2] or (np.zeros(0),) * 2), times_s[good]))
+    decided = recording.accepted.times or (np.zeros(0),) * 3
+    accepted = Accepted((*decided[:2], times_s[good], *decided[3:]))
     uneven = Uneven(times, np.zeros_like(times))
     found = replace(
         recording, measurement=measurement, assumed_sigma=assumed, absent=(), accepted=accepted, uneven=uneven
     )
     known = np.where(np.isfinite(common), common, float(np.nanmedian(common)))
-    return found, Common(None, np.hypot(known, step / math.sqrt(12)), own / typical, rejected)
+    return found, Common(None, np.hypot(known, step / math.sqrt(12)), own / typical, rejected, station_m)
 
 
 def screened(time_s: FloatArray, above_m: FloatArray, step: float) -> tuple[float, NDArray[np.bool_]]:

@@ -26,18 +26,23 @@ STEPS = 3  # of the search for a profile
 
 
 def fit(
-    log: Observations, model: Model, starts: list[Start], given: tuple[FloatArray, float], how: tuple[float, bool]
+    log: Observations,
+    model: Model,
+    starts: list[Start],
+    given: tuple[FloatArray, float],
+    how: tuple[float, bool],
+    accepted: NDArray[np.bool_],
 ) -> tuple[Observations, Model, beside.Channel]:
     """A log whose readings are edited, with its range rates; the model, and what is known of the rates. given: (n,)
     m/s, NaN where missing, and the interval in which they are ambiguous, or zero. how: the gate, and whether the jerk
-    is fixed."""
+    is fixed. accepted: (n,) rates that are good by hand."""
     (value, interval), (gate, jerk_fixed) = given, how
 
     def residuals(rates: Scalars) -> tuple[FloatArray, FloatArray]:
         found = residuals_beside(log._replace(beside=(rates,)), model, starts)[0]
         return found[:, 0], found[:, 1]
 
-    channel = beside.understood(Scalars.rates(value, 1.0, np.zeros(len(value))), residuals, gate, interval)
+    channel = beside.understood(Scalars.rates(value, 1.0, np.zeros(len(value))), residuals, gate, interval, accepted)
     if channel.why:
         return log, model, channel
     if channel.told < TELLING:
@@ -48,7 +53,7 @@ def fit(
         both = log._replace(beside=(channel.rates,))
         fitted = fit_profile(both, starts, model._replace(jerk=model.jerk / ALLOWANCE), STEPS)
         model = with_allowance(log, fitted)
-        rates = beside.decided(channel.rates, residuals, gate)
+        rates = beside.decided(channel.rates, residuals, gate, accepted)
         channel = channel._replace(rates=rates, label=beside.labels_of(rates.weight, rates.value))
     both = log._replace(beside=(channel.rates,))
     if beside.of_the_rest(both, model, starts) < beside.of_the_rest(log, without, starts) - beside.CONTRADICTS:

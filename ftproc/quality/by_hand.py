@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,12 @@ from ftproc.records import ACCEPTED, GOOD, REJECTED, Diagnostics, FlagArray, Flo
 FEW_LINES = 3  # that are named
 
 
-def labelled(label: FlagArray, by_hand: ByHand | None) -> FlagArray:
-    """Labels (n, 3) with those of the readings decided by hand. A method with an editor of its own may not use what is
-    accepted: such readings keep its label."""
+def labelled(label: FlagArray, by_hand: ByHand | None, channel: str = "") -> FlagArray:
+    """Labels (n, 3), or those of a channel (n,), with those of the readings decided by hand. A method with an editor of
+    its own may not use what is accepted: such readings keep its label."""
     if by_hand is None:
         return label
-    flags = by_hand.flags
+    flags = by_hand.of(channel) if channel else by_hand.flags
     accepted = (flags == ACCEPTED) & (label == GOOD)
     found: FlagArray = np.where(flags == REJECTED, REJECTED, np.where(accepted, ACCEPTED, label)).astype(np.uint8)
     return found
@@ -35,7 +36,7 @@ def with_rejected(shown: Diagnostics, label: FlagArray, cleaned: FloatArray, var
     off[:, 1] = wrap(off[:, 1])
     residual = np.where(rejected, off, shown.residual)
     sigma = np.where(rejected, np.sqrt(variance), shown.residual_sigma)
-    return Diagnostics(shown.reading, residual, sigma, shown.residual_kind)
+    return replace(shown, residual=residual, residual_sigma=sigma)
 
 
 class Effects:
@@ -46,13 +47,13 @@ class Effects:
         self.counts = {} if decisions is None else {line.number: np.zeros(2, int) for line in decisions.lines}
 
     def add(self, by_hand: ByHand | None, residual: FloatArray, sigma: FloatArray) -> None:
-        """Add the decisions on a part, with its residuals (n, 3) and their sigmas."""
+        """Add the decisions on a part, with its residuals (n, k) and their sigmas, of the first k channels."""
         if by_hand is None:
             return
         with np.errstate(invalid="ignore"):
             inside = np.abs(residual) <= self.gate * sigma
-        lines = by_hand.decisions.lines
-        both = [np.bincount(each.ravel(), minlength=len(lines) + 1) for each in (by_hand.line, by_hand.line * inside)]
+        lines, decided = by_hand.decisions.lines, by_hand.line[:, : residual.shape[1]]
+        both = [np.bincount(each.ravel(), minlength=len(lines) + 1) for each in (decided, decided * inside)]
         for line, counts in zip(lines, np.transpose(both)[1:], strict=True):
             self.counts[line.number] += counts
 

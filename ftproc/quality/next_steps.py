@@ -6,6 +6,7 @@ others need what one log and the program cannot know: the instrument's noise, an
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -18,6 +19,9 @@ Summary = Mapping[str, Any]
 DECISIONS = "decisions.csv"
 UNITS = {"range": "m", "azimuth": "rad", "elevation": "rad"}
 MANY = 0.1  # share of a component's readings that are outliers, from which their decisions are looked at first
+
+#: A remark on how the log was read, with another way that may be right.
+_DOUBT = re.compile(r"(.*): (if .*), say --([a-z-]+) ([\w=-]+)")
 
 #: Setting -> option of the command line, where the names differ.
 _OPTIONS = {"jerk_psd_m2ps5": "jerk", "max_patch_s": "max_patch", "lag_s": "lag", "gain_form": "weight_form",
@@ -54,7 +58,9 @@ def steps(s: Summary, settings: FilterSettings, model_doubtful: bool) -> list[St
     found = [*_left_out(settings), *([_WITHOUT_MODEL] if model_doubtful and s["correction_largest_m"] > 0 else [])]
     found += _smoothed(settings)
     share = max(verdict.outlier_share(part) for part in s["components"].values())
-    rules = (_outliers, *_RULES) if share > verdict.MANY_REJECTED else _RULES  # many may be taken for noise
+    rules = (
+        (_conventions, _outliers, *_RULES) if share > verdict.MANY_REJECTED else _RULES
+    )  # many may be taken for noise
     every = [*found, *(step for rule in rules for step in rule(s))]
     return [step for k, step in enumerate(every) if step not in every[:k]]
 
@@ -150,11 +156,20 @@ def _steps_that_stay(s: Summary) -> Iterator[Step]:
         yield _FUSE._replace(reason=reason, place=f"{step['time_s']:.6g} s")
 
 
+def _conventions(s: Summary) -> Iterator[Step]:
+    """What was remarked when the log was read: another unit or convention than was taken."""
+    for found in filter(None, map(_DOUBT.fullmatch, s["remarks"])):
+        why, condition, option, value = found.groups()
+        advice = f"add --{option} {value}, {condition}"
+        yield Step(advice, why, {option.replace("-", "_"): (f"--{option}", value)})
+
+
 def _clock(s: Summary) -> Iterator[Step]:
     if s["clock_set_back"]:
-        row = s["clock_set_back"]["row"]
+        row, last = s["clock_set_back"]["row"], s["rows_in_file"] - 1
+        fewer = f"{row},{last}" if 2 * row >= last else f"0,{row - 1}"
         yield Step(
-            f"reject the rows with the wrong clock, as all,{row},{s['rows_in_file'] - 1},bad under "
+            f"reject the rows with the wrong clock, as all,{fewer},bad under "
             f"component,from_row,to_row,use, with --decisions {DECISIONS}",
             "rows before and after the clock was set back have the same times",
             {"write_decisions": ("--write-decisions", DECISIONS)}, f"row {row}",
@@ -163,15 +178,25 @@ def _clock(s: Summary) -> Iterator[Step]:
 
 def _noise(s: Summary) -> Iterator[Step]:
     """Where noise and motion cannot be separated, the instrument's noise."""
-    names = [name for name, part in s["components"].items() if part["verdict"] == "cautious" or part["good"] < 20]
-    if names or s["slow_noise_s"]:
+    if any(part["verdict"] == "cautious" for part in s["components"].values()) and not s["slow_noise_s"]:
         found = [s["components"].get(name, {}).get(f"noise_{unit}") for name, unit in UNITS.items()]
         example = ",".join("auto" if sigma is None else f"{sigma:.2g}" for sigma in found)
         yield Step(
             "give the noise of the instrument (m, rad, rad; here are those found)",
-            "noise and motion cannot be separated in so few, so widely spaced or so correlated readings",
+            "noise and motion cannot be separated in readings so widely spaced",
             {"noise": ("--noise", example)},
         )  # fmt: skip
+
+
+def _noise_like_motion(s: Summary) -> Iterator[Step]:
+    """Where no number makes up for what one log lacks: with the noise given, white, it would only look consistent."""
+    if s["slow_noise_s"]:
+        yield _FUSE._replace(reason="noise that is correlated so long looks like motion to a single log")
+    for one in s["one_sided_errors"][:1]:
+        yield _FUSE._replace(reason=f"the {one['component']} errors lie on one side, and so does its estimate")
+    few = [name for name, part in s["components"].items() if part["good"] < verdict.FEWEST_GOOD]
+    if any(name not in s["not_observable"] for name in few):
+        yield _FUSE._replace(reason=f"so few {verdict.listed(few)} readings test nothing")
 
 
 def _geometry(s: Summary) -> Iterator[Step]:
@@ -187,7 +212,7 @@ def _otherwise(s: Summary) -> Iterator[Step]:
 
 
 _RULES: Sequence[Callable[[Summary], Iterator[Step]]] = (
-    _clock, _noise, _outliers, _steps_that_stay, _geometry, _otherwise,
+    _conventions, _clock, _noise_like_motion, _noise, _outliers, _steps_that_stay, _geometry, _otherwise,
 )  # fmt: skip
 
 

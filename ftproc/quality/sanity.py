@@ -36,17 +36,19 @@ ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of a component with fewer
 
 def recording(log: MeasurementLog) -> Recording:
     """The log as the methods take it. Raises InputError as `check`."""
-    count, rejected, accepted = check(log), None, NOTHING
+    count, rejected, accepted, rate = check(log), None, NOTHING, log.range_rate
     if log.by_hand is not None:
-        flags, times = log.by_hand.flags, log.time_s - log.time_s[0]
-        rejected, accepted = flags == REJECTED, Accepted(tuple(times[flag == ACCEPTED] for flag in flags.T))
+        flags, of_rates, times = log.by_hand.flags, log.by_hand.of("range_rate"), log.time_s - log.time_s[0]
+        accepted = Accepted(tuple(times[flag == ACCEPTED] for flag in (*flags.T, of_rates)))
+        rejected = flags == REJECTED
         count = count - totals(rejected)
+        rate = rate if rate is None else np.where(of_rates == REJECTED, np.nan, rate)
     assumed = np.where(count < FEWEST_READINGS, ASSUMED_SIGMA, np.nan)
     absent = tuple(np.flatnonzero(count == 0).tolist())
     if len(absent) == len(COMPONENTS):
         raise InputError(f"{log.name}: every reading is rejected by hand; check the decisions.")
     return Recording(
-        log.time_s, log.measurement, assumed, absent, rejected, accepted, range_rate=log.range_rate,
+        log.time_s, log.measurement, assumed, absent, rejected, accepted, range_rate=rate,
         rate_interval_mps=log.station.range_rate_interval_mps,
     )  # fmt: skip
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ftproc.core.components import any_of, sums, totals
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
+from ftproc.files.reading.clocks.times import NO_ZONE
 from ftproc.methods.estimate import ASSUMED_READING, typical_interval
 from ftproc.order_statistics import median
 from ftproc.quality import consistency, verdict
@@ -41,6 +42,7 @@ class RunStatistics:
     def __init__(self, log: MeasurementLog, absent: Sequence[int], height: Common | None = None) -> None:
         self.log, self.absent, self.height = log, absent, height
         self.range_rate: RangeRate | None = None
+        self.zone_stated = NO_ZONE[0] not in log.understood.get("doubts", ())
         self.every = 1 + (len(log) - 1) // MOST_KEPT
         self.interval_s = typical_interval(log.time_s)
         self.components = [Component(self.every) for _ in COMPONENTS]
@@ -196,6 +198,7 @@ class RunStatistics:
             "duration_s": float(log.time_s[-1] - log.time_s[0]),
             "start_s": float(log.time_s[0]),
             "epoch": log.epoch,
+            "zone_stated": self.zone_stated,
             "interval_s": self.interval_s,
             "gaps": self.gaps,
             "longest_gap_s": self.longest_gap_s,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import quote
@@ -16,7 +16,7 @@ from ftproc.files.layout import Target
 from ftproc.files.writing import atomic
 from ftproc.quality import verdict
 from ftproc.quality.summary import counted
-from ftproc.records import COMPONENTS
+from ftproc.records import BESIDE, COMPONENTS
 from ftproc.report import tables
 from ftproc.report.page import document
 from ftproc.report.style import GREY, VERDICT
@@ -24,7 +24,7 @@ from ftproc.report.style import GREY, VERDICT
 FAILED, UNKNOWN = "failed", "unknown"
 #: What a log may be, the worst first.
 _LEVELS = (FAILED, *reversed(verdict.LEVELS), UNKNOWN)
-_HEADER = ("log", "verdict", "files", "rows", "duration, s", *(f"{c} outliers, %" for c in COMPONENTS), "method", "why")
+_ABOUT = ("log", "verdict", "why", "files", "rows", "duration, s")
 
 
 class Entry(NamedTuple):
@@ -43,21 +43,28 @@ class Entry(NamedTuple):
         return FAILED if self.failure is not None else verdict.level_of(trust) or UNKNOWN
 
     @property
-    def shares(self) -> list[float]:
-        """Of the outliers among the readings of each component; empty where they are not known."""
-        parts = self.summary.get("components", {})
-        return [verdict.outlier_share(parts[name]) for name in COMPONENTS] if self.failure is None and parts else []
+    def shares(self) -> dict[str, float]:
+        """Of the outliers among the readings of each channel; empty where they are not known."""
+        parts = self.summary.get("components", {}) if self.failure is None else {}
+        return {name: verdict.outlier_share(part) for name, part in parts.items()}
 
 
 def write(entries: Sequence[Entry], target: Target) -> None:
     """Write the index, whole or not at all. Raises OutputError."""
-    ordered = sorted(entries, key=lambda each: (_LEVELS.index(each.level), -max(each.shares, default=0.0)))
+    ordered = sorted(entries, key=lambda each: (_LEVELS.index(each.level), -max(each.shares.values(), default=0.0)))
+    channels = shown({name for entry in entries for name in entry.shares})
     here = remote.local(target)
-    rows = (_cells(entry, None if here is None else here.parent) for entry in ordered)
+    rows = (_cells(entry, None if here is None else here.parent, channels) for entry in ordered)
+    header = (*_ABOUT, *(f"{name.replace('_', ' ')} outliers, %" for name in channels), "method")
     heading = html.escape(counts([entry.level for entry in entries]))
-    body = f"<h1>{heading}</h1>{tables.table(_HEADER, rows, 'index', links=3)}"
+    body = f"<h1>{heading}</h1>{tables.table(header, rows, 'index', links=4)}"
     with atomic.replacing(target) as stream:
         stream.write(encodable(document("Reports", body, script="index.js")).encode())
+
+
+def shown(there: Collection[str]) -> list[str]:
+    """The channels that a table of logs has columns for: COMPONENTS, and others that are there in some log."""
+    return [*COMPONENTS, *(name for name in BESIDE if name in there)]
 
 
 def counts(levels: Sequence[str]) -> str:
@@ -67,16 +74,17 @@ def counts(levels: Sequence[str]) -> str:
     return f"{counted(len(levels), 'log')}: {', '.join(f'{found[level]} {level}' for level in named if found[level])}"
 
 
-def _cells(entry: Entry, here: Path | None) -> tuple[str, ...]:
-    """The first three cells are HTML. here: the directory of the index, None if it is not on this machine."""
+def _cells(entry: Entry, here: Path | None, channels: Sequence[str]) -> tuple[str, ...]:
+    """The first four cells are HTML. here: the directory of the index, None if it is not on this machine. channels:
+    that have columns."""
     s, failed = entry.summary, entry.failure is not None
     name = html.escape(entry.log)
     linked = (_link(name, None if failed else entry.page, here) or name, _badge(entry.level))
     files = _link("log", entry.log, here), _link("trajectory", None if failed else entry.output, here)
     why = entry.failure or "; ".join(s.get("trust", {}).get("reasons", ()))
     known = (f"{s['rows']:,}", f"{s['duration_s']:,.6g}") if entry.shares else ("", "")
-    shares = [f"{100 * share:.2f}" for share in entry.shares] or [""] * len(COMPONENTS)
-    return (*linked, " ".join(filter(None, files)), *known, *shares, str(s.get("method", "")), why)
+    shares = [f"{100 * entry.shares[name]:.2f}" if name in entry.shares else "" for name in channels]
+    return (*linked, html.escape(why), " ".join(filter(None, files)), *known, *shares, str(s.get("method", "")))
 
 
 def _link(text: str, name: str | None, here: Path | None) -> str:

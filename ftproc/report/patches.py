@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ftproc.quality import faults
-from ftproc.records import COMPONENTS, ISOLATED, MISSING, PATCH
-from ftproc.report.style import RESIDUAL_UNIT
+from ftproc.records import ISOLATED, MISSING, PATCH, FloatArray
 from ftproc.report.view import View
 
 WORST_S = 10.0  # length of the stretch that is shown at once
@@ -27,7 +26,7 @@ class Patch(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A step that stays, which the estimate bridges. component: one of COMPONENTS, or `clock`. size: with its unit.
+    """A step that stays, which the estimate bridges. component: of the channels, or `clock`. size: with its unit.
     words: what happened, with size and time."""
 
     component: str
@@ -36,9 +35,9 @@ class Step(NamedTuple):
     words: str
 
 
-def steps(view: View) -> list[Step]:
-    """The steps within the times of the view, by their time."""
-    times = view.trajectory.time_s
+def steps(view: View, times: FloatArray | None = None) -> list[Step]:
+    """The steps within some times (n,) s, or those of the view, by their time."""
+    times = view.trajectory.time_s if times is None else times
     found = [
         Step(step["component"], step["time_s"], faults.size_in_words(step), faults.step_in_words(step, view.summary))
         for step in view.summary.get("steps", ())
@@ -49,28 +48,25 @@ def steps(view: View) -> list[Step]:
 def patches(view: View) -> list[Patch]:
     """All patches by their time; missing readings inside one do not end it."""
     found = []
-    time_s, flags = view.trajectory.time_s, view.trajectory.outlier
-    for c, name in enumerate(COMPONENTS):
-        there = np.flatnonzero(flags[:, c] != MISSING)
-        inside = np.r_[False, flags[there, c] == PATCH, False]
+    time_s = view.trajectory.time_s
+    for channel in view.channels:
+        there = np.flatnonzero(channel.flags != MISSING)
+        inside = np.r_[False, channel.flags[there] == PATCH, False]
         for first, end in np.flatnonzero(inside[1:] != inside[:-1]).reshape(-1, 2):
             rows = there[first:end]
             size = np.nan
-            if view.reading is not None:
-                size = float(np.median(view.reading[rows, c] - view.cleaned[rows, c])) * _FACTOR[c]
+            if channel.reading is not None:
+                size = float(np.median(channel.reading[rows] - channel.cleaned[rows])) * channel.size.factor
             start_s, end_s = float(time_s[rows[0]]), float(time_s[rows[-1]])
-            found.append(Patch(name, start_s, end_s, len(rows), size, RESIDUAL_UNIT[c].unit))
-    return sorted(found, key=lambda patch: (patch.start_s, COMPONENTS.index(patch.component)))
-
-
-#: From the unit of the readings' figure to that of residuals.
-_FACTOR = (1.0, 1e3 * np.pi / 180, 1e3 * np.pi / 180)
+            found.append(Patch(channel.name, start_s, end_s, len(rows), size, channel.size.unit))
+    order = [channel.name for channel in view.channels]
+    return sorted(found, key=lambda patch: (patch.start_s, order.index(patch.component)))
 
 
 def worst(view: View) -> tuple[float, float] | None:
     """The WORST_S seconds with most outliers, from and to; None for a log without any, or not longer than that."""
-    time_s, flags = view.trajectory.time_s, view.trajectory.outlier
-    outliers = np.isin(flags, (ISOLATED, PATCH)).sum(1)
+    time_s = view.trajectory.time_s
+    outliers = np.isin([channel.flags for channel in view.channels], (ISOLATED, PATCH)).sum(0)
     if not outliers.any() or time_s[-1] - time_s[0] <= WORST_S:
         return None
     before = np.r_[0, np.cumsum(outliers)]

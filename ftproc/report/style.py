@@ -53,7 +53,16 @@ class Quantity(NamedTuple):
 
 
 DEGREE = 180 / np.pi
-COMPONENT = (Quantity("R", "m"), Quantity("A", "deg", DEGREE), Quantity("E", "deg", DEGREE))
+#: Of what is measured: as it is drawn.
+QUANTITY = {
+    "range": Quantity("R", "m"), "azimuth": Quantity("A", "deg", DEGREE), "elevation": Quantity("E", "deg", DEGREE),
+    "range_rate": Quantity("Ṙ", "m/s"), "height": Quantity("h", "m"),
+}  # fmt: skip
+#: Small differences of these; factor: from their unit.
+SIZE = {
+    "range": Quantity("R", "m"), "azimuth": Quantity("A", "mrad", 1e3 / DEGREE),
+    "elevation": Quantity("E", "mrad", 1e3 / DEGREE), "range_rate": Quantity("Ṙ", "m/s"), "height": Quantity("h", "m"),
+}  # fmt: skip
 RESIDUAL_UNIT = (Quantity("R", "m"), Quantity("A", "mrad", 1e3), Quantity("E", "mrad", 1e3))
 POSITION = tuple(Quantity(axis, "m") for axis in "xyz")
 VELOCITY = tuple(Quantity(f"v{axis}", "m/s") for axis in "xyz")

@@ -29,7 +29,8 @@ _LONGEST_LIST = 6  # values; a longer list is shown by its extremes
 
 def name(trajectory: Trajectory) -> str:
     """The title of the page: the log's file name, or the trajectory's."""
-    return PurePath(str(trajectory.metadata.get("log") or trajectory.name)).name
+    found = PurePath(str(trajectory.metadata.get("log") or trajectory.name)).name
+    return "standard input" if found == "-" else found
 
 
 def heading(view: View) -> str:
@@ -61,7 +62,7 @@ def taken(view: View) -> list[str]:
     target = understood.get("target") if isinstance(understood, Mapping) else None
     known = station.get("in_words") if isinstance(station, Mapping) else None
     instrument = f"instrument: {', '.join(map(str, known))}" if isinstance(known, list | tuple) and known else ""
-    begins = f"T+0 is {moments.begins}" if moments.begins else ""
+    begins = f"T+0 is {moments.begins}{'' if moments.zone else ', time zone not stated'}" if moments.begins else ""
     if not begins and moments.counts_from_elsewhere:
         begins = f"T+0 is {moments.start_s:,.2f} s of the log's clock, whose date is not known"
     return [each for each in (begins, where, f"target {target}" if target else "", instrument) if each]
@@ -70,15 +71,17 @@ def taken(view: View) -> list[str]:
 def _clock(view: View) -> str:
     """What the scripts need of the log's clock: ms since 1970 (UTC) at time zero, and the first time, s."""
     zero = view.moments.zero_ms
-    data = f'data-zero="{"" if zero is None else repr(zero)}" data-start="{view.moments.start_s!r}"'
-    return f'<div id="log" hidden {data}></div>'
+    data = f'data-zero="{"" if zero is None else repr(zero)}" data-start="{view.moments.start_s!r}" '
+    return f'<div id="log" hidden {data}data-zone="{view.moments.zone.strip()}"></div>'
 
 
 def banner(view: View) -> str:
     """The verdict with its reasons, in its colour."""
     trust = view.summary.get("trust")
     if not trust:
-        return _banner(GREY, "no verdict: this file does not say how it was made", [])
+        streamed = (view.trajectory.metadata.get("settings") or {}).get("editing") == "live"
+        why = "a stream is judged by ftproc filter of its log" if streamed else "this file does not say how it was made"
+        return _banner(GREY, f"no verdict: {why}", [])
     level, reasons = verdict.level_of(trust), trust["reasons"]
     if len(reasons) < 2:
         return _banner(VERDICT[level], verdict.sentence(trust), [trust["not_shown"]] if "not_shown" in trust else [])
@@ -124,7 +127,7 @@ def extremes(view: View) -> str:
          *_since(view, each.time_s))
         for each in found
     ]  # fmt: skip
-    header = ("", "value", "1 sigma", _when(view), *(["T+ s"] if moments.counts_from_elsewhere else []))
+    header = ("", "value", "1 sigma", when(view), *(["T+ s"] if moments.counts_from_elsewhere else []))
     note = (
         'Farthest out by the value less 1 sigma. <span class="click">A click zooms all figures over time to it.</span>'
     )
@@ -172,7 +175,7 @@ def patches(view: View) -> str:
     ]  # fmt: skip
     longest = sorted(found, key=lambda p: -p.readings)[:MOST_PATCHES]
     rows += [
-        (_zoom(view.moments.clock(p.start_s), p.start_s, p.end_s), deciding.buttons(p), *_since(view, p.start_s),
+        (_zoom(view.moments.clock(p.start_s), p.start_s, p.end_s), deciding.buttons(view, p), *_since(view, p.start_s),
          f"{p.end_s - p.start_s:,.2f}", p.component, f"{p.readings:,}",
          "-" if p.size != p.size else f"{p.size:+,.3g} {p.unit}")
         for p in sorted(longest, key=lambda p: p.start_s)
@@ -185,7 +188,7 @@ def patches(view: View) -> str:
     click = "A click on a start zooms all figures over time to it."
     title = " and ".join(["Steps"] * bool(steps) + ["Outlier patches"] * bool(found)).replace("and O", "and o")
     since = ["T+ s"] if view.moments.counts_from_elsewhere else []
-    header = (_when(view), "it is", *since, "lasts, s", "component", "readings", "size")
+    header = (when(view), "it is" if view.summary else "", *since, "lasts, s", "component", "readings", "size")
     body = table(header, rows, "numbers patches", links=2)
     whole = '<button data-from="" data-to="">Show the whole log.</button>'
     links = f'<span class="click">{click} {whole}</span>'
@@ -197,9 +200,11 @@ def _zoom(shown: str, start_s: float, end_s: float) -> str:
     return f'<button data-from="{start_s!r}" data-to="{end_s!r}">{html.escape(shown)}</button>'
 
 
-def _when(view: View) -> str:
+def when(view: View) -> str:
     """The title of a column of times."""
-    return "UTC" if view.moments.zero_ms is not None else "time, s"
+    if view.moments.zero_ms is None:
+        return "time, s"
+    return view.moments.zone.strip() or "clock"
 
 
 def _since(view: View, time_s: float) -> list[str]:

@@ -105,7 +105,7 @@ def motion(view: View) -> Drawn:
         drawing.add(figure, drawing.line(view.timeline, value, title.split(",")[0], style.BLUE), row)
     figure.update_layout(showlegend=False, margin_t=14)
     _add_steps(figure, view, len(known))
-    note = "Height over the station."
+    note = f"Height over the {'origin' if view.trajectory.metadata.get('stations') else 'station'}."
     if len(known) == len(parts):
         note += " Load factor: specific force across the direction of flight, z being the vertical."
     return Drawn(figure, note)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,20 @@ from numpy.typing import NDArray
 from ftproc.core.model.frames import from_cartesian, to_cartesian, unwrap, wrap
 from ftproc.files.moments import Moments
 from ftproc.quality.verdict import LEVELS, level_of
-from ftproc.records import ACCEPTED, GOOD, ISOLATED, PATCH, REJECTED, Diagnostics, FloatArray, Trajectory, Truth
-from ftproc.report.style import COMPONENT
+from ftproc.records import (
+    ACCEPTED,
+    COMPONENTS,
+    GOOD,
+    ISOLATED,
+    PATCH,
+    REJECTED,
+    Diagnostics,
+    FlagArray,
+    FloatArray,
+    Trajectory,
+    Truth,
+)
+from ftproc.report.style import QUANTITY, SIZE, Quantity
 from ftproc.report.thinning import Timeline
 from ftproc.scoring import Score, score
 from ftproc.scoring.matching import match
@@ -22,20 +34,43 @@ from ftproc.scoring.matching import match
 OUTLIERS = (ISOLATED, PATCH, REJECTED)
 
 
+class Channel(NamedTuple):
+    """What is drawn of one thing that is measured: (n,) cleaned and raw (None: not known) in the unit of its quantity,
+    labels, and residuals in their sigmas (None: not known). size: the unit of differences, and their factor from that
+    of the quantity."""
+
+    name: str
+    quantity: Quantity
+    size: Quantity
+    cleaned: FloatArray
+    reading: FloatArray | None
+    flags: FlagArray
+    scaled: FloatArray | None
+
+    @property
+    def drawn(self) -> FloatArray:
+        """(n,) raw readings, or the estimate where these are not known."""
+        return self.cleaned if self.reading is None else self.reading
+
+    def rows(self, rows: slice) -> Channel:
+        """Of some rows."""
+        reading, scaled = (None if each is None else each[rows] for each in (self.reading, self.scaled))
+        return self._replace(cleaned=self.cleaned[rows], reading=reading, flags=self.flags[rows], scaled=scaled)
+
+
 @dataclass(frozen=True)
 class View:
     """A trajectory with derived arrays, row for row.
 
-    timeline: its times. cleaned: (n, 3) m, deg, deg, the azimuth unwrapped. reading: the raw readings in these
-    units, on the same turn; None when they are not known. components_used: (n,) degrees of freedom of `nis`. error:
+    timeline: its times. channels: what is measured, the azimuth unwrapped. components_used: (n,) degrees of freedom of
+    `nis`. error:
     (n, 9) estimate minus truth of the state, in its units. cleaned_error: (n, 3) the same of the cleaned readings, m,
     rad, rad. These and the score are None without a truth.
     """
 
     trajectory: Trajectory
     timeline: Timeline
-    cleaned: FloatArray
-    reading: FloatArray | None
+    channels: tuple[Channel, ...]
     components_used: FloatArray
     error: FloatArray | None = None
     cleaned_error: FloatArray | None = None
@@ -55,18 +90,10 @@ class View:
             return None, bad
         return to_cartesian(self.trajectory.diagnostics.reading), bad
 
-    def part(self, rows: slice) -> View:
-        """Some of its rows, for the figure of the readings."""
-        whole = self.trajectory
-        trajectory = replace(
-            whole, row=whole.row[rows], time_s=whole.time_s[rows], measurement=whole.measurement[rows],
-            state=whole.state[rows], sigma=whole.sigma[rows], measurement_sigma=whole.measurement_sigma[rows],
-            outlier=whole.outlier[rows], nis=whole.nis[rows], correction=whole.correction[rows], extra=None,
-            diagnostics=None,
-        )  # fmt: skip
-        reading = None if self.reading is None else self.reading[rows]
-        timeline = Timeline.of(trajectory.time_s)
-        return View(trajectory, timeline, self.cleaned[rows], reading, self.components_used[rows])
+    @property
+    def has_readings(self) -> bool:
+        """Whether the raw readings are known."""
+        return self.trajectory.diagnostics is not None
 
     @property
     def diagnostics(self) -> Diagnostics | None:
@@ -99,15 +126,6 @@ def summary_of(trajectory: Trajectory) -> Mapping[str, Any]:
 
 def view(trajectory: Trajectory, truth: Truth | None = None) -> View:
     """The view of a trajectory, with its errors against a truth."""
-    factor = np.array([quantity.factor for quantity in COMPONENT])
-    cleaned = trajectory.measurement.copy()
-    cleaned[:, 1] = unwrap(cleaned[:, 1])
-    reading = None
-    if trajectory.diagnostics is not None:
-        reading = trajectory.diagnostics.reading.copy()
-        turned = cleaned[:, 1] + wrap(reading[:, 1] - cleaned[:, 1])
-        reading[:, 1] = np.where(np.isfinite(turned), turned, reading[:, 1])
-        reading *= factor
     error = cleaned_error = scored = None
     if truth is not None:
         known = match(trajectory.time_s, truth)
@@ -118,10 +136,39 @@ def view(trajectory: Trajectory, truth: Truth | None = None) -> View:
         cleaned_error = trajectory.measurement - from_cartesian(known.position_m)
         cleaned_error[:, 1] = wrap(cleaned_error[:, 1])
         scored = score(trajectory, truth) if np.isfinite(known.position_m).any() else None
+    channels = tuple(_channels(trajectory))
+    used = [np.isin(channel.flags, (GOOD, ACCEPTED)) for channel in channels if channel.name != "range_rate"]
     return View(
-        trajectory, Timeline.of(trajectory.time_s), cleaned * factor, reading,
-        np.isin(trajectory.outlier, (GOOD, ACCEPTED)).sum(1).astype(float), error, cleaned_error, scored,
-    )  # fmt: skip
+        trajectory, Timeline.of(trajectory.time_s), channels, np.sum(used, 0, float), error, cleaned_error, scored
+    )
+
+
+def _channels(trajectory: Trajectory) -> Iterator[Channel]:
+    known = trajectory.diagnostics
+    for c, name in enumerate(COMPONENTS):
+        cleaned = trajectory.measurement[:, c]
+        reading = None if known is None else known.reading[:, c]
+        if name == "azimuth":
+            cleaned = unwrap(cleaned)
+            reading = None if reading is None else _on_the_turn(reading, cleaned)
+        scaled = None if known is None else _scaled(known.residual[:, c], known.residual_sigma[:, c])
+        quantity, factor = QUANTITY[name], QUANTITY[name].factor
+        reading = None if reading is None else factor * reading
+        yield Channel(name, quantity, SIZE[name], factor * cleaned, reading, trajectory.outlier[:, c], scaled)
+    for name, each in ({} if known is None else known.beside).items():
+        scaled = _scaled(each.residual, each.residual_sigma)
+        yield Channel(name, QUANTITY[name], SIZE[name], each.cleaned, each.reading, each.label, scaled)
+
+
+def _on_the_turn(reading: FloatArray, cleaned: FloatArray) -> FloatArray:
+    """Angles (n,) on the turn of others."""
+    turned = cleaned + wrap(reading - cleaned)
+    return np.where(np.isfinite(turned), turned, reading)
+
+
+def _scaled(residual: FloatArray, sigma: FloatArray) -> FloatArray:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return residual / sigma
 
 
 def speed(state: FloatArray) -> FloatArray:

@@ -88,8 +88,10 @@ def standards() -> list[str]:
 
 
 def load(name: str) -> Limits:
-    """The limits of a file, or of a standard by its name. Raises UsageError for what cannot be understood."""
-    path = STANDARDS / f"{name}.toml" if name in standards() else Path(name)
+    """The limits of a file, or of a standard by its name, in capitals or not. Raises UsageError for what cannot be
+    understood."""
+    called = name if Path(name).exists() else name.lower()
+    path = STANDARDS / f"{called}.toml" if called in standards() else Path(name)
     try:
         content = path.read_bytes()[: _MOST_BYTES + 1]
         if len(content) > _MOST_BYTES:

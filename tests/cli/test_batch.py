@@ -251,3 +251,22 @@ def test_a_station_file_for_each_log_that_has_one(run, logs):
     assert result.code == 0, result.err
     found = {name: json.loads(Path(f"out/{name}.trajectory.json").read_text())["settings"]["smooth"] for name in "02"}
     assert found == {"0": True, "2": False}
+
+
+def test_logs_that_measure_other_things_stand_beside_the_rest(run, here):
+    """A radar without elevation has outliers of its heights in place of those, one with range rates has those too."""
+    for scenario in ("surveillance-2d", "radar-doppler", "radar"):
+        flights.write_log(simulate(scenario, seed=1, duration_s=200.0).log, f"{scenario}.csv")
+    result = run("filter", "*.csv", "-o", "out", "--report", "rep", "--table", "t.json", "--summary", "line")
+    assert result.code == 0, result.err
+    lines = {line.partition(".csv")[0]: line for line in result.out.splitlines()}
+    counts = {name: lines[name].partition(" rows, ")[2].partition(" %")[0].count(".") for name in list(lines)[:3]}
+    assert counts == {"surveillance-2d": 3, "radar-doppler": 4, "radar": 3}
+    rows = {row["log"][:-4]: row for row in json.loads(Path("t.json").read_text())}
+    height, doppler, plain = (rows[name] for name in ("surveillance-2d", "radar-doppler", "radar"))
+    assert height["outliers_elevation_percent"] is None
+    assert height["noise_height_m"] == pytest.approx(2.2, abs=0.1)
+    assert doppler["noise_range_rate_mps"] == pytest.approx(0.5, rel=0.2)
+    assert plain["outliers_height_percent"] is plain["noise_range_rate_mps"] is None
+    text = Path("rep/index.html").read_text()
+    assert "<th>range rate outliers, %</th><th>height outliers, %</th><th>method</th></tr>" in text

@@ -70,7 +70,7 @@ def test_score_shows_errors_and_keeps_its_table(run, clean):
     assert result == plain
     text = (clean.parent / "errors.html").read_text()
     assert 'data-figure="errors"' in text
-    assert "A trajectory file does not hold the raw readings" in text
+    assert "Trajectory files and streams do not keep the raw readings" in text
     assert "compared with flight.truth.csv" in text
 
 

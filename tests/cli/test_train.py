@@ -176,6 +176,7 @@ def test_inputs_that_are_none(run, here):
     missing = run("train", "--log", "none.csv", "--truth", "1.truth.csv", "-o", "m")
     assert (missing.code, missing.err) == (1, "ftproc: none.csv: there is no such file.\n")
     (here / "text").write_text("nothing")
+    assert run("train", "--show", "packaged").out.startswith("Correction model, ")
     shown = run("train", "--show", "text")
     assert (shown.code, shown.out) == (1, "")
     assert shown.err == "ftproc: text: not a correction model; `ftproc train` writes one\n"

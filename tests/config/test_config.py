@@ -231,6 +231,17 @@ def test_the_fault_of_a_key_is_named(text, sentence):
     assert str(caught.value) == f"s.toml: {sentence}"
 
 
+def test_the_name_of_an_option_is_answered_with_its_key():
+    for text, sentence in {
+        "[filter]\nnoise = 3": '[filter] has no key "noise"; what --noise says is sigma_m under [range], sigma_rad '
+        "under [azimuth], sigma_rad under [elevation]. Its keys are: method, ",
+        "max_patch = 3": 'there is no key "max_patch"; what --max-patch says is max_patch_s under [filter]. The ',
+    }.items():
+        with pytest.raises(UsageError) as caught:
+            config.parse(text, "s.toml")
+        assert str(caught.value).startswith(f"s.toml: {sentence}")
+
+
 def test_files_that_cannot_be_read(tmp_path):
     for name, sentence in {
         "none.toml": "there is no such file. ftproc filter --write-config > {} makes one.",

@@ -17,6 +17,7 @@ from ftproc.records import MeasurementLog, joined
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
 from ftproc.simulation.simulation import Simulation
+from tests.trust import next_steps as table_of_steps
 
 SMOOTH = FilterSettings(smooth=True)
 
@@ -100,6 +101,40 @@ def test_a_clock_that_was_set_back_names_its_rows() -> None:
     filtering, _ = found(logs.read(table), SMOOTH)
     _, said = first_step(filtering)
     assert "all,300,600,bad" in said["advice"]
+
+
+def test_of_a_clock_that_was_set_back_the_side_with_fewer_rows_is_left_out() -> None:
+    s = {"clock_set_back": {"row": 100, "by_s": -5.0}, "rows_in_file": 601}
+    (step,) = next_steps._clock(s)
+    assert "all,0,99,bad" in step.advice
+
+
+def test_another_convention_that_was_remarked_on_comes_first() -> None:
+    """Zenith angles under a name that does not say so."""
+    log = flight(21, "patch=4:10-40:30-200,isolated=0.02").log
+    table = pd.DataFrame({"time_s": log.time_s, "range_m": log.measurement[:, 0], "azimuth_rad": log.measurement[:, 1]})
+    table["elevation_rad"] = np.pi / 2 - log.measurement[:, 2]
+    filtering, _ = found(logs.read(table), SMOOTH)
+    assert level(filtering) > 0
+    step, said = first_step(filtering)
+    assert step.options == {"elevation_from": ("--elevation-from", "zenith")}
+    assert said["advice"] == "add --elevation-from zenith, if they are zenith angles"
+
+
+def test_what_one_log_lacks_another_station_has() -> None:
+    done = table_of_steps.outcome("13 readings")
+    assert done.step.startswith("fuse with the log of another station")
+    assert done.helps
+    assert not done.deceives
+
+
+def test_noise_that_looks_like_motion_is_not_made_consistent_by_giving_it() -> None:
+    """It would be white, and the run consistent with an estimate far outside its sigmas."""
+    flown, settings = table_of_steps.CASES["noise correlated over seconds"]()
+    filtering, _ = found(flown.log, settings)
+    assert filtering.metadata["summary"]["slow_noise_s"] > 0
+    assert not [step for step in filtering.next_steps if "noise" in step.options]
+    assert first_step(filtering)[0].reason.startswith("noise that is correlated so long")
 
 
 def test_nothing_is_said_of_a_consistent_run_and_nothing_tried_in_a_long_log(monkeypatch: pytest.MonkeyPatch) -> None:

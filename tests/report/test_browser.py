@@ -8,12 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ftproc import report
-from ftproc.records import ISOLATED
+from ftproc import pipeline, report
+from ftproc.files import decisions
+from ftproc.records import ISOLATED, REJECTED
 from ftproc.report import index
 from ftproc.report.browser import printing
 from ftproc.report.index import Entry
 from ftproc.report.page import _text
+from tests import test_decisions
 from tests.report.browser import NEEDED, Opened, browser
 from tests.report.flights import filtered, flight, hostile
 
@@ -273,6 +275,33 @@ def test_clicks_write_decisions_and_the_page_keeps_them(show, tmp_path):
     kept.value.save_as(tmp_path / "kept.csv")
     assert (tmp_path / "kept.csv").read_text() == written.input_value()
     assert opened.complaints == []
+
+
+def test_the_file_that_the_page_keeps_frees_a_flight_with_a_fifth_of_outliers(show, tmp_path):
+    """Three stretches, each shown and named; the result is that of the same lines by hand."""
+    flight = test_decisions.followed(3)
+    lost = pipeline.filter_log(flight.log, test_decisions.SMOOTH)
+    assert test_decisions.verdict(lost) == "suspect"
+    page, stretches = show(lost).page, test_decisions.patches(flight)
+    page.locator("#component").select_option("all")
+    for _, low, high, _ in stretches:
+        shown = (flight.log.time_s[[low, high]] + [-0.05, 0.05]).tolist()
+        page.evaluate("range => Plotly.relayout('readings', {'xaxis.range': range})", shown)
+        page.locator("#stretch").click()
+    with page.expect_download() as kept:
+        page.locator("#keep").click()
+    kept.value.save_as(tmp_path / "kept.csv")
+    assert len((tmp_path / "kept.csv").read_text().splitlines()) == 1 + len(stretches) == 4
+    same = test_decisions.by_hand(flight.log, *stretches)
+    freed, typed = (
+        pipeline.filter_log(log, test_decisions.SMOOTH)
+        for log in (decisions.read(tmp_path / "kept.csv").applied(flight.log), same)
+    )
+    np.testing.assert_array_equal(freed.state, typed.state)
+    assert test_decisions.verdict(freed) == "consistent"
+    blanked = np.where(same.by_hand.flags == REJECTED, np.nan, flight.log.measurement)
+    best = pipeline.filter_log(replace(flight.log, measurement=blanked), test_decisions.SMOOTH)
+    assert test_decisions.error_m(freed, flight) < 1.1 * test_decisions.error_m(best, flight)
 
 
 def test_axes_of_time_say_the_clock_and_seconds_since_the_start(show):

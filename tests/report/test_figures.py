@@ -56,14 +56,14 @@ def test_which_figures_there_are_without_range_or_readings():
 
 def test_every_flagged_reading_is_marked_where_it_is():
     made, figure = filtered(), drawn(filtered(), "readings").figure
-    shown = view(made).reading
+    channels = view(made).channels
     for flag in (ISOLATED, PATCH):
         for c, trace in enumerate(traces(figure, NAMES[flag])):
             rows = made.outlier[:, c] == flag
             np.testing.assert_array_equal(trace.x, made.time_s[rows])
             value = trace.y if trace.customdata is None else trace.customdata
-            np.testing.assert_allclose(value, shown[rows, c], rtol=1e-6)
-            low, high = np.nanmin(view(made).cleaned[:, c]), np.nanmax(view(made).cleaned[:, c])
+            np.testing.assert_allclose(value, channels[c].reading[rows], rtol=1e-6)
+            low, high = np.nanmin(channels[c].cleaned), np.nanmax(channels[c].cleaned)
             room = 0.5 * (high - low) + 20
             assert low - room < np.min(trace.y) <= np.max(trace.y) < high + room
     assert sum(len(trace.x) for trace in traces(figure, NAMES[MISSING])) == (made.outlier == MISSING).sum()

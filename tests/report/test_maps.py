@@ -59,6 +59,12 @@ def test_ticks_are_round_moments(epoch, start_s, span_s, said):
     assert (np.diff(rows) > 0).all()
 
 
+def test_names_of_ticks_that_would_overlap_are_left_out():
+    said = ["15:33:00", "15:33:10", "15:33:20", "15:33:30", "15:33:40"]
+    place = np.array([[0.0, 0.0], [30.0, 2.0], [60.0, 4.0], [60.0, 30.0], [np.nan, 0.0]])
+    assert ticks.apart(said, place) == ["15:33:00", "", "15:33:20", "15:33:30", ""]
+
+
 def test_no_tick_stands_in_a_gap_or_for_a_single_row():
     time_s = np.r_[np.arange(0, 20.0), np.arange(50, 60.0)]
     rows, found = ticks.along(Moments("", 0.0, 59.0), time_s)

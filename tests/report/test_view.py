@@ -18,11 +18,11 @@ def test_azimuth_is_unwrapped_and_readings_follow():
     measurement[:, 1] = np.mod(steady + np.pi, 2 * np.pi) - np.pi
     reading[:, 1] = np.mod(steady + 0.01, 2 * np.pi)
     measurement[7, 1] = np.nan
-    found = view(replace(made, measurement=measurement, diagnostics=replace(made.diagnostics, reading=reading)))
-    others = np.arange(len(made)) != 7
-    np.testing.assert_allclose(found.cleaned[others, 1], np.rad2deg(steady)[others])
-    np.testing.assert_allclose(found.reading[others, 1] - found.cleaned[others, 1], np.rad2deg(0.01))
-    assert found.reading[7, 1] == pytest.approx(np.rad2deg(reading[7, 1]))
+    changed = replace(made, measurement=measurement, diagnostics=replace(made.diagnostics, reading=reading))
+    found, others = view(changed).channels[1], np.arange(len(made)) != 7
+    np.testing.assert_allclose(found.cleaned[others], np.rad2deg(steady)[others])
+    np.testing.assert_allclose(found.reading[others] - found.cleaned[others], np.rad2deg(0.01))
+    assert found.reading[7] == pytest.approx(np.rad2deg(reading[7, 1]))
 
 
 def test_error_is_estimate_minus_truth():

@@ -72,6 +72,7 @@ def test_what_cannot_be_measured_is_not_met(tmp_path):
 @pytest.mark.parametrize("name", limits.standards())
 def test_the_standards_can_be_read_and_name_their_source(name):
     found = limits.load(name)
+    assert limits.load(name.upper()) == found
     assert found.source
     assert found.title
     assert len(limits.judge(TRAJECTORY, TRUTH, found.limits)) == len(found.limits)

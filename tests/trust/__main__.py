@@ -15,6 +15,7 @@ from tests.trust import (
     fused_faults,
     hard,
     long_runs,
+    next_steps,
     runs,
     streams,
     tables,
@@ -40,6 +41,8 @@ def main() -> int:
     diverged = long_runs.many(FLIGHTS)
     endless = long_runs.endless(SAMPLES)
     judged, broken = _faults()
+    steps = list(tables.spread(next_steps.run, [(cause,) for cause in next_steps.CASES], Given(range(1), ())))
+    helpful, deceiving = sum(each.helps for each in steps), sum(each.deceives for each in steps)
     tracebacks = counts["wrong"] + counts["known"] + len(wrong)
     for line in filter(None, [*lines, *taken, *wrong, *lost, *astray, faults.failures, plain.failures, *broken]):
         print(line, file=sys.stderr)
@@ -64,12 +67,16 @@ def main() -> int:
         ("divergences called consistent", diverged.unreported),
         (f"{SAMPLES:,} samples, sigmas finite and positive, as after a late start", endless),
         *judged,
+        ("runs that are suspect, each for a cause of its own", len(steps)),
+        ("of these whose first next step helps", helpful),
+        ("of these that it makes wrong and consistent", deceiving),
         ("tests of the kernels with the compiler off", plain.passed + plain.failed),
         ("of these failed", plain.failed),
     ):
         print(f"| {row[0]} | {row[1]} |")
     right = faults.all_passed and plain.all_passed and endless == "ok" and not broken
-    return int(bool(counts["wrong"] or taken or wrong or lost or astray or diverged.unreported or not right))
+    bad = (counts["wrong"], taken, wrong, lost, astray, diverged.unreported, deceiving)
+    return int(any(bad) or not right)
 
 
 def _faults() -> tuple[list[tuple[str, str]], list[str]]:

@@ -47,7 +47,7 @@ const timeTicks = (function () {
     for (const key in found) {
       const [name, setting] = key.split(".");
       layout[name][setting] = found[key];
-      if (layout[name].title && layout[name].title.text === "time, s") layout[name].title.text = zero === null ? "log's clock, and T+, s" : "UTC, and T+ s";
+      if (layout[name].title && layout[name].title.text === "time, s") layout[name].title.text = zero === null ? "log's clock, and T+, s" : (log.dataset.zone || "log's clock") + ", and T+ s";
     }
     if (Object.keys(found).length) layout.margin.b += 16;
   }

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pyarrow.compute as pc
 
 from ftproc.core.model.frames import to_cartesian
 from ftproc.files.moments import Moments
@@ -81,23 +82,37 @@ def _sights(fused: Fused, s: int) -> tuple[FloatArray, FloatArray]:
     return x, y
 
 
+def log_clocks(flight: Flight, fused: Fused) -> dict[str, float]:
+    """For each station, s from the times of the page to those of its log."""
+    starts = {name: pc.min(table.column("time_s")).as_py() for name, table in flight.edited.items()}
+    first = [float(each.time_s.min()) - fused.constants.estimate[s, CLOCK] for s, each in enumerate(fused.stations)]
+    return {
+        each.name: float(starts[each.name] - first[s] - flight.zero_s) for s, each in enumerate(fused.stations)
+    }  # fmt: skip
+
+
 def residuals(flight: Flight, fused: Fused) -> Drawn:
     """Leave-one-out residuals of each component of each station in their sigmas; the rejected ones marked."""
     shown = [(s, c) for s, station in enumerate(fused.stations) for c in station.components]
     titles = [f"{fused.stations[s].name} {COMPONENTS[c][:2]}" for s, c in shown]
     timeline = Timeline.of(fused.track.time_s + flight.zero_s)
-    figure = rows(timeline, titles, 80 + ROW_PX * len(shown))
+    figure, clocks = rows(timeline, titles, 80 + ROW_PX * len(shown)), log_clocks(flight, fused)
     rejected = sum(int(((w == 0) & (p > 0)).sum()) for w, p in zip(fused.weight, fused.possible, strict=True))
     for row, (s, c) in enumerate(shown):
         time_s = fused.stations[s].time_s - fused.constants.estimate[s, CLOCK] + flight.zero_s
         scaled = fused.residual[s][:, c] / np.sqrt(fused.residual_variance[s][:, c])
         used = fused.weight[s][:, c] > 0
-        own = Timeline.of(time_s)
-        add(figure, dots(own, np.where(used, scaled, np.nan), "used", style.GREY), row, first=row == 0)
+        own, name = Timeline.of(time_s), fused.stations[s].name
+        whose = {"component": COMPONENTS[c], "station": name, "clock": clocks[name]}
+        trace = dots(own, np.where(used, scaled, np.nan), "used", style.GREY)
+        trace.meta = {**whose, "use": "bad"}
+        add(figure, trace, row, first=row == 0)
         out = np.flatnonzero(~used & np.isfinite(scaled))
         kind = style.KINDS[1]._replace(name="rejected")
         if len(out):
-            add(figure, marks(time_s, scaled, out, kind, (-LIMIT, LIMIT), rejected), row, first=row == 0)
+            trace = marks(time_s, scaled, out, kind, (-LIMIT, LIMIT), rejected)
+            trace.meta = {**whose, "use": "good"}
+            add(figure, trace, row, first=row == 0)
         for limit in (-3.0, 3.0):
             add(figure, level(own, limit, "3 sigma"), row, first=row == 0 and limit < 0)
         figure.update_yaxes(range=[-1.05 * LIMIT, 1.05 * LIMIT], row=row + 1, col=1)

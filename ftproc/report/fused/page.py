@@ -6,8 +6,8 @@ import html
 
 from ftproc.fusion import summary
 from ftproc.fusion.flight import Flight
-from ftproc.report import tables
-from ftproc.report.fused.figures import biases, carried, disagreements, residuals, station_map
+from ftproc.report import deciding, tables
+from ftproc.report.fused.figures import biases, carried, disagreements, log_clocks, residuals, station_map
 from ftproc.report.maps.track import track
 from ftproc.report.page import document, section
 from ftproc.report.timeplots import motion, sigmas
@@ -20,9 +20,15 @@ def page(flight: Flight) -> str:
     assert fused is not None
     s = flight.trajectory.metadata["summary"]
     stretches = disagreements(flight, fused)
-    when = "UTC" if shown.moments.zero_ms is not None else "s"
+    when = tables.when(shown).removeprefix("time, ")
     listed = (
-        tables.table(("station", f"from, {when}", f"to, {when}", "what"), stretches, "numbers") if stretches else ""
+        tables.table(
+            ("station", f"from, {when}", f"to, {when}", "what"),
+            stretches,
+            "numbers",
+        )
+        if stretches
+        else ""
     )
     nothing = "" if stretches else '<p class="note">No station joins late, is silent or follows another target.</p>'
     readings = tables.table(summary.COMPONENT_HEADER, summary.component_rows(s), "numbers")
@@ -37,6 +43,7 @@ def page(flight: Flight) -> str:
         section("Who carried which stretch", [("carried", carried(flight, fused))], listed + nothing),
         section("Biases and clocks", [("biases", biases(flight, fused))], known),
         section("Residuals", [("residuals", residuals(flight, fused))]),
+        deciding.section(shown, flight.trajectory.name, log_clocks(flight, fused)),
         section("Uncertainty", [("sigmas", sigmas(shown))]),
         section("Motion", [("motion", motion(shown))]),
         tables.provenance(shown),

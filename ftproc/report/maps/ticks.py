@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ftproc.files.moments import Moments
-from ftproc.records import IntArray
+from ftproc.records import FloatArray, IntArray
 
 STEPS_S = (*(m * 10.0**k for k in range(-3, 1) for m in (1, 2, 5)), 10, 15, 20, 30, 60, 120, 300, 600, 900, 1800,
            3600, 7200, 10_800, 21_600, 43_200, 86_400)  # fmt: skip
 MOST_TICKS = 9
+LETTER, LINE = 6.5, 14.0  # CSS pixels of a letter's width, and of a line
 
 
 def along(moments: Moments, time_s: np.ndarray) -> tuple[IntArray, list[str]]:
@@ -27,6 +28,18 @@ def along(moments: Moments, time_s: np.ndarray) -> tuple[IntArray, list[str]]:
     decimals = max(0, int(np.ceil(-np.log10(step) - 1e-9)))
     said = [_said(moments, float(each), decimals) for each in wanted[near]]
     return rows[near], said
+
+
+def apart(said: list[str], place: FloatArray) -> list[str]:
+    """The names whose box overlaps none before it, "" for the others. place: (n, 2) of them, CSS pixels or NaN."""
+    kept: list[int] = []
+    for k, name in enumerate(said):
+        if np.isnan(place[k]).any():
+            continue
+        size = np.array([LETTER * len(name), LINE])
+        if all((np.abs(place[k] - place[j]) > size).any() for j in kept):
+            kept.append(k)
+    return [name if k in kept else "" for k, name in enumerate(said)]
 
 
 def _said(moments: Moments, time_s: float, decimals: int) -> str:

@@ -26,6 +26,7 @@ LOW = 0.4  # share of the width, up to which an axis has few numbers
 NEAR = 1.0  # widths of the flight; a station within this distance is drawn too
 ROOM = 0.08  # share of the flight's extent around it on the map
 HEIGHT = 460
+NARROWEST = 250  # CSS pixels of the map between its margins, on a telephone
 FILLING = 1.3  # diagonal of the flight over the distance of the eye
 NOTHING = "There is no position to draw: it is not observable."
 
@@ -76,7 +77,8 @@ def ground(view: View) -> Drawn:
     low, high = _room(path[[across, up]])
     extent = (low, high)
     graticule.add(figure, view, extent)
-    for raw, name, look in _raw(view, across, up, extent):
+    dots = _raw(view, across, up, extent)
+    for raw, name, look in dots:
         figure.add_scatter(
             x=raw[0].astype(np.float32),
             y=raw[1].astype(np.float32),
@@ -88,7 +90,7 @@ def ground(view: View) -> Drawn:
     figure.add_scatter(
         x=path[across], y=path[up], mode="lines", name="estimate", line={"color": style.BLUE, "width": 2}
     )  # fmt: skip
-    _add_ticks(figure, view, across, up)
+    _add_ticks(figure, view, (across, up), float((high - low).max()))
     for index, name, symbol in ((0, "start", "circle"), (-1, "end", "square")):
         _spot(figure, path[across, index], path[up, index], name, symbol)
     width = float(max(np.nanmax(v) - np.nanmin(v) for v in path[:2]))
@@ -106,7 +108,7 @@ def ground(view: View) -> Drawn:
             title={"text": names[axes[up]], **title}, nticks=8, scaleanchor="x", scaleratio=1, range=[low[1], high[1]]
         )
     )
-    known = "" if view.reading is None else " Dots: the position that each row of the log shows; some lie outside."
+    known = " Dots: the position that each row of the log shows; some lie outside." if dots else ""
     return Drawn(figure, f"Over the ground: equal scales; circle: start, square: end, triangle: station.{known}")
 
 
@@ -129,17 +131,19 @@ def _room(path: FloatArray) -> tuple[FloatArray, FloatArray]:
     return ends[:, 0] - ROOM * width, ends[:, 1] + ROOM * width
 
 
-def _add_ticks(figure: go.Figure, view: View, across: int, up: int) -> None:
-    """Round moments along the track, with their names."""
+def _add_ticks(figure: go.Figure, view: View, axes: tuple[int, int], width: float) -> None:
+    """Round moments along the track, with the names of those that have room for one. width: of the map, m."""
     trajectory = view.trajectory
     rows, said = ticks.along(view.moments, trajectory.time_s)
-    place = trajectory.state[rows][:, [across, up]]
-    if not len(rows):
+    place = trajectory.state[rows][:, list(axes)]
+    if not np.isfinite(place).any():
         return
     look = {"color": style.BLUE, "symbol": "line-ns-open", "size": 9, "line": {"width": 2}}
+    inward = np.where(place[:, 0] > np.nanmean(place[:, 0]), "top left", "top right").tolist()
     figure.add_scatter(
-        x=place[:, 0], y=place[:, 1], mode="markers+text", name="time", marker=look, text=said, hoverinfo="text",
-        textposition="top right", textfont={"size": 11}, showlegend=False, cliponaxis=True,
+        x=place[:, 0], y=place[:, 1], mode="markers+text", name="time", marker=look, hovertext=said, hoverinfo="text",
+        text=ticks.apart(said, place * NARROWEST / width), textfont={"size": 11}, textposition=inward,
+        showlegend=False, cliponaxis=True,
     )  # fmt: skip
 
 
