@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from ftproc.core.components import any_of
 from ftproc.core.editing import alternatives
 from ftproc.core.editing.decisions import Decision, Record, decide
-from ftproc.core.editing.lasting.faults import Rival
 from ftproc.core.editing.runs import confirmed, suspicious
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
@@ -34,10 +33,6 @@ IntArray = NDArray[np.int64]
 Begin = Callable[[Record, FloatArray], tuple[Record, Decision]]
 
 ROUNDS = 6
-SHORTEST, ENDS = 4, 5  # readings in a run that may be motion, and at its ends, of which the second nearest must be ...
-JOINED, FAR = 12.0, 25.0  # ... so many sigmas off the track at most; and of one that is an outlier in any case
-SAME_SIDE = 0.7  # share of them that are on the side of the track where the one before is: noise changes sides
-SELDOM, OPEN = 8.0, 5.0  # ln of how much more often such runs are motion than patches; within which either may be
 LEAST_KEPT = 0.8  # of the readings of a component that were good before the first round
 MARGIN = 5.0  # in log-probability, by which the decisions made again may be less likely than those before
 FEW_MORE = 0.01  # of the readings: those that another hypothesis may reject beyond the first, to be believed
@@ -54,7 +49,7 @@ SHORT_LOG, MOST = 8000, 0.5  # samples, and share that stands out: then all of i
 
 def reassess(record: Record, decision: Decision) -> Decision:
     """Give the model a jerk profile, and make the decisions again where it stands out or readings are suspicious."""
-    profile = _profile(record, decision)
+    profile = with_profile(record, decision)
     calm = median_level(profile)
     marked, reach = _stands_out(record.time_s, profile), samples_around(record.weighted(decision.weight), calm)
     for island in alternatives.islands(record.time_s, decision.weight, record.possible):
@@ -65,13 +60,13 @@ def reassess(record: Record, decision: Decision) -> Decision:
         return _until_settled(record, decision, profile)
     weight, unexamined = decision.weight.copy(), 0
     for span in _doubtful(record, decision, calm, list(_spans(around))):
-        part = _short(record, span)
+        part = short_record(record, span)
         try:
             starts = _starts(part, weight[span], calm)
         except ValueError:  # a component has too few readings there
             continue
         initial = Decision(weight[span], calm, starts, decision.rates)
-        decided = _until_settled(part, initial, _profile(part, initial))
+        decided = _until_settled(part, initial, with_profile(part, initial))
         weight[span] = decided.weight
         unexamined += decided.unexamined
     return decision._replace(weight=weight, starts=_starts(record, weight, calm), model=profile, unexamined=unexamined)
@@ -105,13 +100,13 @@ def _doubtful(record: Record, decision: Decision, calm: Model, spans: list[slice
             yield span
 
 
-def _profile(record: Record, decision: Decision, steps: int = PROFILE_STEPS) -> Model:
+def with_profile(record: Record, decision: Decision, steps: int = PROFILE_STEPS) -> Model:
     """The decision's model with a jerk profile."""
     return fit_profile(record.weighted(decision.weight), decision.starts, decision.model, steps)
 
 
 def _starts(record: Record, weight: FloatArray, calm: Model) -> list[Start]:
-    return _starts_of(record.weighted(weight), calm)
+    return starts_of(record.weighted(weight), calm)
 
 
 def _until_settled(record: Record, decision: Decision, profile: Model) -> Decision:
@@ -138,7 +133,7 @@ def _until_settled(record: Record, decision: Decision, profile: Model) -> Decisi
         if not _stands_out(record.time_s, profile).any() and (weight == decision.weight).all():
             break
         again = decide(record, decision._replace(weight=weight, model=calm), tune_first=False)
-        again = again._replace(model=_profile(record, again))
+        again = again._replace(model=with_profile(record, again))
         again = _or_as_they_are(record, again, decision._replace(weight=record.with_accepted(weight)), decision)
         if (again.weight == decision.weight).all() or (again.weight.sum(0) < LEAST_KEPT * first.weight.sum(0)).any():
             break
@@ -155,58 +150,7 @@ def _or_as_they_are(record: Record, again: Decision, tried: Decision, before: De
     if (tried.weight == before.weight).all():
         return again
     tried = tried._replace(starts=_starts(record, tried.weight, median_level(before.model)))
-    return max(again, tried._replace(model=_profile(record, tried)), key=partial(_likelihood, record))
-
-
-def with_motion(record: Record, decision: Decision) -> tuple[Decision, tuple[Rival, ...]]:
-    """The decisions on a log with those long rejected runs taken in that leave the track and join it again without a
-    jump, where a jerk profile of their own makes that likelier: no patch, but a take-off or a turn; and those of which
-    either may be."""
-    found, calm, rivals = decision.weight.copy(), median_level(decision.model), list[Rival]()
-    for c, inside, near in list(_may_be_motion(record, decision)):
-        part, weight = _short(record, near), found[near].copy()
-        weight[inside - near.start, c] = 1.0
-        try:
-            model = _profile(part, Decision(weight, calm, _starts(part, weight, calm), decision.rates), COMPARED_STEPS)
-            whole = alternatives.Neighbourhood(
-                part.time_s, part.measurement, part.possible, model, decision.rates, part.gate, part.uneven
-            )
-            weight = alternatives.decisions(whole, weight, 2)[-1].weight
-            one, other = (Decision(w, calm, _starts(part, w, calm), decision.rates) for w in (found[near], weight))
-        except ValueError:  # a component has too few readings there
-            continue
-        if weight[inside - near.start, c].mean() <= 0.5:
-            continue
-        gain = log_probability(part, other) - log_probability(part, one) + SELDOM
-        if gain > 0:
-            found[near] = weight
-        if abs(gain) < OPEN:
-            rivals.append(Rival(c, int(inside[0]), int(inside[-1]) + 1, abs(gain), gain > 0))
-    if (found == decision.weight).all():
-        return decision, tuple(rivals)
-    return decision._replace(weight=found, starts=_starts(record, found, calm)), tuple(rivals)
-
-
-def _may_be_motion(record: Record, decision: Decision) -> Iterator[tuple[int, IntArray, slice]]:
-    """The component of each run that may be motion, its readings but for those that are far off themselves, and the
-    samples around it."""
-    runs, marked = list[tuple[int, IntArray]](), np.zeros(len(record.time_s), bool)
-    for c in range(3):
-        seen = np.flatnonzero(record.possible[:, c])
-        rejected = runs_of(decision.weight[seen, c] <= 0, SHORTEST)
-        runs += [(c, seen[begin:end]) for begin, end in rejected]
-    for _, inside in runs:
-        marked[inside] = True
-    log = record.weighted(decision.weight)
-    around = samples_around(log, median_level(decision.model))
-    residual, variance = residuals_near(log, decision.model, marked, around)
-    for c, inside in runs:
-        away = residual[inside, c] / np.sqrt(variance[inside, c])
-        joined = max(np.sort(np.abs(edge))[1] for edge in (away[:ENDS], away[-ENDS:])) < JOINED
-        near = np.abs(away) < FAR
-        above = away[near] > 0
-        if joined and (above[1:] == above[:-1]).sum() >= SAME_SIDE * (len(above) - 1):
-            yield c, inside[near], slice(max(inside[0] - around, 0), inside[-1] + 1 + around)
+    return max(again, tried._replace(model=with_profile(record, tried)), key=partial(_likelihood, record))
 
 
 def likelier(one: tuple[Record, Decision], other: tuple[Record, Decision]) -> tuple[Record, Decision]:
@@ -239,7 +183,7 @@ def with_less_noise(found: tuple[Record, Decision], begin: Begin) -> tuple[Recor
 
 def log_probability(record: Record, decision: Decision) -> float:
     """Of all readings of a log, as it is understood, with a jerk profile of its own."""
-    return _likelihood(record, decision._replace(model=_profile(record, decision, COMPARED_STEPS)))
+    return _likelihood(record, decision._replace(model=with_profile(record, decision, COMPARED_STEPS)))
 
 
 def _likelihood(record: Record, decision: Decision) -> float:
@@ -269,7 +213,7 @@ def _spans(marked: NDArray[np.bool_]) -> Iterator[slice]:
             yield slice(low, high)
 
 
-def _short(record: Record, span: slice) -> Record:
+def short_record(record: Record, span: slice) -> Record:
     """The record of a stretch that is too short to tell the noise from."""
     return record.part(span)._replace(fixed=record.fixed._replace(noise=np.ones(3, bool)))
 
@@ -293,5 +237,5 @@ def _suspects(
     return suspects
 
 
-def _starts_of(log: Observations, model: Model) -> list[Start]:
+def starts_of(log: Observations, model: Model) -> list[Start]:
     return find_starts(log, model.noise_variance, float(median_level(model).jerk[0, 0]))

@@ -29,9 +29,10 @@ from ftproc.core.editing.decisions import (
 )
 from ftproc.core.editing.lasting.curves import CLOCK
 from ftproc.core.editing.lasting.faults import Faults, Rival, Shift, Step, levelled, refined, taken_out
+from ftproc.core.editing.lasting.last_look import last_look
 from ftproc.core.editing.lasting.search import search, sorted_out
 from ftproc.core.editing.lasting.weighing import scene_of
-from ftproc.core.editing.reassessment import believed, likelier, log_probability, reassess, with_less_noise, with_motion
+from ftproc.core.editing.reassessment import believed, likelier, log_probability, reassess, with_less_noise
 from ftproc.core.editing.screened import rounding_sigma, screen, stuck_readings
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven
@@ -140,7 +141,7 @@ def edit(
         doubtful = [step for step in doubtful if step.component != CLOCK]
     rivals: tuple[Rival, ...] = ()
     if not record.fixed.jerk and not live:  # at the end of a window a patch may look like motion
-        decision, rivals = with_motion(record, decision)
+        decision, rivals = last_look(record, decision)
     decision = decision._replace(weight=np.where(accepted, 1.0, decision.weight))
     if segment_of is None and not short:
         decision = allow_for_colour(record, decision)

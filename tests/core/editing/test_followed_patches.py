@@ -12,7 +12,6 @@ from ftproc.core.editing import alternatives
 from ftproc.core.editing.alternatives import Island
 from ftproc.core.identification.likelihood import FIRST_MEMORIES, first_jerk
 from ftproc.core.identification.scales import scales_of
-from ftproc.quality.verdict import CONSISTENT
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
 from tests.core.tracks import matched
@@ -37,20 +36,9 @@ def test_a_start_that_follows_each_reading_has_a_rival(times):
     assert flown(9, times)[1] < 1.5
 
 
-@pytest.mark.parametrize(("seed", "most_m"), [(6, 2.0), (22, 1.2)])
+@pytest.mark.parametrize(("seed", "most_m"), [(6, 2.0), (11, 2.5), (22, 0.7)])
 def test_a_patch_with_one_edge_is_found(seed, most_m):
     assert flown(seed)[1] < most_m
-
-
-def test_what_may_be_motion_or_a_patch_is_named():
-    """A ramp of two seconds in a turn at the end: off by 190 m, which the log does not betray."""
-    summary, _ = flown(11)
-    (rival,) = summary["rivals"]
-    assert (rival["component"], rival["chosen"]) == ("range", "motion")
-    assert 54 < rival["from_s"] < rival["to_s"] < 61
-    assert 0 < rival["nats"] < 5
-    assert summary["trust"]["verdict"] != CONSISTENT
-    assert any("may be a patch of outliers" in reason for reason in summary["trust"]["reasons"])
 
 
 def test_memories_that_are_too_short_are_left_out():

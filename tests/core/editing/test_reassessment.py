@@ -109,7 +109,7 @@ def test_decisions_that_make_the_whole_record_less_likely_are_refused(decided, m
         monkeypatch.setattr(
             reassessment, "decide", lambda *_, tune_first, rounds=rounds, last=again: next(rounds, last)
         )
-        found = reassessment._until_settled(record, before, reassessment._profile(record, before))
+        found = reassessment._until_settled(record, before, reassessment.with_profile(record, before))
         np.testing.assert_array_equal(found.weight, right.weight)
         assert next(rounds, None) is None
 

@@ -1,0 +1,184 @@
+"""A last look at an edited log: every rejected run is weighed once more against what else it may be.
+
+A run whose readings leave the track and join it again without a jump may be motion. One beside which the track has
+followed a patch, or has been dragged by one that begins slowly, may be longer, or all good, and the readings beside it
+the patch. Each way is decided with a jerk profile of its own, in which no other event takes part, and scored with one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing import outlier_chain
+from ftproc.core.editing.decisions import Decision, Record
+from ftproc.core.editing.lasting.faults import Rival
+from ftproc.core.editing.reassessment import (
+    COMPARED_STEPS,
+    PROFILE_STEPS,
+    log_probability,
+    short_record,
+    starts_of,
+    with_profile,
+)
+from ftproc.core.filtering.records import Model
+from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
+from ftproc.core.identification.nearby import residuals_near, samples_around
+from ftproc.core.identification.profile import median_level
+from ftproc.core.identification.stretches import runs_of
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+SHORTEST, ENDS = 4, 5  # readings in a run, and at its ends, of which the second nearest must be ...
+JOINED, FAR = 12.0, 25.0  # ... so many sigmas off the track at most; and of one that is an outlier in any case
+SAME_SIDE = 0.7  # share of them that are on the side of the track where the one before is: noise changes sides
+SELDOM, OPEN = 8.0, 5.0  # ln of how much more often such runs are motion than patches; within which either may be
+MARGIN = 6.0  # in log-probability, by which other decisions must be better: on 25 manoeuvring flights none of 18 that
+# were better by more was worse in truth, of 12 that were better by less 7
+LENGTHS = (13, 40)  # samples beside a run that may belong to a patch
+ROUNDS = 3  # of deciding
+ELSEWHERE = 3.0  # sigmas of the position, by which two understandings must differ to be told
+
+
+class Run(NamedTuple):
+    """A rejected run of a component: the samples (m,) of its readings, and those of them (m,) that may be motion, of
+    which there are none where it does not join the track."""
+
+    component: int
+    samples: IntArray
+    motion: IntArray
+
+    def near(self, around: int) -> slice:
+        """The samples that are looked at."""
+        reach = LENGTHS[-1] + around
+        return slice(max(int(self.samples[0]) - reach, 0), int(self.samples[-1]) + 1 + reach)
+
+    def moves(self, before: FloatArray, after: FloatArray, offset: int) -> bool:
+        """Whether other decisions (n, 3) take it for motion: they take it in, and reject nothing for it."""
+        taken_in = after[self.motion - offset, self.component]
+        return len(taken_in) > 0 and bool(taken_in.mean() > 0.5 and (after >= before).all())
+
+    def around(self, offset: int) -> slice:
+        """The samples that are decided on, counted from one."""
+        near = self.near(0)
+        return slice(max(near.start - offset, 0), near.stop - offset)
+
+
+def last_look(record: Record, decision: Decision) -> tuple[Decision, tuple[Rival, ...]]:
+    """The decisions on a log, replaced around rejected runs where others are likelier; and those of which either may
+    be."""
+    weight, calm, rivals = decision.weight.copy(), median_level(decision.model), list[Rival]()
+    around = samples_around(record.weighted(weight), calm)
+    for run in list(_runs(record, decision, around)):
+        near = run.near(around)
+        part, own = short_record(record, near), decision._replace(weight=weight[near].copy(), model=calm)
+        if (own.weight[run.samples - near.start, run.component] > 0).any():  # another look has changed it
+            continue
+        try:
+            best, gain = _likeliest(part, own, run, near.start)
+        except ValueError:  # a component has too few readings there
+            continue
+        if gain > 0:
+            weight[near] = best
+        changed = np.flatnonzero(best[:, run.component] != own.weight[:, run.component])
+        if abs(gain) < OPEN and len(changed) >= SHORTEST and _apart(part, own, best):
+            begin, end = int(changed[0]) + near.start, int(changed[-1]) + 1 + near.start
+            taken_in = bool(best[changed, run.component].mean() > 0.5)
+            rivals.append(Rival(run.component, begin, end, abs(gain), taken_in == (gain > 0)))
+    if (weight == decision.weight).all():
+        return decision, tuple(rivals)
+    starts = starts_of(record.weighted(weight), calm)
+    return decision._replace(weight=weight, starts=starts), tuple(rivals)
+
+
+def _likeliest(part: Record, decision: Decision, run: Run, offset: int) -> tuple[FloatArray, float]:
+    """The likeliest other decisions (n, 3) on a part of a log, and by how much more likely they are."""
+    before, here = decision.weight, run.around(offset)
+    unknown = before.copy()
+    unknown[here, run.component] = 0.0
+    model = with_profile(part, _with(part, decision, unknown), PROFILE_STEPS)
+    found = {before.tobytes(): (0.0, before)}
+    one = log_probability(part, _with(part, decision, before))
+    for way in _ways(part, before, run, offset):
+        with contextlib.suppress(ValueError):  # a component has too few readings there
+            other = _decided(part, decision._replace(weight=way), model, here)
+            if other.tobytes() not in found:
+                prior = SELDOM if run.moves(before, other, offset) else -MARGIN
+                gain = log_probability(part, _with(part, decision, other)) - one + prior
+                found[other.tobytes()] = gain, other
+    del found[before.tobytes()]
+    gain, other = max(found.values(), key=lambda each: each[0], default=(-np.inf, before))
+    return other, gain
+
+
+def _ways(part: Record, weight: FloatArray, run: Run, offset: int) -> Iterator[FloatArray]:
+    """Decisions (n, 3) with which to begin: what a run may be."""
+    c, first, last = run.component, int(run.samples[0]) - offset, int(run.samples[-1]) + 1 - offset
+    if len(run.motion):
+        other = weight.copy()
+        other[run.motion - offset, c] = 1.0
+        yield other
+    yield weight
+    for length, before, good in itertools.product(LENGTHS, (True, False), (False, True)):
+        other = weight.copy()
+        if good:
+            other[first:last, c] = part.possible[first:last, c]
+        other[max(first - length, 0) : first, c] *= not before
+        other[last : last + length, c] *= before
+        yield other
+
+
+def _decided(part: Record, decision: Decision, model: Model, here: slice) -> FloatArray:
+    """(n, 3) decisions from these on, made again in a part of the samples."""
+    weight = decision.weight
+    for _ in range(ROUNDS):
+        log = part.weighted(weight)
+        smoothed = smooth_log(log, model, starts_of(log, decision.model), RESIDUALS)
+        good = outlier_chain.classify(
+            smoothed.residual, smoothed.residual_variance, model.reading_variance, decision.rates.copy(), part.gate
+        )
+        decided = weight.copy()
+        decided[here] = part.with_accepted(((good > 0.5) & part.possible).astype(float))[here]
+        if (decided == weight).all():
+            break
+        weight = decided
+    return weight
+
+
+def _with(part: Record, decision: Decision, weight: FloatArray) -> Decision:
+    """The decision with other weights (n, 3)."""
+    return decision._replace(weight=weight, starts=starts_of(part.weighted(weight), decision.model))
+
+
+def _apart(part: Record, decision: Decision, other: FloatArray) -> bool:
+    """Whether other decisions (n, 3) put the target elsewhere."""
+    one, two = (
+        smooth_log(part.weighted(each.weight), with_profile(part, each, COMPARED_STEPS), each.starts)
+        for each in (_with(part, decision, weight) for weight in (decision.weight, other))
+    )
+    sigma = np.maximum(one.sigma[:, :3], two.sigma[:, :3])
+    return bool((np.abs(one.state[:, :3] - two.state[:, :3]) > ELSEWHERE * sigma).any())
+
+
+def _runs(record: Record, decision: Decision, around: int) -> Iterator[Run]:
+    """The rejected runs of a log."""
+    found, marked = list[tuple[int, IntArray]](), np.zeros(len(record.time_s), bool)
+    for c in range(3):
+        seen = np.flatnonzero(record.possible[:, c])
+        found += [(c, seen[begin:end]) for begin, end in runs_of(decision.weight[seen, c] <= 0, SHORTEST)]
+    for _, inside in found:
+        marked[inside] = True
+    residual, variance = residuals_near(record.weighted(decision.weight), decision.model, marked, around)
+    for c, inside in found:
+        away = residual[inside, c] / np.sqrt(variance[inside, c])
+        joined = max(np.sort(np.abs(edge))[1] for edge in (away[:ENDS], away[-ENDS:])) < JOINED
+        near = np.abs(away) < FAR
+        above = away[near] > 0
+        same = (above[1:] == above[:-1]).sum() >= SAME_SIDE * (len(above) - 1)
+        yield Run(c, inside, inside[near] if joined and same else inside[:0])

@@ -1,0 +1,87 @@
+"""The last look at an edited log: what the rejected runs of manoeuvring flights are, beside what the decisions say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc import pipeline
+from ftproc.core.editing import two_pass
+from ftproc.core.editing.lasting import last_look
+from ftproc.core.editing.lasting.last_look import LENGTHS, Run
+from ftproc.quality.verdict import SUSPECT
+from ftproc.settings import FilterSettings
+from ftproc.simulation import simulate
+
+pytestmark = pytest.mark.compiled
+
+UNKNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
+
+
+def error_m(seed):
+    """RMS of the smoothed positions of a manoeuvring flight at 10 Hz with nine patches."""
+    flight = simulate("manoeuvre", seed=seed, dt_s=0.1, duration_s=60.0)
+    found = two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN)
+    off = found.smoothed().state[:, :3] - flight.truth.position_m
+    return float(np.sqrt((off**2).sum(1).mean()))
+
+
+@pytest.mark.parametrize(
+    ("seed", "most_m"),
+    [
+        (22, 0.85),  # a ramp whose first five readings the track has followed
+        (24, 1.5),  # a patch that was followed: the 46 good readings after it were rejected
+        (30, 1.0),  # a walk-off that begins slowly
+        (31, 1.25),  # a ramp that was followed for 29 readings, beside another patch
+        (33, 0.65),  # a ramp that was followed up to the end of the log
+    ],
+)
+def test_patches_that_were_followed(monkeypatch, seed, most_m):
+    assert error_m(seed) < most_m
+    monkeypatch.setattr(two_pass, "last_look", lambda record, decision: (decision, ()))
+    assert error_m(seed) > 1.15 * most_m
+
+
+@pytest.mark.parametrize(("margin", "chosen"), [(43.0, "a patch of outliers"), (47.0, "motion")])
+def test_what_may_be_motion_or_a_patch_is_named(monkeypatch, margin, chosen):
+    """That the ramp is a patch is likelier by 45: with a prior of about so much against it either may be."""
+    monkeypatch.setattr(last_look, "MARGIN", margin)
+    flight = simulate("manoeuvre", seed=31, dt_s=0.1, duration_s=60.0)
+    summary = pipeline.filter_log(flight.log, FilterSettings(smooth=True)).metadata["summary"]
+    (rival,) = summary["rivals"]
+    assert (rival["component"], rival["chosen"]) == ("azimuth", chosen)
+    assert 13 < rival["from_s"] < rival["to_s"] < 19
+    assert 0 < rival["nats"] < 5
+    assert summary["trust"]["verdict"] == SUSPECT
+    assert any("may be" in reason for reason in summary["trust"]["reasons"])
+
+
+def test_what_is_alike_is_left_alone():
+    """Where nothing is rejected there is nothing to look at, and the very decision is returned."""
+    flight = simulate("calibration", seed=2, duration_s=60.0, dt_s=0.2, outliers="none")
+    record, decision = two_pass._decided(
+        flight.log.time_s, flight.log.measurement, UNKNOWN, None, two_pass.Work(len(flight.log)), False,
+        np.zeros(flight.log.measurement.shape, bool),
+    )  # fmt: skip
+    decision = decision._replace(weight=record.possible.astype(float))
+    assert last_look.last_look(record, decision) == (decision, ())
+    assert last_look.last_look(record, decision)[0] is decision
+
+
+def test_ways_to_begin():
+    n, samples = 200, np.arange(90, 100)
+    part = two_pass.Record(
+        np.arange(float(n)), np.zeros((n, 3)), np.ones((n, 3), bool), np.ones((n, 3)), *[None] * 5
+    )  # fmt: skip
+    weight = np.ones((n, 3))
+    weight[samples, 1] = 0.0
+    ways = list(last_look._ways(part, weight, Run(1, samples + 1000, samples[:0]), 1000))
+    assert len(ways) == 1 + 4 * len(LENGTHS)
+    rejected = {tuple(np.flatnonzero(way[:, 1] == 0)[[0, -1]]) for way in ways}
+    assert rejected == {
+        (90, 99), *((90 - length, 99) for length in LENGTHS), *((90, 99 + length) for length in LENGTHS),
+        *((90 - length, 89) for length in LENGTHS), *((100, 99 + length) for length in LENGTHS),
+    }  # fmt: skip
+    assert all((way[:, [0, 2]] == 1).all() for way in ways)
+    taken_in = next(last_look._ways(part, weight, Run(1, samples, samples), 0))
+    assert (taken_in == 1).all()
