@@ -14,6 +14,7 @@ NORMAL_99 = 2.576  # two-sided 99 % point
 LEAST_WIDTH = 0.2  # of the bounds about 1: no model is better, however many the readings
 POORLY_PREDICTED = 8.0  # innovation sigma over noise sigma (median), from which a gate detects too little
 POORLY_OBSERVABLE = 10.0  # sigma over its median
+BULK, FAR_OFF = 31, 5.0  # readings, of which more than half are so many sigmas off: noise never does that
 MOST_INTERVALS = 20  # that are listed
 
 
@@ -29,6 +30,21 @@ def innovation_test(squares: float, count: int) -> dict[str, Any]:
     high = max(float(np.sqrt(1 + spread)), 1 + LEAST_WIDTH)
     verdict = "cautious" if ratio < low else "overconfident" if ratio > high else "consistent"
     return {"innovation_ratio": ratio, "innovation_bounds": [low, high], "verdict": verdict}
+
+
+def left_behind(time_s: FloatArray, squares: FloatArray) -> list[dict[str, float]]:
+    """Stretches over which the bulk of the readings that are used, with these times (m,) and squares of normalised
+    innovations (m,), lie far from the estimate: the median of BULK of them is more than FAR_OFF squared. In time order,
+    with the root of the largest median."""
+    if len(squares) < BULK:
+        return []
+    middle = np.sqrt(np.median(np.lib.stride_tricks.sliding_window_view(squares, BULK), 1))
+    far = np.r_[False, middle > FAR_OFF, False]
+    edges = np.flatnonzero(far[1:] != far[:-1]).reshape(-1, 2)
+    return [
+        {"from_s": float(time_s[a]), "to_s": float(time_s[b + BULK - 2]), "sigmas": float(middle[a:b].max())}
+        for a, b in edges
+    ]
 
 
 def nis_bounds(freedom: FloatArray) -> tuple[FloatArray, FloatArray]:

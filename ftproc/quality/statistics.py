@@ -60,6 +60,7 @@ class RunStatistics:
         self.faults = FaultStatistics()
         self.screened_out, self.overlooked = 0, 0
         self.converged: bool | None = None
+        self.left_behind: list[dict[str, Any]] = []
         self.smoothed_sigma_m: float | None = None
         self.largest_m, self.largest_sigma = 0.0, 0.0
         self.outside, self.rows, self.parts, self.unknown = 0.0, 0, 0, 0
@@ -78,6 +79,11 @@ class RunStatistics:
         for c, component in enumerate(self.components):
             component.add_labels(time_s, estimate.label[:, c])
             component.add_innovations(squares[:, c], run.innovation_sigma[:, c], used[:, c])
+            tested = used[:, c] & np.isfinite(squares[:, c])
+            if not (squares[tested, c] > consistency.FAR_OFF**2).any():
+                continue
+            left = consistency.left_behind(time_s[tested], squares[tested, c])
+            self.left_behind += [{"component": COMPONENTS[c], **each} for each in left]
         self._add_gaps(time_s)
         self._add_changes(cleaned)
         if not self.absent:
@@ -209,6 +215,7 @@ class RunStatistics:
             "jerk_psd_m2ps5": jerk if np.isfinite(psd).all() else None,
             **self._motion(),
             "acceleration_at_least_mps2": self.acceleration,
+            "left_behind": self.left_behind,
             "nis_mean": self.nis_sum / self.nis_count if self.nis_count else None,
             "components_used_mean": float(self.used / max(self.rows_used, 1)),
             "poorly_observable": [] if absent else consistency.poorly_observable(time_s, sigma),

@@ -199,10 +199,25 @@ def _no_flight(s: Mapping[str, Any]) -> Iterator[Remark]:
     if least > FASTEST_MPS2:
         text = f"the readings ask for an acceleration of {least:.3g} m/s2, which hardly anything has that flies"
         yield Remark(SUSPECT, text)
+    yield from _left_behind(s)
     for name, part in s["components"].items():
         if (part.get("noise_rad") or 0.0) > CHANCE_RAD:
             text = f"the {name} noise of {part['noise_rad']:.2g} rad is nearly that of readings at chance"
             yield Remark(UNRELIABLE, f"{text}: check the columns and their units")
+
+
+def _left_behind(s: Mapping[str, Any]) -> Iterator[Remark]:
+    """Where the estimate leaves the bulk of the readings that it uses: the worst stretch of each component, of those
+    whose sigmas are not too small throughout."""
+    for name, part in s["components"].items():
+        stretches = [each for each in s.get("left_behind", ()) if each["component"] == name]
+        if not stretches or part["innovation_ratio"] > UNRELIABLE_RATIO * part["innovation_bounds"][1]:
+            continue
+        worst = max(stretches, key=lambda each: each["sigmas"])
+        first, last = (Moments.of_summary(s).words(worst[end]) for end in ("from_s", "to_s"))
+        text = f"from {first.removesuffix(' s')} to {last} most {name} readings lie {worst['sigmas']:.2g} sigmas or " \
+               "more from the estimate: do not use it there"  # fmt: skip
+        yield Remark(UNRELIABLE, text)
 
 
 def _editing(s: Mapping[str, Any]) -> Iterator[Remark]:

@@ -85,3 +85,18 @@ def test_bounds_of_nis_are_those_of_chi_square_until_they_are_narrow():
     np.testing.assert_allclose(high[1:4], stats.chi2.ppf(0.995, freedom[1:4]), rtol=0.02)
     assert low[4] == pytest.approx(0.64 * freedom[4])
     assert high[4] == pytest.approx(1.44 * freedom[4])
+
+
+def test_stretches_that_the_estimate_leaves():
+    rng, time = np.random.default_rng(4), np.arange(400) * 0.5
+    squares = rng.standard_normal(400) ** 2
+    assert consistency.left_behind(time, squares) == []
+    lone = squares.copy()
+    lone[::3] = 1e4  # a third of the readings is not the bulk
+    assert consistency.left_behind(time, lone) == []
+    squares[100:160] = (12 + rng.standard_normal(60)) ** 2
+    (found,) = consistency.left_behind(time, squares)
+    assert 42 < found["from_s"] < 50
+    assert 79 < found["to_s"] < 88
+    assert found["sigmas"] == pytest.approx(12, abs=1)
+    assert consistency.left_behind(time[:20], np.full(20, 1e4)) == []
