@@ -143,7 +143,7 @@ def test_every_round_of_decisions_keeps_what_is_accepted() -> None:
 
 
 def test_no_later_step_takes_back_what_is_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
-    def rejecting(record: Record, decision: Decision) -> tuple[Decision, tuple[()]]:
+    def rejecting(record: Record, decision: Decision, work: Work) -> tuple[Decision, tuple[()]]:
         weight = decision.weight.copy()
         weight[200:220] = 0.0
         return decision._replace(weight=weight), ()

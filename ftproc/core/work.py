@@ -18,5 +18,5 @@ class Work:
 
 
 def for_lasting_faults(samples: int) -> Work:
-    """What the search for faults that last may cost."""
+    """What the search for faults that last may cost, and the last look."""
     return Work(samples, LASTING, LASTING_PER_SAMPLE)

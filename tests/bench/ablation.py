@@ -83,7 +83,7 @@ RULES: dict[str, tuple[Off, ...]] = {
     "tails": (Off(TWO_PASS, "allow_for_tails", _pair),),
     "late stamps": (Off(TWO_PASS, "late_stamps", _nothing),),
     "very late stamps": (Off(TWO_PASS, "allow_for_very_late_stamps", _pair),),
-    "last look": (Off(TWO_PASS, "last_look", lambda record, decision: (decision, ())),),
+    "last look": (Off(TWO_PASS, "last_look", lambda record, decision, work: (decision, ())),),
     "faults that last": (Off(TWO_PASS, "search", _empty),),
     "one-sided errors": (Off(TWO_PASS, "_one_sided", _empty),),
     "patches between jumps": (Off(f"{EDITING}.jump_patches", "find", lambda time_s, *_: np.zeros(len(time_s))),),

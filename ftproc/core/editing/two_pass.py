@@ -136,13 +136,14 @@ def edit(
         if new.steps and _may_be_late_stamps((record, decision), other):
             break
         (record, decision), found, banned = other, steps, banned | new.banned
-    decision = decision._replace(unexamined=decision.unexamined + for_lasting.passed)
     if decision.stamp_s > 0:  # which explains a clock that seems to jump
         doubtful = [step for step in doubtful if step.component != CLOCK]
     rivals: tuple[Rival, ...] = ()
     if not record.fixed.jerk and not live:  # at the end of a window a patch may look like motion
-        decision, rivals = last_look(record, decision)
-    decision = decision._replace(weight=np.where(accepted, 1.0, decision.weight))
+        decision, rivals = last_look(record, decision, for_lasting)
+    decision = decision._replace(
+        weight=np.where(accepted, 1.0, decision.weight), unexamined=decision.unexamined + for_lasting.passed
+    )
     if segment_of is None and not short:
         decision = allow_for_colour(record, decision)
     log = record.weighted(decision.weight)

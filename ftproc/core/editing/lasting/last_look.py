@@ -31,6 +31,7 @@ from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification.nearby import residuals_near, samples_around
 from ftproc.core.identification.profile import median_level
 from ftproc.core.identification.stretches import runs_of
+from ftproc.core.work import Work
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -42,7 +43,8 @@ SELDOM, OPEN = 8.0, 5.0  # ln of how much more often such runs are motion than p
 MARGIN = 6.0  # in log-probability, by which other decisions must be better: on 25 manoeuvring flights none of 18 that
 # were better by more was worse in truth, of 12 that were better by less 7
 LENGTHS = (13, 40)  # samples beside a run that may belong to a patch
-ROUNDS = 3  # of deciding
+LOOKS, ROUNDS = 2, 3  # at a log, whose runs may have changed; of deciding
+WEIGHED = 10  # times that the samples around a run are weighed, about
 ELSEWHERE = 3.0  # sigmas of the position, by which two understandings must differ to be told
 
 
@@ -53,6 +55,11 @@ class Run(NamedTuple):
     component: int
     samples: IntArray
     motion: IntArray
+
+    @property
+    def key(self) -> tuple[int, bytes]:
+        """What tells it from others."""
+        return self.component, self.samples.tobytes()
 
     def near(self, around: int) -> slice:
         """The samples that are looked at."""
@@ -70,31 +77,38 @@ class Run(NamedTuple):
         return slice(max(near.start - offset, 0), near.stop - offset)
 
 
-def last_look(record: Record, decision: Decision) -> tuple[Decision, tuple[Rival, ...]]:
-    """The decisions on a log, replaced around rejected runs where others are likelier; and those of which either may
-    be."""
-    weight, calm, rivals = decision.weight.copy(), median_level(decision.model), list[Rival]()
-    around = samples_around(record.weighted(weight), calm)
-    for run in list(_runs(record, decision, around)):
-        near = run.near(around)
-        part, own = short_record(record, near), decision._replace(weight=weight[near].copy(), model=calm)
-        if (own.weight[run.samples - near.start, run.component] > 0).any():  # another look has changed it
-            continue
-        try:
-            best, gain = _likeliest(part, own, run, near.start)
-        except ValueError:  # a component has too few readings there
-            continue
-        if gain > 0:
-            weight[near] = best
-        changed = np.flatnonzero(best[:, run.component] != own.weight[:, run.component])
-        if abs(gain) < OPEN and len(changed) >= SHORTEST and _apart(part, own, best):
-            begin, end = int(changed[0]) + near.start, int(changed[-1]) + 1 + near.start
-            taken_in = bool(best[changed, run.component].mean() > 0.5)
-            rivals.append(Rival(run.component, begin, end, abs(gain), taken_in == (gain > 0)))
-    if (weight == decision.weight).all():
-        return decision, tuple(rivals)
-    starts = starts_of(record.weighted(weight), calm)
-    return decision._replace(weight=weight, starts=starts), tuple(rivals)
+def last_look(record: Record, decision: Decision, work: Work) -> tuple[Decision, tuple[Rival, ...]]:
+    """The decisions on a log, replaced around rejected runs where others are likelier, while there is work left; and
+    those of which either may be."""
+    calm, rivals, seen = median_level(decision.model), list[Rival](), set[tuple[int, bytes]]()
+    around, found = samples_around(record.weighted(decision.weight), calm), decision
+    for _ in range(LOOKS):
+        weight = found.weight.copy()
+        for run in [each for each in _runs(record, found, around) if each.key not in seen]:
+            near = run.near(around)
+            if work.left <= 0:
+                work.passed += 1
+                continue
+            part, own = short_record(record, near), found._replace(weight=weight[near].copy(), model=calm)
+            if (own.weight[run.samples - near.start, run.component] > 0).any():  # another look has changed it
+                continue
+            seen.add(run.key)
+            work.left -= WEIGHED * (near.stop - near.start)
+            try:
+                best, gain = _likeliest(part, own, run, near.start)
+            except ValueError:  # a component has too few readings there
+                continue
+            if gain > 0:
+                weight[near] = best
+            changed = np.flatnonzero(best[:, run.component] != own.weight[:, run.component])
+            if abs(gain) < OPEN and len(changed) >= SHORTEST and _apart(part, own, best):
+                begin, end = int(changed[0]) + near.start, int(changed[-1]) + 1 + near.start
+                taken_in = bool(best[changed, run.component].mean() > 0.5)
+                rivals.append(Rival(run.component, begin, end, abs(gain), taken_in == (gain > 0)))
+        if (weight == found.weight).all():
+            break
+        found = found._replace(weight=weight, starts=starts_of(record.weighted(weight), calm))
+    return found, tuple(rivals)
 
 
 def _likeliest(part: Record, decision: Decision, run: Run, offset: int) -> tuple[FloatArray, float]:
@@ -102,11 +116,13 @@ def _likeliest(part: Record, decision: Decision, run: Run, offset: int) -> tuple
     before, here = decision.weight, run.around(offset)
     unknown = before.copy()
     unknown[here, run.component] = 0.0
-    model = with_profile(part, _with(part, decision, unknown), PROFILE_STEPS)
+    calm = with_profile(part, _with(part, decision, unknown), PROFILE_STEPS)
     found = {before.tobytes(): (0.0, before)}
     one = log_probability(part, _with(part, decision, before))
-    for way in _ways(part, before, run, offset):
+    for number, way in enumerate(_ways(part, before, run, offset)):
         with contextlib.suppress(ValueError):  # a component has too few readings there
+            moves = number == 0 and len(run.motion) > 0  # the readings tell how it does
+            model = with_profile(part, _with(part, decision, way), COMPARED_STEPS) if moves else calm
             other = _decided(part, decision._replace(weight=way), model, here)
             if other.tobytes() not in found:
                 prior = SELDOM if run.moves(before, other, offset) else -MARGIN

@@ -188,12 +188,9 @@ def _within(off: FloatArray) -> Iterator[tuple[int, float]]:
 
 
 def distinct(jumps: Sequence[Jump]) -> list[Jump]:
-    """The jumps, the largest first, and each once, with all its ways."""
-    found = dict[tuple[int, int], Jump]()
-    for jump in sorted(jumps, key=lambda jump: -jump.gain):
-        known = found.setdefault((jump.station, jump.sample), jump)
-        found[jump.station, jump.sample] = known._replace(ways=tuple(dict.fromkeys((*known.ways, *jump.ways))))
-    return list(found.values())
+    """The jumps, the largest first, and each once."""
+    found = {(jump.station, jump.sample, jump.ways): jump for jump in sorted(jumps, key=lambda jump: jump.gain)}
+    return sorted(found.values(), key=lambda jump: -jump.gain)
 
 
 def _ways(near: FloatArray, least: float, together: float) -> tuple[tuple[int, ...], ...]:

@@ -9,6 +9,7 @@ from ftproc import pipeline
 from ftproc.core.editing import two_pass
 from ftproc.core.editing.lasting import last_look
 from ftproc.core.editing.lasting.last_look import LENGTHS, Run
+from ftproc.core.work import Work
 from ftproc.quality.verdict import SUSPECT
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
@@ -38,7 +39,7 @@ def error_m(seed):
 )
 def test_patches_that_were_followed(monkeypatch, seed, most_m):
     assert error_m(seed) < most_m
-    monkeypatch.setattr(two_pass, "last_look", lambda record, decision: (decision, ()))
+    monkeypatch.setattr(two_pass, "last_look", lambda record, decision, work: (decision, ()))
     assert error_m(seed) > 1.15 * most_m
 
 
@@ -64,8 +65,8 @@ def test_what_is_alike_is_left_alone():
         np.zeros(flight.log.measurement.shape, bool),
     )  # fmt: skip
     decision = decision._replace(weight=record.possible.astype(float))
-    assert last_look.last_look(record, decision) == (decision, ())
-    assert last_look.last_look(record, decision)[0] is decision
+    assert last_look.last_look(record, decision, Work(10**6)) == (decision, ())
+    assert last_look.last_look(record, decision, Work(10**6))[0] is decision
 
 
 def test_ways_to_begin():
@@ -85,3 +86,21 @@ def test_ways_to_begin():
     assert all((way[:, [0, 2]] == 1).all() for way in ways)
     taken_in = next(last_look._ways(part, weight, Run(1, samples, samples), 0))
     assert (taken_in == 1).all()
+
+
+def test_runs_that_no_work_was_left_for_are_counted():
+    flight = simulate("manoeuvre", seed=3, duration_s=60.0, dt_s=0.1)
+    seen = []
+
+    def looked(record, decision, work):
+        seen.append((record, decision))
+        return decision, ()
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(two_pass, "last_look", looked)
+        two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN)
+    (record, decision), = seen  # fmt: skip
+    work = Work(0, 1, 0)
+    last_look.last_look(record, decision, work)
+    runs = len(list(last_look._runs(record, decision, 10)))
+    assert work.passed == runs - 1
