@@ -38,11 +38,11 @@ def test_a_stop_that_is_overdue_leaves_out_what_was_read_and_says_so(tmp_path, m
     stop = Stop()
     push = Live.push
 
-    def slowly(self, *rows):
+    def slowly(self, *rows, **beside):
         if self._taken > 30:
             stop._ask(signal.SIGINT, None)
             monkeypatch.setattr(stop_module, "GRACE_S", -1.0)
-        return push(self, *rows)
+        return push(self, *rows, **beside)
 
     monkeypatch.setattr(Live, "push", slowly)
     monkeypatch.setattr(stream, "AT_ONCE_S", 0.0)  # so that rows are pushed one by one
@@ -54,7 +54,9 @@ def test_a_stop_that_is_overdue_leaves_out_what_was_read_and_says_so(tmp_path, m
 def test_rows_that_have_been_read_are_used_after_a_stop(tmp_path, monkeypatch):
     stop = Stop()
     push = Live.push
-    monkeypatch.setattr(Live, "push", lambda self, *rows: (stop._ask(signal.SIGINT, None), push(self, *rows))[1])
+    monkeypatch.setattr(
+        Live, "push", lambda self, *rows, **more: (stop._ask(signal.SIGINT, None), push(self, *rows, **more))[1]
+    )
     rows, said = followed(tmp_path, monkeypatch, of_flight(100), stop)
     assert rows.tolist() == list(range(100))
     assert not any("stopped before" in sentence for sentence in said)

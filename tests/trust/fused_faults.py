@@ -33,7 +33,7 @@ from tests.trust import tables
 from tests.trust.runs import is_far
 from tests.trust.tables import Bound, Given
 
-SCENARIOS = tuple(name for name in RANGE_SCENARIOS if name not in ("range", "range-gnss"))
+SCENARIOS = tuple(name for name in RANGE_SCENARIOS if name not in ("range", "range-gnss", "range-surveillance"))
 LASTS_S = 60.0
 BOUND = Bound(wrong=0.45, confident=0.05)  # of all faults but a drift, a little above what is reached
 SEEDS = 3

@@ -28,5 +28,5 @@ def test_it_is_in_the_frame(file, north):
 
 
 def test_without_a_site_the_cure_is_said(file):
-    with pytest.raises(InputError, match="filter the log with --site"):
+    with pytest.raises(InputError, match="no site is known; say --site"):
         truth.read(file[0])

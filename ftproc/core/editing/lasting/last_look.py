@@ -119,13 +119,12 @@ def _likeliest(part: Record, decision: Decision, run: Run, offset: int) -> tuple
     calm = with_profile(part, _with(part, decision, unknown), PROFILE_STEPS)
     found = {before.tobytes(): (0.0, before)}
     one = log_probability(part, _with(part, decision, before))
-    for number, way in enumerate(_ways(part, before, run, offset)):
+    for way, follows in _ways(part, before, run, offset):
         with contextlib.suppress(ValueError):  # a component has too few readings there
-            moves = number == 0 and len(run.motion) > 0  # the readings tell how it does
-            model = with_profile(part, _with(part, decision, way), COMPARED_STEPS) if moves else calm
+            model = with_profile(part, _with(part, decision, way), COMPARED_STEPS) if follows else calm
             other = _decided(part, decision._replace(weight=way), model, here)
             if other.tobytes() not in found:
-                prior = SELDOM if run.moves(before, other, offset) else -MARGIN
+                prior = SELDOM if run.moves(before, other, offset) and not follows else -MARGIN
                 gain = log_probability(part, _with(part, decision, other)) - one + prior
                 found[other.tobytes()] = gain, other
     del found[before.tobytes()]
@@ -133,21 +132,23 @@ def _likeliest(part: Record, decision: Decision, run: Run, offset: int) -> tuple
     return other, gain
 
 
-def _ways(part: Record, weight: FloatArray, run: Run, offset: int) -> Iterator[FloatArray]:
-    """Decisions (n, 3) with which to begin: what a run may be."""
+def _ways(part: Record, weight: FloatArray, run: Run, offset: int) -> Iterator[tuple[FloatArray, bool]]:
+    """Decisions (n, 3) with which to begin: what a run may be; and whether the jerk follows them: where readings are
+    few nothing else tells how it moves, but then it follows a patch as well."""
     c, first, last = run.component, int(run.samples[0]) - offset, int(run.samples[-1]) + 1 - offset
     if len(run.motion):
         other = weight.copy()
         other[run.motion - offset, c] = 1.0
-        yield other
-    yield weight
+        yield other, False
+        yield other, True
+    yield weight, False
     for length, before, good in itertools.product(LENGTHS, (True, False), (False, True)):
         other = weight.copy()
         if good:
             other[first:last, c] = part.possible[first:last, c]
         other[max(first - length, 0) : first, c] *= not before
         other[last : last + length, c] *= before
-        yield other
+        yield other, False
 
 
 def _decided(part: Record, decision: Decision, model: Model, here: slice) -> FloatArray:

@@ -76,7 +76,7 @@ def test_ways_to_begin():
     )  # fmt: skip
     weight = np.ones((n, 3))
     weight[samples, 1] = 0.0
-    ways = list(last_look._ways(part, weight, Run(1, samples + 1000, samples[:0]), 1000))
+    ways = [way for way, _ in last_look._ways(part, weight, Run(1, samples + 1000, samples[:0]), 1000)]
     assert len(ways) == 1 + 4 * len(LENGTHS)
     rejected = {tuple(np.flatnonzero(way[:, 1] == 0)[[0, -1]]) for way in ways}
     assert rejected == {
@@ -84,7 +84,7 @@ def test_ways_to_begin():
         *((90 - length, 89) for length in LENGTHS), *((100, 99 + length) for length in LENGTHS),
     }  # fmt: skip
     assert all((way[:, [0, 2]] == 1).all() for way in ways)
-    taken_in = next(last_look._ways(part, weight, Run(1, samples, samples), 0))
+    taken_in, _ = next(last_look._ways(part, weight, Run(1, samples, samples), 0))
     assert (taken_in == 1).all()
 
 
