@@ -88,6 +88,7 @@ def last_look(record: Record, decision: Decision, work: Work) -> tuple[Decision,
             near = run.near(around)
             if work.left <= 0:
                 work.passed += 1
+                seen.add(run.key)
                 continue
             part, own = short_record(record, near), found._replace(weight=weight[near].copy(), model=calm)
             if (own.weight[run.samples - near.start, run.component] > 0).any():  # another look has changed it
