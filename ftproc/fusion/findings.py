@@ -16,7 +16,7 @@ from ftproc.fusion.estimation.events import CLOCK
 from ftproc.fusion.estimation.whole import Fused
 from ftproc.quality import consistency, faults
 from ftproc.quality.verdict import CONSISTENT, MANY_REJECTED, SUSPECT, TOO_MANY_REJECTED, UNRELIABLE, Remark
-from ftproc.records import COMPONENTS, FloatArray
+from ftproc.records import FloatArray
 
 WRONG_S, WRONG_ROWS = 3.0, 6  # seconds and rows that all of a station's readings are rejected: another target
 BRIDGED = 4  # rows within that are good by chance
@@ -94,12 +94,12 @@ def component_figures(fused: Fused, s: int) -> dict[str, Any]:
     for c in station.components:
         seen, used = np.isfinite(station.measurement[:, c]), fused.weight[s][:, c] > 0
         squares = residual[used, c] ** 2 / variance[used, c]
-        unit = ("m", "rad", "rad")[c]
-        found[COMPONENTS[c]] = {
+        unit, scale = ("m", station.away_m if c else 1.0) if station.away_m else (("m", "rad", "rad")[c], 1.0)
+        found[station.names[c]] = {
             "good": int(used.sum()),
             "rejected": int((seen & ~used).sum()),
             "missing": int((~seen).sum()),
-            f"noise_{unit}": float(fused.noise[s, c]),
+            f"noise_{unit}": float(fused.noise[s, c]) * scale,
             "residual_ratio": float(np.sqrt(squares.mean())) if len(squares) else None,
         }
     for name, each in fused.beside[s].items() if fused.beside else ():
@@ -211,7 +211,7 @@ def _correlated(fused: Fused) -> Iterator[Remark]:
             if coefficient > max(CORRELATED, CORRELATED_SIGMAS / np.sqrt(len(z))):
                 yield Remark(
                     SUSPECT,
-                    f"the {COMPONENTS[c]} residuals of {station.name} are correlated from reading to reading "
+                    f"the {station.names[c]} residuals of {station.name} are correlated from reading to reading "
                     f"(coefficient {coefficient:.2f}): outliers may be among its good readings, the sigmas too small",
                 )
 
@@ -220,7 +220,7 @@ def _rejections(fused: Fused) -> Iterator[Remark]:
     for s, station in enumerate(fused.stations):
         possible, used = np.isfinite(station.measurement), fused.weight[s] > 0
         shares = {
-            COMPONENTS[c]: float(1 - used[possible[:, c], c].mean())
+            station.names[c]: float(1 - used[possible[:, c], c].mean())
             for c in station.components
             if possible[:, c].sum() >= FEWEST
         }
@@ -268,7 +268,7 @@ def _unchecked(fused: Fused, zero_s: float) -> Iterator[Remark]:
                 ]
                 if s in left and len(left) <= DETERMINED and ends[1] - ends[0] > UNCHECKED_S:
                     when = f"from {ends[0] + zero_s:.6g} to {ends[1] + zero_s:.6g} s"
-                    text = f"the {COMPONENTS[c]} of {station.name} is rejected {when}, and no reading that is left "
+                    text = f"the {station.names[c]} of {station.name} is rejected {when}, and no reading that is left "
                     yield Remark(SUSPECT, text + "checks its others: it may follow another target")
 
 

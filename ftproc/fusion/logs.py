@@ -68,10 +68,12 @@ def as_seen(
         prior = np.concatenate([prior, of_heights])
         stated = instrument.options.get("noise") or (None, None, None)
         time_s = np.array(log.time_s) + shift - zero
-        place = instrument.place, instrument.axes
         seen.append(
-            Seen(instrument.name, time_s, z, *place, prior, np.array(stated, float), accepted, sides, instrument.times)
-        )
+            Seen(
+                instrument.name, time_s, z, instrument.place, instrument.axes, prior, np.array(stated, float), accepted,
+                sides, instrument.times, instrument.away_m,
+            )
+        )  # fmt: skip
     return seen, zero
 
 

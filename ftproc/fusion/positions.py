@@ -52,7 +52,8 @@ def read(instrument: Instrument, origin: Geodetic | None) -> tuple[Instrument, M
         duplicate_times=int((np.diff(time_s) == 0).sum()), epoch=found.epoch, sha256=found.sha256,
     )  # fmt: skip
     accuracy = None if found.accuracy is None else (found.accuracy / np.median(found.accuracy[known])) ** 2
-    return replace(instrument, place=place, axes=np.eye(3), options=options, site=None, times=accuracy), log
+    seen = replace(instrument, place=place, axes=np.eye(3), options=options, site=None, times=accuracy, away_m=away)
+    return seen, log
 
 
 def _levered(time_s: FloatArray, point: FloatArray, arm_m: tuple[float, float, float]) -> FloatArray:

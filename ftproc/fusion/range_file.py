@@ -62,6 +62,7 @@ class Instrument:
     config: its station file, or "". kind: tracker, or position, with sigma_m of its positions, 0 for one that is to be
     estimated, and lever_arm_m of the antenna, see `positions`. height_sigma_m: of what its heights are
     off by together, if stated. times: (n,) of the variance of its noise, by row, where its log states an accuracy.
+    away_m: see `estimation.events.Seen`.
     """
 
     name: str
@@ -78,6 +79,7 @@ class Instrument:
     lever_arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     height_sigma_m: float | None = None
     times: FloatArray | None = None
+    away_m: float = 0.0
 
 
 @dataclass(frozen=True)

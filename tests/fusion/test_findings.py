@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ftproc.fusion import findings
+from ftproc.records import COMPONENTS
 
 
 def flight(residual):
@@ -15,7 +16,7 @@ def flight(residual):
     n = len(residual)
     three = np.full((n, 3), np.nan)
     three[:, 1] = residual
-    station = SimpleNamespace(name="theodolite", components=[1])
+    station = SimpleNamespace(name="theodolite", components=[1], names=COMPONENTS, away_m=0.0)
     return SimpleNamespace(
         stations=[station],
         residual=[three],
@@ -43,7 +44,7 @@ def seen_by(*components, interval_s=0.1, n=600):
     """As much of a fused flight of stations with these components as their decisions need; all readings are used."""
     possible = [np.isin(np.arange(3), each)[None] * np.ones((n, 1)) for each in components]
     stations = [
-        SimpleNamespace(name=f"station {s}", components=each, time_s=interval_s * np.arange(n))
+        SimpleNamespace(name=f"station {s}", components=each, names=COMPONENTS, time_s=interval_s * np.arange(n))
         for s, each in enumerate(components)
     ]
     constants = SimpleNamespace(estimate=np.zeros((len(stations), 6)))

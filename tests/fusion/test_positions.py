@@ -45,6 +45,14 @@ def test_the_trajectory_is_inside_its_sigmas(fused):
     assert np.sqrt(((track.state[:, :3] - at) ** 2).sum(1).mean()) < 3.0
 
 
+def test_their_noise_is_said_along_the_axes_in_metres(fused):
+    """Simulated with 2, 2 and 4 m."""
+    parts = fused[1].trajectory.metadata["summary"]["stations"]["gnss"]["components"]
+    assert {name: part["noise_m"] for name, part in parts.items()} == pytest.approx(
+        {"north": 2.0, "east": 2.0, "up": 4.0}, rel=0.2
+    )
+
+
 @pytest.mark.parametrize("column", ["nacp", "hdop"])
 def test_a_stated_accuracy_weighs_each_position(tmp_path, column):
     """Half of the positions are ten times as noisy, and say so: that is better than not knowing which."""

@@ -11,7 +11,7 @@ from ftproc.core.filtering import beside as layout
 from ftproc.core.filtering.biases import PARAMETERS
 from ftproc.core.filtering.records import Observations, Scalars, Sites, Uneven
 from ftproc.core.model.stations import levelled
-from ftproc.records import FloatArray, IntArray
+from ftproc.records import COMPONENTS, FloatArray, IntArray
 
 CLOCK, OFFSET, SCALE = 5, 6, 7  # among the parameters of a station
 
@@ -57,7 +57,8 @@ class Seen(NamedTuple):
     (PARAMETERS,) 1-sigma of its biases m, rad, rad, tilts rad, rad, clock offset s, and of its heights
     the offset m and the scale; zero for what is known. known: (3,) noise 1-sigma that the user specified, else NaN.
     accepted: (n, 3) readings that are good by hand. beside: what else it measures. times: (n,) of the noise's variance,
-    by row, where the log states it."""
+    by row, where the log states it. away_m: how far from the target a place is that positions are seen from, zero for a
+    tracker."""
 
     name: str
     time_s: FloatArray
@@ -69,6 +70,12 @@ class Seen(NamedTuple):
     accepted: NDArray[np.bool_]
     beside: tuple[Side, ...] = ()
     times: FloatArray | None = None
+    away_m: float = 0.0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of its components: seen from the south, a range is a northing, and the angles are across and up."""
+        return ("north", "east", "up") if self.away_m else COMPONENTS
 
     @property
     def components(self) -> list[int]:

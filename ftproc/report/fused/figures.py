@@ -46,11 +46,19 @@ def station_map(flight: Flight, fused: Fused) -> Drawn:
     chosen = timeline.extremes(state[:, 0], state[:, 1])
     for s, station in enumerate(fused.stations):
         x, y = _sights(fused, s)
-        look = {"color": colour(s), "width": 0.7}
-        figure.add_scatter(x=x, y=y, mode="lines", name=f"sight of {station.name}", line=look, hoverinfo="skip")
+        if station.away_m:
+            figure.add_scatter(
+                x=x[1::3], y=y[1::3], mode="markers", name=f"positions of {station.name}", hoverinfo="skip",
+                marker={"color": colour(s), "size": 6},
+            )  # fmt: skip
+            continue
+        line = {"color": colour(s), "width": 0.7}
+        figure.add_scatter(x=x, y=y, mode="lines", name=f"sight of {station.name}", line=line, hoverinfo="skip")
     x, y = (timeline.broken(chosen, state[:, axis])[1] for axis in (0, 1))
     figure.add_scatter(x=x, y=y, mode="lines", name="estimate", line={"color": style.BLACK, "width": 2})
     for s, station in enumerate(fused.stations):
+        if station.away_m:
+            continue
         figure.add_scatter(
             x=[station.place[0]], y=[station.place[1]], mode="markers+text", name=station.name, text=[station.name],
             textposition="bottom center", showlegend=False, cliponaxis=False,
@@ -94,13 +102,15 @@ def log_clocks(flight: Flight, fused: Fused) -> dict[str, float]:
 def residuals(flight: Flight, fused: Fused) -> Drawn:
     """Leave-one-out residuals of each component of each station in their sigmas; the rejected ones marked."""
     shown = [(s, c) for s, station in enumerate(fused.stations) for c in station.components]
-    titles = [f"{fused.stations[s].name} {COMPONENTS[c][:2]}" for s, c in shown]
+    titles = [f"{fused.stations[s].name}<br>{fused.stations[s].names[c]}" for s, c in shown]
     timeline = Timeline.of(fused.track.time_s + flight.zero_s)
     figure, clocks = rows(timeline, titles, 80 + ROW_PX * len(shown)), log_clocks(flight, fused)
     rejected = sum(int(((w == 0) & (p > 0)).sum()) for w, p in zip(fused.weight, fused.possible, strict=True))
     for row, (s, c) in enumerate(shown):
         time_s = fused.stations[s].time_s - fused.constants.estimate[s, CLOCK] + flight.zero_s
         scaled = fused.residual[s][:, c] / np.sqrt(fused.residual_variance[s][:, c])
+        if fused.stations[s].names[c] == "east":  # seen from the south, azimuths grow to the west
+            scaled = -scaled
         used = fused.weight[s][:, c] > 0
         own, name = Timeline.of(time_s), fused.stations[s].name
         whose = {"component": COMPONENTS[c], "station": name, "clock": clocks[name]}
@@ -173,7 +183,7 @@ def carried(flight: Flight, fused: Fused) -> Drawn:
             zmin=0,
             zmax=1,
             colorscale=[[0, style.VERMILLION], [1, style.BLUE]],
-            colorbar={"title": {"text": "used"}, "len": 1, "tickvals": [0, 1], "tickformat": ".0%"},
+            showscale=False,
             hovertemplate="%{x:.6~f} s<br>%{y}: %{z:.0%} used<extra></extra>",
         )
     )
@@ -181,7 +191,7 @@ def carried(flight: Flight, fused: Fused) -> Drawn:
     time = {"text": style.TIME, "standoff": 8}
     figure.update_xaxes(**style.axis(title=time, range=[begin + flight.zero_s, end + flight.zero_s]))
     figure.update_yaxes(**style.axis(autorange="reversed"))
-    return Drawn(figure, "Share of each station's readings that are used; white: it has none.")
+    return Drawn(figure, "Blue: the readings of a station are used; red: none of them; white: it has none.")
 
 
 def disagreements(flight: Flight, fused: Fused) -> list[tuple[str, ...]]:
