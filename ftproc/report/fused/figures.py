@@ -187,7 +187,8 @@ def carried(flight: Flight, fused: Fused) -> Drawn:
             hovertemplate="%{x:.6~f} s<br>%{y}: %{z:.0%} used<extra></extra>",
         )
     )
-    figure.update_layout(**style.LAYOUT, height=100 + BAR_PX * len(names), meta={"time": True})
+    margin = {**style.LAYOUT["margin"], "r": 64}  # the buttons stand in two columns beside so low a figure
+    figure.update_layout(**{**style.LAYOUT, "margin": margin}, height=100 + BAR_PX * len(names), meta={"time": True})
     time = {"text": style.TIME, "standoff": 8}
     figure.update_xaxes(**style.axis(title=time, range=[begin + flight.zero_s, end + flight.zero_s]))
     figure.update_yaxes(**style.axis(autorange="reversed"))

@@ -31,8 +31,8 @@ def page(flight: Flight) -> str:
         else ""
     )
     nothing = "" if stretches else '<p class="note">No station joins late, is silent or follows another target.</p>'
-    readings = tables.table(summary.COMPONENT_HEADER, summary.component_rows(s), "numbers")
-    known = tables.table(summary.BIAS_HEADER, summary.bias_rows(s), "numbers")
+    readings = tables.table(summary.COMPONENT_HEADER, summary.component_rows(s), "numbers stations")
+    known = tables.table(summary.BIAS_HEADER, summary.bias_rows(s), "numbers stations")
     notes = "".join(f"<li>{html.escape(note)}</li>" for note in s["notes"])
     parts = [
         tables.heading(shown),
