@@ -20,13 +20,14 @@ import numpy as np
 from ftproc.core import threads
 from ftproc.core.editing import two_pass
 from ftproc.core.editing.lasting.faults import Shift, spread
-from ftproc.core.filtering import forward
+from ftproc.core.filtering import bridging, forward
 from ftproc.core.filtering.beside import WIDTH
-from ftproc.core.filtering.records import FilterRun, Model
+from ftproc.core.filtering.bridging import Bridged
+from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
 from ftproc.core.identification import likelihood, motion_models
 from ftproc.core.identification.motion_models import Chosen
-from ftproc.core.identification.profile import median_level
+from ftproc.core.identification.profile import ALLOWANCE, fit_profile, median_level, with_allowance
 from ftproc.methods import live, preparing, range_rates
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
 from ftproc.order_statistics import median
@@ -76,7 +77,10 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     names = preparing.motions(settings)
     if len(edited.starts) > MOST_PIECES and motion_models.WHITE in names:
         names = (motion_models.WHITE,)
-    motion = motion_models.choose(log, edited.starts, model, names, specified)
+    label, again = preparing.labels(edited.weight, log.measurement), preparing.re_initialized(edited.starts)
+    over = _bridged(log, model, edited.starts, settings.jerk_psd_m2ps5 is not None)
+    edited = edited._replace(log=over.log, model=over.model, starts=over.starts)
+    motion = motion_models.choose(over.log, over.starts, over.model, names, specified)
     if channel is not None and channel.used is not None:
         motion = motion.with_beside(channel.used)
     both = settings.smooth or usual is None  # cheap, and says what could be had
@@ -85,6 +89,7 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         filtered, other_smoothed, _ = _with_motion(motion, both, other)
         run = _worse_of(run, filtered)
         smoothed = smoothed and other_smoothed and _worse_of(smoothed, other_smoothed)
+    run, smoothed = over.filtered(run), smoothed and over.widened(smoothed)
     shifts = edited.faults.shifts
     if shifts:
         run, smoothed = _widened(run, shifts), smoothed and _widened(smoothed, shifts)
@@ -92,8 +97,6 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     if smoothed is not None and not settings.smooth:
         could_be, hindsight = median(np.sqrt((smoothed.sigma[:, :3] ** 2).sum(1))), smoothed.state
         smoothed = None
-    label = preparing.labels(edited.weight, edited.log.measurement)
-    again = preparing.re_initialized(edited.starts)
     decision = edited.decision
     return Estimate(
         run, label, motion.model, smoothed, again, decision.settled,
@@ -102,6 +105,17 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         faults=edited.faults, motion=motion, smoothed_sigma_m=could_be, hindsight=hindsight,
         range_rate=channel and channel.filtered(left),
     )  # fmt: skip
+
+
+def _bridged(log: Observations, model: Model, starts: list[Start], fixed: bool) -> Bridged:
+    """The log with curves through the gaps that are too long to bridge, and the process noise that it asks for there.
+    fixed: whether that is known."""
+    found = bridging.bridged(log, model, starts)
+    if fixed or len(found.starts) == len(starts):
+        return found
+    likeliest = found.model._replace(jerk=found.model.jerk / ALLOWANCE)
+    fitted = fit_profile(found.log, found.starts, likeliest, motion_models.STEPS)
+    return found._replace(model=with_allowance(found.log, fitted))
 
 
 def _with_motion(motion: Chosen, smooth: bool, model: Model) -> tuple[FilterRun, SmootherRun | None, FloatArray]:

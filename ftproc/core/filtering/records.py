@@ -18,12 +18,15 @@ from ftproc.core.signatures import Layout, Matrix, Vector
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
+ELSEWHERE, ABOUT = 1.0, 2.0  # see `Sample.placed`
+
 
 class Sample(Protocol):
     """One row of a log: measurement m, rad, rad, NaN where missing; the weight of each component in [0, 1], zero for
     one that is not used; the variance of its noise at full weight, and the 1-sigma that a late time stamp adds to all
-    three at once. placed: not zero where the station is not at the origin of the frame, or not level with it: it stands
-    at place, m, and the rows of axes are its own x, y and z."""
+    three at once. placed: ELSEWHERE if the station is not at the origin of the frame, or not level with it: it stands
+    at place, m, and the rows of axes are its own x, y and z. ABOUT: the station is at the origin, and its readings are
+    linearised about place, not about the state."""
 
     time_s: float
     measurement: Annotated[FloatArray, 3]
@@ -132,7 +135,8 @@ class Scalars(NamedTuple):
 class Observations(NamedTuple):
     """A log as the filters see it: time_s (n,), measurement (n, 3) slant range m, azimuth and elevation rad, NaN where
     missing, the weight (n, 3) in [0, 1] of each reading, zero for one that is not used, how the noise of single
-    readings differs, if it does, who took them, if not the one station at the origin, and what is measured beside."""
+    readings differs, if it does, who took them, if not the one station at the origin, and what is measured beside.
+    about: (n, 3) m, places about which the readings of that one station are linearised; NaN: about the state."""
 
     time_s: FloatArray
     measurement: FloatArray
@@ -140,13 +144,15 @@ class Observations(NamedTuple):
     uneven: Uneven | None = None
     sites: Sites | None = None
     beside: tuple[Scalars, ...] = ()
+    about: FloatArray | None = None
 
     def part(self, rows: slice | IntArray) -> Observations:
         """Some of the samples."""
         uneven = None if self.uneven is None else self.uneven.part(rows)
         sites = None if self.sites is None else self.sites.part(rows)
         beside = tuple(each.part(rows) for each in self.beside)
-        return Observations(self.time_s[rows], self.measurement[rows], self.weight[rows], uneven, sites, beside)
+        about = None if self.about is None else self.about[rows]
+        return Observations(self.time_s[rows], self.measurement[rows], self.weight[rows], uneven, sites, beside, about)
 
     def samples(self, noise_variance: FloatArray, made: Any = None) -> Any:
         """The same as an array (n,) of `Sample` records, with noise (3,) m^2, rad^2, rad^2, or (m, 3) by station. made:
@@ -157,10 +163,13 @@ class Observations(NamedTuple):
         _fill(time, z, weight, variance, samples)
         if self.sites is not None:
             station, place, axes, _ = self.sites
-            samples["placed"], samples["place"], samples["axes"] = 1.0, place[station], axes[station]
+            samples["placed"], samples["place"], samples["axes"] = ELSEWHERE, place[station], axes[station]
             samples["noise"] = noise_variance = noise_variance[station]
         if self.uneven is not None:
             samples["noise"], samples["late"] = noise_variance * self.uneven.times, self.uneven.late
+        if self.about is not None:
+            known = np.isfinite(self.about).all(1)
+            samples["placed"][known], samples["place"][known] = ABOUT, self.about[known]
         return samples
 
 

@@ -31,7 +31,9 @@ from numpy.typing import NDArray
 
 from ftproc.core.compiled import part
 from ftproc.core.filtering.filters import OFFSETS, Filter
+from ftproc.core.filtering.records import ABOUT
 from ftproc.core.filtering.unscented import linearise
+from ftproc.core.model import jacobian
 from ftproc.core.model.measurement import wrap_angle
 
 FloatArray = NDArray[np.float64]
@@ -43,6 +45,11 @@ ROUNDING = 1e-15  # of a number, below which its last digits say nothing
 def expect(f: Filter) -> None:
     """The unscented transform with the offsets, if the state has such: z^ = h + b, and C with their covariances."""
     linearise(f)
+    _add_offsets(f)
+
+
+@part
+def _add_offsets(f: Filter) -> None:
     p, h, c, z_hat = f.p, f.h, f.c, f.z_hat
     if len(f.x) > OFFSETS:
         for i in range(3):
@@ -60,6 +67,10 @@ def expect_at(sample: Any, f: Filter) -> None:
     state's frame. The state has no offsets if a station is not at the origin."""
     if sample.placed == 0.0:
         expect(f)
+        return
+    if sample.placed == ABOUT:
+        jacobian.linearise_about(f, sample.place)
+        _add_offsets(f)
         return
     x, p, h, a, o = f.x, f.p, f.h, sample.axes, sample.place
     x0, x1, x2 = x[0], x[1], x[2]

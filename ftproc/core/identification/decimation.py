@@ -42,10 +42,11 @@ def how_many(scales: Scales, model: Model, knot_s: float) -> int:
 
 
 def merged(log: Observations, starts: list[Start], count: int) -> tuple[Observations, list[Start]]:
-    """The log with `count` neighbours merged, or as it is where some components are seen far less often than others;
-    and its starts."""
+    """The log with `count` neighbours merged, or as it is where some components are seen far less often than others,
+    or it has curves through gaps; and its starts."""
     seen = totals(log.weight > 0)
-    return merge(log, starts, count) if count > 1 and seen.min() > OFTEN * seen.max() else (log, starts)
+    alike = log.about is None and count > 1 and seen.min() > OFTEN * seen.max()
+    return merge(log, starts, count) if alike else (log, starts)
 
 
 def merge(log: Observations, starts: list[Start], count: int) -> tuple[Observations, list[Start]]:

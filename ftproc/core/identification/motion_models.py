@@ -204,4 +204,8 @@ def with_steps(
         sites = log.sites.part(np.searchsorted(row, number, "right") - 1)
     moved = [start._replace(sample=int(row[start.sample])) for start in starts]
     beside = tuple(each.spread(row, len(number)) for each in log.beside)
-    return Observations(time_s, measurement, weight, uneven, sites, beside), moved, row
+    about = None
+    if log.about is not None:
+        about = np.full((len(number), 3), np.nan)
+        about[row] = log.about
+    return Observations(time_s, measurement, weight, uneven, sites, beside, about), moved, row

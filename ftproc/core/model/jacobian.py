@@ -54,3 +54,15 @@ def linearise(f: Linearised) -> None:
                 for b in range(3):
                     v += h[i, a] * p[a, b] * h[j, b]
             c[i, j] = v
+
+
+@part
+def linearise_about(f: Linearised, place: FloatArray) -> None:
+    """The same at another place (3,): z^ = h(place) + H (x - place), H the Jacobian there."""
+    x, z_hat, h = f.x, f.z_hat, f.h
+    x0, x1, x2 = x[0], x[1], x[2]
+    x[0], x[1], x[2] = place[0], place[1], place[2]
+    linearise(f)
+    x[0], x[1], x[2] = x0, x1, x2
+    for i in range(3):
+        z_hat[i] += h[i, 0] * (x0 - place[0]) + h[i, 1] * (x1 - place[1]) + h[i, 2] * (x2 - place[2])
