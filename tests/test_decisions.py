@@ -148,7 +148,7 @@ def test_no_later_step_takes_back_what_is_accepted(monkeypatch: pytest.MonkeyPat
         weight[200:220] = 0.0
         return decision._replace(weight=weight), ()
 
-    monkeypatch.setattr(two_pass, "last_look", rejecting)
+    monkeypatch.setattr(two_pass, "reassess_rejected", rejecting)
     found = pipeline.filter_log(by_hand(clean().log, ("range", 200, 219, "good")), SMOOTH)
     assert (found.outlier[200:220, 0] == ACCEPTED).all()
     assert (found.outlier[200:220, 1] != GOOD).all()

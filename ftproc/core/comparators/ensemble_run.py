@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from ftproc.core.comparators import ensemble, particles
 from ftproc.core.editing.track import RETRY_SAMPLES, reacquire
@@ -18,8 +17,7 @@ from ftproc.core.filtering.records import FilterRun, Model, Observations, Start,
 from ftproc.core.model import kinematics
 from ftproc.core.model.frames import line_of_sight_axes
 from ftproc.core.model.measurement import NO_RANGE_M
-
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 BELIEVED = 0.5  # a reading used so far confirms the track
 POWERS_OF_T = np.repeat([2.5, 1.5, 0.5], 3)  # by which Q(T)'s factor grows, row by row

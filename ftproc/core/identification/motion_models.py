@@ -19,9 +19,8 @@ from ftproc.core.identification.profile import ALLOWANCE, climbed, median_level,
 from ftproc.core.identification.scales import Scales, scales_of
 from ftproc.core.model.forces import AT_REST_MPS, GRAVITY
 from ftproc.core.model.motion import WHITE_JERK, Motion
+from ftproc.records import FloatArray, IntArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Run = TypeVar("Run", FilterRun, SmootherRun)
 
 WHITE, ORBITAL = "white-jerk", "orbital"

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 RADIUS_M, ECCENTRICITY2 = 6378137.0, 6.69437999014131705734e-3  # of the ellipsoid: equatorial, and e^2
 
