@@ -17,9 +17,9 @@ from ftproc.core.editing.decisions import Decision, Record
 from ftproc.core.work import Work
 from ftproc.errors import InputError
 from ftproc.files import decisions
-from ftproc.files.decisions import ENDS, Decisions, Line
+from ftproc.files.decisions import Decisions
 from ftproc.methods import anti_outlier
-from ftproc.records import ACCEPTED, GOOD, MISSING, REJECTED, MeasurementLog, Trajectory
+from ftproc.records import ACCEPTED, ENDS, GOOD, MISSING, REJECTED, Line, MeasurementLog, Trajectory
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
 from ftproc.simulation.simulation import Simulation
