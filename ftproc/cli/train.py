@@ -24,12 +24,7 @@ def _number(name: str, least: int, default: int, text: str) -> Callable[[options
 
 @click.command(cls=Command, short_help="A correction model from past flights.", examples=_EXAMPLES)
 @click.option(
-    "--log",
-    "logs",
-    multiple=True,
-    type=options.FILE,
-    metavar="LOG",
-    help="A log to train on, once for each.",
+    "--log", "logs", multiple=True, type=options.FILE, metavar="LOG", help="A log to train on, once for each."
 )
 @click.option(
     "--truth",

@@ -197,7 +197,7 @@ def _no_flight(s: Mapping[str, Any]) -> Iterator[Remark]:
     """What no flight explains."""
     least = s.get("acceleration_at_least_mps2", 0.0)
     if least > FASTEST_MPS2:
-        text = f"the readings ask for an acceleration of {least:.3g} m/s2, which hardly anything has that flies"
+        text = f"the readings ask for an acceleration of {least:.3g} m/s2, which almost nothing that flies reaches"
         yield Remark(SUSPECT, text)
     yield from _left_behind(s)
     for name, part in s["components"].items():

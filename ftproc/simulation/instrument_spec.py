@@ -56,7 +56,7 @@ name.
   range_walk_m          weak echoes read longer, by this times log(1 + (range / range_walk_at_m)^4),
   range_walk_at_m       with this range (10000 m)
   range_wander_m, azimuth_wander_mrad, elevation_wander_mrad
-                        1 sigma of an offset that wanders (first-order Gauss-Markov),
+                        1 sigma of a first-order Gauss-Markov offset,
   wander_s              with this correlation time (1 s)
   stamp_jitter_s        1 sigma by which time stamps are off, the same for the components of a sample
   range_rounding_m, azimuth_rounding_mrad, elevation_rounding_mrad

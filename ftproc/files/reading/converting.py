@@ -56,10 +56,10 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
     origins = {quantity: _origin(header, column) for quantity, column in found.items()}
     each_origin = [origins[quantity] for quantity, column in found.items() for _ in column.positions]
     columns, marks = without_thousands(columns, each_origin)
-    place = 0
+    index = 0
     for quantity, column in found.items():
-        mine, origin = columns[place : place + len(column.positions)], origins[quantity]
-        place += len(mine)
+        mine, origin = columns[index : index + len(column.positions)], origins[quantity]
+        index += len(mine)
         if quantity == "time":
             if len(mine) > 1:
                 clock = joint.read(dict(zip(column.roles, mine, strict=True)), origin, column)

@@ -46,8 +46,8 @@ def station_map(flight: Flight, fused: Fused) -> Drawn:
     chosen = timeline.extremes(state[:, 0], state[:, 1])
     for s, station in enumerate(fused.stations):
         x, y = _sights(fused, s)
-        look = {"color": colour(s), "width": 0.7}
-        figure.add_scatter(x=x, y=y, mode="lines", name=f"sight of {station.name}", line=look, hoverinfo="skip")
+        line = {"color": colour(s), "width": 0.7}
+        figure.add_scatter(x=x, y=y, mode="lines", name=f"sight of {station.name}", line=line, hoverinfo="skip")
     x, y = (timeline.broken(chosen, state[:, axis])[1] for axis in (0, 1))
     figure.add_scatter(x=x, y=y, mode="lines", name="estimate", line={"color": style.BLACK, "width": 2})
     for s, station in enumerate(fused.stations):

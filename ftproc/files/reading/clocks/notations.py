@@ -126,8 +126,8 @@ def first_present(text: pa.ChunkedArray) -> int:
     """The row of the first cell that is not missing; 0 if there is none."""
     import pyarrow.compute as pc
 
-    place = int(pc.index(pc.is_valid(text), True).as_py())
-    return max(place, 0)
+    index = int(pc.index(pc.is_valid(text), True).as_py())
+    return max(index, 0)
 
 
 def parsed(text: pa.ChunkedArray, pattern: str) -> Moments | None:

@@ -17,7 +17,7 @@ _MARKS = (
     (b"\xff\xfe", "utf-16-le", "UTF-16"),
     (b"\xfe\xff", "utf-16-be", "UTF-16"),
 )
-#: The share of NUL bytes at each place of four, in text without a mark.
+#: The share of NUL bytes at each byte of four, in text without a mark.
 _BY_NULS = {"utf-32-le": "0111", "utf-32-be": "1110", "utf-16-le": "0101", "utf-16-be": "1010"}
 #: Encodings of which nothing in the file tells: that in which the most known words stand counts, else the first.
 _NATIONAL = {
@@ -41,7 +41,7 @@ _NATIONAL = {
 _TABLES = (ALIASES, WEAK_ALIASES, SPELLINGS)
 _KNOWN = {word for table in _TABLES for words in table.values() for word in words if word[1:]}
 _SAMPLE = 4096
-_WORDS = 1 << 16  # bytes in which known words are looked for
+_WORDS = 1 << 16  # bytes in which known words are sought
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x19\x1c-\x1f]")
 
 _OTHER_KINDS = {

@@ -26,7 +26,7 @@ _COUNTED = re.compile(r"\W*\d[\d,.]*\s+(rows?|records?|lines?|samples?|points?|e
 _FEW = 0.2  # of the lines, that may be words among the rows
 _LETTERS = np.arange(ord("a"), ord("z") + 1)
 _UNDER = 3  # lines under repeated names, at most, such as units and a rule
-_LAST = 4096  # bytes in which the last line is looked for
+_LAST = 4096  # bytes in which the last line is sought
 
 
 def refuse_wide(source: str, head: bytes) -> None:

@@ -132,13 +132,13 @@ def without_sentinels(found: Mapping[str, Readings]) -> dict[str, Readings]:
     gone: dict[tuple[str, float], np.ndarray] = {}
     for quantity in found:
         while (number := sentinel(values[quantity], quantity)) is not None:
-            places = values[quantity] == number
+            samples = values[quantity] == number
             for other in found:
-                mine = places & (values[other] == number)
+                mine = samples & (values[other] == number)
                 values[other] = np.where(mine, np.nan, values[other])
                 gone[other, number] = gone.get((other, number), False) | mine
-    for (quantity, number), places in gone.items():
-        count = int(np.count_nonzero(places))
+    for (quantity, number), samples in gone.items():
+        count = int(np.count_nonzero(samples))
         times = "once" if count == 1 else f"{count} times"
         name = found[quantity].column.name
         if count:
@@ -184,8 +184,8 @@ def _stands_out(values: FloatArray, found: np.ndarray, number: float, impossible
         return True
     steps = np.abs(np.diff(rest))
     typical = median(steps[steps > 0]) if (steps > 0).any() else 0.0
-    places = np.flatnonzero(~found & np.isfinite(values))
-    before = places[np.maximum(np.searchsorted(places, np.flatnonzero(found)) - 1, 0)]
+    known = np.flatnonzero(~found & np.isfinite(values))
+    before = known[np.maximum(np.searchsorted(known, np.flatnonzero(found)) - 1, 0)]
     return bool(median(np.abs(values[before] - number)) > max(_FAR * typical, 1e-3 * abs(number)))
 
 

@@ -162,8 +162,8 @@ def _stamp(before: str) -> str:
     return str(np.datetime64(int(unix[1]) * 10**9 + int((unix[2] or unix[3] or "").ljust(9, "0")), "ns"))
 
 
-def _at(fields: Sequence[str], place: int) -> str:
-    return fields[place].strip() if place < len(fields) else ""
+def _at(fields: Sequence[str], index: int) -> str:
+    return fields[index].strip() if index < len(fields) else ""
 
 
 def _number(cell: str) -> float | None:
