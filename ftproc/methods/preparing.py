@@ -84,8 +84,8 @@ def trusted(readings: Readings, settings: FilterSettings) -> Trusted:
 
 
 def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[Start]]:
-    """Measurement noise, process noise, and starts of a log, without deciding on its outliers. The first start is that of
-    two-pass editing, so that all methods have the same."""
+    """Measurement noise, process noise, and starts of a log, without deciding on its outliers. The first start is that
+    of two-pass editing, so that all methods have the same."""
     weight, sigma, first = trusted(readings, settings)
     known = what_is_known(readings, settings)
     log = readings.weighted(weight)
