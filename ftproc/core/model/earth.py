@@ -17,8 +17,8 @@ ROUNDS = 8  # of the search for a latitude: each gains three digits
 Geodetic = tuple[float, float, float]  # latitude deg, longitude deg, height m
 
 
-def earth_centred(place: Geodetic) -> FloatArray:
-    """(3,) x, y, z in m, earth-centred and earth-fixed."""
+def earth_centred(place: Geodetic | FloatArray) -> FloatArray:
+    """(3,) x, y, z in m, earth-centred and earth-fixed; or (3, n) of places (3, n)."""
     latitude, longitude = np.radians(place[:2])
     normal = RADIUS_M / np.sqrt(1 - ECCENTRICITY2 * np.sin(latitude) ** 2)
     across = (normal + place[2]) * np.cos(latitude)

@@ -155,10 +155,6 @@ def local(position: FloatArray, origin: Sequence[float]) -> FloatArray:
     from ftproc.core.model import earth
 
     start = (float(origin[0]), float(origin[1]), float(origin[2]))
-    latitude, longitude = np.radians(position[:, 0]), np.radians(position[:, 1])
-    normal = earth.RADIUS_M / np.sqrt(1 - earth.ECCENTRICITY2 * np.sin(latitude) ** 2)
-    across = (normal + position[:, 2]) * np.cos(latitude)
-    up = (normal * (1 - earth.ECCENTRICITY2) + position[:, 2]) * np.sin(latitude)
-    there = np.stack([across * np.cos(longitude), across * np.sin(longitude), up], 1)
+    there = np.ascontiguousarray(earth.earth_centred(position.T).T)
     found: FloatArray = (there - earth.earth_centred(start)) @ earth.verticals(start).T
     return found
