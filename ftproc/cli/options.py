@@ -134,6 +134,10 @@ def scenario(required: bool, text: str) -> Callable[[F], F]:
     return click.option("--scenario", metavar="NAME", shell_complete=_complete_scenario, required=required, help=text)
 
 
+def truth(text: str) -> Callable[[F], F]:
+    return click.option("--truth", "truths", multiple=True, type=FILE, metavar="TRUTH", help=text)
+
+
 def noise(kind: Callable[[Any], Any], default: str | None, text: str) -> Callable[[F], F]:
     what = "1-sigma of range m, azimuth rad, elevation rad, such as 5,0.0002,0.0002"
     return click.option("--noise", type=kind, default=default, metavar="R,A,E", help=f"{what}{text}")

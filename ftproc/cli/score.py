@@ -50,14 +50,7 @@ def _standards() -> str:
 
 @click.command(cls=Command, examples=_EXAMPLES, more=_standards)
 @click.argument("trajectories", nargs=-1, required=True, type=options.FILE, metavar="TRAJECTORY...")
-@click.option(
-    "--truth",
-    "truths",
-    multiple=True,
-    type=options.FILE,
-    metavar="TRUTH",
-    help="The truth: once for all trajectories, or once for each, in the same order.",
-)
+@options.truth("The truth: once for all trajectories, or once for each, in the same order.")
 @click.option(
     "--format", "form", type=click.Choice(["table", "json", "csv"]), default="table", help="Form of the printed scores."
 )

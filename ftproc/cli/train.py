@@ -26,14 +26,7 @@ def _number(name: str, least: int, default: int, text: str) -> Callable[[options
 @click.option(
     "--log", "logs", multiple=True, type=options.FILE, metavar="LOG", help="A log to train on, once for each."
 )
-@click.option(
-    "--truth",
-    "truths",
-    multiple=True,
-    type=options.FILE,
-    metavar="TRUTH",
-    help="The truth of the --log at the same position. Without any, the smoother is the teacher of the filter.",
-)
+@options.truth("The truth of the --log at the same position. Without any, the smoother is the teacher of the filter.")
 @click.option("--config", type=options.FILE, metavar="FILE", help="The station file of the logs.")
 @click.option(
     "--site",

@@ -26,17 +26,9 @@ if TYPE_CHECKING:
 _LATEST = 11  # digits of SOURCE_DATE_EPOCH
 #: The metadata that decide on a result.
 DECISIVE = (
-    "version",
-    "versions",
-    "command",
-    "options",
-    "method",
-    "log",
-    "log_sha256",
-    "model_sha256",
-    "stations",
+    "version", "versions", "command", "options", "method", "log", "log_sha256", "model_sha256", "stations",
     "decisions",
-)
+)  # fmt: skip
 
 
 def describe(

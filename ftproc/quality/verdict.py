@@ -26,7 +26,7 @@ TOO_WIDE = 0.5  # innovation ratio below which the sigmas are far too large
 
 _NO_FAULT = "residuals agree with the published sigmas, and no fault shows"
 _NO_FAULT_BUT = "{} residuals are smaller than the published sigmas, which are cautious, and no fault shows"
-#: Is said with every consistent run.
+#: Stands with every consistent run.
 NOT_SHOWN = (
     "One log cannot show constant or slow biases, an offset of the clock, or a false target followed throughout."
 )

@@ -213,10 +213,10 @@ def _alternatives(log: Neighbourhood, weight: FloatArray, run: AcceptedRun) -> I
     yield from _filled(log, weight, component, slice(first, last))
 
 
-def decisions(log: Neighbourhood, weight: FloatArray, rounds: int = ROUNDS) -> list[Step]:
-    """The decisions from `weight` on until they stand still, or for so many rounds."""
+def decisions(log: Neighbourhood, weight: FloatArray) -> list[Step]:
+    """The decisions from `weight` on until they stand still, or for ROUNDS."""
     steps = []
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         step, smoothed = _step(log, weight)
         steps.append(step)
         noise = log.model.noise_variance

@@ -84,8 +84,8 @@ def _of_a_zone(clock: Clock, column: schema.Column) -> Clock:
     if not clock.epoch or not local or zoned:
         return clock
     doubts = tuple(doubt for doubt in clock.doubts if doubt not in times.NO_ZONE)
-    said = f'"{column.name}" is a local time without its zone, so there is no time_utc'
-    return clock._replace(epoch="", doubts=(*doubts, said))
+    doubt = f'"{column.name}" is a local time without its zone, so there is no time_utc'
+    return clock._replace(epoch="", doubts=(*doubts, doubt))
 
 
 def _origin(header: TableHeader, column: schema.Column) -> Origin:

@@ -226,11 +226,11 @@ def _kept(plan: _Plan, table: pa.Table, chosen: list[int]) -> tuple[IntArray | N
     cells = {condition: table.column(chosen.index(index)) for condition, index in indices.items()}
     mask = rows.meeting(header.source, cells, header.decimal_comma)
     kept = np.flatnonzero(mask)
-    said = " and ".join(str(condition) for condition in plan.conditions)
+    wanted = " and ".join(str(condition) for condition in plan.conditions)
     if not kept.size:
-        raise InputError(f"{header.source}: no row meets {said}; check the column and the value.")
+        raise InputError(f"{header.source}: no row meets {wanted}; check the column and the value.")
     left_out = len(mask) - len(kept)
-    return kept.astype(np.int64), (f"{left_out} of {len(mask)} rows are left out, which do not meet {said}",)
+    return kept.astype(np.int64), (f"{left_out} of {len(mask)} rows are left out, which do not meet {wanted}",)
 
 
 def _explained(
@@ -245,12 +245,12 @@ def _explained(
     names = [name for index, name in enumerate(names) if index not in beside]
     remarks = schema.remarks(names, plan.found, bool(clock.epoch))
     doubtful = (*plan.notes, *judged.doubts, *plan.open, *plausibility.doubts(values, station))
-    said = (*notes, *doubtful)
+    words = (*notes, *doubtful)
     axis = understanding.knows_axis(plan.station, plan.found)
-    understood = understanding.describe(plan.header, plan.found, clock, station, said, axis, plan.beside)
+    understood = understanding.describe(plan.header, plan.found, clock, station, words, axis, plan.beside)
     understood["assumed"] = list(judged.conditions)
     digest = plan.header.sha256()
-    return replace(log, remarks=(*remarks, *said), understood=understood, station=station, sha256=digest)
+    return replace(log, remarks=(*remarks, *words), understood=understood, station=station, sha256=digest)
 
 
 def _check_others(header: TableHeader, others: Iterable[int]) -> None:

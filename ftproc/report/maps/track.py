@@ -115,8 +115,8 @@ def ground(view: View) -> Drawn:
 def axis_names(view: View) -> dict[str, str]:
     """The titles of the axes, with their directions as far as they are known."""
     north = axes_of_north(view.trajectory.metadata)
-    said = {} if north is None else {"xy"[north[0]]: "north", "xy"[north[1]]: "east"}
-    return {axis: f"{axis} ({said[axis]}), m" if axis in said else f"{axis}, m" for axis in "xy"} | {"z": "z (up), m"}
+    names = {} if north is None else {"xy"[north[0]]: "north", "xy"[north[1]]: "east"}
+    return {axis: f"{axis} ({names[axis]}), m" if axis in names else f"{axis}, m" for axis in "xy"} | {"z": "z (up), m"}
 
 
 def _spot(figure: go.Figure, x: float, y: float, name: str, symbol: str) -> None:

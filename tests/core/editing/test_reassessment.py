@@ -63,8 +63,8 @@ def test_spans_that_are_passed_over_would_stay_as_they_are(monkeypatch):
     some = edit(flight).weight
     taken, passed = [], reassessment._doubtful
 
-    def spy(record, decision, calm, spans):
-        taken.append((len(list(passed(record, decision, calm, spans))), len(spans)))
+    def spy(record, decision, at_median, spans):
+        taken.append((len(list(passed(record, decision, at_median, spans))), len(spans)))
         return spans
 
     monkeypatch.setattr(reassessment, "_doubtful", spy)

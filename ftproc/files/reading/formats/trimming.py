@@ -60,10 +60,10 @@ def rows_only(body: memoryview, names: Sequence[str], separator: str, widths: Se
     if repeated:
         whole = _without(whole, repeated)
         words += f", the names repeated {len(repeated)} times"
-    said = _sentences(whole, names, separator, widths)
-    if said:
-        whole = _without(whole, said)
-        words += f", {len(said)} lines of words among the rows"
+    sentences = _sentences(whole, names, separator, widths)
+    if sentences:
+        whole = _without(whole, sentences)
+        words += f", {len(sentences)} lines of words among the rows"
     end, footer = _end(whole, names, separator, widths)
     words += f", {footer} lines below the table" if footer else ""
     return memoryview(whole)[:end], words

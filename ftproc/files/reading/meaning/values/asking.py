@@ -85,8 +85,8 @@ def _unit(way: Way, k: int) -> str:
 
 def _differing_words(log: Known, ways: Sequence[Way]) -> str:
     units, zenith, exchanged = _differing(log, ways)
-    indices = [*units, *(["elevation"] if zenith else []), *(QUANTITIES[2:] if exchanged else ())]
-    return " and ".join(dict.fromkeys(f'"{log.found[q].name}"' for q in indices))
+    quantities = [*units, *(["elevation"] if zenith else []), *(QUANTITIES[2:] if exchanged else ())]
+    return " and ".join(dict.fromkeys(f'"{log.found[q].name}"' for q in quantities))
 
 
 def _answers(log: Known, ways: Sequence[Way]) -> list[str]:
