@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ftproc.derived import Extreme
-from ftproc.derived import extremes as found_extremes
+from ftproc.derived.extremes import Extreme
+from ftproc.derived.extremes import extremes as found_extremes
 from ftproc.derived.quantities import site_of
 from ftproc.quality import summary as figures
 from ftproc.quality import verdict
