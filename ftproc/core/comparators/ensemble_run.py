@@ -19,7 +19,7 @@ from ftproc.core.model.frames import line_of_sight_axes
 from ftproc.core.model.measurement import NO_RANGE_M
 from ftproc.records import FloatArray
 
-BELIEVED = 0.5  # a reading used so far confirms the track
+CONFIRMS = 0.5  # a reading used so far confirms the track
 POWERS_OF_T = np.repeat([2.5, 1.5, 0.5], 3)  # by which Q(T)'s factor grows, row by row
 UNIT_NOISE = np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1.0]])  # Q(1 s) for a jerk of 1
 
@@ -99,7 +99,7 @@ class _Run:
                 cloud = self.motion.move(cloud, time_s[k] - time_s[0], time_s[k] - time_s[k - 1], rng)
             cloud = self._step(k, cloud)
             self.rows["since_start"][k] = k - self.starts[-1].sample
-            if self.rows["weight"][k].max() >= BELIEVED or not np.isfinite(self.log.measurement[k]).any():
+            if self.rows["weight"][k].max() >= CONFIRMS or not np.isfinite(self.log.measurement[k]).any():
                 used_s = time_s[k]
             elif time_s[k] - used_s > self.settings.longest_patch_s and k >= retry:
                 again = reacquire(time_s, self.log.measurement, np.diag(self.sensor.noise), k)
