@@ -197,7 +197,7 @@ def failure(error: BaseException, source: str | None = None) -> Failure:
     if isinstance(error, FileNotFoundError) and not _has_directory():
         return Failure("the working directory was deleted; change to one that is there.", 1, trace)
     if isinstance(error, OSError) and error.strerror:
-        place = error.filename or source
-        return Failure(f"{place}: {error.strerror.lower()}." if place else stdout_fault(error), 1, trace)
+        where = error.filename or source
+        return Failure(f"{where}: {error.strerror.lower()}." if where else stdout_fault(error), 1, trace)
     kind = f"{type(error).__name__}: {error}".splitlines()[0][:200]
     return Failure(f"{about}internal error ({kind}); run again with --debug and report it.", 1, trace)

@@ -34,10 +34,10 @@ def typical(values: NDArray[Any]) -> float:
 def quantile(values: NDArray[Any], share: float) -> float:
     """The number below which a share of the values (n,) lie, n > 0, between two of them in proportion; NaN if one of
     them is."""
-    place = share * (len(values) - 1)
-    near = [int(place), min(int(place) + 1, len(values) - 1), len(values) - 1]
+    rank = share * (len(values) - 1)
+    near = [int(rank), min(int(rank) + 1, len(values) - 1), len(values) - 1]
     low, high, last = np.partition(values, near)[near].tolist()
-    return float(low + (place - near[0]) * (high - low)) if last == last else float("nan")
+    return float(low + (rank - near[0]) * (high - low)) if last == last else float("nan")
 
 
 def distinct(values: NDArray[Any]) -> NDArray[Any]:

@@ -13,12 +13,13 @@ from ftproc.core.identification import unseen_motion
 from ftproc.core.model import kinematics
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.errors import InputError, UsageError
+from ftproc.long_records import joined
 from ftproc.methods import heights, range_rates, registry, simultaneous
 from ftproc.methods.estimate import Estimate, Part
 from ftproc.quality import beside, by_hand, next_steps, provenance, sanity
 from ftproc.quality.next_steps import Step
 from ftproc.quality.statistics import RunStatistics
-from ftproc.records import COMPONENTS, MISSING, Beside, Diagnostics, FloatArray, MeasurementLog, Trajectory, joined
+from ftproc.records import COMPONENTS, MISSING, Beside, Diagnostics, FloatArray, MeasurementLog, Trajectory
 from ftproc.settings import FilterSettings
 
 if TYPE_CHECKING:

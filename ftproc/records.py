@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import importlib
 import mmap
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-    from ftproc.files.decisions import ByHand
-
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 FlagArray = NDArray[np.uint8]
@@ -31,6 +29,10 @@ BESIDE = ("range_rate", "height")  # what a log may have beside them
 
 #: Values of the trajectory's `outlier_*` columns.
 GOOD, ISOLATED, PATCH, MISSING, REJECTED, ACCEPTED = range(6)  # the last two by hand
+#: Of decisions by hand: the channels that they name, their uses, and the columns of their two ends.
+CHANNELS = (*COMPONENTS, *BESIDE)
+USES = {"auto": GOOD, "bad": REJECTED, "good": ACCEPTED}
+ENDS = (("from_s", "to_s"), ("from_row", "to_row"))
 
 #: The readings that an estimate depends on, the fewest first.
 PAST, LAGGED = "past readings", "past readings and those of the next {:g} s"
@@ -49,6 +51,60 @@ class Heights(NamedTuple):
         return self._replace(above_m=self.above_m[rows])
 
 
+class Line(NamedTuple):
+    """A decision by hand. number: of its line in the file. ends: `from_s` and `to_s`, or `from_row` and `to_row`, both
+    of which belong to it. station: the one that it is for, or ""."""
+
+    number: int
+    component: str
+    ends: tuple[str, str]
+    first: float
+    last: float
+    use: str
+    station: str = ""
+    reason: str = ""
+
+    @property
+    def by_row(self) -> bool:
+        """Whether it names rows of the log, not times."""
+        return self.ends == ENDS[1]
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Of a file of decisions by hand. sha256: of its bytes."""
+
+    name: str
+    sha256: str
+    lines: tuple[Line, ...]
+
+
+class ByHand(NamedTuple):
+    """The decisions on the readings of one log. line: (n, 5) which of the lines, from 1, decides on each reading of
+    CHANNELS; 0 for none."""
+
+    decisions: Lines
+    line: IntArray
+
+    @property
+    def flags(self) -> FlagArray:
+        """(n, 3) of COMPONENTS: REJECTED, ACCEPTED, or GOOD where the editor decides."""
+        return self._uses(slice(len(COMPONENTS)))
+
+    def of(self, channel: str) -> FlagArray:
+        """(n,) the same of one of CHANNELS."""
+        return self._uses(CHANNELS.index(channel))
+
+    def _uses(self, columns: int | slice) -> FlagArray:
+        uses = np.array([GOOD, *(USES[line.use] for line in self.decisions.lines)], np.uint8)
+        found: FlagArray = uses[self.line[:, columns]]
+        return found
+
+    def stretch(self, rows: slice) -> ByHand:
+        """Those of some rows."""
+        return self._replace(line=self.line[rows])
+
+
 @dataclass(frozen=True, repr=False)
 class MeasurementLog:
     """One tracker's log, checked, in SI units and in time order.
@@ -63,7 +119,7 @@ class MeasurementLog:
     station: what is known of the instrument, already applied. epoch: the instant of time zero (ISO 8601) or "".
     remarks: how the file was understood, for the user. understood: the same in full, see
     `files.reading.understanding`. sha256: of the file's bytes, "" if it was none. by_hand: the engineer's decisions on
-    its readings, if there are any. heights: of the target, where the log has them in place of elevations. range_rate:
+    its readings, if there are any. heights: of the target, where the log has them instead of elevations. range_rate:
     (n,) m/s, positive when going away or, in some logs, when coming closer; NaN where missing; None without.
     """
 
@@ -90,7 +146,8 @@ class MeasurementLog:
         return len(self.time_s)
 
     def __repr__(self) -> str:
-        return f"<MeasurementLog {self.name}: {_length(self.time_s)}{_from(self.epoch)}>"
+        zero = f", time zero {self.epoch}" if self.epoch else ""
+        return f"<MeasurementLog {self.name}: {_length(self.time_s)}{zero}>"
 
     def stretch(self, rows: slice) -> MeasurementLog:
         """Some of its rows, in memory; counts and remarks of the whole log stay unchanged."""
@@ -235,62 +292,9 @@ def _length(time_s: FloatArray) -> str:
     return f"{rows}, {time_s[-1] - time_s[0]:.6g} s" if len(time_s) else rows
 
 
-def _from(epoch: str) -> str:
-    return f", time zero {epoch}" if epoch else ""
-
-
-def thinned(array: FloatArray, most: int) -> FloatArray:
-    """Every k-th row of an array (n, ...), at most `most`; little of a mapped array is in memory at a time."""
-    every = 1 + max(len(array) - 1, 0) // most
-    found = []
-    for rows in chunks(len(array), every * max((1 << 20) // every, 1)):
-        found.append(np.array(array[rows][::every]))
-        forget(array)
-    return np.concatenate(found) if found else np.array(array)
-
-
-Stretch = TypeVar("Stretch", Diagnostics, Trajectory)
-
-
 def forget(*arrays: NDArray[Any]) -> None:
     """Release the memory of arrays that are mapped from disk; they stay valid."""
     for array in arrays:
         mapped = getattr(array, "_mmap", None)
         if mapped is not None and hasattr(mmap, "MADV_DONTNEED"):
             mapped.madvise(mmap.MADV_DONTNEED)
-
-
-def chunks(n: int, rows: int = 1 << 20) -> Iterator[slice]:
-    """Slices of `rows` rows that cover n of them."""
-    for low in range(0, n, rows):
-        yield slice(low, min(low + rows, n))
-
-
-def joined(parts: Sequence[Trajectory]) -> Trajectory:
-    """Consecutive stretches of one trajectory as a whole; the metadata are those of the first."""
-    if len(parts) == 1:
-        return parts[0]
-    extra = None
-    if parts[0].extra is not None:
-        import pyarrow as pa
-
-        extra = pa.concat_tables([part.extra for part in parts])
-    present = [part.diagnostics for part in parts if part.diagnostics is not None]
-    whole = None
-    if len(present) == len(parts):
-        names = present[0].beside
-        beside = {each: Beside._make(map(np.concatenate, zip(*(d.beside[each] for d in present), strict=True)))
-                  for each in names}  # fmt: skip
-        whole = replace(_concatenated(present, "reading", "residual", "residual_sigma"), beside=beside)
-    arrays: tuple[str, ...] = (
-        "row", "time_s", "measurement", "state", "sigma", "measurement_sigma", "outlier", "nis", "correction",
-    )  # fmt: skip
-    if all(part.path_sigma is not None for part in parts):
-        arrays += ("path_sigma",)
-    return replace(_concatenated(parts, *arrays), diagnostics=whole, extra=extra)
-
-
-def _concatenated(parts: Sequence[Stretch], *names: str) -> Stretch:
-    """The first record, with these arrays of all of them."""
-    arrays: Any = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    return replace(parts[0], **arrays)

@@ -17,9 +17,9 @@ from ftproc.core.editing.decisions import Decision, Record
 from ftproc.core.work import Work
 from ftproc.errors import InputError
 from ftproc.files import decisions
-from ftproc.files.decisions import ENDS, Decisions, Line
+from ftproc.files.decisions import Decisions
 from ftproc.methods import anti_outlier
-from ftproc.records import ACCEPTED, GOOD, MISSING, REJECTED, MeasurementLog, Trajectory
+from ftproc.records import ACCEPTED, ENDS, GOOD, MISSING, REJECTED, Line, MeasurementLog, Trajectory
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
 from ftproc.simulation.simulation import Simulation
@@ -148,7 +148,7 @@ def test_no_later_step_takes_back_what_is_accepted(monkeypatch: pytest.MonkeyPat
         weight[200:220] = 0.0
         return decision._replace(weight=weight), ()
 
-    monkeypatch.setattr(two_pass, "last_look", rejecting)
+    monkeypatch.setattr(two_pass, "reassess_rejected", rejecting)
     found = pipeline.filter_log(by_hand(clean().log, ("range", 200, 219, "good")), SMOOTH)
     assert (found.outlier[200:220, 0] == ACCEPTED).all()
     assert (found.outlier[200:220, 1] != GOOD).all()

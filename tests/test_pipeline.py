@@ -100,7 +100,7 @@ def test_plain_filters_are_not_corrected(flight, method):
 
 
 @pytest.mark.parametrize("smooth", [False, True])
-def test_a_model_that_states_its_own_bound_is_not_believed(flight, smooth):
+def test_a_model_that_states_its_own_bound_is_not_accepted(flight, smooth):
     stage = constant("window" if not smooth else "instrument", 1e9, bound=1e6)
     model = Model({"filter": stage, "smoother": stage})
     corrected = pipeline.filter_log(flight.log, FilterSettings(smooth=smooth), model)

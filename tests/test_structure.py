@@ -17,6 +17,7 @@ MOST_FILES, MOST_LINES, MOST_PARAMETERS = 14, 300, 7
 FLOORS = (
     ("errors", "settings"),
     ("records", "order_statistics", "__init__"),
+    ("long_records",),
     (
         "core.by_hand",
         "core.signatures",
@@ -64,11 +65,8 @@ def source(module: str) -> Path:
 
 
 def imported(text: str, known: set[str]) -> Iterator[str]:
-    """Modules of the package that a module imports anywhere; names of a type checker only do not count."""
-    tree = ast.parse(text)
-    for branch in [n for n in ast.walk(tree) if isinstance(n, ast.If) and "TYPE_CHECKING" in ast.unparse(n.test)]:
-        branch.body = [ast.Pass()]
-    for node in ast.walk(tree):
+    """Modules of the package that a module imports anywhere, for its types only too."""
+    for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             yield from (a.name.removeprefix("ftproc.") for a in node.names if a.name.startswith("ftproc."))
         elif isinstance(node, ast.ImportFrom) and node.module is not None and node.module.split(".")[0] == "ftproc":

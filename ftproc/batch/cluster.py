@@ -1,8 +1,8 @@
 """The worker pool of a Dask cluster: one log at a time each; the log of a worker that dies goes to another.
 
 Workers read the logs and write the trajectories, so both must have the same names on all of them. The model is sent
-with each task: a worker could have cached an older one of the same name. Whoever starts a worker decides from where it
-imports: with PYTHONSAFEPATH=1 not from the directory where it is started.
+with each task: a worker could have cached an older one of the same name. The user who starts a worker decides from
+where it imports: with PYTHONSAFEPATH=1 not from the directory where it is started.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from ftproc.settings import NO_MODEL
 
 REACHED_S = 1.0  # for the machine of a scheduler to accept a connection
 SEEN_S = 5.0  # for what a worker has written to be seen here
-_LOOK_S, _END = 0.2, 1 << 16  # bytes
+_POLL_S, _END = 0.2, 1 << 16  # bytes
 PATIENCE_S = 10.0  # for a scheduler to answer, and for a first worker
 _PROTOCOLS = ("tcp", "tls", "ws", "wss")
 _START = "Start one with `PYTHONSAFEPATH=1 dask worker {0} --nthreads 1`, and more for more logs at a time."
@@ -79,7 +79,7 @@ def outcomes(
 def _carried(task: Task) -> Task:
     """What a worker needs: the directory of this process, and the model itself."""
     recipe = replace(task.recipe, model=model_file.named(task.recipe.model) or NO_MODEL)
-    return replace(task, recipe=recipe, place=os.getcwd())  # noqa: PTH109
+    return replace(task, recipe=recipe, folder=os.getcwd())  # noqa: PTH109
 
 
 def _connect(distributed: Any, address: str) -> Any:
@@ -102,16 +102,16 @@ def _reach(address: str) -> None:
     host, port = _host_and_port(address)
     found: list[Exception | None] = []
 
-    def look() -> None:
+    def connect() -> None:
         try:
             with socket.create_connection((host, port), timeout=REACHED_S):
                 found.append(None)
         except (OSError, UnicodeError) as error:
             found.append(error)
 
-    looking = threading.Thread(target=look, daemon=True)  # names are looked up without a limit of time
-    looking.start()
-    looking.join(REACHED_S)
+    connecting = threading.Thread(target=connect, daemon=True)  # names are looked up without a limit of time
+    connecting.start()
+    connecting.join(REACHED_S)
     if not found or isinstance(found[0], TimeoutError):
         raise _unanswered(address, f"nothing answers there within {REACHED_S:g} s")
     if found[0] is not None:
@@ -154,7 +154,7 @@ def _differs(worker: str, found: str | None, wanted: str) -> str:
 
 class _Done(NamedTuple):
     """What comes back from a worker. written: the files that the task has written there, see `_marks`. said: what the
-    user is told."""
+    user is to read."""
 
     outcome: Outcome
     written: dict[str, str]
@@ -191,8 +191,8 @@ def _mark(path: Path) -> str:
     with path.open("rb") as stream:
         size = stream.seek(0, os.SEEK_END)
         ends = []
-        for place in (0, max(size - _END, 0)):
-            stream.seek(place)
+        for offset in (0, max(size - _END, 0)):
+            stream.seek(offset)
             ends.append(stream.read(_END))
     return hashlib.blake2b(b"".join(ends), salt=size.to_bytes(16, "little"), digest_size=16).hexdigest()
 
@@ -207,15 +207,15 @@ def _arrived(outcome: Outcome, written: dict[str, str], unseen: list[str]) -> Ou
             unseen.append(name)
             why = f"a worker has written {name}, and this machine does not find it there; give -o a directory that"
             return _failed(outcome.task, f"{why} the workers share with it, or a URI.", FileNotFoundError(name))
-        time.sleep(_LOOK_S)
+        time.sleep(_POLL_S)
     return outcome
 
 
 def _outcome(
     distributed: Any, future: Any, task: Task, address: str, unseen: list[str]
 ) -> tuple[Outcome, Sequence[str]]:
-    """Waits for the outcome, and what the user is told. Dask gives the task of a worker that died to another one, a few
-    times. unseen: files that workers have written, but not where this machine finds them; gets another one."""
+    """Waits for the outcome, and what the user is to read. Dask gives the task of a worker that died to another one, a
+    few times. unseen: files that workers have written, but not where this machine finds them; gets another one."""
     try:
         done: _Done = future.result()
         return _arrived(replace(done.outcome, task=task), done.written, unseen), done.said

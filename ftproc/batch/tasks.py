@@ -17,8 +17,8 @@ from ftproc.batch import finished
 from ftproc.config.recipe import Recipe
 from ftproc.errors import Failure, FtprocWarning, failure, interruption, printable
 from ftproc.files import decisions, layout, remote
-from ftproc.files.decisions import Line
-from ftproc.records import BESIDE, MISSING, Trajectory, joined
+from ftproc.long_records import joined
+from ftproc.records import BESIDE, MISSING, Line, Trajectory
 from ftproc.settings import PACKAGED
 
 if TYPE_CHECKING:
@@ -32,14 +32,14 @@ Notify = Callable[[str], None]
 @dataclass(frozen=True)
 class Task:
     """One log to filter and the file of its trajectory; either may be `-`. report: the file of the HTML page, if there
-    is one. place: the directory of relative names, when it is not the worker's current one. redo: filter it, although
+    is one. folder: of relative names, when it is not the worker's current one. redo: filter it, although
     its outputs are those that it would get. takes_decisions: whether the outcome has them."""
 
     log: str
     output: str
     recipe: Recipe = field(default_factory=Recipe)
     report: str | None = None
-    place: str = ""
+    folder: str = ""
     redo: bool = True
     takes_decisions: bool = False
 
@@ -50,11 +50,11 @@ class Task:
 
     def at(self, name: str) -> str:
         """The file of that name, as the worker finds it."""
-        return str(Path(self.place, name)) if self.place and not remote.is_uri(name) else name
+        return str(Path(self.folder, name)) if self.folder and not remote.is_uri(name) else name
 
     def as_named(self, text: str) -> str:
         """A message of the worker with the names that the user has given."""
-        for name in filter(None, (self.log, self.output, self.report)) if self.place else ():
+        for name in filter(None, (self.log, self.output, self.report)) if self.folder else ():
             text = text.replace(printable(self.at(name)), printable(name))
         return text
 
@@ -111,7 +111,7 @@ def _filtered(task: Task, notify: Notify | None) -> Outcome:
 
     started, recipe = time.perf_counter(), task.recipe
     log = logs.read(task.at(task.log), **recipe.reading())
-    if task.place:
+    if task.folder:
         log = replace(log, name=task.log)  # as the user named it
     if recipe.decisions is not None:
         log = recipe.decisions.applied(log, task.station)

@@ -41,7 +41,7 @@ def steps(filtering: Filtering, summary: Mapping[str, Any], command: Command) ->
 
 
 def _tried(filtering: Filtering, step: Step) -> int | None:
-    """The verdict with a step, as its place among LEVELS; None if it cannot be had."""
+    """The verdict with a step, as its index in LEVELS; None if it cannot be had."""
     settings = filtering.settings if step.settings is None else step.settings
     try:
         other = Filtering(filtering.log, replace(settings), filtering.model if step.model else None)

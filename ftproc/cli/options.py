@@ -33,11 +33,6 @@ def seconds(text: Any) -> float:
     return value
 
 
-def number_or_auto(text: Any) -> float | None:
-    """`auto` is None: estimated from the log."""
-    return None if _is_auto(text) else number(text)
-
-
 def noise_sigmas(text: Any) -> tuple[float, float, float]:
     """1-sigma of range m, azimuth rad, elevation rad; zero or more."""
     values = _triple(text)
@@ -139,6 +134,10 @@ def scenario(required: bool, text: str) -> Callable[[F], F]:
     return click.option("--scenario", metavar="NAME", shell_complete=_complete_scenario, required=required, help=text)
 
 
+def truth(text: str) -> Callable[[F], F]:
+    return click.option("--truth", "truths", multiple=True, type=FILE, metavar="TRUTH", help=text)
+
+
 def noise(kind: Callable[[Any], Any], default: str | None, text: str) -> Callable[[F], F]:
     what = "1-sigma of range m, azimuth rad, elevation rad, such as 5,0.0002,0.0002"
     return click.option("--noise", type=kind, default=default, metavar="R,A,E", help=f"{what}{text}")
@@ -216,7 +215,7 @@ _BY_HAND: tuple[Callable[[Any], Any], ...] = (
     click.option(
         "--again", type=FILE, metavar="RUN.json|TRAJECTORY",
         help="Run again what a trajectory, or the JSON beside it, says of how it was made, with its log or another; "
-        "what differs is said. Options on the command line win over it.",
+        "what differs is reported. Options on the command line win over it.",
     ),
 )  # fmt: skip
 
@@ -229,7 +228,7 @@ _TUNED: tuple[Callable[[Any], Any], ...] = (
     ),
     noise(noise_or_auto, AUTO, "; auto, for all or for one: estimated from the log."),
     click.option(
-        "--jerk", type=number_or_auto, default=AUTO, metavar="S",
+        "--jerk", type=lambda text: None if _is_auto(text) else number(text), default=AUTO, metavar="S",
         help="Process noise: the spectral density (PSD) of white jerk in m2/s5, such as 1 for gentle turns and 100 for "
         "a fighter; auto: estimated from the log.",
     ),

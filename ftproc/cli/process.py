@@ -52,7 +52,7 @@ def open_streams() -> None:
 
 def check_directory() -> None:
     """Raise UsageError if the current directory is there no more: names that are relative to it mean nothing, and the
-    system blames whatever file is looked for."""
+    system blames whatever file is sought."""
     try:
         Path.cwd()
     except OSError as error:
@@ -71,6 +71,6 @@ def unsaid(error: OSError, whole: Sequence[str], what: str = "summary") -> Excep
 
 
 def leave_memory() -> None:
-    """What is still held at the end goes back to the system anyway. Python would first look through all of it for
+    """What is still held at the end goes back to the system anyway. Python would first search all of it for
     cycles, which takes a tenth of the time of a small log."""
     gc.freeze()

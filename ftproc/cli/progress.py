@@ -20,11 +20,7 @@ class Progress:
     a context manager it erases the bar at the end."""
 
     def __init__(
-        self,
-        stage: str = "",
-        total: int = 0,
-        stream: TextIO | None = None,
-        clock: Callable[[], float] = time.monotonic,
+        self, stage: str = "", total: int = 0, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._stream = sys.stderr if stream is None else stream
         self._terminal = self._stream.isatty()

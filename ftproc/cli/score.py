@@ -50,14 +50,7 @@ def _standards() -> str:
 
 @click.command(cls=Command, examples=_EXAMPLES, more=_standards)
 @click.argument("trajectories", nargs=-1, required=True, type=options.FILE, metavar="TRAJECTORY...")
-@click.option(
-    "--truth",
-    "truths",
-    multiple=True,
-    type=options.FILE,
-    metavar="TRUTH",
-    help="The truth: once for all trajectories, or once for each, in the same order.",
-)
+@options.truth("The truth: once for all trajectories, or once for each, in the same order.")
 @click.option(
     "--format", "form", type=click.Choice(["table", "json", "csv"]), default="table", help="Form of the printed scores."
 )
@@ -116,21 +109,21 @@ def _run(job: Job) -> int:
     if job.report is not None:
         pages.check(job.report)
     asked = [limits.load(name) for name in job.require]
-    places, index = plan.pages(job.trajectories, job.report)
+    page_files, index = plan.pages(job.trajectories, job.report)
     beside = [found for name in job.trajectories if (found := layout.sidecar(name)) is not None]
-    outputs.check(plan.pages_written(places, index), [*job.trajectories, *job.truths, *beside, *job.files()])
+    outputs.check(plan.pages_written(page_files, index), [*job.trajectories, *job.truths, *beside, *job.files()])
     scored, entries, failed = list[Scored](), [], False
     known: dict[Any, Truth] = {}
-    for number, (name, place) in enumerate(zip(job.trajectories, places, strict=True)):
+    for number, (name, page_file) in enumerate(zip(job.trajectories, page_files, strict=True)):
         try:
             trajectory = trajectory_files.read(name)
             truth = _truth(job.truths[number % len(job.truths)], trajectory, known, job.site) if job.truths else None
             first = scored[0].trajectory if scored and len(job.trajectories) == 2 else None
             scored.append(_scored(trajectory, truth, asked, first))
-            if place is not None:
+            if page_file is not None:
                 with atomic.guarding([*job.trajectories, *job.truths]):
-                    pages.write(scored[-1].trajectory, place, truth)
-                entries.append(Entry(name, place, _summary(scored[-1].trajectory)))
+                    pages.write(scored[-1].trajectory, page_file, truth)
+                entries.append(Entry(name, page_file, _summary(scored[-1].trajectory)))
         except InputError as error:
             click.echo(f"ftproc: {error}", err=True)
             entries.append(Entry(name, None, {}, str(error)))

@@ -24,21 +24,9 @@ def _number(name: str, least: int, default: int, text: str) -> Callable[[options
 
 @click.command(cls=Command, short_help="A correction model from past flights.", examples=_EXAMPLES)
 @click.option(
-    "--log",
-    "logs",
-    multiple=True,
-    type=options.FILE,
-    metavar="LOG",
-    help="A log to train on, once for each.",
+    "--log", "logs", multiple=True, type=options.FILE, metavar="LOG", help="A log to train on, once for each."
 )
-@click.option(
-    "--truth",
-    "truths",
-    multiple=True,
-    type=options.FILE,
-    metavar="TRUTH",
-    help="The truth of the --log at the same position. Without any, the smoother is the teacher of the filter.",
-)
+@options.truth("The truth of the --log at the same position. Without any, the smoother is the teacher of the filter.")
 @click.option("--config", type=options.FILE, metavar="FILE", help="The station file of the logs.")
 @click.option(
     "--site",

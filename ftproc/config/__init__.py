@@ -2,9 +2,3 @@
 
 Calls `files` and, for the names of methods, `methods`.
 """
-
-from ftproc.config.reading import load, parse
-from ftproc.config.recipe import Recipe
-from ftproc.config.writing import dump
-
-__all__ = ["Recipe", "dump", "load", "parse"]

@@ -125,10 +125,7 @@ KEYS: Mapping[str, Mapping[str, Key]] = {
         "from": Key("elevation_from", words("horizon", "zenith"), "horizon", "left out: as the column is called"),
         **_errors("elevation", 0.2, 0.1),
     },
-    "height": {
-        **_column("height", "FL"),
-        "prior_m": Key("height", prior, (0.0, 100.0), _PRIOR),
-    },
+    "height": {**_column("height", "FL"), "prior_m": Key("height", prior, (0.0, 100.0), _PRIOR)},
     "refraction": {
         "correct": Key("refraction", flag, False, "subtract it from the elevation", default=False),
         "temperature_c": Key("temperature_c", number(-90, 60), Air.temperature_c, "at the station", default=15.0),

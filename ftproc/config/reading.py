@@ -82,14 +82,14 @@ def options_of(sections: Mapping[str, Any], name: str) -> dict[str, Any]:
     return _options(name, values)
 
 
-def values_of(place: str, known: Mapping[str, Key], written: Mapping[str, Any]) -> dict[str, Any]:
-    """The values in SI units of what is written, by the names of the keys. place: of the file, for messages."""
+def values_of(where: str, known: Mapping[str, Key], written: Mapping[str, Any]) -> dict[str, Any]:
+    """The values in SI units of what is written, by the names of the keys. where: in the file, for messages."""
     values: dict[str, Any] = {}
     for spelt, value in written.items():
-        key_name, to_si = _key_of(place, known, spelt)
+        key_name, to_si = _key_of(where, known, spelt)
         if key_name in values:
-            raise UsageError(f"{place} has {key_name} in two units; leave one out.")
-        values[key_name] = _checked(f"{place} {spelt}", known[key_name], value, to_si)
+            raise UsageError(f"{where} has {key_name} in two units; leave one out.")
+        values[key_name] = _checked(f"{where} {spelt}", known[key_name], value, to_si)
     return values
 
 
@@ -107,7 +107,7 @@ def _check_section(name: str, section: str, keys: object) -> None:
     raise UsageError(f'{name}: there is no {kind} "{section}"{hint} The sections: {sections}.')
 
 
-def _key_of(place: str, keys: Mapping[str, Key], written: str) -> tuple[str, Callable[[Any], Any]]:
+def _key_of(where: str, keys: Mapping[str, Key], written: str) -> tuple[str, Callable[[Any], Any]]:
     """The name of the key that is `written` with its unit, and the function that converts its value to SI."""
     stem, _, unit = written.rpartition("_")
     if written in keys and not keys[written].quantity:
@@ -120,13 +120,13 @@ def _key_of(place: str, keys: Mapping[str, Key], written: str) -> tuple[str, Cal
     if bare is not None and bare.quantity:
         first = written if written in keys else stem
         raise UsageError(
-            f'{place} "{written}" must end in its unit: {", ".join(_spelt(first, bare))}'
+            f'{where} "{written}" must end in its unit: {", ".join(_spelt(first, bare))}'
             f"{nearest(written, _spelt(first, bare))}"
         )
     all_names = [form for known, its in keys.items() for form in _spelt(known, its)]
     short = ", ".join(f"{known}_UNIT" if its.quantity else known for known, its in keys.items())
     hint = _of_option(written) or nearest(written, all_names) or "."
-    raise UsageError(f'{place} has no key "{written}"{hint} Its keys are: {short}.')
+    raise UsageError(f'{where} has no key "{written}"{hint} Its keys are: {short}.')
 
 
 def _of_option(name: str) -> str:
@@ -139,7 +139,7 @@ def _spelt(name: str, key: Key) -> list[str]:
     return [f"{name}_{unit}" for unit in key.units] or [name]
 
 
-def _checked(place: str, key: Key, value: object, to_si: Callable[[Any], Any]) -> Any:
+def _checked(where: str, key: Key, value: object, to_si: Callable[[Any], Any]) -> Any:
     try:
         found = to_si(key.kind(value))
         if isinstance(found, float) and key.quantity and not key.least <= found <= key.most:
@@ -151,7 +151,7 @@ def _checked(place: str, key: Key, value: object, to_si: Callable[[Any], Any]) -
     except ValueError as error:
         shown = f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else value
         words = str(error).replace('"', "").split(" or ") if isinstance(value, str) else []
-        raise UsageError(f"{place} = {shown}: expected {error}{nearest(str(value), words) or '.'}") from error
+        raise UsageError(f"{where} = {shown}: expected {error}{nearest(str(value), words) or '.'}") from error
 
 
 def _options(name: str, values: Mapping[tuple[str, str], Any]) -> dict[str, Any]:

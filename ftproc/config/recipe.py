@@ -62,7 +62,7 @@ class Recipe:
 
     @classmethod
     def of(cls, options: Mapping[str, Any]) -> Recipe:
-        """The recipe from options as `config.load` returns them, with the defaults for the rest."""
+        """The recipe from options as `config.reading.load` returns them, with the defaults for the rest."""
         known = {_SETTINGS.get(name, name): value for name, value in options.items() if value is not None}
         known["parameters"] = parameters.parse([known["set"]]) if known.get("set") else ()
         known["gain_form"] = known.pop("weight_form", "noise") == "gain"

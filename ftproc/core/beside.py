@@ -20,8 +20,8 @@ from ftproc.core.filtering import beside as layout
 from ftproc.core.filtering.forward import filter_with_beside
 from ftproc.core.filtering.records import Model, Observations, Scalars, Start
 from ftproc.order_statistics import median
+from ftproc.records import FloatArray
 
-FloatArray = NDArray[np.float64]
 Labels = NDArray[np.uint8]
 
 FEWEST = 16  # scalars that tell their noise
@@ -96,22 +96,22 @@ def understood(
     if there.sum() < FEWEST:
         return channel.left_out(f"too few range rates ({int(there.sum())}) to test them")
     residual, spread = residuals(unused)
-    vague = np.maximum(spread - 1.0, 0.0)
+    predicted = np.maximum(spread - 1.0, 0.0)
     expected = value - residual
     if interval > 0:  # where the readings tell the turn
-        there &= vague < (TURN * interval) ** 2
+        there &= predicted < (TURN * interval) ** 2
         value, unused = np.where(there, value, np.nan), unused._replace(weight=unused.weight * there)
     outward, inward = (_nearest(each - expected, interval) for each in (value, -value))
-    closing = _cost(outward, vague) > _cost(inward, vague) + SURE
+    closing = _cost(outward, predicted) > _cost(inward, predicted) + SURE
     off = np.where(there, inward if closing else outward, np.nan)
     value = expected + off if interval > 0 else -value if closing else value
     sigma = max(min(SCALE * median(np.abs(off[there])), _scatter(value)), _least(value))
-    weight = np.where(there & (accepted | (np.abs(off) <= FAR * np.sqrt(vague + sigma**2))), 1.0, 0.0)
+    weight = np.where(there & (accepted | (np.abs(off) <= FAR * np.sqrt(predicted + sigma**2))), 1.0, 0.0)
     rates = unused._replace(value=value, variance=np.full(len(value), sigma**2), weight=weight)
     rates = decided(rates, residuals, gate, accepted & there)
     if rates.weight.sum() < (1 - MOST_REJECTED) * there.sum():
         return channel.left_out("most of the range rates contradict the readings: none is used")
-    told = median(vague[there]) / float(rates.variance[0])
+    told = median(predicted[there]) / float(rates.variance[0])
     return Channel(rates, labels_of(rates.weight, value), closing, told)
 
 
@@ -165,11 +165,11 @@ def _nearest(off: FloatArray, interval: float) -> FloatArray:
     return off - interval * np.round(off / interval) if interval > 0 else off
 
 
-def _cost(off: FloatArray, vague: FloatArray) -> float:
+def _cost(off: FloatArray, predicted: FloatArray) -> float:
     """Minus the log-likelihood of differences (n,) from what is predicted with these variances, with noise by their own
     size and with tails."""
     there = np.isfinite(off)
-    variance = vague[there] + (SCALE * median(np.abs(off[there]))) ** 2 + LEAST**2
+    variance = predicted[there] + (SCALE * median(np.abs(off[there]))) ** 2 + LEAST**2
     each = 0.5 * np.log(variance) + 0.5 * (TAILS + 1) * np.log1p(off[there] ** 2 / (TAILS * variance))
     return float(each.sum())
 

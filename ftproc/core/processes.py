@@ -92,9 +92,9 @@ def _unheard() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _own_code() -> Iterator[None]:
-    """multiprocessing starts `python -c`, which looks for modules in the current directory first: a `signal.py` beside
-    the logs would run in every worker. This variable takes the directory away. Raises InstallationError where the
-    interpreter was told to ignore it."""
+    """multiprocessing starts `python -c`, which searches for modules in the current directory first: a `signal.py`
+    beside the logs would run in every worker. This variable takes the directory away. Raises InstallationError where
+    the interpreter was started to ignore it."""
     if sys.flags.ignore_environment and not sys.flags.safe_path:
         raise InstallationError(
             "python -E ignores PYTHONSAFEPATH, so worker processes would import modules from the current directory; "

@@ -9,8 +9,8 @@ LASTING, LASTING_PER_SAMPLE = 200_000, 10  # the same of samples that are weighe
 
 
 class Work:
-    """What a search in a log of so many samples may still cost, in all hypotheses about it: `left`. passed: places that
-    no work was left for."""
+    """What a search in a log of so many samples may still cost, in all hypotheses about it: `left`. passed: hypotheses
+    that no work was left for."""
 
     def __init__(self, samples: int, at_least: int = WORK, each: int = WORK_PER_SAMPLE) -> None:
         """at_least: how much work any log is worth; a window that moves on is worth none."""
@@ -18,5 +18,5 @@ class Work:
 
 
 def for_lasting_faults(samples: int) -> Work:
-    """What the search for faults that last may cost, and the last look."""
+    """What the search for faults that last may cost, and the reassessment of rejected runs."""
     return Work(samples, LASTING, LASTING_PER_SAMPLE)

@@ -18,11 +18,11 @@ from ftproc.records import FloatArray, IntArray
 
 GRAVITY = 9.81  # m/s2
 SLOW_MPS = 0.5  # below this a target has no direction
-LONGEST = 256  # samples that are looked back at most
+LONGEST = 256  # samples that are used before one at most
 MOST = 6.0  # innovations are cut off at so many sigmas
-FARTHEST = 5.0  # sigmas, targets likewise: what is learned is not the few worst samples
+FARTHEST = 5.0  # sigmas, and so of targets: what is learned is not the few worst samples
 SINGLE, SUMS = 4, (4, 8, 16)  # innovations, and sums of those before
-MEMORIES = (0.5, 2.0)  # of the filter, over which changes of the acceleration are looked at
+MEMORIES = (0.5, 2.0)  # of the filter, over which changes of the acceleration are taken
 
 
 class MotionFeatures(Features):

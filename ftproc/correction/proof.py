@@ -2,7 +2,7 @@
 
 What is left between filter and truth after smoothing does not depend on anything the filter knew, if the noise is what
 it is taken for; so the correction that brings the filter nearer to the smoother brings it nearer to the truth. It is
-applied only as far as that can be told from chance.
+applied only as far as that is distinguished from chance.
 """
 
 from __future__ import annotations

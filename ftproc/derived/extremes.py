@@ -25,9 +25,9 @@ class Extreme(NamedTuple):
 def extremes(trajectory: Trajectory) -> list[Extreme]:
     """The greatest and least speed, height, climb rate, turn rate, load factor and distance of a flight.
 
-    The row is the one that is farthest out by its value less 1 sigma, so that one that is far vaguer than the others,
-    at a start or in a gap, is none. The sigma is that of the row: of many noisy rows the farthest lies a little farther
-    out than the flight has been.
+    The row is the one that is farthest out by its value less 1 sigma, so that one with a far larger sigma than the
+    others, at a start or in a gap, is none. The sigma is that of the row: of many noisy rows the farthest lies a
+    little farther out than the flight has been.
     """
     derived, state, sigma = Derived.of(trajectory), trajectory.state, trajectory.sigma
     length, length_sigma = _norm(state[:, :3], sigma[:, :3])

@@ -18,98 +18,41 @@ import io
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ftproc.errors import InputError, UsageError, nearest
 from ftproc.records import (
     ACCEPTED,
-    BESIDE,
-    COMPONENTS,
+    CHANNELS,
+    ENDS,
     GOOD,
     ISOLATED,
     MISSING,
     PATCH,
-    REJECTED,
+    USES,
+    ByHand,
     FlagArray,
     FloatArray,
     IntArray,
+    Line,
+    Lines,
     MeasurementLog,
 )
 
-CHANNELS = (*COMPONENTS, *BESIDE)
 ALL = "all"
-USES = {"auto": GOOD, "bad": REJECTED, "good": ACCEPTED}
-ENDS = (("from_s", "to_s"), ("from_row", "to_row"))
 COLUMNS = ("component", *ENDS[0], *ENDS[1], "use", "station", "reason")
 _REASONS = {ISOLATED: "isolated outlier", PATCH: "patch"}
 _LARGEST = 16 << 20  # bytes
 _HOW = "See the head of a file that --write-decisions writes."
 
 
-class Line(NamedTuple):
-    """A decision. number: of its line in the file. ends: `from_s` and `to_s`, or `from_row` and `to_row`, both of which
-    belong to it. station: the one that it is for, or ""."""
-
-    number: int
-    component: str
-    ends: tuple[str, str]
-    first: float
-    last: float
-    use: str
-    station: str = ""
-    reason: str = ""
-
-    @property
-    def by_row(self) -> bool:
-        """Whether it names rows of the log, not times."""
-        return self.ends == ENDS[1]
-
-    def as_dict(self) -> dict[str, Any]:
-        """JSON-serialisable, with the names of the file's columns."""
-        first, last = (int(each) if self.by_row else each for each in (self.first, self.last))
-        found = {"line": self.number, "component": self.component, self.ends[0]: first, self.ends[1]: last}
-        more = {"station": self.station, "reason": self.reason}
-        return {**found, "use": self.use, **{name: text for name, text in more.items() if text}}
-
-
-class ByHand(NamedTuple):
-    """The decisions on the readings of one log. line: (n, 5) which of the lines, from 1, decides on each reading of
-    CHANNELS; 0 for none."""
-
-    decisions: Decisions
-    line: IntArray
-
-    @property
-    def flags(self) -> FlagArray:
-        """(n, 3) of COMPONENTS: REJECTED, ACCEPTED, or GOOD where the editor decides."""
-        return self._uses(slice(len(COMPONENTS)))
-
-    def of(self, channel: str) -> FlagArray:
-        """(n,) the same of one of CHANNELS."""
-        return self._uses(CHANNELS.index(channel))
-
-    def _uses(self, columns: int | slice) -> FlagArray:
-        uses = np.array([GOOD, *(USES[line.use] for line in self.decisions.lines)], np.uint8)
-        found: FlagArray = uses[self.line[:, columns]]
-        return found
-
-    def stretch(self, rows: slice) -> ByHand:
-        """Those of some rows."""
-        return self._replace(line=self.line[rows])
-
-
-@dataclass(frozen=True)
-class Decisions:
-    """The lines of a file. sha256: of its bytes."""
-
-    name: str
-    sha256: str
-    lines: tuple[Line, ...]
+class Decisions(Lines):
+    """The lines of a file, and what they mean for a log."""
 
     def of(self, station: str) -> Decisions:
         """The lines for one station, and those for all."""
@@ -157,6 +100,14 @@ class Decisions:
             f"times from {log.time_s[0]:.12g} to {log.time_s[-1]:.12g} s, rows from {log.row.min()} to {log.row.max()}"
         )
         return f"{self.name}: no line names a reading of {log.name}{other} ({times}{stations}); check the file."
+
+
+def as_dict(line: Line) -> dict[str, Any]:
+    """JSON-serialisable, with the names of the file's columns."""
+    first, last = (int(each) if line.by_row else each for each in (line.first, line.last))
+    found = {"line": line.number, "component": line.component, line.ends[0]: first, line.ends[1]: last}
+    more = {"station": line.station, "reason": line.reason}
+    return {**found, "use": line.use, **{name: text for name, text in more.items() if text}}
 
 
 def component_slice(component: str) -> slice:
@@ -229,11 +180,11 @@ def _lines(name: str, text: str) -> Iterator[Line]:
                 header = [cell.lower() for cell in cells]
                 _check_header(name, header)
                 continue
-            place = f"{name}: line {rows.line_num}"
+            where = f"{name}: line {rows.line_num}"
             if len(cells) > len(header):
-                raise UsageError(f"{place} has {len(cells)} cells under {len(header)} names; put quotes round a comma.")
+                raise UsageError(f"{where} has {len(cells)} cells under {len(header)} names; put quotes round a comma.")
             row = dict(zip(header, cells, strict=False))
-            yield _line(place, rows.line_num, row, semicolons)
+            yield _line(where, rows.line_num, row, semicolons)
     except csv.Error as error:
         raise UsageError(f"{name}: line {rows.line_num} is not CSV ({error}); correct it there.") from error
     if header is None:
@@ -251,30 +202,30 @@ def _check_header(name: str, header: Sequence[str]) -> None:
         raise UsageError(f"{name}: there is no column {lacks}. The columns: {', '.join(COLUMNS)}.")
 
 
-def _line(place: str, number: int, row: Mapping[str, str], decimal_comma: bool) -> Line:
+def _line(where: str, number: int, row: Mapping[str, str], decimal_comma: bool) -> Line:
     component, use = (row.get(column, "").lower() for column in ("component", "use"))
     for column, word, known in (("component", component, (*CHANNELS, ALL)), ("use", use, tuple(USES))):
         if word not in known:
             hint = nearest(word, known) or "."
-            raise UsageError(f'{place}: {column} is "{word}", expected one of {", ".join(known)}{hint}')
+            raise UsageError(f'{where}: {column} is "{word}", expected one of {", ".join(known)}{hint}')
     filled = [ends for ends in ENDS if any(row.get(end) for end in ends)]
     if len(filled) != 1:
         what = "both times and rows" if filled else "neither times nor rows"
-        raise UsageError(f"{place} has {what}; fill in from_s and to_s, or from_row and to_row.")
-    first, last = (_end(place, end, row.get(end, ""), decimal_comma) for end in filled[0])
+        raise UsageError(f"{where} has {what}; fill in from_s and to_s, or from_row and to_row.")
+    first, last = (_end(where, end, row.get(end, ""), decimal_comma) for end in filled[0])
     if last < first:
-        raise UsageError(f"{place}: {filled[0][1]} is {last:.12g}, before {filled[0][0]}, {first:.12g}; exchange them.")
+        raise UsageError(f"{where}: {filled[0][1]} is {last:.12g}, before {filled[0][0]}, {first:.12g}; exchange them.")
     return Line(number, component, filled[0], first, last, use, row.get("station", ""), row.get("reason", ""))
 
 
-def _end(place: str, column: str, cell: str, decimal_comma: bool) -> float:
+def _end(where: str, column: str, cell: str, decimal_comma: bool) -> float:
     try:
         value = float(cell.replace(",", ".") if decimal_comma else cell)
     except ValueError:
         value = math.nan
     if not math.isfinite(value) or (column in ENDS[1] and (value != int(value) or value < 0)):
         expected = "a row number, such as 120" if column in ENDS[1] else "seconds, as in time_s, such as 12.5"
-        raise UsageError(f'{place}: {column} is "{cell}", expected {expected}.')
+        raise UsageError(f'{where}: {column} is "{cell}", expected {expected}.')
     return value
 
 

@@ -61,7 +61,7 @@ def too_many_columns(source: str) -> InputError:
     )
 
 
-def name_too_long(source: str, place: str) -> InputError:
+def name_too_long(source: str, what: str) -> InputError:
     return InputError(
-        f"{source}: the name of {place} has more than {LONGEST_NAME} characters; write a line of column names."
+        f"{source}: the name of {what} has more than {LONGEST_NAME} characters; write a line of column names."
     )

@@ -32,7 +32,7 @@ class Condition(NamedTuple):
 
 class Extract(NamedTuple):
     """What of a file is read. widths: of the columns of a text, in characters. where: conditions on its rows. target:
-    COLUMN=VALUE for one of several, or `none`: there is only one, however the rows look."""
+    COLUMN=VALUE for one of several, or `none`: there is only one, whatever the rows suggest."""
 
     widths: tuple[int, ...] = ()
     where: tuple[Condition, ...] = ()

@@ -96,7 +96,7 @@ class Reader:
         self._judge()
 
     def _begun(self, block: Block) -> Block | None:
-        """The rows, from the line on with which the table is understood. The lines are looked at one by one, so that
+        """The rows, from the line on with which the table is understood. The lines are read one by one, so that
         it does not matter how they come."""
         if block.first == 1:
             self._head, self._size = [], 0
@@ -120,7 +120,7 @@ class Reader:
         return None
 
     def _understood(self) -> int | None:
-        """Place of the first row in the head, once its table is understood; else None, with the reason kept."""
+        """Index of the first row in the head, once its table is understood; else None, with the reason kept."""
         widths = parse_widths(self._recipe.widths)
         found = layout.find(self._head, widths)
         if found is None:
@@ -216,17 +216,17 @@ class _Table(NamedTuple):
         return cells
 
     def _row(self, number: int, cells: Sequence[str]) -> list[float]:
-        place = f"{self.source}: line {number}"
+        where = f"{self.source}: line {number}"
         if len(cells) != len(self.names):
             what = "cell" if len(cells) == 1 else "cells"
             raise InputError(
-                f"{place} has {len(cells)} {what} where the header has {len(self.names)}. Complete the row, or delete "
+                f"{where} has {len(cells)} {what} where the header has {len(self.names)}. Complete the row, or delete "
                 "it."
             )
         row = [np.nan] * (RATE + 1)
         if self.rate is not None:
             with contextlib.suppress(ValueError):  # "n/a" and the like
-                row[RATE] = float(cells[self.rate.place])
+                row[RATE] = float(cells[self.rate.position])
         for k, quantity in enumerate(QUANTITIES):
             column = self.found.get(quantity)
             if column is None or (text := cells[column.position]) in _MISSING:
@@ -235,12 +235,12 @@ class _Table(NamedTuple):
                 row[k] = float(text)
             except ValueError:
                 raise InputError(
-                    f'{place}: the {quantity} is "{text[:40]}", which is no number; expected a number of '
+                    f'{where}: the {quantity} is "{text[:40]}", which is no number; expected a number of '
                     f"{column.unit.name}. Correct it, or leave the cell empty."
                 ) from None
             if k == 0 and not abs(row[0]) * column.unit.multiply / column.unit.divide <= LATEST_S:
                 raise InputError(
-                    f"{place}: the time {text[:40]} {column.unit.name} is not that of a flight; state another unit, "
+                    f"{where}: the time {text[:40]} {column.unit.name} is not that of a flight; state another unit, "
                     "such as --units time=ms, or correct it."
                 )
         return row

@@ -25,7 +25,7 @@ class Following:
         self.stream, self.stop, self._say, self._state = stream, stop, say, state
         self.delivered, self.again = 0, 0  # rows that have gone out, and that a run before had published since
         self._ahead_s = 0.0  # of the clock, before the system's
-        self._place: tuple[int, bytes] | None = None
+        self._offset: tuple[int, bytes] | None = None
         self._source: Source | None = None
 
     @property
@@ -40,8 +40,8 @@ class Following:
             yield from self._again()
             with opened(self.stream.source) as source:
                 self._source = source
-                if self._place is not None and isinstance(source, File):
-                    source.place = self._place
+                if self._offset is not None and isinstance(source, File):
+                    source.offset = self._offset
                 yield from self._follow(source)
         except InputError as error:
             self.stream.fault = self.stream.fault or error
@@ -50,15 +50,15 @@ class Following:
 
     def kept(self, output: Mapping[str, Any] | None) -> dict[str, Any]:
         """What a later run must know, at such a moment."""
-        place = self._source.place if isinstance(self._source, File) else self._place
+        offset = self._source.offset if isinstance(self._source, File) else self._offset
         stream = {name: value for name, value in self.stream.__dict__.items() if name not in Stream.kept_apart}
         return {
-            "stream": stream, "output": output, "now_s": self.now_s, "place": place, "delivered": self.delivered,
+            "stream": stream, "output": output, "now_s": self.now_s, "place": offset, "delivered": self.delivered,
         }  # fmt: skip
 
     def _follow(self, source: Source) -> Iterator[Trajectory | None]:
         while self.stream.fault is None:
-            data = self._looked(source)
+            data = self._polled(source)
             now_s = self.now_s
             if source.news:
                 news, source.news = source.news, ""
@@ -73,7 +73,7 @@ class Following:
                 yield from self._done(Entry(now_s, Kind.DATA, data))
             yield None
 
-    def _looked(self, source: Source) -> bytes | None:
+    def _polled(self, source: Source) -> bytes | None:
         """What comes before something is due by the clock."""
         moment_s = time.monotonic() + MOMENT_S
         try:
@@ -106,20 +106,20 @@ class Following:
         stream.__dict__.update(known["stream"])
         if stream._begun:
             stream.understand_again()
-        self._place, now_s = known["place"], known["now_s"]
+        self._offset, now_s = known["place"], known["now_s"]
         self.delivered = known["delivered"]
         for entry in self._state.since:
             now_s = entry.now_s
             if entry.kind == Kind.NEWS:
                 stream.begin_again(entry.data.decode())
-                self._place = (0, b"")
+                self._offset = (0, b"")
             elif entry.kind == Kind.DELIVERED:
                 continue
             else:
                 yield from self._done(entry)
-                if self._place is not None and entry.data:
-                    place, end = self._place
-                    self._place = place + len(entry.data), (end + entry.data)[-256:]
+                if self._offset is not None and entry.data:
+                    offset, end = self._offset
+                    self._offset = offset + len(entry.data), (end + entry.data)[-256:]
         stream._say = said
         self._ahead_s = now_s - time.monotonic()
         self._say(f"{stream.source}: goes on after {stream.taken} rows, which an earlier run had read.")

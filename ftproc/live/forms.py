@@ -57,15 +57,15 @@ class Json(Form):
         return block._replace(texts=lines)
 
 
-def _values(place: str, line: str) -> dict[str, Any]:
+def _values(where: str, line: str) -> dict[str, Any]:
     try:
         found = json.loads(line)
         if isinstance(found, dict):
-            return dict(flat(place, found, "", 0))
+            return dict(flat(where, found, "", 0))
         why = "it is no object"
     except (ValueError, RecursionError) as error:
         why = str(error)
-    raise InputError(f'{place} is no object of JSON ({why}); expected such as {{"time_s": 0.5, "range_m": 5000}}.')
+    raise InputError(f'{where} is no object of JSON ({why}); expected such as {{"time_s": 0.5, "range_m": 5000}}.')
 
 
 def _cell(value: Any) -> str:

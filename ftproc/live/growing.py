@@ -38,7 +38,7 @@ class Lines:
         if not self.number and not self._rest:
             _refuse_other_kinds(self._source, data)
         end, *begun = data.split(b"\n")
-        self._rest += end  # without looking through what came before: a line may come byte by byte
+        self._rest += end  # without a search of what came before: a line may come byte by byte
         whole = [bytes(self._rest), *begun[:-1]] if begun else []
         if begun:
             self._rest = bytearray(begun[-1])

@@ -19,12 +19,13 @@ from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.errors import InputError, UsageError
 from ftproc.files import arrow
 from ftproc.live.order import Left, Order
+from ftproc.long_records import joined
 from ftproc.methods import live, registry
 from ftproc.methods import range_rates as rates_of
 from ftproc.methods.estimate import FARTHEST, Estimate
 from ftproc.order_statistics import median
 from ftproc.quality import sanity
-from ftproc.records import MISSING, FloatArray, IntArray, Trajectory, joined
+from ftproc.records import MISSING, FloatArray, IntArray, Trajectory
 from ftproc.settings import FilterSettings
 
 SLACK_S = 0.002  # by the clock, in which the last reading that a row rests on may come after it is due
@@ -177,11 +178,11 @@ class Live:
         if time_s < self._left_s or not self._order.insert(time_s, reading, came_s):
             self.late += 1
             return
-        place = bisect.bisect_right(self._time_s, time_s)
-        came_s = self._came_s[place] if place < len(self._came_s) else came_s
-        self._time_s.insert(place, time_s)
-        self._row.insert(place, row)
-        self._came_s.insert(place, came_s)
+        index = bisect.bisect_right(self._time_s, time_s)
+        came_s = self._came_s[index] if index < len(self._came_s) else came_s
+        self._time_s.insert(index, time_s)
+        self._row.insert(index, row)
+        self._came_s.insert(index, came_s)
 
     def _passed(self) -> int:
         """How many rows need not wait any more, whatever comes; or are too many to wait."""

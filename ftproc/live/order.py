@@ -95,10 +95,10 @@ class Order:
                 return False
         else:
             times, readings, arrivals = self._held
-            place = bisect.bisect_right(times, time_s)
-            arrivals.insert(place, arrivals[place] if place < len(times) else now_s)
-            times.insert(place, time_s)
-            readings.insert(place, measurement)
+            index = bisect.bisect_right(times, time_s)
+            arrivals.insert(index, arrivals[index] if index < len(times) else now_s)
+            times.insert(index, time_s)
+            readings.insert(index, measurement)
         self._note(1, late_s)
         return True
 
@@ -190,9 +190,9 @@ class Order:
         times, readings = self._fed[0][low:], self._fed[1][low:]
         for kept in self._fed:
             del kept[low:]
-        place = bisect.bisect_right(times, time_s)
-        times.insert(place, time_s)
-        readings.insert(place, measurement)
+        index = bisect.bisect_right(times, time_s)
+        times.insert(index, time_s)
+        readings.insert(index, measurement)
         self._credit -= 2 * len(times)  # to which they add when they are taken again
         self.editor, self._count = copy.deepcopy(found.editor), found.taken
         self._forget(found.editor.published)

@@ -22,11 +22,11 @@ from ftproc.files.reading.formats.standards import octets
 from ftproc.live.stop import Source
 
 MOST = 1 << 18  # bytes that are read at once
-NAP_S = 0.003  # between looks at a file that has not grown
+NAP_S = 0.003  # between polls of a file that has not grown
 AGAIN_S = 0.2  # between attempts to reach the sender
 BUFFER = 1 << 23  # bytes of datagrams that the system is asked to hold while we compute
 NETWORK = ("udp", "tcp")
-_KNOWN_AGAIN = 256  # bytes before the place where reading goes on, by which the file is known to be the same
+_KNOWN_AGAIN = 256  # bytes before the offset where reading goes on, by which the file is known to be the same
 
 
 def is_network(source: str) -> bool:
@@ -83,7 +83,7 @@ class Input:
         except (OSError, AttributeError):  # a stream in memory
             self._descriptor = -1
 
-    def look(self) -> bytes | None:
+    def poll(self) -> bytes | None:
         if self._descriptor < 0:
             stream = self._stream
             return stream.read1(MOST) if isinstance(stream, io.BufferedReader) else stream.read(MOST)
@@ -99,7 +99,7 @@ class Input:
 
 
 class File:
-    """A file under a name, which may come to name another one; a named pipe, or a serial line. Each look also reads the
+    """A file under a name, which may come to name another one; a named pipe, or a serial line. Each poll also reads the
     end of what is known: where it stands no more, the file was overwritten, whatever its length."""
 
     def __init__(self, source: str, path: Path) -> None:
@@ -112,29 +112,29 @@ class File:
             raise
 
     @property
-    def place(self) -> tuple[int, bytes]:
+    def offset(self) -> tuple[int, bytes]:
         """Where reading goes on, and the bytes before."""
-        return self._place, self._end
+        return self._offset, self._end
 
-    @place.setter
-    def place(self, place: tuple[int, bytes]) -> None:
-        self._place, self._end = place
+    @offset.setter
+    def offset(self, offset: tuple[int, bytes]) -> None:
+        self._offset, self._end = offset
 
     def close(self) -> None:
         if hasattr(self, "_stream"):
             self._stream.close()
 
-    def look(self) -> bytes | None:
+    def poll(self) -> bytes | None:
         replaced = self._is_replaced()
         if self._stream.seekable():
-            self._stream.seek(self._place - len(self._end))
+            self._stream.seek(self._offset - len(self._end))
         data = self._stream.read(MOST) or b""
         if not data.startswith(self._end):
-            self._place, self._end, self.news = 0, b"", "became shorter or was overwritten"
+            self._offset, self._end, self.news = 0, b"", "became shorter or was overwritten"
             return None
         if new := data[len(self._end) :]:
             if self._stream.seekable():
-                self._place, self._end = self._place + len(new), data[-_KNOWN_AGAIN:]
+                self._offset, self._end = self._offset + len(new), data[-_KNOWN_AGAIN:]
             return new
         if replaced:
             with contextlib.suppress(FileNotFoundError):
@@ -148,7 +148,7 @@ class File:
     def _begin(self) -> None:
         stream = io.FileIO(self._path, opener=_without_waiting)
         self.close()
-        self._stream, self._place, self._end = stream, 0, b""
+        self._stream, self._offset, self._end = stream, 0, b""
 
     def _is_replaced(self) -> bool:
         """Asked before reading, so that what the old file still got is read first."""
@@ -195,7 +195,7 @@ class Udp:
     def close(self) -> None:
         self._socket.close()
 
-    def look(self) -> bytes | None:
+    def poll(self) -> bytes | None:
         found = bytearray()
         with contextlib.suppress(BlockingIOError):
             while len(found) < MOST:
@@ -225,7 +225,7 @@ class Tcp:
             if each is not None:
                 each.close()
 
-    def look(self) -> bytes | None:
+    def poll(self) -> bytes | None:
         if self._socket is None:
             self._reach()
         if self._socket is None:

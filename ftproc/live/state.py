@@ -191,12 +191,12 @@ class StateFile:
         except Exception as error:
             raise InputError(
                 f"{self._path}: this is no state of a stream that this version of ftproc can go on with. Give --state "
-                "another name, or delete the file to begin anew."
+                "another name, or delete the file to begin again."
             ) from error
         if purpose != self._purpose:
             raise InputError(
                 f"{self._path}: this is the state of another stream, or of other options. Give --state another name, "
-                "or delete the file to begin anew."
+                "or delete the file to begin again."
             )
         self.known, self.since = known, list(_entries(text[begin + size :]))
 

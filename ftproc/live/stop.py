@@ -16,7 +16,7 @@ class Source(Protocol):
 
     news: str
 
-    def look(self) -> bytes | None:
+    def poll(self) -> bytes | None:
         """What has come; empty at the end of the input; None when there may be more later."""
 
     def wait(self, seconds: float) -> None:
@@ -25,7 +25,7 @@ class Source(Protocol):
 
 class Stop:
     """Within its context, a signal that ends the program (Ctrl-C, SIGTERM, a closed terminal) ends the reading, and not
-    what is being computed or written: that looks at `asked` and `overdue` now and then, and never waits for long."""
+    what is being computed or written: that reads `asked` and `overdue` now and then, and never waits for long."""
 
     def __init__(self) -> None:
         self.asked = self._reading = False
@@ -61,7 +61,7 @@ class Stop:
         self._reading = True
         try:
             while not self.asked:
-                found = source.look()
+                found = source.poll()
                 if found is not None or source.news:
                     return found
                 left_s = until_s - time.monotonic()

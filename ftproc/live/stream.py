@@ -166,7 +166,7 @@ class Stream:
 
     def _read(self, block: Block) -> Iterator[tuple[FloatArray, InputError | None, str]]:
         """The readings of some lines, the error of the row after them, and the last of the lines. One by one where
-        lines become rows of a table, rows are told apart by a target, or one from the network is damaged. Raises
+        lines become rows of a table, rows are distinguished by a target, or one from the network is damaged. Raises
         InputError."""
         one_by_one = bool(self.target) or type(self._form) is not forms.Form
         if not one_by_one:

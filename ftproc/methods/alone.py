@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 GATE = 6.0  # sigmas beyond what the target may do
 REACH = 5  # readings on each side, from which the rate is taken
-LOOK_BACK = 30  # runs
+RUNS_BEFORE = 30  # runs
 _BEFORE, _AFTER = ((-2, -1), (-3, -1), (-3, -2)), ((1, 2), (1, 3), (2, 3))
 _AROUND = ((-1, 1), (-2, 1), (-1, 2), (-2, 2))
 
@@ -103,7 +103,7 @@ def _agreeing(t: FloatArray, x: FloatArray, sigma: float, agile: Agile) -> NDArr
     best, before = np.diff(edges).astype(float), np.full(len(edges) - 1, -1)
     size = best.copy()
     for run in range(1, len(size)):
-        earlier = np.arange(max(run - LOOK_BACK, 0), run - 1)
+        earlier = np.arange(max(run - RUNS_BEFORE, 0), run - 1)
         first, last = edges[run], edges[earlier + 1] - 1
         reach = GATE * np.sqrt(2) * sigma + agile.rate_mps * (t[first] - t[last])
         total = np.where(np.abs(x[first] - x[last]) <= reach, best[earlier], 0.0)

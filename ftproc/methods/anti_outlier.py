@@ -39,7 +39,7 @@ Run = TypeVar("Run", FilterRun, SmootherRun)
 LONGEST_WHOLE = 60_000  # samples of a log that is edited as a whole
 KEPT = 60_000  # samples of a segment, without its margins,
 KEPT_MARGINS = 12  # or so many times its margin
-MOST_PIECES = 20  # of a track: what begins anew so often tells no motion (two targets in turn: 115)
+MOST_PIECES = 20  # of a track: what is re-initialized so often shows no motion (two targets in turn: 115)
 MARGIN_S, LEAST_MARGIN, MOST_MARGIN = 60.0, 1_000, 10_000  # s and samples on each side of a segment
 
 
@@ -157,14 +157,14 @@ def usual_of(record: Recording, settings: FilterSettings) -> Model | None:
     found = [e for e in threads.in_order(partial(_span, record, settings), record.spans()) if e is not None]
     if not found:
         return None
-    variance, wander = (
+    variance, markov = (
         np.median([getattr(edited.model, name) for edited in found], 0)
         for name in ("noise_variance", "wander_variance")
     )
-    fade = np.exp(np.median([np.log(edited.model.fade_s) for edited in found], 0))
+    tau_s = np.exp(np.median([np.log(edited.model.fade_s) for edited in found], 0))
     levels = np.array([median_level(edited.model).jerk for edited in found])
     jerk = np.exp(np.median(np.log(levels), 0))
-    return Model(variance, jerk, wander_variance=wander, fade_s=fade)
+    return Model(variance, jerk, wander_variance=markov, fade_s=tau_s)
 
 
 def _span(record: Recording, settings: FilterSettings, rows: slice) -> two_pass.Edited | None:

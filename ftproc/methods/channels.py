@@ -32,7 +32,7 @@ LONGEST = 16  # rejected in a row: the longest run of outliers of Zhang and Zhan
 POLYNOMIAL = (
     Parameter("order", "degree of the polynomial; 0 is the paper's rule, the value before", "from the log", 0, 2, True),
     Parameter("window", "values that it goes through", "from the log", 1, LONGEST_WINDOW, True),
-    Parameter("longest", "readings rejected in a row, after which they are believed", str(LONGEST), 1, 1000, True),
+    Parameter("longest", "readings rejected in a row, after which they are accepted", str(LONGEST), 1, 1000, True),
 )
 
 
@@ -80,21 +80,21 @@ class Expected(NamedTuple):
     walk: float
 
 
-def look(readings: Readings, settings: FilterSettings, blindly: bool = False) -> Log:
+def prepare(readings: Readings, settings: FilterSettings, blindly: bool = False) -> Log:
     """What is known of a log before it is filtered: these papers leave their thresholds to the engineer. blindly: the
     method does not know the first state."""
     time_s, measurement = readings.time_s, readings.measurement
     weight, sigma, start = trusted(readings, settings)
     steps = np.diff(time_s)
     interval = median(steps[steps > 0]) if (steps > 0).any() else 1.0
-    believed = np.where(weight > 0, measurement, np.nan)
+    accepted = np.where(weight > 0, measurement, np.nan)
     if blindly or start is None:
-        return Log(time_s, measurement, 0, interval, sigma, believed)
+        return Log(time_s, measurement, 0, interval, sigma, accepted)
     before = time_s[0] - interval * np.arange(LONGEST_WINDOW, 0, -1.0)
     t = (before - time_s[start.sample])[:, None]
-    place, velocity, acceleration = start.state.reshape(3, 3)
-    carried = from_cartesian(place + velocity * t + 0.5 * acceleration * t**2)
-    rows = [np.concatenate([carried, each]) for each in (measurement, believed)]
+    position, velocity, acceleration = start.state.reshape(3, 3)
+    carried = from_cartesian(position + velocity * t + 0.5 * acceleration * t**2)
+    rows = [np.concatenate([carried, each]) for each in (measurement, accepted)]
     return Log(np.concatenate([before, time_s]), rows[0], LONGEST_WINDOW, interval, sigma, rows[1])
 
 

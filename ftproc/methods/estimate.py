@@ -14,8 +14,9 @@ from ftproc.core.filtering.records import FilterRun, Model, Observations, Uneven
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification.coloured_noise import Coloured
 from ftproc.core.identification.motion_models import Chosen
+from ftproc.long_records import thinned
 from ftproc.order_statistics import median
-from ftproc.records import FlagArray, FloatArray, IntArray, forget, thinned
+from ftproc.records import FlagArray, FloatArray, IntArray, forget
 
 if TYPE_CHECKING:
     from ftproc.core.beside import Channel
@@ -106,8 +107,8 @@ class Estimate(NamedTuple):
     settled: whether two-pass editing's decisions stood still; None where there were none to make. stamp_s: 1-sigma of
     the time stamps. drifts: whether the noise's variance drifts. alternative: a model with correlated noise
     that explains the log as well, and that the sigmas allow for. cleaned: (n, 3) readings of a method that works on
-    range, azimuth and elevation one by one; NaN there and in its run means not estimated. unexamined: places where
-    two-pass editing looked for no alternative, its search having been cut short. faults: of the instrument, that
+    range, azimuth and elevation one by one; NaN there and in its run means not estimated. unexamined: runs where
+    two-pass editing tried no alternative, its search having been cut short. faults: of the instrument, that
     two-pass editing found and took out of the readings. screened_out: (n, 3) readings that screening rejects, of a
     method without sigmas, whose labels nothing else tests. motion: that was chosen. known: (n,) which samples have an
     estimate, where live editing has none of some; absent: the components that it has not seen. smoothed_sigma_m: the
@@ -202,7 +203,7 @@ class Part(NamedTuple):
 
 
 def typical_interval(time_s: FloatArray) -> float:
-    """The median time between neighbours, s; of a very long log (n,) only every so many are looked at."""
+    """The median time between neighbours, s; of a very long log (n,) only every so many are used."""
     if len(time_s) < 2:
         return 0.0
     return median(thinned(time_s[1:], MOST_INTERVALS) - thinned(time_s[:-1], MOST_INTERVALS))

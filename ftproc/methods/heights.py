@@ -1,4 +1,4 @@
-"""The height of a target in place of its elevation: surveillance radars and those of ships measure none.
+"""The height of a target instead of its elevation: surveillance radars and those of ships measure none.
 
 With a height h above the station at slant range R, over a round earth of radius R_e (R_e + h and R are two sides of the
 triangle with the earth's centre),
@@ -9,7 +9,7 @@ with g the ground range. **Measured heights** become elevations by this formula,
 and filtered as such. **Without**, what is known of the height is a prior, by the user or for all targets of a kind: the
 filter works in the plane of range and azimuth, and its estimate is moved to that height: z is the prior, its sigma
 that of the prior, and the sigmas of x and y allow for what the prior leaves open of g. What all heights of a log may be
-off by together (of barometric ones the pressure and the temperature of the air) is added likewise.
+off by together (of barometric ones the pressure and the temperature of the air) is added too.
 """
 
 from __future__ import annotations
@@ -185,7 +185,7 @@ def placed(
     common: Common, part: slice, state: FloatArray, sigma: FloatArray, path_sigma: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The states (n, 9), their sigmas (n, 9) and those of `kinematics` (n, 6) of some samples, with the prior of the
-    height in place of z, and with what the heights may be off by together."""
+    height instead of z, and with what the heights may be off by together."""
     if common.prior is None:
         found, wide = state, _widened(state, sigma, common.sigma_m[part])
     else:

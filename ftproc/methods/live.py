@@ -21,14 +21,15 @@ from ftproc.core.live.editor import LiveEditor
 from ftproc.core.live.recursive import Gating
 from ftproc.core.live.rows import Published
 from ftproc.core.model.motion import isotropic
+from ftproc.long_records import chunks
 from ftproc.methods import preparing
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording
-from ftproc.records import GOOD, MISSING, FlagArray, FloatArray, chunks
+from ftproc.records import GOOD, MISSING, FlagArray, FloatArray
 from ftproc.settings import FilterSettings
 
 BLOCK = 4096  # samples that are taken at once
 NOT_USED = "the range rates are not used by now: too few, or they contradict the readings or do not add to them"
-HISTORY = 256  # samples before a stretch that go with it: the network looks back
+HISTORY = 256  # samples before a stretch that go with it: the network uses samples before
 
 
 def editor(settings: FilterSettings, accepted: Accepted = NOTHING) -> LiveEditor:

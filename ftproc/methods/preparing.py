@@ -55,7 +55,7 @@ def finished(found: Filtered, settings: FilterSettings, kept: FloatArray | None 
 
 
 class Trusted(NamedTuple):
-    """weight: (n, 3), zero for readings not to be believed before a filter has run. sigma: (3,) noise 1-sigma. start:
+    """weight: (n, 3), zero for readings not to be used before a filter has run. sigma: (3,) noise 1-sigma. start:
     the smoothed first state, where the head of the log gives one."""
 
     weight: FloatArray
@@ -64,7 +64,7 @@ class Trusted(NamedTuple):
 
 
 def trusted(readings: Readings, settings: FilterSettings) -> Trusted:
-    """What is believed of a log before a filter has run.
+    """What is known of a log before a filter has run.
 
     Only the head of the log is edited in two passes, because a recursion cannot repair a wrong start; after it the
     weights are those of the screening, and serve to find noise and jerk.
@@ -84,8 +84,8 @@ def trusted(readings: Readings, settings: FilterSettings) -> Trusted:
 
 
 def prepare(readings: Readings, settings: FilterSettings) -> tuple[Model, list[Start]]:
-    """Noise and jerk level, and starts of a log, without deciding on its outliers. The first start is that of two-pass
-    editing, so that all methods have the same."""
+    """Measurement noise, process noise, and starts of a log, without deciding on its outliers. The first start is that
+    of two-pass editing, so that all methods have the same."""
     weight, sigma, first = trusted(readings, settings)
     known = what_is_known(readings, settings)
     log = readings.weighted(weight)

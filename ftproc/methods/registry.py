@@ -118,7 +118,7 @@ METHODS: dict[str, Method] = {
                True, False, True, _from("preparing", "unedited", extended=True), own_model=True),
         Method("kf", "linear Kalman filter on converted measurements", "Lerro and Bar-Shalom 1993",
                True, False, False, _from("papers.kalman", "converted"), smooths=False),
-        Method("imm-ukf", "interacting models of calm flight and manoeuvres", "Zhang, Li and He 2012",
+        Method("imm-ukf", "interacting models of steady flight and manoeuvres", "Zhang, Li and He 2012",
                True, False, False, _from("papers.kalman", "multiple"), smooths=False,
                settable="papers.kalman.IMM_PARAMETERS"),
         Method("huber-ukf", "UKF with Huber's weights", "Karlgaard and Schaub 2007",

@@ -1,7 +1,7 @@
 """Readings that share a stamp, many at once: each component's are one reading, their mean without those far off.
 
 An instrument that reads faster than its clock counts, or sees its target many times in a rotation, gives hundreds of
-rows of one time. The windows in which noise, motion and outliers are looked for are counted in readings: with a few
+rows of one time. The windows in which noise, motion and outliers are sought are counted in readings: with a few
 instants in each they would show no motion at all.
 """
 

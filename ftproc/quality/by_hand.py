@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ftproc.core.model.frames import wrap
-from ftproc.files.decisions import ByHand, Decisions
-from ftproc.records import ACCEPTED, GOOD, REJECTED, Diagnostics, FlagArray, FloatArray
+from ftproc.files.decisions import as_dict
+from ftproc.records import ACCEPTED, GOOD, REJECTED, ByHand, Diagnostics, FlagArray, FloatArray, Lines
 
 FEW_LINES = 3  # that are named
 
@@ -42,7 +42,7 @@ def with_rejected(shown: Diagnostics, label: FlagArray, cleaned: FloatArray, var
 class Effects:
     """Of the lines of decisions on a log, or on those of several stations, to which its parts are added."""
 
-    def __init__(self, decisions: Decisions | None, gate: float) -> None:
+    def __init__(self, decisions: Lines | None, gate: float) -> None:
         self.decisions, self.gate = decisions, gate
         self.counts = {} if decisions is None else {line.number: np.zeros(2, int) for line in decisions.lines}
 
@@ -65,7 +65,7 @@ class Effects:
         lines = []
         for line in self.decisions.lines:
             readings, inside = self.counts[line.number].tolist()
-            lines.append({**line.as_dict(), "readings": readings, "inside_gate": inside})
+            lines.append({**as_dict(line), "readings": readings, "inside_gate": inside})
         return {"decisions": {"file": self.decisions.name, "sha256": self.decisions.sha256, "lines": lines}}
 
     def summary(self) -> dict[str, Any]:

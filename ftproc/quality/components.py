@@ -88,8 +88,8 @@ class RangeRate:
 
     def remarks(self) -> list[str]:
         """What was done with them, and why they are not used."""
-        said = ["the range rates count inward, as the motion shows, and are turned round"] if self.closing else []
-        return [*said, *self.why]
+        turned = ["the range rates count inward, as the motion shows, and are turned round"] if self.closing else []
+        return [*turned, *self.why]
 
     def figures(self) -> dict[str, Any]:
         """As those of other components."""

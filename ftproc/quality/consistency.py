@@ -14,7 +14,10 @@ NORMAL_99 = 2.576  # two-sided 99 % point
 LEAST_WIDTH = 0.2  # of the bounds about 1: no model is better, however many the readings
 POORLY_PREDICTED = 8.0  # innovation sigma over noise sigma (median), from which a gate detects too little
 POORLY_OBSERVABLE = 10.0  # sigma over its median
-BULK, FAR_OFF = 31, 5.0  # readings, of which more than half are so many sigmas off: noise never does that
+BULK, FAR_OFF = (
+    31,
+    5.0,
+)  # readings, of which more than half have such a residual in units of its 1-sigma: noise never does that
 MOST_INTERVALS = 20  # that are listed
 
 

@@ -1,6 +1,6 @@
 """What to do next about a run that is not consistent: the place, the reason, the option to try, best first.
 
-Most runs that are not consistent have been told something that does not hold: then the step is to leave that out. The
+Most runs that are not consistent have been given something that does not hold: then the step is to leave that out. The
 others need what one log and the program cannot know: the instrument's noise, another station, or the engineer's eye.
 """
 
@@ -18,7 +18,7 @@ from ftproc.settings import FilterSettings
 Summary = Mapping[str, Any]
 DECISIONS = "decisions.csv"
 UNITS = {"range": "m", "azimuth": "rad", "elevation": "rad"}
-MANY = 0.1  # share of a component's readings that are outliers, from which their decisions are looked at first
+MANY = 0.1  # share of a component's readings that are outliers, from which their decisions are checked first
 
 #: A remark on how the log was read, with another way that may be right.
 _DOUBT = re.compile(r"(.*): (if .*), say --([a-z-]+) ([\w=-]+)")
@@ -70,8 +70,8 @@ def of_fused(s: Summary, smooth: bool) -> list[Step]:
     if verdict.level_of(s["trust"]) == verdict.CONSISTENT:
         return []
     found = [] if smooth else [Step("add --smooth", _CAUSAL, {"smooth": ("--smooth",)})]
-    places = sorted(s["stretches"], key=lambda each: float(each["from_s"] - each["to_s"]))[:1]
-    where = [f"{each['station']}, {each['from_s']:.6g} to {each['to_s']:.6g} s" for each in places] or [""]
+    stretches = sorted(s["stretches"], key=lambda each: float(each["from_s"] - each["to_s"]))[:1]
+    where = [f"{each['station']}, {each['from_s']:.6g} to {each['to_s']:.6g} s" for each in stretches] or [""]
     return [*found, _DECIDE._replace(place=where[0])]
 
 
@@ -136,15 +136,15 @@ def _outliers(s: Summary) -> Iterator[Step]:
     outliers = {name: part["isolated"] + part["patch"] for name, part in s["components"].items()}
     many = any(count > MANY * (count + s["components"][name]["good"]) for name, count in outliers.items())
     doubtful = any(s[name] for name in ("editing_places_unexamined", "doubtful_steps", "rivals", "reacquired"))
-    places = s["poorly_observable"] if any(outliers.values()) else []
-    if many or doubtful or s["editing_converged"] is False or places:
-        yield _DECIDE._replace(place=_worst([*places, *s["rivals"]], s["doubtful_steps"]))
+    stretches = s["poorly_observable"] if any(outliers.values()) else []
+    if many or doubtful or s["editing_converged"] is False or stretches:
+        yield _DECIDE._replace(place=_worst([*stretches, *s["rivals"]], s["doubtful_steps"]))
 
 
-def _worst(places: Sequence[Summary], steps: Sequence[Summary]) -> str:
-    """The times of the place that is least determined, or of the first step that is in doubt."""
-    if places:
-        worst = max(places, key=lambda each: float(each.get("sigma_m", 0.0)))
+def _worst(stretches: Sequence[Summary], steps: Sequence[Summary]) -> str:
+    """The times of the stretch that is least determined, or of the first step that is in doubt."""
+    if stretches:
+        worst = max(stretches, key=lambda each: float(each.get("sigma_m", 0.0)))
         return f"{worst['from_s']:.6g} to {worst['to_s']:.6g} s"
     return f"{steps[0]['time_s']:.6g} s" if steps else ""
 
@@ -191,7 +191,7 @@ def _noise(s: Summary) -> Iterator[Step]:
 def _noise_like_motion(s: Summary) -> Iterator[Step]:
     """Where no number makes up for what one log lacks: with the noise given, white, it would only look consistent."""
     if s["slow_noise_s"]:
-        yield _FUSE._replace(reason="noise that is correlated so long looks like motion to a single log")
+        yield _FUSE._replace(reason="noise that is correlated so long resembles motion in a single log")
     for one in s["one_sided_errors"][:1]:
         yield _FUSE._replace(reason=f"the {one['component']} errors lie on one side, and so does its estimate")
     few = [name for name, part in s["components"].items() if part["good"] < verdict.FEWEST_GOOD]

@@ -19,7 +19,6 @@ from ftproc.records import FloatArray, MeasurementLog
 from ftproc.settings import FilterSettings
 
 if TYPE_CHECKING:
-    from ftproc.core.filtering import records
     from ftproc.correction.model import Model
     from ftproc.methods.registry import Method
     from ftproc.quality.statistics import RunStatistics
@@ -27,17 +26,9 @@ if TYPE_CHECKING:
 _LATEST = 11  # digits of SOURCE_DATE_EPOCH
 #: The metadata that decide on a result.
 DECISIVE = (
-    "version",
-    "versions",
-    "command",
-    "options",
-    "method",
-    "log",
-    "log_sha256",
-    "model_sha256",
-    "stations",
+    "version", "versions", "command", "options", "method", "log", "log_sha256", "model_sha256", "stations",
     "decisions",
-)
+)  # fmt: skip
 
 
 def describe(
@@ -52,7 +43,9 @@ def describe(
     was filtered in segments has none: it would be as long as the log."""
     from ftproc.correction.model_file import sha256
 
-    sigma = np.sqrt(statistics.model.reading_variance)
+    noise = statistics.model
+    sigma = np.sqrt(noise.reading_variance)
+    jerk = None if statistics.parts > 1 else jerk_profile(noise.jerk, noise.knot_s, noise.motion.acts)
     return {
         **begun(),
         "method": method.name,
@@ -90,19 +83,14 @@ def describe(
             "noise_range_m": float(sigma[0]),
             "noise_azimuth_rad": float(sigma[1]),
             "noise_elevation_rad": float(sigma[2]),
-            "noise_correlation": [float(r) for r in statistics.model.correlation(statistics.interval_s)],
+            "noise_correlation": [float(r) for r in noise.correlation(statistics.interval_s)],
         },
         "motion": summary.get("motion"),
         "motion_gain": summary.get("motion_gain"),
         "model_sha256": None if model is None else sha256(model),
         "summary": dict(summary),
-        "jerk_profile": None if statistics.parts > 1 else jerk_profile(*_jerk_of(statistics.model)),
+        "jerk_profile": jerk,
     }
-
-
-def _jerk_of(model: records.Model) -> tuple[FloatArray, float, bool]:
-    """What `jerk_profile` takes."""
-    return model.jerk, model.knot_s, model.motion.acts
 
 
 def begun() -> dict[str, Any]:

@@ -8,19 +8,10 @@ import numpy as np
 from ftproc.core.by_hand import NOTHING, Accepted
 from ftproc.core.components import totals
 from ftproc.errors import InputError, UsageError, row_named
+from ftproc.long_records import chunks, thinned
 from ftproc.methods.estimate import Recording
 from ftproc.order_statistics import median
-from ftproc.records import (
-    ACCEPTED,
-    COMPONENTS,
-    REJECTED,
-    FloatArray,
-    IntArray,
-    MeasurementLog,
-    chunks,
-    forget,
-    thinned,
-)
+from ftproc.records import ACCEPTED, COMPONENTS, REJECTED, FloatArray, IntArray, MeasurementLog, forget
 from ftproc.settings import EDITING, LEAST_NOISE, MOTIONS, FilterSettings
 
 FARTHEST_M = 1e12  # with half of all ranges beyond, the column or its unit is wrong

@@ -15,12 +15,7 @@ from ftproc.order_statistics import median
 from ftproc.quality import consistency, verdict
 from ftproc.quality.components import Component, RangeRate
 from ftproc.quality.faults import FaultStatistics, clock_set_back
-from ftproc.records import (
-    COMPONENTS,
-    GOOD,
-    FloatArray,
-    MeasurementLog,
-)
+from ftproc.records import COMPONENTS, GOOD, FloatArray, MeasurementLog
 from ftproc.scoring.figures import changes
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ TOO_WIDE = 0.5  # innovation ratio below which the sigmas are far too large
 
 _NO_FAULT = "residuals agree with the published sigmas, and no fault shows"
 _NO_FAULT_BUT = "{} residuals are smaller than the published sigmas, which are cautious, and no fault shows"
-#: Is said with every consistent run.
+#: Stands with every consistent run.
 NOT_SHOWN = (
     "One log cannot show constant or slow biases, an offset of the clock, or a false target followed throughout."
 )
@@ -197,7 +197,7 @@ def _no_flight(s: Mapping[str, Any]) -> Iterator[Remark]:
     """What no flight explains."""
     least = s.get("acceleration_at_least_mps2", 0.0)
     if least > FASTEST_MPS2:
-        text = f"the readings ask for an acceleration of {least:.3g} m/s2, which hardly anything has that flies"
+        text = f"the readings ask for an acceleration of {least:.3g} m/s2, which almost nothing that flies reaches"
         yield Remark(SUSPECT, text)
     yield from _left_behind(s)
     for name, part in s["components"].items():

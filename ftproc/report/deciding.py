@@ -14,6 +14,7 @@ import numpy as np
 from ftproc.errors import quoted
 from ftproc.files import decisions
 from ftproc.files.writing.decisions import text
+from ftproc.records import ENDS
 from ftproc.report.patches import Patch
 from ftproc.report.view import View
 
@@ -72,5 +73,5 @@ def _so_far(view: View, stations: bool) -> str:
     found = view.trajectory.metadata.get("decisions")
     lines = decisions.from_metadata(found).lines if found else ()
     if stations:
-        return text(lines, more=(*decisions.ENDS[0], "station"))
-    return text([line._replace(station="") for line in lines], more=decisions.ENDS[0])
+        return text(lines, more=(*ENDS[0], "station"))
+    return text([line._replace(station="") for line in lines], more=ENDS[0])

@@ -62,7 +62,7 @@ def line(timeline: Timeline, value: FloatArray, name: str, colour: str, dash: st
 
 
 def dots(timeline: Timeline, value: FloatArray, name: str, colour: str) -> Any:
-    """(n,) values as small dots; when too many, a line through their extremes, which looks the same."""
+    """(n,) values as small dots; when too many, a line through their extremes, which appears the same."""
     if timeline.thinned:
         return _joined(*timeline.line(value, over_missing=True), name, {"color": colour, "width": 1})
     chosen = timeline.extremes(value)
@@ -72,9 +72,9 @@ def dots(timeline: Timeline, value: FloatArray, name: str, colour: str) -> Any:
     )  # fmt: skip
 
 
-def _joined(x: FloatArray, y: FloatArray, name: str, look: dict[str, Any]) -> Any:
+def _joined(x: FloatArray, y: FloatArray, name: str, drawn: dict[str, Any]) -> Any:
     mode = "lines+markers" if len(x) <= FEW else "lines"  # a line of one point is invisible
-    return require_plotly().Scatter(x=x, y=y.astype(np.float32), name=name, mode=mode, line=look, marker={"size": 4})
+    return require_plotly().Scatter(x=x, y=y.astype(np.float32), name=name, mode=mode, line=drawn, marker={"size": 4})
 
 
 def level(timeline: Timeline, value: float, name: str, dash: str = "dash") -> Any:
@@ -103,7 +103,7 @@ def marks(
 
 
 def step_lines(figure: go.Figure, steps: Sequence[Step], row: int, column: int = 0, labelled: bool = True) -> None:
-    """Upright lines where steps were bridged, through the plot in a row (from 0); with what happened beside them."""
+    """Upright lines where steps were taken out, through the plot in a row (from 0); with what happened beside them."""
     for number, step in enumerate(steps):
         label = {"text": step.words, "font": {"size": 11, "color": style.PURPLE}, "bgcolor": "rgba(255,255,255,0.8)"}
         after = step.time_s < np.mean(figure.layout.xaxis.range)  # on the side with more room

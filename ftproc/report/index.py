@@ -93,10 +93,10 @@ def _link(text: str, name: str | None, here: Path | None) -> str:
     try:
         if path is None or here is None or not path.is_file():
             return ""
-        place = os.path.relpath(path.resolve(), here.resolve())
+        link = os.path.relpath(path.resolve(), here.resolve())
     except (OSError, ValueError):  # such as on another drive
         return ""
-    return f'<a href="./{html.escape(quote(os.fsencode(place)))}">{text}</a>'
+    return f'<a href="./{html.escape(quote(os.fsencode(link)))}">{text}</a>'
 
 
 def _badge(level: str) -> str:

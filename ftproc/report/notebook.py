@@ -30,13 +30,13 @@ def picture(trajectory: Trajectory) -> str:
     """The track over the ground as SVG, equal scales; empty without positions."""
     north = axes_of_north(trajectory.metadata)
     across, up = (0, 1) if north is None else north[::-1]
-    place = trajectory.state[:, [across, up]]
-    if not np.isfinite(place).all(1).any():
+    position = trajectory.state[:, [across, up]]
+    if not np.isfinite(position).all(1).any():
         return ""
     timeline = Timeline.of(trajectory.time_s, COLUMNS)
-    rows = timeline.extremes(*place.T)
-    drawn = np.stack([timeline.broken(rows, axis)[1] for axis in place.T], 1)  # NaN where it is broken
-    known = place[np.isfinite(place).all(1)]
+    rows = timeline.extremes(*position.T)
+    drawn = np.stack([timeline.broken(rows, axis)[1] for axis in position.T], 1)  # NaN where it is broken
+    known = position[np.isfinite(position).all(1)]
     low, size = known.min(0), float(np.ptp(known, axis=0).max()) or 1.0
     scale = min(WIDTH, HEIGHT) - 2 * MARGIN
     spare = (np.array([WIDTH, HEIGHT]) - scale * np.ptp(known, axis=0) / size) / 2

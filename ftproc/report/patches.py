@@ -1,4 +1,4 @@
-"""The outlier patches of a trajectory, the steps that were bridged, and the seconds with most outliers."""
+"""The outlier patches of a trajectory, the steps that were taken out, and the seconds with most outliers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Patch(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A step that stays, which the estimate bridges. component: of the channels, or `clock`. size: with its unit.
+    """A step that stays, which the estimate takes out. component: of the channels, or `clock`. size: with its unit.
     words: what happened, with size and time."""
 
     component: str

@@ -1,4 +1,4 @@
-"""The look of the report: colours, symbols, labels and units.
+"""The style of the report: colours, symbols, labels and units.
 
 The colours are Okabe and Ito's, distinct for every colour vision; kinds of readings also differ in symbol.
 """

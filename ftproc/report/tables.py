@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ftproc.derived import Extreme
-from ftproc.derived import extremes as found_extremes
+from ftproc.derived.extremes import Extreme
+from ftproc.derived.extremes import extremes as found_extremes
 from ftproc.derived.quantities import site_of
 from ftproc.quality import summary as figures
 from ftproc.quality import verdict
@@ -47,8 +47,8 @@ def heading(view: View) -> str:
     if view.score is not None:
         parts.append(f"compared with {view.score.truth}")
     lines = [line for line in (" · ".join(taken(view)), " · ".join(parts)) if line]
-    said = "".join(f'<p class="sub">{html.escape(line)}</p>' for line in lines)
-    return f"<h1>{html.escape(name(view.trajectory))}</h1>{said}{_clock(view)}"
+    below = "".join(f'<p class="sub">{html.escape(line)}</p>' for line in lines)
+    return f"<h1>{html.escape(name(view.trajectory))}</h1>{below}{_clock(view)}"
 
 
 def taken(view: View) -> list[str]:

@@ -1,4 +1,4 @@
-"""Fewer points with the same look: the extremes of every pixel column, and breaks at gaps of the log."""
+"""Fewer points that appear the same: the extremes of every pixel column, and breaks at gaps of the log."""
 
 from __future__ import annotations
 

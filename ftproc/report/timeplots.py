@@ -154,12 +154,12 @@ def _errors_of_readings(view: View, error: FloatArray) -> Drawn:
     return Drawn(figure, "Errors of the cleaned readings; the position is not observable.")
 
 
-def _add_error(figure: go.Figure, view: View, error: FloatArray, sigma: FloatArray, place: tuple[int, int]) -> None:
+def _add_error(figure: go.Figure, view: View, error: FloatArray, sigma: FloatArray, cell: tuple[int, int]) -> None:
     """An error (n,) and its sigmas (n,) in a row and column."""
-    drawing.add(figure, drawing.line(view.timeline, error, "error", style.BLUE), *place, place == (0, 0))
+    drawing.add(figure, drawing.line(view.timeline, error, "error", style.BLUE), *cell, cell == (0, 0))
     for sign in (-1, 1):
         limit = drawing.line(view.timeline, sign * WITHIN * sigma, f"{WITHIN} sigmas", style.BLACK, "dash", 1)
-        drawing.add(figure, limit, *place, place == (0, 0) and sign < 0)
+        drawing.add(figure, limit, *cell, cell == (0, 0) and sign < 0)
 
 
 def _add_steps(figure: go.Figure, view: View, rows: int = 1, columns: int = 1) -> None:

@@ -78,7 +78,7 @@ class View:
 
     @cached_property
     def moments(self) -> Moments:
-        """How its times are said."""
+        """How its times are written."""
         return Moments.of(self.trajectory.metadata, self.trajectory.time_s)
 
     @cached_property

@@ -114,44 +114,44 @@ def load(name: str) -> Limits:
 
 def _limit(name: str, number: int, line: Any) -> Limit:
     """One [[require]]. Raises UsageError."""
-    place = f"{name}: [[require]] number {number}"
+    where = f"{name}: [[require]] number {number}"
     if not isinstance(line, Mapping) or not isinstance(line.get("what"), str):
-        raise UsageError(f"{place}: it has no what = ..., such as {', '.join(named.names()[:1])} or range.")
+        raise UsageError(f"{where}: it has no what = ..., such as {', '.join(named.names()[:1])} or range.")
     what = str(line["what"])
     allowed = [*named.names(), ESTIMATE, CLEANED]
     if what not in allowed:
-        raise UsageError(f'{place}: what = "{what}" is none of {", ".join(allowed)}.')
+        raise UsageError(f'{where}: what = "{what}" is none of {", ".join(allowed)}.')
     given = {key: line[key] for key in line if key not in ("what", "where", "source")}
-    return Limit(what, *_bound(place, what, given), where=str(line.get("where", "")))
+    return Limit(what, *_bound(where, what, given), where=str(line.get("where", "")))
 
 
-def _bound(place: str, what: str, given: Mapping[str, Any]) -> tuple[str, float, float]:
+def _bound(where: str, what: str, given: Mapping[str, Any]) -> tuple[str, float, float]:
     """Kind, bound and share of a limit. Raises UsageError."""
-    share = _number(place, given, "share", 1.0) if "share" in given else None
+    share = _number(where, given, "share", 1.0) if "share" in given else None
     if share is not None and share > 1:
-        raise UsageError(f"{place}: share = {share:g} is above 1; write 0.95 for 95 %.")
+        raise UsageError(f"{where}: share = {share:g} is above 1; write 0.95 for 95 %.")
     rest = [key for key in given if key != "share"]
     if what == ESTIMATE:
         if share is None or rest:
-            raise UsageError(f"{place}: of the estimate write its share only, such as share = 0.97.")
+            raise UsageError(f"{where}: of the estimate write its share only, such as share = 0.97.")
         return ESTIMATE, math.inf, share
     units = "" if what == CLEANED else named.unit(what)
     forms = {"inside_sigmas": "sigmas"} if what in (*_STATE_COLUMNS, CLEANED) else {}
     if what != CLEANED:
         forms |= {f"below_{units}": "share"} | {f"{kind}_below_{units}": kind for kind in _SIZE}
     if len(rest) != 1 or rest[0] not in forms:
-        raise UsageError(f"{place}: {what} takes one of {', '.join(forms)}, and has {', '.join(rest) or 'none'}.")
-    kind, below = forms[rest[0]], _number(place, given, rest[0], math.inf)
+        raise UsageError(f"{where}: {what} takes one of {', '.join(forms)}, and has {', '.join(rest) or 'none'}.")
+    kind, below = forms[rest[0]], _number(where, given, rest[0], math.inf)
     if (share is None) == (kind in ("share", "sigmas")):
         needs = f"{rest[0]} needs a share, such as share = 0.95" if share is None else f"{rest[0]} takes no share"
-        raise UsageError(f"{place}: {needs}.")
+        raise UsageError(f"{where}: {needs}.")
     return kind, below, 1.0 if share is None else share
 
 
-def _number(place: str, given: Mapping[str, Any], key: str, most: float) -> float:
+def _number(where: str, given: Mapping[str, Any], key: str, most: float) -> float:
     value = given[key]
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
-        raise UsageError(f"{place}: {key} = {value!r} is not a number above zero.")
+        raise UsageError(f"{where}: {key} = {value!r} is not a number above zero.")
     return float(value)
 
 

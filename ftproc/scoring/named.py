@@ -1,5 +1,5 @@
 """Errors by name, as ranges write them: along track, across, vertical, horizontal; of position, velocity, acceleration
-and the cleaned readings. What `score` prints and what limits are set on is looked up here."""
+and the cleaned readings. What `score` prints and what limits are set on is found here."""
 
 from __future__ import annotations
 

@@ -102,16 +102,12 @@ def _json(scores: Sequence[Score]) -> str:
 
 def _csv(scores: Sequence[Score]) -> str:
     rows = [_flat(score.as_dict()) for score in scores]
-    names = list(dict.fromkeys(name for row in _longest_first(rows) for name in row))
+    names = list(dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row))
     out = io.StringIO()
     writer = csv.DictWriter(out, names, lineterminator="\n")
     writer.writeheader()
     writer.writerows({k: no_formula(v) if isinstance(v, str) else v for k, v in row.items()} for row in rows)
     return out.getvalue()
-
-
-def _longest_first(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    return sorted(rows, key=len, reverse=True)
 
 
 def _flat(nested: dict[str, Any], prefix: str = "") -> dict[str, Any]:

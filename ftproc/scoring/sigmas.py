@@ -16,7 +16,7 @@ LEAST_IN_3SIGMA, LOWEST_IN_3SIGMA = 0.97, 0.9  # of a long flight, and of a shor
 MOST_SIGMAS = 12.0  # of the error of a single row
 NORMAL_99, NORMAL_ABOVE_99 = 2.576, 2.326  # two-sided and upper 99 % points
 OUTSIDE_3SIGMA = math.erfc(3 / math.sqrt(2))  # share of Gaussian errors
-MOST_ROWS = 50_000  # whose correlations are looked at; of more, every few
+MOST_ROWS = 50_000  # whose correlations are computed; of more, every few
 WINDOW = 2.0  # correlation times, up to which a correlation is summed
 
 _OVER = "overconfident in "

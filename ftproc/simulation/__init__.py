@@ -16,18 +16,7 @@ from ftproc.simulation.scenarios import Scenario, list_scenarios
 from ftproc.simulation.simulation import Simulation, simulate
 
 __all__ = [
-    "GRAMMAR",
-    "INSTRUMENT_GRAMMAR",
-    "RANGE_SCENARIOS",
-    "Fault",
-    "InstrumentErrors",
-    "OutlierSpec",
-    "Scenario",
-    "SimulatedRange",
-    "Simulation",
-    "list_scenarios",
-    "parse_instrument",
-    "parse_outliers",
-    "simulate",
+    "GRAMMAR", "INSTRUMENT_GRAMMAR", "RANGE_SCENARIOS", "Fault", "InstrumentErrors", "OutlierSpec", "Scenario",
+    "SimulatedRange", "Simulation", "list_scenarios", "parse_instrument", "parse_outliers", "simulate",
     "simulate_range",
-]
+]  # fmt: skip

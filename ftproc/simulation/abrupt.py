@@ -43,8 +43,8 @@ def _drag(velocity: FloatArray, terminal_mps: float) -> FloatArray:
 
 
 def _at(rng: Draw, near_m: float, far_m: float, height_m: float) -> FloatArray:
-    away, place = rng.uniform(near_m, far_m), heading(rng)
-    return np.array([away * place[0], away * place[1], height_m])
+    away, towards = rng.uniform(near_m, far_m), heading(rng)
+    return np.array([away * towards[0], away * towards[1], height_m])
 
 
 def _event(rng: Draw, duration_s: float) -> float:

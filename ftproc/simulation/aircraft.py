@@ -105,14 +105,14 @@ class _Pilot:
         self.speed = rng.uniform(*airframe.speed_mps)
         self.heading = rng.uniform(-np.pi, np.pi)
         around, off = rng.uniform(-np.pi, np.pi), airframe.radius_m * rng.uniform(0.0, 0.6)
-        self.place = np.array([off * np.cos(around), off * np.sin(around), rng.uniform(*airframe.height_m)])
-        self.initial = (self.speed, self.heading, self.place.copy())
+        self.position = np.array([off * np.cos(around), off * np.sin(around), rng.uniform(*airframe.height_m)])
+        self.initial = (self.speed, self.heading, self.position.copy())
         self.commands: list[tuple[int, float, float, float]] = []
         self.elapsed_s = 0.0
 
     def decide(self) -> None:
         """Command a manoeuvre: homewards when outside the area and leaving it, else by the airframe's weights."""
-        if np.hypot(*self.place[:2]) > self.airframe.radius_m and abs(self._off_home()) > 1.0:
+        if np.hypot(*self.position[:2]) > self.airframe.radius_m and abs(self._off_home()) > 1.0:
             self.turn(homewards=True)
             return
         choice = self.rng.choice(4, p=self.airframe.weights)
@@ -138,9 +138,9 @@ class _Pilot:
         frame = self.airframe
         angle = self.rng.uniform(*frame.climb_rad) * self.rng.choice([-1.0, 1.0])
         low, high = frame.height_m
-        if not low < self.place[2] < high:
-            angle = abs(angle) if self.place[2] <= low else -abs(angle)
-        room = high - self.place[2] if angle > 0 else self.place[2] - low
+        if not low < self.position[2] < high:
+            angle = abs(angle) if self.position[2] <= low else -abs(angle)
+        room = high - self.position[2] if angle > 0 else self.position[2] - low
         pull = GRAVITY_MPS2 * self.rng.uniform(*frame.pull_g)
         push = min(pull, PUSH_G * GRAVITY_MPS2)
         enter, leave = (abs(angle) * self.speed / a for a in ((pull, push) if angle > 0 else (push, pull)))
@@ -156,16 +156,11 @@ class _Pilot:
 
     def _off_home(self) -> float:
         """Angle in rad from the heading to the centre of the area."""
-        home = np.arctan2(-self.place[1], -self.place[0])
+        home = np.arctan2(-self.position[1], -self.position[0])
         return float(np.mod(home - self.heading + np.pi, 2 * np.pi) - np.pi)
 
     def _command(
-        self,
-        time_s: float,
-        speed: float = 0.0,
-        climb: float = 0.0,
-        heading: float = 0.0,
-        climb_angle: float = 0.0,
+        self, time_s: float, speed: float = 0.0, climb: float = 0.0, heading: float = 0.0, climb_angle: float = 0.0
     ) -> None:
         """Append one command; dead reckoning with mean speed, mean climb angle, and an arc for a turn."""
         knots = max(1, round(time_s / self.airframe.step_s))
@@ -175,6 +170,6 @@ class _Pilot:
         length = (self.speed + speed / 2) * seconds
         chord, middle = length * np.sinc(heading / (2 * np.pi)), self.heading + heading / 2
         slope = climb_angle + climb / 2
-        self.place += [chord * np.cos(middle), chord * np.sin(middle), length * np.sin(slope)]
+        self.position += [chord * np.cos(middle), chord * np.sin(middle), length * np.sin(slope)]
         self.speed += speed
         self.heading += heading

@@ -161,8 +161,8 @@ def unit_noise(
     return np.array(columns).T
 
 
-def wandering(time_s: FloatArray, errors: InstrumentErrors, rng: np.random.Generator) -> FloatArray:
-    """(n, 3) offsets that wander: range m, azimuth rad, elevation rad."""
+def gauss_markov_offsets(time_s: FloatArray, errors: InstrumentErrors, rng: np.random.Generator) -> FloatArray:
+    """(n, 3) first-order Gauss-Markov offsets: range m, azimuth rad, elevation rad."""
     return np.asarray(errors.of_components("wander") * unit_noise(time_s, errors.wander_s, None, rng))
 
 

@@ -9,34 +9,15 @@ from ftproc.simulation.instrument import InstrumentErrors
 
 #: The fields of `InstrumentErrors`, and the largest size of each: m, rad, refractivity, s, samples.
 LARGEST = {
-    "range_zero_m": 1e5,
-    "azimuth_zero_rad": 0.1,
-    "elevation_zero_rad": 0.1,
-    "mislevel_rad": 0.1,
-    "mislevel_azimuth_rad": 2 * math.pi,
-    "collimation_rad": 0.1,
-    "refraction": 0.01,
-    "servo_lag_s": 1.0,
-    "servo_lag_s2": 1.0,
-    "azimuth_eccentricity_rad": 0.1,
-    "azimuth_ellipticity_rad": 0.1,
-    "elevation_eccentricity_rad": 0.1,
-    "elevation_ellipticity_rad": 0.1,
-    "circle_zero_rad": 2 * math.pi,
-    "range_walk_m": 1e4,
-    "range_walk_at_m": 1e7,
-    "range_wander_m": 1e5,
-    "azimuth_wander_rad": 0.1,
-    "elevation_wander_rad": 0.1,
-    "wander_s": 1e5,
-    "stamp_jitter_s": 10.0,
-    "range_rounding_m": 1e5,
-    "azimuth_rounding_rad": 0.1,
-    "elevation_rounding_rad": 0.1,
-    "range_held": 1000,
-    "azimuth_held": 1000,
+    "range_zero_m": 1e5, "azimuth_zero_rad": 0.1, "elevation_zero_rad": 0.1, "mislevel_rad": 0.1,
+    "mislevel_azimuth_rad": 2 * math.pi, "collimation_rad": 0.1, "refraction": 0.01, "servo_lag_s": 1.0,
+    "servo_lag_s2": 1.0, "azimuth_eccentricity_rad": 0.1, "azimuth_ellipticity_rad": 0.1,
+    "elevation_eccentricity_rad": 0.1, "elevation_ellipticity_rad": 0.1, "circle_zero_rad": 2 * math.pi,
+    "range_walk_m": 1e4, "range_walk_at_m": 1e7, "range_wander_m": 1e5, "azimuth_wander_rad": 0.1,
+    "elevation_wander_rad": 0.1, "wander_s": 1e5, "stamp_jitter_s": 10.0, "range_rounding_m": 1e5,
+    "azimuth_rounding_rad": 0.1, "elevation_rounding_rad": 0.1, "range_held": 1000, "azimuth_held": 1000,
     "elevation_held": 1000,
-}
+}  # fmt: skip
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180, "arcsec": math.pi / 648_000}
 
 INSTRUMENT_GRAMMAR = """\
@@ -56,7 +37,7 @@ name.
   range_walk_m          weak echoes read longer, by this times log(1 + (range / range_walk_at_m)^4),
   range_walk_at_m       with this range (10000 m)
   range_wander_m, azimuth_wander_mrad, elevation_wander_mrad
-                        1 sigma of an offset that wanders (first-order Gauss-Markov),
+                        1 sigma of a first-order Gauss-Markov offset,
   wander_s              with this correlation time (1 s)
   stamp_jitter_s        1 sigma by which time stamps are off, the same for the components of a sample
   range_rounding_m, azimuth_rounding_mrad, elevation_rounding_mrad

@@ -32,11 +32,7 @@ class Flight:
         s = (time_s - (self.start_s + cell * self.step_s))[:, None]
         p, v, a = self.position[cell], self.velocity[cell], self.acceleration[cell]
         jerk = (self.acceleration[cell + 1] - a) / self.step_s
-        return (
-            p + s * (v + s * (a / 2 + s * jerk / 6)),
-            v + s * (a + s * jerk / 2),
-            a + s * jerk,
-        )
+        return (p + s * (v + s * (a / 2 + s * jerk / 6)), v + s * (a + s * jerk / 2), a + s * jerk)
 
     def moved(self, shift_m: FloatArray) -> Flight:
         """The same flight shifted by (3,) metres."""

@@ -92,14 +92,11 @@ GNSS, GNSS_S, GNSS_M = "range-gnss", 1.0, (2.0, 2.0, 4.0)  # name, between posit
 WRONG, WRONG_M = 0.02, 200.0  # share of wrong positions, and their size
 #: Two radars without elevations that hear flight levels, and one with range rates. Is not drawn by ANY.
 SURVEILLANCE = "range-surveillance"
-APART = {
-    GNSS: ((RADAR,), RANGES["range-radars"][2]),
-    SURVEILLANCE: ((FLAT, FLAT, DOPPLER), (("airliner", 400.0),)),
-}
+APART = {GNSS: ((RADAR,), RANGES["range-radars"][2]), SURVEILLANCE: ((FLAT, FLAT, DOPPLER), (("airliner", 400.0),))}
 DESCRIPTIONS = {
     ANY: "several stations on one flight: one of the four below is drawn; -o names a directory",
     **{name: text for name, (text, _, _) in RANGES.items()},
-    SURVEILLANCE: "two radars with flight levels in place of elevations, and one with range rates; an airliner",
+    SURVEILLANCE: "two radars with flight levels instead of elevations, and one with range rates; an airliner",
     GNSS: "a radar with unknown biases, and the positions of GNSS on board; an airliner or a cruiser",
 }
 

@@ -53,8 +53,8 @@ def kept_rows(time_s: FloatArray, spec: OutlierSpec, rng: np.random.Generator) -
     keep = np.ones(len(time_s), bool)
     for count, seconds in spec.gaps:
         for _ in range(count):
-            length, place = rng.uniform(*seconds), rng.random()
-            start = low + place * (high - low - length)
+            length, share = rng.uniform(*seconds), rng.random()
+            start = low + share * (high - low - length)
             if start >= low:
                 keep[(time_s > start) & (time_s < start + length)] = False
     return keep

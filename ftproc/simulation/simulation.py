@@ -16,13 +16,13 @@ from ftproc.simulation.flights import FLIGHTS
 from ftproc.simulation.further import measured
 from ftproc.simulation.instrument import (
     InstrumentErrors,
+    gauss_markov_offsets,
     held,
     readable,
     rounded,
     servo_lag,
     systematic,
     unit_noise,
-    wandering,
 )
 from ftproc.simulation.kinematics import Flight
 from ftproc.simulation.outlier_spec import OutlierSpec, parse_outliers
@@ -116,7 +116,7 @@ def _check(plan: Plan) -> None:
 def measure(flight: Flight, plan: Plan, sigma: FloatArray, name: str, seed: int | Sequence[int]) -> Simulation:
     """The log of a flight that an instrument at the origin takes, and its truth, row for row.
 
-    plan: its `flight` is not looked at. sigma: (3,) unit of sizes in sigmas, m, rad, rad.
+    plan: its `flight` is not used. sigma: (3,) unit of sizes in sigmas, m, rad, rad.
     """
     streams = _streams(seed)
     spec, rng = parse_outliers(plan.outliers), streams["instrument"]
@@ -125,7 +125,7 @@ def measure(flight: Flight, plan: Plan, sigma: FloatArray, name: str, seed: int 
     late = plan.instrument.stamp_jitter_s * rng.standard_normal(len(grid))
     taken = (np.clip(grid + late, grid[0], grid[-1]) if late.any() else grid) - hidden
     exact = systematic(flight.at(taken)[0], plan.instrument) - servo_lag(flight, taken, plan.instrument)
-    exact += wandering(grid, plan.instrument, rng)
+    exact += gauss_markov_offsets(grid, plan.instrument, rng)
     usual = np.asarray(plan.noise * unit_noise(grid, spec.correlation_s, spec.tails_dof, streams["noise"]))
     noise, _ = contaminate(usual, spec.noise, sigma, plan.dt_s, streams["clock"])
     clean = exact + noise

@@ -83,7 +83,7 @@ RULES: dict[str, tuple[Off, ...]] = {
     "tails": (Off(TWO_PASS, "allow_for_tails", _pair),),
     "late stamps": (Off(TWO_PASS, "late_stamps", _nothing),),
     "very late stamps": (Off(TWO_PASS, "allow_for_very_late_stamps", _pair),),
-    "last look": (Off(TWO_PASS, "last_look", lambda record, decision, work: (decision, ())),),
+    "rejected runs": (Off(TWO_PASS, "reassess_rejected", lambda record, decision, work: (decision, ())),),
     "faults that last": (Off(TWO_PASS, "search", _empty),),
     "jumps that the part around them explains": (Off(f"{EDITING}.lasting.search", "_leaves_a_jump", lambda *_: True),),
     "one-sided errors": (Off(TWO_PASS, "_one_sided", _empty),),
@@ -97,7 +97,7 @@ RULES: dict[str, tuple[Off, ...]] = {
     ),
     "alternatives": (
         Off(f"{EDITING}.alternatives", "try_alternatives", lambda log, weight, search: weight.copy()),
-        Off(f"{EDITING}.alternatives", "islands", _empty),
+        Off(f"{EDITING}.alternatives", "accepted_runs", _empty),
     ),
     "patches with one edge": (Off(f"{EDITING}.alternatives", "_at_edges", lambda log, weight, search: weight.copy()),),
     "alternatives as they are": (Off(f"{EDITING}.reassessment", "_or_as_they_are", _second),),

@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 
 import ftproc
-from ftproc import config
 from ftproc.cli.filter import command
 from ftproc.cli.filtering import recipes
+from ftproc.config import reading
 from ftproc.config.keys import every
 from ftproc.config.recipe import Recipe
 from ftproc.files.reading import logs, trajectories
@@ -105,8 +105,8 @@ def test_the_command_line_wins(run, other_conventions):
         '[azimuth]\ncolumn = "Hz"\nunit = "deg"\n'
     )
     args = ("odd.csv", "--config", "f.toml", "--write-config")
-    assert config.parse(run("filter", *args).out, "-")["gate"] == 3.0
-    found = config.parse(
+    assert reading.parse(run("filter", *args).out, "-")["gate"] == 3.0
+    found = reading.parse(
         run("filter", *args, "--no-smooth", "--gate", "5", "--noise", "auto", "--model", "packaged",
             "--columns", "time=clock", "--units", "az=gon").out, "-")  # fmt: skip
     assert found == {
@@ -117,7 +117,7 @@ def test_the_command_line_wins(run, other_conventions):
 
 def test_a_default_that_is_asked_for_wins_too(run, here):
     (here / "f.toml").write_text("[filter]\ngate = 3\n")
-    assert "gate" not in config.parse(run("filter", "--config", "f.toml", "--gate", "4", "--write-config").out, "-")
+    assert "gate" not in reading.parse(run("filter", "--config", "f.toml", "--gate", "4", "--write-config").out, "-")
 
 
 def test_write_config_makes_what_config_reads(run, flight):
@@ -141,7 +141,7 @@ def test_the_command_s_defaults_are_those_of_the_settings():
     ctx = command.make_context("filter", ["x.csv"])
     keys = {key.option for _, _, key in every()}
     given = {name: value for name, value in ctx.params.items() if name in keys}
-    assert config.Recipe.of(given) == Recipe() == recipes.recipe(ctx)
+    assert Recipe.of(given) == Recipe() == recipes.recipe(ctx)
 
 
 def test_every_filter_option_can_be_kept_in_a_file():

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ftproc import config
+from ftproc.config import reading, writing
 from ftproc.config.keys import KEYS, every
 from ftproc.config.recipe import Recipe
 from ftproc.errors import UsageError
@@ -81,7 +81,7 @@ def test_every_key_is_understood():
         ("elevation", "unit"),
         ("height", "column"),
     }
-    found = config.Recipe.of(config.parse(FULL, "s.toml"))
+    found = Recipe.of(reading.parse(FULL, "s.toml"))
     assert found.settings == FilterSettings(
         "ukf", "forward", True, (3.048, None, pytest.approx(20 * math.pi / 648000)), 5.0, 3.5, 9.0, 150, 7, True,
         (48.0, 11.5, 612.0), True, 46.2, (("window", 6.0), ("m", 0.01)), 1.5, True,
@@ -97,22 +97,22 @@ def test_every_key_is_understood():
 
 
 def test_an_empty_file_gives_the_defaults():
-    assert config.Recipe.of(config.parse("", "s.toml")) == Recipe()
-    assert config.parse(config.dump({}), "s.toml") == {}
+    assert Recipe.of(reading.parse("", "s.toml")) == Recipe()
+    assert reading.parse(writing.dump({}), "s.toml") == {}
 
 
 def test_defaults_that_a_comment_shows_are_the_real_ones():
     """Uncommented, every key that has a default sets it."""
     usual = tuple(f"# {name} = " for _, name, key in every() if key.default)
-    lines = [line.removeprefix("# ") if line.startswith(usual) else line for line in config.dump({}).splitlines()]
-    said = config.parse("\n".join(lines), "s.toml")
+    lines = [line.removeprefix("# ") if line.startswith(usual) else line for line in writing.dump({}).splitlines()]
+    said = reading.parse("\n".join(lines), "s.toml")
     assert {"method", "gate", "editing", "model", "temperature_c", "pressure_hpa"} <= set(said)
-    assert config.Recipe.of(said) == Recipe()
+    assert Recipe.of(said) == Recipe()
 
 
 def test_every_example_can_be_used():
-    lines = [line.removeprefix("# ") if " = " in line else line for line in config.dump({}).splitlines()]
-    said = config.parse("\n".join(lines[2:]), "s.toml")
+    lines = [line.removeprefix("# ") if " = " in line else line for line in writing.dump({}).splitlines()]
+    said = reading.parse("\n".join(lines[2:]), "s.toml")
     assert set(said) == {key.option for _, _, key in every()}
 
 
@@ -161,7 +161,7 @@ OPTIONS = st.fixed_dictionaries(
 
 @given(OPTIONS)
 def test_what_is_written_reads_back_the_same(options):
-    assert config.parse(config.dump(options), "s.toml") == options
+    assert reading.parse(writing.dump(options), "s.toml") == options
 
 
 def test_every_option_is_in_the_round_trip():
@@ -171,10 +171,10 @@ def test_every_option_is_in_the_round_trip():
 
 def test_a_model_lies_beside_its_file(tmp_path, monkeypatch):
     (tmp_path / "s.toml").write_text('[filter]\nmodel = "m.safetensors"\n')
-    found = config.load(tmp_path / "s.toml")
+    found = reading.load(tmp_path / "s.toml")
     assert found["model"] == str(tmp_path / "m.safetensors")
     monkeypatch.chdir(tmp_path)
-    assert f'model = "{tmp_path}/m.safetensors"' in config.dump({"model": "m.safetensors"})
+    assert f'model = "{tmp_path}/m.safetensors"' in writing.dump({"model": "m.safetensors"})
 
 
 @pytest.mark.parametrize(
@@ -227,7 +227,7 @@ def test_a_model_lies_beside_its_file(tmp_path, monkeypatch):
 )  # fmt: skip
 def test_the_fault_of_a_key_is_named(text, sentence):
     with pytest.raises(UsageError) as caught:
-        config.parse(text, "s.toml")
+        reading.parse(text, "s.toml")
     assert str(caught.value) == f"s.toml: {sentence}"
 
 
@@ -238,7 +238,7 @@ def test_the_name_of_an_option_is_answered_with_its_key():
         "max_patch = 3": 'there is no key "max_patch"; what --max-patch says is max_patch_s under [filter]. The ',
     }.items():
         with pytest.raises(UsageError) as caught:
-            config.parse(text, "s.toml")
+            reading.parse(text, "s.toml")
         assert str(caught.value).startswith(f"s.toml: {sentence}")
 
 
@@ -250,7 +250,7 @@ def test_files_that_cannot_be_read(tmp_path):
     }.items():
         (tmp_path / "latin.toml").write_bytes(b"# \xe9t\xe9\n")
         with pytest.raises(UsageError) as caught:
-            config.load(tmp_path / name)
+            reading.load(tmp_path / name)
         assert str(caught.value) == f"{tmp_path / name}: {sentence.format(tmp_path / name)}"
 
 
@@ -267,5 +267,5 @@ def test_files_that_cannot_be_read(tmp_path):
 )
 def test_errors_that_no_instrument_has(line, said):
     with pytest.raises(UsageError) as caught:
-        config.parse(line, "s.toml")
+        reading.parse(line, "s.toml")
     assert str(caught.value) == f"s.toml: {said}"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ftproc
-from ftproc.derived import extremes
+from ftproc.derived.extremes import extremes
 from ftproc.settings import FilterSettings
 
 

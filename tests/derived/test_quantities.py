@@ -9,8 +9,7 @@ import pymap3d
 import pytest
 
 import ftproc
-from ftproc.derived import Derived
-from ftproc.derived.quantities import load_factor
+from ftproc.derived.quantities import Derived, load_factor
 from ftproc.files import arrow
 from ftproc.records import Trajectory
 from ftproc.settings import FilterSettings

@@ -10,9 +10,8 @@ import pytest
 
 from ftproc.errors import InputError, UsageError
 from ftproc.files import decisions
-from ftproc.files.decisions import ENDS, ByHand, Line
 from ftproc.files.writing.decisions import write
-from ftproc.records import ACCEPTED, GOOD, ISOLATED, MISSING, PATCH, REJECTED, MeasurementLog
+from ftproc.records import ACCEPTED, ENDS, GOOD, ISOLATED, MISSING, PATCH, REJECTED, ByHand, Line, MeasurementLog
 
 HEAD = "component,from_s,to_s,use,reason\n"
 
@@ -156,5 +155,5 @@ def test_nothing_taken_is_a_file_that_can_be_read(tmp_path: Path) -> None:
 
 def test_metadata_give_the_lines_again(tmp_path: Path) -> None:
     one = read(tmp_path, "component,from_s,to_s,from_row,to_row,use,station\nrange,1,2.5,,,bad,a\nall,,,3,4,auto,\n")
-    lines = [{**line.as_dict(), "readings": 3} for line in one.lines]
+    lines = [{**decisions.as_dict(line), "readings": 3} for line in one.lines]
     assert decisions.from_metadata({"file": one.name, "sha256": one.sha256, "lines": lines}) == one

@@ -83,7 +83,10 @@ def test_log_from_a_bucket_is_the_log(bucket, temporary, tmp_path, flight, monke
 def test_trajectory_in_a_bucket_is_that_on_the_disk(bucket, temporary, tmp_path, flight, kind):
     bucket.pipe("/bucket/flight.csv", flight[1].read_bytes())
     near, far = tmp_path / f"out.{kind}", f"memory://bucket/made/out.{kind}"
-    for task in (Task("memory://bucket/flight.csv", str(near)), Task("memory://bucket/flight.csv", far, place="/work")):
+    for task in (
+        Task("memory://bucket/flight.csv", str(near)),
+        Task("memory://bucket/flight.csv", far, folder="/work"),
+    ):
         assert run.filter_one(task).failure is None
     assert bucket.cat(f"/bucket/made/out.{kind}") == near.read_bytes()
     found = trajectories.read(far)

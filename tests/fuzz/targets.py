@@ -22,7 +22,9 @@ import numpy as np
 import pyarrow as pa
 from safetensors.numpy import save as serialise
 
-from ftproc import config, pipeline
+from ftproc import pipeline
+from ftproc.config import reading, writing
+from ftproc.config.recipe import Recipe
 from ftproc.correction import model, model_file
 from ftproc.errors import FtprocError
 from ftproc.files import layout
@@ -150,12 +152,12 @@ def same(found: Any, expected: Any, *names: str) -> None:
 
 def _station(path: Path) -> None:
     """What is understood can be written, and then says the same."""
-    options = config.load(path)
-    config.Recipe.of(options)
-    again = config.parse(config.dump(options), path.name)
+    options = reading.load(path)
+    Recipe.of(options)
+    again = reading.parse(writing.dump(options), path.name)
     if "model" in options:
         again["model"] = options["model"]  # written with its whole path
-    config.Recipe.of(again)
+    Recipe.of(again)
 
 
 def _model(path: Path) -> None:

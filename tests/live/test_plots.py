@@ -101,5 +101,5 @@ def test_datagrams_of_blocks_stay_what_they_are():
         for each in (data, b"1,2,3"):
             sender.sendto(each, receiver._socket.getsockname())
         receiver.wait(5.0)
-        assert receiver.look() == data + b"1,2,3\n"
+        assert receiver.poll() == data + b"1,2,3\n"
     receiver.close()

@@ -114,19 +114,19 @@ def table(name):
 
 
 def run(folder, monkeypatch, pieces, request, killed_after):
-    """Follow a file that grows by these pieces as it is read; killed after so many looks at it."""
-    log, looks = folder / "log", itertools.count()
+    """Follow a file that grows by these pieces as it is read; killed after so many polls of it."""
+    log, polls = folder / "log", itertools.count()
     whole = b"".join(pieces)
-    look = sources.File.look
+    poll = sources.File.poll
 
     def grow(self):
-        if killed_after is not None and next(looks) >= killed_after:
+        if killed_after is not None and next(polls) >= killed_after:
             raise Killed
         size = log.stat().st_size if log.exists() else 0
         if size < len(whole):
             with log.open("ab") as file:
                 file.write(whole[size : size + len(pieces[0])])
-        found = look(self)
+        found = poll(self)
         if found is None and size >= len(whole):
             return b""
         return found
@@ -134,7 +134,7 @@ def run(folder, monkeypatch, pieces, request, killed_after):
     if not log.exists():
         log.write_bytes(b"")
     with monkeypatch.context() as patch:
-        patch.setattr(sources.File, "look", grow)
+        patch.setattr(sources.File, "poll", grow)
         try:
             follow_log(request, copy.deepcopy(RECIPE), lambda _: None)
         except Killed:

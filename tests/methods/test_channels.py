@@ -26,7 +26,7 @@ def path(t):
 def test_a_log_begins_with_the_first_state_carried_back():
     time_s = TIME[:150]
     log = measured(path(time_s), time_s)
-    found = channels.look(Readings(time_s, log.measurement, UNKNOWN), FilterSettings())
+    found = channels.prepare(Readings(time_s, log.measurement, UNKNOWN), FilterSettings())
     assert found.led == channels.LONGEST_WINDOW
     np.testing.assert_allclose(np.diff(found.time_s), found.interval_s, rtol=1e-9)
     before = found.time_s[: found.led]
@@ -38,7 +38,9 @@ def test_a_log_begins_with_the_first_state_carried_back():
 
 def test_blindly_nothing_is_known_before_the_first_reading():
     time_s = TIME[:150]
-    found = channels.look(Readings(time_s, measured(path(time_s), time_s).measurement, UNKNOWN), FilterSettings(), True)
+    found = channels.prepare(
+        Readings(time_s, measured(path(time_s), time_s).measurement, UNKNOWN), FilterSettings(), True
+    )
     assert found.led == 0
     np.testing.assert_array_equal(found.time_s, time_s)
 
@@ -48,7 +50,7 @@ def test_positions_and_velocities_are_those_of_the_readings_and_their_rates():
     readings = Readings(time_s, measured(path(time_s), time_s).measurement, UNKNOWN)
     value, before, after = (from_cartesian(path(time_s + late)) for late in (0.0, -step_s, step_s))
     cleaned = channels.Cleaned(value, np.ones_like(value), rate=(after - before) / (2 * step_s))
-    state = channels.estimate(readings, channels.look(readings, FilterSettings(), True), cleaned).run.state
+    state = channels.estimate(readings, channels.prepare(readings, FilterSettings(), True), cleaned).run.state
     np.testing.assert_allclose(state[:, :3], path(time_s), rtol=1e-9)
     velocity = (path(time_s + step_s) - path(time_s - step_s)) / (2 * step_s)
     np.testing.assert_allclose(state[:, 3:6], velocity, atol=1e-4)

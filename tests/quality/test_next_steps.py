@@ -11,9 +11,10 @@ import pytest
 from ftproc import pipeline
 from ftproc.batch import trying
 from ftproc.files.reading import logs
+from ftproc.long_records import joined
 from ftproc.quality import next_steps, summary
 from ftproc.quality.verdict import LEVELS
-from ftproc.records import MeasurementLog, joined
+from ftproc.records import MeasurementLog
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
 from ftproc.simulation.simulation import Simulation

@@ -12,7 +12,7 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.files import decisions
-from ftproc.records import ACCEPTED, PATCH, REJECTED, Trajectory
+from ftproc.records import ACCEPTED, ENDS, PATCH, REJECTED, Line, Trajectory
 from ftproc.report.page import FIGURES, page
 from ftproc.report.patches import patches
 from ftproc.report.view import view
@@ -37,8 +37,8 @@ def made(scenario: str, smooth: bool = True) -> Trajectory:
         log = replace(log, heights=log.heights._replace(above_m=above))
     channel = SCENARIOS[scenario][0]
     lines = [
-        decisions.Line(2, channel, decisions.ENDS[1], 100, 119, "bad", reason="=an echo"),
-        decisions.Line(3, channel, decisions.ENDS[0], *log.time_s[[130, 131]].tolist(), "good"),
+        Line(2, channel, ENDS[1], 100, 119, "bad", reason="=an echo"),
+        Line(3, channel, ENDS[0], *log.time_s[[130, 131]].tolist(), "good"),
     ]
     log = decisions.Decisions("d.csv", "0", tuple(lines)).applied(log)
     return pipeline.filter_log(log, FilterSettings(smooth=smooth))
@@ -94,8 +94,7 @@ def test_decisions_on_it_hold_and_stand_on_the_page(scenario: str) -> None:
     assert kept.splitlines()[0] == "component,from_s,to_s,from_row,to_row,use,reason"
     again = list(decisions._lines("kept.csv", kept))
     assert [(line.ends, line.first, line.last, line.use) for line in again] == [
-        (ends, line[ends[0]], line[ends[1]], line["use"])
-        for line, ends in zip(lines, reversed(decisions.ENDS), strict=True)
+        (ends, line[ends[0]], line[ends[1]], line["use"]) for line, ends in zip(lines, reversed(ENDS), strict=True)
     ]
 
 

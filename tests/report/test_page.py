@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from ftproc import report
-from ftproc.derived import extremes
+from ftproc.derived.extremes import extremes
 from ftproc.report.page import _WRAPPER, _figure, document, page
 from ftproc.report.patches import patches
 from ftproc.report.view import view

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ftproc import config, pipeline
+from ftproc import pipeline
+from ftproc.config import reading
 from ftproc.config.recipe import Recipe
 from ftproc.correction import model, model_file
 from ftproc.errors import FtprocError
@@ -180,7 +181,7 @@ def _model(path: Path, options: dict[str, Any]) -> model.Model:
 
 def _station(path: Path, options: dict[str, Any]) -> Recipe:
     """Read it; and filter the flight by it, which may be refused but must not fail."""
-    found = config.Recipe.of(config.load(path))
+    found = Recipe.of(reading.load(path))
     log = path.with_name("flight.csv")
     log.write_text(text())
     with contextlib.suppress(FtprocError):

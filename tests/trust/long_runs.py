@@ -9,8 +9,9 @@ import numpy as np
 
 from ftproc import pipeline
 from ftproc.core.model.frames import from_cartesian, wrap
+from ftproc.long_records import joined
 from ftproc.quality.verdict import CONSISTENT
-from ftproc.records import FloatArray, MeasurementLog, Trajectory, Truth, joined
+from ftproc.records import FloatArray, MeasurementLog, Trajectory, Truth
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
 

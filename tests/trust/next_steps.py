@@ -25,13 +25,14 @@ from ftproc import pipeline
 from ftproc.batch import trying
 from ftproc.core import threads
 from ftproc.core.model.frames import from_cartesian
-from ftproc.files.decisions import ENDS, Decisions, Line
+from ftproc.files.decisions import Decisions
 from ftproc.files.reading import logs
 from ftproc.fusion import flight as fusion
 from ftproc.fusion import range_file
+from ftproc.long_records import joined
 from ftproc.quality.next_steps import Step
 from ftproc.quality.verdict import CONSISTENT, LEVELS, level_of
-from ftproc.records import COMPONENTS, REJECTED, FloatArray, MeasurementLog, Trajectory, joined
+from ftproc.records import COMPONENTS, ENDS, REJECTED, FloatArray, Line, MeasurementLog, Trajectory
 from ftproc.settings import FilterSettings
 from ftproc.simulation import Simulation, simulate
 from tests.trust import faulty_logs, runs, tables

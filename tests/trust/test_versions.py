@@ -48,7 +48,7 @@ def answer(*packages: dict[str, Any]) -> str:
     return json.dumps({"dependencies": packages, "fixes": []})
 
 
-def test_an_audit_is_believed_only_when_it_was_one() -> None:
+def test_an_audit_counts_only_when_it_was_one() -> None:
     good: dict[str, Any] = {"name": "numpy", "version": "2.4.6", "vulns": []}
     bad = {"name": "pillow", "version": "9.0", "vulns": [{"id": "CVE-1", "fix_versions": ["9.1"]}]}
     unknown = {"name": "ruff", "skip_reason": "Dependency not found on PyPI and could not be audited"}

@@ -166,7 +166,7 @@ def _wanted(log: str, recipe: Recipe, left_out: dict[str, None]) -> Iterator[pla
 
 
 def _readings(recipes: Iterable[Recipe]) -> list[str]:
-    """What the user is told of the conventions, each sentence once."""
+    """The sentences to the user on the conventions, each sentence once."""
     found = []
     for recipe in recipes:
         if readings := conventions.in_words(recipe.station):
@@ -223,8 +223,8 @@ def _show(outcome: Outcome, summary: str, debug: bool) -> None:
     elif summary == "line" or (summary == "text" and outcome.before):
         click.echo(table.line(outcome), err=on_stdout)
     elif summary == "text":
-        places = [place for place in (outcome.task.output, outcome.task.report) if place not in (None, "-")]
-        lines = [outcome.text, line("time", f"{outcome.elapsed_s:.2f} s"), *(f"  -> {place}" for place in places)]
+        files = [file for file in (outcome.task.output, outcome.task.report) if file not in (None, "-")]
+        lines = [outcome.text, line("time", f"{outcome.elapsed_s:.2f} s"), *(f"  -> {file}" for file in files)]
         text = "\n".join(lines)
         click.echo("\n".join(map(printable, text.split("\n"))), err=on_stdout)
 

@@ -206,12 +206,12 @@ def _write(found: flight.Flight, output: str, places: results.Places, range_: Ra
         results.write_calibration(range_, found.constants, places.calibration)
 
 
-def _show(found: flight.Flight, places: list[str], form: str, elapsed_s: float, on_stdout: bool) -> None:
+def _show(found: flight.Flight, files: list[str], form: str, elapsed_s: float, on_stdout: bool) -> None:
     metadata = found.trajectory.metadata
     if form == "json":
-        shown = {"log": metadata["log"], "method": metadata["method"], **metadata["summary"], "output": places[0]}
+        shown = {"log": metadata["log"], "method": metadata["method"], **metadata["summary"], "output": files[0]}
         click.echo(json.dumps(trajectories.plain(shown), indent=2), err=on_stdout)
     elif form == "text":
         text = summary.text(metadata) if found.fused is not None else single.text(metadata)
-        lines = [text, line("time", f"{elapsed_s:.2f} s"), *(f"  -> {place}" for place in places if place != "-")]
+        lines = [text, line("time", f"{elapsed_s:.2f} s"), *(f"  -> {file}" for file in files if file != "-")]
         click.echo("\n".join(map(printable, "\n".join(lines).split("\n"))), err=on_stdout)

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from ftproc.core.comparators import ensemble, particles
 from ftproc.core.editing.track import RETRY_SAMPLES, reacquire
@@ -18,10 +17,9 @@ from ftproc.core.filtering.records import FilterRun, Model, Observations, Start,
 from ftproc.core.model import kinematics
 from ftproc.core.model.frames import line_of_sight_axes
 from ftproc.core.model.measurement import NO_RANGE_M
+from ftproc.records import FloatArray
 
-FloatArray = NDArray[np.float64]
-
-BELIEVED = 0.5  # a reading used so far confirms the track
+CONFIRMS = 0.5  # a reading used so far confirms the track
 POWERS_OF_T = np.repeat([2.5, 1.5, 0.5], 3)  # by which Q(T)'s factor grows, row by row
 UNIT_NOISE = np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1.0]])  # Q(1 s) for a jerk of 1
 
@@ -101,7 +99,7 @@ class _Run:
                 cloud = self.motion.move(cloud, time_s[k] - time_s[0], time_s[k] - time_s[k - 1], rng)
             cloud = self._step(k, cloud)
             self.rows["since_start"][k] = k - self.starts[-1].sample
-            if self.rows["weight"][k].max() >= BELIEVED or not np.isfinite(self.log.measurement[k]).any():
+            if self.rows["weight"][k].max() >= CONFIRMS or not np.isfinite(self.log.measurement[k]).any():
                 used_s = time_s[k]
             elif time_s[k] - used_s > self.settings.longest_patch_s and k >= retry:
                 again = reacquire(time_s, self.log.measurement, np.diag(self.sensor.noise), k)

@@ -23,27 +23,25 @@ from ftproc.core.filtering.smoother import RESIDUALS, SmootherRun, smooth_log
 from ftproc.core.identification.stretches import runs_of
 from ftproc.core.work import Work
 from ftproc.order_statistics import typical
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from ftproc.records import FloatArray, IntArray
 
 LONGEST = 48  # used readings between two rejected runs
 LENGTHS = (4, 6, 9, 13, 19, 28, 40)  # samples beside a rejected run, or at an end of the log, that may be the patch
 GAP_INTERVALS = 8.0  # median intervals without a reading, which a patch may end at
-AROUND = 80  # samples on each side that the comparison looks at
+AROUND = 80  # samples on each side that the comparison covers
 ROUNDS = 5
 MARGIN = 5.0  # by which the log-probability of another decision must be better,
 AT_EDGE = 25.0  # and of a patch with one edge: a start in a turn gains 21 without one, patches that were missed 43
-MOST = 100  # comparisons in one look
+MOST = 100  # comparisons in one round
 STEPS = 14  # of filling a hole, or of taking out what stands out most
-FITS = 2.5  # sigmas off at which a reading is taken into a hole
+FITS = 2.5  # residual, in its 1-sigma, at which a reading is taken into a hole
 SURE, ALMOST = 1.5, 1.3  # times the noise, or the smallest sigma in the hole: where the track is known well enough
 APART = 6  # samples between readings that are taken out at once
 
 
 class Neighbourhood(NamedTuple):
     """A stretch of the log and what decides in it: time_s (n,), measurement (n, 3), possible (n, 3) the readings that
-    may be good at all, the model (of a single jerk level), rates (3, 3) of outliers, the gate in sigmas; uneven: see
+    may be good at all, the model (of constant process noise), rates (3, 3) of outliers, the gate in sigmas; uneven: see
     `Observations`."""
 
     time_s: FloatArray
@@ -65,7 +63,7 @@ class Neighbourhood(NamedTuple):
         return self._replace(time_s=arrays[0], measurement=arrays[1], possible=arrays[2], uneven=uneven)
 
 
-class Island(NamedTuple):
+class AcceptedRun(NamedTuple):
     """Used readings [begin, end) of a component between rejected runs [first, begin) and [end, last), one of which may
     be a gap or an end of the log instead."""
 
@@ -75,23 +73,23 @@ class Island(NamedTuple):
     end: int
     last: int
 
-    def shifted(self, samples: int) -> Island:
+    def shifted(self, samples: int) -> AcceptedRun:
         """With samples counted from a later one."""
-        return Island(self.component, *(place - samples for place in self[1:]))
+        return AcceptedRun(self.component, *(index - samples for index in self[1:]))
 
 
 class Search:
-    """A search for alternatives. tried: islands that were examined; they are examined again only if they have changed.
-    unexamined: those beyond the MOST of a look, and those that no work was left for."""
+    """A search for alternatives. tried: runs that were examined; they are examined again only if they have changed.
+    unexamined: those beyond the MOST of a round, and those that no work was left for."""
 
     def __init__(self, work: Work) -> None:
-        self.tried: set[Island] = set()
-        self.unexamined: set[Island] = set()
+        self.tried: set[AcceptedRun] = set()
+        self.unexamined: set[AcceptedRun] = set()
         self.work = work
 
-    def take(self, island: Island) -> bool:
-        """Whether there is work left for an island."""
-        (self.tried if self.work.left > 0 else self.unexamined).add(island)
+    def take(self, run: AcceptedRun) -> bool:
+        """Whether there is work left for a run."""
+        (self.tried if self.work.left > 0 else self.unexamined).add(run)
         return self.work.left > 0
 
 
@@ -104,18 +102,18 @@ class Step(NamedTuple):
 
 def try_alternatives(log: Neighbourhood, weight: FloatArray, search: Search) -> FloatArray:
     """The decisions (n, 3), replaced by others where these are likelier."""
-    # Where a window ends, a patch may look like motion, and motion like a patch.
+    # Where a window ends, a patch may resemble motion, and motion a patch.
     result = weight.copy() if search.work.of_window else _at_edges(log, weight, search)
-    new = [island for island in islands(log.time_s, weight, log.possible) if island not in search.tried]
+    new = [run for run in accepted_runs(log.time_s, weight, log.possible) if run not in search.tried]
     search.unexamined.update(new[MOST:])
-    for island in new[:MOST]:
-        if not search.take(island):
+    for run in new[:MOST]:
+        if not search.take(run):
             continue
-        low = max(island.first - AROUND, 0)
-        near = slice(low, island.last + AROUND)
+        low = max(run.first - AROUND, 0)
+        near = slice(low, run.last + AROUND)
         part = log.part(near)
         try:
-            steps = [*decisions(part, result[near]), *_alternatives(part, result[near], island.shifted(low))]
+            steps = [*decisions(part, result[near]), *_alternatives(part, result[near], run.shifted(low))]
         except ValueError:  # a component has too few readings there
             continue
         search.work.left -= len(steps) * len(part.time_s)
@@ -128,8 +126,8 @@ def try_alternatives(log: Neighbourhood, weight: FloatArray, search: Search) -> 
 def _at_edges(log: Neighbourhood, weight: FloatArray, search: Search) -> FloatArray:
     """The decisions (n, 3), replaced where it is likelier that a rejected run, or an end of the log, is the edge of a
     patch that was followed: a ramp begins without a jump, and at an end of the log there is no other edge. Of several
-    in the same place, the likeliest."""
-    found = list[tuple[float, Island, slice, FloatArray]]()
+    with common samples, the likeliest."""
+    found = list[tuple[float, AcceptedRun, slice, FloatArray]]()
     for edge in [each for each in _edges(weight, log.possible) if each not in search.tried]:
         if not search.take(edge):
             continue
@@ -151,8 +149,8 @@ def _at_edges(log: Neighbourhood, weight: FloatArray, search: Search) -> FloatAr
     return result
 
 
-def _beside(part: Neighbourhood, weight: FloatArray, edge: Island) -> list[Step]:
-    """The decisions, and those with readings beside a rejected run rejected in its place."""
+def _beside(part: Neighbourhood, weight: FloatArray, edge: AcceptedRun) -> list[Step]:
+    """The decisions, and those with readings beside a rejected run rejected instead of it."""
     component, first, begin, end, last = edge
     steps = [_step(part, weight)[0]]
     for side, length in itertools.product((-1, 1), LENGTHS):
@@ -166,18 +164,18 @@ def _beside(part: Neighbourhood, weight: FloatArray, edge: Island) -> list[Step]
     return steps if best is steps[0] else [*steps, *decisions(part, best.weight)]
 
 
-def _edges(weight: FloatArray, possible: NDArray[np.bool_]) -> list[Island]:
+def _edges(weight: FloatArray, possible: NDArray[np.bool_]) -> list[AcceptedRun]:
     """The rejected runs of each component, and the ends of the log, which are runs of nothing."""
-    found, n = list[Island](), len(weight)
+    found, n = list[AcceptedRun](), len(weight)
     for c in range(3):
         seen = np.flatnonzero(possible[:, c])
         if len(seen):
             runs = [(int(seen[a]), int(seen[b - 1]) + 1) for a, b in runs_of(weight[seen, c] <= 0, SHORTEST_RUN)]
-            found += [Island(c, a, a, b, b) for a, b in [(0, 0), *runs, (n, n)]]
+            found += [AcceptedRun(c, a, a, b, b) for a, b in [(0, 0), *runs, (n, n)]]
     return found
 
 
-def islands(time_s: FloatArray, weight: FloatArray, possible: NDArray[np.bool_]) -> list[Island]:
+def accepted_runs(time_s: FloatArray, weight: FloatArray, possible: NDArray[np.bool_]) -> list[AcceptedRun]:
     """Where a patch may have been followed. time_s (n,), weight, possible: (n, 3)."""
     found = []
     for c in range(3):
@@ -194,31 +192,31 @@ def islands(time_s: FloatArray, weight: FloatArray, possible: NDArray[np.bool_])
         for (low, begin), (end, high) in itertools.pairwise(banks):
             if 0 < end - begin <= LONGEST and low + end < begin + high:
                 outer = int(seen[low]), int(seen[high - 1]) + 1
-                found.append(Island(c, outer[0], int(seen[begin]), int(seen[end - 1]) + 1, outer[1]))
+                found.append(AcceptedRun(c, outer[0], int(seen[begin]), int(seen[end - 1]) + 1, outer[1]))
     return found
 
 
-def _inside(place: int, runs: IntArray) -> bool:
+def _inside(index: int, runs: IntArray) -> bool:
     """Whether a gap lies in one of the runs (m, 2), or at its edge."""
-    return bool(((runs[:, 0] <= place) & (place <= runs[:, 1])).any())
+    return bool(((runs[:, 0] <= index) & (index <= runs[:, 1])).any())
 
 
-def _alternatives(log: Neighbourhood, weight: FloatArray, island: Island) -> Iterator[Step]:
-    """Decisions from the opposite hypothesis, and from that of nothing known of the component there."""
-    component, first, begin, end, last = island
-    opposite = weight.copy()
-    opposite[first:last, component] = 1.0
-    opposite[begin:end, component] = 0.0
-    steps = _without_the_worst(log, opposite * log.possible)
+def _alternatives(log: Neighbourhood, weight: FloatArray, run: AcceptedRun) -> Iterator[Step]:
+    """Decisions from the alternative hypothesis, and from that of nothing known of the component there."""
+    component, first, begin, end, last = run
+    exchanged = weight.copy()
+    exchanged[first:last, component] = 1.0
+    exchanged[begin:end, component] = 0.0
+    steps = _without_the_worst(log, exchanged * log.possible)
     yield from steps
     yield from decisions(log, max(steps, key=lambda step: step.likelihood).weight)
     yield from _filled(log, weight, component, slice(first, last))
 
 
-def decisions(log: Neighbourhood, weight: FloatArray, rounds: int = ROUNDS) -> list[Step]:
-    """The decisions from `weight` on until they stand still, or for so many rounds."""
+def decisions(log: Neighbourhood, weight: FloatArray) -> list[Step]:
+    """The decisions from `weight` on until they stand still, or for ROUNDS."""
     steps = []
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         step, smoothed = _step(log, weight)
         steps.append(step)
         noise = log.model.noise_variance
@@ -232,7 +230,7 @@ def decisions(log: Neighbourhood, weight: FloatArray, rounds: int = ROUNDS) -> l
 
 def _without_the_worst(log: Neighbourhood, weight: FloatArray) -> list[Step]:
     """The decisions with ever fewer readings, the worst of each surroundings first: beside an outlier, good readings
-    look bad."""
+    seem bad."""
     steps = []
     for _ in range(STEPS):
         step, smoothed = _step(log, weight)

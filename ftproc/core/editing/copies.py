@@ -1,10 +1,10 @@
 """Readings that were not measured: held from the sample before, drawn on a line between two others, or computed.
 
-An instrument that is slower than its log, or that has nothing new to say, leaves the reading before in its place; a
+An instrument that is slower than its log, or that has nothing new to say, repeats the reading before; a
 program that brings several instruments to one clock interpolates. Used as readings, such copies make the noise
-seem correlated, and what they say is counted several times. They are told from chance by exact agreement: the readings
-of a moving target change by many steps of their rounding, and hardly ever by none. A coarse instrument that sees a slow
-target repeats its readings too, but then goes on by single steps.
+seem correlated, and what they say is counted several times. They are distinguished from chance by exact agreement: the
+readings of a moving target change by many steps of their rounding, and very seldom by none. A coarse instrument that
+sees a slow target repeats its readings too, but then goes on by single steps.
 
 A tracker that has lost its target coasts: it computes where the target should be, and the noise is gone.
 """
@@ -18,8 +18,8 @@ from ftproc.core.editing.screening import stuck
 from ftproc.core.identification.stretches import runs_of
 from ftproc.core.model.frames import unwrap, wrap
 from ftproc.order_statistics import distinct, quantile, typical
+from ftproc.records import FloatArray
 
-FloatArray = NDArray[np.float64]
 KindArray = NDArray[np.uint8]
 
 MEASURED, HELD, INTERPOLATED, COMPUTED = 0, 1, 2, 3
@@ -28,13 +28,13 @@ SOME, SOME_ON_GRID = 4000, 0.5  # readings, or steps, that stand for many more; 
 FEWEST = 20  # readings that must be left
 MANY = 6.0  # steps of rounding by which a reading changes typically, or else it is coarse
 NEAR = 4.0  # steps within which changes are counted, to know how many are none by chance
-LEAST, SHARE, TIMES_CHANCE = 8, 0.03, 3.0  # copies, of all readings, and of those that chance makes, to be believed
+LEAST, SHARE, TIMES_CHANCE = 8, 0.03, 3.0  # copies, of all readings, and of those that chance makes, to count
 LEAST_ON_LINES = 0.15  # share of a component's readings
 NEARLY = 0.2  # of the median that the nearest twentieth of those off the lines are off: more shows rounding that is
 # coarse, whatever its step
 ROUNDING = 1e-12  # of a number
 QUIET, IN_A_ROW = 0.05, 14  # of the noise, third differences that have none, and so many of them
-CALM, OF_NORMAL = 0.2, 0.2533  # share of third differences that tell the noise, and their limit in its 1-sigma
+NOISE_SHARE, OF_NORMAL = 0.2, 0.2533  # share of third differences that gives the noise, and their limit in its 1-sigma
 BEYOND, ALTERNATE = 5.0, -0.3  # times the noise that count, and correlation of third differences that noise has at most
 TELLS = 0.2  # of the noise: coarser rounding hides whether there is any
 MOVED = 10.0  # times the noise that readings of a target that moves change meanwhile
@@ -49,7 +49,7 @@ def without_copies(
     MEASURED.
 
     time_s (n,), measurement (n, 3). Repeats of a component that is stuck now and then are outliers, not copies.
-    genuine: (n, 3) readings that are no copies whatever they look like.
+    genuine: (n, 3) readings that are no copies whatever they resemble.
     """
     z, kind = measurement.copy(), np.zeros(measurement.shape, np.uint8)
     quiet, moving = np.zeros(z.shape, bool), np.zeros(len(z), bool)
@@ -89,9 +89,9 @@ def _grid(readings: FloatArray, levels: FloatArray) -> float:
     if not len(steps):
         return 0.0
     chosen, level = steps[:: 1 + len(steps) // SOME], float(levels[len(levels) // 2])
-    places = [int(share * (len(chosen) - 1)) for share in (0.5, 0.2, 0.05)]
+    indices = [int(share * (len(chosen) - 1)) for share in (0.5, 0.2, 0.05)]
     some = readings[:: 1 + len(readings) // SOME]
-    for step in [*map(float, np.partition(chosen, places)[places]), float(steps.min())]:
+    for step in [*map(float, np.partition(chosen, indices)[indices]), float(steps.min())]:
         if _on_grid(some, level, step) > SOME_ON_GRID and _on_grid(readings, level, step) >= MOSTLY_ON_GRID:
             return step
     return 0.0
@@ -199,7 +199,7 @@ def _without_noise(time_s: FloatArray, values: FloatArray, step: float) -> tuple
     second = np.diff(first) / (time_s[2:] - time_s[:-2])
     third = np.diff(second) / (time_s[3:] - time_s[:-3]) / np.sqrt((share**2).sum(0))
     off = np.abs(third)
-    noise = quantile(off, CALM) / OF_NORMAL
+    noise = quantile(off, NOISE_SHARE) / OF_NORMAL
     third, limit = np.clip(third, -BEYOND * noise, BEYOND * noise), max(QUIET * noise, step)
     if limit < TELLS * noise and (third[1:] * third[:-1]).sum() < ALTERNATE * (third**2).sum():
         for begin, end in runs_of(off <= limit, IN_A_ROW):

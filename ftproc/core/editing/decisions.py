@@ -20,8 +20,7 @@ from ftproc.core.identification.nearby import samples_around, smoothed_near
 from ftproc.core.identification.profile import median_level
 from ftproc.core.identification.stretches import widened
 from ftproc.core.work import Work
-
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 MAX_ROUNDS = 8
 TUNING_ROUNDS = 3
@@ -30,10 +29,10 @@ IMPRECISE = (0.3, 0.03, 0.003)  # shares of the variance of late time stamps by 
 # apart: the rates at which these change are not known better, and do not stay the same
 TAILS, RARE = 0.5, 0.005  # share of what lies outside the gate that lies just outside, and of all readings, to be tails
 MOST_IN_TAILS = 0.05  # share of all readings: of more, nobody knows whether they are tails or outliers
-NORMALLY, FADING = 3.0, 1.0  # times as many as a normal distribution has there, and as farther out
+NORMALLY, FALLING = 3.0, 1.0  # times as many as a normal distribution has there, and as farther out
 GATE_STEP, WIDEST_GATE = 1.1, 2.5  # by which a gate is widened, and times itself at most
 ROUNDED = 0.5  # of a component's noise that rounding makes
-FEW_PLACES, ALIKE = 0.25, 1e-9  # share of a log around what has changed, to smooth only that; of what is the same
+FEW_CHANGED, ALIKE = 0.25, 1e-9  # share of a log around what has changed, to smooth only that; of what is the same
 FEWEST_KEPT = 0.5  # share of what screening trusts that must survive the decisions, in each component
 
 
@@ -82,7 +81,7 @@ class Residuals(NamedTuple):
 
 class Decision(NamedTuple):
     """Weights (n, 3), the model and starts they were made with, the estimated outlier rates (3, 3), how many rounds it
-    took, whether they stand still, for how many places no work was left to look for alternatives, the 1-sigma of the
+    took, whether they stand still, for how many runs no work was left to try alternatives, the 1-sigma of the
     time stamps, s, the log-probability of their being as late as they are, whether the noise drifts, a model with
     correlated noise that explains the log as well or better, but is not followed, that with the slowest noise of the
     one that is followed, and the residuals by which `decide` made them."""
@@ -147,7 +146,7 @@ def _smoothed(log: Observations, model: Model, starts: list[Start], before: _Smo
             return before._replace(log=log, starts=starts)
         around = samples_around(log, median_level(model))
         reached = widened(changed, around // 2)
-        if widened(reached, around).mean() < FEW_PLACES:
+        if widened(reached, around).mean() < FEW_CHANGED:
             samples, smoothed = smoothed_near(log, model, reached, around)
             inside = reached[samples]
             residual, variance = (each.copy() for each in before.residuals)
@@ -205,7 +204,7 @@ def allow_for_very_late_stamps(
     record: Record, decision: Decision, imprecise: float, even: Record
 ) -> tuple[Record, Decision]:
     """The record with a variance for each time stamp, and the decisions made again: a few may be so late that all
-    readings of their samples, and then those around them, look like outliers. even: the record as it was before late
+    readings of their samples, and then those around them, resemble outliers. even: the record as it was before late
     stamps were allowed for."""
     log = record.weighted(decision.weight)
     smoothed = smooth_log(log, decision.model, decision.starts)
@@ -253,7 +252,7 @@ def _has_tails(off: FloatArray, gate: float, count: int) -> bool:
     )
     normal = NORMALLY * count * math.erfc(gate / math.sqrt(2))
     few = int(outside.sum()) <= MOST_IN_TAILS * count
-    return few and near > FADING * far and near + far > max(TAILS * int(outside.sum()), RARE * count, normal)
+    return few and near > FALLING * far and near + far > max(TAILS * int(outside.sum()), RARE * count, normal)
 
 
 def allow_for_drift(record: Record, decision: Decision) -> tuple[Record, Decision]:

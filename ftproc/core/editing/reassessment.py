@@ -1,8 +1,9 @@
 """Reassessment: a jerk profile that follows the flight, and the decisions made again where something stands out.
 
-A patch that was missed makes the process noise too high around it, so that it goes on being missed. So the places where
-the profile stands out, where runs of readings are off together, and where an alternative hypothesis may be likelier
-are decided again with the profile's median, which no single event can move. The rest of a long log stays as it is.
+A patch that was missed makes the process noise too high around it, so that it goes on being missed. So the stretches
+where the profile stands out, where runs of readings are off together, and where an alternative hypothesis may be
+likelier are decided again with the profile's median, which no single event can move. The rest of a long log stays as
+it is.
 """
 
 from __future__ import annotations
@@ -27,16 +28,15 @@ from ftproc.core.identification.profile import fit_profile, median_level, pieces
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.identification.stretches import runs_of, stretches_of, widened
 from ftproc.order_statistics import median
+from ftproc.records import FloatArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Begin = Callable[[Record, FloatArray], tuple[Record, Decision]]
 
 ROUNDS = 6
 LEAST_KEPT = 0.8  # of the readings of a component that were good before the first round
 MARGIN = 5.0  # in log-probability, by which the decisions made again may be less likely than those before
-FEW_MORE = 0.01  # of the readings: those that another hypothesis may reject beyond the first, to be believed
-OTHER_LEVEL = 2.5  # times the jerk level at which an alternative was tried, before it is tried again
+FEW_MORE = 0.01  # of the readings: those that another hypothesis may reject beyond the first, to be preferred
+OTHER_LEVEL = 2.5  # times the process noise at which an alternative was tried, before it is tried again
 PROFILE_STEPS, COMPARED_STEPS = 2, 5  # of the search for the jerk profile; where two are compared
 STANDS_OUT = 64.0  # times the median of the jerk profile
 LONGEST_SPAN = 3000  # samples that are decided together
@@ -50,53 +50,55 @@ SHORT_LOG, MOST = 8000, 0.5  # samples, and share that stands out: then all of i
 def reassess(record: Record, decision: Decision) -> Decision:
     """Give the model a jerk profile, and make the decisions again where it stands out or readings are suspicious."""
     profile = with_profile(record, decision)
-    calm = median_level(profile)
-    marked, reach = _stands_out(record.time_s, profile), samples_around(record.weighted(decision.weight), calm)
-    for island in alternatives.islands(record.time_s, decision.weight, record.possible):
-        marked[island.first : island.last] = True
-    marked |= any_of(_suspects(record, decision, calm, profile, widened(marked, reach)))
+    at_median = median_level(profile)
+    marked, reach = _stands_out(record.time_s, profile), samples_around(record.weighted(decision.weight), at_median)
+    for run in alternatives.accepted_runs(record.time_s, decision.weight, record.possible):
+        marked[run.first : run.last] = True
+    marked |= any_of(_suspects(record, decision, at_median, profile, widened(marked, reach)))
     around = widened(marked, reach)
     if len(around) <= SHORT_LOG and around.mean() > MOST:
         return _until_settled(record, decision, profile)
     weight, unexamined = decision.weight.copy(), 0
-    for span in _doubtful(record, decision, calm, list(_spans(around))):
+    for span in _doubtful(record, decision, at_median, list(_spans(around))):
         part = short_record(record, span)
         try:
-            starts = _starts(part, weight[span], calm)
+            starts = _starts(part, weight[span], at_median)
         except ValueError:  # a component has too few readings there
             continue
-        initial = Decision(weight[span], calm, starts, decision.rates)
+        initial = Decision(weight[span], at_median, starts, decision.rates)
         decided = _until_settled(part, initial, with_profile(part, initial))
         weight[span] = decided.weight
         unexamined += decided.unexamined
-    return decision._replace(weight=weight, starts=_starts(record, weight, calm), model=profile, unexamined=unexamined)
+    return decision._replace(
+        weight=weight, starts=_starts(record, weight, at_median), model=profile, unexamined=unexamined
+    )
 
 
-def _doubtful(record: Record, decision: Decision, calm: Model, spans: list[slice]) -> Iterator[slice]:
-    """Those of some spans in which a profile and a calm level of their own leave something to decide. All are fitted
-    and smoothed together; most are turns that the level of the whole log has not expected."""
-    near = stretches_of(record.weighted(decision.weight), spans, calm.noise_variance, float(calm.jerk[0, 0]))
+def _doubtful(record: Record, decision: Decision, at_median: Model, spans: list[slice]) -> Iterator[slice]:
+    """Those of some spans in which a profile and a median process noise of their own leave something to decide. All
+    are fitted and smoothed together; most are turns that the level of the whole log has not expected."""
+    near = stretches_of(record.weighted(decision.weight), spans, at_median.noise_variance, float(at_median.jerk[0, 0]))
     if near is None:
         return
-    profile = fit_profile(near.log, near.starts, calm, PROFILE_STEPS)
+    profile = fit_profile(near.log, near.starts, at_median, PROFILE_STEPS)
     piece, levels = pieces(near.log.time_s, profile), profile.jerk.copy()
-    places = list[tuple[slice, slice, slice]]()  # a span, where its samples are among those near, and its pieces
+    inside_near = list[tuple[slice, slice, slice]]()  # a span, where its samples are among those near, and its pieces
     for span in spans:
         low, high = np.searchsorted(near.samples, (span.start, span.stop)).tolist()
         if high > low:
             own = slice(piece[low], piece[high - 1] + 1)
             levels[own] = median_level(profile._replace(jerk=profile.jerk[own])).jerk
-            places.append((span, slice(low, high), own))
+            inside_near.append((span, slice(low, high), own))
     smoothed = smooth_log(near.log, profile._replace(jerk=levels), near.starts, RESIDUALS)
-    for span, inside, own in places:
+    for span, inside, own in inside_near:
         part, possible = near.log.part(inside), record.possible[near.samples[inside]]
-        memory_s = scales_of(part, calm.noise_variance).memory_s(float(levels[own.start, 0]))
+        memory_s = scales_of(part, at_median.noise_variance).memory_s(float(levels[own.start, 0]))
         suspects = suspicious(
             part.time_s, smoothed.residual[inside], smoothed.residual_variance[inside], part.weight, memory_s
         )
         left = np.where(suspects, 0.0, part.weight)
         stands_out = profile.jerk[own, 0].max() >= STANDS_OUT * median(profile.jerk[own, 0])
-        if stands_out or suspects.any() or alternatives.islands(part.time_s, left, possible):
+        if stands_out or suspects.any() or alternatives.accepted_runs(part.time_s, left, possible):
             yield span
 
 
@@ -105,14 +107,14 @@ def with_profile(record: Record, decision: Decision, steps: int = PROFILE_STEPS)
     return fit_profile(record.weighted(decision.weight), decision.starts, decision.model, steps)
 
 
-def _starts(record: Record, weight: FloatArray, calm: Model) -> list[Start]:
-    return starts_of(record.weighted(weight), calm)
+def _starts(record: Record, weight: FloatArray, at_median: Model) -> list[Start]:
+    return starts_of(record.weighted(weight), at_median)
 
 
 def _until_settled(record: Record, decision: Decision, profile: Model) -> Decision:
-    """Decide again from the calm level until nothing changes, or ROUNDS times.
+    """Decide again from the median process noise until nothing changes, or ROUNDS times.
 
-    A round that rejects much of what was good is not believed: where the smallest noise that explains the readings
+    A round that rejects much of what was good is not accepted: where the smallest noise that explains the readings
     left is taken for theirs, ever fewer are left. Nor is the outcome, if it makes all readings together less likely
     than the decisions before did, each with a jerk profile of its own: then turns are taken for patches.
     """
@@ -120,19 +122,19 @@ def _until_settled(record: Record, decision: Decision, profile: Model) -> Decisi
     search = alternatives.Search(record.work)
     tried_at = np.inf
     for _ in range(ROUNDS):
-        calm = median_level(profile)
-        level = float(calm.jerk[0, 0])
+        at_median = median_level(profile)
+        level = float(at_median.jerk[0, 0])
         if not tried_at / OTHER_LEVEL < level < tried_at * OTHER_LEVEL:
             tried_at = level
             search.tried.clear()
-        suspects = _suspects(record, decision, calm, profile)
+        suspects = _suspects(record, decision, at_median, profile)
         whole = alternatives.Neighbourhood(
-            record.time_s, record.measurement, record.possible, calm, decision.rates, record.gate, record.uneven
+            record.time_s, record.measurement, record.possible, at_median, decision.rates, record.gate, record.uneven
         )
         weight = alternatives.try_alternatives(whole, np.where(suspects, 0.0, decision.weight), search)
         if not _stands_out(record.time_s, profile).any() and (weight == decision.weight).all():
             break
-        again = decide(record, decision._replace(weight=weight, model=calm), tune_first=False)
+        again = decide(record, decision._replace(weight=weight, model=at_median), tune_first=False)
         again = again._replace(model=with_profile(record, again))
         again = _or_as_they_are(record, again, decision._replace(weight=record.with_accepted(weight)), decision)
         if (again.weight == decision.weight).all() or (again.weight.sum(0) < LEAST_KEPT * first.weight.sum(0)).any():
@@ -146,7 +148,7 @@ def _until_settled(record: Record, decision: Decision, profile: Model) -> Decisi
 
 def _or_as_they_are(record: Record, again: Decision, tried: Decision, before: Decision) -> Decision:
     """The decisions made again from those that were tried, or these as they are, with a jerk profile of their own,
-    where that is likelier: deciding with a single level of the jerk may lead away from them."""
+    where that is likelier: deciding with constant process noise may lead away from them."""
     if (tried.weight == before.weight).all():
         return again
     tried = tried._replace(starts=_starts(record, tried.weight, median_level(before.model)))
@@ -158,7 +160,7 @@ def likelier(one: tuple[Record, Decision], other: tuple[Record, Decision]) -> tu
     return one if other[1] is one[1] or log_probability(*other) <= log_probability(*one) else other
 
 
-def believed(found: tuple[Record, Decision], other: tuple[Record, Decision]) -> tuple[Record, Decision]:
+def preferred(found: tuple[Record, Decision], other: tuple[Record, Decision]) -> tuple[Record, Decision]:
     """The other hypothesis, if it is likelier and does not reject many more readings to be so."""
     least = found[1].weight.sum() - FEW_MORE * found[0].possible.sum()
     return likelier(found, other) if other[1].weight.sum() > least else found
@@ -175,7 +177,7 @@ def with_less_noise(found: tuple[Record, Decision], begin: Begin) -> tuple[Recor
             break
         other = begin(record._replace(sigma=record.sigma / FINER), decision.weight)
         less = other[1].model.noise_variance < FAR_LESS**2 * decision.model.noise_variance
-        if less.sum() < MANY or believed(found, other) is found:
+        if less.sum() < MANY or preferred(found, other) is found:
             break
         found = other
     return found
@@ -188,9 +190,9 @@ def log_probability(record: Record, decision: Decision) -> float:
 
 def _likelihood(record: Record, decision: Decision) -> float:
     """Log-probability of all readings, of the decisions on them, of late time stamps and of the jerk profile."""
-    model, calm = decision.model, median_level(decision.model)
+    model, at_median = decision.model, median_level(decision.model)
     log = record.weighted(decision.weight)
-    smoothed = smooth_log(log, model, _starts(record, decision.weight, calm), RESIDUALS)
+    smoothed = smooth_log(log, model, _starts(record, decision.weight, at_median), RESIDUALS)
     whole = alternatives.Neighbourhood(
         record.time_s, record.measurement, record.possible, model, decision.rates, record.gate, record.uneven
     )
@@ -219,20 +221,20 @@ def short_record(record: Record, span: slice) -> Record:
 
 
 def _suspects(
-    record: Record, decision: Decision, calm: Model, profile: Model, marked: NDArray[np.bool_] | None = None
+    record: Record, decision: Decision, at_median: Model, profile: Model, marked: NDArray[np.bool_] | None = None
 ) -> NDArray[np.bool_]:
-    """(n, 3) readings that are good so far, in runs that are off together if the flight is calm, and off at once at
-    both ends even if it is not. marked: (n,) samples among which none is looked for."""
+    """(n, 3) readings that are good so far, in runs that are off together at the median process noise, and off at once
+    at both ends even with the profile. marked: (n,) samples among which none is sought."""
     weight, starts = decision.weight, decision.starts
     log = record.weighted(weight)
-    smoothed = smooth_log(log, calm, starts, RESIDUALS)
-    memory_s = scales_of(log, calm.noise_variance).memory_s(float(calm.jerk[0, 0]))
+    smoothed = smooth_log(log, at_median, starts, RESIDUALS)
+    memory_s = scales_of(log, at_median.noise_variance).memory_s(float(at_median.jerk[0, 0]))
     suspects = suspicious(record.time_s, smoothed.residual, smoothed.residual_variance, weight, memory_s)
     if marked is not None:
         suspects[marked] = False
     if suspects.any():
         without = record.weighted(np.where(suspects, 0.0, weight))
-        near = residuals_near(without, profile, any_of(suspects), samples_around(log, calm))
+        near = residuals_near(without, profile, any_of(suspects), samples_around(log, at_median))
         suspects = confirmed(suspects, *near)
     return suspects
 

@@ -15,13 +15,12 @@ from ftproc.core.filtering.records import Observations
 from ftproc.core.identification.likelihood import without_noise
 from ftproc.core.model.frames import unwrap
 from ftproc.order_statistics import median
-
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 SHORT_WINDOW = 11  # samples: sees jumps, and little else
 WINDOWS = (31, 75)  # samples: the short one follows manoeuvres, the long one sees through patches
 OUTVOTED = 0.5  # share of a window's parabolas that a reading is off
-FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be believed
+FEWEST_TRUSTED = 0.65  # share of a component that screening must leave, to be accepted
 
 
 class Screened(NamedTuple):
@@ -65,7 +64,7 @@ def screen_channel(
         if window == WINDOWS[0] and len(scales):
             sigma = max(median(scales), least_sigma)
     weight[jump_patches.find(time_s, unwrap(channel) if angular else channel, weight, sigma) > 0] = 0.0
-    # A component that swings too fast for parabolas loses half of itself: then only the short window is believed.
+    # A component that swings too fast for parabolas loses half of itself: then only the short window is accepted.
     for alternative in (jumps_only, seen):
         if weight.sum() < FEWEST_TRUSTED * seen.sum():
             weight = alternative

@@ -7,14 +7,12 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.editing import gate, screening
 from ftproc.core.filtering.forward import Span, lead_in
 from ftproc.core.filtering.initialization import first_state
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start, empty_rows
-
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 REACQUIRE_SAMPLES = 15
 INLIERS = 0.8  # share of them that must fit a parabola in every component
@@ -23,7 +21,7 @@ RETRY_SAMPLES = 3
 
 class Track(NamedTuple):
     """The recursion between two samples: the sample at which it started, its filter and its gate (arrays of one record,
-    changed in place)."""
+    overwritten)."""
 
     start: int
     filters: Any

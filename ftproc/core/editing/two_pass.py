@@ -29,10 +29,10 @@ from ftproc.core.editing.decisions import (
 )
 from ftproc.core.editing.lasting.curves import CLOCK
 from ftproc.core.editing.lasting.faults import Faults, Rival, Shift, Step, levelled, refined, taken_out
-from ftproc.core.editing.lasting.last_look import last_look
+from ftproc.core.editing.lasting.rejected_runs import reassess_rejected
 from ftproc.core.editing.lasting.search import search, sorted_out
 from ftproc.core.editing.lasting.weighing import scene_of
-from ftproc.core.editing.reassessment import believed, likelier, log_probability, reassess, with_less_noise
+from ftproc.core.editing.reassessment import likelier, log_probability, preferred, reassess, with_less_noise
 from ftproc.core.editing.screened import rounding_sigma, screen, stuck_readings
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven
@@ -46,8 +46,7 @@ from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.measurement import NO_RANGE_M
 from ftproc.core.model.motion import isotropic
 from ftproc.core.work import WORK, Work, for_lasting_faults
-
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 COARSE = 0.5  # of a component's noise: rounding that makes so much of it decides how its readings repeat
 FORGETS, REMEMBERED = 0.8, 5.0  # intervals that a filter remembers: with fewer it follows each reading; another start
@@ -57,7 +56,7 @@ DRIFT_ROUNDS = 3  # of following the noise: where it grows, each finds readings 
 HOPELESS = 200.0  # in log-probability, by which another hypothesis is behind if it is not followed up
 PROFILE_STEPS = 3  # of the search for the jerk profile, once the decisions are made
 STEP_MARGIN = 8.0  # in log-probability, by which steps must explain a log better than late stamps do
-LASTING_ROUNDS = 4  # of looking for faults that last: where one is taken out, another may show
+LASTING_ROUNDS = 4  # of the search for faults that last: where one is taken out, another may show
 
 
 class Known(NamedTuple):
@@ -113,14 +112,14 @@ def edit(
     """
     accepted = known.accepted.of(time_s, measurement)
     measurement, copied = without_copies(time_s, measurement, accepted)
-    work = Work(len(time_s), 0 if live else WORK)  # a window that moves on is soon looked at again
+    work = Work(len(time_s), 0 if live else WORK)  # a window that moves on is soon edited again
     decided = partial(_decided, time_s, known=known, segment_of=segment_of, work=work, white=short)
     banned = np.zeros(measurement.shape, bool)
     record, decision = decided(measurement, banned=banned)
     scene, found, doubtful = None, tuple[Step, ...](), list[Step]()
     for_lasting = for_lasting_faults(len(time_s))
     for _ in range(0 if live else LASTING_ROUNDS):
-        # Noise that wanders looks like many steps, and so do patches that there was no time to understand.
+        # Correlated noise resembles many steps, and so do patches that there was no time to understand.
         if decision.model.coloured or decision.unexamined:
             break
         scene = scene_of(record, decision, for_lasting)
@@ -130,8 +129,8 @@ def edit(
             break
         steps = (*found, *new.steps)
         log = record.weighted(decision.weight)
-        moved = levelled(log, scene.calm.noise_variance, steps)
-        read = taken_out(log._replace(measurement=measurement), scene.calm, scene.setting, moved)
+        moved = levelled(log, scene.at_median.noise_variance, steps)
+        read = taken_out(log._replace(measurement=measurement), scene.at_median, scene.setting, moved)
         other = decided(read.measurement, banned=banned | new.banned)
         if new.steps and _may_be_late_stamps((record, decision), other):
             break
@@ -139,8 +138,8 @@ def edit(
     if decision.stamp_s > 0:  # which explains a clock that seems to jump
         doubtful = [step for step in doubtful if step.component != CLOCK]
     rivals: tuple[Rival, ...] = ()
-    if not record.fixed.jerk and not live:  # at the end of a window a patch may look like motion
-        decision, rivals = last_look(record, decision, for_lasting)
+    if not record.fixed.jerk and not live:  # at the end of a window a patch may resemble motion
+        decision, rivals = reassess_rejected(record, decision, for_lasting)
     decision = decision._replace(
         weight=np.where(accepted, 1.0, decision.weight), unexamined=decision.unexamined + for_lasting.passed
     )
@@ -167,11 +166,11 @@ def _one_sided(log: Observations, model: Model, rounding: FloatArray) -> list[On
     return one_sided.find(log.weight, residual, variance, rounding)
 
 
-def _may_be_late_stamps(without: tuple[Record, Decision], bridged: tuple[Record, Decision]) -> bool:
-    """Whether it may be late time stamps that look like steps: they are left where the steps are bridged, or explain
+def _may_be_late_stamps(without: tuple[Record, Decision], levelled_log: tuple[Record, Decision]) -> bool:
+    """Whether it may be late time stamps that resemble steps: they are left where the steps are taken out, or explain
     the log as well."""
-    late = [decision.stamp_s > 0 for _, decision in (without, bridged)]
-    return all(late) or (any(late) and log_probability(*bridged) < log_probability(*without) + STEP_MARGIN)
+    late = [decision.stamp_s > 0 for _, decision in (without, levelled_log)]
+    return all(late) or (any(late) and log_probability(*levelled_log) < log_probability(*without) + STEP_MARGIN)
 
 
 def _decided(
@@ -198,7 +197,7 @@ def _decided(
     )  # fmt: skip
     begin = partial(_first, segment_of=segment_of, known=known)
     first = begin(record, record.screened)
-    if segment_of is None and _forgets(*first):  # outliers that screening has missed may look like motion
+    if segment_of is None and _forgets(*first):  # outliers that screening has missed may resemble motion
         first = likelier(first, begin(record, record.screened, shortest=REMEMBERED))
     record, decision = with_less_noise(first, begin)
     found = _examined(record, decision, known)
@@ -206,7 +205,7 @@ def _decided(
         other = begin(record, jumps_only * possible)
         takes_in = (other[1].weight > found[1].weight).any()
         if takes_in and log_probability(*other) > log_probability(*found) - HOPELESS:
-            found = believed(found, _examined(*other, known))
+            found = preferred(found, _examined(*other, known))
     return found
 
 
@@ -252,8 +251,8 @@ def _with_late_stamps(record: Record, decision: Decision) -> tuple[Record, Decis
         if many and log_probability(*found) < log_probability(record, decision) - HOPELESS:
             continue  # they are patches of outliers
         for _ in range(STAMP_ROUNDS):
-            before, found = found, believed(found, allow_for_very_late_stamps(*found, imprecise, record))
+            before, found = found, preferred(found, allow_for_very_late_stamps(*found, imprecise, record))
             if found is before:
                 break
-        likeliest = believed(likeliest, found)
+        likeliest = preferred(likeliest, found)
     return likeliest

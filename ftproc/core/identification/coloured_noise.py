@@ -12,7 +12,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun, likelihood_of, score_log
@@ -21,8 +20,7 @@ from ftproc.core.identification.likelihood import Fixed, fit_level, jerk_bounds,
 from ftproc.core.identification.profile import fit_profile
 from ftproc.core.identification.scales import Scales, scales_of
 from ftproc.order_statistics import median
-
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 LEAST = 0.1  # correlation of neighbours from which the noise may not be white ...
 LEAST_IN_SIGMAS = 3.0  # ... if so many of its own standard errors away from zero
@@ -31,10 +29,10 @@ BLOCKS = 9  # stretches of a log whose correlations are compared
 SHORT_MEMORY = (
     4.0  # intervals: a filter with a shorter one follows noise that is correlated, so its residuals show none
 )
-FIRST_FADES = (1.5, 6.0, 25.0)  # intervals: correlation times with which the search begins,
-FIRST_CALMS = (1.0, 1e-3)  # and shares of the jerk that white noise leads to
+FIRST_TAUS = (1.5, 6.0, 25.0)  # intervals: correlation times with which the search begins,
+FIRST_SHARES = (1.0, 1e-3)  # and shares of the jerk that white noise leads to
 FIRST_STEPS, STEPS, PROFILE_STEPS = 5, 15, 3
-SHORTEST_FADE, LONGEST_FADE = 0.3, 0.5  # intervals, and spans of the log
+SHORTEST_TAU, LONGEST_TAU = 0.3, 0.5  # intervals, and spans of the log
 LARGEST = 1e4  # times the variance that white noise would have
 NEGLIGIBLE = 0.02  # share of a component's variance, and correlation of neighbours
 LEAST_GAIN = 8.0  # in log-likelihood, for each component whose noise is called correlated
@@ -43,9 +41,9 @@ INDEPENDENT = 20.0  # correlation times that a log must last for noise and motio
 
 
 class Coloured(NamedTuple):
-    """The likeliest model with correlated noise, and those whose noise wanders as fast, and as slowly and far, as the
-    log allows. likelier: the first is likelier than that of white noise by LEAST_GAIN for each component; possible: by
-    that once. separable: the log lasts long enough to tell such noise, if it is fast, from motion."""
+    """The likeliest model with correlated noise, and those whose noise is correlated over as short, and over as long a
+    time, as the log allows. likelier: the first is likelier than that of white noise by LEAST_GAIN for each component;
+    possible: by that once. separable: the log lasts long enough to tell such noise, if it is fast, from motion."""
 
     model: Model
     fastest: Model
@@ -58,7 +56,7 @@ class Coloured(NamedTuple):
 def may_be(log: Observations, smoothed: SmootherRun, model: Model) -> bool:
     """Whether correlated noise is worth asking for, of a smoother run with a model of white noise.
 
-    By the median of the correlations of BLOCKS stretches of the log: a patch that the smoother has followed looks like
+    By the median of the correlations of BLOCKS stretches of the log: a patch that the smoother has followed resembles
     correlated noise, but only where it is. And where the filter's memory is so short that it would follow such noise.
     """
     scales = scales_of(log, model.noise_variance)
@@ -82,11 +80,11 @@ def may_be(log: Observations, smoothed: SmootherRun, model: Model) -> bool:
 
 
 def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fixed) -> Coloured:
-    """The likeliest model with correlated noise and a single jerk level, from one that took it for white."""
+    """The likeliest model with correlated noise and constant process noise, from one that took it for white."""
     part, starts = representative(log, starts, white.noise_variance, float(white.jerk[0, 0]))
     scales = scales_of(part, white.noise_variance)
     search = _Search(part, starts, white, fixed, scales)
-    tries = [search.run(search.first(fade, calm), FIRST_STEPS) for fade in FIRST_FADES for calm in FIRST_CALMS]
+    tries = [search.run(search.first(tau, share), FIRST_STEPS) for tau in FIRST_TAUS for share in FIRST_SHARES]
     theta = search.run(min(tries, key=lambda theta: search.cost(theta).value), STEPS)
     found = [search.model(theta), *(search.model(search.along(theta, factor)) for factor in (0.5, 2.0))]
     model = found[0]
@@ -118,38 +116,38 @@ class _Search:
         level = np.array([math.log(white.jerk[0, 0]), math.log(white.jerk[0, 2] / white.jerk[0, 0])])
         if fixed.jerk:
             low = high = level
-        fades = np.log(np.array([SHORTEST_FADE * scales.interval_s, LONGEST_FADE * scales.span_s]))
+        taus = np.log(np.array([SHORTEST_TAU * scales.interval_s, LONGEST_TAU * scales.span_s]))
         fewest = np.where(fixed.noise, 0.0, math.log(NEGLIGIBLE / LARGEST))
         most = np.where(fixed.noise, 0.0, math.log(LARGEST))
         none = np.where(fixed.noise, math.log(NEGLIGIBLE) - 1.0, 0.0)  # noise that is specified is white
-        self.lower = np.r_[given + fewest, given + fewest + none, np.full(3, fades[0]), low]
-        self.upper = np.r_[given + np.minimum(most, 1.0), given + most + none, np.full(3, max(fades)), high]
-        self.of_fades = np.full(3, 0.05 * float((log.weight > 0).sum(0).mean()))  # curvature
+        self.lower = np.r_[given + fewest, given + fewest + none, np.full(3, taus[0]), low]
+        self.upper = np.r_[given + np.minimum(most, 1.0), given + most + none, np.full(3, max(taus)), high]
+        self.of_taus = np.full(3, 0.05 * float((log.weight > 0).sum(0).mean()))  # curvature
 
-    def first(self, fade: float, calm: float) -> FloatArray:
-        """Where a search begins: with half of the noise correlated over `fade` intervals, and so much of the jerk."""
+    def first(self, tau: float, share: float) -> FloatArray:
+        """Where a search begins: with half of the noise correlated over `tau` intervals, and so much of the jerk."""
         given, jerk = np.log(0.5 * self.white.noise_variance), self.white.jerk[0]
-        motion = [math.log(calm * jerk[0]), math.log(jerk[2] / jerk[0])]
-        theta = np.r_[given, given, np.full(3, math.log(fade * self.scales.interval_s)), motion]
+        motion = [math.log(share * jerk[0]), math.log(jerk[2] / jerk[0])]
+        theta = np.r_[given, given, np.full(3, math.log(tau * self.scales.interval_s)), motion]
         return np.asarray(np.clip(theta, self.lower, self.upper), np.float64)
 
     def model(self, theta: FloatArray) -> Model:
         """The model of some parameters."""
-        white, wander, fade = np.exp(theta[:9]).reshape(3, 3)
-        return Model(white, shaped(theta[9:10], theta[10]), wander_variance=wander, fade_s=fade)
+        white, markov, tau = np.exp(theta[:9]).reshape(3, 3)
+        return Model(white, shaped(theta[9:10], theta[10]), wander_variance=markov, fade_s=tau)
 
     def cost(self, theta: FloatArray) -> optimizer.Point:
         """Minus the log-likelihood."""
         found = score_log(self.log, self.model(theta), self.starts)
         level, variances = of_level(found, theta[10]), (found.noise, found.wander)
         slope = np.r_[*(-each.score for each in variances), -found.fade, level.gradient]
-        curvature = np.r_[*(each.curvature for each in variances), self.of_fades, level.curvature]
+        curvature = np.r_[*(each.curvature for each in variances), self.of_taus, level.curvature]
         return optimizer.Point(level.value, slope, curvature)
 
     def along(self, theta: FloatArray, factor: float) -> FloatArray:
         """The parameters with offsets as much slower and larger, or faster and smaller, as the log does not refute.
-        Over a few samples an offset of twice the variance that fades half as fast looks the same, and what is slower
-        than that, motion."""
+        Over a few samples an offset of twice the variance and twice the correlation time is the same, and what is
+        slower than that, motion."""
         for c in range(3):
             least = likelihood_of(self.log, self.model(theta), self.starts) - REFUTED
             while True:

@@ -21,11 +21,10 @@ from ftproc.core.identification.scales import EXACT, Scales, scales_of
 from ftproc.core.identification.stretches import stretches_of
 from ftproc.core.model.motion import isotropic
 from ftproc.order_statistics import median
-
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 LEVEL_STEPS, JERK_STEPS = 12, 4  # of the search for one level of noise and jerk, and of the jerk alone
-SPANS, SPAN = 6, 400  # of samples: what stands for a long log when one noise and one jerk level are looked for
+SPANS, SPAN = 6, 400  # of samples: what stands for a long log when one noise and one process noise are estimated
 ASSUMED = 0.03  # of the others' noise, in metres, that is assumed of a component that shows none: nothing moves exactly
 NOISE_GROWTH = 3.0  # times the noise that the search begins with: more of it is a diverged track, not noise
 NOISE_SHRINKS = 4.0  # less of it comes of readings left out until the rest fits
@@ -131,8 +130,8 @@ def fit_level(
 
 
 def most_noise(log: Observations, model: Model, starts: list[Start], predicted_sigma: FloatArray) -> Model | None:
-    """The model with as much noise of each component as the log does not exclude, where motion and noise can hardly be
-    told apart; None where they can, by the 1-sigma (n, 3) of the innovations."""
+    """The model with as much noise of each component as the log does not exclude, where motion and noise are poorly
+    distinguished; None where they are well, by the 1-sigma (n, 3) of the innovations."""
     used = log.weight > 0
     foreseen = [median(predicted_sigma[used[:, c], c]) if used[:, c].any() else 0.0 for c in range(3)]
     doubtful = np.flatnonzero(np.array(foreseen) > UNFORESEEN * np.sqrt(model.noise_variance))
@@ -176,7 +175,7 @@ def of_level(found: Scores, log_ratio: float) -> optimizer.Point:
 
 
 def fit_jerk(log: Observations, starts: list[Start], model: Model) -> Model:
-    """The likeliest single jerk level with its vertical share, from the model's; the noise stays."""
+    """The likeliest constant process noise with its vertical share, from the model's; the noise stays."""
     scales = scales_of(log, model.noise_variance)
     lower, upper = jerk_bounds(scales)
     if log.sites is None:

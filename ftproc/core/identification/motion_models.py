@@ -19,9 +19,8 @@ from ftproc.core.identification.profile import ALLOWANCE, climbed, median_level,
 from ftproc.core.identification.scales import Scales, scales_of
 from ftproc.core.model.forces import AT_REST_MPS, GRAVITY
 from ftproc.core.model.motion import WHITE_JERK, Motion
+from ftproc.records import FloatArray, IntArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Run = TypeVar("Run", FilterRun, SmootherRun)
 
 WHITE, ORBITAL = "white-jerk", "orbital"
@@ -38,7 +37,7 @@ MARGIN = 8.0  # in log-likelihood, by which a model must explain a log better th
 FARTHEST_TURN = 0.2  # rad, over which the motion goes on in one step
 MOST_STEPS = 100  # in a gap
 LIFT, SHARE = 0.5, 0.3  # gravities of lift, and the share of a flight with less of it, that may be ballistic
-CALMER = 10.0 ** -np.arange(8)  # times the jerk of white jerk: where the search begins for a body that nobody steers
+JERK_SHARES = 10.0 ** -np.arange(8)  # of the jerk of white jerk: where the search begins for a body that nobody steers
 
 
 class Chosen(NamedTuple):
@@ -145,7 +144,7 @@ def _may_be(name: str, course: FloatArray) -> bool:
 
 
 def falls(course: FloatArray) -> bool:
-    """Whether a good part of a course (n, 9) has hardly any lift."""
+    """Whether a good part of a course (n, 9) has almost no lift."""
     v, force = course[:, 3:6], course[:, 6:] + np.array([0.0, 0.0, GRAVITY])
     along = (force * v).sum(1) / np.maximum((v * v).sum(1), AT_REST_MPS**2)
     lift = np.sqrt(((force - along[:, None] * v) ** 2).sum(1))
@@ -164,8 +163,8 @@ def _unsteered(short: Logged, model: Model) -> tuple[Model, float]:
     log, starts, scales = short
     found = list[tuple[Model, float]]()
     for shape in (model, median_level(model)):
-        calmer = [shape._replace(jerk=times * shape.jerk) for times in CALMER]
-        best = max(calmer, key=lambda each: _finite(likelihood_of(log, each, starts)))
+        tried = [shape._replace(jerk=times * shape.jerk) for times in JERK_SHARES]
+        best = max(tried, key=lambda each: _finite(likelihood_of(log, each, starts)))
         for _ in range(2):
             best, likelihood = climbed(log, starts, best, STEPS, scales)
             best = best._replace(motion=best.motion.about(smooth_log(log, best, starts).state))

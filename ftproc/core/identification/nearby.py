@@ -1,4 +1,4 @@
-"""What the record says of a few places in it: only what lies around them is smoothed, all of it in one sweep."""
+"""What the record says of a few stretches of it: only what lies around them is smoothed, all of it in one sweep."""
 
 from __future__ import annotations
 
@@ -11,24 +11,22 @@ from ftproc.core.filtering.smoother import RESIDUALS, SmootherRun, smooth_log
 from ftproc.core.identification.profile import from_knot, median_level
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.identification.stretches import Stretches, runs_of, stretches_of, widened
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from ftproc.records import FloatArray, IntArray
 
 AROUND, MEMORIES = (60, 200), 8.0  # samples on each side that tell what lies between, and memories
 
 
-def samples_around(log: Observations, calm: Model) -> int:
+def samples_around(log: Observations, at_median: Model) -> int:
     """Samples on each side that are enough to decide on what lies between."""
-    scales = scales_of(log, calm.noise_variance)
-    return int(np.clip(MEMORIES * scales.memory_samples(float(calm.jerk[0, 0])), *AROUND))
+    scales = scales_of(log, at_median.noise_variance)
+    return int(np.clip(MEMORIES * scales.memory_samples(float(at_median.jerk[0, 0])), *AROUND))
 
 
 def smoothed_near(
     log: Observations, model: Model, marked: NDArray[np.bool_], around: int
 ) -> tuple[IntArray, SmootherRun]:
     """The samples (m,) within so many of what is marked (n,), one at least, and the smoother's residuals of them, with
-    a jerk profile. If a component is not seen near one of the places, all of the log is smoothed."""
+    a jerk profile. If a component is not seen near one of the stretches, all of the log is smoothed."""
     runs = runs_of(widened(marked, around)).tolist()
     begins, own = from_knot(model, log.time_s, slice(runs[0][0], len(marked)))
     runs[0][0], level = begins.start, float(median_level(model).jerk[0, 0])

@@ -22,8 +22,7 @@ from ftproc.core.identification.likelihood import RATIO_BOUND, of_level, shaped
 from ftproc.core.identification.profile import median_level
 from ftproc.core.model.forces import EARTH_M
 from ftproc.core.model.motion import Motion
-
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 ABOVE_M = 100e3  # where the air ends
 FARTHEST_TURN = 0.005  # rad, over which the motion goes on in one step

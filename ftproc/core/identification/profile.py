@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import score_log
@@ -17,9 +16,7 @@ from ftproc.core.identification import decimation, optimizer
 from ftproc.core.identification.likelihood import VERTICAL_PRECISION, jerk_bounds
 from ftproc.core.identification.scales import Scales, scales_of
 from ftproc.order_statistics import median
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from ftproc.records import FloatArray, IntArray
 
 KNOT_SAMPLES = 10  # samples to a knot of the jerk profile ...
 KNOT_MEMORIES = 2.0  # ... but never less than so many memories of the filter,

@@ -13,18 +13,16 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core import pacing
 from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification import optimizer
 from ftproc.order_statistics import median, medians
+from ftproc.records import FloatArray
 
-FloatArray = NDArray[np.float64]
-
-TAILS = 4.0  # degrees of freedom of the distribution that outliers hardly move
-LEAST_GAIN, SHARE = 15.0, 0.07  # in log-likelihood, and for each sample, for late stamps to be believed
+TAILS = 4.0  # degrees of freedom of the distribution that outliers move little
+LEAST_GAIN, SHARE = 15.0, 0.07  # in log-likelihood, and for each sample, for late stamps to be accepted
 STAMP_TAILS, STAMP_ROUNDS = 2.0, 100  # degrees of freedom of how late the stamps are: a few, by very much
 STAMP_SCALES = np.logspace(-2, 8, 101)  # of the usual variance of a stamp, for integrals over it
 STEPS = 30

@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core import beside
 from ftproc.core.filtering.beside import GATE
 from ftproc.core.filtering.records import Model, Observations, Scalars, Start
 from ftproc.core.filtering.smoother import residuals_beside
-
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 WIDTH, RATE = 4, 3  # columns of what comes: range, azimuth, elevation, range rate; and which is the last
 

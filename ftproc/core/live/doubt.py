@@ -1,4 +1,4 @@
-"""Whether readings agree on a track, and when all of the window is looked at because its track is in doubt."""
+"""Whether readings agree on a track, and when all of the window is edited because its track is in doubt."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy as np
 from ftproc.core.live.pace import WINDOW_SAMPLES, WORK_S
 from ftproc.core.live.window import Window
 
-AGAIN_S, GROWTH = 0.5, 0.2  # between looks: so long, or this share of the time since it is in doubt,
+AGAIN_S, GROWTH = 0.5, 0.2  # between edits: so long, or this share of the time since it is in doubt,
 SAMPLES = 3  # and so many samples
 NEWEST, AGREE = 8, 0.6  # readings of a component, and share of them that must be good for a track to be confirmed
-VAGUE = 1.0  # times the noise of a single reading, as 1-sigma of the position: then there is no track
+LARGEST_SIGMA = 1.0  # times the noise of a single reading, as 1-sigma of the position: then there is no track
 
 
 def is_track(window: Window) -> bool:
     """Whether the newest readings of a window that has been edited agree on a track."""
-    return bool((window.used_lately(NEWEST) >= AGREE).all()) and _vagueness(window) < VAGUE
+    return bool((window.used_lately(NEWEST) >= AGREE).all()) and _relative_sigma(window) < LARGEST_SIGMA
 
 
-def _vagueness(window: Window) -> float:
+def _relative_sigma(window: Window) -> float:
     """1-sigma of the newest position, in units of that of a single reading."""
     ((newest,), _) = window.shown(len(window) - 1, len(window))
     range_m = np.linalg.norm(newest["state"][:3])
@@ -30,8 +30,8 @@ def _vagueness(window: Window) -> float:
 
 
 class Doubt(NamedTuple):
-    """When a track in doubt is looked at: not before this row and this time. since_s: when it was first looked at and
-    stayed in doubt; NaN where it is not. edited_s: when all of the window was last decided on."""
+    """When all of the window is edited for a track in doubt: not before this row and this time. since_s: when it first
+    was and stayed in doubt; NaN where it is not. edited_s: when all of the window was last decided on."""
 
     row: int = 0
     time_s: float = -math.inf
@@ -39,11 +39,11 @@ class Doubt(NamedTuple):
     edited_s: float = -math.inf
 
     def is_due(self, window: Window, row: int) -> bool:
-        """Whether it is time to look at a track that is in doubt."""
+        """Whether an edit for a track in doubt is due."""
         return row >= self.row and float(window.time_s[-1]) >= self.time_s
 
     def is_urgent(self, window: Window) -> bool:
-        """Whether a look at a track in doubt is not put off: but where many rows come in no time."""
+        """Whether an edit for a track in doubt is not put off: but where many rows come in no time."""
         return len(window) <= WINDOW_SAMPLES[1] or float(window.time_s[-1]) - self.edited_s >= WORK_S
 
     def after_edit(self, window: Window, row: int) -> Doubt:

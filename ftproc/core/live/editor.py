@@ -1,7 +1,7 @@
 """The live editor: readings in, rows out, each as soon as its lag has passed.
 
 What a row rests on depends on the readings before it, and up to its lag after it, alone, not on how they arrive: when
-the newest part of the window is looked at again, and when all of it, follows from the counts and times of rows. What
+the newest part of the window is edited again, and when all of it, follows from the counts and times of rows. What
 a row costs is bounded, and so is what is kept, whatever the times of the rows are.
 """
 
@@ -12,7 +12,6 @@ import math
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.editing.two_pass import Known
 from ftproc.core.filtering.initialization import FEWEST_READINGS
@@ -32,16 +31,15 @@ from ftproc.core.live.rows import (
     without_what_is_lost,
 )
 from ftproc.core.live.window import Window
-
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 FEWEST = 16  # samples before a track may be confirmed,
 GROWTH = 1.25  # and times as many at the next attempt
 PATIENCE = 64  # samples after which the noise of a component with few readings is assumed
-ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of what was hardly seen
-YOUNG, SOONEST, ROUND = 0.25, 4, 128  # all of the window is looked at when it has grown by this share, but not
+ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of what was seldom seen
+YOUNG, SOONEST, ROUND = 0.25, 4, 128  # all of the window is edited when it has grown by this share, but not
 # sooner and not later than after so many samples, or while the track is in doubt
-STALE = 4  # times what a window keeps, after which a look at all of it that is still under way is given up
+STALE = 4  # times what a window keeps, after which an edit of all of it that is still under way is given up
 
 
 class LiveEditor:
@@ -56,7 +54,7 @@ class LiveEditor:
         self.absent: tuple[int, ...] = ()
         self.count = self.published = 0  # rows taken, and rows that have left
         self.next_edit, self.next_refresh, self.next_work = FEWEST, 0, 0
-        self.doubt, self.doubted = Doubt(), False  # and whether it is why all of the window is looked at,
+        self.doubt, self.doubted = Doubt(), False  # and whether it is why all of the window is edited,
         self.urgent = False  # at once
         self.refreshed = 0  # rows that the last refresh has seen
         self.pace, self.clock = pace_of(np.empty(0), lag_s), Clock()
@@ -93,9 +91,9 @@ class LiveEditor:
                 self._note_gap(self.window, float(time_s[low]))
                 self.window.append(time_s[low:high], with_stand_ins(measurement[low:high], self.absent))
                 self.count, self.clock = self.count + high - low, self.clock.after(time_s[low:high])
-                if self.lag_s == 0:  # what a look finds out is known from the newest row on
+                if self.lag_s == 0:  # what an edit finds out is known from the newest row on
                     found += self._leave(self.count - 1)
-                self._look(self.window)
+                self._take_turn(self.window)
             if self.lag_s == 0:
                 found += self._leave(self.count)
             low = high
@@ -156,7 +154,7 @@ class LiveEditor:
         self.waiting = Waiting(window.time_s[low:].copy(), measurement)
         self.window, self.absent, self.next_edit = None, (), self.count + FEWEST_READINGS
 
-    # -- when to look -----------------------------------------------------------------------------------------------
+    # -- when to edit -----------------------------------------------------------------------------------------------
 
     @property
     def _first(self) -> int:
@@ -164,11 +162,11 @@ class LiveEditor:
         return self.count - len(self.waiting.time_s if self.window is None else self.window)
 
     def _slice_end(self, time_s: FloatArray, measurement: FloatArray, low: int) -> int:
-        """How far the rows can be taken at once: to the next look, the next gap, the first reading of a component that
+        """How far the rows can be taken at once: to the next turn, the next gap, the first reading of a component that
         was absent, or where a row must leave that no refresh has seen."""
         assert self.window is not None
-        due = min(max(self._next_look(self.window) - self.count, 1), len(time_s) - low)
-        high = low + self.clock.next_look(time_s[low:], due)
+        due = min(max(self._next_turn(self.window) - self.count, 1), len(time_s) - low)
+        high = low + self.clock.rows_to_turn(time_s[low:], due)
         if self.lag_s > 0:
             unseen = np.concatenate([self.window.time_s[self.refreshed - self._first :], time_s[low:high]])
             if time_s[low] > unseen[0] + self.lag_s:
@@ -181,22 +179,22 @@ class LiveEditor:
         return low + int(seen[0]) if len(seen) else high
 
     def _note_gap(self, window: Window, time_s: float) -> None:
-        """After a gap that may be too long to bridge, all of the window is looked at as soon as a track can begin."""
+        """After a gap that may be too long to bridge, all of the window is edited as soon as a track can begin."""
         if time_s - window.time_s[-1] > self.pace.longest_s:
             self.next_edit = min(self.next_edit, self.count + FEWEST_READINGS + 1)
 
-    def _next_look(self, window: Window) -> int:
+    def _next_turn(self, window: Window) -> int:
         """How many rows there are when there is something to do again."""
         return min(self.next_refresh, self.next_edit if window.under_way is None else self.next_work)
 
-    def _look(self, window: Window) -> None:
+    def _take_turn(self, window: Window) -> None:
         if len(window) > STALE * (self.pace.sizes.window + BLOCK):
             window.under_way = None
         if self.clock.stands:
             if self.clock.rows % CROWD == 0:
                 self._refresh(window)
             return
-        if self.count < self._next_look(window):
+        if self.count < self._next_turn(window):
             return
         in_doubt = window.in_doubt()
         if window.under_way is not None and self.doubted != in_doubt:
@@ -218,7 +216,7 @@ class LiveEditor:
             self._refresh(window)
 
     def _go_on(self, window: Window) -> None:
-        """A turn at the look at all of the window, or the whole of it."""
+        """A turn at the edit of all of the window, or the whole of it."""
         self.next_work = self.count + self.pace.turn
         try:
             window.go_on(math.inf if self.urgent else self.pace.work)

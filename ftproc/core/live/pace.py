@@ -1,4 +1,4 @@
-"""How much of the readings is kept, and how often they are looked at, by their interval; and the clock, which must go
+"""How much of the readings is kept, and how often they are edited, by their interval; and the clock, which must go
 on for that. So work and memory are bounded by rows, whatever their times are."""
 
 from __future__ import annotations
@@ -7,16 +7,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.filtering.initialization import shortest_gap
 from ftproc.core.live.pieces import CROWD, Sizes
 from ftproc.order_statistics import median
-
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 REFRESH_S = 0.1  # between refreshes of the newest part, or one sample
-WORK_S, WORK_PER_S = 0.05, 160_000  # between turns at a look at all of the window, or one sample; and how much of it
+WORK_S, WORK_PER_S = 0.05, 160_000  # between turns at an edit of all of the window, or one sample; and how much of it
 # there is for each second that the readings last: so many samples that are filtered
 WINDOW_S, WINDOW_SAMPLES = 30.0, (300, 1500)  # of the window: the longer of the two, up to so many samples
 NEAR_S, NEAR_SAMPLES = 8.0, (120, 400)  # of its newest part, beside the lag
@@ -57,7 +55,7 @@ class Clock(NamedTuple):
 
     @property
     def stands(self) -> bool:
-        """Whether so many rows have come in a tick that nothing is looked at before the next one."""
+        """Whether so many rows have come in a tick that nothing is edited before the next one."""
         return self.rows > STANDING
 
     def after(self, time_s: FloatArray) -> Clock:
@@ -66,8 +64,8 @@ class Clock(NamedTuple):
         same = len(time_s) - int(np.searchsorted(time_s // TICK_S, tick))
         return Clock(float(tick), same + (self.rows if same == len(time_s) and tick == self.tick else 0))
 
-    def next_look(self, time_s: FloatArray, rows: int) -> int:
-        """How many of the next rows, with times (n,), are taken before a look that is due after so many: one more
+    def rows_to_turn(self, time_s: FloatArray, rows: int) -> int:
+        """How many of the next rows, with times (n,), are taken before a turn that is due after so many: one more
         than come in the same tick, or as many as make up a CROWD, where the clock stands still then."""
         then = self.after(time_s[:rows])
         if not then.stands or then.rows % CROWD == 0:

@@ -7,18 +7,16 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.filtering.beside import WEIGHT
 from ftproc.core.filtering.forward import Span
 from ftproc.core.filtering.records import Model, Observations, Start, empty_rows
 from ftproc.core.identification.profile import MAX_KNOTS
 from ftproc.core.live.predictive_chain import run_predictive, run_predictive_coloured
+from ftproc.records import FloatArray
 
-FloatArray = NDArray[np.float64]
-
-BLOCK = 4096  # samples between looks at a window that has nothing to learn
-CROWD = 1024  # samples between looks at a window whose clock stands still
+BLOCK = 4096  # samples between edits of a window that has nothing to learn
+CROWD = 1024  # samples between refreshes of a window whose clock stands still
 CROWDED = 2  # times the newest part, or a CROWD, as samples that wait for their lag: more come much faster than usual
 
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from ftproc.core.editing import outlier_chain
 from ftproc.core.editing.screening import SHORTEST_STUCK, STUCK_ODDS
 from ftproc.order_statistics import medians
-
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 LONGEST_ISOLATED = 2  # readings rejected in a row; more make a patch
 RECENT = 50  # samples whose noise the next ones are taken to have

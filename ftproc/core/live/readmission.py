@@ -1,9 +1,9 @@
 """The decisions on the newest part, made again; and where its newest readings are rejected: is it a patch, or the track
 that is wrong?
 
-Each rejected reading alone lies off a prediction that has become vague since, and all of them lie off it together. But
-if the last of them are good, each makes the next one likely. So the log-probability of all readings of the newest part
-is compared between the decisions as they are and those in which the last few of the run, or half of it, or all are
+Each rejected reading alone lies off a prediction whose 1-sigma has grown since, and all of them lie off it together.
+But if the last of them are good, each makes the next one likely. So the log-probability of all readings of the newest
+part is compared between the decisions as they are and those in which the last few of the run, or half of it, or all are
 good.
 """
 
@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from ftproc.core.editing import outlier_chain, patch_likelihood
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
-
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 ROUNDS = 3  # of smoothing and deciding
 MARGIN = 5.0  # by which the log-probability of other decisions must be better

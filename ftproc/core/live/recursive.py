@@ -7,7 +7,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.editing import gate, two_pass
 from ftproc.core.editing.track import REACQUIRE_SAMPLES, GatedRecursion, Track
@@ -17,9 +16,7 @@ from ftproc.core.live.pieces import Sizes
 from ftproc.core.live.readings import Columns, Labels
 from ftproc.core.live.window import Window
 from ftproc.order_statistics import median
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from ftproc.records import FloatArray, IntArray
 
 PATCH_S, PATCH_SAMPLES = 1.5, 12  # the longest patch expected is the longer of the two
 

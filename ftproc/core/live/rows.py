@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import ROW, empty_rows
 from ftproc.core.live.beside import WIDTH
-
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: of what was never seen
 LATELY = 8  # samples whose innovations tell whether the sigmas hold
@@ -82,7 +81,7 @@ def without_what_is_lost(rows: Any) -> NDArray[np.bool_]:
 
 def widened(rows: Any, before: int) -> Any:
     """The rows after so many, their sigmas as much larger as the innovations of the last samples are than expected: a
-    filter that has only seen calm flight learns of a manoeuvre late."""
+    filter that has only seen flight without manoeuvres learns of a manoeuvre late."""
     informed = np.isfinite(rows["nis"])
     nis, used = np.where(informed, rows["nis"], 0.0), np.where(informed, (rows["weight"] > 0).sum(1), 0)
     lately = np.ones(LATELY)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.editing.two_pass import Edited
 from ftproc.core.pacing import Paced
-
-IntArray = NDArray[np.int64]
+from ftproc.records import IntArray
 
 
 class Whole(Paced[Edited]):

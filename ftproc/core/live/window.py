@@ -1,6 +1,6 @@
 """The sliding window of the live editor, and what it carries along: decisions, noise, jerk profile and an anchor.
 
-The window holds the readings that a new look at the whole situation needs: two-pass editing of all of it, now and
+The window holds the readings that a new decision on the whole situation needs: two-pass editing of all of it, now and
 then. Its newest part, from `near` on, is where decisions are still open. A refresh smooths that part alone from the
 anchor, the filter's prediction at its first sample, which stands for everything before; decides again; lets the jerk
 profile follow; and brings the filter to the newest sample.
@@ -13,7 +13,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.editing import two_pass
 from ftproc.core.filtering.beside import OPEN as RATE_OPEN
@@ -28,9 +27,7 @@ from ftproc.core.live.predictive_chain import OPEN, chains_of
 from ftproc.core.live.readings import Columns, Labels, Repeats, labelled, typical, used_lately
 from ftproc.core.live.readmission import Open, readmitted, settled
 from ftproc.core.live.whole import Whole
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from ftproc.records import FloatArray, IntArray
 
 SHORT = 160  # samples: with fewer, nothing is said of how the noise of single readings differs
 YOUNG, JUMPY = 40, 1.5  # samples with which a track is young, and intervals that its filter must remember

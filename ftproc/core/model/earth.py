@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 RADIUS_M, ECCENTRICITY2 = 6378137.0, 6.69437999014131705734e-3  # of the ellipsoid: equatorial, and e^2
 
@@ -18,8 +17,8 @@ ROUNDS = 8  # of the search for a latitude: each gains three digits
 Geodetic = tuple[float, float, float]  # latitude deg, longitude deg, height m
 
 
-def earth_centred(place: Geodetic) -> FloatArray:
-    """(3,) x, y, z in m, earth-centred and earth-fixed."""
+def earth_centred(place: Geodetic | FloatArray) -> FloatArray:
+    """(3,) x, y, z in m, earth-centred and earth-fixed; or (3, n) of places (3, n)."""
     latitude, longitude = np.radians(place[:2])
     normal = RADIUS_M / np.sqrt(1 - ECCENTRICITY2 * np.sin(latitude) ** 2)
     across = (normal + place[2]) * np.cos(latitude)

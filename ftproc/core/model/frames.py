@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 ANY_ANGLE_RAD = np.pi / math.sqrt(3)  # 1-sigma of an angle of which nothing is known
 _NO_DISTANCE_M = 1e-9  # stands in for zero

@@ -13,9 +13,8 @@ straight ray over a spherical earth. For a star it becomes the textbook's (n0 - 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from ftproc.records import FloatArray
 
 EARTH_M = 6.371e6
 REFRACTIVITY = 2.778e-4  # n - 1 of green light (0.55 um) at 15 deg C, 1013.25 hPa: Edlen 1966, dry air

@@ -10,12 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.model.frames import from_cartesian, wrap
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from ftproc.records import FloatArray
 
 MIN_COS_ELEVATION = 1e-3  # nearer to the zenith than this the azimuth says nothing
 
@@ -57,11 +54,7 @@ def jacobian(position: FloatArray) -> FloatArray:
     ground = np.maximum(ground, MIN_COS_ELEVATION * slant)
     ca, sa, ce, se = x / ground, y / ground, ground / slant, z / slant
     zero = np.zeros_like(x)
-    rows = (
-        (ca * ce, sa * ce, se),
-        (-sa / ground, ca / ground, zero),
-        (-ca * se / slant, -sa * se / slant, ce / slant),
-    )
+    rows = ((ca * ce, sa * ce, se), (-sa / ground, ca / ground, zero), (-ca * se / slant, -sa * se / slant, ce / slant))
     return np.stack([np.stack(row, -1) for row in rows], -2)
 
 

@@ -58,10 +58,10 @@ def roulette(weight: FloatArray, count: int, rng: np.random.Generator) -> IntArr
         cumulative = np.cumsum(weight[left])
         if cumulative[-1] <= 0.0:  # only zero weights are left: equal chances
             cumulative = np.arange(1.0, len(left) + 1.0)
-        place = int(np.searchsorted(cumulative, rng.random() * cumulative[-1], side="right"))
-        place = min(place, len(left) - 1)  # a subnormal S times random() may round up to S
-        chosen[k] = left[place]
-        left = np.delete(left, place)
+        index = int(np.searchsorted(cumulative, rng.random() * cumulative[-1], side="right"))
+        index = min(index, len(left) - 1)  # a subnormal S times random() may round up to S
+        chosen[k] = left[index]
+        left = np.delete(left, index)
     return chosen
 
 

@@ -2,7 +2,7 @@
 ratios from the untouched test data. Non-negative stacking with one candidate: it bounds harm on data like the
 validation data, not on a new kind of sensor.
 
-Of a feature set that each flight proves anew, every flight counts alike: one that was lost for a while has errors of
+Of a feature set that each flight proves again, every flight counts alike: one that was lost for a while has errors of
 hundreds of sigmas, beside which the others would not be seen."""
 
 from __future__ import annotations

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
-from typing import Any
 
 from ftproc.correction.feature_sets import FEATURES, named
 from ftproc.correction.model import FILTER, SMOOTHER, Model, Stage
@@ -21,10 +20,7 @@ CANDIDATES = {FILTER: ("window", "motion", "instrument"), SMOOTHER: ("instrument
 
 
 def train_model(
-    flights: Mapping[str, Sequence[Flight]],
-    settings: TrainSettings,
-    progress: Progress = silent,
-    jobs: int = 1,
+    flights: Mapping[str, Sequence[Flight]], settings: TrainSettings, progress: Progress = silent, jobs: int = 1
 ) -> Model:
     """A model from the flights of each stage (`filter`, `smoother`); a smoother's network without a gain is left out.
 
@@ -37,12 +33,8 @@ def train_model(
     for (stage, _), candidate in zip(wanted, trained, strict=True):
         if stage not in stages or _remaining_error(candidate) < _remaining_error(stages[stage]):
             stages[stage] = candidate
-    return Model({k: v for k, v in stages.items() if k == FILTER or v.helps}, _recorded(settings))
-
-
-def _recorded(settings: TrainSettings) -> dict[str, Any]:
-    """As the model keeps them."""
-    return {name: AUTO if value is None else value for name, value in asdict(settings).items()}
+    kept = {name: AUTO if value is None else value for name, value in asdict(settings).items()}
+    return Model({k: v for k, v in stages.items() if k == FILTER or v.helps}, kept)
 
 
 def _candidates(stage: str, flights: Sequence[Flight], settings: TrainSettings) -> tuple[str, ...]:

@@ -78,11 +78,7 @@ class Comparison:
 
 
 def compare(
-    flights: Sequence[Flight],
-    settings: TrainSettings,
-    progress: Progress = silent,
-    jobs: int = 1,
-    seeds: int = SEEDS,
+    flights: Sequence[Flight], settings: TrainSettings, progress: Progress = silent, jobs: int = 1, seeds: int = SEEDS
 ) -> Comparison:
     """Compare the contenders on the same flights. Raises as `train.train`."""
     features = named("window" if settings.features == "auto" else settings.features)
@@ -90,9 +86,7 @@ def compare(
     rng = np.random.default_rng(settings.seed)
     trial = _Trial(
         Problem(
-            data.shape(settings.hidden),
-            data.training.thinned(SAMPLES, rng),
-            data.validation.thinned(SAMPLES // 2, rng),
+            data.shape(settings.hidden), data.training.thinned(SAMPLES, rng), data.validation.thinned(SAMPLES // 2, rng)
         ),
         data.test if len(data.test.inputs) else data.validation,
         GeneticSettings(population=settings.population, generations=settings.generations),

@@ -56,10 +56,10 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
     origins = {quantity: _origin(header, column) for quantity, column in found.items()}
     each_origin = [origins[quantity] for quantity, column in found.items() for _ in column.positions]
     columns, marks = without_thousands(columns, each_origin)
-    place = 0
+    index = 0
     for quantity, column in found.items():
-        mine, origin = columns[place : place + len(column.positions)], origins[quantity]
-        place += len(mine)
+        mine, origin = columns[index : index + len(column.positions)], origins[quantity]
+        index += len(mine)
         if quantity == "time":
             if len(mine) > 1:
                 clock = joint.read(dict(zip(column.roles, mine, strict=True)), origin, column)
@@ -84,8 +84,8 @@ def _of_a_zone(clock: Clock, column: schema.Column) -> Clock:
     if not clock.epoch or not local or zoned:
         return clock
     doubts = tuple(doubt for doubt in clock.doubts if doubt not in times.NO_ZONE)
-    said = f'"{column.name}" is a local time without its zone, so there is no time_utc'
-    return clock._replace(epoch="", doubts=(*doubts, said))
+    doubt = f'"{column.name}" is a local time without its zone, so there is no time_utc'
+    return clock._replace(epoch="", doubts=(*doubts, doubt))
 
 
 def _origin(header: TableHeader, column: schema.Column) -> Origin:

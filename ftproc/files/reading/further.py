@@ -34,7 +34,7 @@ class Further(NamedTuple):
     """The column of a quantity, its unit, and what its name says of it: a height may be barometric, a rate closing."""
 
     quantity: str
-    place: int
+    position: int
     name: str
     unit: Unit
     other_kind: bool
@@ -42,7 +42,7 @@ class Further(NamedTuple):
     def read(self, header: TableHeader) -> FloatArray:
         """(n,) in SI units, rates outward, NaN where missing. Raises InputError for a cell that is no number."""
         origin = Origin(header.source, self.name, f"a {self.quantity} in {self.unit.name}", header.decimal_comma)
-        values = numbers(header.load([], [self.place]).column(0), origin)
+        values = numbers(header.load([], [self.position]).column(0), origin)
         while (number := sentinel(values)) is not None:
             values = np.where(values == number, np.nan, values)
         return self.unit.to_si(-values if self.quantity == RANGE_RATE and self.other_kind else values)
@@ -71,7 +71,7 @@ def find(
     """
     wanted = [RANGE_RATE] if "range" in found else []
     wanted += [HEIGHT] if {"range", "azimuth"} <= set(found) and "elevation" not in found else []
-    taken = {place for column in found.values() for place in column.positions}
+    taken = {index for column in found.values() for index in column.positions}
     return tuple(_found(header, wanted, taken, units, columns))
 
 
@@ -91,17 +91,17 @@ def _found(
         if stated == ABSENT:
             continue
         apart = _all_apart(quantity, header.names, header.units)
-        places = [k for k, name in enumerate(apart) if k not in taken and _means(quantity, name)]
-        places = [_stated(header, quantity, stated)] if stated else places
-        if len(places) > 1 and not header.is_of_a_standard:
-            both = listed([header.names[place] for place in places])
-            say = answer(header.names, {quantity: places[0]})
+        indices = [k for k, name in enumerate(apart) if k not in taken and _means(quantity, name)]
+        indices = [_stated(header, quantity, stated)] if stated else indices
+        if len(indices) > 1 and not header.is_of_a_standard:
+            both = listed([header.names[index] for index in indices])
+            say = answer(header.names, {quantity: indices[0]})
             raise InputError(
                 f"{header.source}: columns {both} could each be {_WHAT[quantity]}. Say which one it is with {say}, or "
                 f"--columns {quantity}={ABSENT}."
             )
-        if places and (stated or _has_numbers(header, places[0])):
-            known = _described(header, quantity, places[0], apart[places[0]], units.get(quantity))
+        if indices and (stated or _has_numbers(header, indices[0])):
+            known = _described(header, quantity, indices[0], apart[indices[0]], units.get(quantity))
             if known is not None:
                 yield known
 
@@ -112,21 +112,21 @@ def rate_of(
     """The range rate by the names of columns alone, and the row of units below them, where there is one."""
     stated = columns.get(RANGE_RATE, "")
     apart = _all_apart(RANGE_RATE, names, row)
-    places = [k for k, name in enumerate(apart) if (names[k] == stated if stated else _means(RANGE_RATE, name))]
-    if len(places) != 1:
+    indices = [k for k, name in enumerate(apart) if (names[k] == stated if stated else _means(RANGE_RATE, name))]
+    if len(indices) != 1:
         return None
-    name = apart[places[0]]
+    name = apart[indices[0]]
     unit = unit_named(RANGE_RATE, units.get(RANGE_RATE) or name.unit or "")
     closing = any(word.startswith(_CLOSING) for word in (name.core(), name.stem))
-    return None if unit is None else Further(RANGE_RATE, places[0], names[places[0]], unit, closing)
+    return None if unit is None else Further(RANGE_RATE, indices[0], names[indices[0]], unit, closing)
 
 
 def _all_apart(quantity: str, names: Sequence[str], row: Sequence[str]) -> list[Name]:
     return [_apart(quantity, *each) for each in zip(names, row or [""] * len(names), strict=True)]
 
 
-def _described(header: TableHeader, quantity: str, place: int, name: Name, stated: str | None) -> Further | None:
-    text, words = header.names[place], {name.core(), name.stem}
+def _described(header: TableHeader, quantity: str, index: int, name: Name, stated: str | None) -> Further | None:
+    text, words = header.names[index], {name.core(), name.stem}
     level = quantity == HEIGHT and words & {*_LEVELS}
     unit = unit_named(quantity, stated or name.unit or ("fl" if level else ""))
     if unit is None and header.is_of_a_standard and quantity == RANGE_RATE:
@@ -143,7 +143,7 @@ def _described(header: TableHeader, quantity: str, place: int, name: Name, state
         kind = unit.name == "fl" or not any(word in text.lower() for word in _GEOMETRIC)
     else:
         kind = any(word.startswith(_CLOSING) for word in words)
-    return Further(quantity, place, text, unit, kind)
+    return Further(quantity, index, text, unit, kind)
 
 
 def _apart(quantity: str, text: str, unit: str) -> Name:
@@ -181,10 +181,10 @@ def _stated(header: TableHeader, quantity: str, name: str) -> int:
     )
 
 
-def _has_numbers(header: TableHeader, place: int) -> bool:
+def _has_numbers(header: TableHeader, index: int) -> bool:
     """Whether a column that nobody names holds numbers at all."""
     try:
-        values = numbers(header.load([], [place]).column(0), Origin(header.source, header.names[place], ""))
+        values = numbers(header.load([], [index]).column(0), Origin(header.source, header.names[index], ""))
     except InputError:
         return False
     return bool(np.isfinite(values).any())

@@ -68,14 +68,14 @@ def _into(spool: _Spool, source: str, blocks: Blocks, convert: Convert, station:
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
             raise
-        place = tempfile.gettempdir()
+        folder = tempfile.gettempdir()
         if error.errno == errno.EFBIG:
             raise InputError(
                 f"{source}: a log of this size needs temporary files larger than the system allows here (ulimit -f); "
                 "raise the limit, or split the log."
             ) from error
         raise InputError(
-            f"{source}: a log of this size needs temporary files in {place}, which is full; make room there, or name "
+            f"{source}: a log of this size needs temporary files in {folder}, which is full; make room there, or name "
             "another directory with TMPDIR."
         ) from error
     if not spool.has_readings:

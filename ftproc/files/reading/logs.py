@@ -44,7 +44,7 @@ class _Plan(NamedTuple):
 
     def positions(self) -> list[int]:
         """Of the columns of all quantities, in their order."""
-        return [place for column in self.found.values() for place in column.positions]
+        return [index for column in self.found.values() for index in column.positions]
 
 
 @np.errstate(over="ignore", invalid="ignore")  # a reading may be 1e308: what overflows is beyond all limits too
@@ -96,8 +96,8 @@ def read(
     plan = _Plan(header, found, station, _conditions(header, extract), extract=extract, beside=beside)
     plan = plan._replace(open=tuple(further.doubts(header, beside, column_of)))
     if keep_columns:
-        wanted = [*plan.positions(), *(each.place for each in beside)]
-        plan = plan._replace(others=tuple(place for place in range(len(header.names)) if place not in wanted))
+        wanted = [*plan.positions(), *(each.position for each in beside)]
+        plan = plan._replace(others=tuple(index for index in range(len(header.names)) if index not in wanted))
         _check_others(header, plan.others)
     whole = plan.others or plan.conditions or beside or header.stated.target or header.stated.station
     if not whole and station.refraction is None:  # refraction needs ranges of other blocks
@@ -116,8 +116,8 @@ def _of_target(log: MeasurementLog, extract: Extract) -> MeasurementLog:
 def targets(source: tables.Source, column: str, widths: tuple[int, ...] = ()) -> tuple[str, ...]:
     """The values of a column that tells targets apart, the first first. Raises InputError."""
     header = tables.read_header(source, widths)
-    place = rows.position(header.source, header.names, column, "--target")
-    cells = rows.cells(header.load([], [place]).column(0))
+    index = rows.position(header.source, header.names, column, "--target")
+    cells = rows.cells(header.load([], [index]).column(0))
     values = tuple(dict.fromkeys(cell for cell in cells.tolist() if cell))
     if not 0 < len(values) <= several.MOST_TARGETS:
         raise InputError(
@@ -185,7 +185,7 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     known = converted.quantities, converted.found, converted.clock, plan.station, header.is_of_a_standard
     judged = converting.judged(header.source, *known)
     packed = {q: column for q, column in judged.found.items() if column.notation != converted.found[q].notation}
-    if packed:  # their cells are read anew
+    if packed:  # their cells are read again
         return _at_once(plan._replace(found={**found, **packed}, notes=judged.doubts))
     quantities = converting.in_other_units(converted.quantities, converted.found, judged.found)
     quantities["time"], spread = stamps.spread(quantities)
@@ -197,7 +197,7 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     if plan.beside:
         log = replace(log, **further.of_rows(plan.beside, header, log.row))
     plan = plan._replace(found=judged.found)
-    if not choosing.is_one_target(header, plan.extract):
+    if not (plan.extract.target or header.stated.target):
         several.refuse(header, judged.found, log)
     notes = (*header.stated.notes, *notes, *converted.notes, *converted.clock.notes, *spread)
     clock = converted.clock
@@ -211,9 +211,9 @@ def _loaded(plan: _Plan) -> list[int]:
     """Positions of the columns of the quantities, and of the conditions that name others."""
     found = plan.positions()
     for condition in plan.conditions:
-        place = rows.position(plan.header.source, plan.header.names, condition.column, "--where or --target")
-        if place not in found:
-            found.append(place)
+        index = rows.position(plan.header.source, plan.header.names, condition.column, "--where or --target")
+        if index not in found:
+            found.append(index)
     return found
 
 
@@ -222,15 +222,15 @@ def _kept(plan: _Plan, table: pa.Table, chosen: list[int]) -> tuple[IntArray | N
     if not plan.conditions:
         return None, ()
     header = plan.header
-    places = {c: rows.position(header.source, header.names, c.column, "--where") for c in plan.conditions}
-    cells = {condition: table.column(chosen.index(place)) for condition, place in places.items()}
+    indices = {c: rows.position(header.source, header.names, c.column, "--where") for c in plan.conditions}
+    cells = {condition: table.column(chosen.index(index)) for condition, index in indices.items()}
     mask = rows.meeting(header.source, cells, header.decimal_comma)
     kept = np.flatnonzero(mask)
-    said = " and ".join(str(condition) for condition in plan.conditions)
+    wanted = " and ".join(str(condition) for condition in plan.conditions)
     if not kept.size:
-        raise InputError(f"{header.source}: no row meets {said}; check the column and the value.")
+        raise InputError(f"{header.source}: no row meets {wanted}; check the column and the value.")
     left_out = len(mask) - len(kept)
-    return kept.astype(np.int64), (f"{left_out} of {len(mask)} rows are left out, which do not meet {said}",)
+    return kept.astype(np.int64), (f"{left_out} of {len(mask)} rows are left out, which do not meet {wanted}",)
 
 
 def _explained(
@@ -240,17 +240,17 @@ def _explained(
     """The log with its station, and with remarks on how it was understood."""
     station = understanding.as_named(plan.station, plan.found)
     values = log.measurement if sample is None else sample
-    beside = {each.place for each in plan.beside}
+    beside = {each.position for each in plan.beside}
     names = [] if plan.header.is_of_a_standard or log.heights is not None else plan.header.names
-    names = [name for place, name in enumerate(names) if place not in beside]
+    names = [name for index, name in enumerate(names) if index not in beside]
     remarks = schema.remarks(names, plan.found, bool(clock.epoch))
     doubtful = (*plan.notes, *judged.doubts, *plan.open, *plausibility.doubts(values, station))
-    said = (*notes, *doubtful)
+    words = (*notes, *doubtful)
     axis = understanding.knows_axis(plan.station, plan.found)
-    understood = understanding.describe(plan.header, plan.found, clock, station, said, axis, plan.beside)
+    understood = understanding.describe(plan.header, plan.found, clock, station, words, axis, plan.beside)
     understood["assumed"] = list(judged.conditions)
     digest = plan.header.sha256()
-    return replace(log, remarks=(*remarks, *said), understood=understood, station=station, sha256=digest)
+    return replace(log, remarks=(*remarks, *words), understood=understood, station=station, sha256=digest)
 
 
 def _check_others(header: TableHeader, others: Iterable[int]) -> None:

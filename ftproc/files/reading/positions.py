@@ -61,7 +61,7 @@ class Positions(NamedTuple):
 
 def is_geodetic(header: TableHeader) -> bool:
     """Whether a table has latitudes and longitudes, but no x, y, z."""
-    return not set(LOCAL) <= set(header.names) and all(_place(header, name) is not None for name in GEODETIC[:2])
+    return not set(LOCAL) <= set(header.names) and all(_index_of(header, name) is not None for name in GEODETIC[:2])
 
 
 def read(source: tables.Source, stated: Mapping[str, str] | None = None) -> Positions:
@@ -70,22 +70,22 @@ def read(source: tables.Source, stated: Mapping[str, str] | None = None) -> Posi
     header, stated = tables.read_header(source), stated or {}
     geodetic = is_geodetic(header) or any(name in stated for name in GEODETIC)
     wanted = GEODETIC if geodetic else LOCAL
-    places = [_needed(header, name, stated.get(name, "")) for name in wanted]
+    indices = [_needed(header, name, stated.get(name, "")) for name in wanted]
     clock = _time(header, stated.get("time", ""))
-    table = header.load([], [clock, *places])
+    table = header.load([], [clock, *indices])
     if table.num_rows == 0:
         raise InputError(f"{header.source}: there are column names but no rows.")
     unit = unit_named("time", taken_apart(header.names[clock]).unit) or Unit("s")
     time_s, epoch = seconds(table.column(0), _origin(header, clock, "seconds or an ISO-8601 timestamp"), unit.to_si)
-    place = np.column_stack([_values(header, at, table.column(k + 1), wanted[k]) for k, at in enumerate(places)])
+    position = np.column_stack([_values(header, at, table.column(k + 1), wanted[k]) for k, at in enumerate(indices)])
     timed = np.flatnonzero(np.isfinite(time_s))
     row = timed[np.argsort(time_s[timed], kind="stable")]
-    if geodetic and (np.abs(place[:, 0]) > 90).any():
-        bad = int(np.argmax(np.abs(place[:, 0]) > 90))
+    if geodetic and (np.abs(position[:, 0]) > 90).any():
+        bad = int(np.argmax(np.abs(position[:, 0]) > 90))
         raise InputError(f"{header.source}: row {bad}: a latitude lies in -90..90 degrees; correct the cell.")
     stated_m = _accuracy(header)
     return Positions(
-        header.source, time_s[row], place[row], geodetic, row.astype(np.int64), len(time_s), epoch, header.sha256(),
+        header.source, time_s[row], position[row], geodetic, row.astype(np.int64), len(time_s), epoch, header.sha256(),
         None if stated_m is None else stated_m[row],
     )  # fmt: skip
 
@@ -93,9 +93,9 @@ def read(source: tables.Source, stated: Mapping[str, str] | None = None) -> Posi
 def _accuracy(header: TableHeader) -> FloatArray | None:
     """(n,) what the first column that states an accuracy says of each position."""
     for kind, names in _ACCURACY.items():
-        for place, name in enumerate(header.names):
+        for index, name in enumerate(header.names):
             if {taken_apart(name).stem, taken_apart(name).core()} & {*names}:
-                values = numbers(header.load([], [place]).column(0), _origin(header, place, "a number"))
+                values = numbers(header.load([], [index]).column(0), _origin(header, index, "a number"))
                 if kind == "category":
                     known = np.clip(np.where(np.isfinite(values), values, 0.0), 0, len(NACP_M) - 1).astype(int)
                     radii: FloatArray = np.array(NACP_M)[known]
@@ -105,7 +105,7 @@ def _accuracy(header: TableHeader) -> FloatArray | None:
     return None
 
 
-def _place(header: TableHeader, name: str) -> int | None:
+def _index_of(header: TableHeader, name: str) -> int | None:
     """The column of a quantity: by its own name, or one of its other ones."""
     if name in header.names:
         return header.names.index(name)
@@ -115,13 +115,13 @@ def _place(header: TableHeader, name: str) -> int | None:
 
 
 def _needed(header: TableHeader, name: str, stated: str) -> int:
-    place = header.names.index(stated) if stated in header.names else None if stated else _place(header, name)
-    if place is None:
+    index = header.names.index(stated) if stated in header.names else None if stated else _index_of(header, name)
+    if index is None:
         raise InputError(
             f"{header.source}: there is no column for {stated or name}. Its columns are: {listed(header.names)}. "
             "Positions are lat_deg, lon_deg, height_m, or x_m, y_m, z_m; rename the right ones."
         )
-    return place
+    return index
 
 
 def _time(header: TableHeader, stated: str) -> int:
@@ -136,29 +136,25 @@ def _time(header: TableHeader, stated: str) -> int:
     )
 
 
-def _origin(header: TableHeader, place: int, expected: str) -> Origin:
-    return Origin(header.source, header.names[place], expected, header.decimal_comma)
+def _origin(header: TableHeader, index: int, expected: str) -> Origin:
+    return Origin(header.source, header.names[index], expected, header.decimal_comma)
 
 
-def _values(header: TableHeader, place: int, column: pa.ChunkedArray, name: str) -> FloatArray:
+def _values(header: TableHeader, index: int, column: pa.ChunkedArray, name: str) -> FloatArray:
     """(n,) in degrees or m."""
-    values = numbers(column, _origin(header, place, "a number"))
-    unit = taken_apart(header.names[place]).unit or name.rpartition("_")[2]
+    values = numbers(column, _origin(header, index, "a number"))
+    unit = taken_apart(header.names[index]).unit or name.rpartition("_")[2]
     if name not in GEODETIC[:2]:
         return (unit_named("height", unit) or Unit("m")).to_si(values)
     angle = unit_named("azimuth", unit)
     return values if angle is None or angle.name == "deg" else np.degrees(angle.to_si(values))
 
 
-def local(place: FloatArray, origin: Sequence[float]) -> FloatArray:
+def local(position: FloatArray, origin: Sequence[float]) -> FloatArray:
     """(n, 3) latitude deg, longitude deg, height m -> (n, 3) east, north, up m at an origin of the same kind."""
     from ftproc.core.model import earth
 
     start = (float(origin[0]), float(origin[1]), float(origin[2]))
-    latitude, longitude = np.radians(place[:, 0]), np.radians(place[:, 1])
-    normal = earth.RADIUS_M / np.sqrt(1 - earth.ECCENTRICITY2 * np.sin(latitude) ** 2)
-    across = (normal + place[:, 2]) * np.cos(latitude)
-    up = (normal * (1 - earth.ECCENTRICITY2) + place[:, 2]) * np.sin(latitude)
-    there = np.stack([across * np.cos(longitude), across * np.sin(longitude), up], 1)
+    there = np.ascontiguousarray(earth.earth_centred(position.T).T)
     found: FloatArray = (there - earth.earth_centred(start)) @ earth.verticals(start).T
     return found

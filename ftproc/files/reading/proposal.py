@@ -58,9 +58,9 @@ def by_values(header: TableHeader) -> Propose:
 
 def the_moments(header: TableHeader, free: Sequence[int]) -> int | None:
     """The column of timestamps or durations among those that have no name, as pandas writes its index; or None."""
-    places = [place for place in free if header.names[place] in _UNNAMED]
-    table = header.load([], places) if places else None
-    found = [place for k, place in enumerate(places) if table is not None and _are_moments(table.column(k))]
+    indices = [index for index in free if header.names[index] in _UNNAMED]
+    table = header.load([], indices) if indices else None
+    found = [index for k, index in enumerate(indices) if table is not None and _are_moments(table.column(k))]
     return found[0] if len(found) == 1 else None
 
 
@@ -74,22 +74,22 @@ def _are_moments(column: pa.ChunkedArray) -> bool:
 
 def _proposed(header: TableHeader, free: Sequence[int], found: Mapping[str, Sequence[int]]) -> Proposal:
     """found: the columns that are known, of each quantity."""
-    places = list(free)[:_MOST_COLUMNS]
-    if not places:
+    indices = list(free)[:_MOST_COLUMNS]
+    if not indices:
         return Proposal()
-    table = header.load([], places).slice(0, _ROWS)
-    cells = {place: table.column(k) for k, place in enumerate(places)}
-    numbers = {place: values for place, column in cells.items() if (values := _values(column, header)) is not None}
-    seen = "; ".join(_shown(header, place, cells[place], numbers.get(place)) for place in places[:_SHOWN])
+    table = header.load([], indices).slice(0, _ROWS)
+    cells = {index: table.column(k) for k, index in enumerate(indices)}
+    numbers = {index: values for index, column in cells.items() if (values := _values(column, header)) is not None}
+    seen = "; ".join(_shown(header, index, cells[index], numbers.get(index)) for index in indices[:_SHOWN])
     times = [tuple(found["time"])] if "time" in found else list(_times(header, cells, numbers))
     if "time" not in found and found:  # only the time is sought
-        only = [place for place in times if len(place) == 1]
+        only = [index for index in times if len(index) == 1]
         return Proposal(answer(header.names, {"time": only[0][0]}) if len(only) == 1 else "", seen)
     best = _best(header, times, numbers)
     if best is None:
         return Proposal(seen=seen)
     time, columns = best
-    clock = "+".join(named(header.names[place], place) for place in time)
+    clock = "+".join(named(header.names[index], index) for index in time)
     return Proposal(answer(header.names, columns, "" if "time" in found else clock), seen)
 
 
@@ -97,14 +97,14 @@ def _times(
     header: TableHeader, cells: Mapping[int, pa.ChunkedArray], numbers: Mapping[int, FloatArray]
 ) -> Iterator[tuple[int, ...]]:
     """Columns that may be the time: of text alone or two together, or of numbers that go forward and do not count."""
-    texts = [place for place in cells if place not in numbers][:4]
-    stamps = [(place,) for place in texts]
+    texts = [index for index in cells if index not in numbers][:4]
+    stamps = [(index,) for index in texts]
     yield from (each for each in [*itertools.permutations(texts, 2), *stamps] if _goes(_clock(header, each)))
-    forward = [place for place, values in numbers.items() if _goes(values) and not _is_other(header.names[place])]
-    steady = [place for place in forward if (numbers[place][1:] == numbers[place][:-1] + 1).all()]
+    forward = [index for index, values in numbers.items() if _goes(values) and not _is_other(header.names[index])]
+    steady = [index for index in forward if (numbers[index][1:] == numbers[index][:-1] + 1).all()]
     spare = len(forward) > 1
-    counters = [place for place in steady if spare or header.names[place].lower().strip("#. ") in _COUNTERS]
-    yield from ((place,) for place in forward if place not in counters)
+    counters = [index for index in steady if spare or header.names[index].lower().strip("#. ") in _COUNTERS]
+    yield from ((index,) for index in forward if index not in counters)
 
 
 def _goes(values: FloatArray) -> bool:
@@ -112,13 +112,13 @@ def _goes(values: FloatArray) -> bool:
     return len(known) > 1 and float(np.ptp(known)) > 0 and bool(np.mean(known[1:] >= known[:-1]) > _RISES)
 
 
-def _clock(header: TableHeader, places: Sequence[int]) -> FloatArray:
+def _clock(header: TableHeader, indices: Sequence[int]) -> FloatArray:
     """(n,) the times of columns in s; empty if they are none."""
-    other = next(place for place in range(len(header.names) + 1) if place not in places)
-    say = {"time": "+".join(str(place + 1) for place in places), "range": str(other + 1)}
+    other = next(index for index in range(len(header.names) + 1) if index not in indices)
+    say = {"time": "+".join(str(index + 1) for index in indices), "range": str(other + 1)}
     try:
         column = schema.resolve(header.source, header.names, {}, say, header.units)["time"]
-        table = header.load([], list(places)).slice(0, _ROWS)
+        table = header.load([], list(indices)).slice(0, _ROWS)
         return converting.converted(header, {"time": column}, table.columns).clock.time_s
     except InputError:
         return np.zeros(0)
@@ -131,15 +131,15 @@ def _best(
     for time in times[:3]:
         clock = _clock(header, time)
         varied = [
-            place for place, values in numbers.items()
-            if place not in time and np.ptp(values[np.isfinite(values)]) > 0 and not _is_other(header.names[place])
+            index for index, values in numbers.items()
+            if index not in time and np.ptp(values[np.isfinite(values)]) > 0 and not _is_other(header.names[index])
         ][:_MOST_TRIED]  # fmt: skip
         kinds = [QUANTITIES[1:]] if len(varied) > 2 else [QUANTITIES[1:3], QUANTITIES[2:]]
         tries = [
             each
             for kind in kinds
-            for places in itertools.permutations(varied, len(kind))
-            for each in _tries(clock, {q: numbers[p] for q, p in zip(kind, places, strict=True)}, places)
+            for indices in itertools.permutations(varied, len(kind))
+            for each in _tries(clock, {q: numbers[p] for q, p in zip(kind, indices, strict=True)}, indices)
         ]
         tries.sort(key=lambda each: -each.odds)
         if tries and all(each.odds * _CLEARLY < tries[0].odds for each in tries if each.columns != tries[0].columns):
@@ -153,7 +153,7 @@ def _is_other(name: str) -> bool:
     return apart.foreign or bool({apart.stem, *apart.words} & OTHER_THINGS)
 
 
-def _tries(clock: FloatArray, readings: Mapping[str, FloatArray], places: Sequence[int]) -> Iterator[_Try]:
+def _tries(clock: FloatArray, readings: Mapping[str, FloatArray], indices: Sequence[int]) -> Iterator[_Try]:
     """A choice of columns, in each of the common units in which the target moves like one."""
     if len(clock) != len(next(iter(readings.values()))):
         return
@@ -167,7 +167,7 @@ def _tries(clock: FloatArray, readings: Mapping[str, FloatArray], places: Sequen
         names = {"time": "s", "range": length, "azimuth": angle, "elevation": angle}
         way = motion.Way(tuple(UNITS[q][names[q]] if q in raw else None for q in QUANTITIES))
         if _is_a_target(moved, way):
-            yield _Try(moved.likelihood(way) * a * b, dict(zip(readings, places, strict=True)))
+            yield _Try(moved.likelihood(way) * a * b, dict(zip(readings, indices, strict=True)))
 
 
 def _fits(quantity: str, unit: Unit, sizes: plausibility.Sizes) -> bool:
@@ -199,16 +199,16 @@ def _values(column: pa.ChunkedArray, header: TableHeader) -> FloatArray | None:
     return None if values is None or not np.isfinite(values).any() else values
 
 
-def _shown(header: TableHeader, place: int, column: pa.ChunkedArray, values: FloatArray | None) -> str:
+def _shown(header: TableHeader, index: int, column: pa.ChunkedArray, values: FloatArray | None) -> str:
     """A column by its number, its cells in two rows, its limits, and what these allow."""
-    name = "" if header.names[place] in ("", str(place + 1)) else f' "{header.names[place]}"'
+    name = "" if header.names[index] in ("", str(index + 1)) else f' "{header.names[index]}"'
     cells = " and ".join(str(cell) for cell in as_text(column.slice(0, 2)).to_pylist())
     if values is None:
-        return f"{place + 1}{name}: {cells[:60]}"
+        return f"{index + 1}{name}: {cells[:60]}"
     known = values[np.isfinite(values)]
     low, high = float(known.min()), float(known.max())
-    possible = [] if low == high or _is_other(header.names[place]) else list(_possible(low, high))
-    return f"{place + 1}{name}: {cells[:60]}, from {low:.6g} to {high:.6g}{' (' * bool(possible)}" \
+    possible = [] if low == high or _is_other(header.names[index]) else list(_possible(low, high))
+    return f"{index + 1}{name}: {cells[:60]}, from {low:.6g} to {high:.6g}{' (' * bool(possible)}" \
            f"{' or '.join(possible)}{')' * bool(possible)}"  # fmt: skip
 
 

@@ -22,10 +22,7 @@ from ftproc.settings import Station
 Understood = Mapping[str, Any]
 
 _AXIS = "nothing says where the azimuth counts from: if clockwise from north, say --azimuth-from north"
-_AXES = {
-    "x": "azimuth anticlockwise from x",
-    "north": "azimuth clockwise from north, x is north and y is east",
-}
+_AXES = {"x": "azimuth anticlockwise from x", "north": "azimuth clockwise from north, x is north and y is east"}
 
 
 def describe(
@@ -36,8 +33,8 @@ def describe(
     epoch: of the times. conventions: of the angles, and what was corrected. axis_is_known: whether anything says from
     where the azimuth counts. doubts: each with the option that settles
     it."""
-    used = {place for column in found.values() for place in column.positions} | {each.place for each in beside}
-    unused = [name for place, name in enumerate(header.names) if place not in used and name]
+    used = {index for column in found.values() for index in column.positions} | {each.position for each in beside}
+    unused = [name for index, name in enumerate(header.names) if index not in used and name]
     return {
         "file": header.form or "table",
         "columns": {

@@ -143,10 +143,10 @@ def growing(target: Target, kept: bool = False) -> Iterator[BinaryIO]:
             file.seek(0, os.SEEK_END)
             yield streams.whole(file)
             os.fsync(file.fileno())
-            kept_place = path.exists() and os.path.samestat(os.fstat(file.fileno()), path.stat())
+            kept = path.exists() and os.path.samestat(os.fstat(file.fileno()), path.stat())
     except OSError as error:
         raise _output_error(near, error) from error
-    if not kept_place:
+    if not kept:
         raise OutputError(f"{target}: removed or replaced while it was written, so its rows are lost; filter again.")
 
 

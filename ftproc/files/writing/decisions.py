@@ -6,10 +6,11 @@ import csv
 import io
 from collections.abc import Collection, Sequence
 
-from ftproc.files.decisions import COLUMNS, ENDS, Line
+from ftproc.files.decisions import COLUMNS, as_dict
 from ftproc.files.layout import Target
 from ftproc.files.writing import atomic
 from ftproc.files.writing.csvtext import no_formula
+from ftproc.records import ENDS, Line
 
 
 def write(lines: Sequence[Line], target: Target) -> None:
@@ -27,6 +28,6 @@ def text(lines: Sequence[Line], more: Collection[str] = ()) -> str:
     writer = csv.DictWriter(found, named, restval="", extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
     for line in lines:
-        cells = line.as_dict()
+        cells = as_dict(line)
         writer.writerow({**cells, **{name: no_formula(cells.get(name, "")) for name in ("station", "reason")}})
     return found.getvalue()

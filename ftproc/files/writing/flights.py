@@ -53,11 +53,7 @@ def write_truth(truth: Truth, target: Target) -> None:
 
     Raises OutputError.
     """
-    groups = (
-        (POSITION, truth.position_m),
-        (VELOCITY, truth.velocity_mps),
-        (ACCELERATION, truth.acceleration_mps2),
-    )
+    groups = ((POSITION, truth.position_m), (VELOCITY, truth.velocity_mps), (ACCELERATION, truth.acceleration_mps2))
     arrays: dict[str, FloatArray | FlagArray] = {"time_s": truth.time_s}
     for names, group in groups:
         if group is not None:

@@ -67,8 +67,8 @@ def located(trajectory: Trajectory, settings: FilterSettings) -> Trajectory:
     found = dict(zip(COLUMNS, geodetic(trajectory.state[:, :3], frame, settings.site), strict=True))
     if settings.ecef:
         found |= zip(ECEF, earth_centred(trajectory.state[:, :6], frame, settings.site), strict=True)
-    places = arrow.table(found)
-    extra = places if trajectory.extra is None else tables.with_extra(trajectory.extra, places)
+    columns = arrow.table(found)
+    extra = columns if trajectory.extra is None else tables.with_extra(trajectory.extra, columns)
     return replace(trajectory, extra=extra, metadata={**trajectory.metadata, "site_axes": axes(frame)})
 
 

@@ -30,13 +30,14 @@ _NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]")
 
 
 class Track(NamedTuple):
-    """The content of a map. place: (n, 3) longitude deg, latitude deg, height m, of samples with an estimate. pieces:
-    its runs without gaps, of two places or more. site: longitude, latitude, height of the station."""
+    """The content of a map. position: (n, 3) longitude deg, latitude deg, height m, of samples with an estimate.
+    pieces:
+    its runs without gaps, of two samples or more. site: longitude, latitude, height of the station."""
 
     name: str
     about: str
     time_s: FloatArray
-    place: FloatArray
+    position: FloatArray
     pieces: list[slice]
     site: tuple[float, float, float]
     geoid_m: float | None
@@ -69,8 +70,8 @@ def _track(trajectory: Trajectory, kind: str) -> Track:
     assert extra is not None
     assert site is not None
     columns = [np.asarray(extra.column(name)) for name in ("lon_deg", "lat_deg", "height_m")]
-    place = np.column_stack([*(np.round(c, _DEGREES) for c in columns[:2]), np.round(columns[2], _METRES)])
-    estimated = np.isfinite(place).all(1)
+    position = np.column_stack([*(np.round(c, _DEGREES) for c in columns[:2]), np.round(columns[2], _METRES)])
+    estimated = np.isfinite(position).all(1)
     if not estimated.any():
         raise InputError(f"{trajectory.name}: no position could be estimated, so there is nothing to draw on a map.")
     name = _NOT_XML.sub("?", encodable(Path(trajectory.name).name))
@@ -78,22 +79,22 @@ def _track(trajectory: Trajectory, kind: str) -> Track:
     return Track(
         name if kind == ".kml" else name.translate(_NO_MARKUP),
         f"{how} by {metadata['method']}, ftproc {metadata['version']}",
-        trajectory.time_s[estimated], place[estimated], _pieces(place, estimated), (site[1], site[0], site[2]),
+        trajectory.time_s[estimated], position[estimated], _pieces(position, estimated), (site[1], site[0], site[2]),
         settings.get("geoid_m"), str(metadata.get("epoch", "")),
     )  # fmt: skip
 
 
-def _pieces(place: FloatArray, estimated: Any) -> list[slice]:
+def _pieces(position: FloatArray, estimated: Any) -> list[slice]:
     """Runs without a gap, cut where the longitude jumps across 180 degrees."""
     row = np.flatnonzero(estimated)
-    jump = np.abs(np.diff(place[row, 0])) > 180
+    jump = np.abs(np.diff(position[row, 0])) > 180
     ends = np.flatnonzero((np.diff(row) > 1) | jump) + 1
     bounds = [0, *ends.tolist(), len(row)]
     return [slice(a, b) for a, b in itertools.pairwise(bounds) if b - a > 1]
 
 
 def _geojson(track: Track) -> str:
-    lines = [track.place[piece].tolist() for piece in track.pieces]
+    lines = [track.position[piece].tolist() for piece in track.pieces]
     times = [track.time_s[piece].tolist() for piece in track.pieces]
     station = {"type": "Point", "coordinates": list(track.site)}
     features = [
@@ -114,7 +115,7 @@ def _kml(track: Track) -> str:
     simplekml = _library(".kml")
     simplekml.Kml.resetidcounter()  # same trajectory, same bytes
     geoid = track.geoid_m or 0.0
-    places = np.round(track.place - (0.0, 0.0, geoid), _DEGREES)
+    positions = np.round(track.position - (0.0, 0.0, geoid), _DEGREES)
     known = f"Heights are above the geoid, which is {geoid:g} m above the ellipsoid here."
     unknown = (
         "Heights are above the WGS-84 ellipsoid. A viewer counts them from the geoid (sea level), so they are off by "
@@ -126,11 +127,11 @@ def _kml(track: Track) -> str:
     document.newpoint(name="station", coords=[(longitude, latitude, height - geoid)], altitudemode="absolute")
     lines = document.newmultigeometry(name=track.name, description=about)
     for piece in track.pieces:
-        lines.newlinestring(coords=places[piece].tolist(), altitudemode="absolute")
+        lines.newlinestring(coords=positions[piece].tolist(), altitudemode="absolute")
     if track.epoch:
         moving = document.newgxtrack(name=f"{track.name} in time", altitudemode="absolute")
         moving.newwhen(_instants(track))
-        moving.newgxcoord(places.tolist())
+        moving.newgxcoord(positions.tolist())
     # Without indents, for which simplekml would parse the document again.
     return f"{_XML}\n{document.kml(format=False)}\n"
 
@@ -150,7 +151,7 @@ def _czml(track: Track) -> str:
     first, last = (start + dt.timedelta(seconds=float(t)) for t in (time_s[0], time_s[-1]))
     availability = czml3.types.TimeInterval(start=first, end=last)
     day = "" if track.epoch else " The log has no date: its first sample is placed at 2000-01-01."
-    samples = np.column_stack([time_s, track.place]).ravel().tolist()
+    samples = np.column_stack([time_s, track.position]).ravel().tolist()
     colour = properties.Color(rgba=[255, 200, 0, 255])
     packets = [
         czml3.Packet(

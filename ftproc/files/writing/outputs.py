@@ -61,7 +61,7 @@ def check(outputs: Sequence[Output], inputs: Iterable[Target]) -> None:
             raise atomic.overwriting(each.target, read[found], each.option)
         if found in streams:
             raise UsageError(f"{each.option} and {streams[found]} are both {each.target}; give one another name.")
-        name = atomic.resolved_name(each.target)  # files of one content may be linked: each is replaced by itself
+        name = atomic.resolved_name(each.target)  # files of one content may be linked: each is replaced separately
         if name in taken:
             raise UsageError(_twice(each, taken[name]))
         taken[name] = each

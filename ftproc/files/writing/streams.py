@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, TextIO, cast
 
 GRACE_S = 1.0  # for a reader to take something, once the program is to end
-_LOOK_S = 0.05
+_POLL_S = 0.05
 _AT_ONCE = 4096  # bytes; a pipe that takes any takes so many without blocking
 
 _ending: Callable[[], bool] | None = None
@@ -67,7 +67,7 @@ def _descriptor(path: Path) -> int:
             if error.errno != errno.ENXIO or not stat.S_ISFIFO(path.stat().st_mode):
                 raise
         began = _patience(began)
-        time.sleep(_LOOK_S)
+        time.sleep(_POLL_S)
 
 
 def _patience(began: float | None) -> float | None:
@@ -120,14 +120,14 @@ class _Whole(io.RawIOBase):
     def _wait(self) -> None:
         """Until the reader takes something. Raises TimeoutError."""
         began = None
-        while self._descriptor >= 0 and not select.select([], [self._descriptor], [], _LOOK_S)[1]:
+        while self._descriptor >= 0 and not select.select([], [self._descriptor], [], _POLL_S)[1]:
             began = _patience(began)
 
     def writable(self) -> bool:
         return True
 
-    def seek(self, place: int, whence: int = 0) -> int:
-        return int(self._raw.seek(place, whence))
+    def seek(self, offset: int, whence: int = 0) -> int:
+        return int(self._raw.seek(offset, whence))
 
     def truncate(self, size: int | None = None) -> int:
         return int(self._raw.truncate(size))

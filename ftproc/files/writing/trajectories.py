@@ -19,7 +19,8 @@ from ftproc.errors import encodable
 from ftproc.files import arrow, layout, remote
 from ftproc.files.layout import METADATA_KEY, Target, sidecar
 from ftproc.files.writing import atomic, maps, tables
-from ftproc.records import Trajectory, joined
+from ftproc.long_records import joined
+from ftproc.records import Trajectory
 
 if TYPE_CHECKING:
     import pyarrow as pa

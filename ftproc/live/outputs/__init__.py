@@ -1,2 +1,2 @@
 """Where a stream goes: `rows` to standard output or a file that is seen to grow, `parquet` to one whose end is written
-anew, `page` shows the newest ones."""
+again, `page` shows the newest ones."""

@@ -1,4 +1,4 @@
-"""A page that follows a stream: the report of its newest rows, written anew every few seconds by a process of its own,
+"""A page that follows a stream: the report of its newest rows, written again every few seconds by a process of its own,
 so that no row waits for it; whole each time, and it loads itself again."""
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from dataclasses import replace
 from typing import Any
 
 from ftproc import report
-from ftproc.records import Trajectory, joined
+from ftproc.long_records import joined
+from ftproc.records import Trajectory
 
 EVERY_S = 3.0  # between pages
 ROWS = 20_000  # newest ones that are shown

@@ -1,5 +1,5 @@
 """A Parquet file that is whole after each moment: rows since the last whole row group make up a last one, which is
-written anew with the footer until it is large enough to stay."""
+written again with the footer until it is large enough to stay."""
 
 from __future__ import annotations
 

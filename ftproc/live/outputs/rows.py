@@ -16,7 +16,8 @@ from ftproc.files import layout, remote
 from ftproc.files.layout import Target, sidecar
 from ftproc.files.writing import atomic, csvtext, outputs, tables, trajectories
 from ftproc.live.outputs.parquet import GrowingParquet
-from ftproc.records import Trajectory, joined
+from ftproc.long_records import joined
+from ftproc.records import Trajectory
 
 GROWING = (".csv", ".csv.gz", ".jsonl", ".parquet")
 EVERY_S = 0.5  # at the latest rows are seen in a file, and counted in its metadata

@@ -26,14 +26,11 @@ FIRST_VARIANCE = 5.0  # times the noise variance
 LINE = {"order": 1.0, "window": 4.0, "longest": 3.0}  # of the least-squares method
 IN_LOG = "from the log"
 
-GATE_PARAMETERS = (
-    *POLYNOMIAL,
-    *per_component("F", "threshold of the gate, the paper's 0.06 degrees", IN_LOG),
-)
+GATE_PARAMETERS = (*POLYNOMIAL, *per_component("F", "threshold of the gate, the paper's 0.06 degrees", IN_LOG))
 LINE_PARAMETERS = (
     Parameter("order", "degree of the polynomial that is extrapolated", "1, the paper's", 0, 2, True),
     Parameter("window", "values that it goes through", "4, the paper's", 1, channels.LONGEST_WINDOW, True),
-    Parameter("longest", "readings rejected in a row, after which they are believed", "3, the paper's", 1, 1000, True),
+    Parameter("longest", "readings rejected in a row, after which they are accepted", "3, the paper's", 1, 1000, True),
     *per_component("D", "threshold on the residual, the paper's 0.6 degrees", IN_LOG),
 )
 KALMAN_PARAMETERS = (
@@ -47,7 +44,7 @@ KALMAN_PARAMETERS = (
 
 def gate(readings: Readings, settings: FilterSettings, check_first: bool = False) -> Estimate:
     """Readings that differ too much from what the accepted ones foretell are dropped: no estimate there."""
-    log = channels.look(readings, settings, blindly=not check_first)
+    log = channels.prepare(readings, settings, blindly=not check_first)
     weight = _accepted(log, settings, check_first)
     value = np.where(weight > 0, log.reading, np.nan)
     return channels.estimate(readings, log, Cleaned(value, weight))
@@ -55,7 +52,7 @@ def gate(readings: Readings, settings: FilterSettings, check_first: bool = False
 
 def least_squares(readings: Readings, settings: FilterSettings) -> Estimate:
     """Readings too far from the line through the last four values are replaced by it."""
-    log = channels.look(readings, settings)
+    log = channels.prepare(readings, settings)
     known = replace(settings, parameters=tuple({**LINE, **dict(settings.parameters)}.items()))
     columns = [
         kernels.least_squares(
@@ -71,7 +68,7 @@ def least_squares(readings: Readings, settings: FilterSettings) -> Estimate:
 def outlier_kalman(readings: Readings, settings: FilterSettings, improved: bool = False) -> Estimate:
     """The anti-outlier Kalman filter. improved: begin with readings that agree, and turn down the gain of the component
     that is off only."""
-    log = channels.look(readings, settings, blindly=not improved)
+    log = channels.prepare(readings, settings, blindly=not improved)
     seen = np.isfinite(log.reading).astype(float)
     begin = _first(_accepted(log, settings, True), seen) if improved else _first(seen, seen)
     expected = [channels.expect(log, c, settings) for c in range(3)]

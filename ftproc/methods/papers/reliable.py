@@ -51,7 +51,7 @@ def reliable(readings: Readings, settings: FilterSettings, literal: bool = False
 
 
 def _run(readings: Readings, settings: FilterSettings, kind: int) -> Estimate:
-    log = channels.look(readings, settings)
+    log = channels.prepare(readings, settings)
     memory, least = (settings.parameter(name) for name in ("memory", "least_noise"))
     found = []
     for c in range(3):

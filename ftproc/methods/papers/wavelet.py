@@ -24,14 +24,14 @@ WAVELET, LEVELS = "db4", 4
 EDGES = "antireflect"  # a mirror without the kink that a slope would get, which would pass for detail
 GAP_INTERVALS = 5.0  # a longer pause ends the stretch that is denoised as one
 FIRST = 10  # readings that the first state comes from
-VAGUE = 1e3  # times the noise, per second: 1-sigma of rates about which nothing is known
+UNKNOWN = 1e3  # times the noise, per second: 1-sigma of rates about which nothing is known
 GAUSSIAN = 0.6745  # median of |x| of a normal distribution
-DECADES = np.arange(-6.0, 8.1, 0.5)  # of jerk density over noise variance, s^-5: where the likeliest is looked for
+DECADES = np.arange(-6.0, 8.1, 0.5)  # of jerk density over noise variance, s^-5: among which the likeliest is sought
 
 
 def estimate(readings: Readings, settings: FilterSettings) -> Estimate:
     """Filter, then denoise. The rates are the filter's."""
-    log = channels.look(readings, settings, blindly=True)
+    log = channels.prepare(readings, settings, blindly=True)
     parts = [_component(readings, log, c) for c in range(3)]
     value, rate, innovation, sigma, weight = (np.stack(part, 1) for part in zip(*parts, strict=True))
     return channels.estimate(readings, log, Cleaned(value, weight, innovation, sigma, rate=rate))
@@ -61,7 +61,7 @@ def _start(time_s: FloatArray, z: FloatArray, sigma: float, angular: bool) -> tu
     t, v = time_s[rows] - time_s[rows[0]], unwrap(z[rows]) if angular else z[rows]
     span = float(t[-1])
     if span <= 0:
-        return int(rows[0]), np.array([v[0], 0.0, 0.0]), np.diag([sigma, VAGUE * sigma, VAGUE * sigma]) ** 2
+        return int(rows[0]), np.array([v[0], 0.0, 0.0]), np.diag([sigma, UNKNOWN * sigma, UNKNOWN * sigma]) ** 2
     fitted = np.polynomial.Polynomial.fit(t, v, min(2, len(np.unique(t)) - 1)).convert().coef
     value, rate, half = np.r_[fitted, 0.0, 0.0][:3]
     return int(rows[0]), np.array([value, rate, 2 * half]), np.diag([2, 15 / span, 60 / span**2]) ** 2 * sigma**2

@@ -22,13 +22,7 @@ def page(flight: Flight) -> str:
     stretches = disagreements(flight, fused)
     when = tables.when(shown).removeprefix("time, ")
     listed = (
-        tables.table(
-            ("station", f"from, {when}", f"to, {when}", "what"),
-            stretches,
-            "numbers",
-        )
-        if stretches
-        else ""
+        tables.table(("station", f"from, {when}", f"to, {when}", "what"), stretches, "numbers") if stretches else ""
     )
     nothing = "" if stretches else '<p class="note">No station joins late, is silent or follows another target.</p>'
     readings = tables.table(summary.COMPONENT_HEADER, summary.component_rows(s), "numbers stations")

@@ -30,14 +30,14 @@ def along(moments: Moments, time_s: np.ndarray) -> tuple[IntArray, list[str]]:
     return rows[near], said
 
 
-def apart(said: list[str], place: FloatArray) -> list[str]:
-    """The names whose box overlaps none before it, "" for the others. place: (n, 2) of them, CSS pixels or NaN."""
+def apart(said: list[str], position: FloatArray) -> list[str]:
+    """The names whose box overlaps none before it, "" for the others. position: (n, 2) of them, CSS pixels or NaN."""
     kept: list[int] = []
     for k, name in enumerate(said):
-        if np.isnan(place[k]).any():
+        if np.isnan(position[k]).any():
             continue
         size = np.array([LETTER * len(name), LINE])
-        if all((np.abs(place[k] - place[j]) > size).any() for j in kept):
+        if all((np.abs(position[k] - position[j]) > size).any() for j in kept):
             kept.append(k)
     return [name if k in kept else "" for k, name in enumerate(said)]
 

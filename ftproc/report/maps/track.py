@@ -78,13 +78,13 @@ def ground(view: View) -> Drawn:
     extent = (low, high)
     graticule.add(figure, view, extent)
     dots = _raw(view, across, up, extent)
-    for raw, name, look in dots:
+    for raw, name, mark in dots:
         figure.add_scatter(
             x=raw[0].astype(np.float32),
             y=raw[1].astype(np.float32),
             mode="markers",
             name=name,
-            marker=look,
+            marker=mark,
             hoverinfo="skip",
         )
     figure.add_scatter(
@@ -115,8 +115,8 @@ def ground(view: View) -> Drawn:
 def axis_names(view: View) -> dict[str, str]:
     """The titles of the axes, with their directions as far as they are known."""
     north = axes_of_north(view.trajectory.metadata)
-    said = {} if north is None else {"xy"[north[0]]: "north", "xy"[north[1]]: "east"}
-    return {axis: f"{axis} ({said[axis]}), m" if axis in said else f"{axis}, m" for axis in "xy"} | {"z": "z (up), m"}
+    names = {} if north is None else {"xy"[north[0]]: "north", "xy"[north[1]]: "east"}
+    return {axis: f"{axis} ({names[axis]}), m" if axis in names else f"{axis}, m" for axis in "xy"} | {"z": "z (up), m"}
 
 
 def _spot(figure: go.Figure, x: float, y: float, name: str, symbol: str) -> None:
@@ -135,15 +135,15 @@ def _add_ticks(figure: go.Figure, view: View, axes: tuple[int, int], width: floa
     """Round moments along the track, with the names of those that have room for one. width: of the map, m."""
     trajectory = view.trajectory
     rows, said = ticks.along(view.moments, trajectory.time_s)
-    place = trajectory.state[rows][:, list(axes)]
-    if not np.isfinite(place).any():
+    position = trajectory.state[rows][:, list(axes)]
+    if not np.isfinite(position).any():
         return
-    look = {"color": style.BLUE, "symbol": "line-ns-open", "size": 9, "line": {"width": 2}}
-    inward = np.where(place[:, 0] > np.nanmean(place[:, 0]), "top left", "top right").tolist()
+    mark = {"color": style.BLUE, "symbol": "line-ns-open", "size": 9, "line": {"width": 2}}
+    inward = np.where(position[:, 0] > np.nanmean(position[:, 0]), "top left", "top right").tolist()
     figure.add_scatter(
-        x=place[:, 0], y=place[:, 1], mode="markers+text", name="time", marker=look, hovertext=said, hoverinfo="text",
-        text=ticks.apart(said, place * NARROWEST / width), textfont={"size": 11}, textposition=inward,
-        showlegend=False, cliponaxis=True,
+        x=position[:, 0], y=position[:, 1], mode="markers+text", name="time", marker=mark, hovertext=said,
+        hoverinfo="text", text=ticks.apart(said, position * NARROWEST / width), textfont={"size": 11},
+        textposition=inward, showlegend=False, cliponaxis=True,
     )  # fmt: skip
 
 
@@ -154,14 +154,14 @@ def _raw(
     position, bad = view.raw_position
     if position is None:
         return []
-    place = position[:, [across, up]]
-    inside = np.asarray(((place >= extent[0]) & (place <= extent[1])).all(1))
+    position = position[:, [across, up]]
+    inside = np.asarray(((position >= extent[0]) & (position <= extent[1])).all(1))
     timeline = Timeline.of(view.trajectory.time_s, RAW_COLUMNS)
     found = list[tuple[FloatArray, str, dict[str, Any]]]()
     for chosen, name, colour, size in (
         (inside & ~bad, "raw position", style.READING, 2.5), (inside & bad, "with an outlier", style.VERMILLION, 3.5),
     ):  # fmt: skip
-        shown = np.where(chosen[:, None], place, np.nan).T
+        shown = np.where(chosen[:, None], position, np.nan).T
         rows = timeline.extremes(*shown)
         if len(rows):
             found.append((shown[:, rows], name, {"color": colour, "size": size, "opacity": 0.7}))

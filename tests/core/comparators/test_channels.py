@@ -75,7 +75,7 @@ def test_line_replaces_one_or_two_outliers_exactly(run):
     np.testing.assert_array_equal(np.flatnonzero(weight == 0), np.arange(10, 10 + run))
 
 
-def test_three_outliers_in_a_row_are_believed():
+def test_three_outliers_in_a_row_are_accepted():
     """The paper's own limit."""
     z = 3 + 0.1 * TIME[:30]
     z[10:13] += 50

@@ -60,7 +60,7 @@ def test_trust_in_members_by_the_rules_one_by_one(mean, member):
 
 
 @given(st.lists(st.floats(0, 60), min_size=2, max_size=20))
-def test_a_larger_innovation_is_never_believed_more(rho):
+def test_a_larger_innovation_never_weighs_more(rho):
     rho = sorted(rho)
     gamma = [fuzzy.trust_in_reading(r, 3) for r in rho]
     assert all(a >= b - 1e-12 for a, b in itertools.pairwise(gamma))

@@ -50,10 +50,10 @@ def test_far_patch_beside_other_outliers_is_given_up(component):
     np.testing.assert_array_equal(found[165:255, component], right[165:255, component])
 
 
-def test_islands_are_tried_once():
+def test_accepted_runs_are_tried_once():
     log, wrong, _ = followed()
     search = alternatives.Search(Work(len(wrong)))
-    (again,) = alternatives.islands(log.time_s, wrong, log.possible)
+    (again,) = alternatives.accepted_runs(log.time_s, wrong, log.possible)
     edges = alternatives._edges(wrong, log.possible)
     search.tried = {again, *edges}
     np.testing.assert_array_equal(alternatives.try_alternatives(log, wrong, search), wrong)
@@ -72,13 +72,13 @@ def test_the_searches_in_a_log_end_when_its_work_is_done(monkeypatch):
     monkeypatch.setattr(alternatives, "MOST", 0)
     many = alternatives.Search(work)
     alternatives.try_alternatives(log, wrong, many)
-    islands = set(alternatives.islands(log.time_s, wrong, log.possible))
-    assert islands <= many.unexamined <= search.tried
+    runs = set(alternatives.accepted_runs(log.time_s, wrong, log.possible))
+    assert runs <= many.unexamined <= search.tried
     monkeypatch.undo()
     work.left = 0
     another = alternatives.Search(work)
     np.testing.assert_array_equal(alternatives.try_alternatives(log, wrong, another), wrong)
-    assert another.unexamined == {*islands, *alternatives._edges(wrong, log.possible)}
+    assert another.unexamined == {*runs, *alternatives._edges(wrong, log.possible)}
     assert not another.tried
 
 
@@ -117,7 +117,7 @@ def test_right_decisions_stay(component):
     np.testing.assert_array_equal(alternatives.try_alternatives(log, two, alternatives.Search(Work(len(two)))), two)
 
 
-def test_islands_lie_between_two_rejected_runs():
+def test_accepted_runs_lie_between_two_rejected_runs():
     weight = np.ones((60, 3))
     possible = np.ones((60, 3), bool)
     weight[10:14, 1] = weight[20:23, 1] = 0.0
@@ -126,7 +126,7 @@ def test_islands_lie_between_two_rejected_runs():
     possible[16, 1] = False
     weight[4:8, 2] = 0.0
     time = 0.1 * np.arange(60)
-    assert alternatives.islands(time, weight, possible) == [
+    assert alternatives.accepted_runs(time, weight, possible) == [
         (1, 0, 0, 10, 14),
         (1, 10, 14, 20, 23),
         (1, 20, 23, 60, 60),
@@ -136,20 +136,20 @@ def test_islands_lie_between_two_rejected_runs():
     ]
 
 
-def test_islands_end_at_gaps():
+def test_accepted_runs_end_at_gaps():
     weight = np.ones((60, 3))
     weight[20:24, 0] = 0.0
     time = 0.1 * np.arange(60)
     time[30:] += 2.0
-    assert alternatives.islands(time, weight, weight > -1) == [(0, 0, 0, 20, 24), (0, 20, 24, 30, 30)]
+    assert alternatives.accepted_runs(time, weight, weight > -1) == [(0, 0, 0, 20, 24), (0, 20, 24, 30, 30)]
     time[22:] += 2.0  # within the rejected run it ends nothing
-    assert alternatives.islands(time, weight, weight > -1) == [(0, 0, 0, 20, 24), (0, 20, 24, 30, 30)]
+    assert alternatives.accepted_runs(time, weight, weight > -1) == [(0, 0, 0, 20, 24), (0, 20, 24, 30, 30)]
 
 
 def test_far_apart_runs_have_no_island_between_them():
     weight = np.ones((200, 3))
     weight[60:64, 0] = weight[64 + alternatives.LONGEST + 1 : 120, 0] = 0.0
-    assert alternatives.islands(0.1 * np.arange(200), weight, np.ones((200, 3), bool)) == []
+    assert alternatives.accepted_runs(0.1 * np.arange(200), weight, np.ones((200, 3), bool)) == []
 
 
 def test_neighbourhood_that_says_too_little_is_left():

@@ -9,7 +9,7 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.core.editing import alternatives
-from ftproc.core.editing.alternatives import Island
+from ftproc.core.editing.alternatives import AcceptedRun
 from ftproc.core.identification.likelihood import FIRST_MEMORIES, first_jerk
 from ftproc.core.identification.scales import scales_of
 from ftproc.settings import FilterSettings
@@ -54,6 +54,6 @@ def test_edges_are_rejected_runs_and_ends():
     weight[10:15, 0] = 0.0
     found = alternatives._edges(weight, possible)
     assert found == [
-        Island(0, 0, 0, 0, 0), Island(0, 10, 10, 15, 15), Island(0, 40, 40, 40, 40),
-        Island(1, 0, 0, 0, 0), Island(1, 40, 40, 40, 40),
+        AcceptedRun(0, 0, 0, 0, 0), AcceptedRun(0, 10, 10, 15, 15), AcceptedRun(0, 40, 40, 40, 40),
+        AcceptedRun(1, 0, 0, 0, 0), AcceptedRun(1, 40, 40, 40, 40),
     ]  # fmt: skip

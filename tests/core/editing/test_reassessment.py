@@ -25,7 +25,7 @@ def test_reassessment_finds_the_patch_that_made_the_jerk_jump(monkeypatch):
         return np.sqrt((error**2).sum(1).mean())
 
     assert rms() < 0.7
-    monkeypatch.setattr(two_pass, "last_look", lambda record, decision, work: (decision, ()))
+    monkeypatch.setattr(two_pass, "reassess_rejected", lambda record, decision, work: (decision, ()))
     reassessed = rms()
     monkeypatch.setattr(two_pass, "reassess", lambda record, decision: decision)
     assert reassessed < 0.7
@@ -63,8 +63,8 @@ def test_spans_that_are_passed_over_would_stay_as_they_are(monkeypatch):
     some = edit(flight).weight
     taken, passed = [], reassessment._doubtful
 
-    def spy(record, decision, calm, spans):
-        taken.append((len(list(passed(record, decision, calm, spans))), len(spans)))
+    def spy(record, decision, at_median, spans):
+        taken.append((len(list(passed(record, decision, at_median, spans))), len(spans)))
         return spans
 
     monkeypatch.setattr(reassessment, "_doubtful", spy)

@@ -49,7 +49,7 @@ def test_recovers(trouble, seed):
 @pytest.mark.parametrize("components", [(0,), (1,), (0, 1, 2)])
 @pytest.mark.parametrize("seed", range(4))
 def test_step_bias_is_followed_in_the_end(components, seed):
-    """A bias that stays is no patch: after the longest patch the readings are believed again."""
+    """A bias that stays is no patch: after the longest patch the readings are accepted again."""
     a = matched(seed, 500, q=20.0)
     error = np.zeros(3)
     error[list(components)] = 40.0

@@ -56,7 +56,7 @@ def test_turns_are_not_patches(monkeypatch):
     assert largest.max() < 200
     assert rejected.max() < 0.03
     monkeypatch.setattr(profile, "ABRUPT", 1e6)
-    monkeypatch.setattr(two_pass, "last_look", lambda record, decision, work: (decision, ()))
+    monkeypatch.setattr(two_pass, "reassess_rejected", lambda record, decision, work: (decision, ()))
     assert edited(flights)[0].mean() > 30
 
 
@@ -98,7 +98,7 @@ def test_a_take_off_is_no_patch(monkeypatch):
     rejected, off = worst_of(flights)
     assert rejected < 0.01
     assert off < 5
-    monkeypatch.setattr(two_pass, "last_look", lambda record, decision, work: (decision, ()))
+    monkeypatch.setattr(two_pass, "reassess_rejected", lambda record, decision, work: (decision, ()))
     rejected, off = worst_of(flights)
     assert rejected > 0.04
     assert off > 7

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.compiled
 
 
 def piecewise(seed):
-    """Twenty seconds of calm, twenty of hard jerk, twenty of calm."""
+    """Twenty seconds of small jerk, twenty of large jerk, twenty of small jerk."""
     a = matched(seed, 600, q=1.0)
     jerk = np.array([[0.01], [400.0], [0.01]]) * motion.isotropic(1.0)
     rng, truth = np.random.default_rng(seed), a.truth.copy()

@@ -69,7 +69,7 @@ def test_a_late_stamp_is_noise_that_the_components_share():
         )
 
 
-def test_late_stamps_are_believed_only_if_they_keep_the_readings_in_order():
+def test_late_stamps_are_accepted_only_if_they_keep_the_readings_in_order():
     """The same residuals, of stamps off by 20 ms, at longer and at shorter intervals than that."""
     rng = np.random.default_rng(3)
     n, late_s, sigma = 600, 0.02, np.array([0.1, 1e-4, 1e-4])

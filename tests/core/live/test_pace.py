@@ -1,4 +1,4 @@
-"""How often a window is looked at: by the interval of its readings, and by a clock that goes on."""
+"""How often a window is edited: by the interval of its readings, and by a clock that goes on."""
 
 from __future__ import annotations
 
@@ -47,18 +47,18 @@ def test_few_long_intervals_among_many_short_ones_do_not_count():
 
 @pytest.mark.parametrize("step", [1, 7, 999, 10_000])
 @pytest.mark.parametrize("name", FLOOD)
-def test_looks_do_not_depend_on_how_rows_come(name, step):
-    """A look is due with every row; which rows get one is counted."""
+def test_turns_do_not_depend_on_how_rows_come(name, step):
+    """A turn is due with every row; which rows get one is counted."""
     time_s = FLOOD[name]
-    clock, looks = Clock(), []
+    clock, turns = Clock(), []
     for low in range(0, len(time_s), step):
         block = time_s[low : low + step]
         done = 0
         while done < len(block):
-            count = clock.next_look(block[done:], 1)
+            count = clock.rows_to_turn(block[done:], 1)
             clock, done = clock.after(block[done : done + count]), done + count
             if not clock.stands or clock.rows % CROWD == 0:
-                looks.append(low + done - 1)
+                turns.append(low + done - 1)
     ticks = time_s // TICK_S
     order = np.arange(len(ticks)) - np.searchsorted(ticks, ticks) + 1
-    assert looks == np.flatnonzero((order <= STANDING) | (order % CROWD == 0)).tolist()
+    assert turns == np.flatnonzero((order <= STANDING) | (order % CROWD == 0)).tolist()

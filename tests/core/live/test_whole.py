@@ -1,4 +1,4 @@
-"""A look at all of the window that is spread over the readings which come meanwhile."""
+"""An edit of all of the window that is spread over the readings which come meanwhile."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
 """Faults that last: patches of any length, steps that stay, clocks that jump; proposed, weighed, taken out; and the
-last look at the runs that are rejected."""
+reassessment of the runs that are rejected."""
 
 from __future__ import annotations

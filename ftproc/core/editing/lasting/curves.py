@@ -11,16 +11,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.filtering.columns import Columns, said_of
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.model.frames import wrap
+from ftproc.records import FloatArray, IntArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
-CLOCK = 3  # in place of a component
+CLOCK = 3  # instead of a component
 WIDE, WIDE_CLOCK = 25.0, 10.0  # sigmas of the noise, and intervals: half of all terms are smaller, the others of any
 # size (Cauchy)
 ROUNDS, NEAR = 4, 0.1  # of finding the sizes, because the track bends with them; sigmas that they may yet move
@@ -156,6 +153,6 @@ def _scales(curve: Curve, model: Model, setting: Setting) -> FloatArray:
 
 
 def _sized(curves: Sequence[Curve], size: FloatArray) -> list[Curve]:
-    places = np.cumsum([len(curve.size) for curve in curves])[:-1]
-    pieces = np.split(size, places)
+    bounds = np.cumsum([len(curve.size) for curve in curves])[:-1]
+    pieces = np.split(size, bounds)
     return [curve._replace(size=tuple(own.tolist())) for curve, own in zip(curves, pieces, strict=True)]

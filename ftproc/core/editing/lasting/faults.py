@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.editing.copies import KindArray
 from ftproc.core.editing.lasting.curves import CLOCK, Curve, Setting, fitted, without
@@ -23,9 +22,7 @@ from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification.one_sided import OneSided
 from ftproc.core.model.frames import line_of_sight_axes
 from ftproc.order_statistics import median, medians
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from ftproc.records import FloatArray, IntArray
 
 CLOCK_ROUNDS = 2  # of taking a jump of the clock out: the way that is missing shows without it only
 SAME = 4.5  # sigmas of the noise within which two levels are one

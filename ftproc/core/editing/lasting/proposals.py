@@ -7,15 +7,13 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.editing.lasting import scan
 from ftproc.core.editing.lasting.curves import Curve
 from ftproc.core.editing.lasting.weighing import Scene
 from ftproc.core.filtering.records import Model
+from ftproc.records import FloatArray, IntArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Channels = Sequence[tuple[int, int]]
 
 SPANS, APART, MOST_SPANS = 2, 3, 4  # stretches on either side of a jump, cells between them, and all that are weighed
@@ -23,40 +21,41 @@ PER_TERM = 5.0  # in log-likelihood, for a scan to prefer a stretch of more term
 TERMS = (1, 2, 3, 5)
 LONGEST, FARTHEST = 0.5, 5000  # of the log, and samples: what is off for longer is off for good
 CELLS, SHORTEST = 200, 3  # cells of a scan, and samples that are off
-PLACES = 13  # of a jump that is about there, where they need not be exact
+TRIED = 13  # samples about a jump, where it is not yet known to the sample
 
 
-class Place(NamedTuple):
+class LocatedJump(NamedTuple):
     """A jump of channels (component, station) before a sample of a scene. marks: samples of all jumps. width: of a
-    cell, in samples. calm: a single level of jerk, of the flight beside the jump."""
+    cell, in samples. at_median: the model with the median process noise beside
+    the jump."""
 
     channels: Channels
     sample: int
     marks: Sequence[int]
     width: int
-    calm: Model
+    at_median: Model
 
 
-def proposals(scene: Scene, place: Place) -> Iterator[list[Curve]]:
+def proposals(scene: Scene, located: LocatedJump) -> Iterator[list[Curve]]:
     """The curves, of one for each channel, that the jump may be."""
-    n, at = len(scene.possible), place.sample
-    yield from steps(scene, place.channels, at)
+    n, at = len(scene.possible), located.sample
+    yield from steps(scene, located.channels, at)
     reach = min(int(LONGEST * n), FARTHEST)
     here = slice(max(at - reach, 0), min(at + reach, n))
     part, length = scene.part(here), min(at + reach, n) - max(at - reach, 0)
-    near = place._replace(sample=at - here.start)
-    marks = [near.sample, *(mark - here.start for mark in place.marks if abs(mark - at) > 2 * place.width)]
-    edges = scan.spread(marks, max(place.width, length // CELLS), length)
-    for more, edge in _likeliest_spans(gains_of(part, place, edges), edges, near.sample):
-        other = edge if more else other_end(part, near, edge, place.width, more)
+    near = located._replace(sample=at - here.start)
+    marks = [near.sample, *(mark - here.start for mark in located.marks if abs(mark - at) > 2 * located.width)]
+    edges = scan.spread(marks, max(located.width, length // CELLS), length)
+    for more, edge in _likeliest_spans(gains_of(part, located, edges), edges, near.sample):
+        other = edge if more else other_end(part, near, edge, located.width, more)
         begin, end = here.start + min(near.sample, other), here.start + max(near.sample, other)
         for terms in TERMS:
             if (terms > 1) == more and end - begin >= SHORTEST and (terms == 1 or terms <= (end - begin) // 4):
-                yield [Curve(c, begin, end, (0.0,) * terms, s) for c, s in place.channels]
+                yield [Curve(c, begin, end, (0.0,) * terms, s) for c, s in located.channels]
 
 
 def steps(scene: Scene, channels: Channels, sample: int) -> list[list[Curve]]:
-    """Steps that stay, before a sample; which side is right, other stations tell."""
+    """Steps that stay, before a sample; which side is right, other stations show."""
     n = len(scene.possible)
     later = [Curve(c, sample, n, (0.0,), s) for c, s in channels]
     return [later, [curve._replace(begin=0, end=sample) for curve in later]] if len(scene.rates) > 1 else [later]
@@ -79,7 +78,7 @@ def _from(gain: FloatArray, k: int) -> FloatArray:
 
 
 def _peaks(values: FloatArray, inside: slice) -> Iterator[int]:
-    """The places of the largest values of a part, well apart."""
+    """The indices of the largest values of a part, well apart."""
     left = np.zeros(len(values))
     left[inside] = values[inside]
     for _ in range(SPANS):
@@ -90,44 +89,46 @@ def _peaks(values: FloatArray, inside: slice) -> Iterator[int]:
         left[max(j - APART, 0) : j + APART + 1] = 0.0
 
 
-def gains_of(part: Scene, place: Place, edges: IntArray, of_one: Callable[..., FloatArray] = scan.gains) -> FloatArray:
-    """The gains, as `of_one` has them of one, of all channels of a place, as if each were off alone."""
-    whole = [Curve(c, 0, len(part.possible), (), s) for c, s in place.channels]
+def gains_of(
+    part: Scene, located: LocatedJump, edges: IntArray, of_one: Callable[..., FloatArray] = scan.gains
+) -> FloatArray:
+    """The gains, as `of_one` has them of one, of all channels of a jump, as if each were off alone."""
+    whole = [Curve(c, 0, len(part.possible), (), s) for c, s in located.channels]
     log = part.log._replace(weight=part.taking_in(whole))
     starts = part.starts(log)
     found: FloatArray = np.sum(
-        [of_one(log, place.calm, starts, part.setting, each, edges) for each in place.channels], 0
+        [of_one(log, located.at_median, starts, part.setting, each, edges) for each in located.channels], 0
     )
     return found
 
 
-def exactly(part: Scene, place: Place) -> int:
+def exactly(part: Scene, located: LocatedJump) -> int:
     """The sample of a jump that is about there: first in steps, then by the sample."""
-    found, within = place.sample, place.width
+    found, within = located.sample, located.width
     while within:
-        edges = places_about(len(part.possible), found, within)
+        edges = edges_about(len(part.possible), found, within)
         if len(edges) <= 2:
             break
-        gain = gains_of(part, place, edges, scan.steps_of)
+        gain = gains_of(part, located, edges, scan.steps_of)
         found = int(edges[1 + int(gain[1:].argmax())])
-        within //= PLACES // 2
+        within //= TRIED // 2
     return found
 
 
-def other_end(part: Scene, place: Place, about: int, within: int, more: bool) -> int:
+def other_end(part: Scene, located: LocatedJump, about: int, within: int, more: bool) -> int:
     """The other end of a stretch that begins or ends with a jump, to the sample, about where it is."""
     n = len(part.possible)
-    edges = _fine(n, about, within, place.sample)
-    gain = gains_of(part, place, edges)[int(more)]
-    along = _from(gain, int(np.searchsorted(edges, place.sample)))
-    along[(edges == 0) | (edges == n) | (np.abs(edges - place.sample) < SHORTEST)] = 0.0
+    edges = _fine(n, about, within, located.sample)
+    gain = gains_of(part, located, edges)[int(more)]
+    along = _from(gain, int(np.searchsorted(edges, located.sample)))
+    along[(edges == 0) | (edges == n) | (np.abs(edges - located.sample) < SHORTEST)] = 0.0
     return int(edges[int(along.argmax())])
 
 
-def places_about(n: int, sample: int, within: int) -> IntArray:
+def edges_about(n: int, sample: int, within: int) -> IntArray:
     """Edges at some of the samples within so many of one, and at the ends of n."""
-    places = np.linspace(sample - within, sample + within, PLACES).astype(np.int64)
-    return np.unique(np.clip([0, *places, n], 0, n))
+    about = np.linspace(sample - within, sample + within, TRIED).astype(np.int64)
+    return np.unique(np.clip([0, *about, n], 0, n))
 
 
 def _fine(n: int, about: int, within: int, *others: int) -> IntArray:

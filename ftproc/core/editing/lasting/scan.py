@@ -24,9 +24,7 @@ from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification.stretches import runs_of
 from ftproc.order_statistics import median
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from ftproc.records import FloatArray, IntArray
 
 TERMS = 3  # of a cell: offset, slope, bend
 BLOCK = 1000  # sums from which their scale is taken
@@ -149,7 +147,7 @@ def jumps(found: FloatArray, least: float, most: int, apart: int, together: floa
 
 def jumps_between(gain: FloatArray, edges: IntArray, least: float, together: float) -> list[Jump]:
     """The largest jump of each channel, where several stations show how large the channels are: gain (stations, 4, m)
-    of a step at each edge. The evidence for it does not fade with the distance."""
+    of a step at each edge. The evidence for it does not decrease with the distance."""
     found = []
     for s, c in np.ndindex(gain.shape[:2]):
         k = int(gain[s, c].argmax())
@@ -166,9 +164,9 @@ def beside_runs(weight: FloatArray, possible: NDArray[np.bool_], off: FloatArray
     for c in range(CLOCK):
         seen = np.flatnonzero(possible[:, c])
         for begin, end in runs_of(weight[seen, c] <= 0, 2 * FEWEST):
-            for place, size in _within(off[seen[begin:end], c]):
-                if 0.5 * size**2 > least and begin + place < len(seen):
-                    found.append(Jump(0.5 * size**2, int(seen[begin + place]), 0, ((c,),)))
+            for index, size in _within(off[seen[begin:end], c]):
+                if 0.5 * size**2 > least and begin + index < len(seen):
+                    found.append(Jump(0.5 * size**2, int(seen[begin + index]), 0, ((c,),)))
     return sorted(found, key=lambda jump: -jump.gain)
 
 
@@ -177,9 +175,9 @@ def _within(off: FloatArray) -> Iterator[tuple[int, float]]:
     track that is bent from before a step to after it lies between the two, or joins one of them slowly."""
     n = len(off)
     higher = np.cumsum(np.sign(off))  # readings above the track less those below, up to each
-    for place, other in ((int(higher.argmin()) + 1, higher[-1]), (int(higher.argmax()) + 1, -higher[-1])):
-        if min(place, n - place) >= FEWEST and 0.5 * (n + other) + abs(higher[place - 1]) >= AGREE * n:
-            yield place, median(off[place : place + BESIDE]) - median(off[max(place - BESIDE, 0) : place])
+    for index, other in ((int(higher.argmin()) + 1, higher[-1]), (int(higher.argmax()) + 1, -higher[-1])):
+        if min(index, n - index) >= FEWEST and 0.5 * (n + other) + abs(higher[index - 1]) >= AGREE * n:
+            yield index, median(off[index : index + BESIDE]) - median(off[max(index - BESIDE, 0) : index])
     first, last = median(off[:BESIDE]), median(off[-BESIDE:])
     if abs(last) < JOINS * abs(first):
         yield 0, first

@@ -3,7 +3,7 @@
 Wherever a station jumps (`scan`), the jump is weighed on the log around it (`weighing`), first as a step of one
 component, of several, and of the clock. With the jump taken out, the process noise there is that of the flight, and a
 scan of the stretches that begin or end with it tells from where to where the components may be off (`proposals`). These
-are weighed too, the likeliest is taken, and the log is looked at again without it.
+are weighed too, the likeliest is taken, and the log is searched again without it.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from ftproc.core.editing.lasting.faults import Step
 from ftproc.core.editing.lasting.proposals import (
     CELLS,
     SHORTEST,
-    Place,
+    LocatedJump,
+    edges_about,
     exactly,
     other_end,
-    places_about,
     proposals,
     steps,
 )
@@ -36,9 +36,7 @@ from ftproc.core.identification.profile import median_level
 from ftproc.core.identification.scales import scales_of
 from ftproc.order_statistics import median
 
-FloatArray = NDArray[np.float64]
-
-ROUNDS, JUMPS = 8, 5  # of looking at a log, and jumps that are looked at in one, by either set of weights
+ROUNDS, JUMPS = 8, 5  # over a log, and jumps that are weighed in one, by either set of weights
 LEAST_GAIN, TOGETHER = 18.0, 0.03  # of a jump, in log-likelihood; of the largest: components that jump with it
 LEFT = 6.0  # the same by the model of the part around a jump; up to 4 where there is none, from 12 on where there is
 LEAST_OFF = 10.0  # the same of a jump in a rejected run, by the noise alone
@@ -47,11 +45,11 @@ AROUND, MEMORIES = (150, 2000), 12.0  # samples on each side of what is weighed,
 SHORTEST_CELL = 2  # samples in a cell of a scan
 OPEN, MOVES = 4.0, 15.0  # in log-probability: within it, whether a fault stays is open; before half of a log is moved
 REMEMBERED = 2.5  # samples that a filter remembers: with fewer, hard turns jump as faults do
-PRIOR, DOUBT, MARGIN = -6.0, -6.0, 8.0  # log-odds of such a fault at a place; with which it is told, and taken out
+PRIOR, DOUBT, MARGIN = -6.0, -6.0, 8.0  # log-odds of such a fault at a jump; with which it is reported, and taken out
 HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
 MOST_EACH = 20.0  # of log-probability, of each reading: where more is gained, the part without the fault was lost
 SURE = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
-END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step cannot be told from a patch
+END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step may as well be a patch
 
 
 class Found(NamedTuple):
@@ -68,8 +66,9 @@ class Found(NamedTuple):
         return self.curves[0].begin == 0 or self.curves[0].end == n
 
 
-class Look(NamedTuple):
-    """A look at a log: its scene, the samples on each side of what is weighed, and in a cell, and its jumps."""
+class Scanned(NamedTuple):
+    """A scene that was scanned for jumps; the samples on each side of what is weighed, and in a cell, and
+    its jumps."""
 
     scene: Scene
     around: int
@@ -89,20 +88,20 @@ def search(scene: Scene) -> list[Found]:
     """The faults that last in the log of one or several stations whose outliers were decided as if it had none."""
     found, rejected = list[Found](), list[Jump]()
     for _ in range(ROUNDS):
-        best = _likeliest(look_at(scene.without([curve for each in found for curve in each.curves])), rejected)
+        best = _likeliest(scanned(scene.without([curve for each in found for curve in each.curves])), rejected)
         if best is None or any(best.curves[0][:3] == each.curves[0][:3] for each in found):
             break
         found.append(best)
     return found
 
 
-def look_at(scene: Scene) -> Look:
+def scanned(scene: Scene) -> Scanned:
     """A scene with its jumps."""
     log = scene.log._replace(weight=scene.taken_in)
-    memory = scales_of(log, scene.calm.noise_variance).memory_samples(float(scene.calm.jerk[0, 0]))
+    memory = scales_of(log, scene.at_median.noise_variance).memory_samples(float(scene.at_median.jerk[0, 0]))
     width, around = max(int(memory / 2), SHORTEST_CELL), int(np.clip(MEMORIES * memory, *AROUND))
     if memory < REMEMBERED:
-        return Look(scene, around, width, [])
+        return Scanned(scene, around, width, [])
     starts, n = scene.starts(log), len(scene.possible)
     if len(scene.rates) > 1:
         width = max(width, n // CELLS)
@@ -110,7 +109,7 @@ def look_at(scene: Scene) -> Look:
         gain = [
             scan.steps_of(
                 scene.log._replace(weight=scene.taking_in([Curve(c, 0, n, (), s)])),
-                scene.calm,
+                scene.at_median,
                 starts,
                 scene.setting,
                 (c, s),
@@ -119,66 +118,66 @@ def look_at(scene: Scene) -> Look:
             for s, c in channels
         ]
         between = np.stack(gain).reshape(len(scene.rates), CLOCK + 1, -1)
-        return Look(scene, AROUND[1], width, scan.jumps_between(between, edges, LEAST_GAIN, TOGETHER))
+        return Scanned(scene, AROUND[1], width, scan.jumps_between(between, edges, LEAST_GAIN, TOGETHER))
     found = list[Jump]()
     for each in (log, scene.log) if (log.weight != scene.log.weight).any() else (log,):
-        smoothed = smooth_log(each, scene.calm, scene.starts(each), RESIDUALS)
+        smoothed = smooth_log(each, scene.at_median, scene.starts(each), RESIDUALS)
         sums = scan.sums(each, smoothed, scene.setting, len(scene.rates))
         found += scan.jumps(sums, LEAST_GAIN, JUMPS, 3 * width, TOGETHER)
-    off = scene.residual / np.sqrt(scene.calm.noise_variance)
+    off = scene.residual / np.sqrt(scene.at_median.noise_variance)
     found += scan.beside_runs(scene.log.weight, scene.possible, off, LEAST_OFF)[:JUMPS]
-    return Look(scene, around, width, scan.distinct(found))
+    return Scanned(scene, around, width, scan.distinct(found))
 
 
-def _likeliest(look: Look, rejected: list[Jump]) -> Found | None:
+def _likeliest(seen: Scanned, rejected: list[Jump]) -> Found | None:
     """What the largest jump is that is no motion; those that are motion are added to the rejected. Where one station
-    jumps, others seem to: the likeliest of all of them at a place counts."""
-    for jump in look.jumps:
-        if any(abs(jump.sample - old.sample) < look.width and jump.station == old.station for old in rejected):
+    jumps, others seem to: the likeliest of all of them at a sample counts."""
+    for jump in seen.jumps:
+        if any(abs(jump.sample - old.sample) < seen.width and jump.station == old.station for old in rejected):
             continue
-        if look.scene.work is not None and look.scene.work.left <= 0:
-            look.scene.work.passed += 1
+        if seen.scene.work is not None and seen.scene.work.left <= 0:
+            seen.scene.work.passed += 1
             return None
-        here = [each for each in look.jumps if abs(each.sample - jump.sample) <= look.width]
-        found = [each for each in (_tried(look, each) for each in here) if each is not None]
+        here = [each for each in seen.jumps if abs(each.sample - jump.sample) <= seen.width]
+        found = [each for each in (_tried(seen, each) for each in here) if each is not None]
         if found:
             return max(found, key=lambda each: each.gain)
         rejected += here
     return None
 
 
-def _tried(look: Look, jump: Jump) -> Found | None:
+def _tried(seen: Scanned, jump: Jump) -> Found | None:
     """What happened at a jump; None if it is motion, or there are too few readings to tell."""
     with contextlib.suppress(ValueError, np.linalg.LinAlgError):
-        return _at(look, jump)
+        return _at(seen, jump)
     return None
 
 
-def _at(look: Look, jump: Jump) -> Found | None:
+def _at(seen: Scanned, jump: Jump) -> Found | None:
     """What happened at a jump; None if it is motion."""
-    n, near = look.samples, look.near(jump.sample, jump.sample)
-    part = look.scene.part(near)
+    n, near = seen.samples, seen.near(jump.sample, jump.sample)
+    part = seen.scene.part(near)
     without = _weighed(part, near, ())
-    if not (part.taken_in != part.log.weight).any() and not _leaves_a_jump(look, jump, part, without):
+    if not (part.taken_in != part.log.weight).any() and not _leaves_a_jump(seen, jump, part, without):
         return None
     null = without.log_probability
-    gain, place, step = max((_as_step(look, jump, way, null) for way in jump.ways), key=lambda each: each[0])
+    gain, located, step = max((_as_step(seen, jump, way, null) for way in jump.ways), key=lambda each: each[0])
     moves = [c.component for c, s in zip(step.curves, step.sigma, strict=True) if abs(c.size[0]) > CERTAIN * s]
     if 0 < len(moves) < len(step.curves):
-        gain, place, step = max((gain, place, step), _as_step(look, jump, moves, null), key=lambda each: each[0])
-    if not DOUBT <= gain < MOST_EACH * look.scene.possible[near].sum() or not 0 < place.sample < n:
+        gain, located, step = max((gain, located, step), _as_step(seen, jump, moves, null), key=lambda each: each[0])
+    if not DOUBT <= gain < MOST_EACH * seen.scene.possible[near].sum() or not 0 < located.sample < n:
         return None
-    if place.channels[0][0] == CLOCK:
+    if located.channels[0][0] == CLOCK:
         return Found(_in_whole(step, near, n), step.sigma, gain)
-    proposed = list(proposals(look.scene, place._replace(calm=median_level(step.model))))
+    proposed = list(proposals(seen.scene, located._replace(at_median=median_level(step.model))))
     ends = [edge for curves in proposed for edge in (curves[0].begin, curves[0].end) if 0 < edge < n]
-    return _best(look, proposed, look.near(min(ends), max(ends)), place)
+    return _best(seen, proposed, seen.near(min(ends), max(ends)), located)
 
 
-def _leaves_a_jump(look: Look, jump: Jump, part: Scene, without: Weighed) -> bool:
+def _leaves_a_jump(seen: Scanned, jump: Jump, part: Scene, without: Weighed) -> bool:
     """Whether the channels jump by what the part around a jump is without a fault: the process noise is its own there,
     and may explain what that of the whole log does not. A step that hides in it has rejected readings beside it."""
-    edges = places_about(len(part.possible), jump.sample - look.near(jump.sample, jump.sample).start, look.width)
+    edges = edges_about(len(part.possible), jump.sample - seen.near(jump.sample, jump.sample).start, seen.width)
     log = part.log._replace(weight=without.weight)
     starts = part.starts(log)
     of_each = {
@@ -188,21 +187,23 @@ def _leaves_a_jump(look: Look, jump: Jump, part: Scene, without: Weighed) -> boo
     return bool(max(sum(of_each[channel] for channel in way) for way in jump.ways) > LEFT)
 
 
-def _as_step(look: Look, jump: Jump, way: Sequence[int], null: float) -> tuple[float, Place, Weighed]:
-    """A jump as a step of some components, or of the clock: its gain, its place, and the log around it. null:
+def _as_step(seen: Scanned, jump: Jump, way: Sequence[int], null: float) -> tuple[float, LocatedJump, Weighed]:
+    """A jump as a step of some components, or of the clock: its gain, where it is, and the log around it. null:
     log-probability without it."""
-    n, near = look.samples, look.near(jump.sample, jump.sample)
-    part, channels = look.scene.part(near), [(c, jump.station) for c in way]
-    there = Place(channels, jump.sample - near.start, [each.sample for each in look.jumps], look.width, part.calm)
-    place = there._replace(sample=near.start + exactly(part, there))
-    sides = steps(look.scene, channels, place.sample)
+    n, near = seen.samples, seen.near(jump.sample, jump.sample)
+    part, channels = seen.scene.part(near), [(c, jump.station) for c in way]
+    there = LocatedJump(
+        channels, jump.sample - near.start, [each.sample for each in seen.jumps], seen.width, part.at_median
+    )
+    located = there._replace(sample=near.start + exactly(part, there))
+    sides = steps(seen.scene, channels, located.sample)
     step = max((_weighed(part, near, side) for side in sides), key=lambda each: each.log_probability)
-    return step.log_probability - null + _prior(sides[0], n), place, step
+    return step.log_probability - null + _prior(sides[0], n), located, step
 
 
-def _best(look: Look, proposed: Sequence[Sequence[Curve]], here: slice, place: Place) -> Found | None:
+def _best(seen: Scanned, proposed: Sequence[Sequence[Curve]], here: slice, located: LocatedJump) -> Found | None:
     """The likeliest of what was proposed, all weighed on the same part of the log."""
-    part, n = look.scene.part(here), look.samples
+    part, n = seen.scene.part(here), seen.samples
     null = _weighed(part, here, ()).log_probability
 
     def outcome(curves: Sequence[Curve]) -> Found:
@@ -216,9 +217,9 @@ def _best(look: Look, proposed: Sequence[Sequence[Curve]], here: slice, place: P
         return None
     if len(best.curves[0].size) > 1:  # its other end is known to a cell
         one = best.curves[0]
-        other, at = (one.begin if one.end == place.sample else one.end), place.sample - here.start
-        edge = here.start + other_end(part, place._replace(sample=at), other - here.start, 2 * look.width, True)
-        ends = {"begin": min(place.sample, edge), "end": max(place.sample, edge)}
+        other, at = (one.begin if one.end == located.sample else one.end), located.sample - here.start
+        edge = here.start + other_end(part, located._replace(sample=at), other - here.start, 2 * seen.width, True)
+        ends = {"begin": min(located.sample, edge), "end": max(located.sample, edge)}
         if ends["end"] - ends["begin"] >= SHORTEST:
             sharper = outcome([curve.of(len(curve.size))._replace(**ends) for curve in best.curves])
             best = max(best, sharper, key=lambda each: each.gain)
@@ -245,9 +246,9 @@ def _in_whole(found: Weighed, near: slice, n: int) -> tuple[Curve, ...]:
 
 
 def _prior(curves: Sequence[Curve], n: int) -> float:
-    """Log-odds of there being such a fault, in one of n places."""
-    places = 1 if curves[0].begin == 0 or curves[0].end == n else 2
-    return PRIOR - math.log(3) - places * math.log(n)
+    """Log-odds of there being such a fault, at one of n samples."""
+    ends = 1 if curves[0].begin == 0 or curves[0].end == n else 2
+    return PRIOR - math.log(3) - ends * math.log(n)
 
 
 class SortedOut(NamedTuple):
@@ -260,11 +261,12 @@ class SortedOut(NamedTuple):
 
 def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
     """What follows from the faults of a single station."""
-    n, noise_variance = len(scene.possible), scene.calm.noise_variance
+    n, noise_variance = len(scene.possible), scene.at_median.noise_variance
+    near_end = 1 + min(END, int(SHARE * n))
     result = SortedOut(np.zeros((n, 3), bool), [], [])
     for each in found:
         for curve, sigma in zip(each.curves, each.sigma, strict=True):
-            if curve.end < n or min(curve.begin, n - curve.begin) < end_of(n):
+            if curve.end < n or min(curve.begin, n - curve.begin) < near_end:
                 if curve.component != CLOCK and each.gain > MARGIN:
                     side = slice(0, curve.begin) if curve.end == n and 2 * curve.begin < n else curve.rows
                     result.banned[side, curve.component] = True
@@ -287,8 +289,3 @@ def _may_be_a_halt(scene: Scene, clock: Curve) -> bool:
     speed = np.sqrt(late[:, 0] ** 2 + (r * np.cos(e) * late[:, 1]) ** 2 + (r * late[:, 2]) ** 2)[clock.rows]
     speed = speed[np.isfinite(speed)]
     return len(speed) > 0 and 4 * median(speed) < HALTS_MPS2 * abs(clock.size[0])
-
-
-def end_of(samples: int) -> int:
-    """Samples at either end of so many in which a step cannot be told from a patch."""
-    return 1 + min(END, int(SHARE * samples))

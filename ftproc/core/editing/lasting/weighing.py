@@ -25,9 +25,7 @@ from ftproc.core.identification.uneven_noise import rates
 from ftproc.core.model import stations
 from ftproc.core.work import Work
 from ftproc.order_statistics import median
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from ftproc.records import FloatArray, IntArray
 
 SETTLED = 2  # rounds of deciding, at most
 TAKEN_IN, EVEN = 3, 5.0  # readings in a rejected run, and second differences in sigmas, that may be a track
@@ -39,17 +37,17 @@ class Scene(NamedTuple):
     """A part of a log of one or several stations, and what decides in it.
 
     log: with the weights as decided. possible (n, 3): readings that may be good. taken_in (n, 3): the weights with the
-    rejected runs that may be a track. setting: see `curves`. calm: a model with a single level of jerk; fixed: whether
-    that is known. rates (stations, 3, 3) of outliers. gate: in sigmas. residual (n, 3): leave-one-out, as decided.
-    track, doubt: (n, 9) states about which a filter may start, and their 1-sigma; None where a start is to be found in
-    the readings. work: what weighing may still cost; None without a bound.
+    rejected runs that may be a track. setting: see `curves`. at_median: the model with the median process noise;
+    fixed: whether that is known. rates (stations, 3, 3) of outliers. gate: in sigmas. residual (n, 3): leave-one-out,
+    as decided. track, doubt: (n, 9) states about which a filter may start, and their 1-sigma; None where a start is to
+    be found in the readings. work: what weighing may still cost; None without a bound.
     """
 
     log: Observations
     possible: NDArray[np.bool_]
     taken_in: FloatArray
     setting: Setting
-    calm: Model
+    at_median: Model
     fixed: bool
     rates: FloatArray
     gate: float
@@ -91,7 +89,7 @@ class Scene(NamedTuple):
         """Where a filter over the log starts."""
         if self.track is not None and self.doubt is not None:
             return [Start(0, self.track[0], np.diag(np.repeat(FREE, 3) ** 2 + (WIDER * self.doubt[0]) ** 2))]
-        return find_starts(log, self.calm.noise_variance, float(self.calm.jerk[0, 0]))
+        return find_starts(log, self.at_median.noise_variance, float(self.at_median.jerk[0, 0]))
 
 
 class Weighed(NamedTuple):
@@ -110,13 +108,13 @@ def weighed(scene: Scene, weight: FloatArray, curves: Sequence[Curve]) -> Weighe
     readings."""
     if scene.work is not None:
         scene.work.left -= len(scene.possible)
-    model, known, settled = scene.calm, tuple(curves), False
+    model, known, settled = scene.at_median, tuple(curves), False
     for _ in range(SETTLED):
         found = _fitted(scene, scene.log._replace(weight=weight), model, known)
         known = found.curves
         starts, clock = scene.starts(found.log), any(curve.component == CLOCK for curve in known)
         if not scene.fixed:
-            model = fit_profile(found.log, starts, fit_jerk(found.log, starts, scene.calm), PROFILE_STEPS)
+            model = fit_profile(found.log, starts, fit_jerk(found.log, starts, scene.at_median), PROFILE_STEPS)
         smoothed = smooth_log(found.log, model, starts, STATES if clock else RESIDUALS)
         if clock:  # with it, the track goes another way there
             scene = scene._replace(setting=scene.setting._replace(late=late_of(scene.log, smoothed.state)))
@@ -138,8 +136,8 @@ def late_of(log: Observations, state: FloatArray) -> FloatArray:
     """(n, 3) by which readings of states (n, 9) grow with an offset of their clock, per s."""
     if log.sites is None:
         return -rates(state)
-    station, place, axes, _ = log.sites
-    return np.ascontiguousarray(stations.design(state, place[station], axes[station])[:, :, 2])
+    station, position, axes, _ = log.sites
+    return np.ascontiguousarray(stations.design(state, position[station], axes[station])[:, :, 2])
 
 
 def _fitted(scene: Scene, log: Observations, model: Model, curves: tuple[Curve, ...]) -> Fitted:
@@ -173,13 +171,13 @@ def _rejections(scene: Scene, weight: FloatArray, smoothed: SmootherRun, model: 
 
 
 def scene_of(record: Record, decision: Decision, work: Work) -> Scene:
-    """A log as it has been decided on, in which to look for faults that last."""
-    log, calm = record.weighted(decision.weight), median_level(decision.model)
+    """A log as it has been decided on, in which faults that last are sought."""
+    log, at_median = record.weighted(decision.weight), median_level(decision.model)
     smoothed = smooth_log(log, decision.model, decision.starts)
-    weight = with_even_runs(log.weight, record.possible, smoothed.residual, np.sqrt(calm.noise_variance))
+    weight = with_even_runs(log.weight, record.possible, smoothed.residual, np.sqrt(at_median.noise_variance))
     setting = Setting(record.time_s, late_of(log, smoothed.state))
     return Scene(
-        log, record.possible, weight, setting, calm, record.fixed.jerk, decision.rates[None], record.gate,
+        log, record.possible, weight, setting, at_median, record.fixed.jerk, decision.rates[None], record.gate,
         smoothed.residual, work=work,
     )  # fmt: skip
 

@@ -196,6 +196,6 @@ def _filled(values: FloatArray) -> FloatArray:
     present = np.flatnonzero(np.isfinite(values))
     if not present.size:
         return np.zeros(len(values))
-    place = np.maximum(np.searchsorted(present, np.arange(len(values)), side="right") - 1, 0)
-    found: FloatArray = values[present[place]]
+    index = np.maximum(np.searchsorted(present, np.arange(len(values)), side="right") - 1, 0)
+    found: FloatArray = values[present[index]]
     return found

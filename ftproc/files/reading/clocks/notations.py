@@ -21,26 +21,9 @@ if TYPE_CHECKING:
 _CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2}(?:[.,]\d*|:\d{3})?)(?:\s*(?P<half>[AaPp])\.?[Mm]\.?)?"
 #: Zones by their usual letters, in hours ahead of UTC; those that several zones share are left out.
 _ZONES = {
-    "CET": 1,
-    "CEST": 2,
-    "EET": 2,
-    "EEST": 3,
-    "MSK": 3,
-    "WEST": 1,
-    "EST": -5,
-    "EDT": -4,
-    "CDT": -5,
-    "MST": -7,
-    "MDT": -6,
-    "PST": -8,
-    "PDT": -7,
-    "AKDT": -8,
-    "HST": -10,
-    "JST": 9,
-    "KST": 9,
-    "AEST": 10,
-    "AEDT": 11,
-}
+    "CET": 1, "CEST": 2, "EET": 2, "EEST": 3, "MSK": 3, "WEST": 1, "EST": -5, "EDT": -4, "CDT": -5, "MST": -7,
+    "MDT": -6, "PST": -8, "PDT": -7, "AKDT": -8, "HST": -10, "JST": 9, "KST": 9, "AEST": 10, "AEDT": 11,
+}  # fmt: skip
 _ZONE = rf"\s*(?P<zone>Z|z|UTC|UT|GMT|[+-]\d{{2}}(?::?\d{{2}})?|{'|'.join(_ZONES)})?(?:\[[\w/]+\])?"
 _YEAR_FIRST = r"(?P<year>\d{4})[-/.](?P<month>\d{1,2})[-/.](?P<day>\d{1,2})"
 _COMPACT = r"(?P<year>(?:19|20)\d{2})(?P<month>\d{2})(?P<day>\d{2})"
@@ -126,8 +109,8 @@ def first_present(text: pa.ChunkedArray) -> int:
     """The row of the first cell that is not missing; 0 if there is none."""
     import pyarrow.compute as pc
 
-    place = int(pc.index(pc.is_valid(text), True).as_py())
-    return max(place, 0)
+    index = int(pc.index(pc.is_valid(text), True).as_py())
+    return max(index, 0)
 
 
 def parsed(text: pa.ChunkedArray, pattern: str) -> Moments | None:

@@ -6,43 +6,39 @@ import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ftproc.errors import InputError
 from ftproc.files.reading.formats import content
 
-if TYPE_CHECKING:
-    from ftproc.files.reading.formats.csvtext import CsvText
-
 _BLOCK = 8 << 20  # bytes that are parsed at once
 
 
-def of_file(path: Path, head: CsvText, before: os.stat_result) -> Iterator[CsvText]:
-    """The rows of a file in blocks of whole lines; `head` comes from `split` of its beginning, when it was as `before`.
+def of_file(path: Path, source: str, offset: int, delimiter: str, before: os.stat_result) -> Iterator[memoryview]:
+    """The rows of a file from an offset on, in blocks of whole lines; it is as it was `before`.
 
     Raises Changed when it is not so any more; InputError where a row may span lines, or only the whole file can tell
     what a point means.
     """
-    with path.open("rb") as stream, content.unchanged(head.source, stream, before):
-        stream.seek(head.body_offset)
+    with path.open("rb") as stream, content.unchanged(source, stream, before):
+        stream.seek(offset)
         rest, marks = b"", set()
         while data := stream.read(_BLOCK):
             data = rest + data
             end = data.rfind(b"\n") + 1
             rest = data[end:]
             if len(rest) > _BLOCK:
-                raise InputError(f"{head.source}: a line of more than {_BLOCK >> 20} MiB is no row of a log.")
-            if head.delimiter != ",":  # points separate thousands if there is a comma anywhere in the file
+                raise InputError(f"{source}: a line of more than {_BLOCK >> 20} MiB is no row of a log.")
+            if delimiter != ",":  # points separate thousands if there is a comma anywhere in the file
                 marks |= {mark for mark in (b",", b".") if mark in data}
                 if len(marks) > 1:
-                    raise InputError(f"{head.source}: decimal commas and points.")
-            yield from _block(head, memoryview(data)[:end])
-        yield from _block(head, memoryview(rest))
+                    raise InputError(f"{source}: decimal commas and points.")
+            yield from _block(source, memoryview(data)[:end])
+        yield from _block(source, memoryview(rest))
 
 
-def _block(head: CsvText, body: memoryview) -> Iterator[CsvText]:
+def _block(source: str, body: memoryview) -> Iterator[memoryview]:
     if not re.search(rb"[^\r\n]", body):
         return
     if b'"' in bytes(body):
-        raise InputError(f"{head.source}: quotation marks, in which a line may end.")
-    yield head._replace(body=body, odd_quotes=False)
+        raise InputError(f"{source}: quotation marks, in which a line may end.")
+    yield body

@@ -22,7 +22,7 @@ LARGE = 32 << 20
 GZIP_MAGIC = b"\x1f\x8b"
 
 _OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EMFILE, errno.ENFILE, errno.EIO)
-_MOST_BESIDE = 2000  # files that are looked through for a similar name
+_MOST_BESIDE = 2000  # files that are searched for a similar name
 _ALIKE = 0.75
 MAX_STDIN = limits.WITHOUT_END
 

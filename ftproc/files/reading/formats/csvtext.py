@@ -31,7 +31,7 @@ MISSING_WORDS = (
 
 _QUOTED_COMMA = re.compile(rb'"[+-]?\d+,(?:\d{1,2}|\d{4,})"')  # a decimal comma, that does not separate thousands
 _HEAD = 1 << 20  # bytes of a large file that contain its header line
-_PLAIN_ROWS = 20  # under the names, that are looked at before a file counts as plain
+_PLAIN_ROWS = 20  # under the names, that are read before a file counts as plain
 _SEPARATOR_NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks", "": "fixed widths"}
 _PARSED, _PARSED_OF_A_COLUMN = 1 << 20, 256  # bytes that pyarrow parses at once, the more the more columns there are
 
@@ -79,7 +79,8 @@ def _large_file(name: str, path: Path) -> TableHeader:
         if head.encoding:  # in which the rows are elsewhere than in UTF-8
             return None
         rows = max(bytes(head.body).count(b"\n"), 1) * before.st_size // _HEAD
-        return Blocks((text.load(numeric, ()) for text in blocks.of_file(path, head, before)), rows)
+        bodies = blocks.of_file(path, head.source, head.body_offset, head.delimiter, before)
+        return Blocks((head._replace(body=body, odd_quotes=False).load(numeric, ()) for body in bodies), rows)
 
     return TableHeader(
         name, head.names, load, head.delimiter != ",", blocks=in_blocks, units=head.units, form=head.form
@@ -173,8 +174,8 @@ class CsvText(NamedTuple):
         frame = pd.read_fwf(
             io.BytesIO(self.body), widths=list(self.widths), header=None, dtype=str, keep_default_na=False
         )
-        arrays = [pa.array([str(cell) for cell in frame[place]], pa.string()) for place in chosen]
-        return pa.Table.from_arrays(arrays, names=[self.names[place] for place in chosen])
+        arrays = [pa.array([str(cell) for cell in frame[index]], pa.string()) for index in chosen]
+        return pa.Table.from_arrays(arrays, names=[self.names[index] for index in chosen])
 
     def _refuse_ragged(self) -> None:
         """Raise InputError for the first row with a wrong number of cells, found in plain Python."""
@@ -187,8 +188,8 @@ class CsvText(NamedTuple):
                 if len(cells) != len(self.names) or (self.odd_quotes and _spans_lines(cells)):
                     raise InputError(self._ragged(row, cells))
         except csv.Error as error:
-            place = f"{self.source}: {row_named(row + 1)}"
-            raise InputError(f"{place} cannot be read as CSV ({error}). Correct the row or delete it.") from error
+            where = f"{self.source}: {row_named(row + 1)}"
+            raise InputError(f"{where} cannot be read as CSV ({error}). Correct the row or delete it.") from error
 
     def _ragged(self, row: int, cells: list[str]) -> str:
         expected = len(self.names)
@@ -242,9 +243,9 @@ def _plain(data: bytes) -> tuple[list[str], str, int] | None:
     names = layout.split(line, delimiter)
     if len(names) < 2 or layout.is_comment(line) or any(re.match(r"[+-]?\.?\d", name) for name in names):
         return None
-    place = found.end()
+    offset = found.end()
     for _ in range(_PLAIN_ROWS):
-        row = layout.LINE.match(data, place)
+        row = layout.LINE.match(data, offset)
         if row is None or not row[1].strip():
             break
         if row[1].count(delimiter.encode()) >= trimming.MOST_MARKS:
@@ -252,8 +253,8 @@ def _plain(data: bytes) -> tuple[list[str], str, int] | None:
         cells = layout.split(row[1].decode("utf-8", "replace"), delimiter)
         if len(cells) != len(names) or not (layout.is_data(cells) or layout.is_data(cells[:1])):
             return None
-        place = row.end()
-    return None if place == found.end() else (names, delimiter, found.end())
+        offset = row.end()
+    return None if offset == found.end() else (names, delimiter, found.end())
 
 
 def _searched(source: str, data: bytes, widths: Sequence[int]) -> tuple[CsvText, int]:

@@ -55,15 +55,15 @@ def _parsed(name: str, text: str) -> Any:
         first = text.lstrip().split("\n", 1)[0].strip()
     if not first.endswith(("{", ",")):
         return _by_line(name, text)
-    found, place = [], 0
-    while place < len(text):
+    found, offset = [], 0
+    while offset < len(text):
         try:
-            each, place = json.JSONDecoder().raw_decode(text, place)
+            each, offset = json.JSONDecoder().raw_decode(text, offset)
         except json.JSONDecodeError:
             return _by_line(name, text)
         found.append(each)
-        gap = _BETWEEN.match(text, place)
-        place = gap.end() if gap else place
+        gap = _BETWEEN.match(text, offset)
+        offset = gap.end() if gap else offset
     return found
 
 

@@ -17,31 +17,19 @@ _MARKS = (
     (b"\xff\xfe", "utf-16-le", "UTF-16"),
     (b"\xfe\xff", "utf-16-be", "UTF-16"),
 )
-#: The share of NUL bytes at each place of four, in text without a mark.
+#: The share of NUL bytes at each byte of four, in text without a mark.
 _BY_NULS = {"utf-32-le": "0111", "utf-32-be": "1110", "utf-16-le": "0101", "utf-16-be": "1010"}
 #: Encodings of which nothing in the file tells: that in which the most known words stand counts, else the first.
 _NATIONAL = {
-    "cp1252": "Windows or Latin-1",
-    "gb18030": "GBK",
-    "big5": "Big5",
-    "shift_jis": "Shift JIS",
-    "euc_kr": "EUC-KR",
-    "euc_jp": "EUC-JP",
-    "cp1251": "Windows-1251",
-    "koi8_r": "KOI8-R",
-    "cp866": "DOS-866",
-    "iso8859_5": "ISO 8859-5",
-    "cp1250": "Windows-1250",
-    "iso8859_2": "ISO 8859-2",
-    "cp1253": "Windows-1253",
-    "cp1254": "Windows-1254",
-    "mac_roman": "Mac Roman",
-    "cp437": "DOS-437",
-}
+    "cp1252": "Windows or Latin-1", "gb18030": "GBK", "big5": "Big5", "shift_jis": "Shift JIS", "euc_kr": "EUC-KR",
+    "euc_jp": "EUC-JP", "cp1251": "Windows-1251", "koi8_r": "KOI8-R", "cp866": "DOS-866", "iso8859_5": "ISO 8859-5",
+    "cp1250": "Windows-1250", "iso8859_2": "ISO 8859-2", "cp1253": "Windows-1253", "cp1254": "Windows-1254",
+    "mac_roman": "Mac Roman", "cp437": "DOS-437",
+}  # fmt: skip
 _TABLES = (ALIASES, WEAK_ALIASES, SPELLINGS)
 _KNOWN = {word for table in _TABLES for words in table.values() for word in words if word[1:]}
 _SAMPLE = 4096
-_WORDS = 1 << 16  # bytes in which known words are looked for
+_WORDS = 1 << 16  # bytes in which known words are sought
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x19\x1c-\x1f]")
 
 _OTHER_KINDS = {

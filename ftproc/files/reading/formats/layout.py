@@ -66,7 +66,7 @@ class Layout(NamedTuple):
 
 
 def find(lines: Sequence[str], widths: Sequence[int] = ()) -> Layout | None:
-    """The layout of a text from its first lines (the empty ones too), or None if no line looks like a row."""
+    """The layout of a text from its first lines (the empty ones too), or None if no line is like a row."""
     filled = [number for number, line in enumerate(lines[:_MOST_LINES]) if line.strip()]
     tables = {}
     for separator in ("",) if widths else _SEPARATORS:
@@ -156,22 +156,22 @@ def _with_names(
             break
         top -= 1
     units: list[str] = []
-    place = top - 1
-    while place >= 0 and _RULE.fullmatch(lines[filled[place]]):  # a rule under the names
-        place -= 1
-    if place >= 0:
-        cells = _heading(lines[filled[place]], separator, width, block, widths)
-        if cells is not None and _is_units(cells) and place:
-            units, place = cells, place - 1
-    names = None if place < 0 else _heading(lines[filled[place]], separator, width, block, widths)
+    index = top - 1
+    while index >= 0 and _RULE.fullmatch(lines[filled[index]]):  # a rule under the names
+        index -= 1
+    if index >= 0:
+        cells = _heading(lines[filled[index]], separator, width, block, widths)
+        if cells is not None and _is_units(cells) and index:
+            units, index = cells, index - 1
+    names = None if index < 0 else _heading(lines[filled[index]], separator, width, block, widths)
     if names is not None and sum(bool(_CELL.fullmatch(_NUMBERED.sub("", name))) for name in names) > len(names) / 2:
         names = None
     names = _enumerated([lines[number] for number in filled[:top]], width) or names
     if names is None and top < start:  # the numbers above belong to something else
         return _with_names(lines, filled, start, separator, {**rows, **{n: [""] for n in filled[top:start]}}, widths)
-    if names is None and place >= 0 and top - place == 1 and (cells := _mismatched(lines[filled[place]], separator)):
+    if names is None and index >= 0 and top - index == 1 and (cells := _mismatched(lines[filled[index]], separator)):
         names = cells  # the rows have too many or too few cells, and are refused
-    over = [lines[number] for number in filled[max(place - 1, 0) : place + 1]]
+    over = [lines[number] for number in filled[max(index - 1, 0) : index + 1]]
     if names is None and separator == BLANKS:
         names = _stacked(over, block, width)
     elif names is not None and not all(names) and len(over) > 1:  # groups of columns, such as merged cells
@@ -183,8 +183,8 @@ def _with_names(
         units = []
     first, row_of_units = filled[top], bool(units)
     if names is not None and not units:
-        units = units_stated([lines[number] for number in filled[: max(place, 0)]], names)
-    return Layout(found, first, separator, units, max(place, 0) if names is not None else top, names is not None, width,
+        units = units_stated([lines[number] for number in filled[: max(index, 0)]], names)
+    return Layout(found, first, separator, units, max(index, 0) if names is not None else top, names is not None, width,
                   row_of_units)  # fmt: skip
 
 
@@ -195,7 +195,7 @@ def _enumerated(above: Sequence[str], width: int) -> list[str] | None:
 
 
 def _mismatched(line: str, separator: str) -> list[str]:
-    """The cells of a line that looks like names, though there are not as many as in a row; else nothing."""
+    """The cells of a line that may be names, though there are not as many as in a row; else nothing."""
     cells = split(line, separator)
     plain = all(re.fullmatch(r"[A-Za-z_]\w*(?: ?[(\[].{1,8}[)\]])?", cell) for cell in cells)
     return cells if plain and separator != BLANKS and len(cells) > 1 else []
@@ -281,7 +281,7 @@ def _above_columns(line: str, block: Sequence[str], width: int) -> list[str]:
 
 
 def first_line(source: str, data: bytes) -> tuple[list[str], str, int]:
-    """Names and separator of a file in which no line looks like a row: of its first line."""
+    """Names and separator of a file in which no line is like a row: of its first line."""
     found = LINE.match(data)
     assert found is not None
     line = found[1].decode("utf-8", "replace")

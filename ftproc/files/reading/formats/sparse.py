@@ -49,8 +49,8 @@ class Sparse:
 
             chosen = [*numeric, *others]
             self.room.check(8 * self.rows * len(chosen))
-            arrays = [self._array(names[place]) for place in chosen]
-            return pa.Table.from_arrays(arrays, names=[shown[place] for place in chosen])
+            arrays = [self._array(names[index]) for index in chosen]
+            return pa.Table.from_arrays(arrays, names=[shown[index] for index in chosen])
 
         return TableHeader(self.room.name, shown, load, decimal_comma, form=form)
 

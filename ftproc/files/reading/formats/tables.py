@@ -167,18 +167,13 @@ def _of_file(name: str, path: Path, how: How, scratch: _Scratch, deep: int = 0) 
         if deep > _DEEPEST:
             raise InputError(f"{name}: packed more than {_DEEPEST} times over; unpack it first.")
         return _of_file(name, packing.unpacked(name, path, packed, scratch.path(), how.room), how, scratch, deep + 1)
-    kind = layout.ending(path, FORMATS)
-    return FORMATS[kind or _kind_of(head)](name, path, how)
+    by_bytes = next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), ".csv")
+    return FORMATS[layout.ending(path, FORMATS) or by_bytes](name, path, how)
 
 
 def _beginning(path: Path) -> bytes:
     with path.open("rb") as stream:
         return stream.read(_SMALL)
-
-
-def _kind_of(head: bytes) -> str:
-    """The kind of a file whose name says nothing, by its first bytes."""
-    return next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), ".csv")
 
 
 def _in_memory(table: Any) -> TableHeader:

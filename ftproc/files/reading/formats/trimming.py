@@ -26,7 +26,7 @@ _COUNTED = re.compile(r"\W*\d[\d,.]*\s+(rows?|records?|lines?|samples?|points?|e
 _FEW = 0.2  # of the lines, that may be words among the rows
 _LETTERS = np.arange(ord("a"), ord("z") + 1)
 _UNDER = 3  # lines under repeated names, at most, such as units and a rule
-_LAST = 4096  # bytes in which the last line is looked for
+_LAST = 4096  # bytes in which the last line is sought
 
 
 def refuse_wide(source: str, head: bytes) -> None:
@@ -60,10 +60,10 @@ def rows_only(body: memoryview, names: Sequence[str], separator: str, widths: Se
     if repeated:
         whole = _without(whole, repeated)
         words += f", the names repeated {len(repeated)} times"
-    said = _sentences(whole, names, separator, widths)
-    if said:
-        whole = _without(whole, said)
-        words += f", {len(said)} lines of words among the rows"
+    sentences = _sentences(whole, names, separator, widths)
+    if sentences:
+        whole = _without(whole, sentences)
+        words += f", {len(sentences)} lines of words among the rows"
     end, footer = _end(whole, names, separator, widths)
     words += f", {footer} lines below the table" if footer else ""
     return memoryview(whole)[:end], words

@@ -51,7 +51,7 @@ def _table(name: str, title: str, cells: list[tuple[Any, ...]]) -> TableHeader |
         last -= 1
     import pyarrow as pa
 
-    columns = [_column([row[place] for row in rows[:last]]) for place in range(found.cells)]
+    columns = [_column([row[index] for row in rows[:last]]) for index in range(found.cells)]
     below = f", {len(rows) - last} lines below the table" if last < len(rows) else ""
     table = pa.Table.from_arrays(columns, names=found.names)
     return of_arrow(table, name, f'Excel workbook, sheet "{title}"{below}', found.units, decimal_comma=True)

@@ -58,7 +58,7 @@ NOTATIONS = frozenset(
 )
 
 
-#: Words of azimuths that count clockwise from north, and how else it is said.
+#: Words of azimuths that count clockwise from north, and how else it is written.
 _FROM_NORTH = frozenset(("bearing", "brg", "taz", "north", "clockwise", "cw", "peilung", "пеленг"))
 _EAST_OF_NORTH = re.compile(r"\+?\s*(?:E|east) (?:of|from) (?:due |true )?N(?:orth)?\b", re.IGNORECASE)
 
@@ -89,10 +89,10 @@ class Name(NamedTuple):
 
     def core(self) -> str:
         """The stem without words that say nothing about the quantity, such as `radar1`."""
-        said = [word for word in self.words if word.rstrip("0123456789") not in QUALIFIERS]
-        if any(word in aliases for word in said for aliases in ALIASES.values()):  # such as theta_az
-            said = [word for word in said if word not in EITHER_ANGLE]
-        return "".join(word for k, word in enumerate(said) if not (k and word in _OF_UTC)).rstrip("0123456789")
+        words = [word for word in self.words if word.rstrip("0123456789") not in QUALIFIERS]
+        if any(word in aliases for word in words for aliases in ALIASES.values()):  # such as theta_az
+            words = [word for word in words if word not in EITHER_ANGLE]
+        return "".join(word for k, word in enumerate(words) if not (k and word in _OF_UTC)).rstrip("0123456789")
 
     def is_zenith(self) -> bool:
         """Whether it names zenith angles."""
@@ -155,8 +155,8 @@ def _unit_inside(text: str) -> str:
 def says_north(text: str) -> bool:
     """Whether the name of an azimuth says that it counts clockwise from true north."""
     name = taken_apart(text)
-    said = name.notation in ("t", "true") or name.words[:1] == ("true",) or _FROM_NORTH & {name.stem, *name.words}
-    return bool(said or _EAST_OF_NORTH.search(text))
+    from_north = name.notation in ("t", "true") or name.words[:1] == ("true",) or _FROM_NORTH & {name.stem, *name.words}
+    return bool(from_north or _EAST_OF_NORTH.search(text))
 
 
 def _squeezed(text: str) -> str:

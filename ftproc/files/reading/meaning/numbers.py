@@ -1,6 +1,6 @@
 """Arrow columns of any type -> float64; messages that name the first cell that is not a number.
 
-Work is done on whole columns; single cells are looked at only to name the wrong one.
+Work is done on whole columns; single cells are read only to name the wrong one.
 """
 
 from __future__ import annotations

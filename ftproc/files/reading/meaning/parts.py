@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 
 from ftproc.files.reading.meaning.names import Name
 from ftproc.files.words import ALIASES, WEAK_ALIASES
@@ -53,13 +52,9 @@ def together(quantity: str, names: Sequence[Name]) -> dict[str, int] | None:
     """The roles {role: index} of the columns that the user names for one quantity, in any order."""
     by_index = dict(enumerate(names))
     if quantity == "time":
-        return _time(by_index) or _in_order(names)
+        return _time(by_index) or ({"date": 0, "time": 1} if len(names) == 2 else None)
     roles = _angle(quantity, by_index)
     return roles or (dict(zip(_ANGLE, range(3), strict=True)) if len(names) == 3 else None)
-
-
-def _in_order(names: Sequence[Name]) -> dict[str, int] | None:
-    return {"date": 0, "time": 1} if len(names) == 2 else None
 
 
 def _time(names: Mapping[int, Name]) -> dict[str, int] | None:
@@ -74,19 +69,19 @@ def _time(names: Mapping[int, Name]) -> dict[str, int] | None:
         seconds = of_week if of_week is not None else next(iter(clock), hms["second"])
         return None if seconds is None else {"week": week, "tow": seconds}
     fraction = _fraction(names)
-    clock = [place for place in clock if place != fraction]
+    clock = [index for index in clock if index != fraction]
     calendar = {role: one(role) for role in ("year", "month", "day")}
     if calendar["month"] is None and hms["hour"] is None:  # MM beside YYYY and DD
         calendar["month"] = _only(names, lambda name: name.stem == "mm")
-    days = {role: place for role, place in calendar.items() if place is not None}
+    days = {role: index for role, index in calendar.items() if index is not None}
     if len(days) < 3:
-        days = {role: place for role in ("year", "doy") if (place := one(role)) is not None}
+        days = {role: index for role in ("year", "doy") if (index := one(role)) is not None}
         days = days if "doy" in days else {}
     date = one("date")
     if date is not None:
         days = {"date": date}
     if None not in hms.values():
-        days |= {role: place for role, place in hms.items() if place is not None}
+        days |= {role: index for role, index in hms.items() if index is not None}
     else:
         clock += [hms["second"]] if not clock and hms["second"] is not None and (days or fraction is not None) else []
         if not clock or not (days or fraction is not None):
@@ -116,18 +111,14 @@ def unit_of_fraction(name: Name) -> str:
 
 def _angle(quantity: str, names: Mapping[int, Name]) -> dict[str, int] | None:
     for stem in (*ALIASES[quantity], *WEAK_ALIASES[quantity]):
-        mine = {place: name for place, name in names.items() if name.stem == stem}
-        roles = {role: _only(mine, partial(_has_unit, words)) for role, words in _ANGLE.items()}
-        known = {role: place for role, place in roles.items() if place is not None}
+        mine = {index: name.unit.lower() for index, name in names.items() if name.stem == stem}
+        fits = {role: [index for index, unit in mine.items() if unit in words] for role, words in _ANGLE.items()}
+        known = {role: only[0] for role, only in fits.items() if len(only) == 1}
         if len(known) == len(mine) > 1 and {"deg", "min"} <= set(known):
             return known
     return None
 
 
-def _has_unit(words: Sequence[str], name: Name) -> bool:
-    return name.unit.lower() in words
-
-
 def _only(names: Mapping[int, Name], test: Callable[[Name], bool]) -> int | None:
-    fits = [place for place, name in names.items() if test(name)]
+    fits = [index for index, name in names.items() if test(name)]
     return fits[0] if len(fits) == 1 else None

@@ -39,16 +39,13 @@ def _pairs(line: str) -> dict[str, str]:
             quantity: pair["unit"]
             for pair in pattern.finditer(_UNIT.sub(" ", line))
             for word in re.split(r"\s+and\s+|\s*[&/]\s*", pair["name"])
-            for quantity in _meant(taken_apart(word))
+            for name in (taken_apart(word),)
+            for quantity in _GROUPS.get(name.stem, filter(name.means, QUANTITIES))
             if unit_named(quantity, pair["unit"])
         }
         if found:
             return found
     return {}
-
-
-def _meant(name: Name) -> Sequence[str]:
-    return _GROUPS.get(name.stem, [quantity for quantity in QUANTITIES if name.means(quantity)])
 
 
 def _of(name: Name, stated: Mapping[str, str]) -> str:

@@ -28,15 +28,15 @@ class Proposal(NamedTuple):
 Propose = Callable[[Sequence[int], Mapping[str, Sequence[int]]], Proposal]
 
 
-def named(name: str, place: int) -> str:
+def named(name: str, index: int) -> str:
     """A column as `--columns` takes it: by its name, or by its number where the name has marks of the option."""
     plain = name and not any(mark in name for mark in ",=+") and not name.isdecimal()
-    return name if plain else str(place + 1)
+    return name if plain else str(index + 1)
 
 
 def answer(names: Sequence[str], columns: Mapping[str, int], time: str = "") -> str:
     """`--columns range=RNG,azimuth=3`, as a shell takes it. time: its columns, such as 1+2."""
-    each = [*([f"time={time}"] if time else []), *(f"{q}={named(names[place], place)}" for q, place in columns.items())]
+    each = [*([f"time={time}"] if time else []), *(f"{q}={named(names[index], index)}" for q, index in columns.items())]
     return f"--columns {quoted(','.join(each))}"
 
 
@@ -57,12 +57,13 @@ def refuse_twice(source: str, names: Sequence[str], name: str) -> None:
 def refuse_unknown_unit(source: str, apart: Sequence[Name], free: Sequence[int], quantity: str) -> None:
     """A log without a range may be angles-only; one with `range_furlong` is not."""
     names = [name.text for name in apart]
-    for place, unit in _units_unknown(apart, free, quantity):
+    absent = "" if quantity == "time" else f", or --columns {quantity}={ABSENT} if it is something else"
+    for index, unit in _units_unknown(apart, free, quantity):
         raise InputError(
-            f'{source}: "{unit}" in column "{names[place]}" is not a unit of {quantity}; understood are '
+            f'{source}: "{unit}" in column "{names[index]}" is not a unit of {quantity}; understood are '
             f"{', '.join(UNITS[quantity])}. Convert the column and rename it, "
-            f"or say {answer(names, {quantity: place})} --units {quantity}=UNIT (with a factor: '{quantity}=100 "
-            f"{next(iter(UNITS[quantity]))}'){_or_absent(quantity)}."
+            f"or say {answer(names, {quantity: index})} --units {quantity}=UNIT (with a factor: '{quantity}=100 "
+            f"{next(iter(UNITS[quantity]))}'){absent}."
         )
 
 
@@ -80,12 +81,12 @@ def refuse_alike(source: str, apart: Sequence[Name], free: Sequence[int], quanti
     """Ask about a column that may be the quantity, so that it is not left out without a word."""
     known = {alias for alias in ALIASES[quantity] if len(alias) > 1}
     other = NOT_UNITS - _OF_THE_QUANTITY
-    for place in free if quantity != "time" else ():
-        name = apart[place]
+    for index in free if quantity != "time" else ():
+        name = apart[index]
         words = set(name.words)
         either = quantity != "range" and name.core() in EITHER_ANGLE
         if not name.foreign and (either or (known & words and not other & words)):
-            say = answer([each.text for each in apart], {quantity: place})
+            say = answer([each.text for each in apart], {quantity: index})
             raise InputError(
                 f'{source}: column "{name.text}" may be the {quantity}. Say {say}, or '
                 f"--columns {quantity}={ABSENT} if it is something else."
@@ -94,40 +95,36 @@ def refuse_alike(source: str, apart: Sequence[Name], free: Sequence[int], quanti
 
 def refuse_either(source: str, apart: Sequence[Name], free: Sequence[int]) -> None:
     """Ask which of two angles is the azimuth where their names, such as theta and phi, leave it open."""
-    places = [place for place in free if apart[place].core() in EITHER_ANGLE][:2]
-    if len(places) > 1:
+    indices = [index for index in free if apart[index].core() in EITHER_ANGLE][:2]
+    if len(indices) > 1:
         names = [name.text for name in apart]
-        one, other = (answer(names, {"azimuth": a, "elevation": e}) for a, e in (places, places[::-1]))
+        one, other = (answer(names, {"azimuth": a, "elevation": e}) for a, e in (indices, indices[::-1]))
         raise InputError(
-            f'{source}: "{names[places[0]]}" and "{names[places[1]]}" are the azimuth and the other angle, in an order '
-            f"that the names leave open. Say {one} or {other}; add --elevation-from zenith if the other angle counts "
-            "from the vertical."
+            f'{source}: "{names[indices[0]]}" and "{names[indices[1]]}" are the azimuth and the other angle, in an '
+            f"order that the names leave open. Say {one} or {other}; add --elevation-from zenith if the other angle "
+            "counts from the vertical."
         )
 
 
 def _units_unknown(apart: Sequence[Name], free: Sequence[int], quantity: str) -> Iterator[tuple[int, str]]:
     """Column and unit, where a name of the quantity has a unit that is none of its units."""
-    for place in free:
-        name = apart[place]
+    for index in free:
+        name = apart[index]
         if name.foreign or NOT_UNITS & {*name.words, name.unit.lower()}:
             continue
         known = any(unit_named(quantity, word) for word in name.unit.split())
         if name.unit and name.stem in ALIASES[quantity] and (len(name.stem) > 1 or known):
-            yield place, name.unit
+            yield index, name.unit
         elif not name.unit and len(name.words) == 2 and name.words[0] in ALIASES[quantity] and len(name.words[0]) > 1:
-            yield place, name.words[1]
-
-
-def _or_absent(quantity: str) -> str:
-    return "" if quantity == "time" else f", or --columns {quantity}={ABSENT} if it is something else"
+            yield index, name.words[1]
 
 
 def check_complete(source: str, names: Sequence[str], found: Mapping[str, tuple[int, ...]], propose: Propose) -> None:
     """Raise InputError, a question, if the time or every component is missing. found: positions of each quantity."""
     if "time" in found and len(found) > 1:
         return
-    taken = {place for places in found.values() for place in places}
-    free = [place for place in range(len(names)) if place not in taken]
+    taken = {index for indices in found.values() for index in indices}
+    free = [index for index in range(len(names)) if index not in taken]
     sought = [quantity for quantity in QUANTITIES if quantity not in found and ("time" in found or len(found) == 0)]
     sought = sought or ["time"]
     wanted = "time" if "time" not in found else "range"
@@ -150,9 +147,9 @@ def check_complete(source: str, names: Sequence[str], found: Mapping[str, tuple[
             f"{source}: there is no line of column names.{seen}{none_moves} Say which column is which by their "
             f"numbers, such as {say}."
         )
-    others = [names[place] for place in free if not NOT_UNITS & {*taken_apart(names[place]).words}]
+    others = [names[index] for index in free if not NOT_UNITS & {*taken_apart(names[index]).words}]
     hint = nearest(CANONICAL[wanted], others)
-    similar = next((place for place in free if hint and f'"{names[place]}"' in hint), None)
+    similar = next((index for index in free if hint and f'"{names[index]}"' in hint), None)
     say = say if proposed.answer or similar is None else answer(names, {wanted: similar})
     raise InputError(
         f"{source}: {what} (expected {CANONICAL[wanted]} or {' or '.join(ALIASES[wanted][:2])}){hint or '.'} "

@@ -29,39 +29,11 @@ if TYPE_CHECKING:
 
 #: Words that mean "no reading" and are reported, beside those that every program writes; and marks without letters.
 WORDS = (
-    *("nil", "NIL", "missing", "MISSING", "invalid", "INVALID", "void", "lost", "LOST", "no data", "NO DATA", "nodata"),
-    *("NODATA", "\\N", "n.a.", "N.A.", "x", "X", "blank", "BLANK", "no track", "NO TRACK", "unknown", "dropout"),
-    *(
-        "n/d",
-        "N/D",
-        "drop",
-        "DROP",
-        "bad",
-        "BAD",
-        "error",
-        "ERROR",
-        "out",
-        "nan(ind)",
-        "-nan(ind)",
-        "нет",
-        "нет данных",
-    ),
-    *(
-        "无",
-        "無",
-        "#DIV/0!",
-        "#VALUE!",
-        "#REF!",
-        "#NUM!",
-        "#NAME?",
-        "#NULL!",
-        "<null>",
-        "<NULL>",
-        "(null)",
-        "[]",
-        "nan%",
-    ),
-)
+    "nil", "NIL", "missing", "MISSING", "invalid", "INVALID", "void", "lost", "LOST", "no data", "NO DATA", "nodata",
+    "NODATA", "\\N", "n.a.", "N.A.", "x", "X", "blank", "BLANK", "no track", "NO TRACK", "unknown", "dropout", "n/d",
+    "N/D", "drop", "DROP", "bad", "BAD", "error", "ERROR", "out", "nan(ind)", "-nan(ind)", "нет", "нет данных", "无",
+    "無", "#DIV/0!", "#VALUE!", "#REF!", "#NUM!", "#NAME?", "#NULL!", "<null>", "<NULL>", "(null)", "[]", "nan%",
+)  # fmt: skip
 _MARKS = r"^[-*?./_#]+$"
 _A_WORD = r"^[^\d\s][^\d]{0,11}$"  # that stands repeatedly for a number
 #: Numbers that mean "no reading" where they stand out.
@@ -132,13 +104,13 @@ def without_sentinels(found: Mapping[str, Readings]) -> dict[str, Readings]:
     gone: dict[tuple[str, float], np.ndarray] = {}
     for quantity in found:
         while (number := sentinel(values[quantity], quantity)) is not None:
-            places = values[quantity] == number
+            samples = values[quantity] == number
             for other in found:
-                mine = places & (values[other] == number)
+                mine = samples & (values[other] == number)
                 values[other] = np.where(mine, np.nan, values[other])
                 gone[other, number] = gone.get((other, number), False) | mine
-    for (quantity, number), places in gone.items():
-        count = int(np.count_nonzero(places))
+    for (quantity, number), samples in gone.items():
+        count = int(np.count_nonzero(samples))
         times = "once" if count == 1 else f"{count} times"
         name = found[quantity].column.name
         if count:
@@ -184,8 +156,8 @@ def _stands_out(values: FloatArray, found: np.ndarray, number: float, impossible
         return True
     steps = np.abs(np.diff(rest))
     typical = median(steps[steps > 0]) if (steps > 0).any() else 0.0
-    places = np.flatnonzero(~found & np.isfinite(values))
-    before = places[np.maximum(np.searchsorted(places, np.flatnonzero(found)) - 1, 0)]
+    known = np.flatnonzero(~found & np.isfinite(values))
+    before = known[np.maximum(np.searchsorted(known, np.flatnonzero(found)) - 1, 0)]
     return bool(median(np.abs(values[before] - number)) > max(_FAR * typical, 1e-3 * abs(number)))
 
 
@@ -194,19 +166,19 @@ def _without_words(text: pa.ChunkedArray, described: Column) -> tuple[pa.Chunked
     import pyarrow as pa
     import pyarrow.compute as pc
 
-    said = pc.or_(pc.is_in(text, pa.array(WORDS, text.type)), pc.match_substring_regex(text, _MARKS))
+    is_word = pc.or_(pc.is_in(text, pa.array(WORDS, text.type)), pc.match_substring_regex(text, _MARKS))
     counts = pc.value_counts(pc.filter(text, pc.match_substring_regex(text, _A_WORD))).to_pylist()
     often = [each["values"] for each in counts if each["counts"] > 1 and each["counts"] < len(text) / 2]
     if 0 < len(often) <= _MOST_WORDS:
-        said = pc.or_(said, pc.is_in(text, pa.array(often, text.type)))
-    count = int(pc.sum(said).as_py() or 0)
+        is_word = pc.or_(is_word, pc.is_in(text, pa.array(often, text.type)))
+    count = int(pc.sum(is_word).as_py() or 0)
     if not count or count == len(text) - text.null_count:
         return text, ()
-    words = sorted(set(pc.unique(pc.filter(text, said)).to_pylist()))
+    words = sorted(set(pc.unique(pc.filter(text, is_word)).to_pylist()))
     quoted = " and ".join(f'"{word}"' for word in words)
     times = "once" if count == 1 else f"{count} times"
     note = f'"{described.name}" is {quoted} {times}, which is taken for a missing reading'
-    return pc.if_else(said, None, text), (note,)
+    return pc.if_else(is_word, None, text), (note,)
 
 
 def _in_degrees(described: Column) -> Column:

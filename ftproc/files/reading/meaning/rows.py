@@ -16,14 +16,7 @@ from ftproc.files.reading.meaning.questions import listed
 if TYPE_CHECKING:
     import pyarrow as pa
 
-_TESTS = {
-    "<=": np.less_equal,
-    ">=": np.greater_equal,
-    "!=": np.not_equal,
-    "=": np.equal,
-    "<": np.less,
-    ">": np.greater,
-}
+_TESTS = {"<=": np.less_equal, ">=": np.greater_equal, "!=": np.not_equal, "=": np.equal, "<": np.less, ">": np.greater}
 
 
 def position(source: str, names: list[str], name: str, option: str) -> int:

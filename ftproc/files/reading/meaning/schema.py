@@ -32,8 +32,9 @@ class Column(NamedTuple):
     """The column (or columns) of a quantity, its unit, and who stated the unit.
 
     positions: in the file, one for each of `roles`: ("value",), ("date", "time"), ("deg", "min", "sec"), ...
-    key: the stem of the name, by which clocks are told apart. notation: from the name, such as `dms`. why: the column
-    was taken. others: columns that could be the quantity too. zenith: the name is that of a zenith angle. written:
+    key: the stem of the name, by which clocks are distinguished. notation: from the name, such as `dms`. why: the
+    column was taken. others: columns that could be the quantity too. zenith: the name is that of a zenith angle.
+    written:
     the units in the names of several columns. fraction: the unit of a fraction of the second beside the time.
     """
 
@@ -85,7 +86,7 @@ def resolve(
         ]
     table = _Table(source, names, apart, units)
     found: dict[str, Column] = {}
-    taken = {place for name in columns.values() if name != ABSENT for place in table.places(name)}
+    taken = {index for name in columns.values() if name != ABSENT for index in table.indices(name)}
     for quantity in QUANTITIES:
         if columns.get(quantity) == ABSENT:
             continue
@@ -115,15 +116,15 @@ class _Table(NamedTuple):
     apart: Sequence[Name]
     units: Mapping[str, str]
 
-    def places(self, name: str) -> list[int]:
+    def indices(self, name: str) -> list[int]:
         """The positions of a column that the user names, by its name, its number, or several joined by +."""
         if name in self.names:
             return [self.names.index(name)]
         if name.isdecimal() and 1 <= int(name) <= len(self.names):
             return [int(name) - 1]
         several = [part.strip() for part in name.split("+")]
-        found = [self.places(part) for part in several] if len(several) > 1 else []
-        return [place for part in found for place in part] if all(found) else []
+        found = [self.indices(part) for part in several] if len(several) > 1 else []
+        return [index for part in found for index in part] if all(found) else []
 
     def column(self, quantity: str, position: int, why: str, others: Sequence[str] = ()) -> Column:
         questions.refuse_twice(self.source, self.names, self.names[position])
@@ -139,15 +140,15 @@ class _Table(NamedTuple):
         )  # fmt: skip
 
     def joint(self, quantity: str, roles: Mapping[str, int], why: str) -> Column:
-        places = tuple(roles.values())
+        indices = tuple(roles.values())
         unit = self.units.get(quantity)
         chosen = (unit and unit_named(quantity, unit)) or si_unit(quantity)
-        name = " + ".join(self.names[place] for place in places)
-        written = tuple(self.apart[place].unit for place in places)
-        time = self.apart[roles["time"]] if "time" in roles else self.apart[places[0]]
+        name = " + ".join(self.names[index] for index in indices)
+        written = tuple(self.apart[index].unit for index in indices)
+        time = self.apart[roles["time"]] if "time" in roles else self.apart[indices[0]]
         fraction = parts.unit_of_fraction(self.apart[roles["fraction"]]) if "fraction" in roles else ""
         return Column(
-            quantity, places, name, chosen, unit is not None, False, tuple(roles), time.stem, time.notation, why,
+            quantity, indices, name, chosen, unit is not None, False, tuple(roles), time.stem, time.notation, why,
             written=written, fraction=fraction,
         )  # fmt: skip
 
@@ -166,57 +167,57 @@ def remarks(names: Sequence[str], found: Mapping[str, Column], timestamps: bool)
     if assumed:
         lines.append(f"no unit is stated, so these are taken to be: {', '.join(assumed)}")
     absent = [quantity for quantity in QUANTITIES if quantity not in found]
-    used = {place for column in found.values() for place in column.positions}
-    unused = [name for place, name in enumerate(names) if place not in used]
+    used = {index for column in found.values() for index in column.positions}
+    unused = [name for index, name in enumerate(names) if index not in used]
     if absent and unused:
         lines.append(f"no column is taken for {' and '.join(absent)}; not used: {listed(unused)}")
     return tuple(lines)
 
 
 def _named(table: _Table, quantity: str, name: str) -> Column:
-    places = table.places(name)
-    if not places:
+    indices = table.indices(name)
+    if not indices:
         raise InputError(
             f'{table.source}: there is no column "{name}", which --columns or the station file names for {quantity}'
             f"{nearest(name, table.names) or '.'} Its columns are: {listed(table.names)}."
         )
-    if len(places) == 1:
-        return table.column(quantity, places[0], "--columns")
-    roles = parts.together(quantity, [table.apart[place] for place in places])
+    if len(indices) == 1:
+        return table.column(quantity, indices[0], "--columns")
+    roles = parts.together(quantity, [table.apart[index] for index in indices])
     if roles is None:
         raise InputError(
             f'{table.source}: the columns "{name}" do not make up one {quantity}; understood are '
             "Date+Time, Week+Seconds, Day+Time, Hour+Minute+Second and Degrees+Minutes+Seconds."
         )
-    return table.joint(quantity, {role: places[k] for role, k in roles.items()}, "--columns")
+    return table.joint(quantity, {role: indices[k] for role, k in roles.items()}, "--columns")
 
 
 def _recognised(table: _Table, quantity: str, free: Sequence[int]) -> Column | None:
     names, canonical = table.names, CANONICAL[quantity]
-    fits = [place for place in free if table.apart[place].means(quantity) == 1]
-    if any(names[place] == canonical for place in fits):
-        fits = [place for place in fits if table.apart[place].unit]
-    elif (roles := parts.found(quantity, {place: table.apart[place] for place in free})) is not None:
+    fits = [index for index in free if table.apart[index].means(quantity) == 1]
+    if any(names[index] == canonical for index in fits):
+        fits = [index for index in fits if table.apart[index].unit]
+    elif (roles := parts.found(quantity, {index: table.apart[index] for index in free})) is not None:
         return table.joint(quantity, roles, f"their names: {', '.join(roles)}")
     if not fits and quantity == "azimuth":
         questions.refuse_either(table.source, table.apart, free)
-    fits = fits or [place for place in free if table.apart[place].means(quantity) == 2]
+    fits = fits or [index for index in free if table.apart[index].means(quantity) == 2]
     if not fits:
-        zenith = [place for place in free if quantity == "elevation" and table.apart[place].is_zenith()]
+        zenith = [index for index in free if quantity == "elevation" and table.apart[index].is_zenith()]
         if zenith:
             return table.column(quantity, zenith[0], "its name, that of a zenith angle")
         questions.refuse_unknown_unit(table.source, table.apart, free, quantity)
         return None
-    for place in fits:
-        questions.refuse_twice(table.source, names, names[place])
-    kinds = {(name.stem, name.unit, name.notation) for name in (table.apart[place] for place in fits)}
+    for index in fits:
+        questions.refuse_twice(table.source, names, names[index])
+    kinds = {(name.stem, name.unit, name.notation) for name in (table.apart[index] for index in fits)}
     if len(fits) > 1 and (quantity != "time" or len(kinds) < len(fits)):
         raise InputError(
-            f"{table.source}: columns {' and '.join(names[place] for place in fits)} could each be the {quantity}. "
+            f"{table.source}: columns {' and '.join(names[index] for index in fits)} could each be the {quantity}. "
             f"Say which one it is with {answer(names, {quantity: fits[0]})}."
         )
     name, unit = table.apart[fits[0]], table.units.get(quantity)
-    column = table.column(quantity, fits[0], "its name", [names[place] for place in fits[1:]])
+    column = table.column(quantity, fits[0], "its name", [names[index] for index in fits[1:]])
     stated = unit_named(quantity, name.unit) if name.unit else None
     if stated and unit and stated.name != unit:
         raise InputError(

@@ -14,14 +14,14 @@ from ftproc.files.reading.meaning import names, rows, schema
 from ftproc.order_statistics import medians
 from ftproc.records import COMPONENTS, FloatArray, IntArray, MeasurementLog
 
-_LAGS = 8  # rows before, among which the one before of the same target is looked for
+_LAGS = 8  # rows before, among which the one before of the same target is sought
 _FAR = 10.0  # times the distance to the nearest of these, for a jump from one target to another
 _SHARE = 0.2  # of the rows that jump, when targets alternate
 _LARGEST = 1e15  # of a reading
 _FEWEST = 24  # rows, for a judgement
-_MOST = 20_000  # rows that are looked at, in four stretches
+_MOST = 20_000  # rows that are read, in four stretches
 MOST_TARGETS = 500
-_MOST_COLUMNS = 100  # that are looked through
+_MOST_COLUMNS = 100  # that are searched
 _AGREE = 0.8  # of the jumps fall on changes of the column that tells targets apart
 
 #: Words in the names of columns that number targets.
@@ -44,11 +44,11 @@ class Column(NamedTuple):
 
 def refuse(header: TableHeader, found: Mapping[str, schema.Column], log: MeasurementLog) -> None:
     """Raise InputError, a question, if a log in SI units and in time order holds several targets."""
-    used = {place for column in found.values() for place in column.positions}
-    free = [place for place, name in enumerate(header.names) if place not in used and header.names.count(name) == 1]
+    used = {index for column in found.values() for index in column.positions}
+    free = [index for index, name in enumerate(header.names) if index not in used and header.names.count(name) == 1]
     mixed = alternate(log.measurement)
     if not mixed:
-        free = [place for place in free if _numbers_targets(header.names[place])]
+        free = [index for index in free if _numbers_targets(header.names[index])]
     column = column_of(log.measurement, _cells(header, free[:_MOST_COLUMNS], log.row)) if free else None
     if column is not None:
         first, count = column.values[0], len(column.values)
@@ -78,9 +78,9 @@ def _numbers_targets(name: str) -> bool:
     return apart.stem in WORDS or bool(WORDS & set(apart.words))
 
 
-def _cells(header: TableHeader, places: list[int], row: IntArray) -> dict[str, NDArray[np.str_]]:
-    table = header.load([], places)
-    return {header.names[place]: rows.cells(table.column(k))[row] for k, place in enumerate(places)}
+def _cells(header: TableHeader, indices: list[int], row: IntArray) -> dict[str, NDArray[np.str_]]:
+    table = header.load([], indices)
+    return {header.names[index]: rows.cells(table.column(k))[row] for k, index in enumerate(indices)}
 
 
 def alternate(measurement: FloatArray) -> bool:
@@ -126,7 +126,7 @@ def _turned(step: FloatArray, azimuth: IntArray) -> FloatArray:
 
 
 def column_of(measurement: FloatArray, columns: Mapping[str, NDArray[np.str_]]) -> Column | None:
-    """The column by which the rows (n, 3), in time order, are told apart; None if none does so.
+    """The column by which the rows (n, 3), in time order, are distinguished; None if none does so.
 
     columns: their cells as text, row for row.
     """
@@ -171,10 +171,10 @@ def threshold(measurement: FloatArray) -> tuple[int, float] | None:
         low, high = values[len(values) // 50], values[-1 - len(values) // 50]
         inner = values[(values >= low) & (values <= high)]
         gaps = np.diff(inner)
-        place = int(np.argmax(gaps)) if len(gaps) else 0
-        balanced = 0.2 * len(inner) < place + 1 < 0.8 * len(inner)
-        if len(gaps) and balanced and gaps[place] > 0.2 * (high - low):
-            value = float(inner[place] + inner[place + 1]) / 2
+        index = int(np.argmax(gaps)) if len(gaps) else 0
+        balanced = 0.2 * len(inner) < index + 1 < 0.8 * len(inner)
+        if len(gaps) and balanced and gaps[index] > 0.2 * (high - low):
+            value = float(inner[index] + inner[index + 1]) / 2
             below = measurement[:, component] < value
             if not alternate(measurement[below]) and not alternate(measurement[~below]):
                 return component, value

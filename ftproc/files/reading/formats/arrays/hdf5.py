@@ -30,10 +30,10 @@ _SLICE, _MOST_SLICE = 256, 256 << 20  # rows of texts that are read at once at l
 class Stored(NamedTuple):
     """An array that is not read yet: a dataset, a field of a compound one, or a column of a matrix.
 
-    place: of the dataset in the file. chunk: bytes that must be unpacked at once.
+    path: of the dataset in the file. chunk: bytes that must be unpacked at once.
     """
 
-    place: str
+    path: str
     shape: tuple[int, ...]
     dtype: np.dtype[Any]
     chunk: int
@@ -116,15 +116,15 @@ class _Elsewhere(Exception):
     pass
 
 
-def _inside(node: Any, place: bytes, depth: int) -> Any:
-    """What lies at a place, through links within the file. Raises _Elsewhere for what a link to another file is on the
+def _inside(node: Any, path: bytes, depth: int) -> Any:
+    """What lies at a path, through links within the file. Raises _Elsewhere for what a link to another file is on the
     way to."""
     from h5py import h5l
 
     if depth > _DEEPEST:
-        raise KeyError(place)
-    node = node.file["/"] if place.startswith(b"/") else node
-    for part in filter(None, place.split(b"/")):
+        raise KeyError(path)
+    node = node.file["/"] if path.startswith(b"/") else node
+    for part in filter(None, path.split(b"/")):
         kind = node.id.links.get_info(part).type
         if kind == h5l.TYPE_EXTERNAL:
             file, _ = node.id.links.get_val(part)
@@ -206,7 +206,7 @@ def _reader(name: str, path: Path, room: Room, columns: Mapping[str, Stored]) ->
         import h5py
 
         wanted = [columns[each] for each in names]
-        whole = {one.place: one for one in wanted}.values()
+        whole = {one.path: one for one in wanted}.values()
         room.check(sum(int(np.prod([float(side) for side in one.shape])) * one.dtype.itemsize for one in whole))
         room.check(max((one.chunk for one in whole), default=0))
 
@@ -224,11 +224,11 @@ def _reader(name: str, path: Path, room: Room, columns: Mapping[str, Stored]) ->
 
 def _values(file: Any, one: Stored, room: Room, matrices: dict[str, Any]) -> Any:
     """The values of a column. matrices: those that are read already."""
-    dataset = file[one.place]
+    dataset = file[one.path]
     if one.column is not None:
-        if one.place not in matrices:
-            matrices[one.place] = dataset[()]
-        matrix = matrices[one.place]
+        if one.path not in matrices:
+            matrices[one.path] = dataset[()]
+        matrix = matrices[one.path]
         return matrix[one.column] if vectors.lies(matrix.shape) else matrix[:, one.column]
     selected = dataset.fields(one.field) if one.field else dataset
     if one.dtype.kind != "O":
@@ -243,8 +243,8 @@ def _texts(selected: Any, one: Stored, room: Room) -> Any:
     step = max(_SLICE, _MOST_SLICE // max(room.packed, 1))
     found: list[Any] = []
     for start in range(0, length, step):
-        place = tuple(slice(start, start + step) if k == axis else slice(None) for k in range(len(one.shape)))
-        part = np.asarray(selected[place], object).reshape(-1).tolist()
+        part_of = tuple(slice(start, start + step) if k == axis else slice(None) for k in range(len(one.shape)))
+        part = np.asarray(selected[part_of], object).reshape(-1).tolist()
         size += sum(len(cell) for cell in part if isinstance(cell, bytes | str))
         room.check(size)
         found += part

@@ -32,7 +32,7 @@ def read(name: str, path: Path, room: Room, variable: str = "") -> TableHeader:
     from scipy.io import loadmat, whosmat
 
     with content.undamaged(name, "a Matlab file", "save it as CSV"):
-        if _is_version_4(head):
+        if 0 in head[:4]:  # version 4: no header of text, but a matrix, whose type has a zero byte
             room.check(sum(8 * math.prod(shape) for _, shape, _ in whosmat(path)))
         else:
             _survey(content.read(name, path), room)
@@ -113,11 +113,6 @@ def _cells(values: list[Any]) -> Any:
     return None
 
 
-def _is_version_4(head: bytes) -> bool:
-    """Whether a file has no header of text, but begins with a matrix, whose type has a zero byte."""
-    return 0 in head[:4]
-
-
 def _survey(data: bytes, room: Room) -> None:
     """Raise InputError for arrays that unpack to too much, or lie too deep inside each other for a reader."""
     order = ">" if data[126:128] == b"MI" else "<"
@@ -133,27 +128,27 @@ def _survey(data: bytes, room: Room) -> None:
 
 def _unpacked(data: bytes, order: str, room: Room) -> Iterator[bytes]:
     """The elements of a file with their types and lengths, unpacked."""
-    place = _HEADER
-    while place + 8 <= len(data):
-        kind, length = struct.unpack_from(f"{order}II", data, place)
+    offset = _HEADER
+    while offset + 8 <= len(data):
+        kind, length = struct.unpack_from(f"{order}II", data, offset)
         if kind == _COMPRESSED:
-            yield zlib.decompressobj().decompress(data[place + 8 : place + 8 + length], room.limit + 1)
+            yield zlib.decompressobj().decompress(data[offset + 8 : offset + 8 + length], room.limit + 1)
         else:
-            yield data[place : place + 8 + length]
-        place += 8 + length
+            yield data[offset : offset + 8 + length]
+        offset += 8 + length
 
 
 def _depths(data: bytes, order: str) -> Iterator[int]:
     """How many arrays each element of an element lies in; 0 first."""
     yield 0
     ends: list[int] = []
-    place = 0
-    while place + 8 <= len(data):
-        while ends and place >= ends[-1]:
+    offset = 0
+    while offset + 8 <= len(data):
+        while ends and offset >= ends[-1]:
             ends.pop()
         yield len(ends)
-        kind, length = struct.unpack_from(f"{order}II", data, place)
+        kind, length = struct.unpack_from(f"{order}II", data, offset)
         if kind == _MATRIX:
-            ends.append(place + 8 + length)
+            ends.append(offset + 8 + length)
         small = kind >> 16  # a small element has its length, type and data in 8 bytes
-        place += 8 if small or kind == _MATRIX else 8 + (length + 7) // 8 * 8
+        offset += 8 if small or kind == _MATRIX else 8 + (length + 7) // 8 * 8

@@ -18,7 +18,7 @@ from ftproc.files.reading.formats import content
 _LONGEST_S, _BYTES_A_SECOND = 5.0, 10 << 20  # for any file, and for a large one in addition
 #: What ends the copy, and nobody hears; Windows, where there is no copy, has not all of them.
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGSEGV", "SIGABRT", "SIGBUS", "SIGFPE", "SIGILL")
-_FIRST_LOOK_S, _LONGEST_LOOK_S = 2e-4, 0.002
+_FIRST_POLL_S, _LONGEST_POLL_S = 2e-4, 0.002
 
 
 def rehearse(path: Path, room_name: str, kind: str, read: Callable[[], object]) -> None:
@@ -55,11 +55,11 @@ def _read_and_end(read: Callable[[], object]) -> None:
 
 def _ended(child: int, until: float) -> int | None:
     """The status of a process; None if it has not ended in time."""
-    look = _FIRST_LOOK_S
+    pause_s = _FIRST_POLL_S
     while time.monotonic() < until:
         done, status = os.waitpid(child, os.WNOHANG)
         if done:
             return status
-        time.sleep(look)
-        look = min(2 * look, _LONGEST_LOOK_S)
+        time.sleep(pause_s)
+        pause_s = min(2 * pause_s, _LONGEST_POLL_S)
     return None

@@ -71,11 +71,11 @@ def _header(room: Room, table: Table, form: str) -> TableHeader:
         import pyarrow as pa
 
         wanted = [*numeric, *others]
-        sizes = [_size(table.columns[names[place]]) for place in wanted]
-        room.check(sum(sizes), max((max(table.columns[names[place]].shape) for place in wanted), default=0))
-        values = table.read([names[place] for place in wanted])
-        cells = [_arrow(_dated(each, units[place])) for place, each in zip(wanted, values, strict=True)]
-        return pa.Table.from_arrays(cells, names=[encodable(names[place]) for place in wanted])
+        sizes = [_size(table.columns[names[index]]) for index in wanted]
+        room.check(sum(sizes), max((max(table.columns[names[index]].shape) for index in wanted), default=0))
+        values = table.read([names[index] for index in wanted])
+        cells = [_arrow(_dated(each, units[index])) for index, each in zip(wanted, values, strict=True)]
+        return pa.Table.from_arrays(cells, names=[encodable(names[index]) for index in wanted])
 
     written = ["" if _since(unit) else unit for unit in units]
     return TableHeader(room.name, [encodable(name) for name in names], load, units=written, form=form)

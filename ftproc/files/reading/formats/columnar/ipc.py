@@ -32,8 +32,8 @@ def read(name: str, path: Path, room: Room) -> TableHeader:
     def load(numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
         import pyarrow as pa
 
-        places = sorted({*numeric, *others})
-        some = places if len(places) < len(names) else []
+        indices = sorted({*numeric, *others})
+        some = indices if len(indices) < len(names) else []
         with _undamaged(name):
             wanted, batches = _opened(data, some)
             held = []
@@ -42,7 +42,7 @@ def read(name: str, path: Path, room: Room) -> TableHeader:
                 held.append(batch)
             table = pa.Table.from_batches(held, wanted)
             room.check(sum(map(sizes.unpacked, table.columns)), table.num_rows)
-            return table.select([places.index(place) for place in (*numeric, *others)])
+            return table.select([indices.index(index) for index in (*numeric, *others)])
 
     return TableHeader(name, names, load, metadata=schema.metadata or {}, form="Arrow")
 
@@ -60,12 +60,12 @@ def _undamaged(name: str) -> Iterator[None]:
         ) from error
 
 
-def _opened(data: bytes, places: Sequence[int] = ()) -> tuple[pa.Schema, Iterator[pa.RecordBatch]]:
-    """Schema and batches of an Arrow file, or else of an Arrow stream. places: of the columns that are read; all if
+def _opened(data: bytes, indices: Sequence[int] = ()) -> tuple[pa.Schema, Iterator[pa.RecordBatch]]:
+    """Schema and batches of an Arrow file, or else of an Arrow stream. indices: of the columns that are read; all if
     there are none."""
     import pyarrow as pa
 
-    options = pa.ipc.IpcReadOptions(included_fields=list(places))
+    options = pa.ipc.IpcReadOptions(included_fields=list(indices))
     if not data.startswith(_ARROW_MAGIC):
         stream = pa.ipc.open_stream(pa.py_buffer(data), options=options)
         return stream.schema, iter(stream)

@@ -82,10 +82,10 @@ class _Parquet:
         # Without threads: where there is no memory for them, pyarrow would wait for ever.
         table = parquet.read(chosen, use_threads=False)
         self.room.check(sum(map(sizes.unpacked, table.columns)))
-        for place, name in enumerate(table.column_names):
+        for index, name in enumerate(table.column_names):
             kind = self.schema.field(self.names.index(name)).type
-            if name in texts and table.column(place).type != kind:
-                table = table.set_column(place, name, table.column(place).cast(kind))
+            if name in texts and table.column(index).type != kind:
+                table = table.set_column(index, name, table.column(index).cast(kind))
         return table
 
     def _few_at_once(self, file: pa.OSFile, chosen: list[str], longest: int) -> pa.Table:

@@ -91,8 +91,8 @@ def _blocks(data: bytes) -> Iterator[int]:
         root = _root(footer)
         for field in (2, 3):
             start, count = _vector(footer, root, field)
-            for place in range(start, start + 24 * count, 24):
-                (offset,) = struct.unpack_from("<q", footer, place)
+            for entry in range(start, start + 24 * count, 24):
+                (offset,) = struct.unpack_from("<q", footer, entry)
                 if 0 < offset < len(data):
                     yield offset
     except (struct.error, IndexError):
@@ -102,20 +102,20 @@ def _blocks(data: bytes) -> Iterator[int]:
 def _claim(metadata: bytes, body: pa.Buffer | None) -> Claim:
     """Of one message, which is a flatbuffer."""
     message = _root(metadata)
-    place = _field(metadata, message, 1)
-    kind = metadata[place] if place else 0
+    field = _field(metadata, message, 1)
+    kind = metadata[field] if field else 0
     header = _table(metadata, message, 2)
     if kind == _DICTIONARY:
         header = _table(metadata, header, 1)
     elif kind != _RECORDS:
         return Claim(0, 0, False)
-    place = _field(metadata, header, 0)
-    rows = struct.unpack_from("<q", metadata, place)[0] if place else 0
+    field = _field(metadata, header, 0)
+    rows = struct.unpack_from("<q", metadata, field)[0] if field else 0
     start, count = _vector(metadata, header, 2)
     packed = _field(metadata, header, 3) > 0
     size = 0
-    for place in range(start, start + 16 * count, 16):
-        offset, length = struct.unpack_from("<qq", metadata, place)
+    for entry in range(start, start + 16 * count, 16):
+        offset, length = struct.unpack_from("<qq", metadata, entry)
         claimed = length
         if packed and body is not None and length >= 8 and 0 <= offset <= body.size - 8:
             (claimed,) = struct.unpack("<q", body.slice(offset, 8).to_pybytes())
@@ -139,14 +139,14 @@ def _field(data: bytes, table: int, number: int) -> int:
 
 def _table(data: bytes, table: int, number: int) -> int:
     """Where a table in a field begins."""
-    place = _field(data, table, number)
-    return place + int(struct.unpack_from("<I", data, place)[0]) if place else len(data)
+    field = _field(data, table, number)
+    return field + int(struct.unpack_from("<I", data, field)[0]) if field else len(data)
 
 
 def _vector(data: bytes, table: int, number: int) -> tuple[int, int]:
     """Where a vector in a field begins, and how many elements it has."""
-    place = _field(data, table, number)
-    if not place:
+    field = _field(data, table, number)
+    if not field:
         return 0, 0
-    start = place + struct.unpack_from("<I", data, place)[0]
+    start = field + struct.unpack_from("<I", data, field)[0]
     return int(start + 4), int(struct.unpack_from("<I", data, start)[0])

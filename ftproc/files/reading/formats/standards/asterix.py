@@ -2,7 +2,7 @@
 text and tables.
 
 What the specifications of the categories settle is stated: the columns, their units, azimuths clockwise from north, and
-the column by which targets are told apart.
+the column by which targets are distinguished.
 """
 
 from __future__ import annotations
@@ -94,17 +94,17 @@ def by_names(header: TableHeader) -> TableHeader:
     words = {word for name in header.names for word in re.split(r"[^a-z0-9]+", name.lower())}
     if not {"rho", "theta"} <= words or (len(_BESIDE & {*plain, *words}) < 2 and not {"polar", "coordinates"} <= words):
         return header
-    places = {
+    indices = {
         quantity: [k for k, name in enumerate(header.names) if word in re.split(r"[^a-z0-9]+", name.lower())]
         for quantity, word in (("range", "rho"), ("azimuth", "theta"))
     }
-    if any(len(found) != 1 for found in places.values()) or header.units:
+    if any(len(found) != 1 for found in indices.values()) or header.units:
         return header
-    columns = {quantity: header.names[found[0]] for quantity, found in places.items()}
+    columns = {quantity: header.names[found[0]] for quantity, found in indices.items()}
     time = _named(tuple(header.names), _QUANTITIES["time"])
     units = ["deg" if name == columns["azimuth"] else "" for name in header.names]
-    if max(map(_float, header.load([], places["range"]).column(0).to_pylist()), default=0.0) <= _FARTHEST_NMI:
-        units[places["range"][0]] = "nmi"
+    if max(map(_float, header.load([], indices["range"]).column(0).to_pylist()), default=0.0) <= _FARTHEST_NMI:
+        units[indices["range"][0]] = "nmi"
     target = next((header.names[plain.index(word)] for word in _OF_TARGETS if word in plain), "")
     known = Stated(columns | ({"time": time} if time else {}), "north", target)
     return replace(header, stated=known, units=units)
@@ -215,7 +215,8 @@ def stated(header: TableHeader, category: int, table: Sparse) -> TableHeader:
     ranges = (_float(cell) for cell in table.columns[columns["range"]][1])
     if max(ranges, default=0.0) > _FARTHEST_NMI and _PLOTS[category] == "nmi":
         del unit[columns["range"]]
-    target = next((name for role in _TARGETS if (name := _named(names, (role,))) and _tells(table, name)), "")
+    targets = (_named(names, (role,)) for role in _TARGETS)
+    target = next((name for name in targets if name and len(table.columns[name][0]) >= _ENOUGH * table.rows), "")
     if target and max(Counter(map(str, table.columns[target][1])).values()) < 2:
         raise InputError(
             f"{header.source}: {table.rows} {'plot' if table.rows == 1 else 'plots'} of as many targets, of which none "
@@ -223,10 +224,6 @@ def stated(header: TableHeader, category: int, table: Sparse) -> TableHeader:
         )
     known = Stated(columns, "north", target, _named(names, (_STATION,)))
     return replace(header, stated=known, units=[unit.get(name, "") for name in names])
-
-
-def _tells(table: Sparse, name: str) -> bool:
-    return len(table.columns[name][0]) >= _ENOUGH * table.rows
 
 
 def _float(cell: Any) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ftproc.errors import InputError, quoted
-from ftproc.files.options import ABSENT, Condition, Extract
+from ftproc.files.options import Condition, Extract
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning import rows
 from ftproc.records import IntArray
@@ -54,11 +54,6 @@ def conditions(header: TableHeader) -> list[Condition]:
     name = header.stated.station
     values = _values(header, name, None) if name else []
     return [Condition(name, "=", value) for value in values] if len(values) > 1 else []
-
-
-def is_one_target(header: TableHeader, extract: Extract) -> bool:
-    """Whether the user or the standard says that the rows are of one target."""
-    return bool(extract.target) or bool(header.stated.target) or extract.target == ABSENT
 
 
 def _values(header: TableHeader, column: str, kept: IntArray | None) -> list[str]:

@@ -16,16 +16,9 @@ _WORD = re.compile(r"(?P<index>\d\d)[\d.]{3}(?P<unit>[\d.])(?P<sign>[+-])(?P<dig
 _NAMES = {"11": "point", "18": "clock", "19": "date", "21": "Hz", "22": "V", "31": "SD"}
 #: Digit of the unit -> the unit and its counts.
 _UNITS = {
-    "0": ("m", 1e3),
-    "6": ("m", 1e4),
-    "8": ("m", 1e5),
-    "1": ("ft", 1e3),
-    "7": ("ft", 1e4),
-    "2": ("gon", 1e5),
-    "3": ("deg", 1e5),
-    "4": ("dddmmss", 1e1),
-    "5": ("mil", 1e4),
-}
+    "0": ("m", 1e3), "6": ("m", 1e4), "8": ("m", 1e5), "1": ("ft", 1e3), "7": ("ft", 1e4), "2": ("gon", 1e5),
+    "3": ("deg", 1e5), "4": ("dddmmss", 1e1), "5": ("mil", 1e4),
+}  # fmt: skip
 
 
 def read(text: str, room: limits.Room) -> TableHeader | None:

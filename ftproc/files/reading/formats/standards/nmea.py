@@ -47,7 +47,7 @@ class _Sentence(NamedTuple):
 
 
 class _Ship:
-    """What the sentences before said of clock and heading."""
+    """What the sentences before tell of clock and heading."""
 
     def __init__(self) -> None:
         self.day: np.datetime64 | None = None
@@ -55,8 +55,8 @@ class _Ship:
         self.heading: float | None = None
         self.moves = False
 
-    def hear(self, said: _Sentence) -> None:
-        kind, fields = said.kind[-3:], said.fields
+    def hear(self, sentence: _Sentence) -> None:
+        kind, fields = sentence.kind[-3:], sentence.fields
         if kind in _CLOCKS:
             self.second = _of_day(_at(fields, _CLOCKS[kind]))
             date = fields[3:0:-1] if kind == "ZDA" else re.findall("..", _at(fields, 8))[::-1] if kind == "RMC" else []
@@ -81,24 +81,24 @@ def read(text: str, room: limits.Room) -> TableHeader | None:
     """The targets of TTM sentences; else the fields of the sentence of which there are the most, such as
     `$PTRK,120000.05,1234.5*42`. None if most lines are no sentences. Raises InputError for positions alone."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
-    said = [_Sentence(m["before"], m["type"], m["body"].split(",")) for m in map(_SENTENCE.fullmatch, lines) if m]
-    if not said or len(said) < _MOSTLY * len(lines):
+    sentences = [_Sentence(m["before"], m["type"], m["body"].split(",")) for m in map(_SENTENCE.fullmatch, lines) if m]
+    if not sentences or len(sentences) < _MOSTLY * len(lines):
         return None
-    kinds = Counter(each.kind for each in said)
+    kinds = Counter(each.kind for each in sentences)
     if any(kind[-3:] == "TTM" for kind in kinds):
-        return _targets(said, room)
+        return _targets(sentences, room)
     held = [what for kind in kinds if (what := _POSITIONS.get(kind[-3:]))]
     if held and all(len(kind) == 5 for kind in kinds):
         raise InputError(
             f"{room.name}: these NMEA sentences hold {held[0]}, and no ranges and bearings (TTM) of a radar."
         )
-    return _fields(said, kinds, len(lines), room)
+    return _fields(sentences, kinds, len(lines), room)
 
 
-def _targets(said: Sequence[_Sentence], room: limits.Room) -> TableHeader:
+def _targets(sentences: Sequence[_Sentence], room: limits.Room) -> TableHeader:
     columns, ship, left = Sparse(room), _Ship(), Counter[str]()
     relative, rows = False, list[tuple[list[str], dict[str, float | str | None]]]()
-    for each in said:
+    for each in sentences:
         ship.hear(each)
         if each.kind[-3:] != "TTM":
             continue
@@ -137,10 +137,10 @@ def _targets(said: Sequence[_Sentence], room: limits.Room) -> TableHeader:
     return replace(columns.header("NMEA 0183, sentences TTM"), stated=stated)
 
 
-def _fields(said: Sequence[_Sentence], kinds: Counter[str], lines: int, room: limits.Room) -> TableHeader:
+def _fields(sentences: Sequence[_Sentence], kinds: Counter[str], lines: int, room: limits.Room) -> TableHeader:
     """The fields of the most frequent sentence, by their numbers."""
     chosen = kinds.most_common(1)[0][0]
-    bodies = [each.fields for each in said if each.kind == chosen]
+    bodies = [each.fields for each in sentences if each.kind == chosen]
     width = 1 + max(map(len, bodies))
     if width > limits.MOST_COLUMNS:
         raise limits.too_many_columns(room.name)
@@ -162,8 +162,8 @@ def _stamp(before: str) -> str:
     return str(np.datetime64(int(unix[1]) * 10**9 + int((unix[2] or unix[3] or "").ljust(9, "0")), "ns"))
 
 
-def _at(fields: Sequence[str], place: int) -> str:
-    return fields[place].strip() if place < len(fields) else ""
+def _at(fields: Sequence[str], index: int) -> str:
+    return fields[index].strip() if index < len(fields) else ""
 
 
 def _number(cell: str) -> float | None:

@@ -60,21 +60,21 @@ def _parts(packet: bytes) -> list[bytes]:
     """The data blocks of a packet, or those in frames of a recorder: length, four octets of its clock, blocks."""
     if are_blocks(packet):
         return [packet]
-    parts, place = list[bytes](), 0
-    while place < len(packet):
-        end = place + max(_number(packet[place : place + 2]), _FRAME)
-        parts.append(packet[place + _FRAME : end])
-        place = end
-    return parts if place == len(packet) and all(map(are_blocks, parts)) else []
+    parts, offset = list[bytes](), 0
+    while offset < len(packet):
+        end = offset + max(_number(packet[offset : offset + 2]), _FRAME)
+        parts.append(packet[offset + _FRAME : end])
+        offset = end
+    return parts if offset == len(packet) and all(map(are_blocks, parts)) else []
 
 
 def _blocks(data: bytes | bytearray) -> Iterator[tuple[int, int, int]]:
     """Category, start and end of each block; the end is beyond the data where that is none."""
-    place = 0
-    while place < len(data):
-        length = int.from_bytes(data[place + 1 : place + _HEADER], "big")
-        yield data[place], place + _HEADER, place + max(length, _HEADER + 1)
-        place += max(length, _HEADER + 1)
+    offset = 0
+    while offset < len(data):
+        length = int.from_bytes(data[offset + 1 : offset + _HEADER], "big")
+        yield data[offset], offset + _HEADER, offset + max(length, _HEADER + 1)
+        offset += max(length, _HEADER + 1)
 
 
 def are_blocks(data: bytes) -> bool:
@@ -93,33 +93,33 @@ def whole_blocks(data: bytes | bytearray) -> int:
 
 
 def _records(data: bytes) -> Iterator[Record]:
-    for category, place, end in _blocks(data):
+    for category, offset, end in _blocks(data):
         if category not in PLANS:
             yield Record(category, {})
             continue
         try:
-            while place < end:
-                found, place = _record(data, place, category)
-                if place <= end:
+            while offset < end:
+                found, offset = _record(data, offset, category)
+                if offset <= end:
                     yield Record(category, found)
         except IndexError:  # a field specification beyond the plan: the rest of the block is unknown
             yield Record(0, {})
 
 
-def _record(data: bytes, place: int, category: int) -> tuple[Row, int]:
-    """The values of the record at a place, and where it ends."""
-    first, place = place, _extended(data, place)
+def _record(data: bytes, offset: int, category: int) -> tuple[Row, int]:
+    """The values of the record at an offset, and where it ends."""
+    first, offset = offset, _extended(data, offset)
     found: dict[str, float | str] = {}
     plan = PLANS[category]
-    for number in _set(data[first:place]):
+    for number in _set(data[first:offset]):
         item = plan[number]
-        end = _end(data, place, item.length)
-        if item.number == "020" and category == 1 and data[place] & 0x80:
+        end = _end(data, offset, item.length)
+        if item.number == "020" and category == 1 and data[offset] & 0x80:
             plan = PLANS[-1]
         if item.decode is not None:
-            found.update(zip(item.names, item.decode(data[place:end]), strict=True))
-        place = end
-    return found, place
+            found.update(zip(item.names, item.decode(data[offset:end]), strict=True))
+        offset = end
+    return found, offset
 
 
 @functools.lru_cache(maxsize=4096)
@@ -128,29 +128,29 @@ def _set(octets: bytes) -> tuple[int, ...]:
     return tuple(7 * k + bit for k, octet in enumerate(octets) for bit in range(7) if octet & (0x80 >> bit))
 
 
-def _extended(data: bytes, place: int) -> int:
+def _extended(data: bytes, offset: int) -> int:
     """Where octets end of which the last bit says that another follows."""
-    while data[place] & 1:
-        place += 1
-    return place + 1
+    while data[offset] & 1:
+        offset += 1
+    return offset + 1
 
 
-def _end(data: bytes, place: int, length: int | str) -> int:
+def _end(data: bytes, offset: int, length: int | str) -> int:
     """Where an item ends. Raises IndexError beyond the data."""
     if isinstance(length, int):
-        return place + length
+        return offset + length
     kind = length[0]
     if kind == "x":
-        return _extended(data, place)
+        return _extended(data, offset)
     if kind == "r":
-        return place + 1 + data[place] * int(length[1:])
+        return offset + 1 + data[offset] * int(length[1:])
     if kind == "e":
-        return place + max(data[place], 1)
-    parts, first = length[1:].split(","), place  # compound
-    place = _extended(data, first)
-    for number in _set(data[first:place]):
-        place = _end(data, place, _length(parts[number]))
-    return place
+        return offset + max(data[offset], 1)
+    parts, first = length[1:].split(","), offset  # compound
+    offset = _extended(data, first)
+    for number in _set(data[first:offset]):
+        offset = _end(data, offset, _length(parts[number]))
+    return offset
 
 
 def _length(text: str) -> int | str:
@@ -241,21 +241,21 @@ def _of_capture(data: bytes) -> Iterator[tuple[int, bytes]]:
     if len(data) < 24:
         return
     (link,) = struct.unpack_from(f"{order}I", data, 20)
-    place = 24
-    while place + 16 <= len(data):
-        (length,) = struct.unpack_from(f"{order}I", data, place + 8)
-        yield link & 0xFFFF, data[place + 16 : place + 16 + length]
-        place += 16 + length
+    offset = 24
+    while offset + 16 <= len(data):
+        (length,) = struct.unpack_from(f"{order}I", data, offset + 8)
+        yield link & 0xFFFF, data[offset + 16 : offset + 16 + length]
+        offset += 16 + length
 
 
 def _of_sections(data: bytes) -> Iterator[tuple[int, bytes]]:
     """The same of a pcapng file."""
-    order, links, place = "<", list[int](), 0
-    while place + 12 <= len(data):
-        if data.startswith(b"\n\r\r\n", place):
-            order, links = "<" if data[place + 8] == 0x4D else ">", []
-        kind, length = struct.unpack_from(f"{order}II", data, place)
-        body = data[place + 8 : place + length - 4]
+    order, links, offset = "<", list[int](), 0
+    while offset + 12 <= len(data):
+        if data.startswith(b"\n\r\r\n", offset):
+            order, links = "<" if data[offset + 8] == 0x4D else ">", []
+        kind, length = struct.unpack_from(f"{order}II", data, offset)
+        body = data[offset + 8 : offset + length - 4]
         if kind == 1 and len(body) >= 2:
             links.append(struct.unpack_from(f"{order}H", body)[0])
         elif kind == 6 and len(body) >= 20:
@@ -263,4 +263,4 @@ def _of_sections(data: bytes) -> Iterator[tuple[int, bytes]]:
             yield links[which] if which < len(links) else -1, body[20 : 20 + size]
         elif kind == 3 and links:
             yield links[0], body[4:]
-        place += max(length, 12)
+        offset += max(length, 12)

@@ -59,14 +59,14 @@ def read(text: str, room: Room) -> TableHeader:
                 row["range_halved"] = row["range"] / 2 if question else row["range"]
                 questions |= {"range": question} if question else {}
             columns.add([("time", _utc(epoch, meta, room)), *row.items(), ("station", station), ("target", target)])
-    said = (*(f"{count} values are left out: {what}" for what, count in left.items()), *sorted(others))
+    notes = (*(f"{count} values are left out: {what}" for what, count in left.items()), *sorted(others))
     if not {"range", "azimuth_deg", "elevation_deg"} & set(columns.columns):
         held = "; ".join(left) or "no observations"
         raise InputError(f"{room.name}: this TDM holds no range, azimuth or elevation of a target, but {held}.")
     if not questions:
         columns.columns.pop("range_halved", None)
     header = columns.header("CCSDS TDM")
-    stated = Stated({}, "north", "target", "station", questions, said)
+    stated = Stated({}, "north", "target", "station", questions, notes)
     units = ["km" if name.startswith("range") and name != "range_rate_mps" else "" for name in header.names]
     return replace(header, stated=stated, units=units)
 

@@ -78,15 +78,15 @@ def _differing(log: Known, ways: Sequence[Way]) -> tuple[list[str], bool, bool]:
 
 def _unit(way: Way, k: int) -> str:
     """The name of the unit of the kth quantity, wherever its readings stand."""
-    place = 5 - k if way.exchanged and k > 1 else k
-    unit = way.units[place]
+    index = 5 - k if way.exchanged and k > 1 else k
+    unit = way.units[index]
     return unit.name if unit else ""
 
 
 def _differing_words(log: Known, ways: Sequence[Way]) -> str:
     units, zenith, exchanged = _differing(log, ways)
-    places = [*units, *(["elevation"] if zenith else []), *(QUANTITIES[2:] if exchanged else ())]
-    return " and ".join(dict.fromkeys(f'"{log.found[q].name}"' for q in places))
+    quantities = [*units, *(["elevation"] if zenith else []), *(QUANTITIES[2:] if exchanged else ())]
+    return " and ".join(dict.fromkeys(f'"{log.found[q].name}"' for q in quantities))
 
 
 def _answers(log: Known, ways: Sequence[Way]) -> list[str]:

@@ -25,7 +25,7 @@ from ftproc.records import FloatArray
 DIGITS = "dms"  # the notation of degrees, minutes and seconds in the digits of a number
 _CLEARLY = 10.0  # times likelier than any other is taken, or contradicts a name
 _STILL = 3.0  # times likelier must the usual be than any other, to be taken without a word
-_TOLD = 30.0  # times likelier is it told by the motion, and no condition
+_SHOWN = 30.0  # times likelier is it shown by the motion, and no condition
 _QUESTIONED = 1e-6  # times as likely as the best
 _BELOW_RAD = -0.02  # median elevation of a target below the station
 _MOVES = 0.02  # likelihood of a motion that contradicts a name
@@ -161,7 +161,7 @@ def _rivals(log: Known, choices: Sequence[Choice], taken: Choice) -> list[Way]:
     return [
         choice.way
         for choice in choices
-        if choice is not taken and choice.odds * (_TOLD if log.allows(choice.way) else _DOUBTED) > taken.odds
+        if choice is not taken and choice.odds * (_SHOWN if log.allows(choice.way) else _DOUBTED) > taken.odds
     ]
 
 

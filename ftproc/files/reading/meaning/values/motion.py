@@ -22,7 +22,7 @@ from ftproc.files.words import QUANTITIES
 from ftproc.order_statistics import median
 from ftproc.records import FloatArray
 
-_MOST_ROWS = 1000  # that are looked at
+_MOST_ROWS = 1000  # that are used
 
 #: How likely a value is up to each limit, and beyond the last.
 _STEP_S = (

@@ -20,14 +20,9 @@ _STEEP_DEG = 60  # few records have a median elevation above this
 _MAX_ANGLE = 1e6  # rad; larger ones are clipped
 SURVEYORS = ("hz", "horizontalangle", "horizontaldirection", "hzangle", "v", "verticalangle", "vertangle", "ha", "va")
 _TURNS = {
-    "rad": 2 * math.pi,
-    "deg": 360.0,
-    "grad": 400.0,
-    "mil6000": 6000.0,
-    "mrad": 2e3 * math.pi,
-    "mil6300": 6300.0,
+    "rad": 2 * math.pi, "deg": 360.0, "grad": 400.0, "mil6000": 6000.0, "mrad": 2e3 * math.pi, "mil6300": 6300.0,
     "mil": 6400.0,
-}
+}  # fmt: skip
 _SAME_TURN = 0.002
 _FEWEST, _FEWEST_MINUTES = 24, 3  # rows, and different minutes in them, by which packed angles are known
 

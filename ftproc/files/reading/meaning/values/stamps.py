@@ -178,5 +178,5 @@ def _evidence(values: FloatArray, time: FloatArray, clock: _Clock) -> float:
 def _note(clock: _Clock, rounded: bool) -> str:
     steps = "whole seconds" if clock.step == 1.0 else f"multiples of {clock.step:.4g} s"
     rows = clock.step / clock.period
-    said = f"with {rows:.3g} rows in each" if rows > 1 else f"though rows come every {clock.period:.4g} s"
-    return f"the times are {'rounded to ' * rounded}{steps} {said}, which are spread evenly"
+    rate = f"with {rows:.3g} rows in each" if rows > 1 else f"though rows come every {clock.period:.4g} s"
+    return f"the times are {'rounded to ' * rounded}{steps} {rate}, which are spread evenly"

@@ -1,5 +1,5 @@
 """The ways in which a log may be meant: the units of its columns, whether its elevations are zenith angles, and whether
-its angles are exchanged; each with how likely it is before the motion is looked at."""
+its angles are exchanged; each with how likely it is before the motion is used."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _OTHER_TURN = 1e-3  # azimuths that jump by the turn of another unit
 
 
 class Known(NamedTuple):
-    """What is known of a log before its values are looked at. bare_time: the times are numbers of which nothing states
+    """What is known of a log before its values are read. bare_time: the times are numbers of which nothing states
     the unit. numbered: they are numbers without a date. standard: the format says what the columns are."""
 
     source: str
@@ -111,10 +111,6 @@ def _units(log: Known, quantity: str) -> Iterator[tuple[Unit | None, float]]:
     for name in others:
         if name != column.unit.name and not (name == "grad" and column.unit.name == "gon"):
             yield UNITS[quantity][name], prior * (_OTHER_MIL if name == "mil" else 1.0)
-
-
-def _is_steep(half_rad: float, zenith: bool) -> bool:
-    return (math.pi / 2 - half_rad if zenith else half_rad) > _STEEP_RAD
 
 
 def _is_sure(column: Column) -> bool:
@@ -191,7 +187,8 @@ def _fit(
         upright = mine.rows < _FEW or zenith or mine.most * unit.multiply / unit.divide < _UPRIGHT_RAD
         if quantity == "elevation" and not upright:
             found *= _SMALL
-        if quantity == "elevation" and _is_steep(mine.half * unit.multiply / unit.divide, zenith):
+        half_rad = mine.half * unit.multiply / unit.divide
+        if quantity == "elevation" and (math.pi / 2 - half_rad if zenith else half_rad) > _STEEP_RAD:
             found *= _STEEP
         if quantity == "azimuth" and mine.turn and not plausibility.turns(unit, mine):
             found *= _OTHER_TURN

@@ -1,4 +1,4 @@
-"""A last look at an edited log: every rejected run is weighed once more against what else it may be.
+"""Reassessment of the rejected runs of an edited log: each is weighed once more against what else it may be.
 
 A run whose readings leave the track and join it again without a jump may be motion. One beside which the track has
 followed a patch, or has been dragged by one that begins slowly, may be longer, or all good, and the readings beside it
@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.editing import outlier_chain
 from ftproc.core.editing.decisions import Decision, Record
@@ -32,20 +31,21 @@ from ftproc.core.identification.nearby import residuals_near, samples_around
 from ftproc.core.identification.profile import median_level
 from ftproc.core.identification.stretches import runs_of
 from ftproc.core.work import Work
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from ftproc.records import FloatArray, IntArray
 
 SHORTEST, ENDS = 4, 5  # readings in a run, and at its ends, of which the second nearest must be ...
-JOINED, FAR = 12.0, 25.0  # ... so many sigmas off the track at most; and of one that is an outlier in any case
+JOINED, FAR = (
+    12.0,
+    25.0,
+)  # ... such a residual at most, in units of its 1-sigma; and of one that is an outlier in any case
 SAME_SIDE = 0.7  # share of them that are on the side of the track where the one before is: noise changes sides
 SELDOM, OPEN = 8.0, 5.0  # ln of how much more often such runs are motion than patches; within which either may be
 MARGIN = 6.0  # in log-probability, by which other decisions must be better: on 25 manoeuvring flights none of 18 that
 # were better by more was worse in truth, of 12 that were better by less 7
 LENGTHS = (13, 40)  # samples beside a run that may belong to a patch
-LOOKS, ROUNDS = 2, 3  # at a log, whose runs may have changed; of deciding
+ROUNDS, REPEATS = 2, 3  # over a log, whose runs may have changed; of deciding
 WEIGHED = 10  # times that the samples around a run are weighed, about
-ELSEWHERE = 3.0  # sigmas of the position, by which two understandings must differ to be told
+ELSEWHERE = 3.0  # sigmas of the position, by which two understandings must differ to be distinguished
 
 
 class Run(NamedTuple):
@@ -58,11 +58,11 @@ class Run(NamedTuple):
 
     @property
     def key(self) -> tuple[int, bytes]:
-        """What tells it from others."""
+        """What distinguishes it from others."""
         return self.component, self.samples.tobytes()
 
     def near(self, around: int) -> slice:
-        """The samples that are looked at."""
+        """The samples that are weighed."""
         reach = LENGTHS[-1] + around
         return slice(max(int(self.samples[0]) - reach, 0), int(self.samples[-1]) + 1 + reach)
 
@@ -77,12 +77,12 @@ class Run(NamedTuple):
         return slice(max(near.start - offset, 0), near.stop - offset)
 
 
-def last_look(record: Record, decision: Decision, work: Work) -> tuple[Decision, tuple[Rival, ...]]:
+def reassess_rejected(record: Record, decision: Decision, work: Work) -> tuple[Decision, tuple[Rival, ...]]:
     """The decisions on a log, replaced around rejected runs where others are likelier, while there is work left; and
     those of which either may be."""
-    calm, rivals, seen = median_level(decision.model), list[Rival](), set[tuple[int, bytes]]()
-    around, found = samples_around(record.weighted(decision.weight), calm), decision
-    for _ in range(LOOKS):
+    at_median, rivals, seen = median_level(decision.model), list[Rival](), set[tuple[int, bytes]]()
+    around, found = samples_around(record.weighted(decision.weight), at_median), decision
+    for _ in range(ROUNDS):
         weight = found.weight.copy()
         for run in [each for each in _runs(record, found, around) if each.key not in seen]:
             near = run.near(around)
@@ -90,8 +90,8 @@ def last_look(record: Record, decision: Decision, work: Work) -> tuple[Decision,
                 work.passed += 1
                 seen.add(run.key)
                 continue
-            part, own = short_record(record, near), found._replace(weight=weight[near].copy(), model=calm)
-            if (own.weight[run.samples - near.start, run.component] > 0).any():  # another look has changed it
+            part, own = short_record(record, near), found._replace(weight=weight[near].copy(), model=at_median)
+            if (own.weight[run.samples - near.start, run.component] > 0).any():  # another run's reassessment took it in
                 continue
             seen.add(run.key)
             work.left -= WEIGHED * (near.stop - near.start)
@@ -108,7 +108,7 @@ def last_look(record: Record, decision: Decision, work: Work) -> tuple[Decision,
                 rivals.append(Rival(run.component, begin, end, abs(gain), taken_in == (gain > 0)))
         if (weight == found.weight).all():
             break
-        found = found._replace(weight=weight, starts=starts_of(record.weighted(weight), calm))
+        found = found._replace(weight=weight, starts=starts_of(record.weighted(weight), at_median))
     return found, tuple(rivals)
 
 
@@ -117,12 +117,12 @@ def _likeliest(part: Record, decision: Decision, run: Run, offset: int) -> tuple
     before, here = decision.weight, run.around(offset)
     unknown = before.copy()
     unknown[here, run.component] = 0.0
-    calm = with_profile(part, _with(part, decision, unknown), PROFILE_STEPS)
+    unfollowed = with_profile(part, _with(part, decision, unknown), PROFILE_STEPS)
     found = {before.tobytes(): (0.0, before)}
     one = log_probability(part, _with(part, decision, before))
     for way, follows in _ways(part, before, run, offset):
         with contextlib.suppress(ValueError):  # a component has too few readings there
-            model = with_profile(part, _with(part, decision, way), COMPARED_STEPS) if follows else calm
+            model = with_profile(part, _with(part, decision, way), COMPARED_STEPS) if follows else unfollowed
             other = _decided(part, decision._replace(weight=way), model, here)
             if other.tobytes() not in found:
                 prior = SELDOM if run.moves(before, other, offset) and not follows else -MARGIN
@@ -155,7 +155,7 @@ def _ways(part: Record, weight: FloatArray, run: Run, offset: int) -> Iterator[t
 def _decided(part: Record, decision: Decision, model: Model, here: slice) -> FloatArray:
     """(n, 3) decisions from these on, made again in a part of the samples."""
     weight = decision.weight
-    for _ in range(ROUNDS):
+    for _ in range(REPEATS):
         log = part.weighted(weight)
         smoothed = smooth_log(log, model, starts_of(log, decision.model), RESIDUALS)
         good = outlier_chain.classify(

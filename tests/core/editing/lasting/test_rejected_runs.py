@@ -1,4 +1,5 @@
-"""The last look at an edited log: what the rejected runs of manoeuvring flights are, beside what the decisions say."""
+"""Reassessment of the rejected runs of an edited log: what the rejected runs of manoeuvring flights are, beside what
+the decisions say."""
 
 from __future__ import annotations
 
@@ -7,8 +8,8 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.core.editing import two_pass
-from ftproc.core.editing.lasting import last_look
-from ftproc.core.editing.lasting.last_look import LENGTHS, Run
+from ftproc.core.editing.lasting import rejected_runs
+from ftproc.core.editing.lasting.rejected_runs import LENGTHS, Run
 from ftproc.core.work import Work
 from ftproc.quality.verdict import SUSPECT
 from ftproc.settings import FilterSettings
@@ -39,14 +40,14 @@ def error_m(seed):
 )
 def test_patches_that_were_followed(monkeypatch, seed, most_m):
     assert error_m(seed) < most_m
-    monkeypatch.setattr(two_pass, "last_look", lambda record, decision, work: (decision, ()))
+    monkeypatch.setattr(two_pass, "reassess_rejected", lambda record, decision, work: (decision, ()))
     assert error_m(seed) > 1.15 * most_m
 
 
 @pytest.mark.parametrize(("margin", "chosen"), [(43.0, "a patch of outliers"), (47.0, "motion")])
 def test_what_may_be_motion_or_a_patch_is_named(monkeypatch, margin, chosen):
     """That the ramp is a patch is likelier by 45: with a prior of about so much against it either may be."""
-    monkeypatch.setattr(last_look, "MARGIN", margin)
+    monkeypatch.setattr(rejected_runs, "MARGIN", margin)
     flight = simulate("manoeuvre", seed=31, dt_s=0.1, duration_s=60.0)
     summary = pipeline.filter_log(flight.log, FilterSettings(smooth=True)).metadata["summary"]
     (rival,) = summary["rivals"]
@@ -58,15 +59,15 @@ def test_what_may_be_motion_or_a_patch_is_named(monkeypatch, margin, chosen):
 
 
 def test_what_is_alike_is_left_alone():
-    """Where nothing is rejected there is nothing to look at, and the very decision is returned."""
+    """Where nothing is rejected there is nothing to reassess, and the very decision is returned."""
     flight = simulate("calibration", seed=2, duration_s=60.0, dt_s=0.2, outliers="none")
     record, decision = two_pass._decided(
         flight.log.time_s, flight.log.measurement, UNKNOWN, None, two_pass.Work(len(flight.log)), False,
         np.zeros(flight.log.measurement.shape, bool),
     )  # fmt: skip
     decision = decision._replace(weight=record.possible.astype(float))
-    assert last_look.last_look(record, decision, Work(10**6)) == (decision, ())
-    assert last_look.last_look(record, decision, Work(10**6))[0] is decision
+    assert rejected_runs.reassess_rejected(record, decision, Work(10**6)) == (decision, ())
+    assert rejected_runs.reassess_rejected(record, decision, Work(10**6))[0] is decision
 
 
 def test_ways_to_begin():
@@ -76,7 +77,7 @@ def test_ways_to_begin():
     )  # fmt: skip
     weight = np.ones((n, 3))
     weight[samples, 1] = 0.0
-    ways = [way for way, _ in last_look._ways(part, weight, Run(1, samples + 1000, samples[:0]), 1000)]
+    ways = [way for way, _ in rejected_runs._ways(part, weight, Run(1, samples + 1000, samples[:0]), 1000)]
     assert len(ways) == 1 + 4 * len(LENGTHS)
     rejected = {tuple(np.flatnonzero(way[:, 1] == 0)[[0, -1]]) for way in ways}
     assert rejected == {
@@ -84,7 +85,7 @@ def test_ways_to_begin():
         *((90 - length, 89) for length in LENGTHS), *((100, 99 + length) for length in LENGTHS),
     }  # fmt: skip
     assert all((way[:, [0, 2]] == 1).all() for way in ways)
-    taken_in, _ = next(last_look._ways(part, weight, Run(1, samples, samples), 0))
+    taken_in, _ = next(rejected_runs._ways(part, weight, Run(1, samples, samples), 0))
     assert (taken_in == 1).all()
 
 
@@ -92,15 +93,15 @@ def test_runs_that_no_work_was_left_for_are_counted():
     flight = simulate("manoeuvre", seed=3, duration_s=60.0, dt_s=0.1)
     seen = []
 
-    def looked(record, decision, work):
+    def reassessed(record, decision, work):
         seen.append((record, decision))
         return decision, ()
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(two_pass, "last_look", looked)
+        patched.setattr(two_pass, "reassess_rejected", reassessed)
         two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN)
     (record, decision), = seen  # fmt: skip
     work = Work(0, 1, 0)
-    last_look.last_look(record, decision, work)
-    runs = len(list(last_look._runs(record, decision, 10)))
+    rejected_runs.reassess_rejected(record, decision, work)
+    runs = len(list(rejected_runs._runs(record, decision, 10)))
     assert work.passed == runs - 1
