@@ -43,3 +43,13 @@ def test_far_target_ekf_and_ukf_agree():
     plain = forward.filter_log(a.log, a.model, a.starts)
     np.testing.assert_allclose((extended.state - plain.state) / plain.sigma, 0, atol=1e-3)
     assert not np.array_equal(extended.state, plain.state)
+
+
+def test_about_its_own_predictions_a_filter_is_the_extended_one():
+    a = matched(4, 80, irregular=True, missing=0.3)
+    extended = forward.filter_log(a.log, a.model, a.starts, extended=True)
+    given = a.log._replace(about=np.array(extended.predicted[:, :3]))
+    about = forward.filter_log(given, a.model, a.starts)
+    np.testing.assert_allclose((about.state - extended.state) / extended.sigma, 0, atol=1e-6)
+    np.testing.assert_allclose(about.sigma, extended.sigma, rtol=1e-9)
+    assert about.log_likelihood == pytest.approx(extended.log_likelihood, rel=1e-9)
