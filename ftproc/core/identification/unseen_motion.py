@@ -34,6 +34,7 @@ AT_REST = 0.1  # m/s2 in an octave
 PER_SPEED = 1e-3  # m/s2 for each m/s
 FASTEST = 4.0  # rad/s; the octave above it has less and less
 HIDDEN = 0.5
+ROUNDING = 1e-15  # of a number, below which its last digits say nothing: no sigma is smaller
 
 
 def widened(state: FloatArray, sigma: FloatArray, los_sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -41,6 +42,9 @@ def widened(state: FloatArray, sigma: FloatArray, los_sigma: FloatArray) -> tupl
     stays NaN."""
     wider = np.array(sigma, order="C"), np.array(los_sigma, order="C")
     _widen(np.ascontiguousarray(state), *wider)
+    least = np.stack([ROUNDING * np.sqrt((state[:, a : a + 3] ** 2).sum(1)) for a in (0, 3, 6)], 1)
+    for each in wider:
+        np.maximum(each, np.repeat(least, 3, 1)[:, : each.shape[1]], out=each)
     return wider
 
 

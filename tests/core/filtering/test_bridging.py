@@ -93,7 +93,7 @@ def test_what_no_other_part_of_the_log_tells_is_not_bridged():
 
 def test_the_sense_of_the_azimuth_does_not_matter_at_its_cut():
     """The same log turned by 130 degrees, so that the gap lies over the cut."""
-    log, model, starts, _ = with_gap([1])
+    log, model, *_ = with_gap([1])
     tracks = []
     for turn in (0.0, 2.27):
         z = log.measurement.copy()
