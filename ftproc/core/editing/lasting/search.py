@@ -44,7 +44,6 @@ CERTAIN = 4.0  # sigmas of its size from which a component takes part in a step 
 AROUND, MEMORIES = (150, 2000), 12.0  # samples on each side of what is weighed, and memories
 SHORTEST_CELL = 2  # samples in a cell of a scan
 OPEN, MOVES = 4.0, 15.0  # in log-probability: within it, whether a fault stays is open; before half of a log is moved
-REMEMBERED = 2.5  # samples that a filter remembers: with fewer, hard turns jump as faults do
 PRIOR, DOUBT, MARGIN = -6.0, -6.0, 8.0  # log-odds of such a fault at a jump; with which it is reported, and taken out
 HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
 MOST_EACH = 20.0  # of log-probability, of each reading: where more is gained, the part without the fault was lost
@@ -100,8 +99,6 @@ def scanned(scene: Scene) -> Scanned:
     log = scene.log._replace(weight=scene.taken_in)
     memory = scales_of(log, scene.at_median.noise_variance).memory_samples(float(scene.at_median.jerk[0, 0]))
     width, around = max(int(memory / 2), SHORTEST_CELL), int(np.clip(MEMORIES * memory, *AROUND))
-    if memory < REMEMBERED:
-        return Scanned(scene, around, width, [])
     starts, n = scene.starts(log), len(scene.possible)
     if len(scene.rates) > 1:
         width = max(width, n // CELLS)
