@@ -23,6 +23,7 @@ from ftproc.core.editing.lasting.proposals import (
     CELLS,
     SHORTEST,
     Place,
+    cell_of,
     exactly,
     other_end,
     places_about,
@@ -69,12 +70,14 @@ class Found(NamedTuple):
 
 
 class Look(NamedTuple):
-    """A look at a log: its scene, the samples on each side of what is weighed, and in a cell, and its jumps."""
+    """A look at a log: its scene, the samples on each side of what is weighed, those within which its jumps are known,
+    the jumps, and the samples in a cell of a scan beside one."""
 
     scene: Scene
     around: int
     width: int
     jumps: list[Jump]
+    cell: int
 
     @property
     def samples(self) -> int:
@@ -102,10 +105,10 @@ def look_at(scene: Scene) -> Look:
     memory = scales_of(log, scene.calm.noise_variance).memory_samples(float(scene.calm.jerk[0, 0]))
     width, around = max(int(memory / 2), SHORTEST_CELL), int(np.clip(MEMORIES * memory, *AROUND))
     if memory < REMEMBERED:
-        return Look(scene, around, width, [])
+        return Look(scene, around, width, [], width)
     starts, n = scene.starts(log), len(scene.possible)
     if len(scene.rates) > 1:
-        width = max(width, n // CELLS)
+        width, cell = max(width, n // CELLS), cell_of(width, n)
         edges, channels = scan.spread([], width, n), list(np.ndindex(len(scene.rates), CLOCK + 1))
         gain = [
             scan.steps_of(
@@ -119,7 +122,7 @@ def look_at(scene: Scene) -> Look:
             for s, c in channels
         ]
         between = np.stack(gain).reshape(len(scene.rates), CLOCK + 1, -1)
-        return Look(scene, AROUND[1], width, scan.jumps_between(between, edges, LEAST_GAIN, TOGETHER))
+        return Look(scene, AROUND[1], width, scan.jumps_between(between, edges, LEAST_GAIN, TOGETHER), cell)
     found = list[Jump]()
     for each in (log, scene.log) if (log.weight != scene.log.weight).any() else (log,):
         smoothed = smooth_log(each, scene.calm, scene.starts(each), RESIDUALS)
@@ -127,7 +130,7 @@ def look_at(scene: Scene) -> Look:
         found += scan.jumps(sums, LEAST_GAIN, JUMPS, 3 * width, TOGETHER)
     off = scene.residual / np.sqrt(scene.calm.noise_variance)
     found += scan.beside_runs(scene.log.weight, scene.possible, off, LEAST_OFF)[:JUMPS]
-    return Look(scene, around, width, scan.distinct(found))
+    return Look(scene, around, width, scan.distinct(found), width)
 
 
 def _likeliest(look: Look, rejected: list[Jump]) -> Found | None:
@@ -170,7 +173,7 @@ def _at(look: Look, jump: Jump) -> Found | None:
         return None
     if place.channels[0][0] == CLOCK:
         return Found(_in_whole(step, near, n), step.sigma, gain)
-    proposed = list(proposals(look.scene, place._replace(calm=median_level(step.model))))
+    proposed = list(proposals(look.scene, place._replace(width=look.cell, calm=median_level(step.model))))
     ends = [edge for curves in proposed for edge in (curves[0].begin, curves[0].end) if 0 < edge < n]
     return _best(look, proposed, look.near(min(ends), max(ends)), place)
 
@@ -217,7 +220,7 @@ def _best(look: Look, proposed: Sequence[Sequence[Curve]], here: slice, place: P
     if len(best.curves[0].size) > 1:  # its other end is known to a cell
         one = best.curves[0]
         other, at = (one.begin if one.end == place.sample else one.end), place.sample - here.start
-        edge = here.start + other_end(part, place._replace(sample=at), other - here.start, 2 * look.width, True)
+        edge = here.start + other_end(part, place._replace(sample=at), other - here.start, 2 * look.cell, True)
         ends = {"begin": min(place.sample, edge), "end": max(place.sample, edge)}
         if ends["end"] - ends["begin"] >= SHORTEST:
             sharper = outcome([curve.of(len(curve.size))._replace(**ends) for curve in best.curves])
