@@ -9,8 +9,6 @@ from ftproc.core.editing.lasting import proposals
 from ftproc.fusion import flight, range_file
 from ftproc.settings import FilterSettings
 
-pytestmark = pytest.mark.compiled
-
 
 def fused(folder):
     return flight.fuse(range_file.load(str(folder / "range.toml")), FilterSettings(smooth=True)).trajectory
