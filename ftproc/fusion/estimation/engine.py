@@ -22,7 +22,6 @@ from ftproc.core.identification.likelihood import fit_jerk
 from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import isotropic
-from ftproc.core.work import for_lasting_faults
 from ftproc.fusion.estimation import alternatives, beside, first_track, lasting, places, process_noise, screening
 from ftproc.fusion.estimation import constants as posterior
 from ftproc.fusion.estimation.constants import Constants, Said
@@ -30,7 +29,6 @@ from ftproc.fusion.estimation.events import Events, Seen, merge, moved_to
 from ftproc.records import FloatArray
 
 FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 18, 8
-LASTING_ROUNDS = 3  # of looking for faults that last: where one is taken out, another may show
 PROFILE_STEPS, LAST_STEPS = 2, 4
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after the first rounds
 STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that may still change
@@ -73,31 +71,7 @@ class Alone(Exception):
     """The readings of the stations determine no first track."""
 
 
-def fuse(
-    stations: list[Seen], gate: float, jerk_psd: float | None, known: Said, progress: Callable[[int], None]
-) -> Current:  # fmt: skip
-    """The fused flight, or a stretch. known: what others have said. progress: takes each round. Raises Alone."""
-    readings = lasting.Readings.of(stations)
-    current = _settled(readings, gate, jerk_psd, known, progress)
-    work = for_lasting_faults(len(current.events.time_s), len(stations))
-    for _ in range(LASTING_ROUNDS):
-        if current.unexamined or lasting.contradicted(current.stations, current.weight):
-            break
-        run, possible = current.found.run, current.events.gathered(current.possible)
-        track = run.state, run.sigma, run.residual
-        decided = lasting.Decided(current.events, current.log, possible, current.model, *track, current.rates)
-        if not (found := lasting.find(decided, gate, jerk_psd is not None, work)):
-            break
-        readings = lasting.taken_out(readings, current.events, found)
-        without = _settled(readings, gate, jerk_psd, known, progress)._replace(steps=readings.steps)
-        if lasting.contradicted(without.stations, without.weight):
-            break
-        current = without
-    current = _last(beside.fitted(current, gate, lambda each: at(each, each.constants)))
-    return current._replace(unexamined=current.unexamined + work.passed)
-
-
-def _settled(
+def settled(
     readings: lasting.Readings, gate: float, jerk_psd: float | None, known: Said, progress: Callable[[int], None]
 ) -> Current:
     """The flight of readings without faults that last, when the decisions stand still. Raises Alone."""
@@ -292,7 +266,7 @@ def _lead_in(log: Observations, model: Model, found: Biased) -> None:
         found.beside[:, : head.sample] = residuals_beside(*given)[:, :0:-1]
 
 
-def _last(current: Current) -> Current:
+def last(current: Current) -> Current:
     """The run to publish: with a little more process noise than is likeliest."""
     if math.isfinite(current.model.knot_s):
         log, begun = current.log, process_noise.on_knots(current.log, current.model)
