@@ -6,6 +6,8 @@ from __future__ import annotations
 WORK, WORK_PER_SAMPLE = 250_000, 60  # samples that may be smoothed for a log, and for each of its samples
 LASTING, LASTING_PER_SAMPLE = 200_000, 10  # the same of samples that are weighed with faults that last, a dozen sweeps
 # each: flights with three long patches take up to 180,000, logs with sixty steps would take three million
+SEVERAL = 5  # times as much of several stations, in all: 2,000 events on either side of a jump are weighed, and flights
+# with usual patches take 250,000 to 710,000
 
 
 class Work:
@@ -17,6 +19,7 @@ class Work:
         self.left, self.of_window, self.passed = at_least + each * samples, at_least == 0, 0
 
 
-def for_lasting_faults(samples: int) -> Work:
-    """What the search for faults that last may cost, and the reassessment of rejected runs."""
-    return Work(samples, LASTING, LASTING_PER_SAMPLE)
+def for_lasting_faults(samples: int, stations: int = 1) -> Work:
+    """What the search for faults that last and the reassessment of rejected runs may cost; several stations share
+    it."""
+    return Work(samples, LASTING if stations == 1 else SEVERAL * LASTING, LASTING_PER_SAMPLE)

@@ -15,7 +15,7 @@ from ftproc.fusion.estimation import constants as posterior
 from ftproc.fusion.estimation.events import CLOCK
 from ftproc.fusion.estimation.whole import Fused
 from ftproc.quality import consistency, faults
-from ftproc.quality.verdict import CONSISTENT, MANY_REJECTED, SUSPECT, TOO_MANY_REJECTED, UNRELIABLE, Remark
+from ftproc.quality.verdict import CONSISTENT, MANY_REJECTED, SUSPECT, TOO_MANY_REJECTED, UNRELIABLE, Remark, cut_short
 from ftproc.records import FloatArray
 
 WRONG_S, WRONG_ROWS = 3.0, 6  # seconds and rows that all of a station's readings are rejected: another target
@@ -293,7 +293,6 @@ def _poorly(fused: Fused, zero_s: float) -> Iterator[Remark]:
 
 def _unsettled(fused: Fused) -> Iterator[Remark]:
     if fused.unexamined:
-        text = f"the search for likelier decisions was cut short: places not examined: {fused.unexamined}"
-        yield Remark(SUSPECT, text)
+        yield cut_short(fused.unexamined)
     if not fused.settled:
         yield Remark(SUSPECT, "the decisions on outliers and the biases did not settle: inspect the flagged readings")

@@ -229,13 +229,16 @@ def _editing(s: Mapping[str, Any]) -> Iterator[Remark]:
     if s["editing_converged"] is False:
         yield Remark(SUSPECT, "the outlier decisions did not converge: inspect the flagged readings")
     if s["editing_places_unexamined"]:
-        count = s["editing_places_unexamined"]
-        places = "1 place was" if count == 1 else f"{count} places were"
-        text = f"the search for likelier outlier decisions was cut short: {places} not examined"
-        yield Remark(SUSPECT, text)
+        yield cut_short(s["editing_places_unexamined"])
     if s["reacquired"]:
         often = {1: "once", 2: "twice"}.get(s["reacquired"], f"{s['reacquired']} times")
         yield Remark(SUSPECT, f"re-initialized {often} (track loss, or a gap too long to bridge)")
+
+
+def cut_short(count: int) -> Remark:
+    """That no work was left for so many places."""
+    places = "1 place was" if count == 1 else f"{count} places were"
+    return Remark(SUSPECT, f"the search for likelier outlier decisions was cut short: {places} not examined")
 
 
 def outlier_share(part: Mapping[str, Any]) -> float:

@@ -8,7 +8,7 @@ import pytest
 from ftproc.core.filtering.biases import PARAMETERS
 from ftproc.files.writing import ranges
 from ftproc.fusion import logs, range_file
-from ftproc.fusion.estimation import engine, whole
+from ftproc.fusion.estimation import engine, flight_faults, whole
 from ftproc.fusion.estimation.constants import Constants, Said, parameters
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate_range
@@ -77,7 +77,7 @@ def test_a_station_may_be_silent_for_a_whole_stretch(stations, monkeypatch):
 def test_a_stretch_without_a_first_track_joins_its_neighbour(stations, monkeypatch, fails):
     in_parts(monkeypatch)
     sizes, tried = [], []
-    fuse = engine.fuse
+    fuse = flight_faults.fuse
 
     def fails_once(parts, *given):
         sizes.append(sum(len(each.time_s) for each in parts))
@@ -89,12 +89,12 @@ def test_a_stretch_without_a_first_track_joins_its_neighbour(stations, monkeypat
         return fuse(parts, *given)
 
     failed = []
-    monkeypatch.setattr(engine, "fuse", fails_once)
+    monkeypatch.setattr(flight_faults, "fuse", fails_once)
     found = fused(stations)
     assert failed
     assert max(sizes) > 1500 + 2 * 400
     assert all(np.isfinite(each).all() for each in found.position)
-    monkeypatch.setattr(engine, "fuse", fails_always)
+    monkeypatch.setattr(flight_faults, "fuse", fails_always)
     with pytest.raises(engine.Alone):
         fused(stations)
 
@@ -105,7 +105,7 @@ def test_what_other_stretches_have_said_narrows_the_biases(stations):
                               measurement=each.measurement[slice(*np.searchsorted(each.time_s, ends))],
                               accepted=each.accepted[slice(*np.searchsorted(each.time_s, ends))])
                 for each in stations]  # fmt: skip
-        return engine.fuse(part, FilterSettings().gate, None, known, lambda number: None)
+        return flight_faults.fuse(part, FilterSettings().gate, None, known, lambda number: None)
 
     nothing = Said.nothing(PARAMETERS * len(stations))
     first, alone = half(nothing, 0.0, 60.0), half(nothing, 60.0, 121.0)

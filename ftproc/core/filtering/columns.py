@@ -34,9 +34,10 @@ FORGOTTEN, QUIET = 1e-5, 8  # of its largest effect on a whitened reading, and s
 
 
 class Columns(NamedTuple):
-    """m unknown numbers, in the order in which they begin. design: (n, 3, m) derivative of each reading by them.
-    begin, end: (m,) samples from which and up to which they act on readings. jolt: (m,) the element of the state to
-    which a column adds its number at `begin`, -1 for none."""
+    """m unknown numbers, in the order in which they begin. design: (n, 3, m) derivative of each reading by them, or
+    (n, 3, w) where that of column c is the one of c + w, as with cells that begin and end one after the other. begin,
+    end: (m,) samples from which and up to which they act on readings. jolt: (m,) the element of the state to which a
+    column adds its number at `begin`, -1 for none."""
 
     design: FloatArray
     begin: IntArray
@@ -73,7 +74,7 @@ class _Sums(NamedTuple):
 def _carry(f: Filter, k: int, interval: float, low: int, high: int, sums: Any) -> None:
     """Take the columns [low, high) over an interval and an update."""
     s, white, g, u, root, y = sums.state, sums.white, f.g, f.u, f.root, f.y
-    score, information, h = sums.score, sums.information, 0.5 * interval * interval
+    score, information, h, width = sums.score, sums.information, 0.5 * interval * interval, sums.design.shape[2]
     for i in range(3):
         for c in range(low, high):
             s[i, c] += interval * s[i + 3, c] + h * s[i + 6, c]
@@ -81,7 +82,8 @@ def _carry(f: Filter, k: int, interval: float, low: int, high: int, sums: Any) -
     for c in range(low, high):
         d0 = d1 = d2 = 0.0
         if sums.begin[c] <= k < sums.end[c]:
-            d0, d1, d2 = sums.design[k, 0, c], sums.design[k, 1, c], sums.design[k, 2, c]
+            own = c % width
+            d0, d1, d2 = sums.design[k, 0, own], sums.design[k, 1, own], sums.design[k, 2, own]
         for i in range(3):
             direct = root[i, 0] * d0 + root[i, 1] * d1 + root[i, 2] * d2
             white[i, c] = direct + (g[i, 0] * s[0, c] + g[i, 1] * s[1, c] + g[i, 2] * s[2, c])

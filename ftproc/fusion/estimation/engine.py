@@ -29,13 +29,11 @@ from ftproc.fusion.estimation.events import Events, Seen, merge, moved_to
 from ftproc.records import FloatArray
 
 FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 18, 8
-LASTING_ROUNDS = 3  # of looking for faults that last: where one is taken out, another may show
 PROFILE_STEPS, LAST_STEPS = 2, 4
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after the first rounds
 STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that may still change
 NOISE_STEP = 4.0  # times its variance that the noise of a component moves in a round
-START_SIGMA = (30.0, 10.0, 20.0)  # m, m/s, m/s2: at least, of the state at the start
-START_INFLATION = 25.0  # on its variance
+START_SIGMA, START_INFLATION = (30.0, 10.0, 20.0), 25.0  # m, m/s, m/s2: at least, at the start; on its variance
 FIRST_MEMORIES = (5.0, 20.0, 80.0)  # intervals of the densest station: of the filters that begin the search
 SHARES = (1.0, 0.25, 0.06, 0.0)  # of what is unknown of the readings, which is taken for noise at first: ever less
 FEWEST_KEPT = 0.5  # of what screening trusts, in each component of a station
@@ -73,30 +71,7 @@ class Alone(Exception):
     """The readings of the stations determine no first track."""
 
 
-def fuse(
-    stations: list[Seen], gate: float, jerk_psd: float | None, known: Said, progress: Callable[[int], None]
-) -> Current:  # fmt: skip
-    """The fused flight, or a stretch. known: what others have said. progress: takes each round. Raises Alone."""
-    readings = lasting.Readings.of(stations)
-    current = _settled(readings, gate, jerk_psd, known, progress)
-    for _ in range(LASTING_ROUNDS):
-        if current.unexamined or lasting.contradicted(current.stations, current.weight):
-            break  # the work that a flight may cost is spent, or the stations disagree throughout
-        run, possible = current.found.run, current.events.gathered(current.possible)
-        decided = lasting.Decided(
-            current.events, current.log, possible, current.model, run.state, run.sigma, run.residual, current.rates
-        )  # fmt: skip
-        if not (found := lasting.find(decided, gate, jerk_psd is not None)):
-            break
-        readings = lasting.taken_out(readings, current.events, found)
-        without = _settled(readings, gate, jerk_psd, known, progress)._replace(steps=readings.steps)
-        if lasting.contradicted(without.stations, without.weight):
-            break
-        current = without
-    return _last(beside.fitted(current, gate, lambda each: at(each, each.constants)))
-
-
-def _settled(
+def settled(
     readings: lasting.Readings, gate: float, jerk_psd: float | None, known: Said, progress: Callable[[int], None]
 ) -> Current:
     """The flight of readings without faults that last, when the decisions stand still. Raises Alone."""
@@ -131,8 +106,7 @@ def _begin(
     range_m = np.array([np.median(np.linalg.norm(track.state[:, :3] - s.place, axis=1)) for s in stations])
     events = merge(stations, constants.estimate, range_m)
     state = track.at(events.time_s)
-    first = int(np.searchsorted(events.time_s, track.time_s[0]))
-    first = min(first, len(events.time_s) - 1)
+    first = min(int(np.searchsorted(events.time_s, track.time_s[0])), len(events.time_s) - 1)
     spread = max(float(track.sigma[0]), START_SIGMA[0])
     start = Start(first, state[first], np.diag(np.repeat([spread, 100.0, 50.0], 3) ** 2))
     log = events.weighted(weight)
@@ -292,7 +266,7 @@ def _lead_in(log: Observations, model: Model, found: Biased) -> None:
         found.beside[:, : head.sample] = residuals_beside(*given)[:, :0:-1]
 
 
-def _last(current: Current) -> Current:
+def last(current: Current) -> Current:
     """The run to publish: with a little more process noise than is likeliest."""
     if math.isfinite(current.model.knot_s):
         log, begun = current.log, process_noise.on_knots(current.log, current.model)

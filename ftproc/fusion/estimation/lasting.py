@@ -13,6 +13,7 @@ from ftproc.core.editing.lasting.search import MARGIN, Found, search
 from ftproc.core.editing.lasting.weighing import Scene, late_of, with_even_runs
 from ftproc.core.filtering.records import Model, Observations
 from ftproc.core.identification.profile import median_level
+from ftproc.core.work import Work
 from ftproc.fusion.estimation.events import Events, Seen
 from ftproc.records import FloatArray, IntArray
 
@@ -63,8 +64,8 @@ def contradicted(stations: Sequence[Seen], weight: Sequence[FloatArray]) -> bool
     )
 
 
-def find(decided: Decided, gate: float, jerk_known: bool) -> list[Found]:
-    """The faults that last, as far as they are certain enough to be taken out."""
+def find(decided: Decided, gate: float, jerk_known: bool, work: Work) -> list[Found]:
+    """The faults that last, as far as they are certain enough to be taken out, and there is work left to weigh them."""
     events, log = decided.events, decided.log
     possible, taken_in, sigma = decided.possible > 0, log.weight.copy(), np.sqrt(decided.model.noise_variance)
     for s in range(len(decided.rates)):
@@ -74,7 +75,7 @@ def find(decided: Decided, gate: float, jerk_known: bool) -> list[Found]:
     calm = median_level(decided.model)
     scene = Scene(
         log, possible, taken_in, setting, calm, jerk_known, decided.rates, gate, decided.residual, decided.state,
-        decided.sigma,
+        decided.sigma, work,
     )  # fmt: skip
     return [each for each in search(scene) if each.gain > MARGIN]
 

@@ -18,7 +18,7 @@ from ftproc.core.filtering.records import FilterRun
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.model import kinematics
 from ftproc.core.model.stations import levelled
-from ftproc.fusion.estimation import engine
+from ftproc.fusion.estimation import engine, flight_faults
 from ftproc.fusion.estimation.beside import Aside, expected
 from ftproc.fusion.estimation.constants import FARTHEST, Constants, Said, parameters
 from ftproc.fusion.estimation.engine import Current
@@ -99,7 +99,7 @@ def fuse(
         known = _said(found, prior.size)
         say = functools.partial(_say, progress, k * engine.MOST_ROUNDS, (len(edges) - 1) * engine.MOST_ROUNDS)
         try:
-            current = engine.fuse(there, gate, jerk_psd, known.of(parameters(seen)), say)
+            current = flight_faults.fuse(there, gate, jerk_psd, known.of(parameters(seen)), say)
         except engine.Alone:
             if len(edges) == 2:
                 raise

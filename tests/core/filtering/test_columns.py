@@ -47,6 +47,19 @@ def test_score_and_information_are_slope_and_bend_of_the_likelihood():
         assert likelihood(b) == pytest.approx(expected, abs=2e-3 * (1 + b @ said.information @ b))
 
 
+def test_columns_of_cells_share_their_derivatives():
+    """Those of column c + 2 are those of column c, as if each had its own."""
+    a = track()
+    one = np.random.default_rng(2).standard_normal((len(a.time), 3, 2)) * SIGMA[:, None]
+    begin, end = np.repeat([0, 30, 60], 2), np.repeat([30, 60, len(a.time)], 2)
+    found, expected = (
+        said_of(a.log, a.model, a.starts, Columns(np.tile(one, (1, 1, often)), begin, end, np.full(6, -1)))
+        for often in (1, 3)
+    )
+    np.testing.assert_array_equal(found.score, expected.score)
+    np.testing.assert_array_equal(found.information, expected.information)
+
+
 def test_what_a_column_has_ceased_to_do_costs_nothing_and_changes_nothing():
     """A column that is followed no further says what one followed to the end says."""
     a = matched(5, 900, dt=0.2, q=4.0, distance=100_000.0)

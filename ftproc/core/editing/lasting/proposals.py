@@ -36,6 +36,12 @@ class LocatedJump(NamedTuple):
     at_median: Model
 
 
+def cell_of(width: int, n: int) -> int:
+    """Samples in a cell of a scan beside a jump, where those of all of a flight of n would be too wide: a scan costs
+    the square of its columns, three for each sample of two cells where an end is looked for."""
+    return int(np.clip(width, min(n, 2 * FARTHEST) // CELLS, 2 * FARTHEST // CELLS))
+
+
 def proposals(scene: Scene, located: LocatedJump) -> Iterator[list[Curve]]:
     """The curves, of one for each channel, that the jump may be."""
     n, at = len(scene.possible), located.sample

@@ -88,16 +88,15 @@ def steps_of(
 
 def _cells(setting: Setting, channel: tuple[int, int], edges: IntArray, powers: FloatArray) -> Columns:
     """Columns of the powers (n, terms) of time in each cell between edges (m + 1,)."""
-    (component, station), terms, m = channel, powers.shape[1], len(edges) - 1
-    design = np.zeros((len(powers), 3, m * terms))
-    for j, (a, b) in enumerate(itertools.pairwise(edges)):
-        rows, own = setting.rows(Curve(component, int(a), int(b), (), station)), slice(j * terms, (j + 1) * terms)
-        if component == CLOCK:
-            design[rows, :, own] = setting.late[rows, :, None] * powers[rows, None, :]
-        else:
-            design[rows, component, own] = powers[rows]
+    (component, station), n, terms = channel, len(powers), powers.shape[1]
+    design = np.zeros((n, 3, terms))
+    rows = setting.rows(Curve(component, 0, n, (), station))
+    if component == CLOCK:
+        design[rows] = setting.late[rows, :, None] * powers[rows, None, :]
+    else:
+        design[rows, component] = powers[rows]
     begin, end = np.repeat(edges[:-1], terms), np.repeat(edges[1:], terms)
-    return Columns(design, begin, end, np.full(m * terms, -1))
+    return Columns(design, begin, end, np.full(len(begin), -1))
 
 
 def gains(
@@ -154,7 +153,7 @@ def jumps_between(gain: FloatArray, edges: IntArray, least: float, together: flo
         if gain[s, c, k] > least:
             near = gain[s, :, max(k - 2, 0) : k + 3].max(1)
             found.append(Jump(float(gain[s, c, k]), int(edges[k]), int(s), _ways(near, least, together)))
-    return sorted(found, key=lambda jump: -jump.gain)
+    return distinct(found)
 
 
 def beside_runs(weight: FloatArray, possible: NDArray[np.bool_], off: FloatArray, least: float) -> list[Jump]:

@@ -23,6 +23,7 @@ from ftproc.core.editing.lasting.proposals import (
     CELLS,
     SHORTEST,
     LocatedJump,
+    cell_of,
     edges_about,
     exactly,
     other_end,
@@ -66,13 +67,14 @@ class Found(NamedTuple):
 
 
 class Scanned(NamedTuple):
-    """A scene that was scanned for jumps; the samples on each side of what is weighed, and in a cell, and
-    its jumps."""
+    """A scene that was scanned for jumps; the samples on each side of what is weighed, those within which its jumps
+    are known, the jumps, and the samples in a cell of a scan beside one."""
 
     scene: Scene
     around: int
     width: int
     jumps: list[Jump]
+    cell: int
 
     @property
     def samples(self) -> int:
@@ -101,7 +103,7 @@ def scanned(scene: Scene) -> Scanned:
     width, around = max(int(memory / 2), SHORTEST_CELL), int(np.clip(MEMORIES * memory, *AROUND))
     starts, n = scene.starts(log), len(scene.possible)
     if len(scene.rates) > 1:
-        width = max(width, n // CELLS)
+        width, cell = max(width, n // CELLS), cell_of(width, n)
         edges, channels = scan.spread([], width, n), list(np.ndindex(len(scene.rates), CLOCK + 1))
         gain = [
             scan.steps_of(
@@ -115,7 +117,7 @@ def scanned(scene: Scene) -> Scanned:
             for s, c in channels
         ]
         between = np.stack(gain).reshape(len(scene.rates), CLOCK + 1, -1)
-        return Scanned(scene, AROUND[1], width, scan.jumps_between(between, edges, LEAST_GAIN, TOGETHER))
+        return Scanned(scene, AROUND[1], width, scan.jumps_between(between, edges, LEAST_GAIN, TOGETHER), cell)
     found = list[Jump]()
     for each in (log, scene.log) if (log.weight != scene.log.weight).any() else (log,):
         smoothed = smooth_log(each, scene.at_median, scene.starts(each), RESIDUALS)
@@ -123,7 +125,7 @@ def scanned(scene: Scene) -> Scanned:
         found += scan.jumps(sums, LEAST_GAIN, JUMPS, 3 * width, TOGETHER)
     off = scene.residual / np.sqrt(scene.at_median.noise_variance)
     found += scan.beside_runs(scene.log.weight, scene.possible, off, LEAST_OFF)[:JUMPS]
-    return Scanned(scene, around, width, scan.distinct(found))
+    return Scanned(scene, around, width, scan.distinct(found), width)
 
 
 def _likeliest(seen: Scanned, rejected: list[Jump]) -> Found | None:
@@ -166,7 +168,7 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
         return None
     if located.channels[0][0] == CLOCK:
         return Found(_in_whole(step, near, n), step.sigma, gain)
-    proposed = list(proposals(seen.scene, located._replace(at_median=median_level(step.model))))
+    proposed = list(proposals(seen.scene, located._replace(width=seen.cell, at_median=median_level(step.model))))
     ends = [edge for curves in proposed for edge in (curves[0].begin, curves[0].end) if 0 < edge < n]
     return _best(seen, proposed, seen.near(min(ends), max(ends)), located)
 
@@ -215,7 +217,7 @@ def _best(seen: Scanned, proposed: Sequence[Sequence[Curve]], here: slice, locat
     if len(best.curves[0].size) > 1:  # its other end is known to a cell
         one = best.curves[0]
         other, at = (one.begin if one.end == located.sample else one.end), located.sample - here.start
-        edge = here.start + other_end(part, located._replace(sample=at), other - here.start, 2 * seen.width, True)
+        edge = here.start + other_end(part, located._replace(sample=at), other - here.start, 2 * seen.cell, True)
         ends = {"begin": min(located.sample, edge), "end": max(located.sample, edge)}
         if ends["end"] - ends["begin"] >= SHORTEST:
             sharper = outcome([curve.of(len(curve.size))._replace(**ends) for curve in best.curves])

@@ -1,0 +1,126 @@
+"""The flight of several stations, and what is wrong with one of them: settled, faults proposed, settled without them.
+
+Where a settled flight has more noise than its components show alone, or rejects many readings, each station is left
+out, and a jump of its clock is proposed by the track of the others. The likeliest flight without one is kept, if it is
+likelier than the flight with it. All other faults that last are weighed on the settled flight (`lasting`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import numpy as np
+
+from ftproc.core.editing.lasting.curves import CLOCK
+from ftproc.core.editing.lasting.search import MARGIN, PRIOR
+from ftproc.core.editing.patch_likelihood import log_probability_of_all
+from ftproc.core.identification.profile import roughness
+from ftproc.core.work import for_lasting_faults
+from ftproc.fusion.estimation import beside, clock_jumps, engine, lasting
+from ftproc.fusion.estimation.clock_jumps import Jump
+from ftproc.fusion.estimation.constants import Said
+from ftproc.fusion.estimation.engine import Alone, Current
+from ftproc.fusion.estimation.events import Seen
+from ftproc.fusion.estimation.lasting import Readings
+
+LASTING_ROUNDS = 3  # of looking for faults that last: where one is taken out, another may show
+NOISIER, REJECTED = 2.0, 0.2  # times the noise that a component shows alone, and share of its readings that are
+# rejected: more is a fault of its station, or of another
+Settle = Callable[[Readings], Current]
+
+
+def fuse(
+    stations: list[Seen], gate: float, jerk_psd: float | None, known: Said, progress: Callable[[int], None]
+) -> Current:  # fmt: skip
+    """The fused flight, or a stretch. known: what others have said. progress: takes each round. Raises Alone."""
+    settle = partial(engine.settled, gate=gate, jerk_psd=jerk_psd, known=known, progress=progress)
+    readings, current = _with_even_clocks(Readings.of(stations), settle)
+    work = for_lasting_faults(len(current.events.time_s), len(stations))
+    for _ in range(LASTING_ROUNDS):
+        if current.unexamined or lasting.contradicted(current.stations, current.weight):
+            break  # the work that a flight may cost is spent, or the stations disagree throughout
+        run, possible = current.found.run, current.events.gathered(current.possible)
+        track = run.state, run.sigma, run.residual
+        decided = lasting.Decided(current.events, current.log, possible, current.model, *track, current.rates)
+        if not (found := lasting.find(decided, gate, jerk_psd is not None, work)):
+            break
+        readings = lasting.taken_out(readings, current.events, found)
+        without = settle(readings)
+        if lasting.contradicted(without.stations, without.weight):
+            break
+        current = without._replace(steps=readings.steps)
+    current = engine.last(beside.fitted(current, gate, lambda each: engine.at(each, each.constants)))
+    return current._replace(unexamined=current.unexamined + work.passed)
+
+
+def _with_even_clocks(readings: Readings, settle: Settle) -> tuple[Readings, Current]:
+    """The readings without the jumps of clocks that are likelier than none, and their flight."""
+    current = settle(readings)
+    for _ in range(LASTING_ROUNDS):
+        if not _is_astray(current):
+            break
+        least = score(current) + MARGIN - PRIOR + math.log(len(current.events.time_s))
+        tried = _without_jumps(readings, current, settle)
+        s, jump, first = max(tried, key=lambda each: score(each[2]), default=(0, None, current))
+        if jump is None or score(first) < least:
+            break
+        readings, current = _as_all_tell(readings, s, jump, first, settle)
+    return readings, current
+
+
+def _is_astray(current: Current) -> bool:
+    """Whether the stations contradict each other more than their noise explains."""
+    if current.unexamined or lasting.contradicted(current.stations, current.weight):
+        return True
+    rejected = (
+        (np.where(each > 0, 1 - weight, 0.0).sum(0) > REJECTED * each.sum(0)).any()
+        for each, weight in zip(current.possible, current.weight, strict=True)
+    )
+    return bool((current.sigma > NOISIER * current.own).any()) or any(rejected)
+
+
+def _without_jumps(readings: Readings, current: Current, settle: Settle) -> Iterator[tuple[int, Jump, Current]]:
+    """The jumps of the clock of each station, as the track of the others tells them, and the flights without them."""
+    for s, station in enumerate(readings.stations):
+        banned = [np.ones_like(each) if k == s else each for k, each in enumerate(readings.banned)]
+        with contextlib.suppress(Alone):
+            others = settle(readings._replace(banned=banned))
+            jump = clock_jumps.propose(station, current.own[s], others.events.time_s, others.found.run.state)
+            if jump is not None and jump.gain > MARGIN:
+                yield s, jump, settle(_without(readings, s, jump))
+
+
+def _as_all_tell(readings: Readings, s: int, jump: Jump, first: Current, settle: Settle) -> tuple[Readings, Current]:
+    """The readings without a jump of station s of the size that all stations tell, and their flight. first: the flight
+    without the jump as the others told it."""
+    run = first.found.run
+    more_s = clock_jumps.rest_of(jump, s, first.events, first.log, first.model, first.start, run.state)
+    gap_s = float(np.diff(readings.stations[s].time_s)[jump.row - 1])
+    found = _without(readings, s, jump._replace(size_s=min(jump.size_s + more_s, gap_s)))
+    with contextlib.suppress(Alone):
+        if score(flight := settle(found)) > score(first):
+            return found, flight._replace(steps=found.steps)
+    found = _without(readings, s, jump)
+    return found, first._replace(steps=found.steps)
+
+
+def _without(readings: Readings, s: int, jump: Jump) -> Readings:
+    stations = [jump.taken_out(each) if k == s else each for k, each in enumerate(readings.stations)]
+    step = lasting.Step(stations[s].name, CLOCK, float(readings.stations[s].time_s[jump.row]), jump.size_s)
+    return readings._replace(stations=stations, steps=(*readings.steps, step))
+
+
+def score(current: Current) -> float:
+    """Log-probability of the readings of a settled flight, of the decisions on them, and of its process noise."""
+    run, time_s, total = current.found.run, current.events.time_s, -roughness(current.model)
+    for s, weight in enumerate(current.weight):
+        at = np.flatnonzero(current.events.station == s)
+        rows = current.events.row[at]
+        total += log_probability_of_all(
+            time_s[at], run.residual[at], run.residual_variance[at], weight[rows], current.possible[s][rows] > 0,
+            current.sigma[s] ** 2, current.rates[s],
+        )  # fmt: skip
+    return total + run.log_likelihood
