@@ -213,7 +213,7 @@ class RunStatistics:
             **({} if self.height is None else self.height.figures()),
             "average_gradient": self._average_gradient(),
             "jerk_psd_m2ps5": jerk if np.isfinite(psd).all() else None,
-            **self._motion(),
+            **motion(self.motions, self.motion_gain),
             "acceleration_at_least_mps2": self.acceleration,
             "left_behind": self.left_behind,
             "nis_mean": self.nis_sum / self.nis_count if self.nis_count else None,
@@ -243,17 +243,19 @@ class RunStatistics:
         trust = verdict.verdict(verdict.remarks(figures), verdict.too_wide(figures), figures["assumed"])
         return figures | {"trust": trust}
 
-    def _motion(self) -> dict[str, Any]:
-        """The model of motion of most rows, of a method that chooses one; the share of these rows; and by how much more
-        likely the log is with what was chosen than with white jerk, or with the best rival than with white jerk."""
-        if not self.motions:
-            return {"motion": None}
-        name = max(self.motions, key=lambda each: self.motions[each])
-        share = self.motions[name] / sum(self.motions.values())
-        return {"motion": name.replace("-", " "), "motion_share": share, "motion_gain": self.motion_gain}
-
     def _poorly_observable_readings(self, time_s: FloatArray, sigma: FloatArray) -> dict[str, list[dict[str, float]]]:
         """By component, of a log in which the position is not observable."""
         seen = [c for c in range(3) if self.absent and c not in self.absent]
         found = {COMPONENTS[c]: consistency.poorly_observable(time_s, sigma[:, [c]], UNITS[c]) for c in seen}
         return {name: intervals for name, intervals in found.items() if intervals}
+
+
+def motion(rows: Mapping[str, int], gain: float) -> dict[str, Any]:
+    """The model of motion of most rows, of a method that chooses one; the share of these rows; and by how much more
+    likely the readings are with what was chosen than with white jerk, or with the best rival than with white jerk.
+    rows: of each model by name."""
+    if not rows:
+        return {"motion": None}
+    name = max(rows, key=lambda each: rows[each])
+    share = rows[name] / sum(rows.values())
+    return {"motion": name.replace("-", " "), "motion_share": share, "motion_gain": gain}
