@@ -12,7 +12,10 @@ import numpy as np
 
 from ftproc import pipeline
 from ftproc.core.identification import motion_models, unseen_motion
+from ftproc.core.impact import heights
 from ftproc.core.model import kinematics
+from ftproc.core.model.earth import Geodetic
+from ftproc.derived import impact
 from ftproc.derived.columns import with_derived
 from ftproc.errors import InputError, UsageError
 from ftproc.files import arrow
@@ -106,6 +109,7 @@ def _flight(
         f"{name}: {each}" for name, log in zip(names, read, strict=True) for each in log.understood.get("assumed", ())
     ]
     summary = summarize(fused, zero_s, effects, assumed)
+    summary |= _impact(fused, float(track.time_s[-1]) + zero_s, range_.origin)
     metadata = {**_metadata(range_, read, settings, summary, fused), "epoch": logs.epoch(read), **effects.metadata()}
     n = len(track.time_s)
     sigma, _ = unseen_motion.widened(track.state, track.sigma, np.full((n, 6), np.nan))
@@ -221,6 +225,15 @@ def _motion(fused: Fused) -> dict[str, Any]:
     for motion, there in fused.motions:
         rows[motion.name] = rows.get(motion.name, 0) + there
     return statistics.motion(rows, sum(motion.gain for motion, _ in fused.motions))
+
+
+def _impact(fused: Fused, last_s: float, site: Geodetic | None) -> dict[str, Any]:
+    """The end of a ballistic flight, for the summary."""
+    if fused.last is None:
+        return {}
+    lowest_m = float((heights(fused.track.state[:, :3]) + fused.track.sigma[:, 2]).min())
+    here = {"stations": True, "settings": {"site": site}}
+    return impact.of_flight(*fused.last, lowest_m, last_s, here)
 
 
 def _acts(fused: Fused) -> bool:

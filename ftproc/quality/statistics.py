@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ftproc.core.components import any_of, sums, totals
+from ftproc.core.impact import heights
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.files.reading.clocks.times import NO_ZONE
 from ftproc.methods.estimate import ASSUMED_READING, typical_interval
@@ -26,6 +27,7 @@ from ftproc.scoring.figures import changes
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from ftproc.core.filtering.records import Start
     from ftproc.methods.estimate import Estimate
     from ftproc.methods.heights import Common
 
@@ -55,6 +57,8 @@ class RunStatistics:
         self.motions: dict[str, int] = {}
         self.motion_gain = 0.0
         self.acceleration = 0.0  # m/s2, that the target had at least
+        self.last: Start | None = None
+        self.lowest_m = np.inf  # of the heights, with their 1-sigma
         self.reacquired, self.unexamined, self.stamp_s, self.drifts = 0, 0, 0.0, False
         self.slow_noise_s, self.slow_noise_likelier, self.slow_noise_separable = 0.0, False, True
         self.faults = FaultStatistics()
@@ -97,6 +101,10 @@ class RunStatistics:
         self._add_sigmas(time_s, self._tested_sigmas(best.state, best.sigma, best.los_sigma))
         self.jerk.append(estimate.model.jerk.mean(1))
         self.model = estimate.model
+        self.last = estimate.last
+        if not self.absent:
+            above = heights(best.state[:, :3]) + best.sigma[:, 2]
+            self.lowest_m = float(np.min(above, initial=self.lowest_m, where=np.isfinite(above)))
         if estimate.motion is not None:
             name = estimate.motion.name
             self.motions[name] = self.motions.get(name, 0) + len(time_s)

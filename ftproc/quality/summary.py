@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ftproc.derived import impact
 from ftproc.files.moments import Moments
 from ftproc.quality import next_steps, verdict
 
@@ -90,6 +91,8 @@ def facts(s: Mapping[str, Any]) -> list[tuple[str, str]]:
         found.append(("jerk", f"PSD {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.3g} to {jerk['highest']:.3g})"))
     if s.get("motion"):
         found.append(("motion", motion(s)))
+    if s.get("impact"):
+        found.append((s["impact"]["kind"], impact.in_words(s["impact"])))
     return found
 
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from ftproc.core.identification.motion_models import MARGIN, MODELS, WHITE
+from ftproc.core.model.frames import from_cartesian
 from ftproc.files.writing import ranges
 from ftproc.fusion import logs, range_file
 from ftproc.fusion.estimation import motions, whole
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate_range
+from tests.derived.test_impact import bomb
 
 SEED, DURATION_S = 1, 60.0
 GAP_S = 20.0, 28.0
@@ -90,3 +93,24 @@ def test_the_motion_that_the_user_names_is_taken_and_stated(run, folder):
     assert "ballistic" in (folder / "b.html").read_text()
     again = run("filter", "--again", "b.csv", "-o", "again.csv", "--summary", "json")
     assert json.loads(again.out)["motion"] == "ballistic"
+
+
+def test_two_radars_predict_where_a_bomb_comes_down(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    time_s, position = bomb()
+    kept, rng, text = np.arange(0, len(time_s) - 400, 5), np.random.default_rng(1), ""
+    for name, east_m in (("near", 0.0), ("far", 4000.0)):
+        noise = rng.normal(size=(len(kept), 3)) * [3.0, 2e-4, 2e-4]
+        readings = from_cartesian(position[kept] - [east_m, 0.0, 0.0]) + noise
+        columns = dict(zip(["range_m", "azimuth_rad", "elevation_rad"], readings.T, strict=True))
+        pd.DataFrame({"time_s": time_s[kept], **columns}).to_csv(f"{name}.csv", index=False)
+        text += f'[station.{name}]\nlog = "{name}.csv"\neast_m = {east_m}\nnorth_m = 0.0\nup_m = 0.0\n'
+    (tmp_path / "two.toml").write_text(text)
+    result = run("filter", "--fuse", "two.toml", "--motion", "ballistic", "--smooth", "-o", "two.csv")
+    assert (result.code, result.err) == (0, "")
+    assert "impact     predicted at x " in result.out
+    found = json.loads((tmp_path / "two.json").read_text())["summary"]["impact"]
+    assert found["ground"] == "the height of the origin"
+    assert found["after_last_reading_s"] == pytest.approx(4.0, abs=0.1)
+    miss = position[-1, :2] - [found["x_m"], found["y_m"]]
+    assert np.sqrt(miss @ np.linalg.solve(np.array(found["covariance_xy_m2"]), miss)) < 3

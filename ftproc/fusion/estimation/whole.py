@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core.filtering.records import FilterRun
+from ftproc.core import impact
+from ftproc.core.filtering.records import FilterRun, Model, Start
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification import motion_models
 from ftproc.core.model import kinematics
@@ -48,7 +49,7 @@ class Fused(NamedTuple):
     shows alone; axes (m, 3, 3) with the tilts; jerk (k, 3) each for knot_s seconds; rounds, settled: of the decisions;
     unexamined: places where no work was left to look for other hypotheses; steps: that were taken out; beside: of each
     station by name, what it measures beside its readings; motions: of each stretch the motion that was chosen, its gain
-    there, and for how many rows."""
+    there, and for how many rows; last: the last state of a ballistic motion, with its model."""
 
     stations: list[Seen]
     weight: list[FloatArray]
@@ -69,6 +70,7 @@ class Fused(NamedTuple):
     steps: tuple[Step, ...] = ()
     beside: tuple[dict[str, Aside], ...] = ()
     motions: tuple[tuple[Motive, int], ...] = ()
+    last: tuple[Start, Model] | None = None
 
 
 class Stretch(NamedTuple):
@@ -186,7 +188,16 @@ def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, sm
         max(each.current.rounds for each in found), all(each.current.settled for each in found),
         sum(each.current.unexamined for each in found),
         tuple(step for each in found for step in each.current.steps), beside, tuple(chosen),
+        _last(found[-1].current, best),
     )  # fmt: skip
+
+
+def _last(current: Current, best: FilterRun | SmootherRun) -> tuple[Start, Model] | None:
+    """The last state of a ballistic motion, and the model."""
+    if not current.model.motion.pressed:
+        return None
+    published = best.state[-1], best.sigma[-1]
+    return impact.end_of(current.log, current.model, [current.start], *published), current.model
 
 
 def _profile(found: list[Stretch], time_s: FloatArray) -> tuple[FloatArray, float]:
