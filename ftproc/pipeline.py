@@ -12,6 +12,7 @@ import numpy as np
 from ftproc.core.identification import unseen_motion
 from ftproc.core.model import kinematics
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
+from ftproc.derived import impact
 from ftproc.errors import InputError, UsageError
 from ftproc.long_records import joined
 from ftproc.methods import heights, range_rates, registry, simultaneous
@@ -88,6 +89,9 @@ class Filtering:
                 **self.effects.summary(),
             }
         )
+        here = {"frame": self.log.frame, "settings": {"site": self.settings.site}}
+        seen = self.statistics
+        summary |= impact.of_flight(seen.last, seen.model, seen.lowest_m, float(self.log.time_s[-1]), here)
         summary = next_steps.added(summary, [step.as_dict() for step in self._steps(summary)])
         found = provenance.describe(self.log, self.method, self.settings, self.statistics, self.model, summary)
         return {**found, **self.effects.metadata()}

@@ -51,7 +51,20 @@ def extremes(trajectory: Trajectory) -> list[Extreme]:
         ("greatest distance", distance, 1),
     )
     found = (_extreme(trajectory, what, *each, sign) for what, each, sign in wanted)
-    return [each for each in found if each is not None]
+    return [each for each in [*found, _impact(trajectory)] if each is not None]
+
+
+def _impact(trajectory: Trajectory) -> Extreme | None:
+    """The predicted impact, or apogee, of the summary: its distance over the ground, with the sigma along that."""
+    s = trajectory.metadata.get("summary", {}).get("impact")
+    if s is None:
+        return None
+    place = np.array([s["x_m"], s["y_m"]])
+    length = float(np.sqrt(place @ place))
+    along = place / max(length, 1e-9)
+    sigma = float(np.sqrt(along @ np.array(s["covariance_xy_m2"]) @ along))
+    what = f"predicted {s['kind']}, distance over ground ({s['semi_major_m']:.3g} by {s['semi_minor_m']:.3g} m)"
+    return Extreme(what, length, sigma, "m", float(s["time_s"]), len(trajectory) - 1)
 
 
 def _extreme(

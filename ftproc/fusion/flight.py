@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ftproc import pipeline
-from ftproc.core.identification import unseen_motion
+from ftproc.core.identification import motion_models, unseen_motion
+from ftproc.core.impact import heights
 from ftproc.core.model import kinematics
+from ftproc.core.model.earth import Geodetic
+from ftproc.derived import impact
 from ftproc.derived.columns import with_derived
 from ftproc.errors import InputError, UsageError
 from ftproc.files import arrow
@@ -26,7 +29,8 @@ from ftproc.fusion.estimation import engine, whole
 from ftproc.fusion.estimation.constants import Constants
 from ftproc.fusion.estimation.whole import Fused
 from ftproc.fusion.range_file import Instrument, Range
-from ftproc.quality import by_hand, provenance, verdict
+from ftproc.methods import preparing
+from ftproc.quality import by_hand, provenance, statistics, verdict
 from ftproc.records import MeasurementLog, Trajectory
 from ftproc.settings import FilterSettings
 
@@ -73,7 +77,9 @@ def fuse(
     seen, zero_s = logs.as_seen(range_.instruments, read, range_.origin)
     logs.check_overlap(range_, seen)
     try:
-        fused = whole.fuse(seen, settings.gate, settings.jerk_psd_m2ps5, settings.smooth, say)
+        fused = whole.fuse(
+            seen, settings.gate, settings.jerk_psd_m2ps5, settings.smooth, say, preparing.motions(settings)
+        )
     except engine.Alone as cause:
         names = ", ".join(station.name for station in seen)
         raise InputError(
@@ -103,6 +109,7 @@ def _flight(
         f"{name}: {each}" for name, log in zip(names, read, strict=True) for each in log.understood.get("assumed", ())
     ]
     summary = summarize(fused, zero_s, effects, assumed)
+    summary |= _impact(fused, float(track.time_s[-1]) + zero_s, range_.origin)
     metadata = {**_metadata(range_, read, settings, summary, fused), "epoch": logs.epoch(read), **effects.metadata()}
     n = len(track.time_s)
     sigma, _ = unseen_motion.widened(track.state, track.sigma, np.full((n, 6), np.nan))
@@ -203,12 +210,35 @@ def summarize(fused: Fused, zero_s: float, effects: by_hand.Effects, assumed: Se
         ],
         "cannot_be_told": posterior.not_observable(fused.constants, [station.name for station in fused.stations]),
         "jerk_psd_m2ps5": {"lowest": jerk.min(), "median": float(np.median(jerk)), "highest": jerk.max()},
+        **_motion(fused),
         "rounds": fused.rounds,
         "editing_converged": fused.settled,
         "notes": [remark.text for remark in said if remark.text not in trust["reasons"]],
         "trust": trust,
         **effects.summary(),
     }
+
+
+def _motion(fused: Fused) -> dict[str, Any]:
+    """The motion that was chosen for most rows, as in the summary of a single log."""
+    rows = dict[str, int]()
+    for motion, there in fused.motions:
+        rows[motion.name] = rows.get(motion.name, 0) + there
+    return statistics.motion(rows, sum(motion.gain for motion, _ in fused.motions))
+
+
+def _impact(fused: Fused, last_s: float, site: Geodetic | None) -> dict[str, Any]:
+    """The end of a ballistic flight, for the summary."""
+    if fused.last is None:
+        return {}
+    lowest_m = float((heights(fused.track.state[:, :3]) + fused.track.sigma[:, 2]).min())
+    here = {"stations": True, "settings": {"site": site}}
+    return impact.of_flight(*fused.last, lowest_m, last_s, here)
+
+
+def _acts(fused: Fused) -> bool:
+    """Whether the first axis of the process noise goes along the path."""
+    return any(motion.name != motion_models.WHITE for motion, _ in fused.motions)
 
 
 def _digest(range_: Range) -> str | None:
@@ -254,12 +284,15 @@ def _metadata(
             "editing": "two-pass",
             "smooth": settings.smooth,
             "gate": settings.gate,
+            "motion": settings.motion,
             "site": range_.origin,
             "jerk_specified": settings.jerk_psd_m2ps5 is not None,
             "jerk_psd_m2ps5": settings.jerk_psd_m2ps5,
         },
+        "motion": summary["motion"],
+        "motion_gain": summary["motion_gain"],
         "sees": "the whole record",
         "model_sha256": None,
         "summary": summary,
-        "jerk_profile": provenance.jerk_profile(fused.jerk, fused.knot_s),
+        "jerk_profile": provenance.jerk_profile(fused.jerk, fused.knot_s, _acts(fused)),
     }

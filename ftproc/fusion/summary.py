@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ftproc.derived import impact
 from ftproc.fusion.estimation.constants import NAMES, WORDS
 from ftproc.quality import next_steps, verdict
-from ftproc.quality.summary import counted, line
+from ftproc.quality.summary import counted, line, motion
 
 COMPONENT_HEADER = ("station", "component", "good", "rejected", "missing", "noise (1 sigma)")
 BIAS_HEADER = ("station", "bias", "estimate", "1 sigma", "before", "")
@@ -23,6 +24,8 @@ def text(metadata: Mapping[str, Any]) -> str:
     lines += _table([BIAS_HEADER, *bias_rows(s)])
     jerk = s["jerk_psd_m2ps5"]
     named = [("jerk", f"PSD {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.3g} to {jerk['highest']:.3g})")]
+    named += [("motion", motion(s))] if s.get("motion") else []
+    named += [(s["impact"]["kind"], impact.in_words(s["impact"]))] if s.get("impact") else []
     named += [("note", note) for note in s["notes"]]
     level, reasons = verdict.level_of(s["trust"]), s["trust"]["reasons"]
     if len(reasons) < 2:

@@ -17,7 +17,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ftproc.core import threads
+from ftproc.core import impact, threads
 from ftproc.core.editing import two_pass
 from ftproc.core.editing.lasting.faults import Shift, spread
 from ftproc.core.filtering import bridging, forward
@@ -103,7 +103,7 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts,
         alternative=decision.alternative,
         faults=edited.faults, motion=motion, smoothed_sigma_m=could_be, hindsight=hindsight,
-        range_rate=channel and channel.filtered(left),
+        range_rate=channel and channel.filtered(left), last=_last_of(motion, smoothed or run),
     )  # fmt: skip
 
 
@@ -127,6 +127,12 @@ def _with_motion(motion: Chosen, smooth: bool, model: Model) -> tuple[FilterRun,
     left = left if motion.row is None or not len(left) else left[motion.row]
     smoothed = motion.of_rows(smooth_log(motion.log, model, motion.starts, PATHS)) if smooth else None
     return motion.of_rows(run), smoothed, left
+
+
+def _last_of(motion: Chosen, best: FilterRun | SmootherRun) -> Start | None:
+    if not motion.model.motion.pressed:
+        return None
+    return impact.end_of(motion.log, motion.model, motion.starts, best.state[-1], best.sigma[-1])
 
 
 def _as_likely(edited: two_pass.Edited, known: two_pass.Known, run: FilterRun) -> Iterator[Model]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ftproc.core.by_hand import NOTHING, Accepted
 from ftproc.core.editing.lasting.faults import Faults
-from ftproc.core.filtering.records import FilterRun, Model, Observations, Uneven
+from ftproc.core.filtering.records import FilterRun, Model, Observations, Start, Uneven
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification.coloured_noise import Coloured
 from ftproc.core.identification.motion_models import Chosen
@@ -113,7 +113,8 @@ class Estimate(NamedTuple):
     method without sigmas, whose labels nothing else tests. motion: that was chosen. known: (n,) which samples have an
     estimate, where live editing has none of some; absent: the components that it has not seen. smoothed_sigma_m: the
     median 1-sigma of the position that the smoother would have, where it is known and was not asked for, and
-    hindsight: (n, 9) its states. range_rate: what is known of the range rates, see `methods.range_rates`.
+    hindsight: (n, 9) its states. range_rate: what is known of the range rates, see `methods.range_rates`. last: state
+    and covariance after the last sample, of a ballistic motion.
     """
 
     run: FilterRun
@@ -135,6 +136,7 @@ class Estimate(NamedTuple):
     smoothed_sigma_m: float | None = None
     hindsight: FloatArray | None = None
     range_rate: Channel | None = None
+    last: Start | None = None
 
     @property
     def smoothed_run(self) -> FilterRun:
@@ -155,6 +157,7 @@ class Estimate(NamedTuple):
             reacquired=tuple(k - low for k in self.reacquired if low <= k < high),
             known=None if self.known is None else self.known[low:high],
             cleaned=None if self.cleaned is None else self.cleaned[low:high],
+            last=self.last if high == len(self.label) else None,
             hindsight=None if self.hindsight is None else self.hindsight[low:high],
             screened_out=None if self.screened_out is None else self.screened_out[low:high],
             faults=None if self.faults is None else self.faults.rows(low, high),

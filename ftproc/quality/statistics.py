@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ftproc.core.components import any_of, sums, totals
+from ftproc.core.impact import heights
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.files.reading.clocks.times import NO_ZONE
 from ftproc.methods.estimate import ASSUMED_READING, typical_interval
@@ -21,6 +22,7 @@ from ftproc.scoring.figures import changes
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from ftproc.core.filtering.records import Start
     from ftproc.methods.estimate import Estimate
     from ftproc.methods.heights import Common
 
@@ -50,6 +52,8 @@ class RunStatistics:
         self.motions: dict[str, int] = {}
         self.motion_gain = 0.0
         self.acceleration = 0.0  # m/s2, that the target had at least
+        self.last: Start | None = None
+        self.lowest_m = np.inf  # of the heights, with their 1-sigma
         self.reacquired, self.unexamined, self.stamp_s, self.drifts = 0, 0, 0.0, False
         self.slow_noise_s, self.slow_noise_likelier, self.slow_noise_separable = 0.0, False, True
         self.faults = FaultStatistics()
@@ -92,6 +96,10 @@ class RunStatistics:
         self._add_sigmas(time_s, self._tested_sigmas(best.state, best.sigma, best.los_sigma))
         self.jerk.append(estimate.model.jerk.mean(1))
         self.model = estimate.model
+        self.last = estimate.last
+        if not self.absent:
+            above = heights(best.state[:, :3]) + best.sigma[:, 2]
+            self.lowest_m = float(np.min(above, initial=self.lowest_m, where=np.isfinite(above)))
         if estimate.motion is not None:
             name = estimate.motion.name
             self.motions[name] = self.motions.get(name, 0) + len(time_s)
@@ -208,7 +216,7 @@ class RunStatistics:
             **({} if self.height is None else self.height.figures()),
             "average_gradient": self._average_gradient(),
             "jerk_psd_m2ps5": jerk if np.isfinite(psd).all() else None,
-            **self._motion(),
+            **motion(self.motions, self.motion_gain),
             "acceleration_at_least_mps2": self.acceleration,
             "left_behind": self.left_behind,
             "nis_mean": self.nis_sum / self.nis_count if self.nis_count else None,
@@ -238,17 +246,19 @@ class RunStatistics:
         trust = verdict.verdict(verdict.remarks(figures), verdict.too_wide(figures), figures["assumed"])
         return figures | {"trust": trust}
 
-    def _motion(self) -> dict[str, Any]:
-        """The model of motion of most rows, of a method that chooses one; the share of these rows; and by how much more
-        likely the log is with what was chosen than with white jerk, or with the best rival than with white jerk."""
-        if not self.motions:
-            return {"motion": None}
-        name = max(self.motions, key=lambda each: self.motions[each])
-        share = self.motions[name] / sum(self.motions.values())
-        return {"motion": name.replace("-", " "), "motion_share": share, "motion_gain": self.motion_gain}
-
     def _poorly_observable_readings(self, time_s: FloatArray, sigma: FloatArray) -> dict[str, list[dict[str, float]]]:
         """By component, of a log in which the position is not observable."""
         seen = [c for c in range(3) if self.absent and c not in self.absent]
         found = {COMPONENTS[c]: consistency.poorly_observable(time_s, sigma[:, [c]], UNITS[c]) for c in seen}
         return {name: intervals for name, intervals in found.items() if intervals}
+
+
+def motion(rows: Mapping[str, int], gain: float) -> dict[str, Any]:
+    """The model of motion of most rows, of a method that chooses one; the share of these rows; and by how much more
+    likely the readings are with what was chosen than with white jerk, or with the best rival than with white jerk.
+    rows: of each model by name."""
+    if not rows:
+        return {"motion": None}
+    name = max(rows, key=lambda each: rows[each])
+    share = rows[name] / sum(rows.values())
+    return {"motion": name.replace("-", " "), "motion_share": share, "motion_gain": gain}

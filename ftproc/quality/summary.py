@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ftproc.derived import impact
 from ftproc.files.moments import Moments
 from ftproc.quality import next_steps, verdict
 
@@ -89,11 +90,13 @@ def facts(s: Mapping[str, Any]) -> list[tuple[str, str]]:
     if jerk is not None:
         found.append(("jerk", f"PSD {jerk['median']:.3g} m2/s5 (from {jerk['lowest']:.3g} to {jerk['highest']:.3g})"))
     if s.get("motion"):
-        found.append(("motion", _motion(s)))
+        found.append(("motion", motion(s)))
+    if s.get("impact"):
+        found.append((s["impact"]["kind"], impact.in_words(s["impact"])))
     return found
 
 
-def _motion(s: Mapping[str, Any]) -> str:
+def motion(s: Mapping[str, Any]) -> str:
     """The model of motion, and how much more likely than white jerk it, or its best rival, is."""
     some = "" if s["motion_share"] == 1 else f" in {100 * s['motion_share']:.0f} % of the rows"
     if s["motion_gain"] == 0:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.model.frames import from_cartesian, wrap
+from ftproc.derived import impact
 from ftproc.errors import InputError
 from ftproc.records import COMPONENTS, ISOLATED, MISSING, PATCH, REJECTED, FlagArray, FloatArray, Trajectory, Truth
 from ftproc.scoring import named
@@ -121,6 +122,7 @@ class Score:
     smoothed: bool | None = None
     difference: Difference | None = None
     require: list[dict[str, Any]] | None = None
+    impact: dict[str, Any] | None = None
 
     def __repr__(self) -> str:
         errors = (("position RMSE", self.rmse_3d_m, "m"), ("velocity RMSE", self.rmse_v_mps, "m/s"))
@@ -150,6 +152,10 @@ def score(trajectory: Trajectory, truth: Truth | None = None) -> Score:
         "samples": len(trajectory),
         "average_gradient": average_gradient(trajectory.measurement),
     }
+    summary = trajectory.metadata.get("summary")
+    predicted = summary.get("impact") if isinstance(summary, Mapping) else None
+    if isinstance(predicted, Mapping):
+        known["impact"] = impact.against(predicted, truth)
     if truth is not None:
         known |= _against(trajectory, truth)
     return Score(**known)

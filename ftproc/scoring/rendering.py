@@ -70,6 +70,13 @@ _LABELS = {
         ("nees_and_bounds", "  NEES (bounds)"),
     )
 } | {"sigma_verdict": "the sigmas are"} | {
+    f"impact.{key}": label
+    for key, label in (
+        ("kind", "predicted"), ("time_s", "  time (s)"), ("x_m", "  x (m)"), ("y_m", "  y (m)"),
+        ("semi_major_m", "  semi-major axis (m)"), ("semi_minor_m", "  semi-minor axis (m)"),
+        ("miss_m", "  miss (m)"), ("miss_s", "  miss (s)"), ("miss_in_sigmas", "  miss / sigma"),
+    )
+} | {
     f"outliers.{component}.{key}": f"{component} outliers, precision" if key == "precision" else f"  {label}"
     for component in ("range", "azimuth", "elevation")
     for key, label in (

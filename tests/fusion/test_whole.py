@@ -105,7 +105,7 @@ def test_what_other_stretches_have_said_narrows_the_biases(stations):
                               measurement=each.measurement[slice(*np.searchsorted(each.time_s, ends))],
                               accepted=each.accepted[slice(*np.searchsorted(each.time_s, ends))])
                 for each in stations]  # fmt: skip
-        return flight_faults.fuse(part, FilterSettings().gate, None, known, lambda number: None)
+        return flight_faults.fuse(part, FilterSettings().gate, None, ("white-jerk",), known, lambda number: None)
 
     nothing = Said.nothing(PARAMETERS * len(stations))
     first, alone = half(nothing, 0.0, 60.0), half(nothing, 60.0, 121.0)

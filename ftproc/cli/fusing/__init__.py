@@ -42,6 +42,7 @@ MEANT = (
     "report",
     "jerk",
     "gate",
+    "motion",
     "ecef",
     "derived",
     "decisions",
@@ -52,7 +53,7 @@ MEANT = (
 )
 
 #: Those on which the trajectory depends.
-OPTIONS = ("fuse", "smooth", "jerk", "gate", "ecef", "decisions")
+OPTIONS = ("fuse", "smooth", "jerk", "gate", "motion", "ecef", "decisions")
 
 
 def range_file(ctx: click.Context) -> str:
@@ -72,6 +73,7 @@ def fuse_logs(ctx: click.Context, debug: bool) -> int:
         smooth=given.get("smooth", False),
         jerk_psd_m2ps5=given.get("jerk"),
         gate=given.get("gate", FilterSettings.gate),
+        motion=given.get("motion", FilterSettings.motion),
         ecef=given.get("ecef", False),
         derived=given.get("derived", False),
     )

@@ -91,13 +91,15 @@ def _direction(rotation: FloatArray) -> FloatArray:
 
 def _settled(track: Track, model: Model) -> Model:
     """The likeliest noise and level of the jerk, linearised about its own track."""
-    log_noise, level = np.log(model.noise_variance), math.log(model.jerk[0, 0])
+    first = model.noise_variance[0] if model.noise_variance.ndim > 1 else model.noise_variance
+    of_stations, log_noise, level = model.noise_variance / first, np.log(first), math.log(model.jerk[0, 0])
     less, calmer = FARTHEST
     lower = np.r_[np.where(track.known, log_noise, log_noise - less), level - calmer, -RATIO_BOUND]
     upper = np.r_[np.where(track.known, log_noise, log_noise + less), level + calmer, RATIO_BOUND]
 
     def of(theta: FloatArray) -> Model:
-        return model._replace(noise_variance=np.exp(theta[:3]), jerk=shaped(theta[3:4], theta[4]))
+        noise = np.exp(theta[:3]) * of_stations
+        return model._replace(noise_variance=noise, jerk=shaped(theta[3:4], theta[4]))
 
     def cost(theta: FloatArray) -> optimizer.Point:
         found = score_log(track.log, of(theta), track.starts)

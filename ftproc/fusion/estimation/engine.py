@@ -17,15 +17,15 @@ import numpy as np
 from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.biases import Biased, Directions, smooth_biased
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import PATHS, residuals_beside, smooth_log
 from ftproc.core.identification.likelihood import fit_jerk
 from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import isotropic
-from ftproc.fusion.estimation import alternatives, beside, first_track, lasting, places, process_noise, screening
+from ftproc.fusion.estimation import alternatives, beside, first_track, lasting, motions, places, screening
 from ftproc.fusion.estimation import constants as posterior
 from ftproc.fusion.estimation.constants import Constants, Said
 from ftproc.fusion.estimation.events import Events, Seen, merge, moved_to
+from ftproc.fusion.estimation.process_noise import on_knots
 from ftproc.records import FloatArray
 
 FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 18, 8
@@ -43,7 +43,7 @@ class Current(NamedTuple):
     """What is believed now. events, weight (rows, 3) of each station; sigma (m, 3) noise; constants; model; start;
     found: the smoother's run that the rest belongs to; own (m, 3): the noise that each component shows alone;
     rounds, settled: of the decisions; unexamined: places where no work was left to look for other hypotheses; steps:
-    that were taken out of the readings."""
+    that were taken out of the readings; motion: of the model."""
 
     stations: list[Seen]
     events: Events
@@ -60,6 +60,7 @@ class Current(NamedTuple):
     settled: bool = False
     unexamined: int = 0
     steps: tuple[lasting.Step, ...] = ()
+    motion: motions.Motive = motions.Motive()
 
     @property
     def log(self) -> Observations:
@@ -219,7 +220,7 @@ def _tuned(current: Current, jerk_psd: float | None, first: int | None) -> Curre
         if first is not None:
             model = fit_jerk(log, starts, model)
         else:
-            model = fit_profile(log, starts, process_noise.on_knots(log, model), PROFILE_STEPS)
+            model = fit_profile(log, starts, on_knots(log, model), PROFILE_STEPS)
     return current._replace(sigma=sigma, model=model)
 
 
@@ -246,29 +247,18 @@ def at(current: Current, constants: Constants) -> Current:
     first = min(head.sample, len(events.time_s) - 1)
     start = Start(first, state[first], START_INFLATION * head.covariance + np.diag(np.repeat(START_SIGMA, 3) ** 2))
     log = events.weighted(current.weight)
-    found = smooth_biased(log, current.model, start, _directions(events, state, constants))
-    _lead_in(log, current.model, found)
+    found = motions.smoothed(log, current.model, start, _directions(events, state, constants), state)
     return current._replace(events=events, constants=constants, start=start, found=found)
 
 
-def _lead_in(log: Observations, model: Model, found: Biased) -> None:
-    """Smooth the events before the start too, in place: back in time from the smoothed state there."""
-    head = found.run.heads[0]
-    if head.sample == 0:
-        return
-    back = log.part(slice(head.sample, None, -1))
-    back.weight[0] = 0.0  # is in the head
-    back = back._replace(beside=tuple(each._replace(weight=np.r_[0.0, each.weight[1:]]) for each in back.beside))
-    given = back, model._replace(jerk=model.jerk[:1], knot_s=math.inf), [head._replace(sample=0)]
-    for filled, values in zip(found.run[:7], smooth_log(*given, PATHS)[:7], strict=True):
-        filled[: head.sample] = values[:0:-1]
-    if back.beside:
-        found.beside[:, : head.sample] = residuals_beside(*given)[:, :0:-1]
-
-
-def last(current: Current) -> Current:
-    """The run to publish: with a little more process noise than is likeliest."""
+def last(current: Current, names: tuple[str, ...]) -> Current:
+    """The run to publish: with a little more process noise than is likeliest, and the likeliest motion. names: of the
+    models of motion to choose from."""
     if math.isfinite(current.model.knot_s):
-        log, begun = current.log, process_noise.on_knots(current.log, current.model)
+        log, begun = current.log, on_knots(current.log, current.model)
         current = current._replace(model=with_allowance(log, fit_profile(log, [current.start], begun, LAST_STEPS)))
-    return _smoothed(_smoothed(current))
+    current = _smoothed(_smoothed(current))
+    known = np.any([np.isfinite(station.known) for station in current.stations], 0)
+    motion, model = motions.choose(current.log, current.start, current.model, names, known)
+    current = current._replace(motion=motion, model=model)
+    return _smoothed(_smoothed(current)) if model.motion.acts else current

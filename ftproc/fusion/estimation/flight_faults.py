@@ -33,9 +33,11 @@ Settle = Callable[[Readings], Current]
 
 
 def fuse(
-    stations: list[Seen], gate: float, jerk_psd: float | None, known: Said, progress: Callable[[int], None]
+    stations: list[Seen], gate: float, jerk_psd: float | None, names: tuple[str, ...], known: Said,
+    progress: Callable[[int], None],
 ) -> Current:  # fmt: skip
-    """The fused flight, or a stretch. known: what others have said. progress: takes each round. Raises Alone."""
+    """The fused flight, or a stretch. names: of the models of motion to choose from. known: what others have said.
+    progress: takes each round. Raises Alone."""
     settle = partial(engine.settled, gate=gate, jerk_psd=jerk_psd, known=known, progress=progress)
     readings, current = _with_even_clocks(Readings.of(stations), settle)
     work = for_lasting_faults(len(current.events.time_s), len(stations))
@@ -52,7 +54,7 @@ def fuse(
         if lasting.contradicted(without.stations, without.weight):
             break
         current = without._replace(steps=readings.steps)
-    current = engine.last(beside.fitted(current, gate, lambda each: engine.at(each, each.constants)))
+    current = engine.last(beside.fitted(current, gate, lambda each: engine.at(each, each.constants)), names)
     return current._replace(unexamined=current.unexamined + work.passed)
 
 

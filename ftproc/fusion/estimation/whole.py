@@ -13,17 +13,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core.filtering.forward import filter_log
-from ftproc.core.filtering.records import FilterRun
+from ftproc.core import impact
+from ftproc.core.filtering.records import FilterRun, Model, Start
 from ftproc.core.filtering.smoother import SmootherRun
+from ftproc.core.identification import motion_models
 from ftproc.core.model import kinematics
 from ftproc.core.model.stations import levelled
-from ftproc.fusion.estimation import engine, flight_faults
+from ftproc.fusion.estimation import engine, flight_faults, motions
 from ftproc.fusion.estimation.beside import Aside, expected
 from ftproc.fusion.estimation.constants import FARTHEST, Constants, Said, parameters
 from ftproc.fusion.estimation.engine import Current
 from ftproc.fusion.estimation.events import CLOCK, Seen
 from ftproc.fusion.estimation.lasting import Step
+from ftproc.fusion.estimation.motions import Motive
 from ftproc.records import FloatArray, IntArray
 
 MOST = 200_000  # rows of a stretch
@@ -46,7 +48,8 @@ class Fused(NamedTuple):
     (rows, 3), position (rows, 3) of the track in m. noise (m, 3) 1-sigma, own (m, 3) the noise that each component
     shows alone; axes (m, 3, 3) with the tilts; jerk (k, 3) each for knot_s seconds; rounds, settled: of the decisions;
     unexamined: places where no work was left to look for other hypotheses; steps: that were taken out; beside: of each
-    station by name, what it measures beside its readings."""
+    station by name, what it measures beside its readings; motions: of each stretch the motion that was chosen, its gain
+    there, and for how many rows; last: the last state of a ballistic motion, with its model."""
 
     stations: list[Seen]
     weight: list[FloatArray]
@@ -66,6 +69,8 @@ class Fused(NamedTuple):
     unexamined: int
     steps: tuple[Step, ...] = ()
     beside: tuple[dict[str, Aside], ...] = ()
+    motions: tuple[tuple[Motive, int], ...] = ()
+    last: tuple[Start, Model] | None = None
 
 
 class Stretch(NamedTuple):
@@ -81,11 +86,12 @@ class Stretch(NamedTuple):
 
 
 def fuse(
-    stations: list[Seen], gate: float, jerk_psd: float | None, smooth: bool, progress: Callable[[int, int], None]
-) -> Fused:
+    stations: list[Seen], gate: float, jerk_psd: float | None, smooth: bool, progress: Callable[[int, int], None],
+    names: tuple[str, ...] = (motion_models.WHITE,),
+) -> Fused:  # fmt: skip
     """The fused flight of two or more stations. smooth: whether the track is smoothed, or filtered with the decisions
     and the biases of the whole flight. progress is called with the rounds that are done, and the most there may be.
-    Raises engine.Alone."""
+    names: of the models of motion to choose from. Raises engine.Alone."""
     prior = np.stack([station.prior for station in stations])
     times = np.sort(np.concatenate([station.time_s for station in stations]))
     pieces = -(-len(times) // MOST)
@@ -99,7 +105,7 @@ def fuse(
         known = _said(found, prior.size)
         say = functools.partial(_say, progress, k * engine.MOST_ROUNDS, (len(edges) - 1) * engine.MOST_ROUNDS)
         try:
-            current = flight_faults.fuse(there, gate, jerk_psd, known.of(parameters(seen)), say)
+            current = flight_faults.fuse(there, gate, jerk_psd, names, known.of(parameters(seen)), say)
         except engine.Alone:
             if len(edges) == 2:
                 raise
@@ -148,7 +154,8 @@ def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, sm
     sizes = [len(station.time_s) for station in stations]
     weight, possible, residual, variance, position = ([np.full((n, 3), np.nan) for n in sizes] for _ in range(5))
     beside = tuple({side.name: Aside.before(side) for side in station.beside} for station in stations)
-    tracks, noise, own = [], np.zeros((len(stations), 3)), np.full((len(stations), 3), np.inf)
+    chosen, tracks = list[tuple[Motive, int]](), list[Track]()
+    noise, own = np.zeros((len(stations), 3)), np.full((len(stations), 3), np.inf)
     for each in found:
         current = each.current
         if len(found) > 1:
@@ -169,6 +176,8 @@ def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, sm
             noise[s] += len(rows) / sizes[s] * current.sigma[k] ** 2
             own[s] = np.minimum(own[s], current.own[k])
         last = here.start + distinct(events.time_s[here])
+        count = int(here.stop - here.start)
+        chosen.append((current.motion.share(count / len(events.time_s)), count))
         nis = _together(best.nis[here], last - here.start)
         tracks.append(Track(events.time_s[last], best.state[last], best.sigma[last], best.path_sigma[last], nis))
     track = Track(*map(np.concatenate, zip(*tracks, strict=True)))
@@ -178,8 +187,17 @@ def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, sm
         levelled(np.stack([each.axes for each in stations]), constants.estimate[:, 3:CLOCK]), jerk, knot_s,
         max(each.current.rounds for each in found), all(each.current.settled for each in found),
         sum(each.current.unexamined for each in found),
-        tuple(step for each in found for step in each.current.steps), beside,
+        tuple(step for each in found for step in each.current.steps), beside, tuple(chosen),
+        _last(found[-1].current, best),
     )  # fmt: skip
+
+
+def _last(current: Current, best: FilterRun | SmootherRun) -> tuple[Start, Model] | None:
+    """The last state of a ballistic motion, and the model."""
+    if not current.model.motion.pressed:
+        return None
+    published = best.state[-1], best.sigma[-1]
+    return impact.end_of(current.log, current.model, [current.start], *published), current.model
 
 
 def _profile(found: list[Stretch], time_s: FloatArray) -> tuple[FloatArray, float]:
@@ -226,6 +244,6 @@ def published(current: Current, smooth: bool) -> FilterRun | SmootherRun:
     Sigmas include those of the biases."""
     if smooth:
         return current.found.run
-    run = filter_log(current.log, current.model, [current.start])
+    run = motions.filtered(current.log, current.model, current.start, current.found.run.state)
     sigma = np.sqrt(run.sigma**2 + current.found.spread)
     return run._replace(sigma=sigma, path_sigma=kinematics.widened(run.state, run.path_sigma, run.sigma, sigma))

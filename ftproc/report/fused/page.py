@@ -6,6 +6,7 @@ import html
 
 from ftproc.fusion import summary
 from ftproc.fusion.flight import Flight
+from ftproc.quality import summary as single
 from ftproc.report import deciding, tables
 from ftproc.report.fused.figures import biases, carried, disagreements, log_clocks, residuals, station_map
 from ftproc.report.maps.track import track
@@ -27,7 +28,8 @@ def page(flight: Flight) -> str:
     nothing = "" if stretches else '<p class="note">No station joins late, is silent or follows another target.</p>'
     readings = tables.table(summary.COMPONENT_HEADER, summary.component_rows(s), "numbers stations")
     known = tables.table(summary.BIAS_HEADER, summary.bias_rows(s), "numbers stations")
-    notes = "".join(f"<li>{html.escape(note)}</li>" for note in s["notes"])
+    said = [*([f"motion: {single.motion(s)}"] if s.get("motion") else []), *s["notes"]]
+    notes = "".join(f"<li>{html.escape(note)}</li>" for note in said)
     parts = [
         tables.heading(shown),
         tables.banner(shown),

@@ -1,0 +1,127 @@
+"""The motion of a fused flight: the model that the readings of all stations choose, and the runs over events with it.
+
+A motion whose forces act is linearised about the track that was smoothed before; so that no step turns too far, gaps
+between the events get samples without readings, which the runs that are returned do not have.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.filtering.biases import Biased, Directions, smooth_biased
+from ftproc.core.filtering.forward import filter_log
+from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
+from ftproc.core.filtering.smoother import PATHS, SmootherRun, residuals_beside, smooth_log
+from ftproc.core.identification import motion_models
+from ftproc.fusion.estimation.events import moved_to
+from ftproc.records import FloatArray, IntArray
+
+Run = TypeVar("Run", FilterRun, SmootherRun)
+
+
+class Motive(NamedTuple):
+    """name: of the motion, in `motion_models.MODELS`. gain: by how much likelier the readings are than with white jerk;
+    of white jerk, by how much the best of the others is, see `motion_models.Chosen`."""
+
+    name: str = motion_models.WHITE
+    gain: float = 0.0
+
+    def share(self, of: float) -> Motive:
+        """What such a share of the rows has of the gain."""
+        return self._replace(gain=of * self.gain)
+
+
+def choose(
+    log: Observations, start: Start, white: Model, names: tuple[str, ...], known: NDArray[np.bool_]
+) -> tuple[Motive, Model]:
+    """The likeliest motion of these names, and the model with it. white: as in `motion_models.choose`; known: (3,)
+    components whose noise the user has specified."""
+    found = motion_models.choose(log, [start], white, names, known)
+    return Motive(found.name, found.gain), found.model
+
+
+class _Stepped(NamedTuple):
+    """A log with steps in its gaps, its start, the model linearised there, and the rows of the log's own samples."""
+
+    log: Observations
+    start: Start
+    model: Model
+    row: IntArray | None
+
+    def of_rows(self, run: Run) -> Run:
+        """A run over the log with its steps, of the log's own samples."""
+        if self.row is None:
+            return run
+        own: dict[str, Any] = {
+            name: each[self.row] for name, each in run._asdict().items() if isinstance(each, np.ndarray)
+        }
+        return run._replace(**own)
+
+
+def _stepped(log: Observations, model: Model, start: Start, state: FloatArray) -> _Stepped:
+    """state: (n, 9) about which the motion is linearised."""
+    if not model.motion.acts:
+        return _Stepped(log, start, model, None)
+    dense, (begin,), row = motion_models.with_steps(log, [start], state)
+    course = state if row is None else between(log.time_s, state, dense.time_s)
+    return _Stepped(dense, begin, model._replace(motion=model.motion.about(course)), row)
+
+
+def between(time_s: FloatArray, state: FloatArray, wanted: FloatArray) -> FloatArray:
+    """(k, 9) states at times between those of a track: from the motion of either side, blended."""
+    after = np.clip(np.searchsorted(time_s, wanted), 0, len(time_s) - 1)
+    before = np.clip(np.searchsorted(time_s, wanted, side="right") - 1, 0, len(time_s) - 1)
+    length = time_s[after] - time_s[before]
+    share = np.where(length > 0, (wanted - time_s[before]) / np.where(length > 0, length, 1.0), 0.0)[:, None]
+    behind = moved_to(-time_s[::-1], state[::-1] * _TURNED, -wanted) * _TURNED
+    found: FloatArray = (1 - share) * moved_to(time_s, state, wanted) + share * behind
+    return found
+
+
+_TURNED = np.repeat([1.0, -1.0, 1.0], 3)  # a state whose time runs backward
+
+
+def smoothed(log: Observations, model: Model, start: Start, directions: Directions, state: FloatArray) -> Biased:
+    """Smooth the events of all stations, those before the start too; see `biases.smooth_biased`. state: (n, 9) about
+    which the motion is linearised."""
+    stepped = _stepped(log, model, start, state)
+    if stepped.row is not None:
+        n, kinds = len(stepped.log.time_s), len(directions.beside)
+        design, scalars = np.zeros((n, 3, 3)), np.zeros((kinds, n, directions.beside.shape[2]))
+        design[stepped.row], scalars[:, stepped.row] = directions.design, directions.beside
+        directions = directions._replace(design=design, beside=scalars)
+    found = smooth_biased(stepped.log, stepped.model, stepped.start, directions)
+    if stepped.row is not None:
+        (head,) = found.run.heads
+        run = stepped.of_rows(found.run)._replace(heads=(head._replace(sample=start.sample),))
+        beside = found.beside[:, stepped.row] if len(found.beside) else found.beside
+        found = found._replace(run=run, spread=found.spread[stepped.row], beside=beside)
+    _lead_in(log, model, found, state)
+    return found
+
+
+def _lead_in(log: Observations, model: Model, found: Biased, state: FloatArray) -> None:
+    """Smooth the events before the start too, in place: back in time from the smoothed state there."""
+    head = found.run.heads[0]
+    if head.sample == 0:
+        return
+    there = slice(head.sample, None, -1)
+    back = log.part(there)
+    back.weight[0] = 0.0  # is in the head
+    back = back._replace(beside=tuple(each._replace(weight=np.r_[0.0, each.weight[1:]]) for each in back.beside))
+    behind = model._replace(jerk=model.jerk[:1], knot_s=math.inf, motion=model.motion.about(state[there]))
+    given = back, behind, [head._replace(sample=0)]
+    for filled, values in zip(found.run[:7], smooth_log(*given, PATHS)[:7], strict=True):
+        filled[: head.sample] = values[:0:-1]
+    if back.beside:
+        found.beside[:, : head.sample] = residuals_beside(*given)[:, :0:-1]
+
+
+def filtered(log: Observations, model: Model, start: Start, state: FloatArray) -> FilterRun:
+    """The causal filter over the events of all stations. state: (n, 9) smoothed."""
+    stepped = _stepped(log, model, start, state)
+    return stepped.of_rows(filter_log(stepped.log, stepped.model.causal, [stepped.start]))
