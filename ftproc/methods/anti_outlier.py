@@ -20,15 +20,15 @@ import numpy as np
 from ftproc.core import impact, threads
 from ftproc.core.editing import two_pass
 from ftproc.core.editing.lasting.faults import Shift, spread
-from ftproc.core.filtering import bridging, forward
+from ftproc.core.filtering import forward
 from ftproc.core.filtering.beside import WIDTH
-from ftproc.core.filtering.bridging import Bridged
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
 from ftproc.core.identification import likelihood, motion_models
 from ftproc.core.identification.motion_models import Chosen
 from ftproc.core.identification.profile import ALLOWANCE, fit_profile, median_level, with_allowance
-from ftproc.methods import live, preparing, range_rates
+from ftproc.methods import bridging, live, preparing, range_rates
+from ftproc.methods.bridging import Bridged
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
 from ftproc.order_statistics import median
 from ftproc.records import FloatArray
@@ -77,8 +77,9 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     names = preparing.motions(settings)
     if len(edited.starts) > MOST_PIECES and motion_models.WHITE in names:
         names = (motion_models.WHITE,)
-    label, again = preparing.labels(edited.weight, log.measurement), preparing.re_initialized(edited.starts)
+    again = preparing.re_initialized(edited.starts)
     over = _bridged(log, model, edited.starts, settings.jerk_psd_m2ps5 is not None)
+    label = preparing.labels(np.where(over.read, 0.0, over.log.weight), log.measurement)
     edited = edited._replace(log=over.log, model=over.model, starts=over.starts)
     motion = motion_models.choose(over.log, over.starts, over.model, names, specified)
     if channel is not None and channel.used is not None:

@@ -15,7 +15,7 @@ from ftproc.core.identification.motion_models import MODELS
 from ftproc.core.impact import heights
 from ftproc.core.model.forces import EARTH_M, GRAVITY
 from ftproc.core.model.frames import from_cartesian
-from ftproc.derived import extremes
+from ftproc.derived.extremes import extremes
 from ftproc.derived.impact import figures
 from ftproc.files.reading import trajectories
 from tests.cli.conftest import run

@@ -34,6 +34,7 @@ class LocatedJump(NamedTuple):
     marks: Sequence[int]
     width: int
     at_median: Model
+    longest: float = LONGEST
 
 
 def cell_of(width: int, n: int) -> int:
@@ -46,7 +47,7 @@ def proposals(scene: Scene, located: LocatedJump) -> Iterator[list[Curve]]:
     """The curves, of one for each channel, that the jump may be."""
     n, at = len(scene.possible), located.sample
     yield from steps(scene, located.channels, at)
-    reach = min(int(LONGEST * n), FARTHEST)
+    reach = min(int(located.longest * n), FARTHEST)
     here = slice(max(at - reach, 0), min(at + reach, n))
     part, length = scene.part(here), min(at + reach, n) - max(at - reach, 0)
     near = located._replace(sample=at - here.start)

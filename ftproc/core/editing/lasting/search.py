@@ -21,6 +21,7 @@ from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.faults import Step
 from ftproc.core.editing.lasting.proposals import (
     CELLS,
+    LONGEST,
     SHORTEST,
     LocatedJump,
     cell_of,
@@ -45,6 +46,8 @@ CERTAIN = 4.0  # sigmas of its size from which a component takes part in a step 
 AROUND, MEMORIES = (150, 2000), 12.0  # samples on each side of what is weighed, and memories
 SHORTEST_CELL = 2  # samples in a cell of a scan
 OPEN, MOVES = 4.0, 15.0  # in log-probability: within it, whether a fault stays is open; before half of a log is moved
+REMEMBERED, SHORT = 2.5, 0.12  # samples that a filter remembers: with fewer, a long curve may as well be the target's
+# motion, and this share of the log is the longest
 PRIOR, DOUBT, MARGIN = -6.0, -6.0, 8.0  # log-odds of such a fault at a jump; with which it is reported, and taken out
 HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
 MOST_EACH = 20.0  # of log-probability, of each reading: where more is gained, the part without the fault was lost
@@ -75,6 +78,7 @@ class Scanned(NamedTuple):
     width: int
     jumps: list[Jump]
     cell: int
+    longest: float = LONGEST
 
     @property
     def samples(self) -> int:
@@ -125,7 +129,8 @@ def scanned(scene: Scene) -> Scanned:
         found += scan.jumps(sums, LEAST_GAIN, JUMPS, 3 * width, TOGETHER)
     off = scene.residual / np.sqrt(scene.at_median.noise_variance)
     found += scan.beside_runs(scene.log.weight, scene.possible, off, LEAST_OFF)[:JUMPS]
-    return Scanned(scene, around, width, scan.distinct(found), width)
+    longest = LONGEST if memory > REMEMBERED else SHORT
+    return Scanned(scene, around, width, scan.distinct(found), width, longest)
 
 
 def _likeliest(seen: Scanned, rejected: list[Jump]) -> Found | None:
@@ -194,7 +199,7 @@ def _as_step(seen: Scanned, jump: Jump, way: Sequence[int], null: float) -> tupl
     there = LocatedJump(
         channels, jump.sample - near.start, [each.sample for each in seen.jumps], seen.width, part.at_median
     )
-    located = there._replace(sample=near.start + exactly(part, there))
+    located = there._replace(sample=near.start + exactly(part, there), longest=seen.longest)
     sides = steps(seen.scene, channels, located.sample)
     step = max((_weighed(part, near, side) for side in sides), key=lambda each: each.log_probability)
     return step.log_probability - null + _prior(sides[0], n), located, step

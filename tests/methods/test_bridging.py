@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from ftproc.core.filtering import forward
-from ftproc.core.filtering.bridging import bridged
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations
 from ftproc.core.filtering.smoother import PATHS, smooth_log
 from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.core.model.motion import isotropic
+from ftproc.methods.bridging import bridged
 
 SIGMA = np.array([0.01, 1e-4, 1e-4])
 DT, N, JERK = 0.1, 1500, 1.0
@@ -104,3 +104,16 @@ def test_the_sense_of_the_azimuth_does_not_matter_at_its_cut():
         cosine, sine = np.cos(turn), np.sin(turn)
         tracks.append(state @ np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]]))
     np.testing.assert_allclose(tracks[0], tracks[1], atol=1e-6)
+
+
+def test_readings_at_the_edge_of_a_gap_that_belong_to_it_are_rejected():
+    """Two readings after it, eighty metres off, that were taken for good."""
+    log, _, _, place = with_gap([0])
+    log.measurement[900:902, 0] -= 80.0
+    model = Model(SIGMA**2, np.tile(isotropic(JERK), (15, 1)), 10.0)
+    found = bridged(log, model, find_starts(log, SIGMA**2, JERK))
+    assert (found.log.weight[900:902] == [0, 1, 1]).all()
+    smoothed = found.widened(smooth_log(found.log, found.model, found.starts, PATHS))
+    off = np.abs(smoothed.state[:, :3] - place)
+    assert (off < 5 * smoothed.sigma[:, :3]).all()
+    assert off.max() < 25
