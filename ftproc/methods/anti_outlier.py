@@ -90,7 +90,7 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         filtered, other_smoothed, _ = _with_motion(motion, both, other)
         run = _worse_of(run, filtered)
         smoothed = smoothed and other_smoothed and _worse_of(smoothed, other_smoothed)
-    run, smoothed = over.filtered(run), smoothed and over.widened(smoothed)
+    run, smoothed = over.filtered(run), smoothed and over.smoothed(smoothed)
     shifts = edited.faults.shifts
     if shifts:
         run, smoothed = _widened(run, shifts), smoothed and _widened(smoothed, shifts)

@@ -47,18 +47,24 @@ class Bridged(NamedTuple):
     measurement: FloatArray
 
     def filtered(self, run: FilterRun) -> FilterRun:
-        """A run over the log, with the innovations of what was measured."""
+        """A run over the log, as one of what was measured."""
         if not self.read.any():
             return run
+        innovation, weight = run.innovation + self._off(), np.where(self.read, 0.0, run.weight)
+        return self._widened(run._replace(innovation=innovation, weight=weight))
+
+    def smoothed(self, run: SmootherRun) -> SmootherRun:
+        """The same of the smoother."""
+        return self._widened(run._replace(residual=run.residual + self._off())) if self.read.any() else run
+
+    def _off(self) -> FloatArray:
+        """(n, 3) by which what was measured lies off the curves; NaN where nothing was."""
         off = self.measurement - self.log.measurement
         off[:, 1] = wrap(off[:, 1])
-        innovation = run.innovation + np.where(self.read, off, 0.0)
-        return self.widened(run._replace(innovation=innovation, weight=np.where(self.read, 0.0, run.weight)))
+        return np.where(self.read, off, 0.0)
 
-    def widened(self, run: Run) -> Run:
-        """A run over the log, with sigmas that allow for the errors of the curves."""
-        if not self.read.any():
-            return run
+    def _widened(self, run: Run) -> Run:
+        """With sigmas that allow for the errors of the curves."""
         position, sigma, los_sigma = run.state[:, :3], run.sigma.copy(), run.los_sigma.copy()
         scale = np.stack([np.ones(len(position)), np.hypot(*position[:, :2].T), np.linalg.norm(position, axis=1)], 1)
         size, sight = self.error * scale[:, :, None], line_of_sight_axes(position)

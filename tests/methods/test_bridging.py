@@ -41,7 +41,7 @@ def test_the_track_in_a_gap_is_inside_its_sigmas(components):
     assert len(starts) == 2
     found = bridged(log, model, starts)
     assert found.starts == starts[:1]
-    smoothed = found.widened(smooth_log(found.log, found.model, found.starts, PATHS))
+    smoothed = found.smoothed(smooth_log(found.log, found.model, found.starts, PATHS))
     off = np.abs(smoothed.state[:, :3] - place)
     assert (off < 5 * smoothed.sigma[:, :3]).all()
     assert off.max() < 25
@@ -80,6 +80,9 @@ def test_readings_of_a_curve_are_no_readings():
     assert np.isfinite(run.innovation[600:900, 0]).tolist() == [k == 700 for k in range(600, 900)]
     assert run.innovation[700, 0] == pytest.approx(500 - np.linalg.norm(run.predicted[700, :3]), abs=1)
     assert found.read.sum() == 300
+    smoothed = found.smoothed(smooth_log(found.log, found.model, found.starts))
+    assert np.isfinite(smoothed.residual[600:900, 0]).tolist() == [k == 700 for k in range(600, 900)]
+    assert smoothed.residual[700, 0] == pytest.approx(500 - np.linalg.norm(smoothed.state[700, :3]), abs=1)
 
 
 def test_what_no_other_part_of_the_log_tells_is_not_bridged():
@@ -113,7 +116,7 @@ def test_readings_at_the_edge_of_a_gap_that_belong_to_it_are_rejected():
     model = Model(SIGMA**2, np.tile(isotropic(JERK), (15, 1)), 10.0)
     found = bridged(log, model, find_starts(log, SIGMA**2, JERK))
     assert (found.log.weight[900:902] == [0, 1, 1]).all()
-    smoothed = found.widened(smooth_log(found.log, found.model, found.starts, PATHS))
+    smoothed = found.smoothed(smooth_log(found.log, found.model, found.starts, PATHS))
     off = np.abs(smoothed.state[:, :3] - place)
     assert (off < 5 * smoothed.sigma[:, :3]).all()
     assert off.max() < 25
