@@ -86,7 +86,7 @@ def test_three_lines_free_the_rest(seed: int) -> None:
     )
     assert verdict(before) != "consistent"
     assert verdict(after) == "consistent"
-    assert error_m(before, flight) > 3 * error_m(after, flight)
+    assert error_m(before, flight) > 2 * error_m(after, flight)
     assert error_m(after, flight) < 1.1 * error_m(blanked, flight)
     assert (after.outlier[bad] == REJECTED).all()
     assert (after.outlier[~bad] < MISSING).all()

@@ -110,13 +110,15 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
 
 def _bridged(log: Observations, model: Model, starts: list[Start], fixed: bool) -> Bridged:
     """The log with curves through the gaps that are too long to bridge, and the process noise that it asks for there.
-    fixed: whether that is known."""
+    fixed: whether that is known. As it was where that diverges."""
     found = bridging.bridged(log, model, starts)
     if fixed or len(found.starts) == len(starts):
         return found
     likeliest = found.model._replace(jerk=found.model.jerk / ALLOWANCE)
     fitted = fit_profile(found.log, found.starts, likeliest, motion_models.STEPS)
-    return found._replace(model=with_allowance(found.log, fitted))
+    found = found._replace(model=with_allowance(found.log, fitted))
+    through = forward.filter_log(found.log, found.model, found.starts).state
+    return found if np.isfinite(through).all() else bridging.none(log, model, starts)
 
 
 def _with_motion(motion: Chosen, smooth: bool, model: Model) -> tuple[FilterRun, SmootherRun | None, FloatArray]:

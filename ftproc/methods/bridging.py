@@ -76,10 +76,15 @@ class Bridged(NamedTuple):
         return run._replace(sigma=sigma, los_sigma=los_sigma, path_sigma=path_sigma)
 
 
+def none(log: Observations, model: Model, starts: list[Start]) -> Bridged:
+    """The log as it is."""
+    n = len(log.time_s)
+    return Bridged(log, model, starts, np.zeros((n, 3), bool), np.zeros((n, 3, 3)), log.measurement)
+
+
 def bridged(log: Observations, model: Model, starts: list[Start]) -> Bridged:
     """The log of one station with curves through the gaps before its later starts."""
-    good = (log.weight > 0) & np.isfinite(log.measurement)
-    found = Bridged(log, model, starts, np.zeros(good.shape, bool), np.zeros((*good.shape, 3)), log.measurement)
+    good, found = (log.weight > 0) & np.isfinite(log.measurement), none(log, model, starts)
     if len(starts) < 2 or log.sites is not None:
         return found
     z, about = log.measurement.copy(), np.full(good.shape, np.nan)
@@ -91,7 +96,8 @@ def bridged(log: Observations, model: Model, starts: list[Start]) -> Bridged:
             good &= ~_edges(log, good, gap, noise)
             gap = _gap(log, good, kept[-1].sample, start.sample, stop)
         errors = None if gap is None else [_error(log, good[:, c], gap, c) for c in gap.curved]
-        if gap is None or errors is None or not all(np.isfinite(each).all() for each in errors):
+        empty = gap is None or gap.b == gap.a + 1  # without a sample that could be estimated
+        if gap is None or errors is None or empty or not all(np.isfinite(each).all() for each in errors):
             kept = [*kept, start]
             continue
         places = _curve(log, good, gap)

@@ -17,7 +17,7 @@ import numpy as np
 
 from ftproc.core import threads
 from ftproc.errors import FtprocError
-from ftproc.methods.bridging import Bridged
+from ftproc.methods import bridging
 from ftproc.quality.verdict import CONSISTENT
 from ftproc.settings import FilterSettings
 from tests.bench import logs
@@ -77,11 +77,6 @@ def _empty(*_: Any, **__: Any) -> Any:
     return []
 
 
-def _restarted(log: Any, model: Any, starts: Any) -> Any:
-    n = len(log.time_s)
-    return Bridged(log, model, starts, np.zeros((n, 3), bool), np.zeros((n, 3, 3)), log.measurement)
-
-
 TWO_PASS = f"{EDITING}.two_pass"
 RULES: dict[str, tuple[Off, ...]] = {
     "correlated noise": (Off(TWO_PASS, "allow_for_colour", _second),),
@@ -110,7 +105,7 @@ RULES: dict[str, tuple[Off, ...]] = {
     "another start": (Off(TWO_PASS, "_forgets", lambda *_: False),),
     "reassessment": (Off(TWO_PASS, "reassess", _second),),
     "turns taken for patches": (Off(TWO_PASS, "screen", _same_screen),),
-    "curves through long gaps": (Off("ftproc.methods.bridging", "bridged", _restarted),),
+    "curves through long gaps": (Off("ftproc.methods.bridging", "bridged", bridging.none),),
     "less noise": (Off(TWO_PASS, "with_less_noise", _first),),
     "allowance on the jerk": (Off(TWO_PASS, "with_allowance", _second),),
 }

@@ -25,7 +25,6 @@ from ftproc.fusion.estimation import alternatives, beside, first_track, lasting,
 from ftproc.fusion.estimation import constants as posterior
 from ftproc.fusion.estimation.constants import Constants, Said
 from ftproc.fusion.estimation.events import Events, Seen, merge, moved_to
-from ftproc.fusion.estimation.process_noise import on_knots
 from ftproc.records import FloatArray
 
 FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 18, 8
@@ -220,7 +219,7 @@ def _tuned(current: Current, jerk_psd: float | None, first: int | None) -> Curre
         if first is not None:
             model = fit_jerk(log, starts, model)
         else:
-            model = fit_profile(log, starts, on_knots(log, model), PROFILE_STEPS)
+            model = fit_profile(log, starts, motions.on_knots(log, model), PROFILE_STEPS)
     return current._replace(sigma=sigma, model=model)
 
 
@@ -255,7 +254,7 @@ def last(current: Current, names: tuple[str, ...]) -> Current:
     """The run to publish: with a little more process noise than is likeliest, and the likeliest motion. names: of the
     models of motion to choose from."""
     if math.isfinite(current.model.knot_s):
-        log, begun = current.log, on_knots(current.log, current.model)
+        log, begun = current.log, motions.on_knots(current.log, current.model)
         current = current._replace(model=with_allowance(log, fit_profile(log, [current.start], begun, LAST_STEPS)))
     current = _smoothed(_smoothed(current))
     known = np.any([np.isfinite(station.known) for station in current.stations], 0)

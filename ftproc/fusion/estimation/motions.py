@@ -17,10 +17,13 @@ from ftproc.core.filtering.forward import filter_log
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import PATHS, SmootherRun, residuals_beside, smooth_log
 from ftproc.core.identification import motion_models
+from ftproc.core.identification.profile import knot_length
+from ftproc.core.identification.scales import scales_of
 from ftproc.fusion.estimation.events import moved_to
 from ftproc.records import FloatArray, IntArray
 
 Run = TypeVar("Run", FilterRun, SmootherRun)
+OTHER_KNOTS = 1.5  # times the distance of the knots of the jerk profile, before they are laid out again
 
 
 class Motive(NamedTuple):
@@ -125,3 +128,17 @@ def filtered(log: Observations, model: Model, start: Start, state: FloatArray) -
     """The causal filter over the events of all stations. state: (n, 9) smoothed."""
     stepped = _stepped(log, model, start, state)
     return stepped.of_rows(filter_log(stepped.log, stepped.model.causal, [stepped.start]))
+
+
+def on_knots(log: Observations, model: Model) -> Model:
+    """The model with as many knots as its profile needs over the events, whose span the clocks move; farther apart or
+    closer together where the jerk has become another than the one that they were laid out for."""
+    if not math.isfinite(model.knot_s):
+        return model
+    scales = scales_of(log, model.noise_variance)
+    knot_s = knot_length(scales, float(np.median(model.jerk[:, 0])))
+    if model.knot_s / OTHER_KNOTS < knot_s < model.knot_s * OTHER_KNOTS:
+        knot_s = model.knot_s
+    middle_s = (np.arange(max(math.ceil(scales.span_s / knot_s), 1)) + 0.5) * knot_s
+    before = np.minimum((middle_s / model.knot_s).astype(int), len(model.jerk) - 1)
+    return model._replace(jerk=model.jerk[before], knot_s=knot_s)
