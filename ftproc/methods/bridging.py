@@ -4,8 +4,8 @@ A filter that coasts until the target may be anywhere linearises about a wrong p
 a measurement: with angles alone the target runs away, or turns back to the station where all motion costs little; with
 the range alone it circles. So it is started again after such a gap (`initialization`). The whole record knows where the
 target came out of it. About a curve through the gap all is linear: the track is one, and its sigmas are those of the
-motion. A component that is missing while others go on is read off that curve now and then, with the error that such
-curves have over stretches of this length where the component was measured.
+motion. A component that is missing while others go on is read off that curve, with the error that such curves have
+over stretches of this length where the component was measured.
 """
 
 from __future__ import annotations

@@ -120,3 +120,11 @@ def test_readings_at_the_edge_of_a_gap_that_belong_to_it_are_rejected():
     off = np.abs(smoothed.state[:, :3] - place)
     assert (off < 5 * smoothed.sigma[:, :3]).all()
     assert off.max() < 25
+
+
+def test_the_jerk_that_a_lost_track_asked_for_is_forgotten():
+    log, model, starts, _ = with_gap([0])
+    wild = model._replace(jerk=model.jerk.copy())
+    wild.jerk[6:9] *= 1e6
+    found = bridged(log, wild, starts)
+    np.testing.assert_array_equal(found.model.jerk, model.jerk)

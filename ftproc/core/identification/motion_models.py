@@ -66,12 +66,15 @@ class Chosen(NamedTuple):
 
     def of_rows(self, run: Run) -> Run:
         """A run over the log with its steps, of the log's own samples."""
-        if self.row is None:
-            return run
-        own: dict[str, Any] = {
-            name: each[self.row] for name, each in run._asdict().items() if isinstance(each, np.ndarray)
-        }
-        return run._replace(**own)
+        return of_rows(run, self.row)
+
+
+def of_rows(run: Run, row: IntArray | None) -> Run:
+    """A run at some of its samples; None: at all."""
+    if row is None:
+        return run
+    own: dict[str, Any] = {name: each[row] for name, each in run._asdict().items() if isinstance(each, np.ndarray)}
+    return run._replace(**own)
 
 
 def choose(

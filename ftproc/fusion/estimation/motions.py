@@ -7,7 +7,7 @@ between the events get samples without readings, which the runs that are returne
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 from ftproc.core.filtering.biases import Biased, Directions, smooth_biased
 from ftproc.core.filtering.forward import filter_log
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
-from ftproc.core.filtering.smoother import PATHS, SmootherRun, residuals_beside, smooth_log
+from ftproc.core.filtering.smoother import PATHS, residuals_beside, smooth_log
 from ftproc.core.identification import motion_models
 from ftproc.core.identification.profile import knot_length
 from ftproc.core.identification.scales import scales_of
 from ftproc.fusion.estimation.events import moved_to
 from ftproc.records import FloatArray, IntArray
 
-Run = TypeVar("Run", FilterRun, SmootherRun)
 OTHER_KNOTS = 1.5  # times the distance of the knots of the jerk profile, before they are laid out again
 
 
@@ -54,15 +53,6 @@ class _Stepped(NamedTuple):
     start: Start
     model: Model
     row: IntArray | None
-
-    def of_rows(self, run: Run) -> Run:
-        """A run over the log with its steps, of the log's own samples."""
-        if self.row is None:
-            return run
-        own: dict[str, Any] = {
-            name: each[self.row] for name, each in run._asdict().items() if isinstance(each, np.ndarray)
-        }
-        return run._replace(**own)
 
 
 def _stepped(log: Observations, model: Model, start: Start, state: FloatArray) -> _Stepped:
@@ -100,7 +90,7 @@ def smoothed(log: Observations, model: Model, start: Start, directions: Directio
     found = smooth_biased(stepped.log, stepped.model, stepped.start, directions)
     if stepped.row is not None:
         (head,) = found.run.heads
-        run = stepped.of_rows(found.run)._replace(heads=(head._replace(sample=start.sample),))
+        run = motion_models.of_rows(found.run, stepped.row)._replace(heads=(head._replace(sample=start.sample),))
         beside = found.beside[:, stepped.row] if len(found.beside) else found.beside
         found = found._replace(run=run, spread=found.spread[stepped.row], beside=beside)
     _lead_in(log, model, found, state)
@@ -127,7 +117,8 @@ def _lead_in(log: Observations, model: Model, found: Biased, state: FloatArray) 
 def filtered(log: Observations, model: Model, start: Start, state: FloatArray) -> FilterRun:
     """The causal filter over the events of all stations. state: (n, 9) smoothed."""
     stepped = _stepped(log, model, start, state)
-    return stepped.of_rows(filter_log(stepped.log, stepped.model.causal, [stepped.start]))
+    run = filter_log(stepped.log, stepped.model.causal, [stepped.start])
+    return motion_models.of_rows(run, stepped.row)
 
 
 def on_knots(log: Observations, model: Model) -> Model:
