@@ -9,7 +9,7 @@ from ftproc.core.filtering.biases import PARAMETERS
 from ftproc.files.writing import ranges
 from ftproc.fusion import logs, range_file
 from ftproc.fusion.estimation import engine, flight_faults, whole
-from ftproc.fusion.estimation.constants import Constants, Said, parameters
+from ftproc.fusion.estimation.constants import Constants, Likelihood, parameters
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate_range
 
@@ -107,9 +107,9 @@ def test_what_other_stretches_have_said_narrows_the_biases(stations):
                 for each in stations]  # fmt: skip
         return flight_faults.fuse(part, FilterSettings().gate, None, ("white-jerk",), known, lambda number: None)
 
-    nothing = Said.nothing(PARAMETERS * len(stations))
+    nothing = Likelihood.nothing(PARAMETERS * len(stations))
     first, alone = half(nothing, 0.0, 60.0), half(nothing, 60.0, 121.0)
-    second = half(engine.said(first), 60.0, 121.0)
+    second = half(engine.likelihood(first), 60.0, 121.0)
     ratio = second.constants.sigma / np.maximum(alone.constants.sigma, SILENT)
     assert ratio.max() < 1.02
     assert np.median(ratio[np.stack([each.prior for each in stations]) > 0]) < 0.9
@@ -124,14 +124,14 @@ def said_of(readings, k, seed):
     rng = np.random.default_rng(seed)
     design, truth = rng.standard_normal((readings, k)), rng.standard_normal(k)
     z = design @ truth + rng.standard_normal(readings)
-    return Said(design.T @ z, design.T @ design), design, z
+    return Likelihood(design.T @ z, design.T @ design), design, z
 
 
 def test_what_is_said_adds_up_and_can_be_taken_of_some():
     prior = np.array([[2.0, 1e-3, 1e-3, 0, 0, 0.1, 0, 0], [0, 1e-3, 2e-3, 1e-4, 1e-4, 0.0, 0, 0]])
     free = np.flatnonzero(prior.ravel() > 0)
     said, design, z = said_of(50, len(free), 1)
-    one, other = (Said(design[h].T @ z[h], design[h].T @ design[h]) for h in (slice(20), slice(20, None)))
+    one, other = (Likelihood(design[h].T @ z[h], design[h].T @ design[h]) for h in (slice(20), slice(20, None)))
     both = one.among(free, prior.size).with_(other.among(free, prior.size))
     np.testing.assert_allclose(both.information, said.among(free, prior.size).information, rtol=1e-12, atol=1e-12)
     whole_ = Constants.before(prior, both)

@@ -1,9 +1,9 @@
 """Alternative hypotheses: is it another reading, or another station, that is wrong?
 
-One patch that is believed makes the good readings of the other stations look bad, and the decisions stand still there,
+One patch that is accepted makes the good readings of the other stations look bad, and the decisions stand still there,
 because each supports the others. Where readings are rejected for a while, the decisions are made again over the
 neighbourhood alone: from those of now, from the screening, with each component and each station wrong in turn, from
-few components only, and by continuing the flight into the place from both ends; the likeliest outcome is kept. The
+few components only, and by continuing the flight into the interval from both ends; the likeliest outcome is kept. The
 biases stay.
 """
 
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ftproc.core.editing import outlier_chain, patch_likelihood
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
-from ftproc.fusion.estimation.places import Channel, Search
+from ftproc.fusion.estimation.intervals import Channel, Search
 from ftproc.records import FloatArray, IntArray
 
 TENSION, TENSION_S = 3.5, 2.0  # standard deviations of the sum of squares of so long a stretch, that are explained
@@ -30,14 +30,14 @@ RATES = np.array([0.03, 0.001, 0.93])  # isolated outlier; patch begins; goes on
 MOST_LIVE = 10  # components whose pairs and triples are tried; of more the majority decides
 LOST, FEWEST = 0.35, 12  # share rejected of a component, to be called lost; readings that a hypothesis leaves
 FREE = (50.0, 20.0, 20.0)  # m, m/s, m/s2: 1-sigma of the state where a neighbourhood begins
-MANOEUVRES = (16.0, 256.0)  # times the calm level: of manoeuvres that explain the decisions of now
-CALMER = 4.0  # times the calm level: the jerk may be so much more in a place
+MANOEUVRES = (16.0, 256.0)  # times the typical level: of manoeuvres that explain the decisions of now
+ABOVE_TYPICAL = 4.0  # times the typical level: the jerk may be so much more in an interval
 
 
 class Neighbourhood(NamedTuple):
     """A stretch of the events and what decides in it. log: with the weights of now. possible, trusted (n, 3). sigma
-    (stations, 3). inside (n,): the place itself; together: as of `Place`. start: a state at the first event. levels:
-    models to try. gate, in sigmas. reach_s: over which readings tell what comes next."""
+    (stations, 3). inside (n,): the interval itself; together: as of `Interval`. start: a state at the first event.
+    levels: models to try. gate, in sigmas. reach_s: over which readings tell what comes next."""
 
     log: Observations
     possible: FloatArray
@@ -63,18 +63,18 @@ class Outcome(NamedTuple):
     likelihood: float
 
 
-def calm_levels(model: Model, here: slice, time_s: FloatArray) -> tuple[Model, ...]:
-    """The model with the flight's calm jerk, and with that of the neighbourhood where it is much higher."""
+def typical_levels(model: Model, here: slice, time_s: FloatArray) -> tuple[Model, ...]:
+    """The model with the flight's typical jerk, and with that of the neighbourhood where it is much higher."""
     jerk = model.jerk
-    calm = np.median(jerk, 0)
-    found = [calm]
+    typical = np.median(jerk, 0)
+    found = [typical]
     if len(jerk) > 1 and math.isfinite(model.knot_s):
         knots = np.clip(((time_s[here] - time_s[0]) / model.knot_s).astype(int), 0, len(jerk) - 1)
         around = np.quantile(jerk[np.unique(knots)], 0.35, axis=0)
-        if around[0] > CALMER * calm[0]:
+        if around[0] > ABOVE_TYPICAL * typical[0]:
             found.append(around)
     else:
-        found.append(calm / 10)
+        found.append(typical / 10)
     return tuple(model._replace(jerk=level[None, :].copy(), knot_s=math.inf) for level in found)
 
 
@@ -122,15 +122,15 @@ def likeliest(near: Neighbourhood, search: Search) -> FloatArray | None:
     finalists = [now, *list(reversed(leading.values()))[:FINALISTS]]
     best = max((ways[0].settled(each) for each in finalists), key=lambda each: each.likelihood)
     best = max((way.settled(best.weight) for way in ways), key=lambda each: each.likelihood)
-    calm = ways[0].model
-    ways += [Steps(near, calm._replace(jerk=times * calm.jerk), search) for times in MANOEUVRES]
+    typical = ways[0].model
+    ways += [Steps(near, typical._replace(jerk=times * typical.jerk), search) for times in MANOEUVRES]
     standing = max(way.of(now)[0].likelihood for way in ways)
     return best.weight if best.likelihood > standing + BETTER else None
 
 
-def _tense(near: Neighbourhood, calm: Model) -> bool:
-    """Whether the readings that are used now do not fit a calm flight somewhere about the place."""
-    run = smooth_log(near.log, calm, [near.start], RESIDUALS)
+def _tense(near: Neighbourhood, typical: Model) -> bool:
+    """Whether the readings that are used now do not fit a flight at the typical level somewhere about the interval."""
+    run = smooth_log(near.log, typical, [near.start], RESIDUALS)
     squares = np.where(near.log.weight > 0, run.residual**2 / run.residual_variance, 0.0).sum(1)
     count = ((near.log.weight > 0) & np.isfinite(run.residual)).sum(1)
     time_s = near.log.time_s
@@ -165,7 +165,7 @@ def _hypotheses(near: Neighbourhood) -> Iterator[FloatArray]:
 
 
 def _live(near: Neighbourhood) -> list[Channel]:
-    """The channels that have readings in the place."""
+    """The channels that have readings in the interval."""
     return [
         (s, c)
         for s, c in itertools.product(range(len(near.sigma)), range(3))
@@ -174,12 +174,12 @@ def _live(near: Neighbourhood) -> list[Channel]:
 
 
 def _continued(near: Neighbourhood, way: Steps) -> FloatArray:
-    """Decisions (n, 3) that continue the flight into the place from both of its ends, a few seconds at a time, but not
-    through seconds in which nothing comes and nothing changes, or has not stopped to change for long."""
+    """Decisions (n, 3) that continue the flight into the interval from both of its ends, a few seconds at a time, but
+    not through seconds in which nothing comes and nothing changes, or has not stopped to change for long."""
     time_s, inside = near.log.time_s, near.inside
     first, last = time_s[inside][0], time_s[inside][-1]
     depth_s, weight, idle = 0.0, np.where(inside[:, None], 0.0, near.log.weight), 0
-    depths_s = np.minimum(time_s - first, last - time_s)  # of the readings in the place
+    depths_s = np.minimum(time_s - first, last - time_s)  # of the readings in the interval
     while first + depth_s < last - depth_s:
         new = inside & (depths_s >= depth_s) & (depths_s < depth_s + near.reach_s)
         depth_s += near.reach_s

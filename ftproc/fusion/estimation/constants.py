@@ -3,8 +3,8 @@
 The likelihood is quadratic about the biases it was linearised at (Friedland's columns, `core.filtering.biases`). A
 common shift of all clocks is the same flight a little later: the likelihood is flat along it, but not the linearised
 one, which takes the shift for jerk; so its information along that direction is taken out. Other directions of which
-the readings say next to nothing are left to the prior. Barometric heights are those of one transponder, whoever hears
-it: their offset and scale, which are common to all stations, are those of the first.
+the readings say next to nothing are left to the prior. Barometric heights are those of one transponder: their offset
+and scale, which are common to all stations that hear it, are those of the first.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ OBSERVED = 0.9  # of the prior's 1-sigma: a parameter that stays above it is not
 FARTHEST = 6.0  # prior sigmas that a bias may be off: more of it is a wrong place, clock or target
 
 
-class Said(NamedTuple):
+class Likelihood(NamedTuple):
     """What readings say of the biases in units of the prior, b (k,): their log-likelihood is, but for a constant,
     pull' b - b' information b / 2. pull (k,), information (k, k), k = m * PARAMETERS."""
 
@@ -40,27 +40,27 @@ class Said(NamedTuple):
     information: FloatArray
 
     @classmethod
-    def nothing(cls, k: int) -> Said:
+    def nothing(cls, k: int) -> Likelihood:
         """By no reading."""
         return cls(np.zeros(k), np.zeros((k, k)))
 
-    def with_(self, other: Said) -> Said:
+    def with_(self, other: Likelihood) -> Likelihood:
         """What both say."""
-        return Said(self.pull + other.pull, self.information + other.information)
+        return Likelihood(self.pull + other.pull, self.information + other.information)
 
-    def share(self, part: float) -> Said:
+    def share(self, part: float) -> Likelihood:
         """What so large a part of the readings says."""
-        return Said(part * self.pull, part * self.information)
+        return Likelihood(part * self.pull, part * self.information)
 
-    def of(self, some: IntArray) -> Said:
+    def of(self, some: IntArray) -> Likelihood:
         """What it says of some biases alone, whatever the others are."""
         covariance = np.linalg.inv(self.information + np.eye(len(self.pull)))
         inverse = np.linalg.inv(covariance[np.ix_(some, some)])
-        return Said(inverse @ (covariance @ self.pull)[some], inverse - np.eye(len(some)))
+        return Likelihood(inverse @ (covariance @ self.pull)[some], inverse - np.eye(len(some)))
 
-    def among(self, some: IntArray, k: int) -> Said:
+    def among(self, some: IntArray, k: int) -> Likelihood:
         """The same as said of k biases, of which it knows some."""
-        found = Said.nothing(k)
+        found = Likelihood.nothing(k)
         found.pull[some] = self.pull
         found.information[np.ix_(some, some)] = self.information
         return found
@@ -74,14 +74,14 @@ class Constants(NamedTuple):
     estimate: FloatArray
     covariance: FloatArray
     prior: FloatArray
-    known: Said
+    known: Likelihood
     moved: float = np.inf
     shared: IntArray = np.zeros((0, 2), np.int64)
 
     @classmethod
-    def before(cls, prior: FloatArray, known: Said | None = None) -> Constants:
-        """Before any reading, or with what others have said."""
-        known = Said.nothing(prior.size) if known is None else known
+    def before(cls, prior: FloatArray, known: Likelihood | None = None) -> Constants:
+        """Before any reading, or with what others say."""
+        known = Likelihood.nothing(prior.size) if known is None else known
         heard, prior = np.flatnonzero(prior[:, OFFSET] > 0), prior.copy()
         shared: IntArray = parameters(heard.tolist()).reshape(-1, PARAMETERS)[:, OFFSET:]
         prior.ravel()[shared[1:]] = 0.0
@@ -128,7 +128,7 @@ def parameters(stations: list[int]) -> IntArray:
 
 def update(constants: Constants, found: Biased, directions: Directions) -> Constants:
     """The posterior from a run that was linearised at the constants."""
-    known = constants.known.with_(said(constants, found, directions))
+    known = constants.known.with_(likelihood(constants, found, directions))
     estimate, covariance = _posterior(constants.prior, known, constants.shared)
     sigma = np.sqrt(np.diag(covariance)).reshape(estimate.shape)
     step = np.abs(estimate - constants.estimate)[constants.prior > 0] / sigma[constants.prior > 0]
@@ -136,7 +136,7 @@ def update(constants: Constants, found: Biased, directions: Directions) -> Const
     return constants._replace(estimate=estimate, covariance=covariance, moved=moved)
 
 
-def said(constants: Constants, found: Biased, directions: Directions) -> Said:
+def likelihood(constants: Constants, found: Biased, directions: Directions) -> Likelihood:
     """What a run that was linearised at the constants says of them."""
     prior = constants.prior.ravel()
     free = np.flatnonzero(prior > 0)
@@ -144,10 +144,10 @@ def said(constants: Constants, found: Biased, directions: Directions) -> Said:
     information, score = into.T @ found.info @ into / ALLOWANCE, into.T @ found.score / ALLOWANCE
     information, score = _without_common_clock(constants.prior, free, information, score)
     here = constants.estimate.ravel()[free] / prior[free]
-    return Said(score + information @ here, information).among(free, len(prior))
+    return Likelihood(score + information @ here, information).among(free, len(prior))
 
 
-def _posterior(prior: FloatArray, known: Said, shared: IntArray) -> tuple[FloatArray, FloatArray]:
+def _posterior(prior: FloatArray, known: Likelihood, shared: IntArray) -> tuple[FloatArray, FloatArray]:
     """Estimate (m, PARAMETERS) and covariance with the prior; of directions of which next to nothing is said, the
     prior's."""
     scale = prior.ravel()

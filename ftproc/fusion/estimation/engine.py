@@ -1,6 +1,6 @@
 """The fused flight: smoother, biases, noise, process noise and decisions in turn, until they stand still.
 
-Each round smooths the events of all stations with the readings that are believed (`core.filtering.biases`), moves the
+Each round smooths the events of all stations with the readings that are accepted (`core.filtering.biases`), moves the
 biases to their posterior, the noise of each station to what its leave-one-out residuals show, the process noise to its
 likelihood's maximum, and decides again, station by station and component by component, which readings are outliers: by
 the same hidden Markov chain as for a single log, on residuals in which all other stations take part.
@@ -21,13 +21,13 @@ from ftproc.core.identification.likelihood import fit_jerk
 from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import isotropic
-from ftproc.fusion.estimation import alternatives, beside, first_track, lasting, motions, places, screening
+from ftproc.fusion.estimation import alternatives, beside, first_track, intervals, lasting, motions, screening
 from ftproc.fusion.estimation import constants as posterior
-from ftproc.fusion.estimation.constants import Constants, Said
+from ftproc.fusion.estimation.constants import Constants, Likelihood
 from ftproc.fusion.estimation.events import Events, Seen, merge, moved_to
 from ftproc.records import FloatArray
 
-FIRST_ROUNDS, MOST_ROUNDS, LOOKS = 4, 18, 8
+FIRST_ROUNDS, MOST_ROUNDS, REASSESSMENTS = 4, 18, 8
 PROFILE_STEPS, LAST_STEPS = 2, 4
 READMITTED = 0.8  # probability of being good from which a rejected reading is used again after the first rounds
 STILL, UNMOVED = 1e-4, 0.1  # share of readings, and sigmas of the biases, that may still change
@@ -39,9 +39,9 @@ FEWEST_KEPT = 0.5  # of what screening trusts, in each component of a station
 
 
 class Current(NamedTuple):
-    """What is believed now. events, weight (rows, 3) of each station; sigma (m, 3) noise; constants; model; start;
+    """What is accepted now. events, weight (rows, 3) of each station; sigma (m, 3) noise; constants; model; start;
     found: the smoother's run that the rest belongs to; own (m, 3): the noise that each component shows alone;
-    rounds, settled: of the decisions; unexamined: places where no work was left to look for other hypotheses; steps:
+    rounds, settled: of the decisions; unexamined: intervals where no work was left to look for other hypotheses; steps:
     that were taken out of the readings; motion: of the model."""
 
     stations: list[Seen]
@@ -72,7 +72,7 @@ class Alone(Exception):
 
 
 def settled(
-    readings: lasting.Readings, gate: float, jerk_psd: float | None, known: Said, progress: Callable[[int], None]
+    readings: lasting.Readings, gate: float, jerk_psd: float | None, known: Likelihood, progress: Callable[[int], None]
 ) -> Current:
     """The flight of readings without faults that last, when the decisions stand still. Raises Alone."""
     stations = readings.stations
@@ -84,13 +84,13 @@ def settled(
     trusted = [screening.agreeing(s, each, track) for s, each in zip(stations, screened, strict=True)]
     prior = np.stack([station.prior for station in stations])
     current = _begin(stations, screened, trusted, track, Constants.before(prior, known), gate, jerk_psd)
-    looks, search = 0, places.Search(sum(len(s.time_s) for s in stations))
+    reassessed, search = 0, intervals.Search(sum(len(s.time_s) for s in stations))
     for number in range(MOST_ROUNDS):
         progress(number)
         level = number if number < FIRST_ROUNDS else None
         current = _round(current, trusted, gate, jerk_psd, level)
-        if number >= FIRST_ROUNDS - 1 and looks < LOOKS and (current.settled or number % 2):
-            looks += 1
+        if number >= FIRST_ROUNDS - 1 and reassessed < REASSESSMENTS and (current.settled or number % 2):
+            reassessed += 1
             current, changed = _reassessed(current, trusted, gate, search)
             if not changed and current.settled:
                 break
@@ -143,31 +143,31 @@ def _round(
 
 
 def _reassessed(
-    current: Current, trusted: list[FloatArray], gate: float, search: places.Search
+    current: Current, trusted: list[FloatArray], gate: float, search: intervals.Search
 ) -> tuple[Current, bool]:
-    """The decisions replaced by likelier ones where another hypothesis explains a place better; whether any was."""
+    """The decisions replaced by likelier ones where another hypothesis explains an interval better; whether any was."""
     events, log = current.events, current.log
-    possible, believed, weight = events.gathered(current.possible), events.gathered(trusted), log.weight.copy()
+    possible, accepted, weight = events.gathered(current.possible), events.gathered(trusted), log.weight.copy()
     state = current.found.run.state
     memory_s = scales_of(log, current.model.noise_variance).memory_s(float(np.median(current.model.jerk[:, 0])))
-    margin = places.margin_s(events.time_s, memory_s)
+    margin = intervals.margin_s(events.time_s, memory_s)
     changed = False
     search.begin(float(np.median(current.model.jerk[:, 0])))
-    for place in places.find(log, possible):
-        if not search.take(place):
+    for interval in intervals.find(log, possible):
+        if not search.take(interval):
             continue
-        ends = np.searchsorted(events.time_s, [place.first_s - margin, place.last_s + margin])
+        ends = np.searchsorted(events.time_s, [interval.first_s - margin, interval.last_s + margin])
         here = slice(max(int(ends[0]), current.start.sample), int(ends[1]))
-        inside = (events.time_s[here] >= place.first_s - places.EDGE_S) & (
-            events.time_s[here] <= place.last_s + places.EDGE_S
+        inside = (events.time_s[here] >= interval.first_s - intervals.EDGE_S) & (
+            events.time_s[here] <= interval.last_s + intervals.EDGE_S
         )
         if not inside.any():
             continue
         start = Start(0, state[here.start], np.diag(np.repeat(alternatives.FREE, 3) ** 2))
         near = alternatives.Neighbourhood(
-            log.part(here)._replace(weight=weight[here]), possible[here], believed[here], current.sigma, inside,
-            place.together, start, alternatives.calm_levels(current.model, here, events.time_s), gate,
-            margin / places.MARGIN_MEMORIES,
+            log.part(here)._replace(weight=weight[here]), possible[here], accepted[here], current.sigma, inside,
+            interval.together, start, alternatives.typical_levels(current.model, here, events.time_s), gate,
+            margin / intervals.MARGIN_MEMORIES,
         )  # fmt: skip
         found = alternatives.likeliest(near, search)
         if found is not None:
@@ -176,8 +176,8 @@ def _reassessed(
     if not changed:
         return current, False
     by_station = [np.where(each.accepted, 1.0, events.of(s, weight)) for s, each in enumerate(current.stations)]
-    calm = median_level(current.model) if math.isfinite(current.model.knot_s) else current.model
-    return _smoothed(current._replace(weight=by_station, model=calm, settled=False)), True
+    at_median = median_level(current.model) if math.isfinite(current.model.knot_s) else current.model
+    return _smoothed(current._replace(weight=by_station, model=at_median, settled=False)), True
 
 
 def _decided(current: Current, trusted: list[FloatArray], gate: float, first: int | None) -> Current:
@@ -228,9 +228,9 @@ def _smoothed(current: Current) -> Current:
     return at(current, posterior.update(current.constants, current.found, _directions_of(current)))
 
 
-def said(current: Current) -> Said:
+def likelihood(current: Current) -> Likelihood:
     """What the readings say of the biases."""
-    return posterior.said(current.constants, current.found, _directions_of(current))
+    return posterior.likelihood(current.constants, current.found, _directions_of(current))
 
 
 def _directions_of(current: Current) -> Directions:

@@ -21,19 +21,19 @@ from ftproc.core.identification.profile import roughness
 from ftproc.core.work import for_lasting_faults
 from ftproc.fusion.estimation import beside, clock_jumps, engine, lasting
 from ftproc.fusion.estimation.clock_jumps import Jump
-from ftproc.fusion.estimation.constants import Said
+from ftproc.fusion.estimation.constants import Likelihood
 from ftproc.fusion.estimation.engine import Alone, Current
 from ftproc.fusion.estimation.events import Seen
 from ftproc.fusion.estimation.lasting import Readings
 
-LASTING_ROUNDS = 3  # of looking for faults that last: where one is taken out, another may show
+LASTING_ROUNDS = 3  # of the search for faults that last: where one is taken out, another may show
 NOISIER, REJECTED = 2.0, 0.2  # times the noise that a component shows alone, and share of its readings that are
 # rejected: more is a fault of its station, or of another
 Settle = Callable[[Readings], Current]
 
 
 def fuse(
-    stations: list[Seen], gate: float, jerk_psd: float | None, names: tuple[str, ...], known: Said,
+    stations: list[Seen], gate: float, jerk_psd: float | None, names: tuple[str, ...], known: Likelihood,
     progress: Callable[[int], None],
 ) -> Current:  # fmt: skip
     """The fused flight, or a stretch. names: of the models of motion to choose from. known: what others have said.
@@ -62,7 +62,7 @@ def _with_even_clocks(readings: Readings, settle: Settle) -> tuple[Readings, Cur
     """The readings without the jumps of clocks that are likelier than none, and their flight."""
     current = settle(readings)
     for _ in range(LASTING_ROUNDS):
-        if not _is_astray(current):
+        if not _has_diverged(current):
             break
         least = score(current) + MARGIN - PRIOR + math.log(len(current.events.time_s))
         tried = _without_jumps(readings, current, settle)
@@ -73,7 +73,7 @@ def _with_even_clocks(readings: Readings, settle: Settle) -> tuple[Readings, Cur
     return readings, current
 
 
-def _is_astray(current: Current) -> bool:
+def _has_diverged(current: Current) -> bool:
     """Whether the stations contradict each other more than their noise explains."""
     if current.unexamined or lasting.contradicted(current.stations, current.weight):
         return True

@@ -72,9 +72,9 @@ def find(decided: Decided, gate: float, jerk_known: bool, work: Work) -> list[Fo
         rows = np.flatnonzero(events.station == s)
         taken_in[rows] = with_even_runs(log.weight[rows], possible[rows], decided.residual[rows], sigma[s])
     setting = Setting(events.time_s, late_of(log, decided.state), events.station)
-    calm = median_level(decided.model)
+    at_median = median_level(decided.model)
     scene = Scene(
-        log, possible, taken_in, setting, calm, jerk_known, decided.rates, gate, decided.residual, decided.state,
+        log, possible, taken_in, setting, at_median, jerk_known, decided.rates, gate, decided.residual, decided.state,
         decided.sigma, work,
     )  # fmt: skip
     return [each for each in search(scene) if each.gain > MARGIN]

@@ -1,4 +1,4 @@
-"""What is believed of a station's readings before there is a fused track: what each component says alone, and then
+"""What is accepted of a station's readings before there is a fused track: what each component says alone, and then
 what a first track does not contradict."""
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from ftproc.core.editing import screened
 from ftproc.core.editing.copies import without_copies
 from ftproc.core.filtering.records import Model
 from ftproc.core.model import stations as geometry
-from ftproc.fusion.estimation import alternatives, places
+from ftproc.fusion.estimation import alternatives, intervals
 from ftproc.fusion.estimation.events import CLOCK, Events, Seen
 from ftproc.fusion.estimation.first_track import Track
 from ftproc.records import FloatArray
@@ -88,7 +88,7 @@ def with_biases(events: Events, stations: list[Seen], state: FloatArray, sigma: 
 
 def first_decisions(whole: alternatives.Neighbourhood) -> tuple[Model, FloatArray]:
     """The likeliest model and decisions (n, 3) of a whole flight, from the weights of its log."""
-    search = places.Search(0)
+    search = intervals.Search(0)
     ends = [(alternatives.Steps(whole, model, search).settled(whole.log.weight), model) for model in whole.levels]
     best, model = max(ends, key=lambda each: each[0].likelihood)
     return model, best.weight

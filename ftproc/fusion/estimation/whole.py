@@ -21,7 +21,7 @@ from ftproc.core.model import kinematics
 from ftproc.core.model.stations import levelled
 from ftproc.fusion.estimation import engine, flight_faults, motions
 from ftproc.fusion.estimation.beside import Aside, expected
-from ftproc.fusion.estimation.constants import FARTHEST, Constants, Said, parameters
+from ftproc.fusion.estimation.constants import FARTHEST, Constants, Likelihood, parameters
 from ftproc.fusion.estimation.engine import Current
 from ftproc.fusion.estimation.events import CLOCK, Seen
 from ftproc.fusion.estimation.lasting import Step
@@ -47,9 +47,9 @@ class Fused(NamedTuple):
     """By station, row for row with its log: weight and possible (rows, 3), leave-one-out residual and residual_variance
     (rows, 3), position (rows, 3) of the track in m. noise (m, 3) 1-sigma, own (m, 3) the noise that each component
     shows alone; axes (m, 3, 3) with the tilts; jerk (k, 3) each for knot_s seconds; rounds, settled: of the decisions;
-    unexamined: places where no work was left to look for other hypotheses; steps: that were taken out; beside: of each
-    station by name, what it measures beside its readings; motions: of each stretch the motion that was chosen, its gain
-    there, and for how many rows; last: the last state of a ballistic motion, with its model."""
+    unexamined: intervals for which no work was left; steps: that were taken out; beside: of each station by name, what
+    it measures beside its readings; motions: of each stretch the motion that was chosen, its gain there, and for how
+    many rows; last: the last state of a ballistic motion, with its model."""
 
     stations: list[Seen]
     weight: list[FloatArray]
@@ -75,14 +75,14 @@ class Fused(NamedTuple):
 
 class Stretch(NamedTuple):
     """A part of the flight as it has been decided on. rows: of each station, with those beside. seen: the stations that
-    have any. said: what the part, without those beside, says of the biases of all."""
+    have any. likelihood: of the biases of all, by the part without those beside."""
 
     first_s: float
     stop_s: float
     rows: list[slice]
     seen: list[int]
     current: Current
-    said: Said
+    likelihood: Likelihood
 
 
 def fuse(
@@ -102,7 +102,7 @@ def fuse(
         rows = _rows(stations, times, edges[k], edges[k + 1])
         seen = [s for s, part in enumerate(rows) if part.stop > part.start]
         there = [_part(stations[s], rows[s]) for s in seen]
-        known = _said(found, prior.size)
+        known = _likelihood(found, prior.size)
         say = functools.partial(_say, progress, k * engine.MOST_ROUNDS, (len(edges) - 1) * engine.MOST_ROUNDS)
         try:
             current = flight_faults.fuse(there, gate, jerk_psd, names, known.of(parameters(seen)), say)
@@ -113,10 +113,12 @@ def fuse(
             del edges[min(k + 1, len(edges) - 2)]
             continue
         inside = np.diff(np.searchsorted(current.events.time_s, edges[k : k + 2]))[0] / len(current.events.time_s)
-        said = engine.said(current).share(float(inside)).among(parameters(seen), prior.size)
+        likelihood = engine.likelihood(current).share(float(inside)).among(parameters(seen), prior.size)
         kept = current if len(edges) == 2 else without_run(current)
-        found.append(Stretch(edges[k], edges[k + 1], rows, seen, kept, said))
-    constants = Constants.before(prior, _said(found, prior.size)) if len(found) > 1 else found[0].current.constants
+        found.append(Stretch(edges[k], edges[k + 1], rows, seen, kept, likelihood))
+    constants = found[0].current.constants
+    if len(found) > 1:
+        constants = Constants.before(prior, _likelihood(found, prior.size))
     return _joined(stations, found, constants, smooth)
 
 
@@ -141,8 +143,8 @@ def _part(station: Seen, rows: slice) -> Seen:
     )
 
 
-def _said(found: list[Stretch], k: int) -> Said:
-    return functools.reduce(Said.with_, (each.said for each in found), Said.nothing(k))
+def _likelihood(found: list[Stretch], k: int) -> Likelihood:
+    return functools.reduce(Likelihood.with_, (each.likelihood for each in found), Likelihood.nothing(k))
 
 
 def _say(progress: Callable[[int, int], None], before: int, most: int, number: int) -> None:
