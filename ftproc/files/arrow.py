@@ -43,9 +43,16 @@ def nan_as_missing(column: pa.ChunkedArray) -> pa.ChunkedArray:
 
 
 def _from_numpy(values: NDArray[Any]) -> pa.Array:
-    """An Arrow array over the memory of a (n,) array of float64, int64 or uint8."""
+    """An Arrow array over the memory of a (n,) array of float64, int64 or uint8; or the same of bool or text."""
     import pyarrow as pa
 
+    if values.dtype.kind == "U":
+        cells = [cell.encode() for cell in values.tolist()]
+        ends = np.cumsum([0, *map(len, cells)]).astype(np.int32)
+        return pa.StringArray.from_buffers(len(cells), pa.py_buffer(ends), pa.py_buffer(b"".join(cells)))
+    if values.dtype.kind == "b":
+        bits = pa.py_buffer(np.packbits(values, bitorder="little"))
+        return pa.Array.from_buffers(pa.bool_(), len(values), [None, bits])
     kinds = {"f8": pa.float64(), "i8": pa.int64(), "u1": pa.uint8()}
     plain = np.ascontiguousarray(values)
     return pa.Array.from_buffers(kinds[plain.dtype.str[1:]], len(plain), [None, pa.py_buffer(plain)])

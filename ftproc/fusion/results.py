@@ -139,25 +139,16 @@ def edited_alone(found: Trajectory, log: MeasurementLog) -> pa.Table:
 
 def biases(constants: Constants, names: list[str]) -> pa.Table:
     """A row for each parameter that was not known beforehand."""
-    import pyarrow as pa
-
-    rows = [
-        (
-            name,
-            parameter,
-            constants.estimate[s, j],
-            constants.sigma[s, j],
-            constants.prior[s, j],
-            constants.observable[s, j],
-        )
-        for s, name in enumerate(names)
-        for j, parameter in enumerate(posterior.NAMES)
-        if constants.prior[s, j] > 0
-    ]
-    columns: list[Any] = list(zip(*rows, strict=True)) if rows else [()] * 6
-    kinds = (pa.string(), pa.string(), pa.float64(), pa.float64(), pa.float64(), pa.bool_())
-    titles = ("station", "parameter", "estimate", "sigma", "prior_sigma", "observable")
-    return pa.table([pa.array(c, k) for c, k in zip(columns, kinds, strict=True)], names=titles)
+    station, parameter = np.nonzero(constants.prior > 0)
+    figures = {"estimate": constants.estimate, "sigma": constants.sigma, "prior_sigma": constants.prior}
+    return arrow.table(
+        {
+            "station": np.array(names)[station],
+            "parameter": np.array(posterior.NAMES)[parameter],
+            **{name: each[station, parameter] for name, each in figures.items()},
+            "observable": constants.observable[station, parameter],
+        }
+    )
 
 
 class Places(NamedTuple):
