@@ -1,8 +1,9 @@
 """The flight of several stations, and what is wrong with one of them: settled, faults proposed, settled without them.
 
 Where a settled flight has more noise than its components show alone, or rejects many readings, each station is left
-out, and a jump of its clock is proposed by the track of the others. The likeliest flight without one is kept, if it is
-likelier than the flight with it. All other faults that last are weighed on the settled flight (`lasting`).
+out, and a jump of its clock is proposed by the track of the others, if these agree. The likeliest flight without one is
+kept, if it is likelier than the flight with it. All other faults that last are weighed on the settled flight
+(`lasting`).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from ftproc.core.editing.lasting.curves import CLOCK
 from ftproc.core.editing.lasting.search import MARGIN, PRIOR
 from ftproc.core.editing.patch_likelihood import log_probability_of_all
+from ftproc.core.identification.motion_models import WHITE
 from ftproc.core.identification.profile import roughness
 from ftproc.core.work import for_lasting_faults
 from ftproc.fusion.estimation import beside, clock_jumps, engine, lasting
@@ -54,6 +56,8 @@ def fuse(
         if lasting.contradicted(without.stations, without.weight):
             break
         current = without._replace(steps=readings.steps)
+    if WHITE in names and _contradict(current):
+        names = (WHITE,)  # no motion can be told
     current = engine.last(beside.fitted(current, gate, lambda each: engine.at(each, each.constants)), names)
     return current._replace(unexamined=current.unexamined + work.passed)
 
@@ -62,7 +66,7 @@ def _with_even_clocks(readings: Readings, settle: Settle) -> tuple[Readings, Cur
     """The readings without the jumps of clocks that are likelier than none, and their flight."""
     current = settle(readings)
     for _ in range(LASTING_ROUNDS):
-        if not _has_diverged(current):
+        if not (_contradict(current) or _rejects_many(current)):
             break
         least = score(current) + MARGIN - PRIOR + math.log(len(current.events.time_s))
         tried = _without_jumps(readings, current, settle)
@@ -73,15 +77,19 @@ def _with_even_clocks(readings: Readings, settle: Settle) -> tuple[Readings, Cur
     return readings, current
 
 
-def _has_diverged(current: Current) -> bool:
-    """Whether the stations contradict each other more than their noise explains."""
-    if current.unexamined or lasting.contradicted(current.stations, current.weight):
-        return True
-    rejected = (
+def _contradict(current: Current) -> bool:
+    """Whether the stations that take part contradict each other more than their noise explains."""
+    noisier = bool((current.sigma > NOISIER * current.own).any())
+    taking_part = [s for s, each in enumerate(current.possible) if each.any()]
+    stations, weight = [current.stations[s] for s in taking_part], [current.weight[s] for s in taking_part]
+    return bool(current.unexamined) or noisier or lasting.contradicted(stations, weight)
+
+
+def _rejects_many(current: Current) -> bool:
+    return any(
         (np.where(each > 0, 1 - weight, 0.0).sum(0) > REJECTED * each.sum(0)).any()
         for each, weight in zip(current.possible, current.weight, strict=True)
     )
-    return bool((current.sigma > NOISIER * current.own).any()) or any(rejected)
 
 
 def _without_jumps(readings: Readings, current: Current, settle: Settle) -> Iterator[tuple[int, Jump, Current]]:
@@ -90,6 +98,8 @@ def _without_jumps(readings: Readings, current: Current, settle: Settle) -> Iter
         banned = [np.ones_like(each) if k == s else each for k, each in enumerate(readings.banned)]
         with contextlib.suppress(Alone):
             others = settle(readings._replace(banned=banned))
+            if _contradict(others):
+                continue  # it is one of these
             jump = clock_jumps.propose(station, current.own[s], others.events.time_s, others.found.run.state)
             if jump is not None and jump.gain > MARGIN:
                 yield s, jump, settle(_without(readings, s, jump))
