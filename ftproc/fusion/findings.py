@@ -99,6 +99,7 @@ def component_figures(fused: Fused, s: int) -> dict[str, Any]:
             "good": int(used.sum()),
             "rejected": int((seen & ~used).sum()),
             "missing": int((~seen).sum()),
+            **faults.copies(station.copied[c]),
             f"noise_{unit}": float(fused.noise[s, c]) * scale,
             "residual_ratio": float(np.sqrt(squares.mean())) if len(squares) else None,
         }
@@ -138,18 +139,20 @@ def remarks(fused: Fused, zero_s: float) -> list[Remark]:
 def _clocks(fused: Fused) -> Iterator[Remark]:
     prior = fused.constants.prior[:, CLOCK]
     if len(prior) > 1 and not prior.any():
-        yield Remark(
-            CONSISTENT, "all clocks are taken as exact (clock_offset_sigma_s = 0 everywhere): none is estimated"
-        )
-    elif (prior > 0).all():
-        text = (
-            "no clock is the reference (clock_offset_sigma_s = 0): the time of all is known as well as the best of them"
-        )
+        text = "all clocks are taken as exact (clock_offset_sigma_s = 0 everywhere): none is estimated"
         yield Remark(CONSISTENT, text)
+    elif (prior > 0).all():
+        text = "no clock is the reference (clock_offset_sigma_s = 0): the time of all is known as well as"
+        yield Remark(CONSISTENT, f"{text} the best of them")
 
 
 def _beside(fused: Fused) -> Iterator[Remark]:
-    """What was done with what stands beside the readings."""
+    """What was done with copies, and with what stands beside the readings."""
+    for station in fused.stations:
+        for c in station.components:
+            measured = int(np.isfinite(station.measurement[:, c]).sum())
+            for text in faults.copies_in_words(station.names[c], faults.copies(station.copied[c]), measured):
+                yield Remark(CONSISTENT, f"{station.name}: {text}")
     for station, sides in zip(fused.stations, fused.beside, strict=False):
         for each in sides.values():
             if each.side.why:
@@ -191,11 +194,9 @@ def _scattered(fused: Fused) -> Iterator[Remark]:
     for s, station in enumerate(fused.stations):
         times = max((fused.noise[s, c] / fused.own[s, c] for c in station.components), default=0.0)
         if times > SCATTERED:
-            yield Remark(
-                SUSPECT,
-                f"{station.name} contradicts the others: its readings scatter about the fused trajectory by "
-                f"{times:.0f} times their own noise; check its place, its clock and its conventions",
-            )
+            text = f"{station.name} contradicts the others: its readings scatter about the fused trajectory by "
+            text += f"{times:.0f} times their own noise; check its place, its clock and its conventions"
+            yield Remark(SUSPECT, text)
 
 
 def _correlated(fused: Fused) -> Iterator[Remark]:

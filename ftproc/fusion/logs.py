@@ -9,6 +9,7 @@ from datetime import datetime
 
 import numpy as np
 
+from ftproc.core.editing.copies import without_copies
 from ftproc.core.model.earth import Geodetic
 from ftproc.core.model.frames import wrap
 from ftproc.errors import InputError
@@ -68,10 +69,12 @@ def as_seen(
         prior = np.concatenate([prior, of_heights])
         stated = instrument.options.get("noise") or (None, None, None)
         time_s = np.array(log.time_s) + shift - zero
+        z, kind = without_copies(time_s, z, accepted)
+        copied = np.stack([np.bincount(each, minlength=4) for each in kind.T])
         seen.append(
             Seen(
                 instrument.name, time_s, z, instrument.place, instrument.axes, prior, np.array(stated, float), accepted,
-                sides, instrument.times, instrument.away_m,
+                sides, instrument.times, instrument.away_m, copied,
             )
         )  # fmt: skip
     return seen, zero

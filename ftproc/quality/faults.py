@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ftproc.files.moments import Moments
-from ftproc.records import COMPONENTS, FloatArray, MeasurementLog
+from ftproc.records import COMPONENTS, FloatArray, IntArray, MeasurementLog
 
 if TYPE_CHECKING:
     from ftproc.core.editing.lasting.faults import Faults
@@ -57,8 +57,7 @@ class FaultStatistics:
 
     def of_component(self, c: int) -> dict[str, int]:
         """How many readings of a component were not measured."""
-        held, interpolated, computed = (int(count) for count in self.copies[c, 1:])
-        return {"held": held, "interpolated": interpolated, "computed": computed}
+        return copies(self.copies[c])
 
 
 def clock_set_back(log: MeasurementLog) -> dict[str, float] | None:
@@ -106,14 +105,23 @@ def suspicious(s: Mapping[str, Any]) -> Iterator[str]:
 def allowed_for(s: Mapping[str, Any]) -> Iterator[str]:
     """The faults of a summary that cost readings only."""
     for name, part in s["components"].items():
-        measured = part["good"] + part["isolated"] + part["patch"]
-        rate = f"these count as missing, and {measured} readings are left"
-        if part["held"]:
-            yield f"{name} repeats the reading before in {part['held']} rows: {rate}"
-        if part["interpolated"]:
-            yield f"{name} is interpolated between other readings in {part['interpolated']} rows: {rate}"
-        if part["computed"]:
-            yield f"{name} has no noise in {part['computed']} rows, as if a tracker coasts: {rate}"
+        yield from copies_in_words(name, part, part["good"] + part["isolated"] + part["patch"])
+
+
+def copies(count: IntArray) -> dict[str, int]:
+    """Readings (kinds,) that were not measured, see `core.editing.copies`, by kind."""
+    return dict(zip(("held", "interpolated", "computed"), map(int, count[1:]), strict=True))
+
+
+def copies_in_words(name: str, part: Mapping[str, int], measured: int) -> Iterator[str]:
+    """What of a component was not measured. part: how many readings are of each kind; measured: are left."""
+    rate = f"these count as missing, and {measured} readings are left"
+    if part["held"]:
+        yield f"{name} repeats the reading before in {part['held']} rows: {rate}"
+    if part["interpolated"]:
+        yield f"{name} is interpolated between other readings in {part['interpolated']} rows: {rate}"
+    if part["computed"]:
+        yield f"{name} has no noise in {part['computed']} rows, as if a tracker coasts: {rate}"
 
 
 def step_in_words(step: Mapping[str, Any], s: Mapping[str, Any]) -> str:

@@ -58,7 +58,7 @@ class Seen(NamedTuple):
     the offset m and the scale; zero for what is known. known: (3,) noise 1-sigma that the user specified, else NaN.
     accepted: (n, 3) readings that are good by hand. beside: what else it measures. times: (n,) of the noise's variance,
     by row, where the log states it. away_m: how far from the target a place is that positions are seen from, zero for a
-    tracker."""
+    tracker. copied: (3, kinds) readings of each component that were not measured, see `copies`; these are missing."""
 
     name: str
     time_s: FloatArray
@@ -71,6 +71,7 @@ class Seen(NamedTuple):
     beside: tuple[Side, ...] = ()
     times: FloatArray | None = None
     away_m: float = 0.0
+    copied: IntArray = np.zeros((3, 4), np.int64)
 
     @property
     def names(self) -> tuple[str, ...]:

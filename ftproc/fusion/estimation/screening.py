@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing import screened
-from ftproc.core.editing.copies import without_copies
 from ftproc.core.filtering.records import Model
 from ftproc.core.model import stations as geometry
 from ftproc.fusion.estimation import alternatives, intervals
@@ -35,7 +34,7 @@ class Screened(NamedTuple):
 
 def screen(station: Seen, banned: NDArray[np.bool_]) -> Screened:
     """A station alone. banned: (rows, 3) readings of patches."""
-    z, _ = without_copies(station.time_s, np.where(banned, np.nan, station.measurement))
+    z = np.where(banned, np.nan, station.measurement)
     weight, sigma, least = np.isfinite(z).astype(float), np.ones(3), screened.rounding_sigma(z)
     for c in station.components:
         channel = np.ascontiguousarray(z[:, c])
