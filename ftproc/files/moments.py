@@ -11,6 +11,7 @@ from ftproc.files import leap_seconds
 from ftproc.records import FloatArray
 
 DAY_S = 86_400.0
+NO_ZONE = "the timestamps name no time zone and are taken for UTC"  # a doubt about a log's clock
 NEAR_ZERO_S = 1.0  # a log that begins so near to its time zero counts from its first row
 
 

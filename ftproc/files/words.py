@@ -27,22 +27,23 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
         utctod utcseconds timestamputc unixtimestamp excel exceldate exceltime missiontime ts met
         missionelapsedtime gmt gmttime localtime timecode ticks filetime secondsaftermidnight
         secondspastmidnight secondssincemidnight secspastmidnight secpastmidnight secsaftermidnight
-        timepastmidnight timeaftermidnight timesincemidnight utcofposition zeit uhrzeit temps heure tiempo
+        timepastmidnight timeaftermidnight timesincemidnight utcofposition timez zulutime
+        zeit uhrzeit temps heure tiempo
         hora tempo ora czas tid tijd cas zaman время час 时间 時間 時刻 时刻 시간
         """
     ),
     "range": _split(
         """
         range r slantrange sr rng rho slrange slrng slantrng srange srng entfernung schragentfernung
-        schragdistanz schragdist schraegentfernung schraegdistanz schraegdist distanceoblique
-        distanciainclinada distanciaobliqua egikmesafe egikmenzil дальность наклоннаядальность
+        schragdistanz schragdist schragstrecke schraegstrecke schraegentfernung schraegdistanz schraegdist
+        distanceoblique distanciainclinada distanciaobliqua egikmesafe egikmenzil дальность наклоннаядальность
         дальністьпохила дальність 斜距 斜距离 斜距離 경사거리
         """
     ),
     "azimuth": _split(
         """
         azimuth az a azimuthangle azangle azim azi azmth bearing brg azimut acimut azymut azimute gisement
-        baring peilung азимут пеленг 方位角 方位 방위각
+        baring peilung seitenwinkel азимут пеленг 方位角 方位 방위각
         """
     ),
     "elevation": _split(
@@ -84,13 +85,18 @@ WEAK_ALIASES: Mapping[str, tuple[str, ...]] = {
         """
     ),
     "azimuth": _split(
-        "theta hz richtung horizontalangle horizontaldirection hzangle hangle ha horangle horizangle аз β"
+        """
+        theta hz hr richtung horizontalwinkel horizontalrichtung horizontalangle horizontaldirection hzangle hangle ha
+        horangle horizangle аз β
+        """
     ),
-    "elevation": _split("v verticalangle vertangle vangle va elv alt altitude site depression depressionangle ум ε"),
+    "elevation": _split(
+        "v vertikalwinkel verticalangle vertangle vangle va elv alt altitude site depression depressionangle ум ε"
+    ),
 }
 
 #: Weak aliases that need a unit, because alone they are a height, a place or anything.
-ONLY_BY_UNIT = ("alt", "altitude", "site", "d", "β", "ε")
+ONLY_BY_UNIT = ("alt", "altitude", "site", "d", "hr", "z", "vz", "β", "ε")
 
 #: Names of angles of which none says whether it is the azimuth, and from where the other one counts.
 EITHER_ANGLE = ("theta", "phi", "pan", "tilt")
@@ -101,8 +107,8 @@ GERMAN = frozenset(_split("zeit uhrzeit entfernung schragentfernung schragdistan
 #: Names of zenith angles, which are 90 degrees minus the elevation.
 ZENITH_ALIASES = _split(
     """
-    zenith zenithangle zenithdistance zen zd za zendist zenang zenithdist zenit zenitdistanz zenitwinkel coelevation
-    coelevationangle offzenithangle offzenith colatitude зенитноерасстояние 天顶距
+    z vz zenith zenithangle zenithdistance zen zd za zendist zenang zenithdist zenit zenitdistanz zenitwinkel
+    coelevation coelevationangle offzenithangle offzenith colatitude зенитноерасстояние 天顶距
     """
 )
 
@@ -114,7 +120,7 @@ QUALIFIERS = frozenset(
     _split(
         """
     measured meas raw obs observed target tgt track trk radar sensor tracker polar value angle reading laser
-    instrument theodolite the true los look to from corrected station angular
+    instrument theodolite anchor aoa rot rotor rotator antenna ant the true los look to from corrected station angular
     """
     )
 )
@@ -127,7 +133,7 @@ NOT_UNITS = frozenset(
     mode sd var variance rms outlier velocity speed vel doppler acc cmd command commanded offset corr lag
     correction width beamwidth max min ground horizontal cov uncertainty idx index count no number code lock
     signal power servo encoder counts raw true truth
-    filt filtered smooth smoothed sac sic cat category fl typ len trn tn
+    filt filtered smooth smoothed pred predicted prediction sac sic cat category fl typ len trn tn
     """
     )
 )
@@ -143,7 +149,7 @@ OTHER_THINGS = frozenset(
     id sensor sensorid station code mode squawk icao callsign target track trackid number no index idx count
     date day month year hour minute min second sec hours minutes
     snr rcs db power amplitude mag magnitude temp temperature pressure humidity voltage battery quality status flag
-    fl flightlevel
+    fl flightlevel pred predicted prediction cmd command commanded
     """
     )
 )

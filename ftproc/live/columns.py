@@ -18,7 +18,7 @@ from ftproc.errors import InputError
 from ftproc.files import conventions
 from ftproc.files.options import parse_columns, parse_units, parse_widths
 from ftproc.files.reading import converting, further, understanding
-from ftproc.files.reading.clocks import numeric
+from ftproc.files.reading.clocks.growing import Stamps
 from ftproc.files.reading.formats import layout
 from ftproc.files.reading.formats.csvtext import MISSING_WORDS
 from ftproc.files.reading.further import Further
@@ -154,6 +154,7 @@ class _Table(NamedTuple):
     given: Station
     station: Station
     rate: Further | None
+    stamps: Stamps
 
     @classmethod
     def of(cls, source: str, text: layout.Layout, head: Sequence[str], recipe: Recipe) -> _Table:
@@ -173,7 +174,7 @@ class _Table(NamedTuple):
             raise conventions.axis_question(source, found["azimuth"].name)
         widths = parse_widths(recipe.widths)
         rate = further.rate_of(names, text.units, parse_units(recipe.units), parse_columns(recipe.columns))
-        return cls(source, names, text.separator, widths, above, found, recipe.station, station, rate)
+        return cls(source, names, text.separator, widths, above, found, recipe.station, station, rate, Stamps())
 
     def read(self, block: Block) -> Rows:
         """(n, 5) in SI units as the instrument counts, see `Reader.read`."""
@@ -195,12 +196,12 @@ class _Table(NamedTuple):
 
     def _numbers(self, block: Block) -> Rows:
         """(n, 5) in the units of the log."""
-        rows: list[list[float]] = []
-        fault = None
+        rows, fault = list[list[float]](), None
         try:
-            for number, line in enumerate(block.texts, block.first):
-                if (cells := self._cells(line)) is not None:
-                    rows.append(self._row(number, cells))
+            each = [(number, self._cells(line)) for number, line in enumerate(block.texts, block.first)]
+            time, width = self.found["time"].position, len(self.names)
+            moments = self.stamps.seconds([cells[time] for _, cells in each if cells and len(cells) == width])
+            rows += (self._row(number, cells, moments) for number, cells in each if cells is not None)
         except InputError as error:
             fault = error
         return np.array(rows, float).reshape(-1, RATE + 1), fault
@@ -215,7 +216,7 @@ class _Table(NamedTuple):
             return None
         return cells
 
-    def _row(self, number: int, cells: Sequence[str]) -> list[float]:
+    def _row(self, number: int, cells: Sequence[str], moments: Mapping[str, float]) -> list[float]:
         where = f"{self.source}: line {number}"
         if len(cells) != len(self.names):
             what = "cell" if len(cells) == 1 else "cells"
@@ -232,7 +233,7 @@ class _Table(NamedTuple):
             if column is None or (text := cells[column.position]) in _MISSING:
                 continue
             try:
-                row[k] = float(text)
+                row[k] = moments[text] if k == 0 and text in moments else float(text)
             except ValueError:
                 raise InputError(
                     f'{where}: the {quantity} is "{text[:40]}", which is no number; expected a number of '
@@ -247,13 +248,15 @@ class _Table(NamedTuple):
 
     def check_clock(self, rows: Block) -> None:
         """Raise InputError for times that the reader of complete logs does not take for numbers in one unit."""
-        if said := self._other_clock(self._numbers(rows)[0][:, 0]):
+        said = self._other_clock(self._numbers(rows)[0][:, 0])
+        self.stamps.begin_again()
+        if said:
             raise InputError(said)
 
     def _other_clock(self, times: FloatArray) -> str:
         """What is wrong with times (n,) in the unit of the log, which are no numbers in one unit; or ""."""
         column, known = self.found["time"], np.isfinite(times)
-        clock = numeric.read(times, column)
+        clock = self.stamps.clock(times, column)
         if not known.any() or clock.notes or (clock.time_s == column.unit.to_si(times))[known].all():
             return ""
         unit = next((word for word in re.findall(r"\w+", clock.words) if word in UNITS["time"] and word != "s"), "")
@@ -265,8 +268,9 @@ class _Table(NamedTuple):
 
     def remarks(self) -> Iterator[str]:
         """What is assumed, or follows from the names."""
-        bare = [quantity for quantity, column in self.found.items() if not column.unit_is_stated]
-        for remark in schema.remarks(self.names, self.found, timestamps=False):
+        stamps = bool(self.stamps.pattern)
+        bare = [q for q, column in self.found.items() if not (column.unit_is_stated or (stamps and q == "time"))]
+        for remark in schema.remarks(self.names, self.found, stamps):
             other = ",".join(f"{quantity}={_OTHERS[quantity]}" for quantity in bare)
             yield f"{remark}; state others with --units, such as --units {other}" if bare else remark
             bare = []
@@ -284,7 +288,7 @@ class _Table(NamedTuple):
         quantities = {quantity: readings[:, k] for k, quantity in enumerate(QUANTITIES) if quantity in self.found}
         unit = self.found["time"].unit
         times = readings[:, 0] * unit.divide / unit.multiply
-        clock = numeric.read(times, self.found["time"])
+        clock = self.stamps.clock(times, self.found["time"])
         try:
             judged = converting.judged(self.source, quantities, self.found, clock, self.given).found
         except InputError as error:

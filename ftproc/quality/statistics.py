@@ -10,7 +10,7 @@ import numpy as np
 from ftproc.core.components import any_of, sums, totals
 from ftproc.core.impact import heights
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
-from ftproc.files.reading.clocks.times import NO_ZONE
+from ftproc.files.moments import NO_ZONE
 from ftproc.methods.estimate import ASSUMED_READING, typical_interval
 from ftproc.order_statistics import median
 from ftproc.quality import consistency, verdict
@@ -39,7 +39,7 @@ class RunStatistics:
     def __init__(self, log: MeasurementLog, absent: Sequence[int], height: Common | None = None) -> None:
         self.log, self.absent, self.height = log, absent, height
         self.range_rate: RangeRate | None = None
-        self.zone_stated = NO_ZONE[0] not in log.understood.get("doubts", ())
+        self.zone_stated = NO_ZONE not in log.understood.get("doubts", ())
         self.every = 1 + (len(log) - 1) // MOST_KEPT
         self.interval_s = typical_interval(log.time_s)
         self.components = [Component(self.every) for _ in COMPONENTS]

@@ -153,3 +153,20 @@ def test_a_wrong_file_gets_the_right_command(run, flight, name, content, sentenc
 def test_a_trajectory_is_no_log(run, flight):
     assert run("filter", "flight.csv").code == 0
     assert "this is a trajectory that ftproc wrote, no log: ftproc score" in run("filter", "flight.trajectory.csv").err
+
+
+@pytest.mark.parametrize(
+    ("head", "stamp", "stands"),
+    [
+        ("Time,", "2026-06-14T15:32:{:02d},", False),
+        ("Time,", "2026-06-14T15:32:{:02d}Z,", True),
+        ("Time (UTC),", "2026-06-14 15:32:{:02d},", True),
+        ("Date,Clock,", "14.06.2026,15:32:{:02d},", False),
+        ("Date,UTC,", "14.06.2026,15:32:{:02d},", True),
+    ],
+)
+def test_utc_stands_there_only_where_the_zone_is_known(run, here, head, stamp, stands):
+    rows = "".join(f"{stamp.format(k)}{1000 + 9 * k},{0.1 + 0.01 * k},0.2\n" for k in range(40))
+    Path("log.csv").write_text(f"{head}range_m,azimuth_rad,elevation_rad\n{rows}")
+    assert run("filter", "log.csv", "-o", "out.csv").code == 0
+    assert ("time_utc" in Path("out.csv").read_text()) == stands

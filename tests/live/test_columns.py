@@ -155,3 +155,25 @@ def test_range_rates_are_read_as_in_a_complete_log(tmp_path, name, options, expe
     whole = logs.read(tmp_path / "a.csv", **recipe.reading())
     if whole.range_rate is not None:
         np.testing.assert_allclose(whole.range_rate, expected)
+
+
+@pytest.mark.parametrize(
+    "stamp",
+    ["2026-06-14T23:59:{:02d}.500", "14.06.2026 23:59:{:02d}.500", "23:59:{:02d}.500", "2026-06-14 23:59:{:02d},500Z"],
+)
+@pytest.mark.parametrize("at_once", [1, 2, 100])
+def test_moments_are_those_of_the_complete_log(tmp_path, stamp, at_once):
+    stamps = [stamp.format(57 + k) for k in range(3)]
+    stamps += [each.replace("23:59:57", "00:00:01").replace("14", "15", 1) for each in stamps[:1]]
+    text = "Time;R;A;E\n" + "".join(f"{each};{1000 + k};0.1;0.2\n" for k, each in enumerate(stamps))
+    (tmp_path / "a.csv").write_text(text)
+    complete = logs.read(tmp_path / "a.csv")
+    readings, fault, _ = followed(text, at_once=at_once)
+    assert fault is None
+    np.testing.assert_array_equal(readings[:, 0], complete.time_s)
+
+
+def test_a_cell_that_is_no_moment_like_the_others_is_a_fault():
+    readings, fault, _ = followed("Time;R\n14.06.2026 15:32:10.000;1000\n14.06.2026 25:32:11;1010\n")
+    assert len(readings) == 1
+    assert "line 3: the time is" in str(fault)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ftproc.files.moments import NO_ZONE
 from ftproc.files.reading.clocks import joint, numeric, times
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning import readings, schema
-from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.numbers import Origin, finite, without_thousands
 from ftproc.files.reading.meaning.values import deciding, ways
 from ftproc.records import FloatArray
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _LOCAL = frozenset(("local", "localtime", "lt", "ortszeit", "lokalzeit"))
+_UTC = frozenset(("utc", "gmt", "zulu", "utcdate", "utctime", "dateutc", "timeutc", "utcdatetime", "datetimeutc", "z"))
 
 Found = Mapping[str, schema.Column]
 
@@ -78,14 +79,18 @@ def _converted(header: TableHeader, found: Found, columns: list[pa.ChunkedArray]
 
 
 def _of_a_zone(clock: Clock, column: schema.Column) -> Clock:
-    """Without an epoch if the times are local ones and name no zone: they are no UTC."""
-    local = bool(_LOCAL & set(re.findall(r"[a-z]+", taken_apart(column.name).text.lower())))
-    zoned = len(column.roles) == 1 and not set(times.NO_ZONE) & set(clock.doubts)
-    if not clock.epoch or not local or zoned:
+    """Without an epoch if the times are local ones and name no zone: they are no UTC; with a doubt if nothing names a
+    zone."""
+    words = set(re.findall(r"[a-z]+", column.name.lower()))
+    of_parts = len(column.roles) > 1 and "week" not in column.roles
+    zoned = not of_parts and NO_ZONE not in clock.doubts
+    if not clock.epoch or zoned:
         return clock
-    doubts = tuple(doubt for doubt in clock.doubts if doubt not in times.NO_ZONE)
-    doubt = f'"{column.name}" is a local time without its zone, so there is no time_utc'
-    return clock._replace(epoch="", doubts=(*doubts, doubt))
+    doubts = tuple(doubt for doubt in clock.doubts if doubt != NO_ZONE)
+    if _LOCAL & words:
+        doubt = f'"{column.name}" is a local time without its zone, so there is no time_utc'
+        return clock._replace(epoch="", doubts=(*doubts, doubt))
+    return clock._replace(doubts=doubts if _UTC & words else (*doubts, NO_ZONE))
 
 
 def _origin(header: TableHeader, column: schema.Column) -> Origin:

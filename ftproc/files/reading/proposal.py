@@ -34,6 +34,7 @@ _COUNTERS = ("", *"nik", *("no", "nr", "num", "number", "row", "index", "idx", "
 _ROWS = 2000
 _MOST_COLUMNS, _MOST_TRIED, _SHOWN = 60, 7, 8
 _RISES = 0.98  # of the steps of a time are forward
+_MOST_OF_A_MINUTE = 45  # s, of which seconds of arc take all values
 _CLEARLY = 10.0  # times likelier than any other choice
 _STRAIGHT, _LEAST_TURN_RAD = 0.3, 0.03  # a path that no wrong choice gives, seen from a side
 _TURNED_RAD, _GONE = 0.09, 0.05  # or a path that is bent, of which angles and range change so much
@@ -80,7 +81,9 @@ def _proposed(header: TableHeader, free: Sequence[int], found: Mapping[str, Sequ
     table = header.load([], indices).slice(0, _ROWS)
     cells = {index: table.column(k) for k, index in enumerate(indices)}
     numbers = {index: values for index, column in cells.items() if (values := _values(column, header)) is not None}
+    joined = _of_minutes(numbers)
     seen = "; ".join(_shown(header, index, cells[index], numbers.get(index)) for index in indices[:_SHOWN])
+    cells = {index: cells[index] for index in cells if not {index - 1, index - 2} & joined}
     times = [tuple(found["time"])] if "time" in found else list(_times(header, cells, numbers))
     if "time" not in found and found:  # only the time is sought
         only = [index for index in times if len(index) == 1]
@@ -90,7 +93,24 @@ def _proposed(header: TableHeader, free: Sequence[int], found: Mapping[str, Sequ
         return Proposal(seen=seen)
     time, columns = best
     clock = "+".join(named(header.names[index], index) for index in time)
-    return Proposal(answer(header.names, columns, "" if "time" in found else clock), seen)
+    return Proposal(answer(header.names, columns, "" if "time" in found else clock, joined), seen)
+
+
+def _of_minutes(numbers: dict[int, FloatArray]) -> set[int]:
+    """The columns of degrees before columns of minutes and seconds; their values become those of all three."""
+    found = set()
+    for index in sorted(numbers):
+        parts = [numbers[index + k] for k in range(3) if index + k in numbers]
+        if len(parts) < 3 or not np.isfinite(parts).all():
+            continue
+        degrees, minutes, seconds = parts
+        whole = all((part == np.round(part)).all() for part in (degrees, minutes))
+        below = all(((part >= 0) & (part < 60)).all() for part in (minutes, seconds))
+        if whole and below and np.ptp(seconds) > _MOST_OF_A_MINUTE:
+            numbers[index] = degrees + np.where(np.signbit(degrees), -1, 1) * (minutes + seconds / 60) / 60
+            del numbers[index + 1], numbers[index + 2]
+            found.add(index)
+    return found
 
 
 def _times(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ftproc.files import leap_seconds
+from ftproc.files.moments import NO_ZONE
 from ftproc.files.writing import tables
 from ftproc.records import MeasurementLog, Trajectory
 
@@ -12,11 +13,12 @@ COLUMN = "time_utc"
 
 
 def stamped(trajectory: Trajectory, log: MeasurementLog) -> Trajectory:
-    """The trajectory with the column `time_utc` (microseconds, UTC) if its log's clock is known, else unchanged.
+    """The trajectory with the column `time_utc` (microseconds, UTC) if its log's clock and zone are known, else
+    unchanged.
 
     Raises UsageError if a kept column already has the name.
     """
-    if not log.epoch or not len(log):
+    if not log.epoch or not len(log) or NO_ZONE in log.understood.get("doubts", ()):
         return trajectory
     import pyarrow as pa
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ftproc.errors import InputError
 from ftproc.files import arrow, leap_seconds
+from ftproc.files.moments import NO_ZONE
 from ftproc.files.reading.clocks import notations, numeric
 from ftproc.files.reading.clocks.clock import DAY_S, HOUR_S, Clock, unrolled
 from ftproc.files.reading.meaning.numbers import Origin, as_text, not_a_number, numbers, parsed, without_text
@@ -30,7 +31,6 @@ _COUNTED = (  # whole cells: from the start of a flight, and with a unit
     r"^(?P<number>[+-]?\d+\.?\d*)\s*(?P<unit>[A-Za-z]+)$",
 )
 _MOST_OF_A_YEAR = 360  # days
-NO_ZONE = ("the timestamps name no time zone and are taken for UTC",)
 
 
 def read(column: pa.ChunkedArray, origin: Origin, described: Column) -> Clock:
@@ -62,7 +62,7 @@ def read(column: pa.ChunkedArray, origin: Origin, described: Column) -> Clock:
 
 def _on_gps(clock: Clock, described: Column) -> Clock:
     """A clock of timestamps without a zone, in UTC although the name of the column says that they are in GPS time."""
-    if described.key not in ("gpst", "gpstime", "timegps") or not clock.epoch or NO_ZONE[0] not in clock.doubts:
+    if described.key not in ("gpst", "gpstime", "timegps") or not clock.epoch or NO_ZONE not in clock.doubts:
         return clock
     start = np.datetime64(clock.epoch.removesuffix("Z"), "s")
     ahead = int(leap_seconds.before(start.astype("datetime64[D]").astype(np.int64)))
@@ -118,7 +118,7 @@ def stamped(text: pa.ChunkedArray, origin: Origin) -> Clock:
     if stamps is not None:
         time_s, epoch = since_midnight(stamps, origin)
         zoned = stamps.type.tz is not None
-        return Clock(time_s, epoch, STAMPED, doubts=() if zoned else NO_ZONE)
+        return Clock(time_s, epoch, STAMPED, doubts=() if zoned else (NO_ZONE,))
     fits = notations.matching(text, notations.STAMPS)
     if not fits:
         raise _no_time(text, origin)
@@ -130,7 +130,7 @@ def stamped(text: pa.ChunkedArray, origin: Origin) -> Clock:
         whole, notes = unrolled(moments.second, HOUR_S if words == "minutes and seconds" else DAY_S)
         return Clock(whole, "", f"{words}, in s since midnight", notes)
     doubts: tuple[str, ...] = () if sure else ("day and month cannot be told apart, so the date is left open",)
-    doubts += () if moments.zoned or not (moments.dated and sure) else NO_ZONE
+    doubts += () if moments.zoned or not (moments.dated and sure) else (NO_ZONE,)
     clock = counted(moments.day, moments.second, moments.dated and sure, f"{words}, in s since 00:00 of the first day")
     return clock._replace(doubts=doubts)
 

@@ -263,7 +263,7 @@ def _searched(source: str, data: bytes, widths: Sequence[int]) -> tuple[CsvText,
     texts = [line.decode("utf-8", "replace") for line in lines[::2]]
     found = layout.find(texts, widths)
     if found is None:
-        names, delimiter, start = layout.first_line(source, data)
+        names, delimiter, start = _first_line(source, data)
         return CsvText(source, names, delimiter, memoryview(b""), False), start
     start = sum(map(len, lines[: 2 * found.first]))
     names = [name.strip() for name in found.names]
@@ -272,6 +272,26 @@ def _searched(source: str, data: bytes, widths: Sequence[int]) -> tuple[CsvText,
     parts += ["a row of units" if found.row_of_units else "units stated above the table"] if found.units else []
     text = CsvText(source, names, found.separator, memoryview(b""), False, widths=widths, units=found.units)
     return text._replace(form=", ".join(parts)), start
+
+
+def _first_line(source: str, data: bytes) -> tuple[list[str], str, int]:
+    """Names and separator of a file in which no line is like a row: of its first line."""
+    found = layout.LINE.match(data)
+    assert found is not None
+    line = found[1].decode("utf-8", "replace")
+    delimiter = max(",;\t", key=line.count)  # the comma if there is none
+    try:
+        names = [name.strip() for name in next(csv.reader([line], delimiter=delimiter))]
+    except (csv.Error, StopIteration) as error:
+        raise InputError(
+            f"{source}: the header line cannot be read as CSV ({error}); correct it, or delete the lines before it."
+        ) from error
+    if len(names) == 1 and re.search(r"\S[ |]+\S", names[0]):
+        raise InputError(
+            f'{source}: the header line "{line[:80]}" has no separator, and no line looks like a row of a log; '
+            "separate the cells with commas, semicolons or tabs."
+        )
+    return names, delimiter, found.end()
 
 
 def _spans_lines(cells: list[str]) -> bool:

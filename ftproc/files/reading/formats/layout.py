@@ -13,7 +13,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ftproc.errors import InputError
+from ftproc.files.reading.meaning import parts
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.preamble import units_stated
 from ftproc.files.units import unit_named
@@ -164,6 +164,8 @@ def _with_names(
         if cells is not None and _is_units(cells) and index:
             units, index = cells, index - 1
     names = None if index < 0 else _heading(lines[filled[index]], separator, width, block, widths)
+    split_up = parts.under(_over_columns(lines[filled[index]], block, width), units) if units and not widths else None
+    names, units = split_up or (names, units)
     if names is not None and sum(bool(_CELL.fullmatch(_NUMBERED.sub("", name))) for name in names) > len(names) / 2:
         names = None
     names = _enumerated([lines[number] for number in filled[:top]], width) or names
@@ -267,11 +269,9 @@ def _stacked(over: Sequence[str], block: Sequence[str], width: int) -> list[str]
 
 def _above_columns(line: str, block: Sequence[str], width: int) -> list[str]:
     """The words above each column of numbers, "" where there are none; nothing if the rows do not line up."""
-    spans = [[(m.start(), m.end()) for m in re.finditer(r"\S+", row)] for row in block]
-    spans = [row for row in spans if len(row) == width]
-    if not spans:
+    middles = _middles(block, width)
+    if not middles:
         return []
-    middles = [sum(low + high for low, high in column) / (2 * len(spans)) for column in zip(*spans, strict=True)]
     cells: list[list[str]] = [[] for _ in range(width)]
     for word in re.finditer(r"\S+", line):
         behind = bisect.bisect(middles, centre := (word.start() + word.end()) / 2)
@@ -280,21 +280,14 @@ def _above_columns(line: str, block: Sequence[str], width: int) -> list[str]:
     return [" ".join(words) for words in cells]
 
 
-def first_line(source: str, data: bytes) -> tuple[list[str], str, int]:
-    """Names and separator of a file in which no line is like a row: of its first line."""
-    found = LINE.match(data)
-    assert found is not None
-    line = found[1].decode("utf-8", "replace")
-    delimiter = max(",;\t", key=line.count)  # the comma if there is none
-    try:
-        names = [name.strip() for name in next(csv.reader([line], delimiter=delimiter))]
-    except (csv.Error, StopIteration) as error:
-        raise InputError(
-            f"{source}: the header line cannot be read as CSV ({error}); correct it, or delete the lines before it."
-        ) from error
-    if len(names) == 1 and re.search(r"\S[ |]+\S", names[0]):
-        raise InputError(
-            f'{source}: the header line "{line[:80]}" has no separator, and no line looks like a row of a log; '
-            "separate the cells with commas, semicolons or tabs."
-        )
-    return names, delimiter, found.end()
+def _over_columns(line: str, block: Sequence[str], width: int) -> list[str]:
+    """The words, two blanks apart from others, that are nearest to each column; nothing if the rows do not line up."""
+    over = {(found.start() + found.end()) / 2: found[0] for found in re.finditer(r"\S+(?: \S+)*", line)}
+    return [over[min(over, key=lambda centre: abs(centre - middle))] for middle in _middles(block, width) if over]
+
+
+def _middles(block: Sequence[str], width: int) -> list[float]:
+    """The middle of each column of numbers, in characters; nothing if the rows do not line up."""
+    spans = [[(m.start(), m.end()) for m in re.finditer(r"\S+", row)] for row in block]
+    spans = [row for row in spans if len(row) == width]
+    return [sum(low + high for low, high in column) / (2 * len(spans)) for column in zip(*spans, strict=True)]

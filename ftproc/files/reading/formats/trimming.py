@@ -99,7 +99,11 @@ def _sentences(whole: bytes, names: Sequence[str], separator: str, widths: Seque
     if not len(letters) or letters.max() < ord("A"):  # digits and marks only
         return []
     starts = np.flatnonzero(letters == ord("\n")) + 1
-    first = letters[starts[starts < len(letters)]]
+    begins = starts[starts < len(letters)]
+    if separator == layout.BLANKS:  # which rows may begin with too
+        filled = np.flatnonzero(letters != ord(" "))
+        begins = filled[np.searchsorted(filled[:-1], begins)]
+    first = letters[begins]
     odd = starts[: len(first)][np.isin(first | 0x20, _LETTERS) | (first == ord("*")) | (first == ord("-"))]
     if not 0 < len(odd) <= _FEW * len(starts):
         return []
@@ -109,7 +113,8 @@ def _sentences(whole: bytes, names: Sequence[str], separator: str, widths: Seque
         assert line is not None
         text = line[1].decode("utf-8", "replace")
         cells = layout.split(text, separator)
-        if len(cells) != len(names) and not layout.is_data(cells) and re.match(r"[\W_]*[^\W\d_]{2}", text):
+        other = len(cells) != len(names) or (separator == layout.BLANKS and not re.search(r"\d|nan", text, re.I))
+        if other and not layout.is_data(cells) and re.match(r"[\W_]*[^\W\d_]{2}", text):
             found.append((start, line.end()))
     return found
 
@@ -131,8 +136,8 @@ def _has_comments(whole: bytes) -> bool:
 def _repeated_names(whole: bytes, names: Sequence[str], separator: str, widths: Sequence[int]) -> list[tuple[int, int]]:
     """Where the names stand once more among the rows, as on each page of a printout or in files that were put together;
     with the lines around them that are no rows."""
-    first = names[0].encode()
-    if not first or names[0].isdigit() or first not in whole:
+    first = next(filter(None, names), "").encode()
+    if not first or first.isdigit() or first not in whole:
         return []
     found: list[tuple[int, int]] = []
     bare = _bare("".join(names))

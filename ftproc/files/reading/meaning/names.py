@@ -78,8 +78,7 @@ class Name(NamedTuple):
 
     def means(self, quantity: str) -> int:
         """0: not this quantity; 1: by one of its names; 2: by a name that other things have too."""
-        unit = unit_named(quantity, self.unit) if self.unit else None
-        if self.foreign or (self.unit and unit is None) or (self.stem in ONLY_BY_UNIT and unit is None):
+        if self.foreign or ((self.unit or self.stem in ONLY_BY_UNIT) and not self.is_in_a_unit_of(quantity)):
             return 0
         for rank, aliases in ((1, ALIASES), (2, WEAK_ALIASES)):
             if self.stem in aliases[quantity]:
@@ -96,8 +95,13 @@ class Name(NamedTuple):
 
     def is_zenith(self) -> bool:
         """Whether it names zenith angles."""
-        core = self.core()
-        return not self.foreign and bool({self.stem, core} & set(ZENITH_ALIASES))
+        alone = self.stem not in ONLY_BY_UNIT or self.is_in_a_unit_of("elevation")
+        return not self.foreign and alone and bool({self.stem, self.core()} & set(ZENITH_ALIASES))
+
+    def is_in_a_unit_of(self, quantity: str) -> bool:
+        """Whether its unit, or a notation of degrees, is one of the quantity."""
+        packed = quantity in QUANTITIES[2:] and "dd" in self.notation
+        return packed or bool(self.unit and unit_named(quantity, self.unit))
 
 
 @functools.lru_cache(maxsize=4096)

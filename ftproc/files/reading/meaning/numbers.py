@@ -225,6 +225,8 @@ def as_text(column: pa.ChunkedArray) -> pa.ChunkedArray:
         cells = [None if cell is None else str(cell) for cell in _in_python(column)]
         column = pa.chunked_array([pa.array(cells, pa.string())])
     trimmed = pc.utf8_trim_whitespace(column)
+    if _has(trimmed, '"'):  # quoted between blanks
+        trimmed = pc.replace_substring_regex(trimmed, '^"\\s*([^"]*?)\\s*"$', r"\1")
     return pc.if_else(pc.is_in(trimmed, pa.array(MISSING_WORDS, trimmed.type)), None, trimmed)
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 
-from ftproc.files.reading.meaning.names import Name
+from ftproc.files.reading.meaning.names import Name, taken_apart
 from ftproc.files.words import ALIASES, WEAK_ALIASES
 
 _SECONDS_OF_WEEK = frozenset(
@@ -30,6 +31,7 @@ FRACTIONS = {
         ("ns", "nsec", "nsecs", "nanos", "nanosec", "nanosecs", "nanosecond", "nanoseconds", "tvnsec"), "ns"
     ),
 }
+_OF_CLOCK = frozenset(word for role in ("hour", "minute", "second") for word in _TIME[role])
 _PREFIXES = ("utc", "gps", "gmt")  # of the names of parts, such as UTC_HH
 #: Times that do not count from a midnight, and parts of one.
 _ELAPSED = frozenset([*_TIME["second"], "t", "elapsed", "elapsedtime", "elapsedseconds", "missiontime"])
@@ -39,6 +41,25 @@ _ANGLE = {
     "min": ("m", "min", "mins", "minute", "minutes", "'", "mm", "arcmin"),
     "sec": ("s", "sec", "secs", "second", "seconds", '"', "ss", "arcsec"),
 }
+
+
+def under(groups: Sequence[str], units: Sequence[str]) -> tuple[list[str], list[str]] | None:
+    """Names and units of columns, some of which are parts of what stands over several: `AZIMUTH` over `DEG MIN SEC`,
+    `ZULU TIME` over `HH MM SS.SSS`; None unless a column of minutes follows one of degrees or hours. groups: what
+    stands over each column. units: the words under it."""
+    words = [unit.lower().strip("()[]").partition(".")[0] for unit in units]
+    larger = {*_ANGLE["deg"], *_TIME["hour"]}
+    if not all(groups) or not any(a in larger and b in _ANGLE["min"] for a, b in itertools.pairwise(words)):
+        return None
+    clock = [bool({*taken_apart(group).words} & {*ALIASES["time"]}) and word in _OF_CLOCK
+             for group, word in zip(groups, words, strict=True)]  # fmt: skip
+    return (
+        [
+            word if of else f"{group} {unit}" if groups.count(group) > 1 else group
+            for group, unit, word, of in zip(groups, units, words, clock, strict=True)
+        ],
+        ["" if of else unit for unit, of in zip(units, clock, strict=True)],
+    )
 
 
 def found(quantity: str, names: Mapping[int, Name]) -> dict[str, int] | None:

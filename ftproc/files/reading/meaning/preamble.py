@@ -1,4 +1,4 @@
-"""Units that lines above a table state: `Range unit: ft`, `# Units: time=s, range=ft`."""
+"""Units that lines above a table state: `Range unit: ft`, `# Units: time=s, range=ft`, `# range [mm], Hz [deg]`."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ _PAIRS = (  # the first that finds any
     re.compile(rf"{_NAME}\s*(?:[=:;,|\t(\[]+|\b(?:in|is|are)\b)\s*{_STATED}"),
     re.compile(rf"{_NAME}\s+{_STATED}"),
 )
+_IN_BRACKETS = re.compile(rf"{_NAME}\s*[\[(](?P<unit>[^\])]{{1,20}})[\])]")
+_SEVERAL = 2  # names with units in brackets in one line, which needs no word for units
 _MOST_LINES, _LONGEST = 200, 300  # that are searched: above the table, and characters of one
 _GROUPS = {
     **dict.fromkeys(("angle", "angles", "winkel"), QUANTITIES[2:]),
@@ -26,7 +28,7 @@ _GROUPS = {
 def units_stated(above: Sequence[str], names: Sequence[str]) -> list[str]:
     """The unit of each column that the lines above the table state, "" where none; nothing if they state none."""
     apart = [taken_apart(name) for name in names]
-    short = [line for line in above[-_MOST_LINES:] if len(line) <= _LONGEST and _UNIT.search(line)]
+    short = [line for line in above[-_MOST_LINES:] if len(line) <= _LONGEST]
     stated = {quantity: unit for line in short for quantity, unit in _pairs(line).items()}
     units = ["" if name.unit or name.notation else _of(name, stated) for name in apart]
     return units if any(units) else []
@@ -34,18 +36,21 @@ def units_stated(above: Sequence[str], names: Sequence[str]) -> list[str]:
 
 def _pairs(line: str) -> dict[str, str]:
     """The quantities of a line and their units as written."""
-    for pattern in _PAIRS:
-        found = {
-            quantity: pair["unit"]
-            for pair in pattern.finditer(_UNIT.sub(" ", line))
-            for word in re.split(r"\s+and\s+|\s*[&/]\s*", pair["name"])
-            for name in (taken_apart(word),)
-            for quantity in _GROUPS.get(name.stem, filter(name.means, QUANTITIES))
-            if unit_named(quantity, pair["unit"])
-        }
-        if found:
-            return found
-    return {}
+    if not _UNIT.search(line):
+        found = _found(_IN_BRACKETS, line)
+        return found if len(found) >= _SEVERAL else {}
+    return next(filter(None, (_found(pattern, _UNIT.sub(" ", line)) for pattern in _PAIRS)), {})
+
+
+def _found(pattern: re.Pattern[str], line: str) -> dict[str, str]:
+    return {
+        quantity: pair["unit"]
+        for pair in pattern.finditer(line)
+        for word in re.split(r"\s+and\s+|\s*[&/]\s*", pair["name"])
+        for name in (taken_apart(word),)
+        for quantity in _GROUPS.get(name.stem, filter(name.means, QUANTITIES))
+        if unit_named(quantity, pair["unit"])
+    }
 
 
 def _of(name: Name, stated: Mapping[str, str]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from ftproc.errors import InputError, nearest, quoted
@@ -10,7 +10,7 @@ from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
 from ftproc.files.reading.meaning.names import Name, taken_apart
 from ftproc.files.units import UNITS, unit_named
-from ftproc.files.words import ALIASES, EITHER_ANGLE, NOT_UNITS, QUANTITIES
+from ftproc.files.words import ALIASES, EITHER_ANGLE, NOT_UNITS, OTHER_THINGS, QUANTITIES
 
 #: Words of NOT_UNITS with which a column may still be the quantity.
 _OF_THE_QUANTITY = frozenset(["true", "corr", "raw", "ref"])
@@ -34,9 +34,12 @@ def named(name: str, index: int) -> str:
     return name if plain else str(index + 1)
 
 
-def answer(names: Sequence[str], columns: Mapping[str, int], time: str = "") -> str:
-    """`--columns range=RNG,azimuth=3`, as a shell takes it. time: its columns, such as 1+2."""
-    each = [*([f"time={time}"] if time else []), *(f"{q}={named(names[index], index)}" for q, index in columns.items())]
+def answer(names: Sequence[str], columns: Mapping[str, int], time: str = "", joined: Collection[int] = ()) -> str:
+    """`--columns range=RNG,azimuth=3`, as a shell takes it. time: its columns, such as 1+2. joined: those of degrees
+    with minutes and seconds in the two columns behind them."""
+    behind = {index: range(index, index + 3 if index in joined else index + 1) for index in columns.values()}
+    each = [f"time={time}"] if time else []
+    each += (f"{q}={'+'.join(named(names[k], k) for k in behind[index])}" for q, index in columns.items())
     return f"--columns {quoted(','.join(each))}"
 
 
@@ -83,9 +86,11 @@ def refuse_alike(source: str, apart: Sequence[Name], free: Sequence[int], quanti
     other = NOT_UNITS - _OF_THE_QUANTITY
     for index in free if quantity != "time" else ():
         name = apart[index]
-        words = set(name.words)
+        words = {name.stem, *name.words}
         either = quantity != "range" and name.core() in EITHER_ANGLE
-        if not name.foreign and (either or (known & words and not other & words)):
+        another = words & OTHER_THINGS or name.is_zenith() or any(name.means(each) for each in QUANTITIES)
+        alike = known & words or (name.is_in_a_unit_of(quantity) and not another)
+        if not name.foreign and (either or (alike and not other & words)):
             say = answer([each.text for each in apart], {quantity: index})
             raise InputError(
                 f'{source}: column "{name.text}" may be the {quantity}. Say {say}, or '

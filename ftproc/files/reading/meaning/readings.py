@@ -3,11 +3,13 @@ in the cells, degrees, minutes and seconds in one column or three."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ftproc.files import arrow
 from ftproc.files.reading.meaning.numbers import (
     Origin,
     as_text,
@@ -51,6 +53,7 @@ _DMS = (
     r"(?:(?P<sec>\d{1,2}(?:[.,]\d*)?)\s*(?:\"|''|”|″|s)?)?)?$"
 )
 _WITH_UNIT = r"^(?P<number>[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[A-Za-z°º]+)$"
+_PACKED = re.compile(r"d+m+s+f*")  # notations of degrees, minutes and seconds in the digits of one number
 _MOST_TURN = 720.0  # deg
 _MOST_WORDS = 3  # that stand for missing numbers in one column
 
@@ -78,7 +81,11 @@ def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) 
             text, words = _without_words(text, described)
             column = text
             if parsed(text, origin.decimal_comma) is None:
-                found = _degrees(text, origin, described) or _with_units(text, origin, described)
+                found = (
+                    _hundreds(text, described)
+                    or _degrees(text, origin, described)
+                    or _with_units(text, origin, described)
+                )
                 if found is None:
                     raise origin.first_bad_cell(text, not_a_number(text, origin.decimal_comma))
                 return found._replace(notes=(*words, *found.notes))
@@ -91,7 +98,7 @@ def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) 
     if described.key in DEPRESSIONS:
         values = -values
         words += (f'"{described.name}" counts downwards and is turned round',)
-    if described.notation in ("dms", "ddmmss", "dddmmss", "dmmss") and described.quantity != "range":
+    if _PACKED.fullmatch(described.notation) and described.quantity != "range":
         return Readings(_from_digits(values), _in_degrees(described), words)
     return Readings(values, described, words)
 
@@ -213,6 +220,18 @@ def _degrees(text: pa.ChunkedArray, origin: Origin, described: Column) -> Readin
         row = int(np.argmax(wrong))
         raise origin.bad_cell(row, str(text[row]), "an angle in degrees, minutes and seconds")
     return Readings(_joined(sign, degrees, minutes, seconds), _in_degrees(described))
+
+
+def _hundreds(text: pa.ChunkedArray, described: Column) -> Readings | None:
+    """The angles of a column of mils whose hundreds stand apart, as gunners write them: 12-45; None if it is none."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    fields = pc.extract_regex(text, pattern=r"^(?P<sign>[+-]?)(?P<hundreds>\d{1,2})-(?P<rest>\d\d)$")
+    if not described.unit.name.startswith("mil") or fields.null_count > text.null_count:
+        return None
+    digits = pc.binary_join_element_wise(*(pc.struct_field(fields, k) for k in range(3)), "")
+    return Readings(arrow.to_numpy(digits.cast(pa.float64())), described)
 
 
 def _with_units(text: pa.ChunkedArray, origin: Origin, described: Column) -> Readings | None:

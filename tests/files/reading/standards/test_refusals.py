@@ -43,7 +43,10 @@ NOT_A_LOG = {
         "MSG,3,1,1,3C660C,1,2024/05/31,12:00:00.0,,,,37000,,,48.1,11.3,,,,,,0\n" * 3,
         "(SBS-1)",
     ),
-    "JobXML": ('<?xml version="1.0"?>\n<JOBFile jobName="a"><FieldBook/></JOBFile>\n', SURVEY),
+    "JobXML": (
+        '<?xml version="1.0"?>\n<JOBFile jobName="a"><FieldBook/></JOBFile>\n',
+        "points of a survey; to filter the track of a prism in it, export times",
+    ),
     "Topcon": ("_'P1_(CODE_)1.500_ ?+00008986m1079916+1023376d+00008978t60+00+25\n", SURVEY),
     "GSI": ("110001+00000001 21.322+03496940 22.322+09364360 31..00+00030485 51..1.+0000+000\n" * 30, SURVEY),
     "TLL": (standards.checked("RATLL,01,4807.0,N,01131.0,E,TGT,123456.0,T,") + "\n", "positions of targets (TLL)"),

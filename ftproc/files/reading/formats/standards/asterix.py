@@ -21,6 +21,7 @@ from ftproc.files.reading.formats import content
 from ftproc.files.reading.formats.header import Stated, TableHeader
 from ftproc.files.reading.formats.sparse import Sparse
 from ftproc.files.reading.formats.standards import octets
+from ftproc.files.reading.meaning.names import taken_apart
 
 Row = Mapping[str, Any]
 Flatten = Callable[[Any], Row]
@@ -106,6 +107,8 @@ def by_names(header: TableHeader) -> TableHeader:
     if max(map(_float, header.load([], indices["range"]).column(0).to_pylist()), default=0.0) <= _FARTHEST_NMI:
         units[indices["range"][0]] = "nmi"
     target = next((header.names[plain.index(word)] for word in _OF_TARGETS if word in plain), "")
+    if not any(taken_apart(name).means("elevation") == 1 for name in header.names):
+        columns["elevation"] = ABSENT
     known = Stated(columns | ({"time": time} if time else {}), "north", target)
     return replace(header, stated=known, units=units)
 

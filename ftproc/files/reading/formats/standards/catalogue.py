@@ -66,7 +66,8 @@ TEXTS = (
     _no("LandXML", r"<LandXML\b", _SURVEY),
     _no("Carlson RW5", r"^SS,OP\w{1,20},FP\w{1,20},AR", f"a field book of a total station (RW5), {_SURVEY}"),
     _no("Nikon RAW", r"\ACO,.*Nikon RAW", f"a field book of a total station (Nikon), {_SURVEY}"),
-    _no("JobXML", r"<JOBFile\b", f"a field book of a total station (JobXML), {_SURVEY}"),
+    _no("JobXML", r"<JOBFile\b", "a field book of a total station (JobXML), points of a survey; to filter the track of "
+        "a prism in it, export times, circles and slope distances as .csv"),
     _no("Topcon GTS", r"\A_'[^\r\n]{0,200}_\(", f"a field book of a total station (Topcon), {_SURVEY}"),
     _no("Sokkia SDR", r"\A00NM(?:SDR|\w\w)", f"a field book of a total station (SDR), {_SURVEY}"),
     _of("names and values", r"[=:]\s*[\"']?[+-]?\.?\d", tagged.pairs),

@@ -45,6 +45,20 @@ def _kind(pattern: str, **units: str) -> _Kind:
 _N = r"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?"
 _OREKIT = r"(?P<time>\d{4}-\d\d-\d\dT\S+)\s+"
 LAYOUTS = (
+    _Layout(  # replies of a Leica total station to TMC_GetSimpleMea, with the logger's clock before them
+        "GeoCOM",
+        (
+            _kind(
+                r"(?P<time>\d{4}-\d\d-\d\d[T ]\S+|\d+(?:\.\d+)?)\W.*%R1P,0,\d+:0,"
+                rf"(?P<Hz>{_N}),(?P<zenith>{_N}),(?P<range>{_N})",
+                Hz="rad",
+                zenith="rad",
+                range="m",
+            ),
+        ),
+        re.compile(r".*%R1[QP],.*"),
+        Stated({"elevation": "zenith"}),
+    ),
     _Layout(
         "Orekit measurements",
         (
@@ -71,7 +85,7 @@ LAYOUTS = (
         Stated({"elevation": ABSENT}),
     ),
 )
-MARK = rf"^(?:{_OREKIT}(?:RANGE|AZ_EL|PV)\s|[RL]\s+{_N}\s+{_N}\s+(?:{_N}\s+)?\d{{13,19}}\s)"
+MARK = rf"^(?:.{{0,60}}%R1P,0,\d+:0,|{_OREKIT}(?:RANGE|AZ_EL|PV)\s|[RL]\s+{_N}\s+{_N}\s+(?:{_N}\s+)?\d{{13,19}}\s)"
 
 
 def read(text: str, room: limits.Room) -> TableHeader | None:
