@@ -160,8 +160,11 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     """What happened at a jump; None if it is motion."""
     n, near = seen.samples, seen.near(jump.sample, jump.sample)
     part = seen.scene.part(near)
+    around = jump.sample - near.start, seen.width
+    if not leaves_a_jump(part, jump, around, part.log.weight, part.at_median):
+        return None
     without = _weighed(part, near, ())
-    if not leaves_a_jump(part, jump, jump.sample - near.start, seen.width, without):
+    if not leaves_a_jump(part, jump, around, without.weight, without.model):
         return None
     null = without.log_probability
     gain, located, step = max((_as_step(seen, jump, way, null) for way in jump.ways), key=lambda each: each[0])
