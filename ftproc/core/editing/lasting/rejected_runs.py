@@ -155,9 +155,7 @@ def _ways(part: Record, weight: FloatArray, run: Run, offset: int) -> Iterator[t
         yield other, False
 
 
-def _decided(
-    part: Record, decision: Decision, model: Model, here: slice, known: dict[bytes, FloatArray]
-) -> FloatArray:
+def _decided(part: Record, decision: Decision, model: Model, here: slice, known: dict[bytes, FloatArray]) -> FloatArray:
     """(n, 3) decisions from these on, made again in a part of the samples. known: what follows from which decisions by
     this model; others are added."""
     weight = decision.weight
