@@ -161,10 +161,12 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     n, near = seen.samples, seen.near(jump.sample, jump.sample)
     part = seen.scene.part(near)
     around = jump.sample - near.start, seen.width
-    if not leaves_a_jump(part, jump, around, part.log.weight, part.at_median):
+    # What was rejected of one station, others may show to be right.
+    screened = len(part.rates) == 1 or bool((part.taken_in == part.log.weight).all())
+    if screened and not leaves_a_jump(part, jump, around, part.log.weight, part.at_median):
         return None
     without = _weighed(part, near, ())
-    if not leaves_a_jump(part, jump, around, without.weight, without.model):
+    if screened and not leaves_a_jump(part, jump, around, without.weight, without.model):
         return None
     null = without.log_probability
     gain, located, step = max((_as_step(seen, jump, way, null) for way in jump.ways), key=lambda each: each[0])
