@@ -23,7 +23,7 @@ from ftproc.core.editing.lasting.faults import Shift, spread
 from ftproc.core.filtering import forward
 from ftproc.core.filtering.beside import WIDTH
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
-from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
+from ftproc.core.filtering.smoother import PATHS, STATES, SmootherRun, smooth_log
 from ftproc.core.identification import likelihood, motion_models
 from ftproc.core.identification.motion_models import Chosen
 from ftproc.core.identification.profile import ALLOWANCE, fit_profile, median_level, with_allowance
@@ -84,10 +84,10 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     motion = motion_models.choose(over.log, over.starts, over.model, names, specified)
     if channel is not None and channel.used is not None:
         motion = motion.with_beside(channel.used)
-    both = settings.smooth or usual is None  # cheap, and says what could be had
-    run, smoothed, left = _with_motion(motion, both, motion.model)
+    wanted = PATHS if settings.smooth else STATES if usual is None else None  # cheap, and says what could be had
+    run, smoothed, left = _with_motion(motion, motion.model, wanted)
     for other in _as_likely(edited, known, run):
-        filtered, other_smoothed, _ = _with_motion(motion, both, other)
+        filtered, other_smoothed, _ = _with_motion(motion, other, wanted)
         run = _worse_of(run, filtered)
         smoothed = smoothed and other_smoothed and _worse_of(smoothed, other_smoothed)
     run, smoothed = over.filtered(run), smoothed and over.smoothed(smoothed)
@@ -121,14 +121,14 @@ def _bridged(log: Observations, model: Model, starts: list[Start], fixed: bool) 
     return found if np.isfinite(through).all() else bridging.none(log, model, starts)
 
 
-def _with_motion(motion: Chosen, smooth: bool, model: Model) -> tuple[FilterRun, SmootherRun | None, FloatArray]:
+def _with_motion(motion: Chosen, model: Model, wanted: int | None) -> tuple[FilterRun, SmootherRun | None, FloatArray]:
     """The filter and, if asked, the smoother over an edited log, by a model; and what the filter leaves of its range
-    rates, see `core.filtering.beside`."""
+    rates, see `core.filtering.beside`. wanted: of the smoother."""
     starts = preparing.smoothed_starts(motion.log, model, motion.starts)
     run, beside = forward.filter_with_beside(motion.log, model.causal, starts)
     left = beside[0] if len(beside) else np.zeros((0, WIDTH))
     left = left if motion.row is None or not len(left) else left[motion.row]
-    smoothed = motion.of_rows(smooth_log(motion.log, model, motion.starts, PATHS)) if smooth else None
+    smoothed = motion.of_rows(smooth_log(motion.log, model, motion.starts, wanted)) if wanted is not None else None
     return motion.of_rows(run), smoothed, left
 
 

@@ -32,6 +32,7 @@ AROUND = 80  # samples on each side that the comparison covers
 ROUNDS = 5
 MARGIN = 5.0  # by which the log-probability of another decision must be better,
 AT_EDGE = 25.0  # and of a patch with one edge: a start in a turn gains 21 without one, patches that were missed 43
+HOPELESS = 400.0  # by which a longer patch must not be worse, for a shorter one to be tried: ten for each reading
 MOST = 100  # comparisons in one round
 STEPS = 14  # of filling a hole, or of taking out what stands out most
 FITS = 2.5  # residual, in its 1-sigma, at which a reading is taken into a hole
@@ -152,14 +153,15 @@ def _at_edges(log: Neighbourhood, weight: FloatArray, search: Search) -> FloatAr
 def _beside(part: Neighbourhood, weight: FloatArray, edge: AcceptedRun) -> list[Step]:
     """The decisions, and those with readings beside a rejected run rejected instead of it."""
     component, first, begin, end, last = edge
-    steps = [_step(part, weight)[0]]
-    for side, length in itertools.product((-1, 1), LENGTHS):
+    steps, hopeless = [_step(part, weight)[0]], {-1: False, 1: False}
+    for side, length in itertools.product((-1, 1), reversed(LENGTHS)):
         patch = slice(max(first - length, 0), first) if side < 0 else slice(last, last + length)
         other = weight.copy()
         other[begin:end, component] = part.possible[begin:end, component]
         other[patch, component] = 0.0
-        if (other != weight).any():
+        if (other != weight).any() and not hopeless[side]:
             steps.append(_step(part, other)[0])
+            hopeless[side] = steps[-1].likelihood < steps[0].likelihood - HOPELESS
     best = max(steps, key=lambda step: step.likelihood)
     return steps if best is steps[0] else [*steps, *decisions(part, best.weight)]
 

@@ -88,17 +88,17 @@ def choose(
     others = [name for name in names if name != WHITE]
     if not others:
         return Chosen(WHITE, white, 0.0, log, starts)
-    fitted = _fitted(log, starts, white, others, known)
+    fitted, short, course = _fitted(log, starts, white, others, known)
     best = max(fitted, key=lambda each: _finite(each.gain))
     if best.gain > MARGIN or WHITE not in names:
-        return best
+        return _about_its_track(best, log, short, course, white)
     return Chosen(WHITE, white, best.gain, log, starts)
 
 
 def _fitted(
     log: Observations, starts: list[Start], white: Model, names: list[str], known: NDArray[np.bool_]
-) -> list[Chosen]:
-    """Each of these models, fitted to the log with neighbours merged."""
+) -> tuple[list[Chosen], Observations, FloatArray]:
+    """Each of these models, fitted to the log with neighbours merged; this log, and the course (m, 9) along it."""
     scales = scales_of(log, white.noise_variance)
     likeliest = white._replace(jerk=white.jerk / ALLOWANCE)
     count = 1 if log.sites is not None else decimation.how_many(scales, likeliest, white.knot_s)
@@ -110,7 +110,6 @@ def _fitted(
     if orbits.may_be(course):  # whose readings alone are too far apart to follow it
         short = Logged(*with_steps(short.log, short.starts, course, turn)[:2], scales)
         course = smooth_log(short.log, white, short.starts).state
-    track = course if dense is short.log else smooth_log(dense, white, own).state
     found = list[Chosen]()
     for name in names:
         motion = MODELS[name]
@@ -121,14 +120,21 @@ def _fitted(
             model, likelihood = orbits.fit(
                 orbits.Track(*short[:2], known), begin, base if len(names) > 1 else -math.inf
             )
-            motion = model.motion
         else:
             model, likelihood = (_unsteered if motion.pressed else _steered)(short, begin)
-        model = model._replace(motion=motion.about(track))
-        if short.log is log:  # else the samples are far closer than the motion is followed
-            model = model._replace(motion=motion.about(smooth_log(dense, model, own).state))
         found.append(Chosen(name, model, likelihood - base, dense, own, row))
-    return found
+    return found, short.log, course
+
+
+def _about_its_track(found: Chosen, log: Observations, short: Observations, course: FloatArray, white: Model) -> Chosen:
+    """A motion that was fitted to a short log along a course (m, 9), linearised about the track of the log that it is
+    for."""
+    track = course if found.log is short else smooth_log(found.log, white, found.starts).state
+    model = found.model._replace(motion=found.model.motion.about(track))
+    if short is log:  # else the samples are far closer than the motion is followed
+        track = smooth_log(found.log, model, found.starts).state
+        model = model._replace(motion=model.motion.about(track))
+    return found._replace(model=model)
 
 
 class Logged(NamedTuple):

@@ -174,3 +174,13 @@ def test_hole_is_filled_also_where_the_track_is_known_worse_than_the_noise():
     steps = alternatives._filled(log, weight, 0, hole)
     np.testing.assert_array_equal(steps[0].weight, first.weight)
     assert steps[-1].weight[hole, 0].sum() >= 18
+
+
+def test_no_shorter_patch_is_tried_beside_a_run_that_a_longer_one_does_not_make_likely(monkeypatch):
+    """Far off the track, the run is no better without its neighbours, however few or many they are."""
+    log, _, right = followed(sigmas=100.0)
+    tried, step = [], alternatives._step
+    monkeypatch.setattr(alternatives, "_step", lambda *of: tried.append(1) or step(*of))
+    steps = alternatives._beside(log, right, alternatives.AcceptedRun(0, 190, 190, 215, 215))
+    assert max(steps, key=lambda each: each.likelihood) is steps[0]
+    assert len(tried) == 3  # as decided, and the longest on either side

@@ -119,11 +119,14 @@ def _likeliest(part: Record, decision: Decision, run: Run, offset: int) -> tuple
     unknown[here, run.component] = 0.0
     unfollowed = with_profile(part, _with(part, decision, unknown), PROFILE_STEPS)
     found = {before.tobytes(): (0.0, before)}
-    one = log_probability(part, _with(part, decision, before))
+    one, decided = log_probability(part, _with(part, decision, before)), dict[bytes, FloatArray]()
     for way, follows in _ways(part, before, run, offset):
         with contextlib.suppress(ValueError):  # a component has too few readings there
-            model = with_profile(part, _with(part, decision, way), COMPARED_STEPS) if follows else unfollowed
-            other = _decided(part, decision._replace(weight=way), model, here)
+            if follows:
+                model = with_profile(part, _with(part, decision, way), COMPARED_STEPS)
+                other = _decided(part, decision._replace(weight=way), model, here, {})
+            else:
+                other = _decided(part, decision._replace(weight=way), unfollowed, here, decided)
             if other.tobytes() not in found:
                 prior = SELDOM if run.moves(before, other, offset) and not follows else -MARGIN
                 gain = log_probability(part, _with(part, decision, other)) - one + prior
@@ -152,21 +155,29 @@ def _ways(part: Record, weight: FloatArray, run: Run, offset: int) -> Iterator[t
         yield other, False
 
 
-def _decided(part: Record, decision: Decision, model: Model, here: slice) -> FloatArray:
-    """(n, 3) decisions from these on, made again in a part of the samples."""
+def _decided(part: Record, decision: Decision, model: Model, here: slice, known: dict[bytes, FloatArray]) -> FloatArray:
+    """(n, 3) decisions from these on, made again in a part of the samples. known: what follows from which decisions by
+    this model; others are added."""
     weight = decision.weight
     for _ in range(REPEATS):
-        log = part.weighted(weight)
-        smoothed = smooth_log(log, model, starts_of(log, decision.model), RESIDUALS)
-        good = outlier_chain.classify(
-            smoothed.residual, smoothed.residual_variance, model.reading_variance, decision.rates.copy(), part.gate
-        )
-        decided = weight.copy()
-        decided[here] = part.with_accepted(((good > 0.5) & part.possible).astype(float))[here]
-        if (decided == weight).all():
+        before, key = weight, weight.tobytes()
+        if key not in known:
+            known[key] = _decided_once(part, decision._replace(weight=weight), model, here)
+        weight = known[key]
+        if (weight == before).all():
             break
-        weight = decided
     return weight
+
+
+def _decided_once(part: Record, decision: Decision, model: Model, here: slice) -> FloatArray:
+    log = part.weighted(decision.weight)
+    smoothed = smooth_log(log, model, starts_of(log, decision.model), RESIDUALS)
+    good = outlier_chain.classify(
+        smoothed.residual, smoothed.residual_variance, model.reading_variance, decision.rates.copy(), part.gate
+    )
+    decided = decision.weight.copy()
+    decided[here] = part.with_accepted(((good > 0.5) & part.possible).astype(float))[here]
+    return decided
 
 
 def _with(part: Record, decision: Decision, weight: FloatArray) -> Decision:

@@ -25,13 +25,13 @@ from ftproc.core.editing.lasting.proposals import (
     SHORTEST,
     LocatedJump,
     cell_of,
-    edges_about,
     exactly,
     other_end,
     proposals,
     steps,
 )
 from ftproc.core.editing.lasting.scan import Jump
+from ftproc.core.editing.lasting.screen import leaves_a_jump
 from ftproc.core.editing.lasting.weighing import Scene, Weighed, weighed
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification.profile import median_level
@@ -40,7 +40,6 @@ from ftproc.order_statistics import median
 
 ROUNDS, JUMPS = 8, 5  # over a log, and jumps that are weighed in one, by either set of weights
 LEAST_GAIN, TOGETHER = 18.0, 0.03  # of a jump, in log-likelihood; of the largest: components that jump with it
-LEFT = 6.0  # the same by the model of the part around a jump; up to 4 where there is none, from 12 on where there is
 LEAST_OFF = 10.0  # the same of a jump in a rejected run, by the noise alone
 CERTAIN = 4.0  # sigmas of its size from which a component takes part in a step of several
 AROUND, MEMORIES = (150, 2000), 12.0  # samples on each side of what is weighed, and memories
@@ -161,8 +160,13 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     """What happened at a jump; None if it is motion."""
     n, near = seen.samples, seen.near(jump.sample, jump.sample)
     part = seen.scene.part(near)
+    around = jump.sample - near.start, seen.width
+    # What was rejected of one station, others may show to be right.
+    screened = len(part.rates) == 1 or bool((part.taken_in == part.log.weight).all())
+    if screened and not leaves_a_jump(part, jump, around, part.log.weight, part.at_median):
+        return None
     without = _weighed(part, near, ())
-    if not (part.taken_in != part.log.weight).any() and not _leaves_a_jump(seen, jump, part, without):
+    if screened and not leaves_a_jump(part, jump, around, without.weight, without.model):
         return None
     null = without.log_probability
     gain, located, step = max((_as_step(seen, jump, way, null) for way in jump.ways), key=lambda each: each[0])
@@ -176,19 +180,6 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     proposed = list(proposals(seen.scene, located._replace(width=seen.cell, at_median=median_level(step.model))))
     ends = [edge for curves in proposed for edge in (curves[0].begin, curves[0].end) if 0 < edge < n]
     return _best(seen, proposed, seen.near(min(ends), max(ends)), located)
-
-
-def _leaves_a_jump(seen: Scanned, jump: Jump, part: Scene, without: Weighed) -> bool:
-    """Whether the channels jump by what the part around a jump is without a fault: the process noise is its own there,
-    and may explain what that of the whole log does not. A step that hides in it has rejected readings beside it."""
-    edges = edges_about(len(part.possible), jump.sample - seen.near(jump.sample, jump.sample).start, seen.width)
-    log = part.log._replace(weight=without.weight)
-    starts = part.starts(log)
-    of_each = {
-        channel: scan.steps_of(log, without.model, starts, part.setting, (channel, jump.station), edges)[1:].max()
-        for channel in {channel for way in jump.ways for channel in way}
-    }
-    return bool(max(sum(of_each[channel] for channel in way) for way in jump.ways) > LEFT)
 
 
 def _as_step(seen: Scanned, jump: Jump, way: Sequence[int], null: float) -> tuple[float, LocatedJump, Weighed]:

@@ -132,6 +132,13 @@ def weighed(scene: Scene, weight: FloatArray, curves: Sequence[Curve]) -> Weighe
     return Weighed(found.curves, tuple(sigma.tolist()), weight, model, likely)
 
 
+def as_it_is(scene: Scene, weight: FloatArray, model: Model) -> float:
+    """Log-probability of the scene without curves, with these weights (n, 3) and by this model."""
+    log = scene.log._replace(weight=weight)
+    smoothed = smooth_log(log, model, scene.starts(log), RESIDUALS)
+    return smoothed.log_likelihood + _rejections(scene, weight, smoothed, model) - roughness(model)
+
+
 def late_of(log: Observations, state: FloatArray) -> FloatArray:
     """(n, 3) by which readings of states (n, 9) grow with an offset of their clock, per s."""
     if log.sites is None:

@@ -31,7 +31,7 @@ def error_m(seed):
 @pytest.mark.parametrize(
     ("seed", "most_m"),
     [
-        (22, 0.85),  # a ramp whose first five readings the track has followed
+        (22, 0.84),  # a ramp whose first five readings the track has followed
         (24, 1.5),  # a patch that was followed: the 46 good readings after it were rejected
         (30, 1.0),  # a walk-off that begins slowly
         (31, 1.25),  # a ramp that was followed for 29 readings, beside another patch

@@ -7,7 +7,7 @@ import pytest
 
 from ftproc.core import work
 from ftproc.core.editing import two_pass
-from ftproc.core.editing.lasting import search
+from ftproc.core.editing.lasting import screen, search
 from tests.simulated import simulate
 
 pytestmark = pytest.mark.compiled
@@ -59,14 +59,38 @@ def test_the_work_is_charged_with_each_sample_that_is_weighed(monkeypatch):
 def test_a_jump_that_the_part_around_it_does_not_leave_is_not_weighed_as_a_step(monkeypatch, seed):
     """A turn jumps by the process noise of the whole flight; by that of the part around it it does not."""
     looked, weighed = [], []
-    jumps, step = search._leaves_a_jump, search._as_step
-    monkeypatch.setattr(search, "_leaves_a_jump", lambda *of: looked.append(jumps(*of)) or looked[-1])
+    jumps, step = search.leaves_a_jump, search._as_step
+    monkeypatch.setattr(search, "leaves_a_jump", lambda *of: looked.append(jumps(*of)) or looked[-1])
     monkeypatch.setattr(search, "_as_step", lambda *of: weighed.append(1) or step(*of))
     two_pass.edit(*flown(seed=seed), UNKNOWN)
     assert looked
-    assert not any(looked)
     assert not weighed
-    monkeypatch.setattr(search, "_leaves_a_jump", lambda *of: True)
+    monkeypatch.setattr(search, "leaves_a_jump", lambda *of: True)
     found = two_pass.edit(*flown(seed=seed), UNKNOWN)
     assert weighed
     assert found.faults.steps == ()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_step_is_weighed_at_the_ends_of_a_patch_that_is_rejected(monkeypatch, seed):
+    """Its readings, taken in, make each end a jump, but none that stays."""
+    time_s, z = flown(seed=seed)
+    z[500:515, 1] += 0.05
+    weighed, step = [], search._as_step
+    monkeypatch.setattr(search, "_as_step", lambda *of: weighed.append(1) or step(*of))
+    found = two_pass.edit(time_s, z, UNKNOWN)
+    assert not found.weight[500:515, 1].any()
+    assert not weighed
+
+
+def test_a_jump_beside_which_readings_were_rejected_is_seen_only_with_these_taken_in(monkeypatch):
+    """The log as decided shows none, if it begins with the readings of another target."""
+    time_s, z = flown(seed=1)
+    z[:6] += (900.0, 0.05, 0.05)
+    found, look = [], two_pass.search
+    monkeypatch.setattr(two_pass, "search", lambda scene: found.append(look(scene)) or found[-1])
+    two_pass.edit(time_s, z, UNKNOWN)
+    assert any(curve.begin == 6 for each in found[0] for curve in each.curves)
+    monkeypatch.setattr(screen, "_with_rejected", lambda part, way, station, around, weight: weight)
+    two_pass.edit(time_s, z, UNKNOWN)
+    assert not found[-1]
