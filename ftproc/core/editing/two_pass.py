@@ -119,8 +119,7 @@ def edit(
     scene, found, doubtful = None, tuple[Step, ...](), list[Step]()
     for_lasting = for_lasting_faults(len(time_s))
     for _ in range(0 if live else LASTING_ROUNDS):
-        # Correlated noise resembles many steps, and so do patches that there was no time to understand.
-        if decision.model.coloured or decision.unexamined:
+        if decision.model.coloured:  # which resembles many steps
             break
         scene = scene_of(record, decision, for_lasting)
         new = sorted_out(scene, search(scene))

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing.lasting import scan
+from ftproc.core.editing.lasting.between import followed
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.faults import Step
 from ftproc.core.editing.lasting.proposals import (
@@ -93,7 +94,10 @@ def search(scene: Scene) -> list[Found]:
     """The faults that last in the log of one or several stations whose outliers were decided as if it had none."""
     found, rejected = list[Found](), list[Jump]()
     for _ in range(ROUNDS):
-        best = _likeliest(scanned(scene.without([curve for each in found for curve in each.curves])), rejected)
+        seen = scanned(scene.without([curve for each in found for curve in each.curves]))
+        best = _likeliest(seen, rejected)
+        if len(scene.rates) == 1:
+            best = max(filter(None, (best, _followed(seen))), key=lambda each: each.gain, default=None)
         if best is None or any(best.curves[0][:3] == each.curves[0][:3] for each in found):
             break
         found.append(best)
@@ -148,6 +152,21 @@ def _likeliest(seen: Scanned, rejected: list[Jump]) -> Found | None:
             return max(found, key=lambda each: each.gain)
         rejected += here
     return None
+
+
+def _followed(seen: Scanned) -> Found | None:
+    """The likeliest patch between two rejected runs; None if there is none."""
+    found = list[Found]()
+    for curves in followed(seen.scene):
+        near = seen.near(curves[0].begin, curves[0].end)
+        part = seen.scene.part(near)
+        with contextlib.suppress(ValueError, np.linalg.LinAlgError):
+            null = _weighed(part, near, ()).log_probability
+            for curve in curves:
+                weighed_ = _weighed(part, near, [curve])
+                gain = weighed_.log_probability - null + _prior([curve], seen.samples)
+                found.append(Found(_in_whole(weighed_, near, seen.samples), weighed_.sigma, gain))
+    return max((each for each in found if each.gain > MARGIN), key=lambda each: each.gain, default=None)
 
 
 def _tried(seen: Scanned, jump: Jump) -> Found | None:
