@@ -30,7 +30,8 @@ from ftproc.core.editing.decisions import (
 from ftproc.core.editing.lasting.curves import CLOCK
 from ftproc.core.editing.lasting.faults import Faults, Rival, Shift, Step, levelled, refined, taken_out
 from ftproc.core.editing.lasting.rejected_runs import reassess_rejected
-from ftproc.core.editing.lasting.search import search, sorted_out
+from ftproc.core.editing.lasting.search import search
+from ftproc.core.editing.lasting.sorting import sorted_out
 from ftproc.core.editing.lasting.weighing import scene_of
 from ftproc.core.editing.reassessment import likelier, log_probability, preferred, reassess, with_less_noise
 from ftproc.core.editing.screened import rounding_sigma, screen, stuck_readings

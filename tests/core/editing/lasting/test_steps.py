@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.editing import two_pass
-from ftproc.core.editing.lasting import faults, search
+from ftproc.core.editing.lasting import faults, sorting
 from ftproc.core.editing.lasting.curves import CLOCK, Curve, Setting, without
 from ftproc.core.editing.lasting.faults import Shift, Step, levelled
 from ftproc.core.filtering.records import Observations
@@ -126,7 +126,7 @@ def test_a_clock_that_jumps_by_a_second_may_be_a_halt_of_what_is_slow(speed_mps,
     late = -np.gradient(z, 0.1, axis=0)
     z[70] = np.nan
     scene = SimpleNamespace(log=SimpleNamespace(measurement=z), setting=SimpleNamespace(late=late))
-    assert search._may_be_a_halt(scene, Curve(CLOCK, 60, 100, (late_s,))) == may_be
+    assert sorting._may_be_a_halt(scene, Curve(CLOCK, 60, 100, (late_s,))) == may_be
 
 
 @pytest.mark.parametrize("seed", range(6))

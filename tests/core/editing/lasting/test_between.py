@@ -1,0 +1,80 @@
+"""Patches that were followed, between the runs that were rejected at their ends."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.core.editing import two_pass
+from ftproc.core.editing.lasting.between import MOST, Between, followed, trimmed
+from ftproc.core.editing.lasting.curves import Curve, Setting
+from ftproc.core.editing.lasting.scan import Jump
+from ftproc.core.editing.lasting.weighing import Scene
+from ftproc.core.filtering.records import Model, Observations
+from ftproc.core.model.motion import isotropic
+from tests.trust import hard
+
+UNKNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
+N = 200
+
+
+def scene(*rejected):
+    """A scene with rejected readings of (component, begin, end)."""
+    weight = np.ones((N, 3))
+    for c, begin, end in rejected:
+        weight[begin:end, c] = 0.0
+    time_s, zeros = np.arange(N) * 1.0, np.zeros((N, 3))
+    log = Observations(time_s, zeros, weight)
+    model = Model(np.ones(3), isotropic(1.0))
+    return Scene(
+        log, np.ones((N, 3), bool), weight, Setting(time_s, zeros), model, False, np.full((1, 3, 3), 0.01), 4.0, zeros
+    )
+
+
+def test_a_patch_may_lie_between_two_rejected_runs_of_a_component():
+    assert followed(scene((0, 50, 54), (0, 90, 95)), ()) == [[Between(0, 50, 54, 90, 95)]]
+    assert followed(scene((0, 50, 54), (1, 90, 95)), ()) == []
+    assert followed(scene((0, 50, 52), (0, 90, 95)), ()) == []  # two readings are no run
+    assert followed(scene((0, 50, 80), (0, 90, 95)), ()) == []  # less was accepted between them than rejected
+
+
+def test_runs_of_several_components_that_coincide_are_weighed_together():
+    one, other = Between(0, 50, 54, 90, 95), Between(2, 52, 58, 88, 92)
+    found = followed(scene((0, 50, 54), (0, 90, 95), (2, 52, 58), (2, 88, 92)), ())
+    assert found == [[one], [other], [one, other]]
+
+
+def test_what_is_known_is_not_weighed_again():
+    assert followed(scene((0, 50, 54), (0, 90, 95)), [Curve(0, 52, 93, (1.0,))]) == []
+    assert len(followed(scene((0, 50, 54), (0, 90, 95)), [Curve(1, 52, 93, (1.0,))])) == 1
+
+
+def test_of_many_runs_the_nearest_are_weighed():
+    runs = [(0, k, k + 3) for k in range(10, 190, 15)]
+    found = followed(scene(*runs), ())
+    assert len(found) == MOST
+    assert all(each.end - each.begin == 18 for (each,) in found)
+
+
+def test_it_goes_from_the_largest_jump_in_the_first_run_to_that_in_the_last():
+    one = Between(0, 50, 54, 90, 95)
+    jumps = [Jump(9.0, 92, 0, ((0,), (3,))), Jump(8.0, 51, 0, ((1,),)), Jump(7.0, 91, 0, ((0,),))]
+    assert one.at_jumps(jumps) == one._replace(end=92)
+
+
+def test_a_curve_ends_with_its_readings_that_are_used():
+    weight = scene((0, 50, 54), (0, 88, 95)).log.weight
+    curves = [Curve(0, 50, 95, (1.0, 2.0)), Curve(0, 51, 53, (1.0,))]
+    assert trimmed(curves, weight) == [Curve(0, 54, 88, (0.0, 0.0)), curves[1]]
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(("name", "seed"), [("sine", 0), ("mirror", 2)])
+def test_a_patch_that_a_short_memory_follows_is_found(name, seed):
+    """An elevation that swings by 170 sigmas for 47 s at 5 Hz, of an aircraft whose filter follows such a motion; and a
+    mirror's."""
+    dirty = hard.make(name, seed).simulated
+    bad = dirty.truth.outlier[:, 2] > 0
+    found = two_pass.edit(dirty.log.time_s, dirty.log.measurement, UNKNOWN)
+    assert found.weight[bad, 2].mean() < 0.02
+    assert found.weight[~bad, 2].mean() > 0.99
