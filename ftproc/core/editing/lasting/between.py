@@ -20,7 +20,7 @@ from ftproc.core.editing.lasting.weighing import TAKEN_IN, Scene
 from ftproc.core.identification.stretches import runs_of
 from ftproc.records import FloatArray
 
-TERMS = (5, 2, 8, 12, 22)  # of a curve, each for four samples at least
+TERMS, PER_TERM = (5, 2, 8, 12, 22), 4  # of a curve, and samples for each at least
 FROM_IT, MOST = 2, 6  # runs from the first to the last, and stretches that are weighed
 
 
@@ -41,8 +41,8 @@ class Between(NamedTuple):
         return self._replace(begin=begin, end=end)
 
     def contains(self, curve: Curve) -> bool:
-        """Whether some of it is explained by a curve."""
-        return curve.component == self.component and curve.begin < self.end and self.begin < curve.end
+        """Whether a curve explains some of what lies between the runs."""
+        return curve.component == self.component and curve.begin < self.high and self.low < curve.end
 
     def coincides(self, other: Between) -> bool:
         """Whether the runs at both ends overlap."""

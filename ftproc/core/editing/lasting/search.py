@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ftproc.core.editing.lasting import scan
-from ftproc.core.editing.lasting.between import TERMS, followed, of_terms, trimmed
+from ftproc.core.editing.lasting.between import PER_TERM, TERMS, Between, followed, of_terms, trimmed
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.proposals import (
     CELLS,
@@ -86,12 +86,12 @@ class Scanned(NamedTuple):
 
 def search(scene: Scene) -> list[Found]:
     """The faults that last in the log of one or several stations whose outliers were decided as if it had none."""
-    found, rejected = list[Found](), list[Jump]()
+    found, rejected, motion = list[Found](), list[Jump](), set[tuple[Between, ...]]()
     for _ in range(ROUNDS):
         seen = scanned(scene.without([curve for each in found for curve in each.curves]))
         best = _likeliest(seen, rejected)
         if len(scene.rates) == 1:
-            between = _followed(seen, [curve for each in found for curve in each.curves])
+            between = _followed(seen, [curve for each in found for curve in each.curves], motion)
             best = max(filter(None, (best, between)), key=lambda each: each.gain, default=None)
         if best is None or any(best.curves[0][:3] == each.curves[0][:3] for each in found):
             break
@@ -156,29 +156,40 @@ def _worth(scene: Scene) -> bool:
     return False
 
 
-def _followed(seen: Scanned, known: Sequence[Curve]) -> Found | None:
-    """The likeliest patch between two rejected runs beside what is known; None if there is none."""
-    found = list[Found]()
+def _followed(seen: Scanned, known: Sequence[Curve], motion: set[tuple[Between, ...]]) -> Found | None:
+    """The likeliest patch between two rejected runs beside what is known; None if there is none. Those that are motion
+    are added to what is."""
+    found, n = list[Found](), seen.samples
     for stretches in followed(seen.scene, known):
+        if tuple(stretches) in motion:
+            continue
         if not _worth(seen.scene):
             break
         near = seen.near(min(each.begin for each in stretches), max(each.end for each in stretches))
-        part, n = seen.scene.part(near), seen.samples
+        part = seen.scene.part(near)
         with contextlib.suppress(ValueError, np.linalg.LinAlgError):
             null = _weighed(part, near, ()).log_probability
-            ends = [stretches, [each.at_jumps(seen.jumps) for each in stretches]]
-            tried = [_weighed(part, near, of_terms(each, TERMS[0])) for each in ends]
-            curves = max(tried, key=lambda each: each.log_probability).curves
-            longest = min(curve.end - curve.begin for curve in curves) // 4
-            for terms in (terms for terms in TERMS[1:] if terms <= longest):
-                tried.append(_weighed(part, slice(0, n), [curve.of(terms) for curve in curves]))
-            for _ in range(TRIMMED):
-                best = max(tried, key=lambda each: each.log_probability)
-                tried.append(_weighed(part, slice(0, n), trimmed(best.curves, best.weight)))
-            best = max(tried, key=lambda each: each.log_probability)
+            best = _of_any_shape(part, near, [stretches, [each.at_jumps(seen.jumps) for each in stretches]])
             gain = best.log_probability - null + _prior(best.curves, n)
             found.append(Found(_in_whole(best, near, n), best.sigma, gain))
+            if gain < MARGIN:
+                motion.add(tuple(stretches))
     return max((each for each in found if each.gain > MARGIN), key=lambda each: each.gain, default=None)
+
+
+def _of_any_shape(part: Scene, near: slice, ends: Sequence[Sequence[Between]]) -> Weighed:
+    """The likeliest curves of any number of terms, first with these ends, then with those that their readings show."""
+
+    def likeliest(of: Iterable[Sequence[Curve]], *others: Weighed) -> Weighed:
+        tried = (weighed(part, part.log.weight, curves) for curves in of)
+        return max((*others, *tried), key=lambda each: each.log_probability)
+
+    best = likeliest([curve.within(near) for curve in of_terms(each, TERMS[0])] for each in ends)
+    most = min(curve.end - curve.begin for curve in best.curves) // PER_TERM
+    best = likeliest(([curve.of(terms) for curve in best.curves] for terms in TERMS[1:] if terms <= most), best)
+    for _ in range(TRIMMED):
+        best = likeliest([trimmed(best.curves, best.weight)], best)
+    return best
 
 
 def _tried(seen: Scanned, jump: Jump) -> Found | None:
