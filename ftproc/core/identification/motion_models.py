@@ -83,20 +83,16 @@ def choose(
     """The likeliest motion of a log of these names. white: the model with white jerk, whose profile has its allowance.
     known: (3,) which noise the user has specified.
 
-    A single name is taken without asking how likely it is. Of several, one that explains the log only about a course
-    that is known beforehand is none: a filter that has its own estimate alone diverges with it.
+    A single name is taken without asking how likely it is.
     """
     others = [name for name in names if name != WHITE]
     if not others:
         return Chosen(WHITE, white, 0.0, log, starts)
-    fitted = sorted(_fitted(log, starts, white, others, known), key=lambda each: -_finite(each.gain))
-    if WHITE not in names:
-        return fitted[0]
-    least = likelihood_of(log, white, starts) if fitted[0].gain > MARGIN else math.inf
-    for each in fitted:
-        if each.gain > MARGIN and likelihood_of(each.log, each.model.causal, each.starts) > least:
-            return each
-    return Chosen(WHITE, white, min(fitted[0].gain, MARGIN), log, starts)
+    fitted = _fitted(log, starts, white, others, known)
+    best = max(fitted, key=lambda each: _finite(each.gain))
+    if best.gain > MARGIN or WHITE not in names:
+        return best
+    return Chosen(WHITE, white, best.gain, log, starts)
 
 
 def _fitted(

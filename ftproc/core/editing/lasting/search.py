@@ -35,6 +35,7 @@ from ftproc.core.editing.lasting.weighing import Scene, Weighed, weighed
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification.profile import median_level
 from ftproc.core.identification.scales import scales_of
+from ftproc.core.work import for_lasting_faults
 
 ROUNDS, JUMPS = 8, 5  # over a log, and jumps that are weighed in one, by either set of weights
 LEAST_GAIN, TOGETHER = 18.0, 0.03  # of a jump, in log-likelihood; of the largest: components that jump with it
@@ -87,11 +88,12 @@ class Scanned(NamedTuple):
 def search(scene: Scene) -> list[Found]:
     """The faults that last in the log of one or several stations whose outliers were decided as if it had none."""
     found, rejected, motion = list[Found](), list[Jump](), set[tuple[Between, ...]]()
+    own = for_lasting_faults(len(scene.possible))  # work, so that usual patches leave enough for the jumps
     for _ in range(ROUNDS):
         seen = scanned(scene.without([curve for each in found for curve in each.curves]))
         best = _likeliest(seen, rejected)
         if len(scene.rates) == 1:
-            between = _followed(seen, [curve for each in found for curve in each.curves], motion)
+            between = _followed(seen._replace(scene=seen.scene._replace(work=own)), found, motion)
             best = max(filter(None, (best, between)), key=lambda each: each.gain, default=None)
         if best is None or any(best.curves[0][:3] == each.curves[0][:3] for each in found):
             break
@@ -156,11 +158,11 @@ def _worth(scene: Scene) -> bool:
     return False
 
 
-def _followed(seen: Scanned, known: Sequence[Curve], motion: set[tuple[Between, ...]]) -> Found | None:
+def _followed(seen: Scanned, known: Sequence[Found], motion: set[tuple[Between, ...]]) -> Found | None:
     """The likeliest patch between two rejected runs beside what is known; None if there is none. Those that are motion
     are added to what is."""
     found, n = list[Found](), seen.samples
-    for stretches in followed(seen.scene, known):
+    for stretches in followed(seen.scene, [curve for each in known for curve in each.curves]):
         if tuple(stretches) in motion:
             continue
         if not _worth(seen.scene):
