@@ -40,6 +40,14 @@ class Between(NamedTuple):
         end = next((jump.sample for jump in own if self.high <= jump.sample <= self.end), self.end)
         return self._replace(begin=begin, end=end)
 
+    def jumps(self, jumps: Sequence[Jump], within: int) -> bool:
+        """Whether the component jumps in one of the runs, or beside it."""
+        return any(
+            low - within <= jump.sample <= high + within and any(self.component in way for way in jump.ways)
+            for jump in jumps
+            for low, high in ((self.begin, self.low), (self.high, self.end))
+        )
+
     def contains(self, curve: Curve) -> bool:
         """Whether a curve explains some of what lies between the runs."""
         return curve.component == self.component and curve.begin < self.high and self.low < curve.end
@@ -50,9 +58,9 @@ class Between(NamedTuple):
         return firsts <= min(self.low, other.low) and lasts <= min(self.end, other.end)
 
 
-def followed(scene: Scene, known: Sequence[Curve]) -> list[list[Between]]:
+def followed(scene: Scene, jumps: Sequence[Jump], within: int, known: Sequence[Curve]) -> list[list[Between]]:
     """Where a patch may have been followed beside what is known, of one component or of several, in the log of one
-    station."""
+    station: its jumps are known within so many samples."""
     found = list[tuple[int, Between]]()
     for c in range(CLOCK):
         seen = np.flatnonzero(scene.possible[:, c])
@@ -61,7 +69,8 @@ def followed(scene: Scene, known: Sequence[Curve]) -> list[list[Between]]:
             if m - k <= FROM_IT and d - b >= max(b - a, e - d) and e - a <= LONGEST * len(seen):
                 ends = int(seen[a]), int(seen[b]), int(seen[d]), int(seen[e - 1]) + 1
                 found.append((m - k, Between(c, *ends)))
-    single = [each for _, each in sorted(found)[:MOST] if not any(each.contains(curve) for curve in known)]
+    shown = [each for _, each in sorted(found) if each.jumps(jumps, within)]
+    single = [each for each in shown[:MOST] if not any(each.contains(curve) for curve in known)]
     together = [[each for each in single if each.coincides(one)] for one in single]
     several = {tuple(each): each for each in together if len(each) > 1}
     return [*([each] for each in single), *several.values()]

@@ -162,7 +162,7 @@ def _followed(seen: Scanned, known: Sequence[Found], motion: set[tuple[Between, 
     """The likeliest patch between two rejected runs beside what is known; None if there is none. Those that are motion
     are added to what is."""
     found, n = list[Found](), seen.samples
-    for stretches in followed(seen.scene, [curve for each in known for curve in each.curves]):
+    for stretches in followed(seen.scene, seen.jumps, seen.width, [curve for each in known for curve in each.curves]):
         if tuple(stretches) in motion:
             continue
         if not _worth(seen.scene):
@@ -191,7 +191,7 @@ def _of_any_shape(part: Scene, near: slice, ends: Sequence[Sequence[Between]]) -
     best = likeliest(([curve.of(terms) for curve in best.curves] for terms in TERMS[1:] if terms <= most), best)
     for _ in range(TRIMMED):
         best = likeliest([trimmed(best.curves, best.weight)], best)
-    return best
+    return max(best, _weighed(part, slice(0, len(part.possible)), best.curves), key=lambda each: each.log_probability)
 
 
 def _tried(seen: Scanned, jump: Jump) -> Found | None:

@@ -18,7 +18,7 @@ from ftproc.order_statistics import median
 
 OPEN, MOVES = 4.0, 15.0  # in log-probability: within it, whether a fault stays is open; before half of a log is moved
 HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
-BEFORE = 12  # samples before a step
+BEFORE, SEEN = 12, 0.25  # samples before a step, and share of them that may be good
 SURE = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
 END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step may as well be a patch
 
@@ -57,8 +57,9 @@ def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
 
 
 def _seen_before(scene: Scene, step: Curve) -> bool:
-    """Whether most readings just before a step may be good: behind a gap in a component a track may be anywhere."""
-    return bool(scene.possible[max(step.begin - BEFORE, 0) : step.begin, step.component].mean() > 0.5)
+    """Whether readings just before a step may be good: behind a gap in a component a track may be anywhere."""
+    before = scene.possible[max(step.begin - BEFORE, 0) : step.begin, step.component]
+    return bool(before.mean() > SEEN)
 
 
 def _may_be_a_halt(scene: Scene, clock: Curve) -> bool:

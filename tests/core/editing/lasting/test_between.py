@@ -31,27 +31,38 @@ def scene(*rejected):
     )
 
 
+def found_in(some, known=(), jumps=None):
+    """What may have been followed where there is a jump of all components at each sample, or at these."""
+    ways = ((0,), (1,), (2,))
+    return followed(some, [Jump(9.0, k, 0, ways) for k in (range(N) if jumps is None else jumps)], 2, known)
+
+
 def test_a_patch_may_lie_between_two_rejected_runs_of_a_component():
-    assert followed(scene((0, 50, 54), (0, 90, 95)), ()) == [[Between(0, 50, 54, 90, 95)]]
-    assert followed(scene((0, 50, 54), (1, 90, 95)), ()) == []
-    assert followed(scene((0, 50, 52), (0, 90, 95)), ()) == []  # two readings are no run
-    assert followed(scene((0, 50, 80), (0, 90, 95)), ()) == []  # less was accepted between them than rejected
+    assert found_in(scene((0, 50, 54), (0, 90, 95))) == [[Between(0, 50, 54, 90, 95)]]
+    assert found_in(scene((0, 50, 54), (1, 90, 95))) == []
+    assert found_in(scene((0, 50, 52), (0, 90, 95))) == []  # two readings are no run
+    assert found_in(scene((0, 50, 80), (0, 90, 95))) == []  # less was accepted between them than rejected
+
+
+def test_the_component_jumps_at_one_of_its_ends_at_least():
+    runs = scene((0, 50, 54), (0, 90, 95))
+    assert [len(found_in(runs, jumps=[k])) for k in (47, 48, 56, 57, 70, 88, 97, 98)] == [0, 1, 1, 0, 0, 1, 1, 0]
 
 
 def test_runs_of_several_components_that_coincide_are_weighed_together():
     one, other = Between(0, 50, 54, 90, 95), Between(2, 52, 58, 88, 92)
-    found = followed(scene((0, 50, 54), (0, 90, 95), (2, 52, 58), (2, 88, 92)), ())
+    found = found_in(scene((0, 50, 54), (0, 90, 95), (2, 52, 58), (2, 88, 92)))
     assert found == [[one], [other], [one, other]]
 
 
 def test_what_is_known_is_not_weighed_again():
-    assert followed(scene((0, 50, 54), (0, 90, 95)), [Curve(0, 52, 93, (1.0,))]) == []
-    assert len(followed(scene((0, 50, 54), (0, 90, 95)), [Curve(1, 52, 93, (1.0,))])) == 1
+    assert found_in(scene((0, 50, 54), (0, 90, 95)), [Curve(0, 52, 93, (1.0,))]) == []
+    assert len(found_in(scene((0, 50, 54), (0, 90, 95)), [Curve(1, 52, 93, (1.0,))])) == 1
 
 
 def test_of_many_runs_the_nearest_are_weighed():
     runs = [(0, k, k + 3) for k in range(10, 190, 15)]
-    found = followed(scene(*runs), ())
+    found = found_in(scene(*runs))
     assert len(found) == MOST
     assert all(each.end - each.begin == 18 for (each,) in found)
 
