@@ -81,11 +81,15 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     over = _bridged(log, model, edited.starts, settings.jerk_psd_m2ps5 is not None)
     label = preparing.labels(np.where(over.read, 0.0, over.log.weight), log.measurement)
     edited = edited._replace(log=over.log, model=over.model, starts=over.starts)
-    motion = motion_models.choose(over.log, over.starts, over.model, names, specified)
-    if channel is not None and channel.used is not None:
-        motion = motion.with_beside(channel.used)
+
+    def chosen(names: tuple[str, ...]) -> Chosen:
+        found = motion_models.choose(over.log, over.starts, over.model, names, specified)
+        return found if channel is None or channel.used is None else found.with_beside(channel.used)
+
     wanted = PATHS if settings.smooth else STATES if usual is None else None  # cheap, and says what could be had
-    run, smoothed, left = _with_motion(motion, motion.model, wanted)
+    motion = chosen(names)
+    white = chosen((motion_models.WHITE,)) if motion_models.WHITE in names else motion
+    motion, (run, smoothed, left) = _followed(motion, white, wanted)
     for other in _as_likely(edited, known, run):
         filtered, other_smoothed, _ = _with_motion(motion, other, wanted)
         run = _worse_of(run, filtered)
@@ -119,6 +123,19 @@ def _bridged(log: Observations, model: Model, starts: list[Start], fixed: bool) 
     found = found._replace(model=with_allowance(found.log, fitted))
     through = forward.filter_log(found.log, found.model, found.starts).state
     return found if np.isfinite(through).all() else bridging.none(log, model, starts)
+
+
+def _followed(
+    motion: Chosen, white: Chosen, wanted: int | None
+) -> tuple[Chosen, tuple[FilterRun, SmootherRun | None, FloatArray]]:
+    """A motion and what comes of it, or of white jerk, if the filter follows that better: it knows no course but its
+    own estimate, and may diverge where the smoother is right about the course. wanted: of the smoother."""
+    found = _with_motion(motion, motion.model, wanted)
+    if motion.name != white.name:
+        other = _with_motion(white, white.model, None)
+        if other[0].log_likelihood > found[0].log_likelihood:
+            return white, _with_motion(white, white.model, wanted)
+    return motion, found
 
 
 def _with_motion(motion: Chosen, model: Model, wanted: int | None) -> tuple[FilterRun, SmootherRun | None, FloatArray]:

@@ -30,7 +30,8 @@ from ftproc.core.editing.decisions import (
 from ftproc.core.editing.lasting.curves import CLOCK
 from ftproc.core.editing.lasting.faults import Faults, Rival, Shift, Step, levelled, refined, taken_out
 from ftproc.core.editing.lasting.rejected_runs import reassess_rejected
-from ftproc.core.editing.lasting.search import search, sorted_out
+from ftproc.core.editing.lasting.search import search
+from ftproc.core.editing.lasting.sorting import sorted_out
 from ftproc.core.editing.lasting.weighing import scene_of
 from ftproc.core.editing.reassessment import likelier, log_probability, preferred, reassess, with_less_noise
 from ftproc.core.editing.screened import rounding_sigma, screen, stuck_readings
@@ -56,6 +57,7 @@ DRIFT_ROUNDS = 3  # of following the noise: where it grows, each finds readings 
 HOPELESS = 200.0  # in log-probability, by which another hypothesis is behind if it is not followed up
 PROFILE_STEPS = 3  # of the search for the jerk profile, once the decisions are made
 STEP_MARGIN = 8.0  # in log-probability, by which steps must explain a log better than late stamps do
+LOST = 100.0  # in log-probability, for each reading that is left out: ten go with the reading itself
 LASTING_ROUNDS = 4  # of the search for faults that last: where one is taken out, another may show
 
 
@@ -119,8 +121,7 @@ def edit(
     scene, found, doubtful = None, tuple[Step, ...](), list[Step]()
     for_lasting = for_lasting_faults(len(time_s))
     for _ in range(0 if live else LASTING_ROUNDS):
-        # Correlated noise resembles many steps, and so do patches that there was no time to understand.
-        if decision.model.coloured or decision.unexamined:
+        if decision.model.coloured:  # which resembles many steps
             break
         scene = scene_of(record, decision, for_lasting)
         new = sorted_out(scene, search(scene))
@@ -132,7 +133,9 @@ def edit(
         moved = levelled(log, scene.at_median.noise_variance, steps)
         read = taken_out(log._replace(measurement=measurement), scene.at_median, scene.setting, moved)
         other = decided(read.measurement, banned=banned | new.banned)
-        if new.steps and _may_be_late_stamps((record, decision), other):
+        if (new.steps and _may_be_late_stamps((record, decision), other)) or (
+            new.banned.any() and _is_lost((record, decision), other, int(new.banned.sum()))
+        ):
             break
         (record, decision), found, banned = other, steps, banned | new.banned
     if decision.stamp_s > 0:  # which explains a clock that seems to jump
@@ -164,6 +167,11 @@ def _one_sided(log: Observations, model: Model, rounding: FloatArray) -> list[On
     around = samples_around(log, median_level(model))
     residual, variance = residuals_near(log, model, one_sided.spread(len(log.time_s)), around)
     return one_sided.find(log.weight, residual, variance, rounding)
+
+
+def _is_lost(before: tuple[Record, Decision], other: tuple[Record, Decision], without: int) -> bool:
+    """Whether so many readings are missing that the track is lost in their gap: that makes the others unlikely."""
+    return log_probability(*other) < log_probability(*before) - LOST * without
 
 
 def _may_be_late_stamps(without: tuple[Record, Decision], levelled_log: tuple[Record, Decision]) -> bool:

@@ -18,6 +18,7 @@ from ftproc.settings import AUTO, MOTIONS, FilterSettings
 from ftproc.simulation import simulate
 from tests.core.identification.test_likelihood import level
 from tests.core.tracks import matched
+from tests.trust import hard
 
 pytestmark = pytest.mark.compiled
 
@@ -31,6 +32,14 @@ def errors(flight, **settings):
     there = np.isin(flight.truth.time_s, found.time_s)
     wrong = (found.state[:, :6] - truth[there]) ** 2
     return np.sqrt([wrong[:, :3].sum(1).mean(), wrong[:, 3:].sum(1).mean()]), found.metadata["summary"]
+
+
+def test_a_motion_that_a_filter_without_a_course_cannot_follow_is_not_chosen():
+    """The smoother follows a ship in a seaway, about its course; about its own estimate the filter diverges."""
+    ship = hard.make("sine", 1).simulated
+    found = pipeline.filter_log(ship.log, FilterSettings())
+    assert found.metadata["summary"]["motion"] == "white jerk"
+    assert (np.abs(found.state[:, :3] - ship.truth.position_m) < 5 * found.sigma[:, :3]).all()
 
 
 def test_an_aircraft_that_manoeuvres_has_a_force_that_turns():

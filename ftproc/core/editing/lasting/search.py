@@ -10,15 +10,14 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ftproc.core.editing.lasting import scan
+from ftproc.core.editing.lasting.between import PER_TERM, TERMS, Between, followed, of_terms, trimmed
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
-from ftproc.core.editing.lasting.faults import Step
 from ftproc.core.editing.lasting.proposals import (
     CELLS,
     LONGEST,
@@ -36,7 +35,7 @@ from ftproc.core.editing.lasting.weighing import Scene, Weighed, weighed
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification.profile import median_level
 from ftproc.core.identification.scales import scales_of
-from ftproc.order_statistics import median
+from ftproc.core.work import for_lasting_faults
 
 ROUNDS, JUMPS = 8, 5  # over a log, and jumps that are weighed in one, by either set of weights
 LEAST_GAIN, TOGETHER = 18.0, 0.03  # of a jump, in log-likelihood; of the largest: components that jump with it
@@ -44,14 +43,11 @@ LEAST_OFF = 10.0  # the same of a jump in a rejected run, by the noise alone
 CERTAIN = 4.0  # sigmas of its size from which a component takes part in a step of several
 AROUND, MEMORIES = (150, 2000), 12.0  # samples on each side of what is weighed, and memories
 SHORTEST_CELL = 2  # samples in a cell of a scan
-OPEN, MOVES = 4.0, 15.0  # in log-probability: within it, whether a fault stays is open; before half of a log is moved
 REMEMBERED, SHORT = 2.5, 0.12  # samples that a filter remembers: with fewer, a long curve may as well be the target's
 # motion, and this share of the log is the longest
 PRIOR, DOUBT, MARGIN = -6.0, -6.0, 8.0  # log-odds of such a fault at a jump; with which it is reported, and taken out
-HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
 MOST_EACH = 20.0  # of log-probability, of each reading: where more is gained, the part without the fault was lost
-SURE = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
-END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step may as well be a patch
+TRIMMED = 2  # times that the ends of a patch are brought to where its readings fit it
 
 
 class Found(NamedTuple):
@@ -90,9 +86,14 @@ class Scanned(NamedTuple):
 
 def search(scene: Scene) -> list[Found]:
     """The faults that last in the log of one or several stations whose outliers were decided as if it had none."""
-    found, rejected = list[Found](), list[Jump]()
+    found, rejected, motion = list[Found](), list[Jump](), set[tuple[Between, ...]]()
+    own = for_lasting_faults(len(scene.possible))  # work, so that usual patches leave enough for the jumps
     for _ in range(ROUNDS):
-        best = _likeliest(scanned(scene.without([curve for each in found for curve in each.curves])), rejected)
+        seen = scanned(scene.without([curve for each in found for curve in each.curves]))
+        best = _likeliest(seen, rejected)
+        if len(scene.rates) == 1:
+            between = _followed(seen._replace(scene=seen.scene._replace(work=own)), found, motion)
+            best = max(filter(None, (best, between)), key=lambda each: each.gain, default=None)
         if best is None or any(best.curves[0][:3] == each.curves[0][:3] for each in found):
             break
         found.append(best)
@@ -138,8 +139,7 @@ def _likeliest(seen: Scanned, rejected: list[Jump]) -> Found | None:
     for jump in seen.jumps:
         if any(abs(jump.sample - old.sample) < seen.width and jump.station == old.station for old in rejected):
             continue
-        if seen.scene.work is not None and seen.scene.work.left <= 0:
-            seen.scene.work.passed += 1
+        if not _worth(seen.scene):
             return None
         here = [each for each in seen.jumps if abs(each.sample - jump.sample) <= seen.width]
         found = [each for each in (_tried(seen, each) for each in here) if each is not None]
@@ -147,6 +147,50 @@ def _likeliest(seen: Scanned, rejected: list[Jump]) -> Found | None:
             return max(found, key=lambda each: each.gain)
         rejected += here
     return None
+
+
+def _worth(scene: Scene) -> bool:
+    """Whether there is work left for another weighing; one without is counted."""
+    if scene.work is None or scene.work.left > 0:
+        return True
+    scene.work.passed += 1
+    return False
+
+
+def _followed(seen: Scanned, known: Sequence[Found], motion: set[tuple[Between, ...]]) -> Found | None:
+    """The likeliest patch between two rejected runs beside what is known; None if there is none. Those that are motion
+    are added to what is."""
+    found, n = list[Found](), seen.samples
+    for stretches in followed(seen.scene, seen.jumps, seen.width, [curve for each in known for curve in each.curves]):
+        if tuple(stretches) in motion:
+            continue
+        if not _worth(seen.scene):
+            break
+        near = seen.near(min(each.begin for each in stretches), max(each.end for each in stretches))
+        part = seen.scene.part(near)
+        with contextlib.suppress(ValueError, np.linalg.LinAlgError):
+            null = _weighed(part, near, ()).log_probability
+            best = _of_any_shape(part, near, [stretches, [each.at_jumps(seen.jumps) for each in stretches]])
+            gain = best.log_probability - null + _prior(best.curves, n)
+            found.append(Found(_in_whole(best, near, n), best.sigma, gain))
+            if gain < MARGIN:
+                motion.add(tuple(stretches))
+    return max((each for each in found if each.gain > MARGIN), key=lambda each: each.gain, default=None)
+
+
+def _of_any_shape(part: Scene, near: slice, ends: Sequence[Sequence[Between]]) -> Weighed:
+    """The likeliest curves of any number of terms, first with these ends, then with those that their readings show."""
+
+    def likeliest(of: Iterable[Sequence[Curve]], *others: Weighed) -> Weighed:
+        tried = (weighed(part, part.log.weight, curves) for curves in of)
+        return max((*others, *tried), key=lambda each: each.log_probability)
+
+    best = likeliest([curve.within(near) for curve in of_terms(each, TERMS[0])] for each in ends)
+    most = min(curve.end - curve.begin for curve in best.curves) // PER_TERM
+    best = likeliest(([curve.of(terms) for curve in best.curves] for terms in TERMS[1:] if terms <= most), best)
+    for _ in range(TRIMMED):
+        best = likeliest([trimmed(best.curves, best.weight)], best)
+    return max(best, _weighed(part, slice(0, len(part.possible)), best.curves), key=lambda each: each.log_probability)
 
 
 def _tried(seen: Scanned, jump: Jump) -> Found | None:
@@ -244,43 +288,3 @@ def _prior(curves: Sequence[Curve], n: int) -> float:
     """Log-odds of there being such a fault, at one of n samples."""
     ends = 1 if curves[0].begin == 0 or curves[0].end == n else 2
     return PRIOR - math.log(3) - ends * math.log(n)
-
-
-class SortedOut(NamedTuple):
-    """banned (n, 3): readings of patches. steps: that are sure. doubtful: that may be an end of a weak patch."""
-
-    banned: NDArray[np.bool_]
-    steps: list[Step]
-    doubtful: list[Step]
-
-
-def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
-    """What follows from the faults of a single station."""
-    n, noise_variance = len(scene.possible), scene.at_median.noise_variance
-    near_end = 1 + min(END, int(SHARE * n))
-    result = SortedOut(np.zeros((n, 3), bool), [], [])
-    for each in found:
-        for curve, sigma in zip(each.curves, each.sigma, strict=True):
-            if curve.end < n or min(curve.begin, n - curve.begin) < near_end:
-                if curve.component != CLOCK and each.gain > MARGIN:
-                    side = slice(0, curve.begin) if curve.end == n and 2 * curve.begin < n else curve.rows
-                    result.banned[side, curve.component] = True
-                continue
-            if curve.component == CLOCK:
-                large = not _may_be_a_halt(scene, curve)
-            else:
-                large = abs(curve.size[0]) > SURE * math.sqrt(noise_variance[curve.component])
-            sure = bool(large and each.gain > MOVES and each.gain - each.second > OPEN)
-            (result.steps if sure else result.doubtful).append(
-                Step(curve.component, curve.begin, curve.size[0], sigma, sure)
-            )
-    return result
-
-
-def _may_be_a_halt(scene: Scene, clock: Curve) -> bool:
-    """Whether the target may have stood still, or hurried, where its clock seems to jump: to make up for the way that
-    is missing within the jump asks for no more acceleration than things that stand and go have."""
-    (r, _, e), late = scene.log.measurement.T, scene.setting.late
-    speed = np.sqrt(late[:, 0] ** 2 + (r * np.cos(e) * late[:, 1]) ** 2 + (r * late[:, 2]) ** 2)[clock.rows]
-    speed = speed[np.isfinite(speed)]
-    return len(speed) > 0 and 4 * median(speed) < HALTS_MPS2 * abs(clock.size[0])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.editing import two_pass
-from ftproc.core.editing.lasting import faults, search
+from ftproc.core.editing.lasting import faults, sorting
 from ftproc.core.editing.lasting.curves import CLOCK, Curve, Setting, without
 from ftproc.core.editing.lasting.faults import Shift, Step, levelled
 from ftproc.core.filtering.records import Observations
@@ -117,6 +117,16 @@ def test_a_clock_that_jumps(late):
     assert found[0].size == pytest.approx(late, abs=5 * found[0].sigma + 0.05)
 
 
+@pytest.mark.parametrize(("gap", "seen"), [(0, True), (6, True), (12, False), (60, False)])
+def test_a_step_behind_a_gap_of_its_component_is_not_sure(gap, seen):
+    """A track that was not seen for a while may be anywhere, and so may seem to jump."""
+    possible = np.ones((100, 3), bool)
+    possible[60 - gap : 60, 1] = False
+    scene = SimpleNamespace(possible=possible)
+    assert sorting._seen_before(scene, Curve(1, 60, 100, (1.0,))) == seen
+    assert sorting._seen_before(scene, Curve(0, 60, 100, (1.0,)))
+
+
 @pytest.mark.parametrize(("speed_mps", "may_be"), [(2.0, True), (7.0, True), (8.0, False), (200.0, False)])
 @pytest.mark.parametrize("late_s", [1.0, -1.0])
 def test_a_clock_that_jumps_by_a_second_may_be_a_halt_of_what_is_slow(speed_mps, may_be, late_s):
@@ -126,7 +136,7 @@ def test_a_clock_that_jumps_by_a_second_may_be_a_halt_of_what_is_slow(speed_mps,
     late = -np.gradient(z, 0.1, axis=0)
     z[70] = np.nan
     scene = SimpleNamespace(log=SimpleNamespace(measurement=z), setting=SimpleNamespace(late=late))
-    assert search._may_be_a_halt(scene, Curve(CLOCK, 60, 100, (late_s,))) == may_be
+    assert sorting._may_be_a_halt(scene, Curve(CLOCK, 60, 100, (late_s,))) == may_be
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -1,0 +1,71 @@
+"""What follows from the faults that were found in the log of a single station: readings of patches that are not used,
+steps that are taken out, and steps that may be an end of a weak patch, and are left."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ftproc.core.editing.lasting.curves import CLOCK, Curve
+from ftproc.core.editing.lasting.faults import Step
+from ftproc.core.editing.lasting.search import MARGIN, Found
+from ftproc.core.editing.lasting.weighing import Scene
+from ftproc.order_statistics import median
+
+OPEN, MOVES = 4.0, 15.0  # in log-probability: within it, whether a fault stays is open; before half of a log is moved
+HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
+BEFORE, SEEN = 12, 0.25  # samples before a step, and share of them that may be good
+SURE = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
+END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step may as well be a patch
+
+
+class SortedOut(NamedTuple):
+    """banned (n, 3): readings of patches. steps: that are sure. doubtful: that may be an end of a weak patch."""
+
+    banned: NDArray[np.bool_]
+    steps: list[Step]
+    doubtful: list[Step]
+
+
+def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
+    """What follows from the faults of a log."""
+    n, noise_variance = len(scene.possible), scene.at_median.noise_variance
+    near_end = 1 + min(END, int(SHARE * n))
+    result = SortedOut(np.zeros((n, 3), bool), [], [])
+    for each in found:
+        for curve, sigma in zip(each.curves, each.sigma, strict=True):
+            if curve.end < n or min(curve.begin, n - curve.begin) < near_end:
+                if curve.component != CLOCK and each.gain > MARGIN:
+                    side = slice(0, curve.begin) if curve.end == n and 2 * curve.begin < n else curve.rows
+                    result.banned[side, curve.component] = True
+                continue
+            if curve.component == CLOCK:
+                large = not _may_be_a_halt(scene, curve)
+            else:
+                large = abs(curve.size[0]) > SURE * math.sqrt(noise_variance[curve.component]) and _seen_before(
+                    scene, curve
+                )
+            sure = bool(large and each.gain > MOVES and each.gain - each.second > OPEN)
+            (result.steps if sure else result.doubtful).append(
+                Step(curve.component, curve.begin, curve.size[0], sigma, sure)
+            )
+    return result
+
+
+def _seen_before(scene: Scene, step: Curve) -> bool:
+    """Whether readings just before a step may be good: behind a gap in a component a track may be anywhere."""
+    before = scene.possible[max(step.begin - BEFORE, 0) : step.begin, step.component]
+    return bool(before.mean() > SEEN)
+
+
+def _may_be_a_halt(scene: Scene, clock: Curve) -> bool:
+    """Whether the target may have stood still, or hurried, where its clock seems to jump: to make up for the way that
+    is missing within the jump asks for no more acceleration than things that stand and go have."""
+    (r, _, e), late = scene.log.measurement.T, scene.setting.late
+    speed = np.sqrt(late[:, 0] ** 2 + (r * np.cos(e) * late[:, 1]) ** 2 + (r * late[:, 2]) ** 2)[clock.rows]
+    speed = speed[np.isfinite(speed)]
+    return len(speed) > 0 and 4 * median(speed) < HALTS_MPS2 * abs(clock.size[0])

@@ -1,0 +1,100 @@
+"""Patches that were followed, between the runs that were rejected at their ends."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.core.editing import two_pass
+from ftproc.core.editing.lasting.between import MOST, Between, followed, trimmed
+from ftproc.core.editing.lasting.curves import Curve, Setting
+from ftproc.core.editing.lasting.scan import Jump
+from ftproc.core.editing.lasting.weighing import Scene
+from ftproc.core.filtering.records import Model, Observations
+from ftproc.core.model.motion import isotropic
+from tests.trust import hard
+
+UNKNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
+N = 200
+
+
+def scene(*rejected):
+    """A scene with rejected readings of (component, begin, end)."""
+    weight = np.ones((N, 3))
+    for c, begin, end in rejected:
+        weight[begin:end, c] = 0.0
+    time_s, zeros = np.arange(N) * 1.0, np.zeros((N, 3))
+    log = Observations(time_s, zeros, weight)
+    model = Model(np.ones(3), isotropic(1.0))
+    return Scene(
+        log, np.ones((N, 3), bool), weight, Setting(time_s, zeros), model, False, np.full((1, 3, 3), 0.01), 4.0, zeros
+    )
+
+
+def found_in(some, known=(), jumps=None):
+    """What may have been followed where there is a jump of all components at each sample, or at these."""
+    ways = ((0,), (1,), (2,))
+    return followed(some, [Jump(9.0, k, 0, ways) for k in (range(N) if jumps is None else jumps)], 2, known)
+
+
+def test_a_patch_may_lie_between_two_rejected_runs_of_a_component():
+    assert found_in(scene((0, 50, 54), (0, 90, 95))) == [[Between(0, 50, 54, 90, 95)]]
+    assert found_in(scene((0, 50, 54), (1, 90, 95))) == []
+    assert found_in(scene((0, 50, 52), (0, 90, 95))) == []  # two readings are no run
+    assert found_in(scene((0, 50, 80), (0, 90, 95))) == []  # less was accepted between them than rejected
+
+
+def test_the_component_jumps_at_one_of_its_ends_at_least():
+    runs = scene((0, 50, 54), (0, 90, 95))
+    assert [len(found_in(runs, jumps=[k])) for k in (47, 48, 56, 57, 70, 88, 97, 98)] == [0, 1, 1, 0, 0, 1, 1, 0]
+
+
+def test_runs_of_several_components_that_coincide_are_weighed_together():
+    one, other = Between(0, 50, 54, 90, 95), Between(2, 52, 58, 88, 92)
+    found = found_in(scene((0, 50, 54), (0, 90, 95), (2, 52, 58), (2, 88, 92)))
+    assert found == [[one], [other], [one, other]]
+
+
+def test_what_is_known_is_not_weighed_again():
+    assert found_in(scene((0, 50, 54), (0, 90, 95)), [Curve(0, 52, 93, (1.0,))]) == []
+    assert len(found_in(scene((0, 50, 54), (0, 90, 95)), [Curve(1, 52, 93, (1.0,))])) == 1
+
+
+def test_of_many_runs_the_nearest_are_weighed():
+    runs = [(0, k, k + 3) for k in range(10, 190, 15)]
+    found = found_in(scene(*runs))
+    assert len(found) == MOST
+    assert all(each.end - each.begin == 18 for (each,) in found)
+
+
+def test_it_goes_from_the_largest_jump_in_the_first_run_to_that_in_the_last():
+    one = Between(0, 50, 54, 90, 95)
+    jumps = [Jump(9.0, 92, 0, ((0,), (3,))), Jump(8.0, 51, 0, ((1,),)), Jump(7.0, 91, 0, ((0,),))]
+    assert one.at_jumps(jumps) == one._replace(end=92)
+
+
+def test_a_curve_ends_with_its_readings_that_are_used():
+    weight = scene((0, 50, 54), (0, 88, 95)).log.weight
+    curves = [Curve(0, 50, 95, (1.0, 2.0)), Curve(0, 51, 53, (1.0,))]
+    assert trimmed(curves, weight) == [Curve(0, 54, 88, (0.0, 0.0)), curves[1]]
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(("name", "seed"), [("sine", 0), ("mirror", 2)])
+def test_a_patch_that_a_short_memory_follows_is_found(name, seed):
+    """An elevation that swings by 170 sigmas for 47 s at 5 Hz, of an aircraft whose filter follows such a motion; and a
+    mirror's."""
+    dirty = hard.make(name, seed).simulated
+    bad = dirty.truth.outlier[:, 2] > 0
+    found = two_pass.edit(dirty.log.time_s, dirty.log.measurement, UNKNOWN)
+    assert found.weight[bad, 2].mean() < 0.02
+    assert found.weight[~bad, 2].mean() > 0.99
+
+
+@pytest.mark.compiled
+def test_a_patch_in_whose_gap_the_track_is_lost_is_not_left_out():
+    """A rocket's azimuths of 28 s, whose ranges of the same time are off: without the azimuths it goes astray by 80 km,
+    with them by 2 km."""
+    rocket = hard.make("two", 0).simulated
+    found = two_pass.edit(rocket.log.time_s, rocket.log.measurement, UNKNOWN).smoothed()
+    assert np.abs(found.state[:, :3] - rocket.truth.position_m).max() < 5e3
