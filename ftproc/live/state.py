@@ -23,7 +23,7 @@ import numpy as np
 from ftproc.core import by_hand, compiled
 from ftproc.core.editing import gate, track, two_pass
 from ftproc.core.filtering import records, smoother
-from ftproc.core.live import beside, doubt, editor, pace, pieces, readings, recursive, rows, whole, window
+from ftproc.core.live import beside, doubt, editor, pace, pieces, readings, recursive, rows, turning, whole, window
 from ftproc.core.model import motion
 from ftproc.errors import InputError, OutputError
 from ftproc.files.writing import atomic
@@ -43,6 +43,7 @@ _KINDS: dict[str, Any] = {
         pace.Pace, pace.Clock, pieces.Sizes, readings.Columns, readings.Labels, readings.Repeats, rows.Waiting,
         rows.Published, records.Model, records.Start, smoother.SmootherRun, two_pass.Known, track.Track,
         gate.GateSettings, by_hand.Accepted, motion.Motion, beside.Rates,
+        turning.Turning,
     )
 }  # fmt: skip
 _FUNCTIONS = {"edit": two_pass.edit}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ftproc.errors import UsageError
 from ftproc.records import EDITED, LAGGED, PAST, WHOLE
-from ftproc.settings import FilterSettings
+from ftproc.settings import AUTO, FilterSettings
 
 if TYPE_CHECKING:
     from ftproc.methods.estimate import Estimate, Part, Readings, Recording
@@ -195,7 +195,10 @@ _ENSEMBLES = "it is for the methods enkf, enpf, enpf-chi2 and renpf"
 #: The options that only some ways of filtering use, by their names on the command line.
 USES = {
     "--editing": Use(lambda m, s: m.name == MAIN, f"it is for {MAIN}; the others have editing of their own, or none"),
-    "--motion": Use(_edited_twice, f"it is for {MAIN} with --editing two-pass"),
+    "--motion": Use(
+        lambda m, s: _edited_twice(m, s) or (_live(m, s) and s.motion in (AUTO, "white-jerk")),
+        f"it is for {MAIN} with --editing two-pass; with --editing live, white-jerk leaves the turning force out",
+    ),
     "--lag": Use(_live, f"it is for {MAIN} with --editing live"),
     "--max-patch": Use(
         lambda m, s: _recursive(m, s) or (m.random and m.handles_outliers),

@@ -64,13 +64,15 @@ LASTING_ROUNDS = 4  # of the search for faults that last: where one is taken out
 class Known(NamedTuple):
     """What the user has specified: noise 1-sigma (3,) m, rad, rad, NaN where it is to be found; jerk_psd m^2/s^5, None
     where it is to be found; the gate, in sigmas, beyond which a lone reading is called an outlier; the readings that
-    are good by hand, or otherwise known to be; and how the noise of single readings is known to differ."""
+    are good by hand, or otherwise known to be; how the noise of single readings is known to differ; and whether nothing
+    but white jerk moves the target, see `live.turning`."""
 
     sigma: FloatArray
     jerk_psd: float | None
     gate: float
     accepted: Accepted = NOTHING
     uneven: Uneven | None = None
+    white_jerk: bool = False
 
 
 class Edited(NamedTuple):

@@ -98,14 +98,14 @@ def carry(back: Backward, f: Filter, after: Posterior, interval: float, by: moti
     if by.acts and size > OFFSETS:
         return False
     if by.acts:
-        forces.linearise(f, by.course[k], by, 0.5 * interval)
+        forces.linearise(f, by.course[k], by, 0.5 * interval, 0.0)
         forces.orient(f, by.course[k], by.course[k + 1])
         forces.spread(f)
         forces.kick_covariance(p, f.kick, f.slope)
     motion.predict(f, interval)
     if by.acts:
         forces.couple(f)
-        forces.linearise(f, by.course[k + 1], by, 0.5 * interval)
+        forces.linearise(f, by.course[k + 1], by, 0.5 * interval, 0.0)
         forces.unkick_covariance(f, back.later)
     motion.wander(f, interval)
     if not invert(p, m, c, back.pn):
@@ -124,7 +124,7 @@ def carry(back: Backward, f: Filter, after: Posterior, interval: float, by: moti
             cov[i, j] = total
             cov[j, i] = total
     if by.acts:
-        forces.linearise(f, by.course[k], by, 0.5 * interval)
+        forces.linearise(f, by.course[k], by, 0.5 * interval, 0.0)
         forces.unkick_covariance(f, cov)
     return True
 

@@ -43,6 +43,11 @@ def piece(after_s: float, model: Model) -> int:
     return int((after_s + 1e-9) / model.knot_s) if math.isfinite(model.knot_s) else 0
 
 
+def later(pieces: FloatArray, passed: int) -> FloatArray:
+    """Those of a profile (m, 3) that are left when so many have passed, at least the last."""
+    return pieces[min(passed, len(pieces) - 1) :]
+
+
 def stretched(model: Model, span_s: float) -> Model:
     """The model with as many pieces of its jerk profile as the span needs; the last one goes on. They become longer
     where MAX_KNOTS of them are too few: one time stamp may lie years after the others."""

@@ -22,10 +22,11 @@ from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
 from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.identification.scales import Scales, scales_of
 from ftproc.core.live import beside
-from ftproc.core.live.pieces import BLOCK, Sizes, filtered, piece, predicted, stretched
+from ftproc.core.live.pieces import BLOCK, Sizes, filtered, later, piece, predicted, stretched
 from ftproc.core.live.predictive_chain import OPEN, chains_of
 from ftproc.core.live.readings import Columns, Labels, Repeats, labelled, typical, used_lately
 from ftproc.core.live.readmission import Open, readmitted, settled
+from ftproc.core.live.turning import Case, Turning
 from ftproc.core.live.whole import Whole
 from ftproc.records import FloatArray, IntArray
 
@@ -53,6 +54,7 @@ class Window:
         # Samples of re-acquisition; how many left before their lag, are kept no more, came before the track's start.
         self.reacquired, self.left, self.forgotten, self.begun = list[int](), 0, 0, -1
         self.under_way: Whole | None = None
+        self.turning = Turning(acts=not (known.white_jerk or stand_ins))
         nothing, ones, self.side = np.zeros((0, 3)), np.ones((0, 3)), beside.Rates()
         self.kept = Columns(
             time_s=np.empty(0), measurement=nothing, possible=nothing > 0, weight=nothing, times=ones, late=nothing,
@@ -94,7 +96,8 @@ class Window:
 
     def smoothed(self) -> SmootherRun:
         """The newest part, smoothed with the decisions as they are."""
-        return smooth_log(self._observed(slice(self.near, len(self))), self.allowed, [self.anchor], PATHS)
+        log = self._observed(slice(self.near, len(self)))
+        return self.turning.smoothed(log, self.anchor, smooth_log(log, self.allowed, [self.anchor], PATHS))
 
     def used_lately(self, count: int) -> FloatArray:
         return used_lately(self.measurement, self.kept["weight"], count)
@@ -152,7 +155,8 @@ class Window:
         self._count_from(starts)
         self.anchor = self._ahead(starts, model, self.near)
         passed = piece(float(self.time_s[self.near] - self.time_s[0]), model)
-        self.model = self.allowed = model._replace(jerk=model.jerk[min(passed, len(model.jerk) - 1) :])
+        self.model = self.allowed = model._replace(jerk=later(model.jerk, passed))
+        self.turning.anew()
         self.refresh()
 
     def _count_from(self, starts: list[Start]) -> None:
@@ -189,10 +193,9 @@ class Window:
         n = len(self)
         stuck = self._take(time_s, measurement)
         first_s = float(self.time_s[self.near])
-        rows, left = self._filtered(
-            self._observed(slice(n - 1, len(self))), Span(1, 1 + len(time_s), 0), self.allowed, self.filters,
-            self.chains, first_s,
-        )  # fmt: skip
+        log, span = self._observed(slice(n - 1, n + len(time_s))), Span(1, 1 + len(time_s), 0)
+        rows, left = self._filtered(log, span, self.allowed, self.filters, self.chains, first_s)
+        self.turning.append(log, span, rows, self.chains, first_s)
         rows["since_start"] += self.kept["rows"]["since_start"][n - 1]
         used, kept = np.column_stack([rows["weight"], left])[1:], self.kept
         kept["weight"][n:], kept["rate_weight"][n:], kept["rows"][n:] = used[:, :-1], used[:, -1], rows[1:]
@@ -260,8 +263,8 @@ class Window:
             self.model = fit_profile(log, [self.anchor], self.model, JERK_STEPS, scales)
             self.allowed = self._with_allowance(log, scales)
         self.filters, self.chains = self.allowed.filter(self.anchor), self._chains(self.allowed)
-        span = Span(0, len(log.time_s), 0)
-        rows, left = self._filtered(log, span, self.allowed, self.filters, self.chains)
+        rows, left = self._filtered(log, Span(0, len(log.time_s), 0), self.allowed, self.filters, self.chains)
+        self.turning.refresh(Case(log, self.allowed, self.anchor, self.chains, scales), rows)
         rows["since_start"] += self.forgotten + self.near - self.begun
         self.kept["rows"][near] = rows
         self.kept["rate_weight"][near] = left
@@ -293,5 +296,5 @@ class Window:
         self._filtered(log, Span(0, len(log.time_s), 0), self.allowed, filters)
         self.anchor, self.near = predicted(filters), ahead
         passed = piece(float(times[ahead]) - first_s, self.model)
-        jerk = self.model.jerk
-        self.model = self.model._replace(jerk=jerk[min(passed, len(jerk) - 1) :])
+        self.model = self.model._replace(jerk=later(self.model.jerk, passed))
+        self.turning.passed(passed)

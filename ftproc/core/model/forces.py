@@ -33,6 +33,7 @@ FloatArray = NDArray[np.float64]
 GRAVITY, EARTH_M = 9.80665, 6371008.8  # m/s2, and the radius of a round earth
 AT_REST_MPS = 3.0  # v0
 SCALE_HEIGHT_M = 8500.0  # H
+LEAST_FORCE = 1e-300  # m2/s4: of none, nothing is known
 
 
 class Forced(Protocol):
@@ -59,8 +60,8 @@ class Scored(Adjoint, Protocol):
 
 
 @part
-def linearise(f: Forced, x: FloatArray, by: Motion, h: float) -> None:
-    """Fill kick and push of a kick of h seconds at a state x (9,)."""
+def linearise(f: Forced, x: FloatArray, by: Motion, h: float, vague: float) -> None:
+    """Fill kick and push of a kick of h seconds at a state x (9,), whose acceleration has this variance."""
     w0, w1, w2 = 2 * by.rotation[0, 0], 2 * by.rotation[0, 1], 2 * by.rotation[0, 2]
     v0, v1, v2, a0, a1, a2 = x[3], x[4], x[5], x[6], x[7], x[8]
     r0, r1, r2 = x[0], x[1], x[2] + EARTH_M
@@ -72,8 +73,11 @@ def linearise(f: Forced, x: FloatArray, by: Motion, h: float) -> None:
     d1 = a1 + pull * r1 + w2 * v0 - w0 * v2
     d2 = a2 + pull * r2 + w0 * v1 - w1 * v0
     i2 = 1 / (v0 * v0 + v1 * v1 + v2 * v2 + AT_REST_MPS * AT_REST_MPS)
+    dd = max(d0 * d0 + d1 * d1 + d2 * d2, LEAST_FORCE)
     vd, ad, va = v0 * d0 + v1 * d1 + v2 * d2, a0 * d0 + a1 * d1 + a2 * d2, v0 * a0 + v1 * a1 + v2 * a2
-    turns, swell = by.turns * i2, by.pressed * (2 * va * i2 - rv * ir / SCALE_HEIGHT_M)
+    known = dd / (dd + vague)
+    turns, pressed = known * by.turns * i2, known * by.pressed
+    swell = pressed * (2 * va * i2 - rv * ir / SCALE_HEIGHT_M)
     v, a, d, r = (v0, v1, v2), (a0, a1, a2), (d0, d1, d2), (r0, r1, r2)
     s, b = f.slope, f.kick
     for i in range(3):
@@ -81,7 +85,7 @@ def linearise(f: Forced, x: FloatArray, by: Motion, h: float) -> None:
         f.push[i] = turned + swell * d[i] - pull * (v[i] - 3 * rv * ir2 * r[i])
         for j in range(3):
             by_force = turns * (a[i] * v[j] - v[i] * a[j])
-            grows = by.pressed * d[i]
+            grows = pressed * d[i]
             s[i, 3 + j] = by_force - turns * v[i] * d[j] + grows * 2 * i2 * v[j]
             s[i, j] = turns * a[i] * d[j] - 2 * turned * i2 * v[j] + 3 * pull * ir2 * r[i] * r[j]
             s[i, j] += grows * (2 * i2 * a[j] - 4 * va * i2 * i2 * v[j] - ir * r[j] / SCALE_HEIGHT_M)
@@ -192,19 +196,19 @@ def travel(f: Forced, by: Motion, before: int, after: int, interval: float) -> N
     """x and P after an interval from sample `before` of the course to `after`, in place; the densities of the jerk that
     hold are in `jerk`."""
     if len(by.course) > 0:
-        linearise(f, by.course[before], by, 0.5 * interval)
+        linearise(f, by.course[before], by, 0.5 * interval, 0.0)
         orient(f, by.course[before], by.course[after])
     else:
-        linearise(f, f.x, by, 0.5 * interval)
+        linearise(f, f.x, by, 0.5 * interval, f.p[6, 6] + f.p[7, 7] + f.p[8, 8])
         orient(f, f.x, f.x)
     spread(f)
     kick(f)
     predict(f, interval)
     couple(f)
     if len(by.course) > 0:
-        linearise(f, by.course[after], by, 0.5 * interval)
+        linearise(f, by.course[after], by, 0.5 * interval, 0.0)
     else:
-        linearise(f, f.x, by, 0.5 * interval)
+        linearise(f, f.x, by, 0.5 * interval, f.p[6, 6] + f.p[7, 7] + f.p[8, 8])
     kick(f)
 
 
@@ -212,7 +216,7 @@ def travel(f: Forced, by: Motion, before: int, after: int, interval: float) -> N
 def kick_back(b: Adjoint, f: Forced, by: Motion, k: int, interval: float) -> None:
     """r <- K' r and N <- K' N K in place, of the kick at sample k of the course on a side of an interval: the backward
     counterpart of `kick`. f: memory."""
-    linearise(f, by.course[k], by, 0.5 * interval)
+    linearise(f, by.course[k], by, 0.5 * interval, 0.0)
     r, n, m = b.r, b.n, f.kick
     r0, r1, r2 = r[6], r[7], r[8]
     for i in range(6):
@@ -277,7 +281,7 @@ def score_jerk(back: Scored, f: Forced, interval: float, sums: FloatArray, piece
 def kick_columns(s: FloatArray, f: Forced, by: Motion, k: int, interval: float) -> None:
     """The columns (9, m) of a matrix after the kick at sample k of the course on a side of an interval, in place. f:
     memory."""
-    linearise(f, by.course[k], by, 0.5 * interval)
+    linearise(f, by.course[k], by, 0.5 * interval, 0.0)
     for c in range(s.shape[1]):
         s3, s4, s5, s6, s7, s8 = s[3, c], s[4, c], s[5, c], s[6, c], s[7, c], s[8, c]
         for i in range(3):
@@ -288,7 +292,7 @@ def kick_columns(s: FloatArray, f: Forced, by: Motion, k: int, interval: float) 
 @part
 def kick_columns_back(s: FloatArray, f: Forced, by: Motion, k: int, interval: float) -> None:
     """The same of the backward recursion."""
-    linearise(f, by.course[k], by, 0.5 * interval)
+    linearise(f, by.course[k], by, 0.5 * interval, 0.0)
     for c in range(s.shape[1]):
         s6, s7, s8 = s[6, c], s[7, c], s[8, c]
         for i in range(6):

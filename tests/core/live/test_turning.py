@@ -1,0 +1,69 @@
+"""The second filter of a live window, and how much of it is published."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.core.filtering.records import empty_rows
+from ftproc.core.live import turning
+from ftproc.methods import live
+from ftproc.settings import FilterSettings
+from tests.simulated import simulate
+
+pytestmark = pytest.mark.compiled
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return simulate("manoeuvre-clean", seed=1, duration_s=40.0)
+
+
+def rows_of(flight, **settings):
+    editor = live.editor(FilterSettings(editing="live", **settings))
+    found = editor.push(flight.log.time_s, flight.log.measurement) + editor.finish()
+    return editor, np.concatenate([each.rows for each in found])
+
+
+def test_a_manoeuvre_is_followed_better(flight):
+    """Decisions are the same, and positions and velocities are nearer to the truth."""
+    (_, mixed), (_, white) = rows_of(flight), rows_of(flight, motion="white-jerk")
+    np.testing.assert_array_equal(mixed["weight"], white["weight"])
+    known = flight.log.time_s > 8.0  # the beginning of a track knows no turn
+    for part, truth in ((slice(0, 3), flight.truth.position_m), (slice(3, 6), flight.truth.velocity_mps)):
+        errors = [np.sqrt(((each["state"][known, part] - truth[known]) ** 2).mean()) for each in (mixed, white)]
+        assert errors[0] < 0.97 * errors[1]
+
+
+@pytest.mark.parametrize("settings", [{"motion": "white-jerk"}, {"jerk_psd_m2ps5": 10.0}])
+def test_white_jerk_that_is_asked_for_is_alone(flight, settings):
+    editor, _ = rows_of(flight, **settings)
+    assert not editor.window.turning.acts
+
+
+def row(state, innovation):
+    rows = empty_rows(1)
+    rows["state"], rows["sigma"], rows["weight"] = state, 1.0, 1.0
+    rows["innovation_sigma"], rows["nis"] = 1.0, 3 * innovation**2
+    return rows
+
+
+def test_a_filter_that_diverges_is_not_published():
+    """Whatever it was worth before."""
+    second = turning.Turning(acts=True)
+    second.odds, here, astray = turning.MOST, row(0.0, 1.0), row(1e6, 1e3)
+    second.run = float(turning._gained(here, astray)[0])
+    turning._mix(here, astray, np.full(1, second.weight), turning.MIXED)
+    np.testing.assert_array_equal(here["state"], 0.0)
+    np.testing.assert_array_equal(here["sigma"], 1.0)
+
+
+def test_one_without_numbers_speaks_for_nothing():
+    assert turning._gained(row(0.0, 1.0), row(np.nan, np.nan))[0] == -np.inf
+
+
+def test_the_sigmas_allow_for_the_difference():
+    here = row(0.0, 1.0)
+    turning._mix(here, row(2.0, 1.0), np.full(1, 0.5), turning.MIXED)
+    np.testing.assert_allclose(here["state"], 1.0)
+    np.testing.assert_allclose(here["sigma"], np.sqrt(2.0))
