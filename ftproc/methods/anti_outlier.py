@@ -22,6 +22,7 @@ from ftproc.core.editing import two_pass
 from ftproc.core.editing.lasting.faults import Shift, spread
 from ftproc.core.filtering import forward
 from ftproc.core.filtering.beside import WIDTH
+from ftproc.core.filtering.initialization import WIDEST_BLIND_BRIDGE
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import PATHS, STATES, SmootherRun, smooth_log
 from ftproc.core.identification import likelihood, motion_models
@@ -129,13 +130,23 @@ def _followed(
     motion: Chosen, white: Chosen, wanted: int | None
 ) -> tuple[Chosen, tuple[FilterRun, SmootherRun | None, FloatArray]]:
     """A motion and what comes of it, or of white jerk, if the filter follows that better: it knows no course but its
-    own estimate, and may diverge where the smoother is right about the course. wanted: of the smoother."""
+    own estimate, and may diverge where the smoother is right about the course; or if the smoother leaves the course
+    about which it is linearised. wanted: of the smoother."""
     found = _with_motion(motion, motion.model, wanted)
     if motion.name != white.name:
         other = _with_motion(white, white.model, None)
-        if other[0].log_likelihood > found[0].log_likelihood:
+        if other[0].log_likelihood > found[0].log_likelihood or _leaves_its_course(motion, found[1]):
             return white, _with_motion(white, white.model, wanted)
     return motion, found
+
+
+def _leaves_its_course(motion: Chosen, smoothed: SmootherRun | None) -> bool:
+    """Whether a smoothed track goes so far away that a filter would linearise about a wrong place."""
+    if smoothed is None:
+        return False
+    course = motion.model.motion.course if motion.row is None else motion.model.motion.course[motion.row]
+    away, range_m = ((each[:, :3] ** 2).sum(1) for each in (smoothed.state - course, course))
+    return not bool((away < WIDEST_BLIND_BRIDGE**2 * range_m).all())
 
 
 def _with_motion(motion: Chosen, model: Model, wanted: int | None) -> tuple[FilterRun, SmootherRun | None, FloatArray]:
