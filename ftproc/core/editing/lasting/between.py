@@ -48,19 +48,15 @@ class Between(NamedTuple):
             for low, high in ((self.begin, self.low), (self.high, self.end))
         )
 
-    def contains(self, curve: Curve) -> bool:
-        """Whether a curve explains some of what lies between the runs."""
-        return curve.component == self.component and curve.begin < self.high and self.low < curve.end
-
     def coincides(self, other: Between) -> bool:
         """Whether the runs at both ends overlap."""
         firsts, lasts = max(self.begin, other.begin), max(self.high, other.high)
         return firsts <= min(self.low, other.low) and lasts <= min(self.end, other.end)
 
 
-def followed(scene: Scene, jumps: Sequence[Jump], within: int, known: Sequence[Curve]) -> list[list[Between]]:
-    """Where a patch may have been followed beside what is known, of one component or of several, in the log of one
-    station: its jumps are known within so many samples."""
+def followed(scene: Scene, jumps: Sequence[Jump], within: int) -> list[list[Between]]:
+    """Where a patch may have been followed, of one component or of several, in the log of one station: its jumps are
+    known within so many samples."""
     found = list[tuple[int, Between]]()
     for c in range(CLOCK):
         seen = np.flatnonzero(scene.possible[:, c])
@@ -69,8 +65,7 @@ def followed(scene: Scene, jumps: Sequence[Jump], within: int, known: Sequence[C
             if m - k <= FROM_IT and d - b >= max(b - a, e - d) and e - a <= LONGEST * len(seen):
                 ends = int(seen[a]), int(seen[b]), int(seen[d]), int(seen[e - 1]) + 1
                 found.append((m - k, Between(c, *ends)))
-    shown = [each for _, each in sorted(found) if each.jumps(jumps, within)]
-    single = [each for each in shown[:MOST] if not any(each.contains(curve) for curve in known)]
+    single = [each for _, each in sorted(found) if each.jumps(jumps, within)][:MOST]
     together = [[each for each in single if each.coincides(one)] for one in single]
     several = {tuple(each): each for each in together if len(each) > 1}
     return [*([each] for each in single), *several.values()]
