@@ -94,11 +94,8 @@ class Scanned(NamedTuple):
 
 
 def search(scene: Scene) -> list[Found]:
-    """The faults that last in the log of one or several stations whose outliers were decided as if it had none.
-
-    A patch that was followed replaces the faults beside which it lies where it explains more than all of them: between
-    two patches, the readings of neither seem to be one.
-    """
+    """The faults that last in the log of one or several stations whose outliers were decided as if it had none. A patch
+    that was followed replaces those beside it only if it explains more: what lies between two patches seems one."""
     found, rejected = list[Found](), list[Jump]()
     seen = scanned(scene)
     followed = _followed(seen)

@@ -31,10 +31,10 @@ def scene(*rejected):
     )
 
 
-def found_in(some, known=(), jumps=None):
+def found_in(some, jumps=None):
     """What may have been followed where there is a jump of all components at each sample, or at these."""
     ways = ((0,), (1,), (2,))
-    return followed(some, [Jump(9.0, k, 0, ways) for k in (range(N) if jumps is None else jumps)], 2, known)
+    return followed(some, [Jump(9.0, k, 0, ways) for k in (range(N) if jumps is None else jumps)], 2)
 
 
 def test_a_patch_may_lie_between_two_rejected_runs_of_a_component():
@@ -53,11 +53,6 @@ def test_runs_of_several_components_that_coincide_are_weighed_together():
     one, other = Between(0, 50, 54, 90, 95), Between(2, 52, 58, 88, 92)
     found = found_in(scene((0, 50, 54), (0, 90, 95), (2, 52, 58), (2, 88, 92)))
     assert found == [[one], [other], [one, other]]
-
-
-def test_what_is_known_is_not_weighed_again():
-    assert found_in(scene((0, 50, 54), (0, 90, 95)), [Curve(0, 52, 93, (1.0,))]) == []
-    assert len(found_in(scene((0, 50, 54), (0, 90, 95)), [Curve(1, 52, 93, (1.0,))])) == 1
 
 
 def test_of_many_runs_the_nearest_are_weighed():
