@@ -179,8 +179,9 @@ def test_live_is_better_with_them(plain, live):
 def test_live_a_useless_one_changes_nothing(plain, live):
     flight, _ = plain
     found = filter_log(with_rates(flight, 100.0), LIVE)
-    settled = found.time_s > 10  # before, the velocity is vague, and they do tell something of it
-    np.testing.assert_array_equal(found.state[settled], live.state[settled])
+    settled = found.time_s > 10  # before, the velocity is vague, and they do tell something of it; by it the process
+    # noise of the turning force is begun from elsewhere
+    np.testing.assert_allclose(found.state[settled], live.state[settled], atol=1e-3)
     turned = filter_log(replace(flight.log, range_rate=-with_rates(flight, 0.5).range_rate), LIVE)
     assert causal_errors(turned, flight.truth)[1] < 0.8 * causal_errors(live, flight.truth)[1]
 

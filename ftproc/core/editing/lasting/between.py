@@ -40,6 +40,13 @@ class Between(NamedTuple):
         end = next((jump.sample for jump in own if self.high <= jump.sample <= self.end), self.end)
         return self._replace(begin=begin, end=end)
 
+    def runs(self) -> list[Curve]:
+        """The rejected runs, each as a patch of its own."""
+        return [
+            Curve(self.component, begin, end, (0.0,) * min(TERMS[0], max((end - begin) // PER_TERM, 1)))
+            for begin, end in ((self.begin, self.low), (self.high, self.end))
+        ]
+
     def jumps(self, jumps: Sequence[Jump], within: int) -> bool:
         """Whether the component jumps in one of the runs, or beside it."""
         return any(

@@ -169,7 +169,7 @@ def _worth(scene: Scene) -> bool:
 
 
 def _followed(seen: Scanned) -> Found | None:
-    """The likeliest patch between two rejected runs of one station; None if there is none."""
+    """The likeliest patch between two rejected runs of one station, if it is likelier than the runs as two patches."""
     if len(seen.scene.rates) > 1:
         return None
     found, n, work = list[Found](), seen.samples, for_lasting_faults(seen.samples)  # so that enough is left for jumps
@@ -180,7 +180,8 @@ def _followed(seen: Scanned) -> Found | None:
         near = seen.near(min(each.begin for each in stretches), max(each.end for each in stretches))
         part = scene.part(near)
         with contextlib.suppress(ValueError, np.linalg.LinAlgError):
-            null = _weighed(part, near, ()).log_probability
+            runs = [curve for each in stretches for curve in each.runs()]
+            null = max(_weighed(part, near, curves).log_probability for curves in ((), runs))
             best = _of_any_shape(part, near, [stretches, [each.at_jumps(seen.jumps) for each in stretches]])
             gain = best.log_probability - null + _prior(best.curves, n)
             found.append(Found(_in_whole(best, near, n), best.sigma, gain))

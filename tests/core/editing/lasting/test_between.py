@@ -55,6 +55,12 @@ def test_runs_of_several_components_that_coincide_are_weighed_together():
     assert found == [[one], [other], [one, other]]
 
 
+def test_its_runs_are_patches_of_their_own():
+    runs = Between(1, 50, 54, 80, 95).runs()
+    assert [each[:3] for each in runs] == [(1, 50, 54), (1, 80, 95)]
+    assert [len(each.size) for each in runs] == [1, 3]
+
+
 def test_of_many_runs_the_nearest_are_weighed():
     runs = [(0, k, k + 3) for k in range(10, 190, 15)]
     found = found_in(scene(*runs))
