@@ -143,7 +143,12 @@ def test_gap_of_minutes(path, seconds, smooth):
     assert (trajectory.sigma > 0).all()
 
 
-@pytest.mark.parametrize("seed", [84, 107, 159])
+ONE_CURVE = pytest.mark.xfail(
+    reason="a curve through two patches and the flight between them is taken for a patch", strict=False
+)
+
+
+@pytest.mark.parametrize("seed", [84, 107, pytest.param(121, marks=ONE_CURVE), 159])
 def test_patches_are_not_followed(seed):
     """Flights with an eighth of each component in patches, some of them at the record's ends: in each, the track once
     went along with a patch and the readings on both sides of it were rejected."""

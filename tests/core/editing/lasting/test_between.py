@@ -12,6 +12,7 @@ from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.weighing import Scene
 from ftproc.core.filtering.records import Model, Observations
 from ftproc.core.model.motion import isotropic
+from ftproc.simulation import simulate
 from tests.trust import hard
 
 UNKNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
@@ -90,6 +91,21 @@ def test_a_patch_that_a_short_memory_follows_is_found(name, seed):
     found = two_pass.edit(dirty.log.time_s, dirty.log.measurement, UNKNOWN)
     assert found.weight[bad, 2].mean() < 0.02
     assert found.weight[~bad, 2].mean() > 0.99
+
+
+@pytest.mark.compiled
+def test_two_patches_with_flight_between_them_are_not_one_that_was_followed(monkeypatch):
+    """A curve through all three explains more than motion does, but less than a patch at either end."""
+    patches = "isolated=0.01:6-300,offset=2:8-30:8-200,ramp=1:10-30:20-200,burst=1:8-20:10-100,nan=0.01"
+    flight = simulate("manoeuvre", seed=261, duration_s=60.0, dt_s=0.1, outliers=patches)
+
+    def error_m():
+        found = two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN).smoothed()
+        return np.sqrt(((found.state[:, :3] - flight.truth.position_m) ** 2).sum(1).mean())
+
+    assert error_m() < 1.0
+    monkeypatch.setattr(Between, "runs", lambda self: [])
+    assert error_m() > 10.0
 
 
 @pytest.mark.compiled
