@@ -10,6 +10,7 @@ so far (`live`).
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -22,12 +23,14 @@ from ftproc.core.editing import two_pass
 from ftproc.core.editing.lasting.faults import Shift, spread
 from ftproc.core.filtering import forward
 from ftproc.core.filtering.beside import WIDTH
-from ftproc.core.filtering.initialization import WIDEST_BLIND_BRIDGE
+from ftproc.core.filtering.initialization import WIDEST_BLIND_BRIDGE, find_starts
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import PATHS, STATES, SmootherRun, smooth_log
 from ftproc.core.identification import likelihood, motion_models
 from ftproc.core.identification.motion_models import Chosen
 from ftproc.core.identification.profile import ALLOWANCE, fit_profile, median_level, with_allowance
+from ftproc.core.model import kinematics
+from ftproc.core.model.frames import line_of_sight_axes
 from ftproc.methods import bridging, live, preparing, range_rates
 from ftproc.methods.bridging import Bridged
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
@@ -38,6 +41,7 @@ from ftproc.settings import FilterSettings
 Run = TypeVar("Run", FilterRun, SmootherRun)
 
 LONGEST_WHOLE = 60_000  # samples of a log that is edited as a whole
+HALFWAY = 0.5  # of the distance to where another understanding puts the target is added to the sigmas
 KEPT = 60_000  # samples of a segment, without its margins,
 KEPT_MARGINS = 12  # or so many times its margin
 MOST_PIECES = 20  # of a track: what is re-initialized so often shows no motion (two targets in turn: 115)
@@ -81,7 +85,7 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     again = preparing.re_initialized(edited.starts)
     over = _bridged(log, model, edited.starts, settings.jerk_psd_m2ps5 is not None)
     label = preparing.labels(np.where(over.read, 0.0, over.log.weight), log.measurement)
-    edited = edited._replace(log=over.log, model=over.model, starts=over.starts)
+    others, edited = edited.others, edited._replace(log=over.log, model=over.model, starts=over.starts)
 
     def chosen(names: tuple[str, ...]) -> Chosen:
         found = motion_models.choose(over.log, over.starts, over.model, names, specified)
@@ -95,6 +99,8 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         filtered, other_smoothed, _ = _with_motion(motion, other, wanted)
         run = _worse_of(run, filtered)
         smoothed = smoothed and other_smoothed and _worse_of(smoothed, other_smoothed)
+    for away in _elsewhere(edited, others, settings.jerk_psd_m2ps5 is not None):
+        run, smoothed = _reaching(run, away), smoothed and _reaching(smoothed, away)
     run, smoothed = over.filtered(run), smoothed and over.smoothed(smoothed)
     shifts = edited.faults.shifts
     if shifts:
@@ -172,6 +178,31 @@ def _as_likely(edited: two_pass.Edited, known: two_pass.Known, run: FilterRun) -
     slowest = decision.slowest if decision.alternative is None else decision.alternative.slowest
     most = likelihood.most_noise(edited.log, edited.model, edited.starts, np.where(free, run.innovation_sigma, 0.0))
     yield from (other for other in (slowest, most) if other is not None)
+
+
+def _elsewhere(edited: two_pass.Edited, others: Sequence[Observations], fixed: bool) -> Iterator[FloatArray]:
+    """(n, 9) how far away from the track that which follows from each other understanding is. fixed: as in
+    `_bridged`."""
+    if not others:
+        return
+    state = smooth_log(edited.log, edited.model, edited.starts, STATES).state
+    for other in others:
+        with contextlib.suppress(ValueError):  # a component has too few readings
+            starts = find_starts(other, edited.model.noise_variance, median(edited.model.jerk[:, 0]))
+            over = _bridged(other, edited.model, starts, fixed)
+            away = smooth_log(over.log, over.model, over.starts, STATES).state - state
+            yield np.where(np.isfinite(away), away, 0.0)
+
+
+def _reaching(run: Run, away: FloatArray) -> Run:
+    """A run with sigmas that reach HALFWAY to where another understanding puts the target, away (n, 9) from it."""
+    sigma, los_sigma = np.hypot(run.sigma, HALFWAY * away), run.los_sigma.copy()
+    sight = line_of_sight_axes(run.state[:, :3])
+    for lines in (slice(0, 3), slice(3, 6)):
+        along = np.einsum("kij,kj->ki", sight, away[:, lines])
+        los_sigma[:, lines] = np.hypot(los_sigma[:, lines], HALFWAY * along)
+    path_sigma = kinematics.widened(run.state, run.path_sigma, run.sigma, sigma)
+    return run._replace(sigma=sigma, los_sigma=los_sigma, path_sigma=path_sigma)
 
 
 def _worse_of(run: Run, other: Run) -> Run:

@@ -39,10 +39,9 @@ class FaultStatistics:
             (self.steps if step.sure else self.doubtful).append(found)
         for rival in faults.rivals:
             name, from_s, to_s = NAMES[rival.component], float(time_s[rival.begin]), float(time_s[rival.end - 1])
-            chosen, other = ("motion", "a patch of outliers")[:: 1 if rival.motion else -1]
-            what = f"the {name} from {from_s:.6g} to {to_s:.6g} s, taken for {chosen}, may be {other}"
+            what = f"the {name} from {from_s:.6g} to {to_s:.6g} s, taken for {rival.chosen}, may be {rival.other}"
             where = {"component": name, "from_s": from_s, "to_s": to_s}
-            self.rivals.append({"what": what, "nats": rival.gain, **where, "chosen": chosen})
+            self.rivals.append({"what": what, "nats": rival.gain, **where, "chosen": rival.chosen})
         for one in faults.one_sided:
             name, unit = NAMES[one.component], UNITS[one.component]
             found = {"component": name, "share": one.share, f"error_{unit}": one.error, f"shift_{unit}": one.shift}

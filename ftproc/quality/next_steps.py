@@ -59,7 +59,7 @@ def steps(s: Summary, settings: FilterSettings, model_doubtful: bool) -> list[St
     found += _smoothed(settings)
     share = max(verdict.outlier_share(part) for part in s["components"].values())
     rules = (
-        (_conventions, _outliers, *_RULES) if share > verdict.MANY_REJECTED else _RULES
+        (_conventions, _clock, _outliers, *_RULES) if share > verdict.MANY_REJECTED else _RULES
     )  # many may be taken for noise
     every = [*found, *(step for rule in rules for step in rule(s))]
     return [step for k, step in enumerate(every) if step not in every[:k]]

@@ -61,7 +61,7 @@ def _second(first: Any, second: Any, *_: Any) -> Any:
     return second
 
 
-def _pair(record: Any, decision: Any, *_: Any) -> Any:
+def _pair(record: Any, decision: Any, *_: Any, **__: Any) -> Any:
     return record, decision
 
 
@@ -85,8 +85,11 @@ RULES: dict[str, tuple[Off, ...]] = {
     "late stamps": (Off(TWO_PASS, "late_stamps", _nothing),),
     "very late stamps": (Off(TWO_PASS, "allow_for_very_late_stamps", _pair),),
     "rejected runs": (Off(TWO_PASS, "reassess_rejected", lambda record, decision, work: (decision, ())),),
-    "faults that last": (Off(TWO_PASS, "search", _empty),),
+    "faults that last": (Off(f"{EDITING}.lasting.settling", "search", _empty),),
     "jumps that the part around them explains": (Off(f"{EDITING}.lasting.search", "leaves_a_jump", lambda *_: True),),
+    "clocks that jump in a gap": (Off(f"{EDITING}.lasting.clock", "gaps", _empty),),
+    "noise of what is rejected": (Off(TWO_PASS, "_rejects_many", lambda *_: False),),
+    "others that are as likely": (Off(TWO_PASS, "others", _empty),),
     "patches that were followed": (Off(f"{EDITING}.lasting.search", "_followed", _nothing),),
     "one-sided errors": (Off(TWO_PASS, "_one_sided", _empty),),
     "patches between jumps": (Off(f"{EDITING}.jump_patches", "find", lambda time_s, *_: np.zeros(len(time_s))),),

@@ -255,11 +255,13 @@ def _has_tails(off: FloatArray, gate: float, count: int) -> bool:
     return few and near > FALLING * far and near + far > max(TAILS * int(outside.sum()), RARE * count, normal)
 
 
-def allow_for_drift(record: Record, decision: Decision) -> tuple[Record, Decision]:
-    """The record with noise whose variance drifts, and the decisions made again, if it does."""
+def allow_for_drift(record: Record, decision: Decision, rejected: bool = False) -> tuple[Record, Decision]:
+    """The record with noise whose variance drifts, and the decisions made again, if it does. rejected: by the readings
+    that were rejected, too: where the noise has grown by far they may be most."""
     if _repeats(record, decision):
         return record, decision
-    drifting = uneven_noise.drift(record.weighted(decision.weight), *_residuals(record, decision))
+    weight = record.possible.astype(float) if rejected else decision.weight
+    drifting = uneven_noise.drift(record.weighted(weight), *_residuals(record, decision))
     if drifting is None:
         return record, decision
     uneven = record.uneven or Uneven.none(len(record.time_s))

@@ -28,11 +28,10 @@ from ftproc.core.editing.decisions import (
     late_stamps,
 )
 from ftproc.core.editing.lasting.curves import CLOCK
-from ftproc.core.editing.lasting.faults import Faults, Rival, Shift, Step, levelled, refined, taken_out
-from ftproc.core.editing.lasting.rejected_runs import reassess_rejected
-from ftproc.core.editing.lasting.search import search
-from ftproc.core.editing.lasting.sorting import sorted_out
-from ftproc.core.editing.lasting.weighing import scene_of
+from ftproc.core.editing.lasting.faults import MOTION, STEP, Faults, Shift, refined
+from ftproc.core.editing.lasting.rejected_runs import OPEN, reassess_rejected
+from ftproc.core.editing.lasting.rivals import others
+from ftproc.core.editing.lasting.settling import Understood, without_lasting
 from ftproc.core.editing.reassessment import likelier, log_probability, preferred, reassess, with_less_noise
 from ftproc.core.editing.screened import rounding_sigma, screen, stuck_readings
 from ftproc.core.filtering.initialization import find_starts
@@ -53,12 +52,11 @@ COARSE = 0.5  # of a component's noise: rounding that makes so much of it decide
 FORGETS, REMEMBERED = 0.8, 5.0  # intervals that a filter remembers: with fewer it follows each reading; another start
 STAMP_ROUNDS = 3  # of estimating how late each time stamp is
 MOST_LATE = 0.08  # share of the readings, rejected, that stamps which are later by far may explain
+REJECTED, GROWN = 0.05, 100.0  # of a component: where more is, noise may have grown; the gain in log-probability with
+# which it has: up to 75 at take-offs and patches, from 577 where noise is tenfold for a third of a log
 DRIFT_ROUNDS = 3  # of following the noise: where it grows, each finds readings that the next can follow
 HOPELESS = 200.0  # in log-probability, by which another hypothesis is behind if it is not followed up
 PROFILE_STEPS = 3  # of the search for the jerk profile, once the decisions are made
-STEP_MARGIN = 8.0  # in log-probability, by which steps must explain a log better than late stamps do
-LOST = 100.0  # in log-probability, for each reading that is left out: ten go with the reading itself
-LASTING_ROUNDS = 4  # of the search for faults that last: where one is taken out, another may show
 
 
 class Known(NamedTuple):
@@ -80,6 +78,7 @@ class Edited(NamedTuple):
 
     log: with weights (n, 3), 1 good, 0 rejected or missing. model: noise and jerk profile. starts: for the next pass.
     decision: the last one, with the model that it was made with. faults: of the instrument, of which the log is free.
+    others: the log as it would be by other understandings that are nearly as likely.
     """
 
     log: Observations
@@ -87,6 +86,7 @@ class Edited(NamedTuple):
     starts: list[Start]
     decision: Decision
     faults: Faults
+    others: tuple[Observations, ...] = ()
 
     @property
     def weight(self) -> FloatArray:
@@ -118,33 +118,17 @@ def edit(
     measurement, copied = without_copies(time_s, measurement, accepted)
     work = Work(len(time_s), 0 if live else WORK)  # a window that moves on is soon edited again
     decided = partial(_decided, time_s, known=known, segment_of=segment_of, work=work, white=short)
-    banned = np.zeros(measurement.shape, bool)
-    record, decision = decided(measurement, banned=banned)
-    scene, found, doubtful = None, tuple[Step, ...](), list[Step]()
     for_lasting = for_lasting_faults(len(time_s))
-    for _ in range(0 if live else LASTING_ROUNDS):
-        if decision.model.coloured:  # which resembles many steps
-            break
-        scene = scene_of(record, decision, for_lasting)
-        new = sorted_out(scene, search(scene))
-        doubtful = new.doubtful
-        if not new.steps and not new.banned.any():
-            break
-        steps = (*found, *new.steps)
-        log = record.weighted(decision.weight)
-        moved = levelled(log, scene.at_median.noise_variance, steps)
-        read = taken_out(log._replace(measurement=measurement), scene.at_median, scene.setting, moved)
-        other = decided(read.measurement, banned=banned | new.banned)
-        if (new.steps and _may_be_late_stamps((record, decision), other)) or (
-            new.banned.any() and _is_lost((record, decision), other, int(new.banned.sum()))
-        ):
-            break
-        (record, decision), found, banned = other, steps, banned | new.banned
+    found = Understood(*decided(measurement, banned=np.zeros(measurement.shape, bool)))
+    possible = found.record.possible
+    if not live:
+        found = without_lasting(found, measurement, decided, for_lasting)
+    record, decision, steps, _, doubtful, rivals, scene = found
     if decision.stamp_s > 0:  # which explains a clock that seems to jump
         doubtful = [step for step in doubtful if step.component != CLOCK]
-    rivals: tuple[Rival, ...] = ()
     if not record.fixed.jerk and not live:  # at the end of a window a patch may resemble motion
-        decision, rivals = reassess_rejected(record, decision, for_lasting)
+        decision, open_ = reassess_rejected(record, decision, for_lasting)
+        rivals = [*rivals, *open_]
     decision = decision._replace(
         weight=np.where(accepted, 1.0, decision.weight), unexamined=decision.unexamined + for_lasting.passed
     )
@@ -154,14 +138,16 @@ def edit(
     if known.jerk_psd is None:
         profile = fit_profile(log, decision.starts, decision.model, PROFILE_STEPS)
         decision = decision._replace(model=with_allowance(log, profile))
-    shifts: tuple[Shift, ...] = ()
-    if scene is not None and found:
-        read = log._replace(measurement=measurement)
-        log, found, shifts = refined(read, decision.model, scene.setting, found)
+    shifts, read = tuple[Shift, ...](), log._replace(measurement=measurement)
+    if scene is not None and steps:
+        log, steps, shifts = refined(read, decision.model, scene.setting, steps)
+    otherwise = () if scene is None else others(read, possible, decision.model, scene.setting, steps, rivals)
     leaning = [] if live else _one_sided(log, decision.model, record.rounding)
     shifts += tuple(Shift(one.component, 0, len(time_s), one.sigma) for one in leaning)
-    faults = Faults(copied, (*found, *doubtful), shifts, tuple(leaning), rivals)
-    return Edited(one_sided.without(log, leaning), decision.model, decision.starts, decision, faults)
+    said = tuple(rival for rival in rivals if rival.chosen != MOTION or rival.other != STEP if rival.gain < OPEN)
+    faults = Faults(copied, (*steps, *doubtful), shifts, tuple(leaning), said)
+    log = one_sided.without(log, leaning)
+    return Edited(log, decision.model, decision.starts, decision, faults, tuple(otherwise))
 
 
 def _one_sided(log: Observations, model: Model, rounding: FloatArray) -> list[OneSided]:
@@ -169,18 +155,6 @@ def _one_sided(log: Observations, model: Model, rounding: FloatArray) -> list[On
     around = samples_around(log, median_level(model))
     residual, variance = residuals_near(log, model, one_sided.spread(len(log.time_s)), around)
     return one_sided.find(log.weight, residual, variance, rounding)
-
-
-def _is_lost(before: tuple[Record, Decision], other: tuple[Record, Decision], without: int) -> bool:
-    """Whether so many readings are missing that the track is lost in their gap: that makes the others unlikely."""
-    return log_probability(*other) < log_probability(*before) - LOST * without
-
-
-def _may_be_late_stamps(without: tuple[Record, Decision], levelled_log: tuple[Record, Decision]) -> bool:
-    """Whether it may be late time stamps that resemble steps: they are left where the steps are taken out, or explain
-    the log as well."""
-    late = [decision.stamp_s > 0 for _, decision in (without, levelled_log)]
-    return all(late) or (any(late) and log_probability(*levelled_log) < log_probability(*without) + STEP_MARGIN)
 
 
 def _decided(
@@ -245,9 +219,19 @@ def _examined(record: Record, decision: Decision, known: Known) -> tuple[Record,
         found = allow_for_tails(*_with_late_stamps(record, decision))
     for _ in range(0 if record.white else DRIFT_ROUNDS):
         before, found = found, likelier(found, allow_for_drift(*found))
+        if _rejects_many(*before):
+            grown = allow_for_drift(*before, rejected=True)
+            if log_probability(*grown) > log_probability(*found) + (0.0 if found[1].drifts else GROWN):
+                found = grown
         if found is before or found[1].weight.sum() <= before[1].weight.sum():
             break
     return found if known.jerk_psd is not None else (found[0], reassess(*found))
+
+
+def _rejects_many(record: Record, decision: Decision) -> bool:
+    """Whether so much is rejected of some component that its noise may be larger for a while."""
+    rejected = (record.possible & (decision.weight <= 0)).sum(0)
+    return bool((rejected > REJECTED * record.possible.sum(0)).any())
 
 
 def _with_late_stamps(record: Record, decision: Decision) -> tuple[Record, Decision]:

@@ -15,7 +15,8 @@ from ftproc.core.editing.lasting.curves import Curve, Setting
 from ftproc.core.editing.lasting.weighing import late_of
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.model import stations as geometry
-from ftproc.fusion.estimation.events import Events, Seen, moved_to
+from ftproc.core.model.moving import moved_to
+from ftproc.fusion.estimation.events import Events, Seen
 from ftproc.records import FloatArray, IntArray
 
 PLACES, FINER = 61, 13  # in which a jump is looked for in a log, and about the best of them

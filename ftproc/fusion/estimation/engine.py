@@ -21,10 +21,11 @@ from ftproc.core.identification.likelihood import fit_jerk
 from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import isotropic
+from ftproc.core.model.moving import moved_to
 from ftproc.fusion.estimation import alternatives, beside, first_track, intervals, lasting, motions, screening
 from ftproc.fusion.estimation import constants as posterior
 from ftproc.fusion.estimation.constants import Constants, Likelihood
-from ftproc.fusion.estimation.events import Events, Seen, merge, moved_to
+from ftproc.fusion.estimation.events import Events, Seen, merge
 from ftproc.records import FloatArray
 
 FIRST_ROUNDS, MOST_ROUNDS, REASSESSMENTS = 4, 18, 8

@@ -150,11 +150,3 @@ def _gathered(events: Events, stations: list[Seen], biases: FloatArray, name: st
                 found.value[here], found.variance[here] = side.unbiased(own)[rows], side.sigma**2
                 found.weight[here], found.point[here] = side.weight[rows] if side.used else 0.0, side.point
     return found
-
-
-def moved_to(time_s: FloatArray, state: FloatArray, wanted: FloatArray) -> FloatArray:
-    """(k, 9) states at other times, by the motion from the nearest one before."""
-    at = np.clip(np.searchsorted(time_s, wanted, side="right") - 1, 0, len(time_s) - 1)
-    late = (wanted - time_s[at])[:, None]
-    p, v, a = state[at, :3], state[at, 3:6], state[at, 6:]
-    return np.hstack([p + late * v + 0.5 * late**2 * a, v + late * a, a])

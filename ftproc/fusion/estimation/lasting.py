@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing.lasting.curves import CLOCK, Curve, Setting
-from ftproc.core.editing.lasting.search import MARGIN, Found, search
-from ftproc.core.editing.lasting.weighing import Scene, late_of, with_even_runs
+from ftproc.core.editing.lasting.search import MARGIN, search
+from ftproc.core.editing.lasting.weighing import Found, Scene, late_of, with_even_runs
 from ftproc.core.filtering.records import Model, Observations
 from ftproc.core.identification.profile import median_level
 from ftproc.core.work import Work

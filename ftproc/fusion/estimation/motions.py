@@ -19,7 +19,7 @@ from ftproc.core.filtering.smoother import PATHS, residuals_beside, smooth_log
 from ftproc.core.identification import motion_models
 from ftproc.core.identification.profile import knot_length
 from ftproc.core.identification.scales import scales_of
-from ftproc.fusion.estimation.events import moved_to
+from ftproc.core.model.moving import between
 from ftproc.records import FloatArray, IntArray
 
 OTHER_KNOTS = 1.5  # times the distance of the knots of the jerk profile, before they are laid out again
@@ -62,20 +62,6 @@ def _stepped(log: Observations, model: Model, start: Start, state: FloatArray) -
     dense, (begin,), row = motion_models.with_steps(log, [start], state)
     course = state if row is None else between(log.time_s, state, dense.time_s)
     return _Stepped(dense, begin, model._replace(motion=model.motion.about(course)), row)
-
-
-def between(time_s: FloatArray, state: FloatArray, wanted: FloatArray) -> FloatArray:
-    """(k, 9) states at times between those of a track: from the motion of either side, blended."""
-    after = np.clip(np.searchsorted(time_s, wanted), 0, len(time_s) - 1)
-    before = np.clip(np.searchsorted(time_s, wanted, side="right") - 1, 0, len(time_s) - 1)
-    length = time_s[after] - time_s[before]
-    share = np.where(length > 0, (wanted - time_s[before]) / np.where(length > 0, length, 1.0), 0.0)[:, None]
-    behind = moved_to(-time_s[::-1], state[::-1] * _TURNED, -wanted) * _TURNED
-    found: FloatArray = (1 - share) * moved_to(time_s, state, wanted) + share * behind
-    return found
-
-
-_TURNED = np.repeat([1.0, -1.0, 1.0], 3)  # a state whose time runs backward
 
 
 def smoothed(log: Observations, model: Model, start: Start, directions: Directions, state: FloatArray) -> Biased:

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from ftproc.core.editing import alternatives, decisions, reassessment, screened, two_pass
+from ftproc.core.editing.lasting import settling
 from ftproc.core.filtering.initialization import first_state
 from ftproc.core.filtering.records import Observations
 from ftproc.core.work import WORK, Work
 from tests.core.tracks import matched, position_error
 from tests.simulated import codes, deviation, simulate
+from tests.trust import hard
 
 pytestmark = pytest.mark.compiled
 
@@ -151,7 +153,7 @@ def test_noise_of_a_short_window_is_taken_for_white_and_even(monkeypatch, short)
 
     def spied(name):
         whole = getattr(two_pass, name)
-        return lambda *given: asked.append(name) or whole(*given)
+        return lambda *given, **named: asked.append(name) or whole(*given, **named)
 
     for name in NOT_IN_SHORT_ONES:
         monkeypatch.setattr(two_pass, name, spied(name))
@@ -173,9 +175,11 @@ def test_tails_of_a_short_window_are_no_wider_gate_and_its_drift_no_noise():
 
 @pytest.mark.parametrize(("kept", "rounds"), [((5, 7, 9), 2), ((5, 7, 7), 2), ((5, 5, 9), 1), ((5, 4, 9), 1)])
 def test_drift_is_asked_for_again_while_more_readings_are_used(monkeypatch, kept, rounds):
-    made = [(None, SimpleNamespace(weight=np.arange(10) < count)) for count in kept]
+    record = SimpleNamespace(possible=np.ones(10, bool))
+    made = [(record, SimpleNamespace(weight=np.arange(10) < count)) for count in kept]
     rest = iter(made[1:])
     monkeypatch.setattr(two_pass, "DRIFT_ROUNDS", 2)
+    monkeypatch.setattr(two_pass, "REJECTED", 1.0)
     monkeypatch.setattr(two_pass, "_with_late_stamps", lambda *_: made[0])
     monkeypatch.setattr(two_pass, "allow_for_tails", lambda *each: each)
     monkeypatch.setattr(two_pass, "allow_for_drift", lambda *_: next(rest))
@@ -184,14 +188,23 @@ def test_drift_is_asked_for_again_while_more_readings_are_used(monkeypatch, kept
     assert found is made[rounds]
 
 
+@pytest.mark.compiled
+def test_noise_that_is_tenfold_for_a_third_of_a_log_is_no_outliers():
+    """Of its readings most would be rejected by the noise of the rest: the rejected tell how large it is."""
+    noisy = hard.make("noise", 0).simulated
+    found = edit(noisy)
+    assert found.decision.drifts
+    assert found.weight.mean() > 0.97
+
+
 @pytest.mark.parametrize(
     ("late_s", "gained", "expected"),
     [((0, 0), -99, False), ((0.01, 0.01), 99, True), ((0.01, 0), 5, True), ((0, 0.01), 5, True), ((0.01, 0), 9, False)],
 )
 def test_steps_must_explain_a_log_better_than_late_stamps_do(monkeypatch, late_s, gained, expected):
     without, bridged = (("log", SimpleNamespace(stamp_s=stamp_s)) for stamp_s in late_s)
-    monkeypatch.setattr(two_pass, "log_probability", lambda _, decision: gained if decision is bridged[1] else 0.0)
-    assert two_pass._may_be_late_stamps(without, bridged) is expected
+    monkeypatch.setattr(settling, "log_probability", lambda _, decision: gained if decision is bridged[1] else 0.0)
+    assert settling._may_be_late_stamps(without, bridged) is expected
 
 
 @pytest.mark.parametrize("live", [False, True])

@@ -55,7 +55,7 @@ class Setting(NamedTuple):
     late: FloatArray
     station: IntArray | None = None
 
-    def part(self, rows: slice) -> Setting:
+    def part(self, rows: slice | IntArray) -> Setting:
         """Of some of the samples."""
         return Setting(self.time_s[rows], self.late[rows], None if self.station is None else self.station[rows])
 

@@ -15,16 +15,15 @@ import numpy as np
 
 from ftproc.core.editing.copies import KindArray
 from ftproc.core.editing.lasting.curves import CLOCK, Curve, Setting, fitted, without
-from ftproc.core.editing.lasting.weighing import late_of
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification.one_sided import OneSided
-from ftproc.core.model.frames import line_of_sight_axes
+from ftproc.core.model.frames import from_cartesian, line_of_sight_axes, wrap
+from ftproc.core.model.moving import between
 from ftproc.order_statistics import median, medians
 from ftproc.records import FloatArray, IntArray
 
-CLOCK_ROUNDS = 2  # of taking a jump of the clock out: the way that is missing shows without it only
 SAME = 4.5  # sigmas of the noise within which two levels are one
 
 
@@ -49,15 +48,20 @@ class Shift(NamedTuple):
     sigma: float
 
 
+MOTION, PATCH, STEP = "motion", "a patch of outliers", "a step that stays"
+
+
 class Rival(NamedTuple):
-    """The readings [begin, end) of a component may be a patch, or the target's motion: by how much more likely, in
-    log-probability, that is which was chosen. motion: whether it was motion."""
+    """What the readings [begin, end) of a component were taken for, MOTION, PATCH or STEP, and what else they may be:
+    that is less likely by `gain` only, in log-probability. step: that was taken out, or would be, if either is one."""
 
     component: int
     begin: int
     end: int
     gain: float
-    motion: bool
+    chosen: str
+    other: str
+    step: Step | None = None
 
 
 Lasting = TypeVar("Lasting", Shift, Rival)
@@ -104,25 +108,47 @@ def refined(
     n = len(log.time_s)
     if not steps:
         return log, (), ()
-    curves = [Curve(step.component, step.sample, n, (step.size,)) for step in sorted(steps, key=lambda s: s.sample)]
-    rest = log._replace(measurement=without(log.measurement, setting, curves))
-    found = fitted(log, model, find_starts(rest, model.noise_variance, median(model.jerk[:, 0])), setting, curves)
-    sigma = np.sqrt(np.diag(found.covariance))
-    known = tuple(Step(c.component, c.begin, c.size[0], float(s)) for c, s in zip(found.curves, sigma, strict=True))
+    clock = [step for step in steps if step.component == CLOCK]
+    on_time = taken_out(log, model, setting, levelled(log, model.noise_variance, clock))
+    curves = [Curve(s.component, s.sample, n, (s.size,)) for s in sorted(steps, key=_when) if s.component != CLOCK]
+    known = tuple(clock)
+    if curves:
+        rest = on_time._replace(measurement=without(on_time.measurement, setting, curves))
+        starts = find_starts(rest, model.noise_variance, median(model.jerk[:, 0]))
+        found = fitted(on_time, model, starts, setting, curves)
+        sigma = np.sqrt(np.diag(found.covariance))
+        known += tuple(
+            Step(c.component, c.begin, c.size[0], float(s)) for c, s in zip(found.curves, sigma, strict=True)
+        )
     moved = levelled(log, model.noise_variance, known)
     shifts = tuple(Shift(c.component, c.begin, c.end, _sigma(known, c)) for c in moved)
-    return taken_out(log, model, setting, moved), known, shifts
+    return taken_out(log, model, setting, moved), tuple(sorted(known, key=_when)), shifts
+
+
+def _when(step: Step) -> int:
+    return step.sample
 
 
 def taken_out(log: Observations, model: Model, setting: Setting, moved: Sequence[Curve]) -> Observations:
-    """The log without what has to be taken out of its readings."""
-    rest = log._replace(measurement=without(log.measurement, setting, moved))
-    for _ in range(CLOCK_ROUNDS if any(curve.component == CLOCK for curve in moved) else 0):
-        starts = find_starts(rest, model.noise_variance, median(model.jerk[:, 0]))
-        level = model._replace(jerk=medians(model.jerk)[None], knot_s=math.inf)
-        setting = setting._replace(late=late_of(rest, smooth_log(rest, level, starts).state))
-        rest = log._replace(measurement=without(log.measurement, setting, moved))
-    return rest
+    """The log without what has to be taken out of its readings: those of a clock that is late are moved to their time
+    stamps along the track that they show at the times at which they were taken."""
+    rest = log._replace(measurement=without(log.measurement, setting, [c for c in moved if c.component != CLOCK]))
+    time_s = log.time_s.copy()
+    for curve in moved:
+        if curve.component == CLOCK:
+            time_s[curve.rows] -= curve.size[0]
+    late = time_s != log.time_s
+    if not late.any():
+        return rest
+    order = np.argsort(time_s, kind="stable")
+    sorted_s, level = time_s[order], model._replace(jerk=medians(model.jerk)[None], knot_s=math.inf)
+    taken = rest.part(order)._replace(time_s=sorted_s)
+    state = smooth_log(taken, level, find_starts(taken, model.noise_variance, float(level.jerk[0, 0]))).state
+    there, here = between(sorted_s, state, log.time_s[late]), between(sorted_s, state, time_s[late])
+    z = rest.measurement.copy()
+    z[late] += from_cartesian(there[:, :3]) - from_cartesian(here[:, :3])
+    z[:, 1] = wrap(z[:, 1])
+    return rest._replace(measurement=z)
 
 
 def _sigma(steps: Sequence[Step], moved: Curve) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ftproc.core.editing import outlier_chain
 from ftproc.core.editing.decisions import Decision, Record
-from ftproc.core.editing.lasting.faults import Rival
+from ftproc.core.editing.lasting.faults import MOTION, PATCH, Rival
 from ftproc.core.editing.reassessment import (
     COMPARED_STEPS,
     PROFILE_STEPS,
@@ -105,7 +105,8 @@ def reassess_rejected(record: Record, decision: Decision, work: Work) -> tuple[D
             if abs(gain) < OPEN and len(changed) >= SHORTEST and _apart(part, own, best):
                 begin, end = int(changed[0]) + near.start, int(changed[-1]) + 1 + near.start
                 taken_in = bool(best[changed, run.component].mean() > 0.5)
-                rivals.append(Rival(run.component, begin, end, abs(gain), taken_in == (gain > 0)))
+                ways = (MOTION, PATCH) if taken_in == (gain > 0) else (PATCH, MOTION)
+                rivals.append(Rival(run.component, begin, end, abs(gain), *ways))
         if (weight == found.weight).all():
             break
         found = found._replace(weight=weight, starts=starts_of(record.weighted(weight), at_median))

@@ -9,11 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ftproc.core.editing.lasting import scan
+from ftproc.core.editing.lasting.clock import gain_at_a_gap
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.proposals import edges_about
 from ftproc.core.editing.lasting.scan import Jump
-from ftproc.core.editing.lasting.weighing import Scene, as_it_is
+from ftproc.core.editing.lasting.weighing import Scene, Weighed, as_it_is
 from ftproc.core.filtering.records import Model
+from ftproc.core.identification.profile import median_level
 from ftproc.core.identification.stretches import runs_of
 from ftproc.records import FloatArray, IntArray
 
@@ -21,17 +23,24 @@ LEFT = 6.0  # in log-likelihood. With the process noise of the part: up to 5.4 w
 # there is; with the median of the log, from 13 on
 
 
-def leaves_a_jump(part: Scene, jump: Jump, around: tuple[int, int], weight: FloatArray, model: Model) -> bool:
-    """Whether one of the ways of a jump makes a part of a log likelier than it is with these weights (n, 3) and this
-    model without a fault. around: the sample of the part about which the jump is, and how far from it at most."""
-    edges, even = edges_about(len(weight), *around), None
+def leaves_a_jump(part: Scene, jump: Jump, around: tuple[int, int], without: Weighed) -> bool:
+    """Whether one of the ways of a jump makes a part of a log likelier than it is without a fault. around: the sample
+    of the part about which the jump is, and how far from it at most.
+
+    The process noise with which readings beside the jump were rejected may be more than they need where they are good:
+    the typical one of the part may do.
+    """
+    weight, edges = without.weight, edges_about(len(part.possible), *around)
+    if (CLOCK,) in jump.ways and gain_at_a_gap(part, around[0], weight, without.model) > LEFT:
+        return True
     for way in jump.ways:
-        if _gain(part, jump, way, edges, weight, model) > LEFT:
+        if _gain(part, jump, way, edges, weight, without.model) > LEFT:
             return True
         taken_in = _with_rejected(part, way, jump.station, around, weight)
-        if (taken_in != weight).any():
-            even = as_it_is(part, weight, model) if even is None else even
-            if _gain(part, jump, way, edges, taken_in, model) + as_it_is(part, taken_in, model) - even > LEFT:
+        models = (without.model, median_level(without.model)) if (taken_in != weight).any() else ()
+        for model in models[: len(without.model.jerk)]:  # of a single level both are the same
+            likely = _gain(part, jump, way, edges, taken_in, model) + as_it_is(part, taken_in, model).log_probability
+            if likely - without.log_probability > LEFT:
                 return True
     return False
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ftproc.core.editing.lasting import between, scan
+from ftproc.core.editing.lasting import between, clock, scan
 from ftproc.core.editing.lasting.between import PER_TERM, TERMS, Between, of_terms, trimmed
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.proposals import (
@@ -31,7 +31,7 @@ from ftproc.core.editing.lasting.proposals import (
 )
 from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.screen import leaves_a_jump
-from ftproc.core.editing.lasting.weighing import Scene, Weighed, weighed
+from ftproc.core.editing.lasting.weighing import Found, Scene, Weighed, as_it_is, weighed
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification.profile import median_level
 from ftproc.core.identification.scales import scales_of
@@ -46,31 +46,10 @@ SHORTEST_CELL = 2  # samples in a cell of a scan
 REMEMBERED, SHORT = 2.5, 0.12  # samples that a filter remembers: with fewer, a long curve may as well be the target's
 # motion, and this share of the log is the longest
 PRIOR, DOUBT, MARGIN = -6.0, -6.0, 8.0  # log-odds of such a fault at a jump; with which it is reported, and taken out
+OPEN = 10.0  # in log-probability, within which a jump may be one or another: beside agile targets it tells little
 MOST_EACH = 20.0  # of log-probability, of each reading: where more is gained, the part without the fault was lost
 FOLLOWED = 25.0  # the same of a patch that motion explains but for its ends: turns gain 18 without one
 TRIMMED = 2  # times that the ends of a patch are brought to where its readings fit it
-
-
-class Found(NamedTuple):
-    """curves: that are accepted together, with the 1-sigma of the first term of each. gain: of log-probability, with
-    their prior; second: of the best rival that stays where they do not, or the other way round."""
-
-    curves: tuple[Curve, ...]
-    sigma: tuple[float, ...]
-    gain: float
-    second: float = 0.0
-
-    def stays(self, n: int) -> bool:
-        """Whether the fault lasts until an end of the log of n samples."""
-        return self.curves[0].begin == 0 or self.curves[0].end == n
-
-    def adjoins(self, other: Found) -> bool:
-        """Whether one begins where, or before, the other ends, in a component of both."""
-        return any(
-            one.component == each.component and one.begin <= each.end and each.begin <= one.end
-            for one in self.curves
-            for each in other.curves
-        )
 
 
 class Scanned(NamedTuple):
@@ -104,6 +83,8 @@ def search(scene: Scene) -> list[Found]:
         if best is None or any(best.curves[0][:3] == each.curves[0][:3] for each in found):
             break
         found.append(best)
+        if best.curves[0].component == CLOCK:  # along which track its readings move, another search knows
+            break
         seen = scanned(scene.without([curve for each in found for curve in each.curves]))
     beside = [each for each in found if followed is not None and each.adjoins(followed)]
     if followed is not None and followed.gain > sum(each.gain for each in beside):
@@ -140,6 +121,7 @@ def scanned(scene: Scene) -> Scanned:
         found += scan.jumps(sums, LEAST_GAIN, JUMPS, 3 * width, TOGETHER)
     off = scene.residual / np.sqrt(scene.at_median.noise_variance)
     found += scan.beside_runs(scene.log.weight, scene.possible, off, LEAST_OFF)[:JUMPS]
+    found += clock.gaps(scene.setting, JUMPS)
     longest = LONGEST if memory > REMEMBERED else SHORT
     return Scanned(scene, around, width, scan.distinct(found), width, longest)
 
@@ -217,10 +199,10 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     around = jump.sample - near.start, seen.width
     # What was rejected of one station, others may show to be right.
     screened = len(part.rates) == 1 or bool((part.taken_in == part.log.weight).all())
-    if screened and not leaves_a_jump(part, jump, around, part.log.weight, part.at_median):
+    if screened and not leaves_a_jump(part, jump, around, as_it_is(part, part.log.weight, part.at_median)):
         return None
     without = _weighed(part, near, ())
-    if screened and not leaves_a_jump(part, jump, around, without.weight, without.model):
+    if screened and not leaves_a_jump(part, jump, around, without):
         return None
     null = without.log_probability
     gain, located, step = max((_as_step(seen, jump, way, null) for way in jump.ways), key=lambda each: each[0])
@@ -244,7 +226,8 @@ def _as_step(seen: Scanned, jump: Jump, way: Sequence[int], null: float) -> tupl
     there = LocatedJump(
         channels, jump.sample - near.start, [each.sample for each in seen.jumps], seen.width, part.at_median
     )
-    located = there._replace(sample=near.start + exactly(part, there), longest=seen.longest)
+    sample = jump.sample if tuple(way) == (CLOCK,) else near.start + exactly(part, there)
+    located = there._replace(sample=sample, longest=seen.longest)
     sides = steps(seen.scene, channels, located.sample)
     step = max((_weighed(part, near, side) for side in sides), key=lambda each: each.log_probability)
     return step.log_probability - null + _prior(sides[0], n), located, step
@@ -261,7 +244,7 @@ def _best(seen: Scanned, proposed: Sequence[Sequence[Curve]], here: slice, locat
         return Found(_in_whole(found, here, n), found.sigma, gain)
 
     outcomes = [outcome(curves) for curves in proposed]
-    best = max(outcomes, key=lambda each: each.gain)
+    best = max(outcomes, key=_gain)
     if not DOUBT <= best.gain < MOST_EACH * part.possible.sum():
         return None
     if len(best.curves[0].size) > 1:  # its other end is known to a cell
@@ -271,14 +254,24 @@ def _best(seen: Scanned, proposed: Sequence[Sequence[Curve]], here: slice, locat
         ends = {"begin": min(located.sample, edge), "end": max(located.sample, edge)}
         if ends["end"] - ends["begin"] >= SHORTEST:
             sharper = outcome([curve.of(len(curve.size))._replace(**ends) for curve in best.curves])
-            best = max(best, sharper, key=lambda each: each.gain)
-    return best._replace(second=max((each.gain for each in outcomes if each.stays(n) != best.stays(n)), default=0.0))
+            best = max(best, sharper, key=_gain)
+    nearly = sorted((each for each in outcomes if each.gain > best.gain - OPEN), key=_gain)
+    likeliest = {each.lies(located.sample, n): each for each in nearly}
+    likeliest.pop(best.lies(located.sample, n), None)
+    return best._replace(others=tuple(likeliest.values()))
+
+
+def _gain(found: Found) -> float:
+    return found.gain
 
 
 def _weighed(part: Scene, near: slice, curves: Sequence[Curve]) -> Weighed:
     """A part of a log with curves, whether nothing was rejected unjustly, or what they act on, or more."""
     own = [curve.within(near) for curve in curves]
     starts = {weight.tobytes(): weight for weight in (part.log.weight, part.taking_in(own), part.taken_in)}.values()
+    if own and own[0].component == CLOCK:
+        jumps = (clock.weighed_jump(part, weight, own[0]) for weight in starts)
+        return max(jumps, key=lambda each: each.log_probability)
     return max((weighed(part, weight, own) for weight in starts), key=lambda each: each.log_probability)
 
 

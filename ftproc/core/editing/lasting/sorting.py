@@ -4,19 +4,19 @@ steps that are taken out, and steps that may be an end of a weak patch, and are 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
-from ftproc.core.editing.lasting.faults import Step
-from ftproc.core.editing.lasting.search import MARGIN, Found
-from ftproc.core.editing.lasting.weighing import Scene
+from ftproc.core.editing.lasting.faults import MOTION, PATCH, STEP, Rival, Step
+from ftproc.core.editing.lasting.search import MARGIN
+from ftproc.core.editing.lasting.weighing import Found, Scene
 from ftproc.order_statistics import median
 
-OPEN, MOVES = 4.0, 15.0  # in log-probability: within it, whether a fault stays is open; before half of a log is moved
+MOVES, SECOND = 15.0, 4.0  # in log-probability, before half of a log is moved, and by which it must not be a patch
 HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
 BEFORE, SEEN = 12, 0.25  # samples before a step, and share of them that may be good
 SURE = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
@@ -24,24 +24,27 @@ END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which
 
 
 class SortedOut(NamedTuple):
-    """banned (n, 3): readings of patches. steps: that are sure. doubtful: that may be an end of a weak patch."""
+    """banned (n, 3): readings of patches. steps: that are sure. doubtful: that may be an end of a weak patch. rivals:
+    what else may be, nearly as likely."""
 
     banned: NDArray[np.bool_]
     steps: list[Step]
     doubtful: list[Step]
+    rivals: list[Rival]
 
 
 def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
     """What follows from the faults of a log."""
     n, noise_variance = len(scene.possible), scene.at_median.noise_variance
     near_end = 1 + min(END, int(SHARE * n))
-    result = SortedOut(np.zeros((n, 3), bool), [], [])
+    result = SortedOut(np.zeros((n, 3), bool), [], [], [])
     for each in found:
         for curve, sigma in zip(each.curves, each.sigma, strict=True):
             if curve.end < n or min(curve.begin, n - curve.begin) < near_end:
                 if curve.component != CLOCK and each.gain > MARGIN:
                     side = slice(0, curve.begin) if curve.end == n and 2 * curve.begin < n else curve.rows
                     result.banned[side, curve.component] = True
+                    result.rivals.extend(_rivals(each, curve._replace(begin=side.start, end=side.stop), PATCH, None, n))
                 continue
             if curve.component == CLOCK:
                 large = not _may_be_a_halt(scene, curve)
@@ -49,11 +52,28 @@ def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
                 large = abs(curve.size[0]) > SURE * math.sqrt(noise_variance[curve.component]) and _seen_before(
                     scene, curve
                 )
-            sure = bool(large and each.gain > MOVES and each.gain - each.second > OPEN)
-            (result.steps if sure else result.doubtful).append(
-                Step(curve.component, curve.begin, curve.size[0], sigma, sure)
-            )
+            second = max((other.gain for other in each.others), default=0.0)
+            sure = bool(large and each.gain > MOVES and each.gain - second > SECOND)
+            step = Step(curve.component, curve.begin, curve.size[0], sigma, sure)
+            (result.steps if step.sure else result.doubtful).append(step)
+            if curve.component != CLOCK:
+                result.rivals.extend(_rivals(each, curve, STEP if step.sure else MOTION, step, n))
     return result
+
+
+def _rivals(found: Found, curve: Curve, chosen: str, step: Step | None, n: int) -> Iterator[Rival]:
+    """What else a fault may be in a component. step: that it was weighed as, if it was."""
+    if chosen == MOTION:
+        yield Rival(curve.component, curve.begin, curve.end, 0.0, chosen, STEP, step)
+    for other in found.others:
+        for each, sigma in zip(other.curves, other.sigma, strict=True):
+            if each.component == curve.component:
+                gain = max(found.gain - other.gain, 0.0)
+                if other.stays(n):
+                    level = Step(each.component, each.begin, each.size[0], sigma)
+                    yield Rival(curve.component, curve.begin, curve.end, gain, chosen, STEP, level)
+                else:
+                    yield Rival(curve.component, each.begin, each.end, gain, chosen, PATCH, step)
 
 
 def _seen_before(scene: Scene, step: Curve) -> bool:

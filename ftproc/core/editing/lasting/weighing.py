@@ -17,7 +17,7 @@ from ftproc.core.editing.decisions import Decision, Record
 from ftproc.core.editing.lasting.curves import CLOCK, Curve, Fitted, Setting, fitted, without
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
-from ftproc.core.filtering.smoother import RESIDUALS, STATES, SmootherRun, smooth_log
+from ftproc.core.filtering.smoother import RESIDUALS, SmootherRun, smooth_log
 from ftproc.core.identification.likelihood import fit_jerk
 from ftproc.core.identification.profile import fit_profile, median_level, roughness
 from ftproc.core.identification.stretches import runs_of
@@ -27,6 +27,7 @@ from ftproc.core.work import Work
 from ftproc.order_statistics import median
 from ftproc.records import FloatArray, IntArray
 
+BESIDE = 12  # samples between two faults that may be one: a track that was followed joins the other within them
 SETTLED = 2  # rounds of deciding, at most
 TAKEN_IN, EVEN = 3, 5.0  # readings in a rejected run, and second differences in sigmas, that may be a track
 PROFILE_STEPS = 2  # of the search for the process noise
@@ -56,7 +57,7 @@ class Scene(NamedTuple):
     doubt: FloatArray | None = None
     work: Work | None = None
 
-    def part(self, near: slice) -> Scene:
+    def part(self, near: slice | IntArray) -> Scene:
         """Some of the samples."""
         return self._replace(
             log=self.log.part(near), possible=self.possible[near], taken_in=self.taken_in[near],
@@ -103,6 +104,33 @@ class Weighed(NamedTuple):
     log_probability: float
 
 
+class Found(NamedTuple):
+    """curves: that are accepted together, with the 1-sigma of the first term of each. gain: of log-probability, with
+    their prior; others: what else the jump may be that is less likely by OPEN at most: the best that lies before it,
+    that lies behind it, and that stays."""
+
+    curves: tuple[Curve, ...]
+    sigma: tuple[float, ...]
+    gain: float
+    others: tuple[Found, ...] = ()
+
+    def stays(self, n: int) -> bool:
+        """Whether the fault lasts until an end of the log of n samples."""
+        return self.curves[0].begin == 0 or self.curves[0].end == n
+
+    def lies(self, sample: int, n: int) -> str:
+        """Where the readings that are off lie, seen from the jump before a sample."""
+        return "on" if self.stays(n) else "before" if self.curves[0].begin < sample else "behind"
+
+    def adjoins(self, other: Found) -> bool:
+        """Whether one begins about where, or before, the other ends, in a component of both."""
+        return any(
+            one.component == each.component and one.begin <= each.end + BESIDE and each.begin <= one.end + BESIDE
+            for one in self.curves
+            for each in other.curves
+        )
+
+
 def weighed(scene: Scene, weight: FloatArray, curves: Sequence[Curve]) -> Weighed:
     """The scene with these curves, decided on from these weights on. Raises ValueError where a component has too few
     readings."""
@@ -112,14 +140,12 @@ def weighed(scene: Scene, weight: FloatArray, curves: Sequence[Curve]) -> Weighe
     for _ in range(SETTLED):
         found = _fitted(scene, scene.log._replace(weight=weight), model, known)
         known = found.curves
-        starts, clock = scene.starts(found.log), any(curve.component == CLOCK for curve in known)
+        starts = scene.starts(found.log)
         if not scene.fixed:
             model = fit_profile(found.log, starts, fit_jerk(found.log, starts, scene.at_median), PROFILE_STEPS)
-        smoothed = smooth_log(found.log, model, starts, STATES if clock else RESIDUALS)
-        if clock:  # with it, the track goes another way there
-            scene = scene._replace(setting=scene.setting._replace(late=late_of(scene.log, smoothed.state)))
+        smoothed = smooth_log(found.log, model, starts, RESIDUALS)
         before, weight = weight, _decided(scene, smoothed, model)
-        settled = not clock and bool((weight == before).all())
+        settled = bool((weight == before).all())
         if settled:
             break
     if curves or not settled:
@@ -132,11 +158,12 @@ def weighed(scene: Scene, weight: FloatArray, curves: Sequence[Curve]) -> Weighe
     return Weighed(found.curves, tuple(sigma.tolist()), weight, model, likely)
 
 
-def as_it_is(scene: Scene, weight: FloatArray, model: Model) -> float:
-    """Log-probability of the scene without curves, with these weights (n, 3) and by this model."""
+def as_it_is(scene: Scene, weight: FloatArray, model: Model) -> Weighed:
+    """The scene without curves, with these weights (n, 3) and by this model."""
     log = scene.log._replace(weight=weight)
     smoothed = smooth_log(log, model, scene.starts(log), RESIDUALS)
-    return smoothed.log_likelihood + _rejections(scene, weight, smoothed, model) - roughness(model)
+    likely = smoothed.log_likelihood + _rejections(scene, weight, smoothed, model) - roughness(model)
+    return Weighed((), (), weight, model, likely)
 
 
 def late_of(log: Observations, state: FloatArray) -> FloatArray:

@@ -7,29 +7,13 @@ import pytest
 
 from ftproc.core.editing import two_pass
 from ftproc.core.editing.lasting.between import MOST, Between, followed, trimmed
-from ftproc.core.editing.lasting.curves import Curve, Setting
+from ftproc.core.editing.lasting.curves import Curve
 from ftproc.core.editing.lasting.scan import Jump
-from ftproc.core.editing.lasting.weighing import Scene
-from ftproc.core.filtering.records import Model, Observations
-from ftproc.core.model.motion import isotropic
 from ftproc.simulation import simulate
+from tests.core.editing.lasting.scenes import N, scene
 from tests.trust import hard
 
 UNKNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
-N = 200
-
-
-def scene(*rejected):
-    """A scene with rejected readings of (component, begin, end)."""
-    weight = np.ones((N, 3))
-    for c, begin, end in rejected:
-        weight[begin:end, c] = 0.0
-    time_s, zeros = np.arange(N) * 1.0, np.zeros((N, 3))
-    log = Observations(time_s, zeros, weight)
-    model = Model(np.ones(3), isotropic(1.0))
-    return Scene(
-        log, np.ones((N, 3), bool), weight, Setting(time_s, zeros), model, False, np.full((1, 3, 3), 0.01), 4.0, zeros
-    )
 
 
 def found_in(some, jumps=None):

@@ -7,7 +7,7 @@ import pytest
 
 from ftproc.core import work
 from ftproc.core.editing import two_pass
-from ftproc.core.editing.lasting import screen, search
+from ftproc.core.editing.lasting import clock, screen, search, settling
 from tests.simulated import simulate
 
 pytestmark = pytest.mark.compiled
@@ -47,7 +47,8 @@ def test_the_work_is_charged_with_each_sample_that_is_weighed(monkeypatch):
         made.append((budget(samples), budget(samples).left))
         return made[-1][0]
 
-    monkeypatch.setattr(search, "weighed", counted)
+    for room in (search, clock):
+        monkeypatch.setattr(room, "weighed", counted)
     for room in (two_pass, search):  # of the jumps, and of the patches that were followed
         monkeypatch.setattr(room, "for_lasting_faults", noted)
     two_pass.edit(*flown(steps=2), UNKNOWN)
@@ -87,8 +88,8 @@ def test_a_jump_beside_which_readings_were_rejected_is_seen_only_with_these_take
     """The log as decided shows none, if it begins with the readings of another target."""
     time_s, z = flown(seed=1)
     z[:6] += (900.0, 0.05, 0.05)
-    found, look = [], two_pass.search
-    monkeypatch.setattr(two_pass, "search", lambda scene: found.append(look(scene)) or found[-1])
+    found, look = [], settling.search
+    monkeypatch.setattr(settling, "search", lambda scene: found.append(look(scene)) or found[-1])
     two_pass.edit(time_s, z, UNKNOWN)
     assert any(curve.begin == 6 for each in found[0] for curve in each.curves)
     monkeypatch.setattr(screen, "_with_rejected", lambda part, way, station, around, weight: weight)
