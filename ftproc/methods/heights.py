@@ -85,10 +85,12 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
     heights, causal, by_hand = log.heights, settings.editing in ("live", "forward"), np.zeros(len(log), np.uint8)
     if log.by_hand is not None:
         by_hand = log.by_hand.of("height")
-    if heights is None or causal or not np.isfinite(heights.above_m).any() or settings.height is not None:
+    if heights is None or not np.isfinite(heights.above_m).any() or settings.height is not None:
         return recording, Common(_prior(log, settings, causal), np.zeros(len(log)))
     measurement = np.array(log.measurement)
     station_m = settings.site[2] if settings.site is not None else 0.0
+    if causal:
+        return _as_they_come(recording, log, by_hand, station_m)
     above, slant = heights.above_m - station_m, _cleaned_ranges(recording, settings)
     step = rounding_step(heights.above_m)
     above = np.where(by_hand == REJECTED, np.nan, above)
@@ -96,9 +98,7 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
     good |= by_hand == ACCEPTED
     rejected = np.isfinite(above) & ~good
     above = np.where(good, above, np.nan)
-    with np.errstate(invalid="ignore"):
-        ratio = sine(above, slant)
-        measurement[:, 2] = np.where(np.abs(ratio) <= 1, np.arcsin(np.clip(ratio, -1, 1)), np.nan)
+    measurement[:, 2] = elevation(above, slant)
     _check(log, np.isfinite(above) & np.isfinite(slant), measurement[:, 2])
     ground = np.maximum(slant * np.cos(measurement[:, 2]), 1.0)
     each = own / ground
@@ -117,6 +117,39 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
     )
     known = np.where(np.isfinite(common), common, float(np.nanmedian(common)))
     return found, Common(None, np.hypot(known, step / math.sqrt(12)), own / typical, rejected, station_m)
+
+
+def _as_they_come(
+    recording: Recording, log: MeasurementLog, by_hand: FlagArray, station_m: float
+) -> tuple[Recording, Common]:
+    """The recording with elevations by the heights, each with the range of its own row, and what is known of these by
+    then; the editor finds their noise and outliers."""
+    assert log.heights is not None
+    measurement = np.array(log.measurement)
+    above = np.where(by_hand == REJECTED, np.nan, log.heights.above_m - station_m)
+    measurement[:, 2] = elevation(above, measurement[:, 0])
+    _check(log, np.isfinite(above) & (measurement[:, 0] > 0), measurement[:, 2])
+    ground = measurement[:, 0] * np.cos(measurement[:, 2])
+    times, decided = log.time_s - log.time_s[0], recording.accepted.times or (np.zeros(0),) * 3
+    accepted = Accepted((*decided[:2], times[by_hand == ACCEPTED], *decided[3:]))
+    found = replace(recording, measurement=measurement, absent=(), accepted=accepted)
+    common = common_sigma(log.heights.barometric, above)
+    return found, Common(None, common, max(float(np.nanmedian(ground)), 1.0), None, station_m)
+
+
+def common_sigma(barometric: bool, above_m: FloatArray) -> FloatArray:
+    """(n,) m 1-sigma that heights (n,) m may be off by together; where there is none, by the last one."""
+    seen = np.maximum.accumulate(np.where(np.isfinite(above_m), np.arange(len(above_m)), -1))
+    last = np.where(seen >= 0, above_m[seen], 0.0)
+    found: FloatArray = np.hypot(PRESSURE_M, TEMPERATURE * last) if barometric else np.zeros(len(above_m))
+    return found
+
+
+def elevation(above_m: FloatArray, range_m: FloatArray) -> FloatArray:
+    """(n,) rad, of a target so high above the station; NaN where a height is larger than the range."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = sine(above_m, range_m)
+        return np.where(np.abs(ratio) <= 1, np.arcsin(np.clip(ratio, -1, 1)), np.nan)
 
 
 def screened(time_s: FloatArray, above_m: FloatArray, step: float) -> tuple[float, NDArray[np.bool_]]:
