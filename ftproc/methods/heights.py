@@ -61,13 +61,18 @@ ANY = Prior(0.0, 6000.0, "any target")
 class Common(NamedTuple):
     """What stands for the elevation. prior: if no height is measured. sigma_m: (n,) that all heights may be off by
     together. range_m: by which the noise of the elevations is that of single heights. rejected: (n,) heights that are
-    outliers. station_m: the station's own height, m."""
+    outliers. station_m: the station's own height, m. barometric: whether they are, where they are used as they come."""
 
     prior: Prior | None
     sigma_m: FloatArray
     range_m: float = 1.0
     rejected: NDArray[np.bool_] | None = None
     station_m: float = 0.0
+    barometric: bool | None = None
+
+    def off_m(self, part: slice, above_m: FloatArray) -> FloatArray:
+        """(n,) m 1-sigma of some samples that are so high, (n,) m."""
+        return self.sigma_m[part] if self.barometric is None else common_sigma(self.barometric, above_m)
 
     def figures(self) -> dict[str, Any]:
         """For the summary, JSON-serialisable."""
@@ -103,7 +108,7 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
     ground = np.maximum(slant * np.cos(measurement[:, 2]), 1.0)
     each = own / ground
     typical = float(np.nanmedian(each))
-    common = np.hypot(PRESSURE_M, TEMPERATURE * above) if heights.barometric else np.zeros(len(above))
+    common = common_sigma(heights.barometric, above)
     times = np.ones((len(log), 3))
     times[:, 2] = np.where(np.isfinite(each), (each / typical) ** 2, 1.0)
     assumed = recording.assumed_sigma.copy()
@@ -133,15 +138,14 @@ def _as_they_come(
     times, decided = log.time_s - log.time_s[0], recording.accepted.times or (np.zeros(0),) * 3
     accepted = Accepted((*decided[:2], times[by_hand == ACCEPTED], *decided[3:]))
     found = replace(recording, measurement=measurement, absent=(), accepted=accepted)
-    common = common_sigma(log.heights.barometric, above)
-    return found, Common(None, common, max(float(np.nanmedian(ground)), 1.0), None, station_m)
+    barometric, typical = log.heights.barometric, max(float(np.nanmedian(ground)), 1.0)
+    off = common_sigma(barometric, np.nan_to_num(above))
+    return found, Common(None, off, typical, None, station_m, barometric)
 
 
 def common_sigma(barometric: bool, above_m: FloatArray) -> FloatArray:
-    """(n,) m 1-sigma that heights (n,) m may be off by together; where there is none, by the last one."""
-    seen = np.maximum.accumulate(np.where(np.isfinite(above_m), np.arange(len(above_m)), -1))
-    last = np.where(seen >= 0, above_m[seen], 0.0)
-    found: FloatArray = np.hypot(PRESSURE_M, TEMPERATURE * last) if barometric else np.zeros(len(above_m))
+    """(n,) m 1-sigma that heights (n,) m may be off by together."""
+    found: FloatArray = np.hypot(PRESSURE_M, TEMPERATURE * above_m) if barometric else np.zeros(len(above_m))
     return found
 
 
@@ -220,7 +224,7 @@ def placed(
     """The states (n, 9), their sigmas (n, 9) and those of `kinematics` (n, 6) of some samples, with the prior of the
     height instead of z, and with what the heights may be off by together."""
     if common.prior is None:
-        found, wide = state, _widened(state, sigma, common.sigma_m[part])
+        found, wide = state, _widened(state, sigma, common.off_m(part, state[:, 2]))
     else:
         found, wide = _moved(common.prior, state, sigma)
     return found, wide, kinematics.widened(found, path_sigma, sigma, np.maximum(wide, sigma))
@@ -231,7 +235,8 @@ def elevated(common: Common, part: slice, cleaned: FloatArray, sigma: FloatArray
     if common.prior is not None:
         return sigma
     ground = np.maximum(cleaned[:, 0] * np.cos(cleaned[:, 2]), 1.0)
-    return np.column_stack([sigma[:, :2], np.hypot(sigma[:, 2], common.sigma_m[part] / ground)])
+    off = common.off_m(part, cleaned[:, 0] * np.sin(cleaned[:, 2]))
+    return np.column_stack([sigma[:, :2], np.hypot(sigma[:, 2], off / ground)])
 
 
 def relabelled(common: Common, part: slice, label: FlagArray) -> FlagArray:
