@@ -84,6 +84,7 @@ class Filtering:
                 ],
                 "network": self._network() if self.method.corrected else None,
                 "at_once": self.at_once is not None,
+                "plots_at_once": 0 if self.at_once is None else self.at_once.plots,
                 "correction_linear": None if stage is None else stage.linear,
                 "correction_lost_by_smoothing": model is not None and stage is None and model.filter.lost_by_smoothing,
                 **self.effects.summary(),

@@ -6,7 +6,6 @@ a unit that nobody stated, is assumed and said.
 
 from __future__ import annotations
 
-import contextlib
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
@@ -17,14 +16,15 @@ from ftproc.config.recipe import Recipe
 from ftproc.errors import InputError
 from ftproc.files import conventions
 from ftproc.files.options import parse_columns, parse_units, parse_widths
-from ftproc.files.reading import converting, further, understanding
+from ftproc.files.reading import converting, understanding
 from ftproc.files.reading.clocks.growing import Stamps
 from ftproc.files.reading.formats import layout
 from ftproc.files.reading.formats.csvtext import MISSING_WORDS
-from ftproc.files.reading.further import Further
 from ftproc.files.reading.meaning import schema
 from ftproc.files.units import UNITS
 from ftproc.files.words import DEPRESSIONS, QUANTITIES
+from ftproc.live import beside
+from ftproc.live.beside import RATE
 from ftproc.live.growing import Block, Say, no_row, no_table
 from ftproc.quality.sanity import LATEST_S
 from ftproc.records import FloatArray, MeasurementLog
@@ -36,7 +36,6 @@ _SAMPLE = 100  # rows that judge assumptions
 _OTHERS = {"time": "ms", "range": "km", "azimuth": "deg", "elevation": "deg"}  # units, as examples
 _MISSING = frozenset(MISSING_WORDS)
 
-RATE = len(QUANTITIES)  # the column of range rates, after those of all logs
 Found = Mapping[str, schema.Column]
 Rows = tuple[FloatArray, InputError | None]
 
@@ -69,9 +68,9 @@ class Reader:
         return self._table.converted(readings), fault
 
     @property
-    def has_rates(self) -> bool:
-        """Whether the table has range rates, once it is known."""
-        return self._table is not None and self._table.rate is not None
+    def beside(self) -> beside.Columns:
+        """What the table has beside range, azimuth and elevation, once it is known."""
+        return beside.Columns() if self._table is None else self._table.beside
 
     @property
     def station(self) -> Station:
@@ -153,7 +152,7 @@ class _Table(NamedTuple):
     found: Found
     given: Station
     station: Station
-    rate: Further | None
+    beside: beside.Columns
     stamps: Stamps
 
     @classmethod
@@ -173,14 +172,13 @@ class _Table(NamedTuple):
         if recipe.settings.site and not understanding.knows_axis(recipe.station, found):
             raise conventions.axis_question(source, found["azimuth"].name)
         widths = parse_widths(recipe.widths)
-        rate = further.rate_of(names, text.units, parse_units(recipe.units), parse_columns(recipe.columns))
-        return cls(source, names, text.separator, widths, above, found, recipe.station, station, rate, Stamps())
+        side = beside.Columns.of(names, text.units, found, recipe)
+        return cls(source, names, text.separator, widths, above, found, recipe.station, station, side, Stamps())
 
     def read(self, block: Block) -> Rows:
         """(n, 5) in SI units as the instrument counts, see `Reader.read`."""
         readings, fault = self._numbers(block)
-        if self.rate is not None:
-            readings[:, RATE] = self.rate.unit.to_si(-readings[:, RATE] if self.rate.other_kind else readings[:, RATE])
+        readings[:, RATE] = self.beside.rates(readings[:, RATE])
         for k, quantity in enumerate(QUANTITIES):
             if quantity in self.found:
                 column = self.found[quantity]
@@ -190,9 +188,10 @@ class _Table(NamedTuple):
 
     def converted(self, readings: FloatArray) -> FloatArray:
         """(n, 5) in the canonical convention, without the station's known errors."""
-        log = MeasurementLog(self.source, readings[:, 0], readings[:, 1:RATE], np.arange(len(readings)))
+        measurement, above_m = self.beside.split(readings)
+        log = MeasurementLog(self.source, readings[:, 0], measurement, np.arange(len(readings)))
         log = conventions.apply(log, self.station)
-        return np.column_stack([log.time_s, log.measurement, readings[:, RATE]])
+        return np.column_stack([log.time_s, self.beside.joined(log.measurement, above_m), readings[:, RATE]])
 
     def _numbers(self, block: Block) -> Rows:
         """(n, 5) in the units of the log."""
@@ -225,9 +224,7 @@ class _Table(NamedTuple):
                 "it."
             )
         row = [np.nan] * (RATE + 1)
-        if self.rate is not None:
-            with contextlib.suppress(ValueError):  # "n/a" and the like
-                row[RATE] = float(cells[self.rate.position])
+        self.beside.fill(row, cells)
         for k, quantity in enumerate(QUANTITIES):
             column = self.found.get(quantity)
             if column is None or (text := cells[column.position]) in _MISSING:
@@ -270,12 +267,15 @@ class _Table(NamedTuple):
         """What is assumed, or follows from the names."""
         stamps = bool(self.stamps.pattern)
         bare = [q for q, column in self.found.items() if not (column.unit_is_stated or (stamps and q == "time"))]
-        for remark in schema.remarks(self.names, self.found, stamps):
+        names = self.names if self.beside.height is None else ()
+        for remark in schema.remarks(names, self.found, stamps):
             other = ",".join(f"{quantity}={_OTHERS[quantity]}" for quantity in bare)
             yield f"{remark}; state others with --units, such as --units {other}" if bare else remark
             bare = []
         if said := conventions.in_words(self.station):
             yield f"readings: {', '.join(said)}"
+        if (height := self.beside.height) is not None:
+            yield f'"{height.name}" in {height.unit.name} stands for the elevation'
         yield from (
             f'"{column.name}" counts downwards and is turned round'
             for column in self.found.values()

@@ -8,6 +8,7 @@ import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +21,7 @@ from ftproc.errors import InputError, UsageError
 from ftproc.files import arrow
 from ftproc.live.order import Left, Order
 from ftproc.long_records import joined
-from ftproc.methods import live, registry
+from ftproc.methods import heights, live, registry
 from ftproc.methods import range_rates as rates_of
 from ftproc.methods.estimate import FARTHEST, Estimate
 from ftproc.order_statistics import median
@@ -48,10 +49,16 @@ class Live:
     """
 
     def __init__(
-        self, settings: FilterSettings | None = None, late_s: float | None = None, range_rates: bool = False
+        self,
+        settings: FilterSettings | None = None,
+        late_s: float | None = None,
+        range_rates: bool = False,
+        barometric: bool | None = None,
     ) -> None:
         """settings: editing `live` (also where they say `two-pass`, the default) or `forward`. late_s: at most the lag;
-        None for the lag. range_rates: whether the rows have columns of range rates. Raises UsageError."""
+        None for the lag. range_rates: whether the rows have columns of range rates. barometric: whether the heights
+        are that stand for the elevations (by `ftproc.methods.heights.elevation`); None where these are measured.
+        Raises UsageError."""
         self.resume(settings or FilterSettings())
         self.late, editor = 0, live.editor(self.settings)
         self._lag_s = editor.lag_s
@@ -60,7 +67,8 @@ class Live:
         self._time_s: list[float] = []  # of the rows that have not been published, in the order of their times,
         self._row: list[int] = []  # their numbers,
         self._came_s: list[float] = []  # and when each came, or the one after it
-        self._taken, self._left_s, self._rates = 0, -math.inf, range_rates
+        self._taken, self._left_s = 0, -math.inf
+        self._rates, self._barometric = range_rates, barometric
 
     def resume(self, settings: FilterSettings) -> None:
         """Go on with these settings, when all else is as it was kept."""
@@ -208,13 +216,19 @@ class Live:
             found = [each.rows for each in some]
             high = low + sum(len(each.rows) for each in found)
             estimate = live.estimate(self._order.editor, found, time_s[low:high])._replace(absent=absent)
-            parts.append(_trajectory(row[low:high], time_s[low:high], estimate, self._rates))
+            parts.append(_trajectory(row[low:high], time_s[low:high], estimate, self._rates, self._barometric))
             low = high
         return joined(parts) if parts else _trajectory(row[:0], time_s[:0], None)
 
 
-def _trajectory(row: IntArray, time_s: FloatArray, estimate: Estimate | None, rates: bool = False) -> Trajectory:
-    """The rows of an estimate; none without one. rates: whether they have columns of range rates."""
+def _trajectory(
+    row: IntArray,
+    time_s: FloatArray,
+    estimate: Estimate | None,
+    rates: bool = False,
+    barometric: bool | None = None,
+) -> Trajectory:
+    """The rows of an estimate; none without one. rates, barometric: as in `Live`."""
     n = len(row)
     if estimate is None:
         none = np.empty((0, 3))
@@ -225,13 +239,19 @@ def _trajectory(row: IntArray, time_s: FloatArray, estimate: Estimate | None, ra
     sigma, los_sigma = unseen_motion.widened(run.state, run.sigma, run.los_sigma)
     path_sigma = kinematics.widened(run.state, run.path_sigma, run.sigma, sigma)
     cleaned_sigma = measurement_sigma(cleaned, los_sigma[:, :3])
+    none, columns = np.zeros((n, 6)), dict[str, Any]()
+    if rates:
+        found = estimate.range_rate.label if estimate.range_rate is not None else np.full(n, MISSING, np.uint8)
+        columns = rates_of.columns(state, los_sigma, found)
+    if barometric is not None:
+        common = heights.Common(None, np.empty(0), barometric=barometric)
+        state, sigma, path_sigma = heights.placed(common, slice(None), state, sigma, path_sigma)
+        cleaned_sigma = heights.elevated(common, slice(None), cleaned, cleaned_sigma)
+        label, column = heights.labelled(label)
+        columns |= column
     if absent:  # the filter ran on stand-ins; what depends on them is not published
         state[:], sigma[:], path_sigma[:], label[:, absent] = np.nan, np.nan, np.nan, MISSING
         cleaned[:, absent], cleaned_sigma[:, absent] = np.nan, np.nan
-    none, extra = np.zeros((n, 6)), None
-    if rates:
-        found = estimate.range_rate.label if estimate.range_rate is not None else np.full(n, MISSING, np.uint8)
-        extra = arrow.table(rates_of.columns(state, los_sigma, found))
     return Trajectory(
         "live",
         row,
@@ -243,6 +263,6 @@ def _trajectory(row: IntArray, time_s: FloatArray, estimate: Estimate | None, ra
         label,
         run.nis,
         none,
-        extra=extra,
+        extra=arrow.table(columns) if columns else None,
         path_sigma=path_sigma,
     )

@@ -43,7 +43,7 @@ _KINDS: dict[str, Any] = {
         pace.Pace, pace.Clock, pieces.Sizes, readings.Columns, readings.Labels, readings.Repeats, rows.Waiting,
         rows.Published, records.Model, records.Start, smoother.SmootherRun, two_pass.Known, track.Track,
         gate.GateSettings, by_hand.Accepted, motion.Motion, beside.Rates,
-        turning.Turning,
+        turning.Second, turning.Turning,
     )
 }  # fmt: skip
 _FUNCTIONS = {"edit": two_pass.edit}

@@ -214,7 +214,8 @@ class Stream:
             if len(self.tracks) >= MOST_TARGETS:
                 self.others += len(timed)
                 return
-            self.tracks[name] = Live(self.recipe.settings, range_rates=self._reader.has_rates)
+            beside = self._reader.beside
+            self.tracks[name] = Live(self.recipe.settings, None, beside.rate is not None, beside.barometric)
         self._came_s[name], self._coasted[name] = now_s, 0
         for part in self._push(self.tracks[name], readings[timed], numbers, now_s, stop):
             yield from self._named(name, part)

@@ -61,13 +61,18 @@ ANY = Prior(0.0, 6000.0, "any target")
 class Common(NamedTuple):
     """What stands for the elevation. prior: if no height is measured. sigma_m: (n,) that all heights may be off by
     together. range_m: by which the noise of the elevations is that of single heights. rejected: (n,) heights that are
-    outliers. station_m: the station's own height, m."""
+    outliers. station_m: the station's own height, m. barometric: whether they are, where they are used as they come."""
 
     prior: Prior | None
     sigma_m: FloatArray
     range_m: float = 1.0
     rejected: NDArray[np.bool_] | None = None
     station_m: float = 0.0
+    barometric: bool | None = None
+
+    def off_m(self, part: slice, above_m: FloatArray) -> FloatArray:
+        """(n,) m 1-sigma of some samples that are so high, (n,) m."""
+        return self.sigma_m[part] if self.barometric is None else common_sigma(self.barometric, above_m)
 
     def figures(self) -> dict[str, Any]:
         """For the summary, JSON-serialisable."""
@@ -85,10 +90,12 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
     heights, causal, by_hand = log.heights, settings.editing in ("live", "forward"), np.zeros(len(log), np.uint8)
     if log.by_hand is not None:
         by_hand = log.by_hand.of("height")
-    if heights is None or causal or not np.isfinite(heights.above_m).any() or settings.height is not None:
+    if heights is None or not np.isfinite(heights.above_m).any() or settings.height is not None:
         return recording, Common(_prior(log, settings, causal), np.zeros(len(log)))
     measurement = np.array(log.measurement)
     station_m = settings.site[2] if settings.site is not None else 0.0
+    if causal:
+        return _as_they_come(recording, log, by_hand, station_m)
     above, slant = heights.above_m - station_m, _cleaned_ranges(recording, settings)
     step = rounding_step(heights.above_m)
     above = np.where(by_hand == REJECTED, np.nan, above)
@@ -96,14 +103,12 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
     good |= by_hand == ACCEPTED
     rejected = np.isfinite(above) & ~good
     above = np.where(good, above, np.nan)
-    with np.errstate(invalid="ignore"):
-        ratio = sine(above, slant)
-        measurement[:, 2] = np.where(np.abs(ratio) <= 1, np.arcsin(np.clip(ratio, -1, 1)), np.nan)
+    measurement[:, 2] = elevation(above, slant)
     _check(log, np.isfinite(above) & np.isfinite(slant), measurement[:, 2])
     ground = np.maximum(slant * np.cos(measurement[:, 2]), 1.0)
     each = own / ground
     typical = float(np.nanmedian(each))
-    common = np.hypot(PRESSURE_M, TEMPERATURE * above) if heights.barometric else np.zeros(len(above))
+    common = common_sigma(heights.barometric, above)
     times = np.ones((len(log), 3))
     times[:, 2] = np.where(np.isfinite(each), (each / typical) ** 2, 1.0)
     assumed = recording.assumed_sigma.copy()
@@ -117,6 +122,38 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
     )
     known = np.where(np.isfinite(common), common, float(np.nanmedian(common)))
     return found, Common(None, np.hypot(known, step / math.sqrt(12)), own / typical, rejected, station_m)
+
+
+def _as_they_come(
+    recording: Recording, log: MeasurementLog, by_hand: FlagArray, station_m: float
+) -> tuple[Recording, Common]:
+    """The recording with elevations by the heights, each with the range of its own row, and what is known of these by
+    then; the editor finds their noise and outliers."""
+    assert log.heights is not None
+    measurement = np.array(log.measurement)
+    above = np.where(by_hand == REJECTED, np.nan, log.heights.above_m - station_m)
+    measurement[:, 2] = elevation(above, measurement[:, 0])
+    _check(log, np.isfinite(above) & (measurement[:, 0] > 0), measurement[:, 2])
+    ground = measurement[:, 0] * np.cos(measurement[:, 2])
+    times, decided = log.time_s - log.time_s[0], recording.accepted.times or (np.zeros(0),) * 3
+    accepted = Accepted((*decided[:2], times[by_hand == ACCEPTED], *decided[3:]))
+    found = replace(recording, measurement=measurement, absent=(), accepted=accepted)
+    barometric, typical = log.heights.barometric, max(float(np.nanmedian(ground)), 1.0)
+    off = common_sigma(barometric, np.nan_to_num(above))
+    return found, Common(None, off, typical, None, station_m, barometric)
+
+
+def common_sigma(barometric: bool, above_m: FloatArray) -> FloatArray:
+    """(n,) m 1-sigma that heights (n,) m may be off by together."""
+    found: FloatArray = np.hypot(PRESSURE_M, TEMPERATURE * above_m) if barometric else np.zeros(len(above_m))
+    return found
+
+
+def elevation(above_m: FloatArray, range_m: FloatArray) -> FloatArray:
+    """(n,) rad, of a target so high above the station; NaN where a height is larger than the range."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = sine(above_m, range_m)
+        return np.where(np.abs(ratio) <= 1, np.arcsin(np.clip(ratio, -1, 1)), np.nan)
 
 
 def screened(time_s: FloatArray, above_m: FloatArray, step: float) -> tuple[float, NDArray[np.bool_]]:
@@ -187,7 +224,7 @@ def placed(
     """The states (n, 9), their sigmas (n, 9) and those of `kinematics` (n, 6) of some samples, with the prior of the
     height instead of z, and with what the heights may be off by together."""
     if common.prior is None:
-        found, wide = state, _widened(state, sigma, common.sigma_m[part])
+        found, wide = state, _widened(state, sigma, common.off_m(part, state[:, 2]))
     else:
         found, wide = _moved(common.prior, state, sigma)
     return found, wide, kinematics.widened(found, path_sigma, sigma, np.maximum(wide, sigma))
@@ -198,7 +235,8 @@ def elevated(common: Common, part: slice, cleaned: FloatArray, sigma: FloatArray
     if common.prior is not None:
         return sigma
     ground = np.maximum(cleaned[:, 0] * np.cos(cleaned[:, 2]), 1.0)
-    return np.column_stack([sigma[:, :2], np.hypot(sigma[:, 2], common.sigma_m[part] / ground)])
+    off = common.off_m(part, cleaned[:, 0] * np.sin(cleaned[:, 2]))
+    return np.column_stack([sigma[:, :2], np.hypot(sigma[:, 2], off / ground)])
 
 
 def relabelled(common: Common, part: slice, label: FlagArray) -> FlagArray:

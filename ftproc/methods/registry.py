@@ -196,8 +196,8 @@ _ENSEMBLES = "it is for the methods enkf, enpf, enpf-chi2 and renpf"
 USES = {
     "--editing": Use(lambda m, s: m.name == MAIN, f"it is for {MAIN}; the others have editing of their own, or none"),
     "--motion": Use(
-        lambda m, s: _edited_twice(m, s) or (_live(m, s) and s.motion in (AUTO, "white-jerk")),
-        f"it is for {MAIN} with --editing two-pass; with --editing live, white-jerk leaves the turning force out",
+        lambda m, s: _edited_twice(m, s) or ((_live(m, s) or _recursive(m, s)) and s.motion in (AUTO, "white-jerk")),
+        f"it is for {MAIN} with --editing two-pass; with live and forward, white-jerk leaves the turning force out",
     ),
     "--lag": Use(_live, f"it is for {MAIN} with --editing live"),
     "--max-patch": Use(

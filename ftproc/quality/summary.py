@@ -130,6 +130,10 @@ def _rows(s: Mapping[str, Any]) -> list[str]:
         found.append(f"{counted(s['rows_without_estimate'], 'row')} without an estimate: no track was confirmed yet")
     if s["duplicate_times"]:
         share = "shares" if s["duplicate_times"] == 1 else "share"
-        merged = "; those of one time are taken as one reading, their mean" if s.get("at_once") else ""
+        at_once = s.get("at_once") and not s.get("plots_at_once")
+        merged = "; those of one time are taken as one reading, their mean" if at_once else ""
         found.append(f"{counted(s['duplicate_times'], 'row')} {share} the time of the row before{merged}")
+    if s.get("plots_at_once"):
+        are = "is a further plot" if s["plots_at_once"] == 1 else "are further plots"
+        found.append(f"{counted(s['plots_at_once'], 'row')} {are} of the same turn, taken as one reading, their mean")
     return found

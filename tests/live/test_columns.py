@@ -10,7 +10,7 @@ from ftproc.errors import InputError
 from ftproc.files.reading import logs
 from ftproc.live.columns import Reader
 from ftproc.live.growing import Block
-from ftproc.settings import Station
+from ftproc.settings import FilterSettings, Station
 from tests.simulated import simulate
 
 ROWS = "0,1000,0.1,0.2\n1,1010,0.1,0.2\n2,1020,0.1,0.2\n"
@@ -177,3 +177,35 @@ def test_a_cell_that_is_no_moment_like_the_others_is_a_fault():
     readings, fault, _ = followed("Time;R\n14.06.2026 15:32:10.000;1000\n14.06.2026 25:32:11;1010\n")
     assert len(readings) == 1
     assert "line 3: the time is" in str(fault)
+
+
+@pytest.mark.parametrize(
+    ("name", "recipe", "barometric"),
+    [
+        ("FL", Recipe(), True),
+        ("height_m", Recipe(station=Station("north"), settings=FilterSettings(site=(47.0, 8.0, 400.0))), False),
+        ("alt_ft", Recipe(columns="height=alt_ft"), True),
+    ],
+)
+def test_heights_stand_for_elevations_with_the_range_of_their_row(name, recipe, barometric):
+    text = f"time_s,range_m,azimuth_rad,{name}\n0,20000,0.1,100\n1,20000,0.1,\n2,,0.1,100\n3,10,0.1,100\n"
+    readings, fault, said = followed(text, recipe)
+    unit = {"FL": 30.48, "height_m": 1.0, "alt_ft": 0.3048}[name]
+    own = 400.0 if recipe.settings.site else 0.0
+    assert fault is None
+    sine = (100 * unit - own) / 20000 - 20000 / (2 * 6371e3)  # of a height far smaller than the earth
+    np.testing.assert_allclose(readings[0, 3], np.arcsin(sine), rtol=1e-3)
+    assert np.isnan(readings[1:, 3]).all()
+    assert any(f'"{name}" in' in each and "stands for the elevation" in each for each in said)
+    reader = Reader("a.csv", recipe, said.append)
+    reader.read(Block(1, text.splitlines()))
+    assert reader.beside.barometric is barometric
+
+
+def test_an_elevation_or_a_height_by_the_user_leaves_heights_alone():
+    rows = "0,20000,0.1,0.2,100\n1,20000,0.1,0.2,100\n"
+    readings, _, _ = followed(f"time_s,range_m,azimuth_rad,elevation_rad,FL\n{rows}")
+    np.testing.assert_array_equal(readings[:, 3], 0.2)
+    specified = Recipe(settings=FilterSettings(height=(5000.0, 100.0)))
+    readings, _, _ = followed("time_s,range_m,azimuth_rad,FL\n0,20000,0.1,100\n", specified)
+    assert np.isnan(readings[:, 3]).all()

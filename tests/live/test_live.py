@@ -12,6 +12,7 @@ import pytest
 
 import ftproc
 from ftproc.errors import InputError, UsageError
+from ftproc.methods import heights
 from ftproc.settings import FilterSettings
 from tests.simulated import simulate
 
@@ -55,6 +56,18 @@ def test_late_rows_take_their_place_as_if_they_had_come_in_time(log, at_once):
     assert track.late == 0
     for name in ("row", "time_s", "state", "sigma", "outlier"):
         np.testing.assert_array_equal(np.concatenate([getattr(part, name) for part in parts]), getattr(whole, name))
+
+
+def test_heights_as_they_come_are_those_of_the_whole_log():
+    log, settings = simulate("surveillance-2d", seed=2).log, FilterSettings(editing="live", lag_s=20.0)
+    track, whole = ftproc.Live(settings, barometric=True), ftproc.filter_log(log, settings)
+    stand_in = heights.elevation(log.heights.above_m, log.measurement[:, 0])
+    parts = [track.push(t, r, a, e) for t, (r, a, _), e in zip(log.time_s, log.measurement, stand_in, strict=True)]
+    parts.append(track.finish())
+    for name in ("row", "time_s", "state", "sigma", "outlier", "measurement", "measurement_sigma"):
+        np.testing.assert_array_equal(np.concatenate([getattr(part, name) for part in parts]), getattr(whole, name))
+    labels = [each for part in parts if len(part) for each in part.extra.column("outlier_height").to_pylist()]
+    assert labels == whole.extra.column("outlier_height").to_pylist()
 
 
 def batches(order, at_once):

@@ -139,9 +139,25 @@ def test_a_patch_of_wrong_levels_is_left_out():
 @pytest.mark.parametrize("editing", ["live", "forward"])
 def test_live_editing_takes_a_prior_of_any_target(editing):
     flight = simulate("surveillance-2d", seed=1)
-    found = filter_log(flight.log, FilterSettings(editing=editing))
+    found = filter_log(replace(flight.log, heights=None), FilterSettings(editing=editing))
     assert found.metadata["summary"]["height_of"] == heights.ANY.why
     assert np.isfinite(found.state).all(1).mean() > 0.8
+
+
+@pytest.mark.parametrize("lag_s", [0.0, 20.0])
+def test_live_editing_uses_heights_as_they_come(lag_s):
+    """Each with the range of its own row, and none before it has come."""
+    flight, settings = simulate("surveillance-2d", seed=1), FilterSettings(editing="live", lag_s=lag_s)
+    found, cut = filter_log(flight.log, settings), filter_log(flight.log.stretch(slice(0, 120)), settings)
+    error = found.state[:, 2] - flight.truth.position_m[:, 2]
+    known = np.isfinite(error)
+    assert known.mean() > 0.9
+    assert np.abs(error[known]).max() < 250.0  # a prior is off by thousands
+    assert (np.abs(error) <= 3 * found.sigma[:, 2])[known].mean() > 0.95
+    same = flight.log.time_s[:120] <= flight.log.time_s[119] - lag_s - 1e-9
+    for name in ("state", "sigma", "outlier", "measurement_sigma"):
+        np.testing.assert_array_equal(getattr(cut, name)[same], getattr(found, name)[:120][same])
+    assert cut.extra.column("outlier_height").to_pylist()[:90] == found.extra.column("outlier_height").to_pylist()[:90]
 
 
 def test_other_methods_use_the_heights(surveillance):

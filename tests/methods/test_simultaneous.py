@@ -1,4 +1,4 @@
-"""Hundreds of rows of one stamp."""
+"""Hundreds of rows of one stamp, and several plots in a turn."""
 
 from __future__ import annotations
 
@@ -93,3 +93,67 @@ def test_means_are_those_of_a_plain_loop(angular):
         rows = [k for k in np.flatnonzero(group == g) if scatter[k] <= limit]
         expected = middles[g] + np.mean([away(values[k], middles[g]) for k in rows])
         assert abs(away(got, expected)) < 1e-12
+
+
+def ship(turns=300, ends=100.0, seed=2, outlier=None):
+    """A ship of 200 m at 8 m/s, seen by bow and stern, one to four plots in each turn of 2.5 s: the middle of it (n, 3)
+    and the log."""
+    random = np.random.default_rng(seed)
+    turn = np.repeat(np.arange(turns), random.integers(1, 5, turns))
+    time_s = 2.5 * turn + 0.012 * (np.arange(len(turn)) - np.searchsorted(turn, turn))
+    along = np.array([0.88, 0.48, 0.0])
+    position = np.array([-4000.0, 5000.0, 15.0]) + 8.0 * time_s[:, None] * along
+    x, y, z = (position + ends * random.choice([-1.0, 1.0], (len(turn), 1)) * along).T
+    reading = np.c_[np.sqrt(x * x + y * y + z * z), np.arctan2(y, x), np.full(len(turn), np.nan)]
+    reading[:, :2] += random.standard_normal((len(turn), 2)) * np.array([8.0, 2e-3])
+    if outlier is not None:
+        reading[outlier, 0] += 1000.0
+    return position, time_s, reading
+
+
+@pytest.mark.parametrize("seed", [2, 4])
+def test_bow_and_stern_are_one_ship(seed):
+    position, time_s, reading = ship(seed=seed)
+    found = smoothed(time_s, reading, height=(15.0, 20.0))
+    error = found.state[:, :2] - position[:, :2]
+    assert np.sqrt((error**2).sum(1).mean()) < 25.0
+    assert (np.abs(error) <= 3 * found.sigma[:, :2]).all(1).mean() > 0.95
+    assert (found.outlier[:, 0] == GOOD).mean() > 0.98
+    assert found.metadata["summary"]["plots_at_once"] > 300
+
+
+def test_an_outlier_among_plots_is_its_row_alone():
+    _, time_s, reading = ship(ends=0.0, outlier=200)
+    found = smoothed(time_s, reading, height=(15.0, 20.0))
+    assert np.flatnonzero(found.outlier[:, 0] != GOOD).tolist() == [200]
+
+
+def merged(time_s, reading):
+    return simultaneous.plots(time_s, reading)
+
+
+def test_a_mean_of_plots_has_so_much_less_variance():
+    _, time_s, reading = ship()
+    found = merged(time_s, reading)
+    count = np.diff(found.first)
+    np.testing.assert_allclose(found.times[:, 0], 1 / count)
+    k = int(np.argmax(count))
+    rows = slice(found.first[k], found.first[k + 1])
+    np.testing.assert_allclose(found.measurement[k], reading[rows].mean(0))
+    np.testing.assert_allclose(found.time_s[k], time_s[rows].mean())
+
+
+@pytest.mark.parametrize("kind", ["one a turn", "uneven", "quick", "copies", "bursts", "shots"])
+def test_other_logs_stay_as_they_are(kind):
+    random = np.random.default_rng(1)
+    reading = random.standard_normal((400, 3)) + np.array([1000.0, 1.0, 0.1])
+    time_s = {
+        "one a turn": 2.5 * np.arange(400) + random.uniform(0, 0.02, 400),
+        "uneven": np.sort(random.uniform(0, 1000, 400)),
+        "quick": 0.05 * (np.arange(400) // 2) + 0.001 * (np.arange(400) % 2),
+        "copies": 2.5 * (np.arange(400) // 2),
+        "shots": 10.0 * (np.arange(400) // 20) + 0.005 * (np.arange(400) % 20),
+        "bursts": 10.0 * (np.arange(400) // 20) + 0.05 * (np.arange(400) % 20),
+    }[kind]
+    reading = reading[np.arange(400) // 2] if kind == "copies" else reading
+    assert merged(time_s, reading) is None

@@ -142,7 +142,7 @@ def recursion(update: Update, kind: Any, filters: Any = Filters) -> Recursion:
 
 
 run_weighted = recursion(_weighted, bool)
-_run_coloured = recursion(_weighted, bool, ColouredFilters)
+run_weighted_coloured = recursion(_weighted, bool, ColouredFilters)
 
 
 class Estimated(Protocol):
@@ -212,12 +212,12 @@ def filter_log(log: Observations, model: Model, starts: list[Start], extended: b
 
     extended: linearise by the Jacobian (EKF) instead of the unscented transform.
     """
-    return run_log(_run_coloured if model.coloured else run_weighted, log, model, starts, extended)
+    return run_log(run_weighted_coloured if model.coloured else run_weighted, log, model, starts, extended)
 
 
 def filter_with_beside(log: Observations, model: Model, starts: list[Start]) -> tuple[FilterRun, FloatArray]:
     """The same, and what `beside` leaves of the log's scalars (kinds, n, WIDTH)."""
-    return run_with_beside(_run_coloured if model.coloured else run_weighted, log, model, starts, False)
+    return run_with_beside(run_weighted_coloured if model.coloured else run_weighted, log, model, starts, False)
 
 
 def run_log(run: Recursion, log: Observations, model: Model, starts: list[Start], extra: Any) -> FilterRun:

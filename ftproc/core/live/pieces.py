@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ftproc.core.filtering.beside import WEIGHT
-from ftproc.core.filtering.forward import Span
+from ftproc.core.filtering.forward import Span, run_weighted, run_weighted_coloured
 from ftproc.core.filtering.records import Model, Observations, Start, empty_rows
 from ftproc.core.identification.profile import MAX_KNOTS
 from ftproc.core.live.predictive_chain import run_predictive, run_predictive_coloured
@@ -61,9 +61,13 @@ def filtered(
     log: Observations, span: Span, model: Model, filters: Any, chains: Any, first_s: float
 ) -> tuple[Any, FloatArray]:
     """`Row` records of a span of a log, filtered from a state, which is changed, and the weights of its range rates.
-    chains: of the decisions, which follow. first_s: where the jerk profile begins; NaN with the log."""
+    chains: of the decisions, which follow; None where all are made. first_s: where the jerk profile begins; NaN with
+    the log."""
     rows, profile = empty_rows(len(log.time_s)), model.profile_of(log)
     profile = profile if math.isnan(first_s) else profile._replace(first_s=first_s)
-    run = run_predictive_coloured if model.coloured else run_predictive
-    run(span, log.samples(model.noise_variance), profile, filters, chains, rows)
+    samples = log.samples(model.noise_variance)
+    if chains is None:
+        (run_weighted_coloured if model.coloured else run_weighted)(span, samples, profile, filters, False, rows)
+    else:
+        (run_predictive_coloured if model.coloured else run_predictive)(span, samples, profile, filters, chains, rows)
     return rows, profile.beside[0, :, WEIGHT] if log.beside else np.ones(len(rows))

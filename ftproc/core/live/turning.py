@@ -31,27 +31,51 @@ MIXED = ("state", "predicted", "innovation", "nis")
 
 class Case(NamedTuple):
     """The newest part of a window: the log with its decisions, the model with white jerk and its allowance, the
-    prediction at its first sample, chains of decisions, and scales."""
+    prediction at its first sample, and scales."""
 
     log: Observations
     white: Model
     anchor: Start
-    chains: Any
     scales: Scales
 
 
-class Turning:
-    """The second filter; nothing is done unless it acts. share: (m, 3) of the density of white jerk, piece by piece,
-    that it needs. odds: the logarithm of those of the two filters, by the readings as they came. run: the same of its
-    present run alone."""
+class Second:
+    """A filter beside one with white jerk, whose decisions it takes over. odds: the logarithm of those of the two
+    filters, by the readings as they came. run: the same of its present run alone."""
 
-    def __init__(self, acts: bool) -> None:
-        self.acts, self.share, self.odds, self.run, self.refreshes = acts, np.ones((1, 3)), -MOST, 0.0, 0
+    model: Model
+    filters: Any
+
+    def __init__(self) -> None:
+        self.odds, self.run = -MOST, 0.0
 
     @property
     def weight(self) -> float:
         """Of its estimate in the mixture."""
         return 1 / (1 + math.exp(min(-min(self.odds, self.run), 700.0)))
+
+    def begin(self, model: Model, filters: Any) -> None:
+        """Begin a run with the state of some filters, which are changed."""
+        self.model, self.filters, self.run = model, filters, 0.0
+
+    def append(self, log: Observations, span: Span, rows: Any, first_s: float) -> None:
+        """Run it over the next readings, as `rows` have decided on them, and mix its rows into these; see
+        `pieces.filtered`."""
+        new, weight = slice(span.first, span.last), np.zeros(len(rows))
+        log.weight[new] = rows["weight"][new]
+        other, _ = filtered(log, span, self.model, self.filters, None, first_s)
+        for k, gained in enumerate(_gained(rows, other)[new].tolist(), span.first):
+            self.odds, self.run = max(min(self.odds + gained, MOST), -MOST), self.run + gained
+            weight[k] = self.weight
+        _mix(rows, other, weight, MIXED)
+
+
+class Turning:
+    """The second filter of a window; nothing is done unless it acts. share: (m, 3) of the density of white jerk, piece
+    by piece, that it needs."""
+
+    def __init__(self, acts: bool) -> None:
+        self.acts, self.share, self.second, self.refreshes = acts, np.ones((1, 3)), Second(), 0
 
     def passed(self, pieces: int) -> None:
         """The newest part begins so many pieces of the profile later."""
@@ -65,7 +89,7 @@ class Turning:
         """Fit it to the newest part now and then, run it, and mix its rows into those of white jerk (n,)."""
         if not self.acts:
             return
-        log, white = case.log, case.white
+        log, white, second = case.log, case.white, self.second
         held = self.share[np.minimum(np.arange(len(white.jerk)), len(self.share) - 1)]
         model = white._replace(jerk=held * white.jerk / ALLOWANCE, motion=MODELS["turning-force"])
         if self.refreshes % EVERY == 0:
@@ -74,34 +98,26 @@ class Turning:
             model = climbed(log, [case.anchor], about, STEPS, case.scales)[0]
             self.share = ALLOWANCE * model.jerk / white.jerk
         self.refreshes += 1
-        self.model = with_allowance(log, model, case.scales).causal
-        self.filters = self.model.filter(case.anchor)
-        span = Span(0, len(log.time_s), 0)
-        other, _ = filtered(log, span, self.model, self.filters, case.chains.copy(), math.nan)
-        self.run = float(_gained(rows, other).sum())
-        _mix(rows, other, np.full(len(rows), self.weight), MIXED)
+        model = with_allowance(log, model, case.scales).causal
+        second.begin(model, model.filter(case.anchor))
+        other, _ = filtered(log, Span(0, len(log.time_s), 0), model, second.filters, None, math.nan)
+        second.run = float(_gained(rows, other).sum())
+        _mix(rows, other, np.full(len(rows), second.weight), MIXED)
 
-    def append(self, log: Observations, span: Span, rows: Any, chains: Any, first_s: float) -> None:
-        """Run it over the next readings, as `rows` have decided on them, and mix its rows into these; see
-        `pieces.filtered`."""
-        if not self.acts:
-            return
-        new, weight = slice(span.first, span.last), np.zeros(len(rows))
-        log.weight[new] = rows["weight"][new]
-        other, _ = filtered(log, span, self.model, self.filters, chains.copy(), first_s)
-        for k, gained in enumerate(_gained(rows, other)[new].tolist(), span.first):
-            self.odds, self.run = max(min(self.odds + gained, MOST), -MOST), self.run + gained
-            weight[k] = self.weight
-        _mix(rows, other, weight, MIXED)
+    def append(self, log: Observations, span: Span, rows: Any, first_s: float) -> None:
+        """See `Second.append`."""
+        if self.acts:
+            self.second.append(log, span, rows, first_s)
 
     def smoothed(self, log: Observations, anchor: Start, white: SmootherRun) -> SmootherRun:
         """The same mixture of the smoothed newest part."""
         if not self.acts:
             return white
-        model = self.model._replace(motion=self.model.motion.about(white.state))
+        model = self.second.model
+        model = model._replace(motion=model.motion.about(white.state))
         other = smooth_log(log, model, [anchor])
         found = {name: getattr(white, name).copy() for name in ("state", "sigma", "los_sigma", "path_sigma")}
-        _mix(found, {"state": other.state}, np.full(len(white.state), self.weight), ("state",))
+        _mix(found, {"state": other.state}, np.full(len(white.state), self.second.weight), ("state",))
         return white._replace(**found)
 
 

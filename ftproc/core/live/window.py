@@ -195,7 +195,7 @@ class Window:
         first_s = float(self.time_s[self.near])
         log, span = self._observed(slice(n - 1, n + len(time_s))), Span(1, 1 + len(time_s), 0)
         rows, left = self._filtered(log, span, self.allowed, self.filters, self.chains, first_s)
-        self.turning.append(log, span, rows, self.chains, first_s)
+        self.turning.append(log, span, rows, first_s)
         rows["since_start"] += self.kept["rows"]["since_start"][n - 1]
         used, kept = np.column_stack([rows["weight"], left])[1:], self.kept
         kept["weight"][n:], kept["rate_weight"][n:], kept["rows"][n:] = used[:, :-1], used[:, -1], rows[1:]
@@ -264,7 +264,7 @@ class Window:
             self.allowed = self._with_allowance(log, scales)
         self.filters, self.chains = self.allowed.filter(self.anchor), self._chains(self.allowed)
         rows, left = self._filtered(log, Span(0, len(log.time_s), 0), self.allowed, self.filters, self.chains)
-        self.turning.refresh(Case(log, self.allowed, self.anchor, self.chains, scales), rows)
+        self.turning.refresh(Case(log, self.allowed, self.anchor, scales), rows)
         rows["since_start"] += self.forgotten + self.near - self.begun
         self.kept["rows"][near] = rows
         self.kept["rate_weight"][near] = left

@@ -106,19 +106,18 @@ def _found(
                 yield known
 
 
-def rate_of(
-    names: Sequence[str], row: Sequence[str], units: Mapping[str, str], columns: Mapping[str, str]
+def by_name(
+    quantity: str, names: Sequence[str], row: Sequence[str], units: Mapping[str, str], columns: Mapping[str, str]
 ) -> Further | None:
-    """The range rate by the names of columns alone, and the row of units below them, where there is one."""
-    stated = columns.get(RANGE_RATE, "")
-    apart = _all_apart(RANGE_RATE, names, row)
-    indices = [k for k, name in enumerate(apart) if (names[k] == stated if stated else _means(RANGE_RATE, name))]
+    """A quantity by the names of columns alone, and the row of units below them, where there is one."""
+    stated = columns.get(quantity, "")
+    apart = _all_apart(quantity, names, row)
+    indices = [k for k, name in enumerate(apart) if (names[k] == stated if stated else _means(quantity, name))]
     if len(indices) != 1:
         return None
-    name = apart[indices[0]]
-    unit = unit_named(RANGE_RATE, units.get(RANGE_RATE) or name.unit or "")
-    closing = any(word.startswith(_CLOSING) for word in (name.core(), name.stem))
-    return None if unit is None else Further(RANGE_RATE, indices[0], names[indices[0]], unit, closing)
+    text, name = names[indices[0]], apart[indices[0]]
+    unit = _unit(quantity, name, units.get(quantity))
+    return None if unit is None else Further(quantity, indices[0], text, unit, _other_kind(quantity, text, name, unit))
 
 
 def _all_apart(quantity: str, names: Sequence[str], row: Sequence[str]) -> list[Name]:
@@ -126,9 +125,7 @@ def _all_apart(quantity: str, names: Sequence[str], row: Sequence[str]) -> list[
 
 
 def _described(header: TableHeader, quantity: str, index: int, name: Name, stated: str | None) -> Further | None:
-    text, words = header.names[index], {name.core(), name.stem}
-    level = quantity == HEIGHT and words & {*_LEVELS}
-    unit = unit_named(quantity, stated or name.unit or ("fl" if level else ""))
+    text, unit = header.names[index], _unit(quantity, name, stated)
     if unit is None and header.is_of_a_standard and quantity == RANGE_RATE:
         unit = unit_named(quantity, "mps")
     if unit is None and quantity == RANGE_RATE:
@@ -139,11 +136,19 @@ def _described(header: TableHeader, quantity: str, index: int, name: Name, state
             f"--units {HEIGHT}=ft (or {', '.join(UNITS[HEIGHT])}), or --columns {HEIGHT}={ABSENT} if it is something "
             "else."
         )
+    return Further(quantity, index, text, unit, _other_kind(quantity, text, name, unit))
+
+
+def _unit(quantity: str, name: Name, stated: str | None) -> Unit | None:
+    level = quantity == HEIGHT and {name.core(), name.stem} & {*_LEVELS}
+    return unit_named(quantity, stated or name.unit or ("fl" if level else ""))
+
+
+def _other_kind(quantity: str, text: str, name: Name, unit: Unit) -> bool:
+    """Whether a height is barometric, a rate closing."""
     if quantity == HEIGHT:
-        kind = unit.name == "fl" or not any(word in text.lower() for word in _GEOMETRIC)
-    else:
-        kind = any(word.startswith(_CLOSING) for word in words)
-    return Further(quantity, index, text, unit, kind)
+        return unit.name == "fl" or not any(word in text.lower() for word in _GEOMETRIC)
+    return any(word.startswith(_CLOSING) for word in (name.core(), name.stem))
 
 
 def _apart(quantity: str, text: str, unit: str) -> Name:

@@ -20,25 +20,40 @@ def flight():
 
 
 def rows_of(flight, **settings):
-    editor = live.editor(FilterSettings(editing="live", **settings))
+    editor = live.editor(FilterSettings(**{"editing": "live", **settings}))
     found = editor.push(flight.log.time_s, flight.log.measurement) + editor.finish()
     return editor, np.concatenate([each.rows for each in found])
 
 
-def test_a_manoeuvre_is_followed_better(flight):
+@pytest.mark.parametrize(("editing", "most"), [("live", 0.97), ("forward", 0.99)])
+def test_a_manoeuvre_is_followed_better(flight, editing, most):
     """Decisions are the same, and positions and velocities are nearer to the truth."""
-    (_, mixed), (_, white) = rows_of(flight), rows_of(flight, motion="white-jerk")
+    (_, mixed), (_, white) = (rows_of(flight, editing=editing, motion=name) for name in ("auto", "white-jerk"))
     np.testing.assert_array_equal(mixed["weight"], white["weight"])
     known = flight.log.time_s > 8.0  # the beginning of a track knows no turn
     for part, truth in ((slice(0, 3), flight.truth.position_m), (slice(3, 6), flight.truth.velocity_mps)):
         errors = [np.sqrt(((each["state"][known, part] - truth[known]) ** 2).mean()) for each in (mixed, white)]
-        assert errors[0] < 0.97 * errors[1]
+        assert errors[0] < most * errors[1]
 
 
 @pytest.mark.parametrize("settings", [{"motion": "white-jerk"}, {"jerk_psd_m2ps5": 10.0}])
 def test_white_jerk_that_is_asked_for_is_alone(flight, settings):
     editor, _ = rows_of(flight, **settings)
     assert not editor.window.turning.acts
+
+
+def test_forward_editing_is_white_jerk_alone_where_a_reading_is_rejected():
+    log = simulate("manoeuvre", seed=3, duration_s=20.0, dt_s=0.04, outliers="isolated=0.1:20-300").log
+    found = []
+    for motion in ("auto", "white-jerk"):
+        editor = live.editor(FilterSettings(editing="forward", motion=motion))
+        found.append(np.concatenate([each.rows for each in editor.push(log.time_s, log.measurement)]))
+    mixed, white = found
+    rejected = (mixed["weight"] <= 0).any(1)
+    np.testing.assert_array_equal(mixed["weight"], white["weight"])
+    np.testing.assert_array_equal(mixed["state"][rejected], white["state"][rejected])
+    assert rejected.any()
+    assert (mixed["state"][~rejected] != white["state"][~rejected]).any()
 
 
 def row(state, innovation):
@@ -50,7 +65,7 @@ def row(state, innovation):
 
 def test_a_filter_that_diverges_is_not_published():
     """Whatever it was worth before."""
-    second = turning.Turning(acts=True)
+    second = turning.Second()
     second.odds, here, astray = turning.MOST, row(0.0, 1.0), row(1e6, 1e3)
     second.run = float(turning._gained(here, astray)[0])
     turning._mix(here, astray, np.full(1, second.weight), turning.MIXED)
