@@ -2,20 +2,25 @@
 
 A step makes that likelier, as it is or with the rejected readings beside it taken in, whose rejection then need not be
 explained. Both are linear problems of a sweep or two, where weighing settles process noise and decisions anew.
+
+The same of the curves of a patch that was followed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+
+import numpy as np
 
 from ftproc.core.editing.lasting import scan
-from ftproc.core.editing.lasting.curves import CLOCK, Curve
+from ftproc.core.editing.lasting.curves import CLOCK, Curve, columns_of
 from ftproc.core.editing.lasting.proposals import edges_about
 from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.weighing import Scene, as_it_is
-from ftproc.core.filtering.records import Model
+from ftproc.core.filtering.columns import said_of
+from ftproc.core.filtering.records import Model, Observations
 from ftproc.core.identification.stretches import runs_of
-from ftproc.records import FloatArray, IntArray
+from ftproc.records import FloatArray
 
 LEFT = 6.0  # in log-likelihood. With the process noise of the part: up to 5.4 where there is no step, from 7 on where
 # there is; with the median of the log, from 13 on
@@ -24,25 +29,45 @@ LEFT = 6.0  # in log-likelihood. With the process noise of the part: up to 5.4 w
 def leaves_a_jump(part: Scene, jump: Jump, around: tuple[int, int], weight: FloatArray, model: Model) -> bool:
     """Whether one of the ways of a jump makes a part of a log likelier than it is with these weights (n, 3) and this
     model without a fault. around: the sample of the part about which the jump is, and how far from it at most."""
-    edges, even = edges_about(len(weight), *around), None
+    edges = edges_about(len(weight), *around)
+
+    def gain(log: Observations) -> float:
+        """With a step of some channels at one of the edges, as if each were off alone."""
+        channels, starts = [(channel, jump.station) for channel in way], part.starts(log)
+        return sum(float(scan.steps_of(log, model, starts, part.setting, c, edges)[1:].max()) for c in channels)
+
     for way in jump.ways:
-        if _gain(part, jump, way, edges, weight, model) > LEFT:
-            return True
         taken_in = _with_rejected(part, way, jump.station, around, weight)
-        if (taken_in != weight).any():
-            even = as_it_is(part, weight, model) if even is None else even
-            if _gain(part, jump, way, edges, taken_in, model) + as_it_is(part, taken_in, model) - even > LEFT:
-                return True
+        if _is_more_than(LEFT, part, gain, weight, taken_in, model):
+            return True
     return False
 
 
-def _gain(part: Scene, jump: Jump, way: Sequence[int], edges: IntArray, weight: FloatArray, model: Model) -> float:
-    """How much likelier the part becomes with a step of some channels at one of the edges, as if each were off
-    alone."""
-    log = part.log._replace(weight=weight)
-    starts = part.starts(log)
-    channels = ((channel, jump.station) for channel in way)
-    return sum(float(scan.steps_of(log, model, starts, part.setting, c, edges)[1:].max()) for c in channels)
+def leaves_curves(part: Scene, curves: Sequence[Curve], least: float, weight: FloatArray, model: Model) -> bool:
+    """Whether curves make a part of a log by so much likelier than it is with these weights (n, 3) and this model."""
+
+    def gain(log: Observations) -> float:
+        """With the likeliest sizes."""
+        said = said_of(log, model, part.starts(log), columns_of(curves, part.setting))
+        scale = np.sqrt(np.maximum(np.diag(said.information), 1e-300))
+        score, information = said.score / scale, said.information / scale / scale[:, None]
+        return 0.5 * float(score @ np.linalg.lstsq(information, score, rcond=None)[0])
+
+    return _is_more_than(least, part, gain, weight, np.maximum(weight, part.taking_in(curves)), model)
+
+
+def _is_more_than(
+    least: float, part: Scene, gain: Callable[[Observations], float], weight: FloatArray, taken_in: FloatArray,
+    model: Model,
+) -> bool:  # fmt: skip
+    """Whether there is such a gain with these weights (n, 3), or with rejected readings taken in, whose rejection then
+    need not be explained."""
+    if gain(part.log._replace(weight=weight)) > least:
+        return True
+    if (taken_in == weight).all():
+        return False
+    more = as_it_is(part, taken_in, model) - as_it_is(part, weight, model)
+    return gain(part.log._replace(weight=taken_in)) + more > least
 
 
 def _with_rejected(
