@@ -211,10 +211,10 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     screened = len(part.rates) == 1 or bool((part.taken_in == part.log.weight).all())
     if screened and not leaves_a_jump(part, jump, around, part.log.weight, part.at_median):
         return None
-    without = _weighed(part, near, ())
+    without = weighed(part, part.log.weight, ())
     if screened and not leaves_a_jump(part, jump, around, without.weight, without.model):
         return None
-    null = without.log_probability
+    null = max(each.log_probability for each in (without, weighed(part, part.taken_in, ())))
     gain, located, step = max((_as_step(seen, jump, way, null) for way in jump.ways), key=lambda each: each[0])
     moves = [c.component for c, s in zip(step.curves, step.sigma, strict=True) if abs(c.size[0]) > CERTAIN * s]
     if 0 < len(moves) < len(step.curves):

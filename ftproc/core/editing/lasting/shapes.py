@@ -13,16 +13,18 @@ TRIMMED = 2  # times that the ends of a patch are brought to where its readings 
 
 
 def of_few_terms(part: Scene, ends: Sequence[Sequence[Curve]], least: float, prior: float) -> Weighed | None:
-    """The likeliest of curves of a few terms with these ends; None if they explain the part of a log no better than
-    motion does, and those of most terms leave too little for a gain of so much with this prior: motion that is slower,
-    or does not follow the patch, leaves more to them."""
+    """The likeliest of curves of a few terms with these ends; None if those with the last ends explain the part of a
+    log no better than motion does, and most terms too little for a gain of so much with this prior: motion that does
+    not follow the patch leaves more to them."""
     most, weight = [curve.of(max(TERMS)) for curve in ends[-1]], part.log.weight
     if not leaves_curves(part, most, least - prior, weight, part.at_median):
         return None
-    without, first = weighed(part, weight, ()), _likeliest(part, ends)
-    if first.log_probability > without.log_probability:
-        return first
-    return first if leaves_curves(part, most, least, without.weight, without.model) else None
+    without, first = weighed(part, weight, ()), weighed(part, weight, ends[-1])
+    if first.log_probability > without.log_probability or leaves_curves(
+        part, most, least, without.weight, without.model
+    ):
+        return _likeliest(part, ends[:-1], first)
+    return None
 
 
 def of_any_shape(part: Scene, best: Weighed) -> Weighed:
