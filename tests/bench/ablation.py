@@ -87,6 +87,7 @@ RULES: dict[str, tuple[Off, ...]] = {
     "rejected runs": (Off(TWO_PASS, "reassess_rejected", lambda record, decision, work: (decision, ())),),
     "faults that last": (Off(TWO_PASS, "search", _empty),),
     "jumps that the part around them explains": (Off(f"{EDITING}.lasting.search", "leaves_a_jump", lambda *_: True),),
+    "curves that leave too little to a patch": (Off(f"{EDITING}.lasting.shapes", "leaves_curves", lambda *_: True),),
     "patches that were followed": (Off(f"{EDITING}.lasting.search", "_followed", _nothing),),
     "one-sided errors": (Off(TWO_PASS, "_one_sided", _empty),),
     "patches between jumps": (Off(f"{EDITING}.jump_patches", "find", lambda time_s, *_: np.zeros(len(time_s))),),
