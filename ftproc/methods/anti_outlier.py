@@ -25,7 +25,7 @@ from ftproc.core.filtering import forward
 from ftproc.core.filtering.beside import WIDTH
 from ftproc.core.filtering.initialization import WIDEST_BLIND_BRIDGE, find_starts
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
-from ftproc.core.filtering.smoother import PATHS, STATES, SmootherRun, smooth_log
+from ftproc.core.filtering.smoother import PATHS, STATES, SmootherRun, likelihood_of, smooth_log
 from ftproc.core.identification import likelihood, motion_models
 from ftproc.core.identification.motion_models import Chosen
 from ftproc.core.identification.profile import ALLOWANCE, fit_profile, median_level, with_allowance
@@ -42,7 +42,7 @@ Run = TypeVar("Run", FilterRun, SmootherRun)
 
 LONGEST_WHOLE = 60_000  # samples of a log that is edited as a whole
 HALFWAY = 0.5  # of the distance to where another understanding puts the target is added to the sigmas
-KEPT = 60_000  # samples of a segment, without its margins,
+KEPT = 30_000  # samples of a segment, without its margins,
 KEPT_MARGINS = 12  # or so many times its margin
 MOST_PIECES = 20  # of a track: what is re-initialized so often shows no motion (two targets in turn: 115)
 MARGIN_S, LEAST_MARGIN, MOST_MARGIN = 60.0, 1_000, 10_000  # s and samples on each side of a segment
@@ -140,8 +140,9 @@ def _followed(
     about which it is linearised. wanted: of the smoother."""
     found = _with_motion(motion, motion.model, wanted)
     if motion.name != white.name:
-        other = _with_motion(white, white.model, None)
-        if other[0].log_likelihood > found[0].log_likelihood or _leaves_its_course(motion, found[1]):
+        starts = preparing.smoothed_starts(white.log, white.model, white.starts)
+        other = likelihood_of(white.log, white.model.causal, starts)
+        if other > found[0].log_likelihood or _leaves_its_course(motion, found[1]):
             return white, _with_motion(white, white.model, wanted)
     return motion, found
 

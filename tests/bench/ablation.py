@@ -90,6 +90,7 @@ RULES: dict[str, tuple[Off, ...]] = {
     "clocks that jump in a gap": (Off(f"{EDITING}.lasting.clock", "gaps", _empty),),
     "noise of what is rejected": (Off(TWO_PASS, "_rejects_many", lambda *_: False),),
     "others that are as likely": (Off(TWO_PASS, "others", _empty),),
+    "curves that leave too little to a patch": (Off(f"{EDITING}.lasting.shapes", "leaves_curves", lambda *_: True),),
     "patches that were followed": (Off(f"{EDITING}.lasting.search", "_followed", _nothing),),
     "one-sided errors": (Off(TWO_PASS, "_one_sided", _empty),),
     "patches between jumps": (Off(f"{EDITING}.jump_patches", "find", lambda time_s, *_: np.zeros(len(time_s))),),

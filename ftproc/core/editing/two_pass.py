@@ -28,9 +28,8 @@ from ftproc.core.editing.decisions import (
     late_stamps,
 )
 from ftproc.core.editing.lasting.curves import CLOCK
-from ftproc.core.editing.lasting.faults import MOTION, STEP, Faults, Shift, refined
+from ftproc.core.editing.lasting.faults import MOTION, STEP, Faults, Shift, others, refined
 from ftproc.core.editing.lasting.rejected_runs import OPEN, reassess_rejected
-from ftproc.core.editing.lasting.rivals import others
 from ftproc.core.editing.lasting.settling import Understood, without_lasting
 from ftproc.core.editing.reassessment import likelier, log_probability, preferred, reassess, with_less_noise
 from ftproc.core.editing.screened import rounding_sigma, screen, stuck_readings

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.core.editing.copies import KindArray
 from ftproc.core.editing.lasting.curves import CLOCK, Curve, Setting, fitted, without
@@ -24,6 +26,7 @@ from ftproc.core.model.moving import between
 from ftproc.order_statistics import median, medians
 from ftproc.records import FloatArray, IntArray
 
+MOST = 6  # understandings that the sigmas allow for, the likeliest
 SAME = 4.5  # sigmas of the noise within which two levels are one
 
 
@@ -191,3 +194,24 @@ def spread(state: FloatArray, shifts: Sequence[Shift]) -> tuple[FloatArray, Floa
         axes[rows] += (moves * shift.sigma) ** 2
         lines[rows] += (np.einsum("kij,kj->ki", sight, moves) * shift.sigma) ** 2
     return axes, lines
+
+
+def others(
+    read: Observations, possible: NDArray[np.bool_], model: Model, setting: Setting, steps: Sequence[Step],
+    rivals: Sequence[Rival],
+) -> Iterator[Observations]:  # fmt: skip
+    """The log by each of some rivals. read: with the readings as they were read and the weights as decided. possible
+    (n, 3): readings that may be good. steps: that were taken out."""
+    for rival in islice(sorted(rivals, key=lambda each: each.gain), MOST):
+        weight, rows = read.weight.copy(), slice(rival.begin, rival.end)
+        if rival.chosen == PATCH or rival.other == PATCH:
+            weight[rows, rival.component] = possible[rows, rival.component] if rival.chosen == PATCH else 0.0
+        left = [each for each in steps if rival.chosen != STEP or not _same(each, rival.step)]
+        if rival.other == STEP and rival.step is not None:
+            left.append(rival.step)
+        log = read._replace(weight=weight)
+        yield taken_out(log, model, setting, levelled(log, model.noise_variance, left))
+
+
+def _same(one: Step, other: Step | None) -> bool:
+    return other is not None and (one.component, one.sample) == (other.component, other.sample)

@@ -2,22 +2,27 @@
 
 A step makes that likelier, as it is or with the rejected readings beside it taken in, whose rejection then need not be
 explained. Both are linear problems of a sweep or two, where weighing settles process noise and decisions anew.
+
+The same of the curves of a patch that was followed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+
+import numpy as np
 
 from ftproc.core.editing.lasting import scan
 from ftproc.core.editing.lasting.clock import gain_at_a_gap
-from ftproc.core.editing.lasting.curves import CLOCK, Curve
+from ftproc.core.editing.lasting.curves import CLOCK, Curve, columns_of
 from ftproc.core.editing.lasting.proposals import edges_about
 from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.weighing import Scene, Weighed, as_it_is
-from ftproc.core.filtering.records import Model
+from ftproc.core.filtering.columns import said_of
+from ftproc.core.filtering.records import Model, Observations
 from ftproc.core.identification.profile import median_level
 from ftproc.core.identification.stretches import runs_of
-from ftproc.records import FloatArray, IntArray
+from ftproc.records import FloatArray
 
 LEFT = 6.0  # in log-likelihood. With the process noise of the part: up to 5.4 where there is no step, from 7 on where
 # there is; with the median of the log, from 13 on
@@ -25,33 +30,51 @@ LEFT = 6.0  # in log-likelihood. With the process noise of the part: up to 5.4 w
 
 def leaves_a_jump(part: Scene, jump: Jump, around: tuple[int, int], without: Weighed) -> bool:
     """Whether one of the ways of a jump makes a part of a log likelier than it is without a fault. around: the sample
-    of the part about which the jump is, and how far from it at most.
-
-    The process noise with which readings beside the jump were rejected may be more than they need where they are good:
-    the typical one of the part may do.
-    """
-    weight, edges = without.weight, edges_about(len(part.possible), *around)
-    if (CLOCK,) in jump.ways and gain_at_a_gap(part, around[0], weight, without.model) > LEFT:
+    of the part about which the jump is, and how far from it at most."""
+    edges = edges_about(len(part.possible), *around)
+    if (CLOCK,) in jump.ways and gain_at_a_gap(part, around[0], without.weight, without.model) > LEFT:
         return True
+
+    def gain(log: Observations, model: Model) -> float:
+        """With a step of some channels at one of the edges, as if each were off alone."""
+        channels, starts = [(channel, jump.station) for channel in way], part.starts(log)
+        return sum(float(scan.steps_of(log, model, starts, part.setting, c, edges)[1:].max()) for c in channels)
+
     for way in jump.ways:
-        if _gain(part, jump, way, edges, weight, without.model) > LEFT:
+        taken_in = _with_rejected(part, way, jump.station, around, without.weight)
+        if _is_more_than(LEFT, part, gain, without, taken_in):
             return True
-        taken_in = _with_rejected(part, way, jump.station, around, weight)
-        models = (without.model, median_level(without.model)) if (taken_in != weight).any() else ()
-        for model in models[: len(without.model.jerk)]:  # of a single level both are the same
-            likely = _gain(part, jump, way, edges, taken_in, model) + as_it_is(part, taken_in, model).log_probability
-            if likely - without.log_probability > LEFT:
-                return True
     return False
 
 
-def _gain(part: Scene, jump: Jump, way: Sequence[int], edges: IntArray, weight: FloatArray, model: Model) -> float:
-    """How much likelier the part becomes with a step of some channels at one of the edges, as if each were off
-    alone."""
-    log = part.log._replace(weight=weight)
-    starts = part.starts(log)
-    channels = ((channel, jump.station) for channel in way)
-    return sum(float(scan.steps_of(log, model, starts, part.setting, c, edges)[1:].max()) for c in channels)
+def leaves_curves(part: Scene, curves: Sequence[Curve], least: float, without: Weighed) -> bool:
+    """Whether curves make a part of a log by so much likelier than it is without a fault."""
+
+    def gain(log: Observations, model: Model) -> float:
+        """With the likeliest sizes."""
+        said = said_of(log, model, part.starts(log), columns_of(curves, part.setting))
+        scale = np.sqrt(np.maximum(np.diag(said.information), 1e-300))
+        score, information = said.score / scale, said.information / scale / scale[:, None]
+        return 0.5 * float(score @ np.linalg.lstsq(information, score, rcond=None)[0])
+
+    return _is_more_than(least, part, gain, without, np.maximum(without.weight, part.taking_in(curves)))
+
+
+def _is_more_than(
+    least: float, part: Scene, gain: Callable[[Observations, Model], float], without: Weighed, taken_in: FloatArray
+) -> bool:
+    """Whether there is such a gain as the part is understood without a fault, or with rejected readings taken in (n, 3)
+    weights, whose rejection then need not be explained. The process noise with which they were rejected may be more
+    than they need where they are good: the typical one of the part may do."""
+    weight, model = without.weight, without.model
+    if gain(part.log._replace(weight=weight), model) > least:
+        return True
+    if (taken_in == weight).all():
+        return False
+    log = part.log._replace(weight=taken_in)
+    models = (model, median_level(model))[: len(model.jerk)]  # of a single level both are the same
+    known = without.log_probability
+    return any(gain(log, each) + as_it_is(part, taken_in, each).log_probability - known > least for each in models)
 
 
 def _with_rejected(

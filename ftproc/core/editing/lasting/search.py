@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ftproc.core.editing.lasting import between, clock, scan
-from ftproc.core.editing.lasting.between import PER_TERM, TERMS, Between, of_terms, trimmed
+from ftproc.core.editing.lasting.between import TERMS, of_terms
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.proposals import (
     CELLS,
@@ -31,6 +31,7 @@ from ftproc.core.editing.lasting.proposals import (
 )
 from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.screen import leaves_a_jump
+from ftproc.core.editing.lasting.shapes import of_any_shape, of_few_terms
 from ftproc.core.editing.lasting.weighing import Found, Scene, Weighed, as_it_is, weighed
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification.profile import median_level
@@ -49,7 +50,6 @@ PRIOR, DOUBT, MARGIN = -6.0, -6.0, 8.0  # log-odds of such a fault at a jump; wi
 OPEN = 10.0  # in log-probability, within which a jump may be one or another: beside agile targets it tells little
 MOST_EACH = 20.0  # of log-probability, of each reading: where more is gained, the part without the fault was lost
 FOLLOWED = 25.0  # the same of a patch that motion explains but for its ends: turns gain 18 without one
-TRIMMED = 2  # times that the ends of a patch are brought to where its readings fit it
 
 
 class Scanned(NamedTuple):
@@ -160,29 +160,21 @@ def _followed(seen: Scanned) -> Found | None:
         if not _worth(scene):
             break
         near = seen.near(min(each.begin for each in stretches), max(each.end for each in stretches))
-        part = scene.part(near)
+        part, at_jumps = scene.part(near), [each.at_jumps(seen.jumps) for each in stretches]
         with contextlib.suppress(ValueError, np.linalg.LinAlgError):
+            ends = [[curve.within(near) for curve in of_terms(each, TERMS[0])] for each in (stretches, at_jumps)]
+            first = of_few_terms(part, ends, FOLLOWED, _prior(ends[0], n))
+            if first is None:
+                continue
             runs = [curve for each in stretches for curve in each.runs()]
             null = max(_weighed(part, near, curves).log_probability for curves in ((), runs))
-            best = _of_any_shape(part, near, [stretches, [each.at_jumps(seen.jumps) for each in stretches]])
+            best = of_any_shape(part, first)
+            best = max(
+                best, _weighed(part, slice(0, len(part.possible)), best.curves), key=lambda each: each.log_probability
+            )
             gain = best.log_probability - null + _prior(best.curves, n)
             found.append(Found(_in_whole(best, near, n), best.sigma, gain))
     return max((each for each in found if each.gain > FOLLOWED), key=lambda each: each.gain, default=None)
-
-
-def _of_any_shape(part: Scene, near: slice, ends: Sequence[Sequence[Between]]) -> Weighed:
-    """The likeliest curves of any number of terms, first with these ends, then with those that their readings show."""
-
-    def likeliest(of: Iterable[Sequence[Curve]], *others: Weighed) -> Weighed:
-        tried = (weighed(part, part.log.weight, curves) for curves in of)
-        return max((*others, *tried), key=lambda each: each.log_probability)
-
-    best = likeliest([curve.within(near) for curve in of_terms(each, TERMS[0])] for each in ends)
-    most = min(curve.end - curve.begin for curve in best.curves) // PER_TERM
-    best = likeliest(([curve.of(terms) for curve in best.curves] for terms in TERMS[1:] if terms <= most), best)
-    for _ in range(TRIMMED):
-        best = likeliest([trimmed(best.curves, best.weight)], best)
-    return max(best, _weighed(part, slice(0, len(part.possible)), best.curves), key=lambda each: each.log_probability)
 
 
 def _tried(seen: Scanned, jump: Jump) -> Found | None:
@@ -201,10 +193,10 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     screened = len(part.rates) == 1 or bool((part.taken_in == part.log.weight).all())
     if screened and not leaves_a_jump(part, jump, around, as_it_is(part, part.log.weight, part.at_median)):
         return None
-    without = _weighed(part, near, ())
+    without = weighed(part, part.log.weight, ())
     if screened and not leaves_a_jump(part, jump, around, without):
         return None
-    null = without.log_probability
+    null = max(each.log_probability for each in (without, weighed(part, part.taken_in, ())))
     gain, located, step = max((_as_step(seen, jump, way, null) for way in jump.ways), key=lambda each: each[0])
     moves = [c.component for c, s in zip(step.curves, step.sigma, strict=True) if abs(c.size[0]) > CERTAIN * s]
     if 0 < len(moves) < len(step.curves):

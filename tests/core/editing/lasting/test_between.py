@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.editing import two_pass
+from ftproc.core.editing.lasting import search, shapes
 from ftproc.core.editing.lasting.between import MOST, Between, followed, trimmed
 from ftproc.core.editing.lasting.curves import Curve
 from ftproc.core.editing.lasting.scan import Jump
@@ -14,6 +15,7 @@ from tests.core.editing.lasting.scenes import N, scene
 from tests.trust import hard
 
 UNKNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
+PATCHES = "isolated=0.01:6-300,offset=2:8-30:8-200,ramp=1:10-30:20-200,burst=1:8-20:10-100,nan=0.01"
 
 
 def found_in(some, jumps=None):
@@ -79,17 +81,40 @@ def test_a_patch_that_a_short_memory_follows_is_found(name, seed):
 
 @pytest.mark.compiled
 def test_two_patches_with_flight_between_them_are_not_one_that_was_followed(monkeypatch):
-    """A curve through all three explains more than motion does, but less than a patch at either end."""
-    patches = "isolated=0.01:6-300,offset=2:8-30:8-200,ramp=1:10-30:20-200,burst=1:8-20:10-100,nan=0.01"
-    flight = simulate("manoeuvre", seed=261, duration_s=60.0, dt_s=0.1, outliers=patches)
+    """A curve through all three explains more than motion does, but less than a patch at either end; and next to
+    nothing where the process noise follows neither."""
+    flight = simulate("manoeuvre", seed=261, duration_s=60.0, dt_s=0.1, outliers=PATCHES)
 
     def error_m():
         found = two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN).smoothed()
         return np.sqrt(((found.state[:, :3] - flight.truth.position_m) ** 2).sum(1).mean())
 
     assert error_m() < 1.0
-    monkeypatch.setattr(Between, "runs", lambda self: [])
-    assert error_m() > 10.0
+    with monkeypatch.context() as without_the_runs:
+        without_the_runs.setattr(Between, "runs", lambda self: [])
+        assert error_m() < 1.0
+        without_the_runs.setattr(shapes, "leaves_curves", lambda *of: True)
+        assert error_m() > 10.0
+    monkeypatch.setattr(shapes, "leaves_curves", lambda *of: True)
+    assert error_m() < 1.0
+
+
+@pytest.mark.compiled
+def test_hardly_any_curves_are_weighed_where_nothing_was_followed(monkeypatch):
+    """A flight of turns with rejected runs on either side of them."""
+    flight, weighed = simulate("manoeuvre", seed=261, duration_s=60.0, dt_s=0.1, outliers=PATCHES), shapes.weighed
+    stretches, each = list[object](), list[object]()
+    monkeypatch.setattr(search, "of_few_terms", lambda *of: stretches.append(0) or shapes.of_few_terms(*of))
+    monkeypatch.setattr(shapes, "weighed", lambda *of: each.append(0) or weighed(*of))
+
+    def weighings():
+        stretches.clear(), each.clear()
+        two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN)
+        return len(each) / len(stretches)
+
+    assert weighings() < 1
+    monkeypatch.setattr(shapes, "leaves_curves", lambda *of: True)
+    assert weighings() > 6
 
 
 @pytest.mark.compiled

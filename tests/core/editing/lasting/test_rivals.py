@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc import pipeline
-from ftproc.core.editing.lasting.faults import MOTION, PATCH, STEP, Rival, Step
-from ftproc.core.editing.lasting.rivals import MOST, others
+from ftproc.core.editing.lasting.faults import MOST, MOTION, PATCH, STEP, Rival, Step, others
 from ftproc.settings import FilterSettings
 from tests.core.editing.lasting.scenes import N, scene
 from tests.trust import hard
