@@ -134,7 +134,8 @@ def _when(step: Step) -> int:
 
 def taken_out(log: Observations, model: Model, setting: Setting, moved: Sequence[Curve]) -> Observations:
     """The log without what has to be taken out of its readings: those of a clock that is late are moved to their time
-    stamps along the track that they show at the times at which they were taken."""
+    stamps along the track that they show at the times at which they were taken; there are none for stamps before or
+    after all of these."""
     rest = log._replace(measurement=without(log.measurement, setting, [c for c in moved if c.component != CLOCK]))
     time_s = log.time_s.copy()
     for curve in moved:
@@ -150,6 +151,7 @@ def taken_out(log: Observations, model: Model, setting: Setting, moved: Sequence
     there, here = between(sorted_s, state, log.time_s[late]), between(sorted_s, state, time_s[late])
     z = rest.measurement.copy()
     z[late] += from_cartesian(there[:, :3]) - from_cartesian(here[:, :3])
+    z[late & ((log.time_s < sorted_s[0]) | (log.time_s > sorted_s[-1]))] = np.nan
     z[:, 1] = wrap(z[:, 1])
     return rest._replace(measurement=z)
 

@@ -56,8 +56,7 @@ def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
             sure = bool(large and each.gain > MOVES and each.gain - second > SECOND)
             step = Step(curve.component, curve.begin, curve.size[0], sigma, sure)
             (result.steps if step.sure else result.doubtful).append(step)
-            if curve.component != CLOCK:
-                result.rivals.extend(_rivals(each, curve, STEP if step.sure else MOTION, step, n))
+            result.rivals.extend(_rivals(each, curve, STEP if step.sure else MOTION, step, n))
     return result
 
 
