@@ -16,6 +16,9 @@ from ftproc.core.identification import unseen_motion
 from ftproc.core.live.editor import LiveEditor
 from ftproc.core.model import kinematics
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
+from ftproc.correction import model_file
+from ftproc.correction.live import LiveCorrection, corrects
+from ftproc.correction.model import Model, Stage
 from ftproc.errors import InputError, UsageError
 from ftproc.files import arrow
 from ftproc.live.order import Left, Order
@@ -26,7 +29,7 @@ from ftproc.methods.estimate import FARTHEST, Estimate
 from ftproc.order_statistics import median
 from ftproc.quality import sanity
 from ftproc.records import MISSING, FloatArray, IntArray, Trajectory
-from ftproc.settings import FilterSettings
+from ftproc.settings import PACKAGED, FilterSettings
 
 SLACK_S = 0.002  # by the clock, in which the last reading that a row rests on may come after it is due
 INTERVALS = 50  # of which the typical one is that of coasted rows
@@ -48,11 +51,17 @@ class Live:
     """
 
     def __init__(
-        self, settings: FilterSettings | None = None, late_s: float | None = None, range_rates: bool = False
+        self,
+        settings: FilterSettings | None = None,
+        late_s: float | None = None,
+        range_rates: bool = False,
+        model: Model | str | None = PACKAGED,
     ) -> None:
         """settings: editing `live` (also where they say `two-pass`, the default) or `forward`. late_s: at most the lag;
-        None for the lag. range_rates: whether the rows have columns of range rates. Raises UsageError."""
-        self.resume(settings or FilterSettings())
+        None for the lag. range_rates: whether the rows have columns of range rates. model: the network's correction,
+        as in `ftproc.filter_log`; rows have one with `live` and lag 0. Raises UsageError, ModelError."""
+        self.resume(settings or FilterSettings(), model)
+        self._correction = LiveCorrection()
         self.late, editor = 0, live.editor(self.settings)
         self._lag_s = editor.lag_s
         self._late_s = self._lag_s if late_s is None else min(late_s, self._lag_s)
@@ -62,14 +71,16 @@ class Live:
         self._came_s: list[float] = []  # and when each came, or the one after it
         self._taken, self._left_s, self._rates = 0, -math.inf, range_rates
 
-    def resume(self, settings: FilterSettings) -> None:
-        """Go on with these settings, when all else is as it was kept."""
+    def resume(self, settings: FilterSettings, model: Model | str | None) -> None:
+        """Go on with these settings and this model, when all else is as it was kept."""
         if settings.editing == "two-pass":
             settings = replace(settings, editing="live")
         sanity.check_settings(settings)
         if settings.method != registry.MAIN or settings.editing == "none" or settings.smooth:
             raise UsageError(f"Live runs {registry.MAIN} with editing live or forward, not smoothed.")
-        self.settings = settings
+        self.settings, loaded = settings, model_file.named(model) if model is not None else None
+        usable = loaded is not None and corrects(loaded.filter, settings.editing, settings.lag_s)
+        self._stage = loaded.filter if loaded is not None and usable else None
         self._coasting: LiveEditor | None = None
 
     @property
@@ -155,7 +166,7 @@ class Live:
         found = self._coasting.push(np.array([at_s]), none)
         found += self._coasting.tick(math.nextafter(at_s + self._lag_s, math.inf))
         left = [Left(each, self._coasting.absent) for each in found]
-        return self._trajectory(left, np.array([time_s]), np.array([-1]))
+        return self._trajectory(left, np.array([time_s]), np.array([-1]), None)
 
     @property
     def wait_s(self) -> float:
@@ -199,36 +210,44 @@ class Live:
             del kept[:count]
         if count:
             self._left_s = float(time_s[-1])
-        return self._trajectory(self._order.take(count), time_s, row)
+        return self._trajectory(self._order.take(count), time_s, row, None if self._rates else self._stage)
 
-    def _trajectory(self, left: Iterable[Left], time_s: FloatArray, row: IntArray) -> Trajectory:
-        """The rows that have left, with these times and numbers (n,)."""
+    def _trajectory(self, left: Iterable[Left], time_s: FloatArray, row: IntArray, stage: Stage | None) -> Trajectory:
+        """The rows that have left, with these times and numbers (n,), corrected by the network of a stage."""
         parts, low = [], 0
         for absent, some in itertools.groupby(left, lambda each: each.absent):
             found = [each.rows for each in some]
             high = low + sum(len(each.rows) for each in found)
             estimate = live.estimate(self._order.editor, found, time_s[low:high])._replace(absent=absent)
-            parts.append(_trajectory(row[low:high], time_s[low:high], estimate, self._rates))
+            correction = np.zeros((high - low, 6))
+            if stage is not None and not absent:
+                correction = self._correction.of(estimate.run, stage)
+            parts.append(_trajectory(row[low:high], time_s[low:high], estimate, correction, self._rates))
             low = high
-        return joined(parts) if parts else _trajectory(row[:0], time_s[:0], None)
+        return joined(parts) if parts else _trajectory(row[:0], time_s[:0], None, np.empty((0, 6)))
 
 
-def _trajectory(row: IntArray, time_s: FloatArray, estimate: Estimate | None, rates: bool = False) -> Trajectory:
-    """The rows of an estimate; none without one. rates: whether they have columns of range rates."""
+def _trajectory(
+    row: IntArray, time_s: FloatArray, estimate: Estimate | None, correction: FloatArray, rates: bool = False
+) -> Trajectory:
+    """The rows of an estimate with their correction (n, 6); none without one. rates: whether they have columns of range
+    rates."""
     n = len(row)
     if estimate is None:
         none = np.empty((0, 3))
-        nothing = (none, np.empty((0, 9)), np.empty((0, 9)), none, none.astype(np.uint8), np.empty(0), np.empty((0, 6)))
+        nothing = (none, np.empty((0, 9)), np.empty((0, 9)), none, none.astype(np.uint8), np.empty(0), correction)
         return Trajectory("live", row, time_s, *nothing)
     run, label, absent = estimate.run, estimate.label.copy(), list(estimate.absent)
-    state, cleaned = run.state.copy(), from_cartesian(run.state[:, :3])
+    state = run.state.copy()
+    state[:, :6] += correction
+    cleaned = from_cartesian(state[:, :3])
     sigma, los_sigma = unseen_motion.widened(run.state, run.sigma, run.los_sigma)
     path_sigma = kinematics.widened(run.state, run.path_sigma, run.sigma, sigma)
     cleaned_sigma = measurement_sigma(cleaned, los_sigma[:, :3])
     if absent:  # the filter ran on stand-ins; what depends on them is not published
         state[:], sigma[:], path_sigma[:], label[:, absent] = np.nan, np.nan, np.nan, MISSING
         cleaned[:, absent], cleaned_sigma[:, absent] = np.nan, np.nan
-    none, extra = np.zeros((n, 6)), None
+    extra = None
     if rates:
         found = estimate.range_rate.label if estimate.range_rate is not None else np.full(n, MISSING, np.uint8)
         extra = arrow.table(rates_of.columns(state, los_sigma, found))
@@ -242,7 +261,7 @@ def _trajectory(row: IntArray, time_s: FloatArray, estimate: Estimate | None, ra
         cleaned_sigma,
         label,
         run.nis,
-        none,
+        correction,
         extra=extra,
         path_sigma=path_sigma,
     )

@@ -214,7 +214,7 @@ class Stream:
             if len(self.tracks) >= MOST_TARGETS:
                 self.others += len(timed)
                 return
-            self.tracks[name] = Live(self.recipe.settings, range_rates=self._reader.has_rates)
+            self.tracks[name] = Live(self.recipe.settings, None, self._reader.has_rates, self.recipe.model)
         self._came_s[name], self._coasted[name] = now_s, 0
         for part in self._push(self.tracks[name], readings[timed], numbers, now_s, stop):
             yield from self._named(name, part)

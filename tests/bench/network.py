@@ -1,6 +1,6 @@
-"""What the packaged network does to the filter of flights that it has not seen, with seeds that were fixed beforehand:
-the error with it over the error without, the geometric mean over flights with its 90 % bootstrap interval. Below, a
-network that a fleet's past flights have taught without truth, over the packaged one."""
+"""What the packaged network does to the filter and to live rows of flights that it has not seen, with seeds that were
+fixed beforehand: the error with it over the error without, the geometric mean over flights with its 90 % bootstrap
+interval. At the end, a network that a fleet's past flights have taught without truth, over the packaged one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ftproc.correction.model import Model
 from ftproc.correction.training.flights import train_flights
 from ftproc.errors import InputError
 from ftproc.records import FloatArray
-from ftproc.settings import TrainSettings
+from ftproc.settings import FilterSettings, TrainSettings
 from ftproc.simulation import Simulation, simulate
 
 SCENARIOS = {
@@ -29,17 +29,20 @@ SCENARIOS = {
     "zuo2021": "never seen: 61 rows without a manoeuvre",
 }
 SEEDS = range(8000, 8012)
+FILTER, LIVE = FilterSettings(), FilterSettings(editing="live")
 PAST, UNSEEN = range(8100, 8124), range(8200, 8212)
 LONGEST_S = 120.0
 HEADER = ("flights", "what", "number", "position", "velocity", "worst position", "corrected %")
 
 
 def rows() -> Iterator[tuple[str, ...]]:
-    """One row per scenario, and one of the fleet."""
+    """One row per scenario and way of editing, and one of the fleet."""
     packaged = model_file.named("packaged")
     assert packaged is not None
-    for name, what in SCENARIOS.items():
-        yield _row(name, what, np.array([_errors(name, seed, packaged) for seed in SEEDS]))
+    for before, settings in (("", FILTER), ("live: ", LIVE)):
+        for name, what in SCENARIOS.items():
+            errors = [_errors(name, seed, packaged, settings) for seed in SEEDS]
+            yield _row(name, f"{before}{what}", np.array(errors))
     past = [(_flight("manoeuvre-clean", seed).log, None) for seed in PAST]
     own = train_flights(past, TrainSettings("motion"))
     found = [[_errors("manoeuvre-clean", seed, model)[0] for model in (own, packaged)] for seed in UNSEEN]
@@ -52,16 +55,17 @@ def _flight(scenario: str, seed: int) -> Simulation:
     return whole if short or scenario == "radar" else simulate(scenario, seed=seed, duration_s=LONGEST_S)
 
 
-def _errors(scenario: str, seed: int, model: Model) -> FloatArray:
-    """(2, 2) root mean square of the errors of position m and velocity m/s, with the network and without; NaN where the
-    filter itself diverges."""
+def _errors(scenario: str, seed: int, model: Model, settings: FilterSettings = FILTER) -> FloatArray:
+    """(2, 2) root mean square of the errors of position m and velocity m/s, with the network and without, over the rows
+    that have an estimate; NaN where the filter itself diverges."""
     flight = _flight(scenario, seed)
     try:
-        found = pipeline.filter_log(flight.log, model=model)
+        found = pipeline.filter_log(flight.log, settings, model)
     except InputError:
         return np.full((2, 2), np.nan)
     truth = np.concatenate([flight.truth.position_m, flight.truth.velocity_mps], axis=1)
-    errors = (found.state[:, :6] - truth, found.state[:, :6] - found.correction - truth)
+    known = np.isfinite(found.state).all(1)
+    errors = [(state - truth)[known] for state in (found.state[:, :6], found.state[:, :6] - found.correction)]
     return np.array([[np.sqrt(np.mean(np.sum(e[:, k : k + 3] ** 2, 1))) for k in (0, 3)] for e in errors])
 
 
