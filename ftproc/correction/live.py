@@ -33,12 +33,12 @@ def corrects(stage: Stage, editing: str, lag_s: float) -> bool:
 class LiveCorrection:
     """Of one track, whose rows come in any pieces. before: the last rows. seen: numbers of samples and sums of 1/sigma
     (7,), and proof: sums of the regression (2,), both fading. wanted: (6,) of the last row along its line of sight, m
-    and m/s, with a gain of one; applied: (6,) what was added to it, in sigmas."""
+    and m/s, with a gain of one; applied: (2, 3) what was added to it, in x y z."""
 
     def __init__(self) -> None:
         self.before: FilterRun | None = None
         self.seen, self.proof = np.zeros(1 + APPLIED), np.zeros(2)
-        self.wanted, self.applied = np.zeros(APPLIED), np.zeros(APPLIED)
+        self.wanted, self.applied = np.zeros(APPLIED), np.zeros((2, 3))
 
     def of(self, new: FilterRun, stage: Stage) -> FloatArray:
         """(n, 6) m and m/s, to be added to the states of the next n rows. stage: of a feature set whose outputs are
@@ -50,16 +50,12 @@ class LiveCorrection:
         self.before = run.rows(max(len(run.time_s) - EARLIER, 0), len(run.time_s))
         fading = np.where(_goes_on(run, first), np.exp(-1 / MEMORY), 0.0)
         sigma = self._usual(new.los_sigma, fading)
-        output = _output(run, stage, first)
-        wanted = output * sigma
+        wanted = _output(run, stage, first) * sigma
         last = np.concatenate([self.wanted[None], wanted[:-1]]) * (fading > 0)[:, None]
         proof = _faded(_regression(run, first, last), fading, self.proof)
         self.proof, self.wanted = proof[-1], wanted[-1]
         gain = ((proof[:, :1] + PRIOR * WORTH) / (proof[:, 1:] + WORTH)).clip(0.0, 1.0)
-        applied = self._in_steps(output * gain, fading > 0) * sigma
-        values, rows = np.zeros_like(applied), np.flatnonzero(applied.any(axis=1))
-        values[rows] = LineOfSight.of(new, 0, n).rows(rows).to_cartesian(applied[rows])
-        return values
+        return self._in_steps(LineOfSight(new.state[:, :3], sigma), wanted * gain, fading > 0)
 
     def _usual(self, sigma: FloatArray, fading: FloatArray) -> FloatArray:
         """Sigmas (n, 6), none much larger than the usual ones; zero where they are none."""
@@ -70,12 +66,17 @@ class LiveCorrection:
         usual = seen[:, :1] / np.maximum(seen[:, 1:], np.finfo(float).tiny)
         return np.where(known, np.minimum(sigma, USUAL * usual), 0.0)
 
-    def _in_steps(self, target: FloatArray, goes_on: BoolArray) -> FloatArray:
-        """What is applied (n, 6) on the way to a target, in sigmas."""
-        found = np.empty_like(target)
-        for k in range(len(target)):
-            self.applied = (self.applied + (target[k] - self.applied).clip(-STEP, STEP)) * goes_on[k]
-            found[k] = self.applied
+    def _in_steps(self, los: LineOfSight, target: FloatArray, goes_on: BoolArray) -> FloatArray:
+        """What is applied (n, 6) in x y z, on the way to a target along the line of sight."""
+        found, step = np.zeros_like(target), STEP * los.sigma.reshape(-1, 2, 3)
+        for k, wanted in enumerate(target.reshape(-1, 2, 3)):
+            if not goes_on[k] or not step[k].all():
+                self.applied = np.zeros((2, 3))
+            elif wanted.any() or self.applied.any():
+                axes = los.axes[k]
+                along = self.applied @ axes.T
+                self.applied = (along + (wanted - along).clip(-step[k], step[k])) @ axes
+            found[k] = self.applied.ravel()
         return found
 
 
