@@ -58,6 +58,7 @@ class Request(NamedTuple):
             features=self.features, hidden=self.hidden, population=self.population, generations=self.generations,
             epochs=EPOCHS[self.optimiser] if self.epochs is None else self.epochs, optimiser=self.optimiser,
             flights=len(self.logs) or self.flights, seed=self.seed, method=self.method,
+            start=TrainSettings.start if self.scenario is None else "genetic",
         )  # fmt: skip
 
     @property

@@ -15,9 +15,8 @@ import numpy as np
 
 from ftproc.core.filtering.records import FilterRun
 from ftproc.correction.features import APPLIED, LOS_NAMES, Features, LineOfSight, innovations, lever_m
-from ftproc.correction.instrument_features import InstrumentFeatures
+from ftproc.correction.instrument_features import InstrumentFeatures, MountFeatures
 from ftproc.correction.motion_features import MotionFeatures
-from ftproc.correction.mount_features import MountFeatures
 from ftproc.errors import UsageError
 from ftproc.records import FloatArray
 

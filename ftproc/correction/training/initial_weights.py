@@ -18,7 +18,8 @@ from ftproc.correction.training.genetic import GeneticSettings
 from ftproc.correction.training.samples import Samples
 from ftproc.records import FloatArray
 
-KINDS = ("genetic", "genetic-solved", "random", "solved")
+PACKAGED = "packaged"  # of the packaged network, if it has the same inputs; else genetic
+KINDS = (PACKAGED, "genetic", "genetic-solved", "random", "solved")
 SEARCH_SAMPLES = 600  # on which the genetic search evaluates the cost; `genetic-solved` solves on as many others
 
 
@@ -37,7 +38,7 @@ def initial_weights(
     inner = scale[: shape.inner]
     if kind == "solved":
         return network.least_squares(rng.uniform(-1.0, 1.0, shape.inner) * inner, shape, *training, DECAY)
-    if kind == "genetic":
+    if kind in (PACKAGED, "genetic"):
         few = training.thinned(SEARCH_SAMPLES, rng)
         found = genetic.search(
             lambda genes: network.population_cost(genes * scale, shape, *few), shape.size, settings, rng, progress
