@@ -3,7 +3,6 @@ estimate; it is never fed back into the filter)."""
 
 from __future__ import annotations
 
-import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -40,9 +39,7 @@ class Output(NamedTuple):
 def network_output(run: FilterRun, stage: Stage, start: int, stop: int, smoothed: FloatArray | None = None) -> Output:
     """The network's output for samples start:stop, before gain and bound. smoothed: (n, 9) the smoother's states, by
     which the output of a feature set that must be proven is multiplied by what they prove in these samples."""
-    edges = [*range(start, stop, CHUNK), stop]
-    parts = [output_of(stage, *stage.features.inputs(run, low, high)) for low, high in itertools.pairwise(edges)]
-    found = Output._make(np.concatenate(each) for each in zip(*parts, strict=True)) if len(parts) > 1 else parts[0]
+    found = output_of(stage, *stage.features.inputs(run, start, stop))
     if stage.features.proven:
         gain = 0.0 if smoothed is None else _own_gain(run, stage, slice(start, stop), smoothed, found)
         found.values[:] *= gain
