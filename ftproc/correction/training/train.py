@@ -84,7 +84,7 @@ def train(flights: Sequence[Flight], settings: TrainSettings, progress: Progress
     if settings.optimiser not in OPTIMISERS or settings.start not in initial_weights.KINDS:
         kinds = ", ".join(initial_weights.KINDS)
         raise UsageError(f"optimiser is one of {', '.join(OPTIMISERS)}; start is one of {kinds}")
-    known = _known(features, settings)
+    known = known_network(features, settings)
     data = prepare(flights, features, settings.seed, known)
     if known is None:
         bent, line = _fitted(data, settings, progress)
@@ -115,7 +115,7 @@ def train(flights: Sequence[Flight], settings: TrainSettings, progress: Progress
     return stage
 
 
-def _known(features: Features, settings: TrainSettings) -> Stage | None:
+def known_network(features: Features, settings: TrainSettings) -> Stage | None:
     """The packaged network, if the training begins with it: it has the same inputs, outputs and hidden units."""
     packaged = model_file.named(PACKAGED) if settings.start == initial_weights.PACKAGED else None
     if packaged is None or packaged.filter.features.name != features.name:
