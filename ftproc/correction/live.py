@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from ftproc.core.filtering.records import FilterRun
+from ftproc.correction import model_file
 from ftproc.correction.apply import output_of
 from ftproc.correction.features import APPLIED, BoolArray, LineOfSight, lever_m
-from ftproc.correction.model import Stage
+from ftproc.correction.model import Model, Stage
 from ftproc.records import FloatArray
 
 # Chosen on 102 flights of the family and 30 others, of 60 to 90 s: without the innovations one of 26 others of the
@@ -28,6 +29,12 @@ def corrects(stage: Stage, editing: str, lag_s: float) -> bool:
     """Whether the rows of a way of editing are corrected one by one: a row that waits is smoothed, and has less of a
     lag to be taken out."""
     return stage.helps and stage.features.proven and editing == "live" and lag_s == 0
+
+
+def live_model(name: Model | str | None, editing: str, lag_s: float) -> Model | None:
+    """A model by its name, if it corrects such rows. Raises ModelError."""
+    model = None if name is None else model_file.named(name)
+    return model if model is not None and corrects(model.filter, editing, lag_s) else None
 
 
 class LiveCorrection:

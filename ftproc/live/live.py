@@ -16,9 +16,8 @@ from ftproc.core.identification import unseen_motion
 from ftproc.core.live.editor import LiveEditor
 from ftproc.core.model import kinematics
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
-from ftproc.correction import model_file
-from ftproc.correction.live import LiveCorrection, corrects
-from ftproc.correction.model import Model, Stage
+from ftproc.correction.live import LiveCorrection, live_model
+from ftproc.correction.model import Model
 from ftproc.errors import InputError, UsageError
 from ftproc.files import arrow
 from ftproc.live.order import Left, Order
@@ -78,9 +77,7 @@ class Live:
         sanity.check_settings(settings)
         if settings.method != registry.MAIN or settings.editing == "none" or settings.smooth:
             raise UsageError(f"Live runs {registry.MAIN} with editing live or forward, not smoothed.")
-        self.settings, loaded = settings, model_file.named(model) if model is not None else None
-        usable = loaded is not None and corrects(loaded.filter, settings.editing, settings.lag_s)
-        self._stage = loaded.filter if loaded is not None and usable else None
+        self.settings, self._model = settings, live_model(model, settings.editing, settings.lag_s)
         self._coasting: LiveEditor | None = None
 
     @property
@@ -210,18 +207,18 @@ class Live:
             del kept[:count]
         if count:
             self._left_s = float(time_s[-1])
-        return self._trajectory(self._order.take(count), time_s, row, None if self._rates else self._stage)
+        return self._trajectory(self._order.take(count), time_s, row, None if self._rates else self._model)
 
-    def _trajectory(self, left: Iterable[Left], time_s: FloatArray, row: IntArray, stage: Stage | None) -> Trajectory:
-        """The rows that have left, with these times and numbers (n,), corrected by the network of a stage."""
+    def _trajectory(self, left: Iterable[Left], time_s: FloatArray, row: IntArray, model: Model | None) -> Trajectory:
+        """The rows that have left, with these times and numbers (n,), corrected by a model."""
         parts, low = [], 0
         for absent, some in itertools.groupby(left, lambda each: each.absent):
             found = [each.rows for each in some]
             high = low + sum(len(each.rows) for each in found)
             estimate = live.estimate(self._order.editor, found, time_s[low:high])._replace(absent=absent)
             correction = np.zeros((high - low, 6))
-            if stage is not None and not absent:
-                correction = self._correction.of(estimate.run, stage)
+            if model is not None and not absent:
+                correction = self._correction.of(estimate.run, model.filter)
             parts.append(_trajectory(row[low:high], time_s[low:high], estimate, correction, self._rates))
             low = high
         return joined(parts) if parts else _trajectory(row[:0], time_s[:0], None, np.empty((0, 6)))

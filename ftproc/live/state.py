@@ -48,7 +48,7 @@ _KINDS: dict[str, Any] = {
     )
 }  # fmt: skip
 _FUNCTIONS = {"edit": two_pass.edit}
-_LEFT_OUT = {"Live": ("settings", "_coasting", "_stage")}  # of an object
+_LEFT_OUT = {"Live": ("settings", "_coasting", "_model")}  # of an object
 
 
 class Kind:
