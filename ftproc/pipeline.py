@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from ftproc.correction.apply import Correction
+    from ftproc.correction.live import LiveCorrection
     from ftproc.correction.model import Model, Stage
 
 
@@ -59,6 +60,7 @@ class Filtering:
             self.record = self.at_once.of_stamps(self.record)
         self.statistics = RunStatistics(log, self.record.absent, self.height)
         self.why_not = ""  # nothing is corrected
+        self.live: LiveCorrection | None = None  # of the rows so far, if each is corrected by what is known by it
         self.effects = by_hand.Effects(None if log.by_hand is None else log.by_hand.decisions, settings.gate)
 
     def parts(self) -> Iterator[Trajectory]:
@@ -124,8 +126,26 @@ class Filtering:
             why_not = self.why_not or "no sample is like those it was trained on"
             return f"gain {stage.gain.max():.2g}, but {why_not}: no correction applied"
         size = f"{self.statistics.largest_m:.3g} m, {self.statistics.largest_sigma:.2g} sigma"
-        proven = ", proven by the smoother of this run" if stage.features.proven else ""
+        by = "innovations" if self.live is not None else "smoother"
+        proven = f", proven by the {by} of this run" if stage.features.proven else ""
         return f"gain {stage.gain.max():.2g}: corrections of up to {size}{proven}"
+
+    def _corrected(self, part: Part, model: Model) -> Correction:
+        """What the network of the stage adds."""
+        from ftproc.correction.apply import Correction, correct
+        from ftproc.correction.live import LiveCorrection, corrects
+
+        estimate = part.estimate
+        if corrects(model.filter, self.method.editing(self.settings), self.settings.lag_s):
+            self.live = self.live or LiveCorrection()
+            values = np.zeros((len(estimate.label), 6))
+            values[part.low : part.high] = self.live.of(estimate.run.rows(part.low, part.high), model.filter)
+            return Correction(values, 0.0)
+        if estimate.smoothed is None:
+            return correct(estimate.run, model.filter, estimate.hindsight)
+        if model.smoother is None:
+            return Correction(np.zeros((len(estimate.run.time_s), 6)), 0.0)
+        return correct(estimate.smoothed_run, model.smoother)
 
     def _trajectory(self, part: Part) -> Trajectory:
         """The rows of a part that count, corrected, and added to the statistics."""
@@ -133,7 +153,7 @@ class Filtering:
         correction, outside = np.zeros((len(part.estimate.label), 6)), 0.0
         plain = not absent and self.height is None and self.log.range_rate is None  # as what the network was taught
         if self.model is not None and self.method.corrected and plain:
-            correction, outside, self.why_not = _corrected(part.estimate, self.model)
+            correction, outside, self.why_not = self._corrected(part, self.model)
         correction, estimate = correction[part.low : part.high], part.estimate.rows(part.low, part.high)
         rows = slice(part.first + part.low, part.first + part.high)
         best = estimate.run if estimate.smoothed is None else estimate.smoothed
@@ -195,17 +215,6 @@ def _beside(extra: pa.Table | None, columns: Mapping[str, Any]) -> pa.Table | No
 
     own = arrow.table(columns)
     return own if extra is None else tables.with_extra(extra, own)
-
-
-def _corrected(estimate: Estimate, model: Model) -> Correction:
-    """What the network of the stage adds."""
-    from ftproc.correction.apply import Correction, correct
-
-    if estimate.smoothed is None:
-        return correct(estimate.run, model.filter, estimate.hindsight)
-    if model.smoother is None:
-        return Correction(np.zeros((len(estimate.run.time_s), 6)), 0.0)
-    return correct(estimate.smoothed_run, model.smoother)
 
 
 def _diagnostics(reading: FloatArray, estimate: Estimate) -> Diagnostics:

@@ -126,4 +126,4 @@ class TrainSettings:
     seed: int = 0
     method: str = "ga-bpnn-ukf"
     optimiser: str = "l-bfgs"
-    start: str = "genetic"
+    start: str = "packaged"

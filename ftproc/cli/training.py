@@ -17,6 +17,7 @@ from ftproc.core import compiled
 from ftproc.correction import model, model_file
 from ftproc.correction.training import stages, study
 from ftproc.correction.training.flights import filtered_flights, train_flights
+from ftproc.correction.training.initial_weights import GENETIC
 from ftproc.errors import UsageError
 from ftproc.files.reading import truth as truth_files
 from ftproc.files.writing import atomic, outputs
@@ -58,6 +59,7 @@ class Request(NamedTuple):
             features=self.features, hidden=self.hidden, population=self.population, generations=self.generations,
             epochs=EPOCHS[self.optimiser] if self.epochs is None else self.epochs, optimiser=self.optimiser,
             flights=len(self.logs) or self.flights, seed=self.seed, method=self.method,
+            start=TrainSettings.start if self.scenario is None else GENETIC,
         )  # fmt: skip
 
     @property

@@ -39,24 +39,28 @@ class Output(NamedTuple):
 def network_output(run: FilterRun, stage: Stage, start: int, stop: int, smoothed: FloatArray | None = None) -> Output:
     """The network's output for samples start:stop, before gain and bound. smoothed: (n, 9) the smoother's states, by
     which the output of a feature set that must be proven is multiplied by what they prove in these samples."""
-    raw, usable = stage.features.inputs(run, start, stop)
+    found = output_of(stage, *stage.features.inputs(run, start, stop))
+    if stage.features.proven:
+        gain = 0.0 if smoothed is None else _own_gain(run, stage, slice(start, stop), smoothed, found)
+        found.values[:] *= gain
+    return found
+
+
+def output_of(stage: Stage, raw: FloatArray, usable: BoolArray) -> Output:
+    """The network's output for inputs (m, d), of which some (m,) are usable."""
     normalised = stage.inputs.forward(raw)
     inside = stage.envelope.contains(normalised)
     output = stage.targets.back(forward(stage.weights, normalised))[:, :APPLIED]
     values = np.zeros((len(raw), APPLIED))  # a feature set may have no output for velocity
     values[:, : output.shape[1]] = np.where((usable & inside)[:, None], output, 0.0)
-    if stage.features.proven:
-        values *= 0.0 if smoothed is None else _own_gain(run, stage, slice(start, stop), smoothed, values, usable)
     return Output(values, usable, usable & ~inside)
 
 
-def _own_gain(
-    run: FilterRun, stage: Stage, rows: slice, smoothed: FloatArray, values: FloatArray, usable: BoolArray
-) -> FloatArray:
-    """(6,) what the smoother's states prove of the output (m, 6) for these rows."""
+def _own_gain(run: FilterRun, stage: Stage, rows: slice, smoothed: FloatArray, found: Output) -> FloatArray:
+    """(6,) what the smoother's states prove of the output for these rows."""
     later = smoothed[rows, :APPLIED] - run.state[rows, :APPLIED]
-    los, bounded_values = LineOfSight.of(run, rows.start, rows.stop), np.clip(values, -stage.bound, stage.bound)
-    return own_gain(los, bounded_values, later, run.time_s[rows], usable)
+    los, values = LineOfSight.of(run, rows.start, rows.stop), np.clip(found.values, -stage.bound, stage.bound)
+    return own_gain(los, values, later, run.time_s[rows], found.usable)
 
 
 def bounded(los: LineOfSight, stage: Stage, output: FloatArray) -> FloatArray:

@@ -14,10 +14,9 @@ from typing import ClassVar
 import numpy as np
 
 from ftproc.core.filtering.records import FilterRun
-from ftproc.correction.features import APPLIED, LOS_NAMES, Features, LineOfSight, innovations
-from ftproc.correction.instrument_features import InstrumentFeatures
+from ftproc.correction.features import APPLIED, LOS_NAMES, Features, LineOfSight, innovations, lever_m
+from ftproc.correction.instrument_features import InstrumentFeatures, MountFeatures
 from ftproc.correction.motion_features import MotionFeatures
-from ftproc.correction.mount_features import MountFeatures
 from ftproc.errors import UsageError
 from ftproc.records import FloatArray
 
@@ -78,9 +77,7 @@ class WindowFeatures(Features):
         x, y, z = run.state[start:stop, :3].T
         flat = np.hypot(x, y)
         distance = np.hypot(flat, z)
-        # Sigma in the units of range, azimuth, elevation; overhead the lever of azimuth would vanish.
-        lever = np.stack([np.ones_like(distance), np.maximum(flat, 1e-3 * distance), distance], axis=1)
-        angular = run.los_sigma[start:stop, :3] / lever
+        angular = run.los_sigma[start:stop, :3] / lever_m(run.state[start:stop, :3])  # in units of the readings
         ratio = np.log(angular / run.innovation_sigma[start:stop])
         position = np.stack([np.log(distance), np.arctan2(z, flat)], axis=1)
         return np.concatenate([position, np.log(angular), ratio], axis=1)

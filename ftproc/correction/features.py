@@ -60,6 +60,15 @@ class LineOfSight:
         return cartesian
 
 
+def lever_m(position_m: FloatArray) -> FloatArray:
+    """(n, 3) metres along the radial, cross and up axes per m of range and rad of azimuth and elevation, at positions
+    (n, 3). That of azimuth does not vanish overhead."""
+    x, y, z = position_m.T
+    ground = np.hypot(x, y)
+    distance = np.hypot(ground, z)
+    return np.stack([np.ones_like(distance), np.maximum(ground, 1e-3 * distance), distance], axis=1)
+
+
 def usable(run: FilterRun, start: int, stop: int) -> BoolArray:
     """(m,) true where the filter has settled, is not coasting (some component was used) and has finite sigmas."""
     sigma = run.los_sigma[start:stop]

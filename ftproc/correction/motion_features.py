@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from ftproc.core.filtering.records import FilterRun
-from ftproc.correction.features import APPLIED, LOS_NAMES, Features, LineOfSight, innovations
+from ftproc.correction.features import APPLIED, LOS_NAMES, Features, LineOfSight, innovations, lever_m
 from ftproc.records import FloatArray, IntArray
 
 GRAVITY = 9.81  # m/s2
@@ -46,7 +46,7 @@ class MotionFeatures(Features):
     def _raw(self, run: FilterRun, start: int, stop: int) -> FloatArray:
         first = max(start - LONGEST, 0)
         latest = innovations(run, start, stop, SINGLE, SUMS).clip(-MOST, MOST)
-        return np.concatenate([latest, _Motion(run.rows(first, stop)).columns()[start - first :]], axis=1)
+        return np.concatenate([latest, _Motion(run.rows(first, stop), start - first).columns()], axis=1)
 
     def unit(self, los: LineOfSight) -> FloatArray:
         return los.sigma
@@ -56,19 +56,22 @@ class MotionFeatures(Features):
 
 
 class _Motion:
-    """Quantities of the motion of n samples. v, a: (n, 3) along the line-of-sight axes. memory_s: (n, 1) of the filter,
-    the sigma of the velocity over that of the acceleration."""
+    """Quantities of the motion of a run, from its sample `first` on: m samples. v, a: (m, 3) along the line-of-sight
+    axes; course: (n, 3) a of the whole run. memory_s: (m, 1) of the filter, the sigma of the velocity over that of the
+    acceleration."""
 
-    def __init__(self, run: FilterRun) -> None:
-        los = LineOfSight.of(run, 0, len(run.time_s))
-        self.run = run
-        self.v, self.a = (np.einsum("nij,nj->ni", los.axes, run.state[:, k : k + 3]) for k in (3, 6))
-        self.position_sigma, self.velocity_sigma = run.los_sigma[:, :3], run.los_sigma[:, 3:]
-        self.acceleration_sigma = _rms(run.sigma[:, 6:])
+    def __init__(self, run: FilterRun, first: int) -> None:
+        n = len(run.time_s)
+        axes = LineOfSight.of(run, 0, n).axes
+        self.time_s, self.course = run.time_s, np.einsum("nij,nj->ni", axes, run.state[:, 6:])
+        self.run, self.own = run.rows(first, n), np.arange(first, n)
+        self.v, self.a = np.einsum("nij,nj->ni", axes[first:], self.run.state[:, 3:6]), self.course[first:]
+        self.position_sigma, self.velocity_sigma = self.run.los_sigma[:, :3], self.run.los_sigma[:, 3:]
+        self.acceleration_sigma = _rms(self.run.sigma[:, 6:])
         self.memory_s = _rms(self.velocity_sigma) / self.acceleration_sigma
 
     def columns(self) -> FloatArray:
-        """(n, 40)."""
+        """(m, 40)."""
         run, v, a, memory_s = self.run, self.v, self.a, self.memory_s
         unit = self.acceleration_sigma
         speed = np.linalg.norm(v, axis=1, keepdims=True) + SLOW_MPS
@@ -77,9 +80,7 @@ class _Motion:
         rate = np.linalg.norm(across, axis=1, keepdims=True) / speed  # of turn, rad/s
         x, y, z = run.state[:, :3].T
         ground = np.hypot(x, y)
-        distance = np.hypot(ground, z)[:, None]
-        lever = np.concatenate([np.ones_like(distance), np.maximum(ground[:, None], 1e-3 * distance), distance], axis=1)
-        innovation_sigma = run.innovation_sigma * lever
+        innovation_sigma = run.innovation_sigma * lever_m(run.state[:, :3])
         back = [self.samples_back(share) for share in MEMORIES]
         return np.concatenate(
             [
@@ -87,7 +88,7 @@ class _Motion:
                 _compressed(across / unit),
                 _compressed(-(rate**2) * v * memory_s / unit),
                 _compressed(along / speed * across * memory_s / unit),
-                *(_compressed(np.nan_to_num((a - a[k]) / unit)) for k in back),
+                *(_compressed(np.nan_to_num((a - self.course[k]) / unit)) for k in back),
                 np.log(self.position_sigma / innovation_sigma),
                 np.log(self.position_sigma / (memory_s * self.velocity_sigma)),
                 np.log(self.velocity_sigma / (memory_s * unit)),
@@ -105,17 +106,16 @@ class _Motion:
         )
 
     def samples_back(self, memories: float) -> IntArray:
-        """(n,) the sample that was so many memories before each, since the filter was initialized."""
-        time_s, own = self.run.time_s, np.arange(len(self.run.time_s))
-        wanted = time_s - memories * np.nan_to_num(self.memory_s[:, 0], posinf=0.0)
-        oldest = np.maximum(own - np.minimum(self.run.since_start, LONGEST), 0)
-        return np.clip(np.searchsorted(time_s, wanted), oldest, own)
+        """(m,) the sample that was so many memories before each, since the filter was initialized."""
+        wanted = self.run.time_s - memories * np.nan_to_num(self.memory_s[:, 0], posinf=0.0)
+        oldest = np.maximum(self.own - np.minimum(self.run.since_start, LONGEST), 0)
+        return np.clip(np.searchsorted(self.time_s, wanted), oldest, self.own)
 
     def interval_s(self) -> FloatArray:
-        """(n, 1) the mean interval of the last 16 samples."""
-        back = np.maximum(np.arange(len(self.run.time_s)) - 16, 0)
-        passed = np.arange(len(back)) - back
-        return ((self.run.time_s - self.run.time_s[back]) / np.maximum(passed, 1))[:, None].clip(1e-6)
+        """(m, 1) the mean interval of the last 16 samples."""
+        back = np.maximum(self.own - 16, 0)
+        passed = self.own - back
+        return ((self.run.time_s - self.time_s[back]) / np.maximum(passed, 1))[:, None].clip(1e-6)
 
 
 def _rms(values: FloatArray) -> FloatArray:

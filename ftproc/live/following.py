@@ -102,7 +102,7 @@ class Following:
         known, stream = self._state.known, self.stream
         said, stream._say = stream._say, lambda _: None
         for track in known["stream"]["tracks"].values():
-            track.resume(stream.recipe.settings)
+            track.resume(stream.recipe.settings, stream.recipe.model)
         stream.__dict__.update(known["stream"])
         if stream._begun:
             stream.understand_again()

@@ -17,6 +17,8 @@ from ftproc.core.identification import unseen_motion
 from ftproc.core.live.editor import LiveEditor
 from ftproc.core.model import kinematics
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
+from ftproc.correction.live import LiveCorrection, live_model
+from ftproc.correction.model import Model
 from ftproc.errors import InputError, UsageError
 from ftproc.files import arrow
 from ftproc.live.order import Left, Order
@@ -27,7 +29,7 @@ from ftproc.methods.estimate import FARTHEST, Estimate
 from ftproc.order_statistics import median
 from ftproc.quality import sanity
 from ftproc.records import MISSING, FloatArray, IntArray, Trajectory
-from ftproc.settings import FilterSettings
+from ftproc.settings import PACKAGED, FilterSettings
 
 SLACK_S = 0.002  # by the clock, in which the last reading that a row rests on may come after it is due
 INTERVALS = 50  # of which the typical one is that of coasted rows
@@ -54,12 +56,15 @@ class Live:
         late_s: float | None = None,
         range_rates: bool = False,
         barometric: bool | None = None,
+        model: Model | str | None = PACKAGED,
     ) -> None:
         """settings: editing `live` (also where they say `two-pass`, the default) or `forward`. late_s: at most the lag;
         None for the lag. range_rates: whether the rows have columns of range rates. barometric: whether the heights
-        are that stand for the elevations (by `ftproc.methods.heights.elevation`); None where these are measured.
-        Raises UsageError."""
-        self.resume(settings or FilterSettings())
+        are that stand for the elevations (by `ftproc.methods.heights.elevation`); None where these are measured. model:
+        the network's correction, as in `ftproc.filter_log`; rows with range, azimuth and elevation alone have one, with
+        `live` and lag 0. Raises UsageError, ModelError."""
+        self.resume(settings or FilterSettings(), model)
+        self._correction = LiveCorrection()
         self.late, editor = 0, live.editor(self.settings)
         self._lag_s = editor.lag_s
         self._late_s = self._lag_s if late_s is None else min(late_s, self._lag_s)
@@ -70,14 +75,14 @@ class Live:
         self._taken, self._left_s = 0, -math.inf
         self._rates, self._barometric = range_rates, barometric
 
-    def resume(self, settings: FilterSettings) -> None:
-        """Go on with these settings, when all else is as it was kept."""
+    def resume(self, settings: FilterSettings, model: Model | str | None) -> None:
+        """Go on with these settings and this model, when all else is as it was kept."""
         if settings.editing == "two-pass":
             settings = replace(settings, editing="live")
         sanity.check_settings(settings)
         if settings.method != registry.MAIN or settings.editing == "none" or settings.smooth:
             raise UsageError(f"Live runs {registry.MAIN} with editing live or forward, not smoothed.")
-        self.settings = settings
+        self.settings, self._model = settings, live_model(model, settings.editing, settings.lag_s)
         self._coasting: LiveEditor | None = None
 
     @property
@@ -163,7 +168,7 @@ class Live:
         found = self._coasting.push(np.array([at_s]), none)
         found += self._coasting.tick(math.nextafter(at_s + self._lag_s, math.inf))
         left = [Left(each, self._coasting.absent) for each in found]
-        return self._trajectory(left, np.array([time_s]), np.array([-1]))
+        return self._trajectory(left, np.array([time_s]), np.array([-1]), None)
 
     @property
     def wait_s(self) -> float:
@@ -207,39 +212,48 @@ class Live:
             del kept[:count]
         if count:
             self._left_s = float(time_s[-1])
-        return self._trajectory(self._order.take(count), time_s, row)
+        return self._trajectory(self._order.take(count), time_s, row, None if self._rates else self._model)
 
-    def _trajectory(self, left: Iterable[Left], time_s: FloatArray, row: IntArray) -> Trajectory:
-        """The rows that have left, with these times and numbers (n,)."""
+    def _trajectory(self, left: Iterable[Left], time_s: FloatArray, row: IntArray, model: Model | None) -> Trajectory:
+        """The rows that have left, with these times and numbers (n,), corrected by a model."""
         parts, low = [], 0
         for absent, some in itertools.groupby(left, lambda each: each.absent):
             found = [each.rows for each in some]
             high = low + sum(len(each.rows) for each in found)
             estimate = live.estimate(self._order.editor, found, time_s[low:high])._replace(absent=absent)
-            parts.append(_trajectory(row[low:high], time_s[low:high], estimate, self._rates, self._barometric))
+            correction = np.zeros((high - low, 6))
+            plain = not absent and self._barometric is None and not self._rates
+            if model is not None and plain:
+                correction = self._correction.of(estimate.run, model.filter)
+            parts.append(
+                _trajectory(row[low:high], time_s[low:high], estimate, correction, self._rates, self._barometric)
+            )
             low = high
-        return joined(parts) if parts else _trajectory(row[:0], time_s[:0], None)
+        return joined(parts) if parts else _trajectory(row[:0], time_s[:0], None, np.empty((0, 6)))
 
 
 def _trajectory(
     row: IntArray,
     time_s: FloatArray,
     estimate: Estimate | None,
+    correction: FloatArray,
     rates: bool = False,
     barometric: bool | None = None,
 ) -> Trajectory:
-    """The rows of an estimate; none without one. rates, barometric: as in `Live`."""
+    """The rows of an estimate with their correction (n, 6); none without one. rates, barometric: as in `Live`."""
     n = len(row)
     if estimate is None:
         none = np.empty((0, 3))
-        nothing = (none, np.empty((0, 9)), np.empty((0, 9)), none, none.astype(np.uint8), np.empty(0), np.empty((0, 6)))
+        nothing = (none, np.empty((0, 9)), np.empty((0, 9)), none, none.astype(np.uint8), np.empty(0), correction)
         return Trajectory("live", row, time_s, *nothing)
     run, label, absent = estimate.run, estimate.label.copy(), list(estimate.absent)
-    state, cleaned = run.state.copy(), from_cartesian(run.state[:, :3])
+    state = run.state.copy()
+    state[:, :6] += correction
+    cleaned = from_cartesian(state[:, :3])
     sigma, los_sigma = unseen_motion.widened(run.state, run.sigma, run.los_sigma)
     path_sigma = kinematics.widened(run.state, run.path_sigma, run.sigma, sigma)
     cleaned_sigma = measurement_sigma(cleaned, los_sigma[:, :3])
-    none, columns = np.zeros((n, 6)), dict[str, Any]()
+    columns = dict[str, Any]()
     if rates:
         found = estimate.range_rate.label if estimate.range_rate is not None else np.full(n, MISSING, np.uint8)
         columns = rates_of.columns(state, los_sigma, found)
@@ -262,7 +276,7 @@ def _trajectory(
         cleaned_sigma,
         label,
         run.nis,
-        none,
+        correction,
         extra=arrow.table(columns) if columns else None,
         path_sigma=path_sigma,
     )

@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 from ftproc import __version__
 from ftproc.config.recipe import Recipe
 from ftproc.core import compiled
+from ftproc.correction import model_file
+from ftproc.correction.live import live_model
 from ftproc.files.conventions import frame
 from ftproc.files.writing import atomic, geodesy, maps, outputs, streams
 from ftproc.live.following import Following
@@ -147,6 +149,7 @@ class _Run:
     def _metadata(self) -> Mapping[str, Any]:
         """What is known of the run so far."""
         settings = self._stream.recipe.settings
+        model = live_model(self._stream.recipe.model, settings.editing, settings.lag_s)
         method = registry.named(settings.method)
         return {
             "program": "ftproc",
@@ -155,7 +158,7 @@ class _Run:
             "sees": method.sees(settings),
             "log": self._request.source,
             "settings": {"editing": settings.editing, "lag_s": settings.lag_s, "smooth": False, "gate": settings.gate},
-            "model_sha256": None,
+            "model_sha256": None if model is None else model_file.sha256(model),
             "summary": {
                 "rows": self._counts.rows,
                 "rows_without_estimate": self._counts.unknown,

@@ -25,6 +25,7 @@ from ftproc.core.editing import gate, track, two_pass
 from ftproc.core.filtering import records, smoother
 from ftproc.core.live import beside, doubt, editor, pace, pieces, readings, recursive, rows, turning, whole, window
 from ftproc.core.model import motion
+from ftproc.correction import live as correction
 from ftproc.errors import InputError, OutputError
 from ftproc.files.writing import atomic
 from ftproc.live import forms, growing, live, order, plots
@@ -43,11 +44,11 @@ _KINDS: dict[str, Any] = {
         pace.Pace, pace.Clock, pieces.Sizes, readings.Columns, readings.Labels, readings.Repeats, rows.Waiting,
         rows.Published, records.Model, records.Start, smoother.SmootherRun, two_pass.Known, track.Track,
         gate.GateSettings, by_hand.Accepted, motion.Motion, beside.Rates,
-        turning.Second, turning.Turning,
+        turning.Second, turning.Turning, correction.LiveCorrection, records.FilterRun,
     )
 }  # fmt: skip
 _FUNCTIONS = {"edit": two_pass.edit}
-_LEFT_OUT = {"Live": ("settings", "_coasting")}  # of an object
+_LEFT_OUT = {"Live": ("settings", "_coasting", "_model")}  # of an object
 
 
 class Kind:

@@ -214,8 +214,8 @@ class Stream:
             if len(self.tracks) >= MOST_TARGETS:
                 self.others += len(timed)
                 return
-            beside = self._reader.beside
-            self.tracks[name] = Live(self.recipe.settings, None, beside.rate is not None, beside.barometric)
+            beside, model = self._reader.beside, self.recipe.model
+            self.tracks[name] = Live(self.recipe.settings, None, beside.rate is not None, beside.barometric, model)
         self._came_s[name], self._coasted[name] = now_s, 0
         for part in self._push(self.tracks[name], readings[timed], numbers, now_s, stop):
             yield from self._named(name, part)

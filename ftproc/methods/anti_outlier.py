@@ -91,7 +91,7 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         found = motion_models.choose(over.log, over.starts, over.model, names, specified)
         return found if channel is None or channel.used is None else found.with_beside(channel.used)
 
-    wanted = PATHS if settings.smooth else STATES if usual is None else None  # cheap, and says what could be had
+    wanted = PATHS if settings.smooth else STATES  # cheap, proves the correction, and says what could be had
     motion = chosen(names)
     white = chosen((motion_models.WHITE,)) if motion_models.WHITE in names else motion
     motion, (run, smoothed, left) = _followed(motion, white, wanted)
@@ -107,8 +107,9 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         run, smoothed = _widened(run, shifts), smoothed and _widened(smoothed, shifts)
     could_be = hindsight = None
     if smoothed is not None and not settings.smooth:
-        could_be, hindsight = median(np.sqrt((smoothed.sigma[:, :3] ** 2).sum(1))), smoothed.state
-        smoothed = None
+        if usual is None:  # else it is of one segment
+            could_be = median(np.sqrt((smoothed.sigma[:, :3] ** 2).sum(1)))
+        hindsight, smoothed = smoothed.state, None
     decision = edited.decision
     return Estimate(
         run, label, motion.model, smoothed, again, decision.settled,

@@ -64,7 +64,7 @@ def test_the_packaged_network_takes_out_the_lag_of_the_filter_on_flights_it_has_
 @pytest.mark.parametrize(
     ("settings", "why"),
     [
-        (FilterSettings(editing="live"), "there is no smoother of this run that could prove it"),
+        (FilterSettings(editing="live", lag_s=1.0), "there is no smoother of this run that could prove it"),
         (FilterSettings(smooth=True), "gain 0"),
         (FilterSettings(editing="none"), "there is no smoother of this run that could prove it"),
     ],

@@ -81,7 +81,7 @@ def test_range_rates_are_used_as_of_a_complete_log(run, here, lag):
         (["--keep-columns"], "--keep-columns is not for --follow, which copies no other columns. Leave it out, or"),
         (["--smooth"], "--smooth is not for --follow, which knows no later rows."),
         (["--report", "a.pdf"], "--report a.pdf: with --follow it is one page that opens in a browser; end its name"),
-        (["--model", "m.safetensors"], "--model is not for --follow, which corrects nothing with a network."),
+        (["--model", "m.safetensors"], "--model is not for --follow, which corrects with the packaged network."),
         (["--jobs", "2"], "--jobs is not for --follow, which runs in one process."),
         (["--scheduler", "tcp://10.0.0.1:8786"], "--scheduler is not for --follow, which runs in one process."),
         (["--summary", "json"], "--summary is not for --follow, which has no summary but the number of rows."),

@@ -43,6 +43,20 @@ def test_one_by_one_it_is_what_the_file_gives(log):
     np.testing.assert_array_equal(found["measurement_sigma"], whole.measurement_sigma)
 
 
+@pytest.mark.parametrize("model", ["packaged", None])
+def test_without_a_lag_the_network_corrects_each_row_as_in_the_file(log, model):
+    """By what is known when the row leaves; a row that is coasted has no correction."""
+    settings = FilterSettings(editing="live")
+    track, whole = ftproc.Live(settings, model=model), ftproc.filter_log(log, settings, model=model)
+    parts = [track.push(log.time_s[k], *log.measurement[k]) for k in range(len(log))]
+    for name in ("state", "correction", "measurement", "sigma"):
+        np.testing.assert_array_equal(np.concatenate([getattr(part, name) for part in parts]), getattr(whole, name))
+    assert np.abs(whole.correction[:, :3]).max() > 0.1 if model else not whole.correction.any()
+    assert not track.coast(0.1).correction.any()
+    if model:
+        assert "proven by the innovations of this run" in whole.metadata["summary"]["network"]
+
+
 @pytest.mark.parametrize("at_once", [1, 40])
 def test_late_rows_take_their_place_as_if_they_had_come_in_time(log, at_once):
     """By less than the lag; one in ten, and the very first."""

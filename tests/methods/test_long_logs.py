@@ -10,6 +10,7 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.core import threads
+from ftproc.correction import model_file
 from ftproc.methods import anti_outlier, live
 from ftproc.methods.estimate import Recording
 from ftproc.settings import FilterSettings
@@ -103,6 +104,19 @@ def test_a_short_log_is_edited_as_a_whole_and_a_long_one_filtered_so_without_edi
     (part,) = anti_outlier.parts(log, settings)
     assert (part.first, part.low, part.high) == (0, 0, len(log))
     np.testing.assert_array_equal(part.estimate.run.state, anti_outlier.estimate(log.whole(), settings).run.state)
+
+
+def test_each_segment_proves_its_correction(in_segments):
+    in_segments(1000, 1000, 300)
+    flight = simulate("manoeuvre-clean", seed=1, duration_s=120.0)
+    found = pipeline.filter_log(flight.log, model=model_file.named("packaged"))
+    assert found.metadata["summary"]["median_sigma_smoothed_m"] is None  # of the whole log it is not known
+    plain, better = (
+        np.sqrt(np.mean((state[:, :3] - flight.truth.position_m) ** 2))
+        for state in (found.state[:, :6] - found.correction, found.state)
+    )
+    assert all(part.any() for part in np.array_split(found.correction, 4))
+    assert better < 0.97 * plain
 
 
 @pytest.mark.parametrize("smooth", [False, True])

@@ -31,7 +31,7 @@ _NOT_FOLLOWED = {
     "keep_columns": f"copies no other columns. {_WHOLE}",
     "derived": f"writes no derived quantities. {_WHOLE}",
     "smooth": f"knows no later rows. {_WHOLE}",
-    "model": "corrects nothing with a network. Leave it out.",
+    "model": "corrects with the packaged network. Leave it out, or say --model none.",
     "jobs": "runs in one process. Leave it out.",
     "scheduler": "runs in one process. Leave it out.",
     "decisions": f"decides on each row as it comes. {_WHOLE}",

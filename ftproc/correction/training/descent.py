@@ -21,11 +21,22 @@ LEARNING_RATE, MOMENTUM, BATCH = 0.01, 0.9, 128
 
 
 class Problem(NamedTuple):
-    """A network to be fitted to normalised training samples, and validation samples that stop the fit early."""
+    """A network to be fitted to normalised training samples, and validation samples that stop the fit early. near:
+    (size,) weights that it is held near, if there are such, and how strongly."""
 
     shape: Shape
     training: Samples
     validation: Samples
+    near: FloatArray | None = None
+    held: float = 0.0
+
+    def cost_and_gradient(self, vector: FloatArray, samples: Samples) -> tuple[float, FloatArray]:
+        """Of the weights, with their decay: towards zero, or towards those that they are held near."""
+        if self.near is None:
+            return cost_and_gradient(vector, self.shape, *samples, DECAY)
+        value, slope = cost_and_gradient(vector, self.shape, *samples, 0.0)
+        away = vector - self.near
+        return value + self.held * float(away @ away), slope + 2.0 * self.held * away
 
 
 class Fit(NamedTuple):
@@ -80,7 +91,7 @@ def _lbfgs(initial: FloatArray, problem: Problem, stopping: _EarlyStopping) -> N
     from scipy.optimize import minimize
 
     def objective(vector: FloatArray) -> tuple[float, FloatArray]:
-        return cost_and_gradient(vector, problem.shape, *problem.training, DECAY)
+        return problem.cost_and_gradient(vector, problem.training)
 
     def after_iteration(xk: FloatArray) -> None:
         if stopping.finished(xk):
@@ -103,7 +114,7 @@ def _momentum(initial: FloatArray, problem: Problem, stopping: _EarlyStopping, r
         order = rng.permutation(len(inputs))
         for first in range(0, len(inputs), BATCH):
             rows = order[first : first + BATCH]
-            _, slope = cost_and_gradient(vector, problem.shape, inputs[rows], targets[rows], DECAY)
+            _, slope = problem.cost_and_gradient(vector, Samples(inputs[rows], targets[rows]))
             velocity = MOMENTUM * velocity - LEARNING_RATE * slope
             vector = vector + velocity
         if stopping.finished(vector):

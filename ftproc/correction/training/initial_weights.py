@@ -3,7 +3,8 @@
 `genetic` is the paper's: all weights are genes (Zuo et al. 2021, section 2.1). `genetic-solved` searches only the
 weights into the hidden layer, solves for the others by least squares, and evaluates the cost on other flights than
 these. `random` and `solved` are the same without the search. No kind is better than another where it was measured
-(`ftproc train --compare-starts`); training uses the paper's by default.
+(`ftproc train --compare-starts`); training uses the paper's by default, or the weights of the packaged network where
+it learns what that has learned (`train`).
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from ftproc.correction.training.genetic import GeneticSettings
 from ftproc.correction.training.samples import Samples
 from ftproc.records import FloatArray
 
-KINDS = ("genetic", "genetic-solved", "random", "solved")
+PACKAGED, GENETIC = "packaged", "genetic"  # the former those of the packaged network, or genetic if it is another one
+KINDS = (PACKAGED, GENETIC, "genetic-solved", "random", "solved")
 SEARCH_SAMPLES = 600  # on which the genetic search evaluates the cost; `genetic-solved` solves on as many others
 
 
@@ -37,7 +39,7 @@ def initial_weights(
     inner = scale[: shape.inner]
     if kind == "solved":
         return network.least_squares(rng.uniform(-1.0, 1.0, shape.inner) * inner, shape, *training, DECAY)
-    if kind == "genetic":
+    if kind in (PACKAGED, GENETIC):
         few = training.thinned(SEARCH_SAMPLES, rng)
         found = genetic.search(
             lambda genes: network.population_cost(genes * scale, shape, *few), shape.size, settings, rng, progress

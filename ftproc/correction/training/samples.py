@@ -22,6 +22,7 @@ BLOCK_S = 30.0  # shortest block, s
 APART = 8  # samples left out between two blocks of a flight, for neighbours share their error
 VALIDATION_SHARE, TEST_SHARE = 1 / 3, 1 / 6
 MOST_VALIDATION, MOST_TEST = 60, 30  # pieces: more prove no more
+MOST_SAMPLES = 40_000  # for back-propagation
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,10 @@ class Split:
     test: tuple[Piece, ...]
     by: str
 
+    @property
+    def count(self) -> int:
+        return len(self.training) + len(self.validation) + len(self.test)
+
 
 class Samples(NamedTuple):
     """Inputs (n, d) and targets (n, o) of the network."""
@@ -73,6 +78,9 @@ class Samples(NamedTuple):
 
     def rows(self, rows: slice) -> Samples:
         return Samples(self.inputs[rows], self.targets[rows])
+
+    def and_(self, others: Samples) -> Samples:
+        return Samples(*(np.concatenate(pair) for pair in zip(self, others, strict=True)))
 
     def thinned(self, most: int, rng: np.random.Generator) -> Samples:
         """At most so many of the samples, in their order."""
@@ -126,14 +134,16 @@ def split(flights: Sequence[Flight], rng: np.random.Generator) -> Split:
 
 def samples(flights: Sequence[Flight], pieces: Sequence[Piece], features: Features) -> Samples:
     """The samples in `pieces` that are valid and have truth, not normalised; of each piece at most so many as the
-    feature set wants, at even distances, so that long flights count no more than others."""
+    feature set wants, or more where there are few pieces, at even distances, so that long flights count no more than
+    others."""
+    most = None if features.most is None else max(features.most, MOST_SAMPLES // max(len(pieces), 1))
     inputs, targets = [np.empty((0, features.input_size))], [np.empty((0, features.output_size))]
     for number, start, stop in pieces:
         flight = flights[number]
         x, valid = features.inputs(flight.run, start, stop)
         t = features.targets(LineOfSight.of(flight.run, start, stop).rows(valid), flight.error[start:stop][valid])
         known = np.all(np.isfinite(t), axis=1)
-        every = 1 if features.most is None else max(-(-int(known.sum()) // features.most), 1)
+        every = 1 if most is None else max(-(-int(known.sum()) // most), 1)
         inputs.append(x[valid][known][::every])
         targets.append(t[known][::every])
     return Samples(np.concatenate(inputs), np.concatenate(targets))

@@ -9,9 +9,10 @@ from dataclasses import asdict, replace
 from ftproc.correction.feature_sets import FEATURES, named
 from ftproc.correction.model import FILTER, SMOOTHER, Model, Stage
 from ftproc.correction.training import Progress, silent
+from ftproc.correction.training.initial_weights import GENETIC, PACKAGED
 from ftproc.correction.training.parallel import each
 from ftproc.correction.training.samples import Flight
-from ftproc.correction.training.train import train
+from ftproc.correction.training.train import known_network, train
 from ftproc.errors import UsageError
 from ftproc.settings import TrainSettings
 
@@ -34,6 +35,8 @@ def train_model(
         if stage not in stages or _remaining_error(candidate) < _remaining_error(stages[stage]):
             stages[stage] = candidate
     kept = {name: AUTO if value is None else value for name, value in asdict(settings).items()}
+    if settings.start == PACKAGED and known_network(stages[FILTER].features, settings) is None:
+        kept["start"] = GENETIC
     return Model({k: v for k, v in stages.items() if k == FILTER or v.helps}, kept)
 
 

@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from ftproc.correction import network
+from ftproc.correction import model_file, network
 from ftproc.correction.envelope import Envelope, Normaliser
 from ftproc.correction.feature_sets import named
 from ftproc.correction.features import APPLIED, BoolArray, Features
@@ -20,13 +20,13 @@ from ftproc.correction.training import Progress, descent, initial_weights, silen
 from ftproc.correction.training.descent import OPTIMISERS, Fit, Problem
 from ftproc.correction.training.genetic import GeneticSettings
 from ftproc.correction.training.holdout import with_verdict
-from ftproc.correction.training.samples import Flight, Samples, Split, overconfidence, samples, split
+from ftproc.correction.training.samples import MOST_SAMPLES, Flight, Samples, Split, overconfidence, samples, split
 from ftproc.errors import InputError, UsageError
-from ftproc.settings import TrainSettings
+from ftproc.settings import PACKAGED, TrainSettings
 
-MOST_SAMPLES = 40_000  # for back-propagation
 FEWEST_SAMPLES = 30
 BOUND_SIGMA = 2.0  # bound on a correction where sigmas are consistent
+MOST_EPOCHS = 100  # of weights that are held near known ones
 LEAST_BEND = 0.05  # relative decrease of validation cost below which the hidden layer is left out
 
 
@@ -51,8 +51,9 @@ class Prepared:
         )
 
 
-def prepare(flights: Sequence[Flight], features: Features, seed: int) -> Prepared:
-    """Split the flights and make samples of them. Raises InputError when there is too little data."""
+def prepare(flights: Sequence[Flight], features: Features, seed: int, known: Stage | None = None) -> Prepared:
+    """Split the flights and make samples of them, normalised as those of a known network, if there is one. Raises
+    InputError when there is too little data."""
     splitting, thinning = _streams(seed)[:2]
     parts = split(flights, splitting)
     tables = [samples(flights, pieces, features) for pieces in (parts.training, parts.validation, parts.test)]
@@ -62,8 +63,8 @@ def prepare(flights: Sequence[Flight], features: Features, seed: int) -> Prepare
                 f"too little to learn from: {len(table.inputs)} usable samples for {name}, at least {FEWEST_SAMPLES} "
                 "are needed; a sample is usable with truth, and not while coasting or just after (re-)initialization"
             )
-    inputs = Normaliser.fit(tables[0].inputs, features.floor)
-    targets = Normaliser.fit(tables[0].targets, 1e-9)
+    inputs = Normaliser.fit(tables[0].inputs, features.floor) if known is None else known.inputs
+    targets = Normaliser.fit(tables[0].targets, 1e-9) if known is None else known.targets
     training, validation, test = (Samples(inputs.forward(x), targets.forward(t)) for x, t in tables)
     if features.most is None:
         training, validation = (s.thinned(MOST_SAMPLES, thinning) for s in (training, validation))
@@ -73,7 +74,9 @@ def prepare(flights: Sequence[Flight], features: Features, seed: int) -> Prepare
 def train(flights: Sequence[Flight], settings: TrainSettings, progress: Progress = silent) -> Stage:
     """Learn the error of a stage from its flights with truth; the same seed and data give the same bytes.
 
-    Where the sigmas of the training flights are too small, the bound on the correction is that many times wider.
+    Where the sigmas of the training flights are too small, the bound on the correction is that many times wider. What
+    begins with the packaged network stays that, unless validation flights prefer the other. Then it learns from all
+    flights, and the verdict is on the one that had not.
 
     Raises InputError when there is too little data, UsageError for an unknown feature set, optimiser or start.
     """
@@ -81,8 +84,14 @@ def train(flights: Sequence[Flight], settings: TrainSettings, progress: Progress
     if settings.optimiser not in OPTIMISERS or settings.start not in initial_weights.KINDS:
         kinds = ", ".join(initial_weights.KINDS)
         raise UsageError(f"optimiser is one of {', '.join(OPTIMISERS)}; start is one of {kinds}")
-    data = prepare(flights, features, settings.seed)
-    bent, line = _fitted(data, settings, progress)
+    known = known_network(features, settings)
+    data = prepare(flights, features, settings.seed, known)
+    if known is None:
+        bent, line = _fitted(data, settings, progress)
+    else:
+        bent, line = _near(known, data.training, len(data.parts.training), settings, progress), None
+        if network.squares(bent, *data.validation).sum() >= network.squares(known.weights, *data.validation).sum():
+            bent = known.weights
     stage = Stage(
         features=features,
         weights=bent,
@@ -100,7 +109,31 @@ def train(flights: Sequence[Flight], settings: TrainSettings, progress: Progress
         stage = replace(stage, weights=_mixed(bent, line, ~unproven))
         stage = with_verdict(stage, flights, data.parts, _streams(settings.seed)[4])
     progress("validation", 1, 1)
+    if known is not None and bent is not known.weights:
+        learned = data.training.and_(data.validation).and_(data.test)
+        stage = replace(stage, weights=_near(known, learned, data.parts.count, settings, progress))
     return stage
+
+
+def known_network(features: Features, settings: TrainSettings) -> Stage | None:
+    """The packaged network, if the training begins with it: it has the same inputs, outputs and hidden units."""
+    packaged = model_file.named(PACKAGED) if settings.start == initial_weights.PACKAGED else None
+    if packaged is None or packaged.filter.features.name != features.name:
+        return None
+    return packaged.filter if settings.hidden in (None, packaged.filter.shape.hidden) else None
+
+
+def _near(
+    known: Stage, learned: Samples, flights: int, settings: TrainSettings, progress: Progress = silent
+) -> Weights:
+    """The weights that samples of some flights prefer, held near those of a known network: so they are fitted to the
+    end."""
+    vector = network.pack(known.weights)
+    problem = Problem(known.shape, learned, learned, vector, 1.0 / flights)
+    descending, steps = _streams(settings.seed)[3], partial(progress, "back-propagation")
+    epochs = min(settings.epochs, MOST_EPOCHS)
+    fit = descent.descend(settings.optimiser, vector, problem, epochs, descending, steps)
+    return network.unpack(fit.vector, known.shape)
 
 
 def _fitted(data: Prepared, settings: TrainSettings, progress: Progress) -> tuple[Weights, Weights | None]:

@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ftproc.correction import model_file, network
 from ftproc.correction.training.flights import filtered_flights, train_flights
+from ftproc.correction.training.train import train
 from ftproc.errors import InputError, UsageError
 from ftproc.records import Truth
 from ftproc.settings import FilterSettings, TrainSettings
+from tests.correction import fake
 from tests.simulated import simulate
 
 
@@ -56,3 +59,20 @@ def test_a_filter_without_a_smoother_to_prove_it_is_not_taught_motion():
     settings = TrainSettings("motion", population=2, generations=0, epochs=5)
     with pytest.raises(UsageError, match="'motion' needs ga-bpnn-ukf with --editing two-pass"):
         train_flights([(flight.log, flight.truth)], settings, FilterSettings(editing="none"))
+
+
+@pytest.mark.parametrize("hidden", [None, 3])
+def test_a_fleet_begins_with_the_packaged_network(hidden):
+    """If that has as many hidden units. It stays what it is where held-out flights do not prefer another."""
+    flown = [simulate("manoeuvre-clean", seed=seed, dt_s=0.2, duration_s=60.0) for seed in range(6)]
+    settings = TrainSettings("motion", hidden=hidden, population=2, generations=0, epochs=10)
+    model, packaged = train_flights([(flight.log, None) for flight in flown], settings), model_file.named("packaged")
+    assert model.settings["start"] == ("packaged" if hidden is None else "genetic")
+    if hidden is None:
+        np.testing.assert_array_equal(network.pack(model.filter.weights), network.pack(packaged.filter.weights))
+
+
+def test_a_fleet_whose_errors_are_others_has_a_network_near_the_packaged_one():
+    known = network.pack(model_file.named("packaged").filter.weights)
+    found = train(fake.flights(1, 8, lag=2.0), TrainSettings("motion", epochs=30))
+    assert 0.01 < np.linalg.norm(network.pack(found.weights) - known) / np.linalg.norm(known) < 0.5
