@@ -256,12 +256,11 @@ def _has_tails(off: FloatArray, gate: float, count: int) -> bool:
 
 
 def allow_for_drift(record: Record, decision: Decision, rejected: bool = False) -> tuple[Record, Decision]:
-    """The record with noise whose variance drifts, and the decisions made again, if it does. rejected: by the readings
-    that were rejected, too: where the noise has grown by far they may be most."""
-    if _repeats(record, decision):
-        return record, decision
+    """The record with noise whose variance drifts, and the decisions made again, if it does. rejected: by what was
+    rejected, too, which may be most where the noise has grown."""
     weight = record.possible.astype(float) if rejected else decision.weight
-    drifting = uneven_noise.drift(record.weighted(weight), *_residuals(record, decision))
+    residuals = None if _repeats(record, decision) else _residuals(record, decision)
+    drifting = None if residuals is None else uneven_noise.drift(record.weighted(weight), *residuals)
     if drifting is None:
         return record, decision
     uneven = record.uneven or Uneven.none(len(record.time_s))
