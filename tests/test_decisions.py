@@ -71,7 +71,7 @@ def verdict(trajectory: Trajectory) -> str:
     return str(trajectory.metadata["summary"]["trust"]["verdict"])
 
 
-@pytest.mark.parametrize("seed", [3, 7, 8])
+@pytest.mark.parametrize("seed", [3, 7, 18])
 def test_three_lines_free_the_rest(seed: int) -> None:
     """Of a flight that comes out wrong; what they leave is as good as if the readings had been blanked."""
     flight = followed(seed)

@@ -27,6 +27,7 @@ COMPARED = 9  # readings after a jump that are compared with the track before it
 PLACES = 4  # in each interval of as many moments,
 TRIED = 3  # of which the likeliest are tried
 ROUNDS, NEAR = 12, 0.1  # of finding how late it is, and sigmas by which that may yet move
+MOST = 0.5  # of the time that is looked at: farther apart, what lies before a jump and after it are two tracks
 
 
 class Moved(NamedTuple):
@@ -73,7 +74,9 @@ def weighed_jump(scene: Scene, weight: FloatArray, curve: Curve) -> Weighed:
     """The scene with a jump of its clock, decided on from these weights on. Raises ValueError where a component has too
     few readings."""
     scale_s = WIDE_CLOCK * scene.setting.interval_s()
-    found = [_likeliest(scene, weight, curve, first_s) for first_s in _first(scene, weight, curve)]
+    most_s = MOST * float(np.ptp(scene.log.time_s))
+    first = (each for each in _first(scene, weight, curve) if abs(each) <= most_s)
+    found = [_likeliest(scene, weight, curve, first_s, most_s) for first_s in first]
     late_s, information, _ = max(found, key=lambda each: each[2])
     there = moved(scene, curve, late_s)
     best = weighed(there.scene, weight[there.order], ())
@@ -84,8 +87,11 @@ def weighed_jump(scene: Scene, weight: FloatArray, curve: Curve) -> Weighed:
     return Weighed((curve._replace(size=(late_s,)),), (information**-0.5,), decided, best.model, likely)
 
 
-def _likeliest(scene: Scene, weight: FloatArray, curve: Curve, late_s: float) -> tuple[float, float, float]:
-    """How late the clock is, from a first value on, s; what the log says of it, 1/s2; and how likely it is then."""
+def _likeliest(
+    scene: Scene, weight: FloatArray, curve: Curve, late_s: float, most_s: float
+) -> tuple[float, float, float]:
+    """How late the clock is, s, from a first value on, at most so much; what the log says of it, 1/s2; and how likely
+    it is then."""
     best = (late_s, 1.0, -math.inf)
     for _ in range(ROUNDS):
         (there, order), model = moved(scene, curve, late_s), scene.at_median
@@ -102,9 +108,9 @@ def _likeliest(scene: Scene, weight: FloatArray, curve: Curve, late_s: float) ->
             break
         best = (late_s, information, said.log_likelihood)
         step_s = float(said.score[0]) / information
-        if abs(step_s) < NEAR * information**-0.5:
-            break
         late_s += step_s
+        if abs(step_s) < NEAR * information**-0.5 or abs(late_s) > most_s:
+            break
     return best
 
 

@@ -16,7 +16,7 @@ from tests.trust import hard
 pytestmark = pytest.mark.compiled
 
 
-@pytest.mark.parametrize(("seed", "size_s", "most_m"), [(0, 1.866, 1.0), (2, -1.46, 4.0), (5, 0.843, 5.0)])
+@pytest.mark.parametrize(("seed", "size_s", "most_m"), [(0, 1.866, 1.0), (2, -1.46, 4.0), (5, 0.843, 1.0)])
 def test_a_jump_of_the_clock_of_an_agile_target_is_found_and_taken_out(seed, size_s, most_m):
     """A car that weaves and a fighter, whose stamps go on evenly, and a sea-skimmer, whose stamps have a gap: within
     the jump they turn, so that the rates of their readings tell little."""
@@ -25,8 +25,9 @@ def test_a_jump_of_the_clock_of_an_agile_target_is_found_and_taken_out(seed, siz
     (step,) = found.metadata["summary"]["steps"]
     assert step["component"] == "clock"
     assert step["size_s"] == pytest.approx(size_s, abs=0.1)
-    error = np.linalg.norm(found.state[:, :3] - late.truth.position_m, axis=1)
-    assert np.sqrt(np.mean(error**2)) < most_m
+    seen = late.log.time_s > size_s  # from the clock's first moment on
+    error = (found.state[:, :3] - late.truth.position_m)[seen]
+    assert np.sqrt(np.mean((error**2).sum(1))) < most_m
 
 
 def test_gaps_are_the_intervals_of_several_others_and_the_jump_is_as_long():
