@@ -134,13 +134,9 @@ def _when(step: Step) -> int:
 
 def taken_out(log: Observations, model: Model, setting: Setting, moved: Sequence[Curve]) -> Observations:
     """The log without what has to be taken out of its readings: those of a clock that is late are moved to their time
-    stamps along the track that they show at the times at which they were taken; there are none for stamps before or
-    after all of these."""
+    stamps along the track that they show at the times at which they were taken."""
     rest = log._replace(measurement=without(log.measurement, setting, [c for c in moved if c.component != CLOCK]))
-    time_s = log.time_s.copy()
-    for curve in moved:
-        if curve.component == CLOCK:
-            time_s[curve.rows] -= curve.size[0]
+    time_s = _taken_s(log.time_s, moved)
     late = time_s != log.time_s
     if not late.any():
         return rest
@@ -151,9 +147,24 @@ def taken_out(log: Observations, model: Model, setting: Setting, moved: Sequence
     there, here = between(sorted_s, state, log.time_s[late]), between(sorted_s, state, time_s[late])
     z = rest.measurement.copy()
     z[late] += from_cartesian(there[:, :3]) - from_cartesian(here[:, :3])
-    z[late & ((log.time_s < sorted_s[0]) | (log.time_s > sorted_s[-1]))] = np.nan
     z[:, 1] = wrap(z[:, 1])
     return rest._replace(measurement=z)
+
+
+def unseen(time_s: FloatArray, moved: Sequence[Curve]) -> NDArray[np.bool_]:
+    """(n,) samples with stamps before or after all times at which readings were taken."""
+    taken_s = _taken_s(time_s, moved)
+    found: NDArray[np.bool_] = (time_s < taken_s.min()) | (time_s > taken_s.max())
+    return found
+
+
+def _taken_s(time_s: FloatArray, moved: Sequence[Curve]) -> FloatArray:
+    """(n,) when the readings were taken, if these jumps of the clock are taken out."""
+    taken_s = time_s.copy()
+    for curve in moved:
+        if curve.component == CLOCK:
+            taken_s[curve.rows] -= curve.size[0]
+    return taken_s
 
 
 def _sigma(steps: Sequence[Step], moved: Curve) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing.decisions import Decision, Record
-from ftproc.core.editing.lasting.faults import MOTION, Rival, Step, levelled, taken_out
+from ftproc.core.editing.lasting.faults import MOTION, Rival, Step, levelled, taken_out, unseen
 from ftproc.core.editing.lasting.search import search
 from ftproc.core.editing.lasting.sorting import sorted_out
 from ftproc.core.editing.lasting.weighing import Scene, scene_of
@@ -55,6 +55,7 @@ def without_lasting(
         log = record.weighted(decision.weight)
         moved = levelled(log, scene.at_median.noise_variance, steps)
         read = taken_out(log._replace(measurement=measurement), scene.at_median, scene.setting, moved)
+        banned = banned | unseen(record.time_s, moved)[:, None]
         other = decided(read.measurement, banned=banned)
         if (new.steps and _may_be_late_stamps((record, decision), other)) or (
             new.banned.any() and _is_lost((record, decision), other, int(new.banned.sum()))
