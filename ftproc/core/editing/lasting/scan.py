@@ -198,8 +198,10 @@ def _ways(near: FloatArray, least: float, together: float) -> tuple[tuple[int, .
     large = [i for i in components if near[i] > max(together * near[components[0]], least)]
     alone = [(i,) for i in large or components[:1]]
     together_ = [tuple(sorted(large)), tuple(sorted(components))] if len(large) > 1 else []
-    ways = [*alone, *together_, (CLOCK,)]
-    return tuple(dict.fromkeys(way for way in ways if near[list(way)].max() > least))
+    found = [way for way in (*alone, *together_, (CLOCK,)) if near[list(way)].max() > least]
+    if len(large) > 1:  # the clock moves them all, and within a large jump of it their rates change
+        found.append((CLOCK,))
+    return tuple(dict.fromkeys(found))
 
 
 def spread(edges: Sequence[int], width: int, samples: int) -> IntArray:

@@ -206,6 +206,8 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     if located.channels[0][0] == CLOCK:
         return Found(_in_whole(step, near, n), step.sigma, gain)
     proposed = list(proposals(seen.scene, located._replace(width=seen.cell, at_median=median_level(step.model))))
+    if (CLOCK,) in jump.ways and len(part.rates) == 1:  # by the same part of the log
+        proposed.append([Curve(CLOCK, located.sample, n, (0.0,), jump.station)])
     ends = [edge for curves in proposed for edge in (curves[0].begin, curves[0].end) if 0 < edge < n]
     return _best(seen, proposed, seen.near(min(ends), max(ends)), located)
 

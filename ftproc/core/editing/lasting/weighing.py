@@ -123,9 +123,11 @@ class Found(NamedTuple):
         return "on" if self.stays(n) else "before" if self.curves[0].begin < sample else "behind"
 
     def adjoins(self, other: Found) -> bool:
-        """Whether one begins about where, or before, the other ends, in a component of both."""
+        """Whether one begins about where, or before, the other ends, in a component of both; a clock acts on all."""
         return any(
-            one.component == each.component and one.begin <= each.end + BESIDE and each.begin <= one.end + BESIDE
+            (one.component == each.component or CLOCK in (one.component, each.component))
+            and one.begin <= each.end + BESIDE
+            and each.begin <= one.end + BESIDE
             for one in self.curves
             for each in other.curves
         )
