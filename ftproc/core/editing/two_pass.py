@@ -125,6 +125,7 @@ def edit(
     record, decision, steps, _, doubtful, rivals, scene = found
     if decision.stamp_s > 0:  # which explains a clock that seems to jump
         doubtful = [step for step in doubtful if step.component != CLOCK]
+        rivals = [rival for rival in rivals if rival.component != CLOCK]
     if not record.fixed.jerk and not live:  # at the end of a window a patch may resemble motion
         decision, open_ = reassess_rejected(record, decision, for_lasting)
         rivals = [*rivals, *open_]

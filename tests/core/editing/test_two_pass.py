@@ -202,8 +202,20 @@ def test_noise_that_is_tenfold_for_a_third_of_a_log_is_no_outliers():
     [((0, 0), -99, False), ((0.01, 0.01), 99, True), ((0.01, 0), 5, True), ((0, 0.01), 5, True), ((0.01, 0), 9, False)],
 )
 def test_steps_must_explain_a_log_better_than_late_stamps_do(monkeypatch, late_s, gained, expected):
-    without, bridged = (("log", SimpleNamespace(stamp_s=stamp_s)) for stamp_s in late_s)
-    monkeypatch.setattr(settling, "log_probability", lambda _, decision: gained if decision is bridged[1] else 0.0)
+    seen, left = np.ones((4, 3), bool), np.ones((4, 3), bool)
+    left[3] = False  # whose stamp a late clock leaves empty
+    records = (decisions.Record(*[None] * 2, possible, *[None] * 6) for possible in (seen, left))
+    without, bridged = (
+        (record, decisions.Decision(np.ones((4, 3)), *[None] * 3, stamp_s=stamp_s))
+        for record, stamp_s in zip(records, late_s, strict=True)
+    )
+
+    def probability(record, decision):
+        assert (record.possible == left).all()
+        assert decision is bridged[1] or (decision.weight == left).all()
+        return gained if decision is bridged[1] else 0.0
+
+    monkeypatch.setattr(settling, "log_probability", probability)
     assert settling._may_be_late_stamps(without, bridged) is expected
 
 

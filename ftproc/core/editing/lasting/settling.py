@@ -74,4 +74,9 @@ def _may_be_late_stamps(without: tuple[Record, Decision], levelled_log: tuple[Re
     """Whether it may be late time stamps that resemble steps: they are left where the steps are taken out, or explain
     the log as well."""
     late = [decision.stamp_s > 0 for _, decision in (without, levelled_log)]
-    return all(late) or (any(late) and log_probability(*levelled_log) < log_probability(*without) + STEP_MARGIN)
+    if not any(late) or all(late):
+        return all(late)
+    record, decision = without
+    possible = record.possible & levelled_log[0].possible  # of the same readings
+    same = record._replace(possible=possible), decision._replace(weight=decision.weight * possible)
+    return log_probability(*levelled_log) < log_probability(*same) + STEP_MARGIN

@@ -11,6 +11,7 @@ from ftproc.core.editing.lasting.curves import CLOCK, Curve, Setting
 from ftproc.core.model.moving import between
 from ftproc.settings import FilterSettings
 from tests.core.editing.lasting.scenes import N, scene
+from tests.simulated import simulate
 from tests.trust import hard
 
 pytestmark = pytest.mark.compiled
@@ -28,6 +29,22 @@ def test_a_jump_of_the_clock_of_an_agile_target_is_found_and_taken_out(seed, siz
     seen = late.log.time_s > size_s  # from the clock's first moment on
     error = (found.state[:, :3] - late.truth.position_m)[seen]
     assert np.sqrt(np.mean((error**2).sum(1))) < most_m
+
+
+@pytest.mark.parametrize(
+    ("name", "seed", "spec", "size_s"),
+    [
+        ("overhead", 43, "late=1:0.5-2", 1.95),  # all components jump, but not as the rates there say
+        ("manoeuvre", 41, "late=1:0.5-2", -1.397),  # three steps explain more, on a longer part of the log
+        ("overhead", 43, "clock=1:0.5-2", 1.951),  # and stamps without readings say nothing for late ones
+    ],
+)
+def test_a_jump_of_the_clock_is_no_step_of_three_components(name, seed, spec, size_s):
+    late = simulate(name, seed=seed, duration_s=80.0, outliers=spec)
+    found = pipeline.filter_log(late.log, FilterSettings(smooth=True))
+    (step,) = found.metadata["summary"]["steps"]
+    assert (step["component"], step["size_s"]) == ("clock", pytest.approx(size_s, abs=0.02))
+    assert np.sqrt(np.mean(((found.state[:, :3] - late.truth.position_m) ** 2).sum(1))) < 1.0
 
 
 def test_gaps_are_the_intervals_of_several_others_and_the_jump_is_as_long():
