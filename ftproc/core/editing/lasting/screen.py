@@ -20,7 +20,6 @@ from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.weighing import Scene, Weighed, as_it_is
 from ftproc.core.filtering.columns import said_of
 from ftproc.core.filtering.records import Model, Observations
-from ftproc.core.identification.profile import median_level
 from ftproc.core.identification.stretches import runs_of
 from ftproc.records import FloatArray
 
@@ -64,17 +63,14 @@ def _is_more_than(
     least: float, part: Scene, gain: Callable[[Observations, Model], float], without: Weighed, taken_in: FloatArray
 ) -> bool:
     """Whether there is such a gain as the part is understood without a fault, or with rejected readings taken in (n, 3)
-    weights, whose rejection then need not be explained. The process noise with which they were rejected may be more
-    than they need where they are good: the typical one of the part may do."""
+    weights, whose rejection then need not be explained."""
     weight, model = without.weight, without.model
     if gain(part.log._replace(weight=weight), model) > least:
         return True
     if (taken_in == weight).all():
         return False
-    log = part.log._replace(weight=taken_in)
-    models = (model, median_level(model))[: len(model.jerk)]  # of a single level both are the same
-    known = without.log_probability
-    return any(gain(log, each) + as_it_is(part, taken_in, each).log_probability - known > least for each in models)
+    more = as_it_is(part, taken_in, model).log_probability - without.log_probability
+    return gain(part.log._replace(weight=taken_in), model) + more > least
 
 
 def _with_rejected(

@@ -9,6 +9,7 @@ from ftproc.core.editing import two_pass
 from ftproc.core.model.frames import from_cartesian, wrap
 from tests.core.tracks import SIGMA, matched
 from tests.simulated import simulate
+from tests.trust import hard
 
 pytestmark = pytest.mark.compiled
 
@@ -108,3 +109,12 @@ def wrap_azimuth(z):
     z = z.copy()
     z[:, 1] = wrap(z[:, 1])
     return z
+
+
+def test_a_jump_is_seen_beside_which_readings_were_rejected():
+    """A ramp of 92 sigmas, after which the filter rejects what is right until it has joined the track again."""
+    ramp = hard.make("ramp", 2).simulated
+    bad = ramp.truth.outlier[:, 2] > 0
+    found = two_pass.edit(ramp.log.time_s, ramp.log.measurement, UNKNOWN)
+    assert found.weight[bad, 2].mean() < 0.05
+    assert found.weight[~bad, 2].mean() > 0.99
