@@ -8,6 +8,8 @@ import subprocess
 import sys
 from typing import NamedTuple
 
+from ftproc.core import threads
+
 #: What happens to a run from outside: also to the workers and the scheduler of a cluster, and code beside its logs.
 FAULTS = ("tests/faults", "tests/batch", "tests/files/writing", "tests/trust/test_foreign_code.py")
 
@@ -31,7 +33,7 @@ class Count(NamedTuple):
 def run(*files: str, **environment: str) -> Count:
     """Run the tests of these files; a run that breaks off counts as one failure more."""
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *files],
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-n", str(threads.available()), *files],
         check=False, capture_output=True, text=True, env={**os.environ, **environment},
     )  # fmt: skip
     last = done.stdout.strip().rpartition("\n")[2]

@@ -45,6 +45,13 @@ def counts(found: Sequence[Judged]) -> str:
     )
 
 
+class Counted(NamedTuple):
+    """Rows of a table, what and how many, and a line for each thing that is wrong."""
+
+    rows: Sequence[tuple[str, object]]
+    failures: Sequence[str]
+
+
 class Given(NamedTuple):
     """Of the command line: seeds, names of classes, number of processes, and whether to print each run."""
 
