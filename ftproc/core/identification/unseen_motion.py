@@ -82,7 +82,7 @@ def _unseen(push: float, sigma: float, bend: float, added: FloatArray) -> None:
     while w < 2 * FASTEST and times < 1e12:
         left = 1 / (1 + 1 / (times * times * times * times * times * times))
         w2 = w * w
-        flies = push * min(2 - w / FASTEST, 1.0) / (w2 * w2)
+        flies = push * min(2 - w / FASTEST, 1.0) / max(w2 * w2, 1e-300)
         variance = left * left * min(flies, HIDDEN * times * sigma * sigma)
         added[0] += variance
         added[1] += w2 * variance
