@@ -17,6 +17,10 @@ FAULTS = ("tests/faults", "tests/batch", "tests/files/writing", "tests/trust/tes
 PLAIN = ("tests/core",)
 
 
+#: Tests of a file may need what those before them have made.
+PARALLEL = ("--dist", "loadfile", "-n", str(threads.available()))
+
+
 class Count(NamedTuple):
     """Of some tests."""
 
@@ -33,7 +37,7 @@ class Count(NamedTuple):
 def run(*files: str, **environment: str) -> Count:
     """Run the tests of these files; a run that breaks off counts as one failure more."""
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-n", str(threads.available()), *files],
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *PARALLEL, *files],
         check=False, capture_output=True, text=True, env={**os.environ, **environment},
     )  # fmt: skip
     last = done.stdout.strip().rpartition("\n")[2]
