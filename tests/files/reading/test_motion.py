@@ -9,6 +9,7 @@ import pytest
 
 from ftproc.errors import InputError
 from ftproc.files.reading import logs
+from ftproc.files.reading.meaning.values import paths
 from ftproc.records import FloatArray
 
 
@@ -77,3 +78,9 @@ def test_small_degrees_are_not_taken_for_radians(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError, match="azimuth=deg,elevation=deg"):
         read(tmp_path / "a.csv", "time_s,range_m,az,el", time, 3e4 - 90 * time, azimuth, elevation)
+
+
+def test_values_that_nothing_has_are_bent_without_end() -> None:
+    """Their squares overflow, without a warning."""
+    draw = np.random.default_rng(0).standard_normal((8, 3))
+    assert paths.bent(1e-300 * np.arange(8.0), 1e150 * draw, np.full(8, 1e150)) == np.inf

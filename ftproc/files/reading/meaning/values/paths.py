@@ -57,6 +57,7 @@ def derived(moment: FloatArray, position: FloatArray) -> tuple[FloatArray, Float
     return velocity, 2 * np.diff(velocity, axis=0) / (moment[2:] - moment[:-2])[:, None]
 
 
+@np.errstate(over="ignore", invalid="ignore")  # values that nothing has
 def bent(moment: FloatArray, position: FloatArray, distance: FloatArray) -> float:
     """The acceleration of a path of n medians, or what is left of it without its mean (gravity, thrust), in units of
     v^2 / r; infinite where rows share their times."""
