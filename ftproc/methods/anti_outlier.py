@@ -42,6 +42,8 @@ Run = TypeVar("Run", FilterRun, SmootherRun)
 
 LONGEST_WHOLE = 60_000  # samples of a log that is edited as a whole
 HALFWAY = 0.5  # of the distance to where another understanding puts the target is added to the sigmas
+APART, BESIDE = 0.1, 0.5  # of the largest such distance, from which two tracks part; of the rows in which they do:
+# the largest within so many counts, since tracks that cross may both be wrong there
 KEPT = 30_000  # samples of a segment, without its margins,
 KEPT_MARGINS = 12  # or so many times its margin
 MOST_PIECES = 20  # of a track: what is re-initialized so often shows no motion (two targets in turn: 115)
@@ -99,8 +101,9 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         filtered, other_smoothed, _ = _with_motion(motion, other, wanted)
         run = _worse_of(run, filtered)
         smoothed = smoothed and other_smoothed and _worse_of(smoothed, other_smoothed)
+    rows = 1 + int(np.flatnonzero(edited.weight.any(1))[-1])
     for away in _elsewhere(edited, others, settings.jerk_psd_m2ps5 is not None):
-        run, smoothed = _reaching(run, away), smoothed and _reaching(smoothed, away)
+        run, smoothed = _reaching(run, away, rows), smoothed and _reaching(smoothed, away, rows)
     run, smoothed = over.filtered(run), smoothed and over.smoothed(smoothed)
     shifts = edited.faults.shifts
     if shifts:
@@ -196,13 +199,23 @@ def _elsewhere(edited: two_pass.Edited, others: Sequence[Observations], fixed: b
             yield np.where(np.isfinite(away), away, 0.0)
 
 
-def _reaching(run: Run, away: FloatArray) -> Run:
-    """A run with sigmas that reach HALFWAY to where another understanding puts the target, away (n, 9) from it."""
-    sigma, los_sigma = np.hypot(run.sigma, HALFWAY * away), run.los_sigma.copy()
+def _reaching(run: Run, away: FloatArray, rows: int) -> Run:
+    """A run with sigmas that reach HALFWAY to where another understanding puts the target, away (n, 9) from it. rows:
+    up to the last reading; what follows is extrapolated."""
+    from scipy.ndimage import maximum_filter1d
+
+    far = np.linalg.norm(away[:rows, :3], axis=1)
+    width = 1 + int(BESIDE * (far > APART * far.max()).sum())
+
+    def reach(of: FloatArray) -> FloatArray:
+        nearby = maximum_filter1d(np.abs(of[:rows]), width, axis=0)
+        return HALFWAY * np.concatenate([nearby, np.abs(of[rows:])])
+
+    sigma, los_sigma = np.hypot(run.sigma, reach(away)), run.los_sigma.copy()
     sight = line_of_sight_axes(run.state[:, :3])
     for lines in (slice(0, 3), slice(3, 6)):
         along = np.einsum("kij,kj->ki", sight, away[:, lines])
-        los_sigma[:, lines] = np.hypot(los_sigma[:, lines], HALFWAY * along)
+        los_sigma[:, lines] = np.hypot(los_sigma[:, lines], reach(along))
     path_sigma = kinematics.widened(run.state, run.path_sigma, run.sigma, sigma)
     return run._replace(sigma=sigma, los_sigma=los_sigma, path_sigma=path_sigma)
 
