@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 
 from ftproc.core.editing.lasting.curves import CLOCK
-from ftproc.core.editing.lasting.search import MARGIN, PRIOR
+from ftproc.core.editing.lasting.scanned import MARGIN, PRIOR
 from ftproc.core.editing.patch_likelihood import log_probability_of_all
 from ftproc.core.identification.motion_models import WHITE
 from ftproc.core.identification.profile import roughness

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing.lasting.curves import CLOCK, Curve, Setting
-from ftproc.core.editing.lasting.search import MARGIN, search
+from ftproc.core.editing.lasting.scanned import MARGIN
+from ftproc.core.editing.lasting.search import search
 from ftproc.core.editing.lasting.weighing import Found, Scene, late_of, with_even_runs
 from ftproc.core.filtering.records import Model, Observations
 from ftproc.core.identification.profile import median_level

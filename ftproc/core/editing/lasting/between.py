@@ -1,26 +1,33 @@
 """Patches that were followed: their readings pass for motion, but for some rejected where the track leaves and returns.
 
-The jerk profile of a filter with a short memory follows a patch of any shape, and no jump is left by which it shows.
-What shows are the rejected readings at either end. So what lies from one rejected run to a later one, of a component or
-of several whose runs coincide, is weighed as a curve, of as many terms as explain it.
+The jerk profile of a filter with a short memory follows a patch of any shape, and no jump is left by which it shows, or
+the step that is left explains little. What shows are the rejected readings at either end, or jumps. So what lies from
+one rejected run, or jump, to a later one, of a component or of several whose runs coincide, is weighed as a curve, of
+as many terms as explain it.
 """
 
 from __future__ import annotations
 
+import contextlib
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.proposals import LONGEST
 from ftproc.core.editing.lasting.scan import Jump
-from ftproc.core.editing.lasting.weighing import TAKEN_IN, Scene
+from ftproc.core.editing.lasting.scanned import FOLLOWED, MOST_EACH, Scanned, in_whole, prior, weighed_on, worth
+from ftproc.core.editing.lasting.screen import leaves_curves
+from ftproc.core.editing.lasting.weighing import TAKEN_IN, Found, Scene, Weighed, as_it_is, weighed
 from ftproc.core.identification.stretches import runs_of
+from ftproc.core.work import for_lasting_faults
 from ftproc.records import FloatArray
 
 TERMS, PER_TERM = (5, 2, 8, 12, 22), 4  # of a curve, and samples for each at least
+TRIMMED = 2  # times that the ends of a patch are brought to where its readings fit it
 FROM_IT, MOST = 2, 6  # runs from the first to the last, and stretches that are weighed
 
 
@@ -61,9 +68,17 @@ class Between(NamedTuple):
         return firsts <= min(self.low, other.low) and lasts <= min(self.end, other.end)
 
 
-def followed(scene: Scene, jumps: Sequence[Jump], within: int) -> list[list[Between]]:
-    """Where a patch may have been followed, of one component or of several, in the log of one station: its jumps are
-    known within so many samples."""
+def followed(seen: Scanned) -> list[list[Between]]:
+    """Where a patch may have been followed, of one component or of several, in the log of one station."""
+    forgets = seen.longest < LONGEST  # each jump beside those of its motion
+    at_jumps = [] if forgets else between_jumps(seen.jumps, seen.left, seen.width, seen.scene.possible)
+    found = together([*between_runs(seen.scene, seen.jumps, seen.width), *at_jumps])
+    likely = [*at_jumps[:1], *(each[0] for each in found if len(each) == CLOCK - 1)]
+    return [*found, *([each._replace(component=c) for c in range(CLOCK)] for each in likely)]  # another target
+
+
+def between_runs(scene: Scene, jumps: Sequence[Jump], within: int) -> list[Between]:
+    """The stretches of a component from one rejected run to another, at one of which it jumps; the shortest first."""
     found = list[tuple[int, Between]]()
     for c in range(CLOCK):
         seen = np.flatnonzero(scene.possible[:, c])
@@ -72,9 +87,35 @@ def followed(scene: Scene, jumps: Sequence[Jump], within: int) -> list[list[Betw
             if m - k <= FROM_IT and d - b >= max(b - a, e - d) and e - a <= LONGEST * len(seen):
                 ends = int(seen[a]), int(seen[b]), int(seen[d]), int(seen[e - 1]) + 1
                 found.append((m - k, Between(c, *ends)))
-    single = [each for _, each in sorted(found) if each.jumps(jumps, within)][:MOST]
-    together = [[each for each in single if each.coincides(one)] for one in single]
-    several = {tuple(each): each for each in together if len(each) > 1}
+    return [each for _, each in sorted(found) if each.jumps(jumps, within)][:MOST]
+
+
+def between_jumps(
+    jumps: Sequence[Jump], left: Sequence[Jump], within: int, possible: NDArray[np.bool_]
+) -> list[Between]:
+    """The stretches from one jump of a component to another; those of the largest jumps first. At one of their ends
+    motion leaves a jump, and they have no gap. possible (n, 3): readings that may be good."""
+    found, n = list[tuple[float, Between]](), len(possible)
+    for c in range(CLOCK):
+        own = [jump for jump in jumps if any(c in way for way in jump.ways)]
+        ends = [(jump.gain, max(jump.sample - within, 0), min(jump.sample + within, n)) for jump in own]
+        for (one, a, b), (other, d, e) in itertools.permutations(ends, 2):
+            leaves = any(low <= jump.sample <= high for low, high in ((a, b), (d, e)) for jump in left)
+            fits = PER_TERM * TERMS[0] + b <= d and e - a <= LONGEST * n
+            if leaves and a < d and fits and not _has_a_gap(possible[a:e, c]):
+                found.append((min(one, other), Between(c, a, b, d, e)))
+    return [each for _, each in sorted(found, key=lambda of: -of[0])][:MOST]
+
+
+def _has_a_gap(possible: NDArray[np.bool_]) -> bool:
+    """Whether so many readings (m,) are missing in a row as a curve needs at least."""
+    return len(runs_of(~possible, PER_TERM * TERMS[0])) > 0
+
+
+def together(single: Sequence[Between]) -> list[list[Between]]:
+    """The stretches, each alone, and those of several components that coincide."""
+    beside = [{each.component: each for each in (*single, one) if each.coincides(one)} for one in single]
+    several = {tuple(sorted(each.values())): sorted(each.values()) for each in beside if len(each) > 1}
     return [*([each] for each in single), *several.values()]
 
 
@@ -92,3 +133,58 @@ def trimmed(curves: Sequence[Curve], weight: FloatArray) -> list[Curve]:
         else curve
         for curve, at in zip(curves, used, strict=True)
     ]
+
+
+def likeliest_followed(seen: Scanned) -> Found | None:
+    """The likeliest patch between two rejected runs of one station, if it is likelier than the runs as two patches."""
+    if len(seen.scene.rates) > 1:
+        return None
+    found, n, work = list[Found](), seen.samples, for_lasting_faults(seen.samples)  # so that enough is left for jumps
+    scene = seen.scene._replace(work=work)
+    for stretches in followed(seen):
+        if not worth(scene):
+            break
+        near = seen.near(min(each.begin for each in stretches), max(each.end for each in stretches))
+        part, at_jumps = scene.part(near), [each.at_jumps(seen.jumps) for each in stretches]
+        with contextlib.suppress(ValueError, np.linalg.LinAlgError):
+            ends = [[curve.within(near) for curve in of_terms(each, TERMS[0])] for each in (stretches, at_jumps)]
+            first = of_few_terms(part, ends, FOLLOWED, prior(ends[0], n))
+            if first is None:
+                continue
+            runs = [curve for each in stretches for curve in each.runs()]
+            null = max(weighed_on(part, near, curves).log_probability for curves in ((), runs))
+            best = of_any_shape(part, first)
+            best = max(
+                best, weighed_on(part, slice(0, len(part.possible)), best.curves), key=lambda each: each.log_probability
+            )
+            gain = best.log_probability - null + prior(best.curves, n)
+            if gain < MOST_EACH * part.possible.sum():
+                found.append(Found(in_whole(best, near, n), best.sigma, gain))
+    return max((each for each in found if each.gain > FOLLOWED), key=lambda each: each.gain, default=None)
+
+
+def of_few_terms(part: Scene, ends: Sequence[Sequence[Curve]], least: float, prior: float) -> Weighed | None:
+    """The likeliest of curves of a few terms with these ends; None if those with the last ends explain the part of a
+    log no better than motion does, and most terms too little for a gain of so much with this prior: motion that does
+    not follow the patch leaves more to them."""
+    most, weight = [curve.of(max(TERMS)) for curve in ends[-1]], part.log.weight
+    if not leaves_curves(part, most, least - prior, as_it_is(part, weight, part.at_median)):
+        return None
+    without, first = weighed(part, weight, ()), weighed(part, weight, ends[-1])
+    if first.log_probability > without.log_probability or leaves_curves(part, most, least, without):
+        return _likeliest(part, ends[:-1], first)
+    return None
+
+
+def of_any_shape(part: Scene, best: Weighed) -> Weighed:
+    """The likeliest curves of any number of terms, first with these ends, then with those that their readings show."""
+    most = min(curve.end - curve.begin for curve in best.curves) // PER_TERM
+    best = _likeliest(part, ([curve.of(terms) for curve in best.curves] for terms in TERMS[1:] if terms <= most), best)
+    for _ in range(TRIMMED):
+        best = _likeliest(part, [trimmed(best.curves, best.weight)], best)
+    return best
+
+
+def _likeliest(part: Scene, of: Iterable[Sequence[Curve]], *others: Weighed) -> Weighed:
+    tried = (weighed(part, part.log.weight, curves) for curves in of)
+    return max((*others, *tried), key=lambda each: each.log_probability)

@@ -20,6 +20,8 @@ SPANS, APART, MOST_SPANS = 2, 3, 4  # stretches on either side of a jump, cells 
 PER_TERM = 5.0  # in log-likelihood, for a scan to prefer a stretch of more terms
 TERMS = (1, 2, 3, 5)
 LONGEST, FARTHEST = 0.5, 5000  # of the log, and samples: what is off for longer is off for good
+LONGEST_AT_END = 0.3  # of the log, at one of its ends: on one side alone a longer curve may as well be motion
+END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step may as well be a patch
 CELLS, SHORTEST = 200, 3  # cells of a scan, and samples that are off
 TRIED = 13  # samples about a jump, where it is not yet known to the sample
 
@@ -57,8 +59,22 @@ def proposals(scene: Scene, located: LocatedJump) -> Iterator[list[Curve]]:
         other = edge if more else other_end(part, near, edge, located.width, more)
         begin, end = here.start + min(near.sample, other), here.start + max(near.sample, other)
         for terms in TERMS:
-            if (terms > 1) == more and end - begin >= SHORTEST and (terms == 1 or terms <= (end - begin) // 4):
+            curve = terms > 1
+            fits = end - begin >= SHORTEST and not (
+                curve and (terms > (end - begin) // 4 or is_one_sided(begin, end, n))
+            )
+            if curve == more and fits:
                 yield [Curve(c, begin, end, (0.0,) * terms, s) for c, s in located.channels]
+
+
+def near_end(n: int) -> int:
+    """Samples at either end of a log of n that are too few to tell of what lies before them."""
+    return 1 + min(END, int(SHARE * n))
+
+
+def is_one_sided(begin: int, end: int, n: int) -> bool:
+    """Whether a curve has a track on one of its sides alone, and is too long for that."""
+    return end - begin > LONGEST_AT_END * n and min(begin, n - end) < near_end(n)
 
 
 def steps(scene: Scene, channels: Channels, sample: int) -> list[list[Curve]]:

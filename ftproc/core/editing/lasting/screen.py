@@ -20,11 +20,13 @@ from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.weighing import Scene, Weighed, as_it_is
 from ftproc.core.filtering.columns import said_of
 from ftproc.core.filtering.records import Model, Observations
+from ftproc.core.identification.profile import median_level
 from ftproc.core.identification.stretches import runs_of
 from ftproc.records import FloatArray
 
 LEFT = 6.0  # in log-likelihood. With the process noise of the part: up to 5.4 where there is no step, from 7 on where
 # there is; with the median of the log, from 13 on
+HIDDEN = 25.0  # the same by the typical process noise of the part, where it may have grown for the jump: turns 20
 
 
 def leaves_a_jump(part: Scene, jump: Jump, around: tuple[int, int], without: Weighed) -> bool:
@@ -42,6 +44,8 @@ def leaves_a_jump(part: Scene, jump: Jump, around: tuple[int, int], without: Wei
     for way in jump.ways:
         taken_in = _with_rejected(part, way, jump.station, around, without.weight)
         if _is_more_than(LEFT, part, gain, without, taken_in):
+            return True
+        if len(without.model.jerk) > 1 and gain(part.log, median_level(without.model)) > HIDDEN:
             return True
     return False
 
@@ -64,13 +68,12 @@ def _is_more_than(
 ) -> bool:
     """Whether there is such a gain as the part is understood without a fault, or with rejected readings taken in (n, 3)
     weights, whose rejection then need not be explained."""
-    weight, model = without.weight, without.model
-    if gain(part.log._replace(weight=weight), model) > least:
+    if gain(part.log._replace(weight=without.weight), without.model) > least:
         return True
-    if (taken_in == weight).all():
+    if (taken_in == without.weight).all():
         return False
-    more = as_it_is(part, taken_in, model).log_probability - without.log_probability
-    return gain(part.log._replace(weight=taken_in), model) + more > least
+    more = as_it_is(part, taken_in, without.model).log_probability - without.log_probability
+    return gain(part.log._replace(weight=taken_in), without.model) + more > least
 
 
 def _with_rejected(

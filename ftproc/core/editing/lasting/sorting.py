@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.faults import MOTION, PATCH, STEP, Rival, Step
-from ftproc.core.editing.lasting.search import MARGIN
+from ftproc.core.editing.lasting.proposals import near_end
+from ftproc.core.editing.lasting.scanned import MARGIN
 from ftproc.core.editing.lasting.weighing import Found, Scene
 from ftproc.order_statistics import median
 
-MOVES, SECOND = 15.0, 4.0  # in log-probability, before half of a log is moved, and by which it must not be a patch
+MOVES = 15.0  # in log-probability, before half of a log is moved
 HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
 BEFORE, SEEN = 12, 0.25  # samples before a step, and share of them that may be good
 SURE = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
-END, SHARE = 48, 0.1  # samples at either end, or share of a short log, in which a step may as well be a patch
 
 
 class SortedOut(NamedTuple):
@@ -36,11 +36,12 @@ class SortedOut(NamedTuple):
 def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
     """What follows from the faults of a log."""
     n, noise_variance = len(scene.possible), scene.at_median.noise_variance
-    near_end = 1 + min(END, int(SHARE * n))
     result = SortedOut(np.zeros((n, 3), bool), [], [], [])
     for each in found:
         for curve, sigma in zip(each.curves, each.sigma, strict=True):
-            if curve.end < n or min(curve.begin, n - curve.begin) < near_end:
+            is_level = curve.end == n and len(curve.size) == 1
+            other_target = len(each.curves) == CLOCK and each.gain > MOVES * CLOCK  # no encoder or mount
+            if not is_level or other_target or min(curve.begin, n - curve.begin) < near_end(n):
                 if curve.component != CLOCK and each.gain > MARGIN:
                     side = slice(0, curve.begin) if curve.end == n and 2 * curve.begin < n else curve.rows
                     result.banned[side, curve.component] = True
@@ -48,12 +49,11 @@ def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
                 continue
             if curve.component == CLOCK:
                 large = not _may_be_a_halt(scene, curve)
+            elif not _seen_before(scene, curve):
+                continue
             else:
-                large = abs(curve.size[0]) > SURE * math.sqrt(noise_variance[curve.component]) and _seen_before(
-                    scene, curve
-                )
-            second = max((other.gain for other in each.others), default=0.0)
-            sure = bool(large and each.gain > MOVES and each.gain - second > SECOND)
+                large = abs(curve.size[0]) > SURE * math.sqrt(noise_variance[curve.component])
+            sure = bool(large and each.gain > MOVES)
             step = Step(curve.component, curve.begin, curve.size[0], sigma, sure)
             (result.steps if step.sure else result.doubtful).append(step)
             result.rivals.extend(_rivals(each, curve, STEP if step.sure else MOTION, step, n))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ftproc.core.editing import two_pass
-from ftproc.core.editing.lasting import search, shapes
-from ftproc.core.editing.lasting.between import MOST, Between, followed, trimmed
+from ftproc.core.editing.lasting import between
+from ftproc.core.editing.lasting.between import MOST, Between, between_jumps, between_runs, together, trimmed
 from ftproc.core.editing.lasting.curves import Curve
 from ftproc.core.editing.lasting.scan import Jump
 from ftproc.simulation import simulate
@@ -19,9 +19,10 @@ PATCHES = "isolated=0.01:6-300,offset=2:8-30:8-200,ramp=1:10-30:20-200,burst=1:8
 
 
 def found_in(some, jumps=None):
-    """What may have been followed where there is a jump of all components at each sample, or at these."""
+    """What may have been followed between rejected runs where there is a jump of all components at each sample, or at
+    these."""
     ways = ((0,), (1,), (2,))
-    return followed(some, [Jump(9.0, k, 0, ways) for k in (range(N) if jumps is None else jumps)], 2)
+    return together(between_runs(some, [Jump(9.0, k, 0, ways) for k in (range(N) if jumps is None else jumps)], 2))
 
 
 def test_a_patch_may_lie_between_two_rejected_runs_of_a_component():
@@ -53,6 +54,14 @@ def test_of_many_runs_the_nearest_are_weighed():
     found = found_in(scene(*runs))
     assert len(found) == MOST
     assert all(each.end - each.begin == 18 for (each,) in found)
+
+
+def test_a_patch_may_lie_between_two_jumps_of_a_component():
+    all_seen = np.ones((N, 3), bool)
+    jumps = [Jump(9.0, 60, 0, ((0,), (3,))), Jump(8.0, 100, 0, ((1,),)), Jump(7.0, 120, 0, ((0, 1),))]
+    assert between_jumps(jumps, jumps[2:], 2, all_seen) == [Between(0, 58, 62, 118, 122)]
+    assert between_jumps(jumps, jumps[1:2], 2, all_seen) == []
+    assert between_jumps(jumps, jumps[2:], 2, all_seen & (abs(np.arange(N)[:, None] - 90) > 10)) == []
 
 
 def test_it_goes_from_the_largest_jump_in_the_first_run_to_that_in_the_last():
@@ -93,19 +102,19 @@ def test_two_patches_with_flight_between_them_are_not_one_that_was_followed(monk
     with monkeypatch.context() as without_the_runs:
         without_the_runs.setattr(Between, "runs", lambda self: [])
         assert error_m() < 1.0
-        without_the_runs.setattr(shapes, "leaves_curves", lambda *of: True)
+        without_the_runs.setattr(between, "leaves_curves", lambda *of: True)
         assert error_m() > 10.0
-    monkeypatch.setattr(shapes, "leaves_curves", lambda *of: True)
+    monkeypatch.setattr(between, "leaves_curves", lambda *of: True)
     assert error_m() < 1.0
 
 
 @pytest.mark.compiled
 def test_hardly_any_curves_are_weighed_where_nothing_was_followed(monkeypatch):
     """A flight of turns with rejected runs on either side of them."""
-    flight, weighed = simulate("manoeuvre", seed=261, duration_s=60.0, dt_s=0.1, outliers=PATCHES), shapes.weighed
-    stretches, each = list[object](), list[object]()
-    monkeypatch.setattr(search, "of_few_terms", lambda *of: stretches.append(0) or shapes.of_few_terms(*of))
-    monkeypatch.setattr(shapes, "weighed", lambda *of: each.append(0) or weighed(*of))
+    flight, weighed = simulate("manoeuvre", seed=261, duration_s=60.0, dt_s=0.1, outliers=PATCHES), between.weighed
+    few, stretches, each = between.of_few_terms, list[object](), list[object]()
+    monkeypatch.setattr(between, "of_few_terms", lambda *of: stretches.append(0) or few(*of))
+    monkeypatch.setattr(between, "weighed", lambda *of: each.append(0) or weighed(*of))
 
     def weighings():
         stretches.clear(), each.clear()
@@ -113,7 +122,7 @@ def test_hardly_any_curves_are_weighed_where_nothing_was_followed(monkeypatch):
         return len(each) / len(stretches)
 
     assert weighings() < 1
-    monkeypatch.setattr(shapes, "leaves_curves", lambda *of: True)
+    monkeypatch.setattr(between, "leaves_curves", lambda *of: True)
     assert weighings() > 6
 
 

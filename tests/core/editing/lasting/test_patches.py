@@ -44,7 +44,7 @@ def test_a_patch_of_half_a_minute_is_found_whatever_its_shape(c, shape):
         rejected = (found.weight[A:B, c][off] == 0).mean() > 0.9
         assert rejected or [(s.component, s.sample) for s in found.faults.steps] == [(c, pytest.approx(B, abs=1))]
         assert rejected or shape in ("ramp", "walk-off")
-        assert np.delete(found.weight, np.s_[A - 40 : B + 3], 0).mean() > (0.89 if shape == "walk-off" else 0.99)
+        assert np.delete(found.weight, np.s_[A - 40 : B + 3], 0).mean() > (0.88 if shape == "walk-off" else 0.99)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -7,7 +7,7 @@ import pytest
 
 from ftproc.core import work
 from ftproc.core.editing import two_pass
-from ftproc.core.editing.lasting import clock, screen, search, settling, shapes
+from ftproc.core.editing.lasting import between, clock, scanned, screen, search, settling
 from tests.simulated import simulate
 
 pytestmark = pytest.mark.compiled
@@ -47,9 +47,9 @@ def test_the_work_is_charged_with_each_sample_that_is_weighed(monkeypatch):
         made.append((budget(samples), budget(samples).left))
         return made[-1][0]
 
-    for room in (search, clock, shapes):
+    for room in (search, clock, between, scanned):
         monkeypatch.setattr(room, "weighed", counted)
-    for room in (two_pass, search):  # of the jumps, and of the patches that were followed
+    for room in (two_pass, between):  # of the jumps, and of the patches that were followed
         monkeypatch.setattr(room, "for_lasting_faults", noted)
     two_pass.edit(*flown(steps=2), UNKNOWN)
     assert weighed
