@@ -42,8 +42,7 @@ Run = TypeVar("Run", FilterRun, SmootherRun)
 
 LONGEST_WHOLE = 60_000  # samples of a log that is edited as a whole
 HALFWAY = 0.5  # of the distance to where another understanding puts the target is added to the sigmas
-APART, BESIDE = 0.1, 0.5  # of the largest such distance, from which two tracks part; of the rows in which they do:
-# the largest within so many counts, since tracks that cross may both be wrong there
+APART, BESIDE = 0.1, 0.5  # of the largest such distance, from which tracks part; and of the rows that are nearby then
 KEPT = 30_000  # samples of a segment, without its margins,
 KEPT_MARGINS = 12  # or so many times its margin
 MOST_PIECES = 20  # of a track: what is re-initialized so often shows no motion (two targets in turn: 115)
