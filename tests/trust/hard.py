@@ -67,8 +67,8 @@ SOUND: dict[str, Fault] = {
 GROUPS = {"patches": PATCHES, "combined": COMBINED, "changes": CHANGES, "dirt": DIRT, "sound": SOUND}
 #: Of the groups, a little above what is reached.
 BOUNDS = {
-    "patches": Bound(wrong=0.2, confident=0.08),
-    "combined": Bound(wrong=0.5, confident=0.06),
+    "patches": Bound(wrong=0.16, confident=0.08),
+    "combined": Bound(wrong=0.4, confident=0.06),
     "changes": Bound(wrong=0.18, confident=0.03),
     "dirt": Bound(wrong=0.05, confident=0.02),
     "sound": Bound(wrong=0.02, reported=0.22),
