@@ -136,7 +136,7 @@ def trimmed(curves: Sequence[Curve], weight: FloatArray) -> list[Curve]:
 
 
 def likeliest_followed(seen: Scanned) -> Found | None:
-    """The likeliest patch between two rejected runs of one station, if it is likelier than the runs as two patches."""
+    """The likeliest patch between two rejected runs, or jumps, of one station, if it is likelier than these alone."""
     if len(seen.scene.rates) > 1:
         return None
     found, n, work = list[Found](), seen.samples, for_lasting_faults(seen.samples)  # so that enough is left for jumps

@@ -59,11 +59,9 @@ def proposals(scene: Scene, located: LocatedJump) -> Iterator[list[Curve]]:
         other = edge if more else other_end(part, near, edge, located.width, more)
         begin, end = here.start + min(near.sample, other), here.start + max(near.sample, other)
         for terms in TERMS:
-            curve = terms > 1
-            fits = end - begin >= SHORTEST and not (
-                curve and (terms > (end - begin) // 4 or is_one_sided(begin, end, n))
-            )
-            if curve == more and fits:
+            if (terms > 1) != more or end - begin < SHORTEST:
+                continue
+            if terms == 1 or (terms <= (end - begin) // 4 and not is_one_sided(begin, end, n)):
                 yield [Curve(c, begin, end, (0.0,) * terms, s) for c, s in located.channels]
 
 

@@ -53,8 +53,8 @@ class Scanned(NamedTuple):
         begin, end = max(first - self.around, 0), min(last + self.around, self.samples)
         for possible in self.scene.possible.T:
             before, behind = np.flatnonzero(possible[:first])[-OF_EACH:], np.flatnonzero(possible[last:])[:OF_EACH]
-            begin = min(begin, *before[:1].tolist(), begin)
-            end = max(end, *(last + 1 + behind[-1:]).tolist(), end)
+            begin = min([begin, *before[:1].tolist()])
+            end = max([end, *(last + 1 + behind[-1:]).tolist()])
         return slice(begin, end)
 
 

@@ -107,7 +107,8 @@ def _joined(seen: Scanned, found: Sequence[Found], new: Found) -> list[Found]:
 def _middle(patch: Found, new: Found, n: int) -> Curve | None:
     """What lies between a patch and another, or a step that stays, if both are of the same component alone."""
     (one, *more), (other, *others) = patch.curves, new.curves
-    if more or others or patch.stays(n) or one.component != other.component or one.component == CLOCK:
+    same = (one.component, one.station) == (other.component, other.station)
+    if more or others or patch.stays(n) or not same or one.component == CLOCK:
         return None
     behind = other.begin > one.begin
     begin, end = (one.end, other.begin) if behind else (other.begin if new.stays(n) else other.end, one.begin)

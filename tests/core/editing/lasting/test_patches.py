@@ -118,3 +118,21 @@ def test_a_jump_is_seen_beside_which_readings_were_rejected():
     found = two_pass.edit(ramp.log.time_s, ramp.log.measurement, UNKNOWN)
     assert found.weight[bad, 2].mean() < 0.05
     assert found.weight[~bad, 2].mean() > 0.99
+
+
+@pytest.mark.parametrize(
+    ("name", "seed", "rows", "components"),
+    [
+        ("sidelobe", 7, slice(1062, 1346), [2]),  # what lies between a patch and a step is weighed with them
+        (
+            "two",
+            8,
+            slice(1237, 1729),
+            [0],
+        ),  # a curve of many terms between two jumps, for which process noise has grown
+        ("exchange", 6, slice(1799, 1999), [0, 1, 2]),  # another target at the end of the log
+    ],
+)
+def test_patches_of_hard_flights_are_found(name, seed, rows, components):
+    log = hard.make(name, seed).simulated.log
+    assert edited(log.measurement, log.time_s).weight[rows, components].mean() < 0.05
