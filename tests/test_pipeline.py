@@ -16,7 +16,7 @@ from ftproc.correction.model import MOST_SIGMA, Model
 from ftproc.errors import InputError, UsageError
 from ftproc.methods import registry
 from ftproc.quality.summary import text
-from ftproc.records import MISSING, MeasurementLog
+from ftproc.records import ISOLATED, MISSING, PATCH, MeasurementLog
 from ftproc.settings import FilterSettings
 from tests.correction.test_apply import constant
 from tests.simulated import simulate
@@ -333,3 +333,15 @@ def test_diagnostics_are_what_the_estimate_was_made_from(flight, smooth):
     off = (trajectory.outlier[:, :2] == 1) | (trajectory.outlier[:, :2] == 2)
     if off.any():
         assert np.abs((found.residual / found.residual_sigma)[:, :2][off]).max() > 4
+
+
+@pytest.mark.parametrize("number", [1e300, -1e300, 1e12])
+@pytest.mark.parametrize("channel", [0, 1, 2])
+def test_a_number_that_no_instrument_reads_is_an_outlier(flight, channel, number):
+    z = flight.log.measurement.copy()
+    z[100:103, channel] = np.nan
+    without = pipeline.filter_log(replace(flight.log, measurement=z), FilterSettings())
+    z[101, channel] = number
+    found = pipeline.filter_log(replace(flight.log, measurement=z.copy()), FilterSettings())
+    assert found.outlier[101, channel] in (ISOLATED, PATCH)
+    assert (np.abs(found.state - without.state) < 0.2 * without.sigma).all()

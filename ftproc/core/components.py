@@ -1,5 +1,5 @@
-"""Sums over the readings of each component, and over the components of each sample; numpy's own go along the short rows
-of (n, 3) one by one, which takes ten times as long."""
+"""The components of readings: how large a reading may be, and sums over the readings of each component, and over the
+components of each sample; numpy's own go along the short rows of (n, 3) one by one, which takes ten times as long."""
 
 from __future__ import annotations
 
@@ -7,6 +7,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+FARTHEST = 1e12  # m, rad, m/s: a larger reading is no more of an outlier, but its square would overflow
+
+
+def bounded(readings: NDArray[Any]) -> NDArray[Any]:
+    """A copy of readings, none of which is farther off than FARTHEST."""
+    found: NDArray[Any] = np.clip(readings, -FARTHEST, FARTHEST)
+    return found
 
 
 def totals(values: NDArray[Any]) -> NDArray[Any]:

@@ -9,6 +9,7 @@ from datetime import datetime
 
 import numpy as np
 
+from ftproc.core.components import bounded
 from ftproc.core.editing.copies import without_copies
 from ftproc.core.model.earth import Geodetic
 from ftproc.core.model.frames import wrap
@@ -53,7 +54,7 @@ def as_seen(
     zero = min(float(log.time_s[0]) + shift for log, shift in zip(found, shifts, strict=True))
     seen = []
     for instrument, log, shift in zip(instruments, found, shifts, strict=True):
-        z, accepted = np.array(log.measurement), np.zeros(log.measurement.shape, bool)
+        z, accepted = bounded(log.measurement), np.zeros(log.measurement.shape, bool)
         if log.by_hand is not None:
             flags = log.by_hand.flags
             z[flags == REJECTED], accepted = np.nan, flags == ACCEPTED

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ftproc.config.recipe import Recipe
+from ftproc.core.components import bounded
 from ftproc.files.options import parse_columns, parse_units
 from ftproc.files.reading import further
 from ftproc.files.reading.further import Further
@@ -55,10 +56,10 @@ class Columns(NamedTuple):
 
     def split(self, readings: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Range, azimuth and elevation (n, 3) of readings (n, 5), and (n,) heights above the station, m."""
-        measurement = readings[:, RANGE:RATE].copy()
+        measurement = bounded(readings[:, RANGE:RATE])
         if self.height is None:
             return measurement, np.full(len(measurement), np.nan)
-        above = self.height.unit.to_si(measurement[:, -1]) - self.own_m
+        above = bounded(self.height.unit.to_si(measurement[:, -1])) - self.own_m
         measurement[:, -1] = np.nan
         return measurement, above
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ftproc.core.components import bounded
 from ftproc.core.identification import unseen_motion
 from ftproc.core.live.editor import LiveEditor
 from ftproc.core.model import kinematics
@@ -25,7 +26,7 @@ from ftproc.live.order import Left, Order
 from ftproc.long_records import joined
 from ftproc.methods import heights, live, registry
 from ftproc.methods import range_rates as rates_of
-from ftproc.methods.estimate import FARTHEST, Estimate
+from ftproc.methods.estimate import Estimate
 from ftproc.order_statistics import median
 from ftproc.quality import sanity
 from ftproc.records import MISSING, FloatArray, IntArray, Trajectory
@@ -113,7 +114,7 @@ class Live:
         components = (range_m, azimuth_rad, elevation_rad, range_rate_mps)
         readings = np.broadcast_arrays(*(np.atleast_1d(np.asarray(each, float)) for each in components))
         times = np.atleast_1d(np.asarray(time_s, float))
-        measurement = np.clip(np.stack(readings, 1), -FARTHEST, FARTHEST)
+        measurement = bounded(np.stack(readings, 1))
         if times.shape != measurement.shape[:1]:
             raise InputError(f"there are {len(times)} times for {len(measurement)} readings; give as many of each.")
         rows = self._taken + np.arange(len(times)) if row is None else np.atleast_1d(np.asarray(row, np.int64))

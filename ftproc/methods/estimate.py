@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.by_hand import NOTHING, Accepted
+from ftproc.core.components import bounded
 from ftproc.core.editing.lasting.faults import Faults
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start, Uneven
 from ftproc.core.filtering.smoother import SmootherRun
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: stands in for a component that is missing throughout
 Run = TypeVar("Run", FilterRun, SmootherRun)
 _ONCE = {"innovation", "residual", "nis", "weight"}  # that a reading has, and not a state
-FARTHEST = 1e12  # m, rad: a larger reading is no more of an outlier, but its square would overflow
 SPANS, SPAN = 6, 2_000
 MOST_INTERVALS = 250_000  # between neighbours, for a typical one to be found among them
 
@@ -77,7 +77,7 @@ class Recording:
 
     def part(self, rows: slice) -> Readings:
         """The readings of a stretch, with times from the log's beginning."""
-        measurement = np.clip(self.measurement[rows], -FARTHEST, FARTHEST)
+        measurement = bounded(self.measurement[rows])
         if self.rejected is not None:
             measurement[self.rejected[rows]] = np.nan
         for c in self.absent:
@@ -85,7 +85,7 @@ class Recording:
         time_s = np.asarray(self.time_s[rows]) - float(self.time_s[0])
         forget(self.time_s, self.measurement)
         uneven = None if self.uneven is None else self.uneven.part(rows)
-        rate = None if self.range_rate is None else np.ascontiguousarray(self.range_rate[rows])
+        rate = None if self.range_rate is None else np.ascontiguousarray(bounded(self.range_rate[rows]))
         measurement = np.ascontiguousarray(measurement)
         beside = uneven, rate, self.rate_interval_mps
         return Readings(time_s, measurement, self.assumed_sigma, self.accepted, *beside)

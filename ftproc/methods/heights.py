@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.by_hand import Accepted
+from ftproc.core.components import bounded
 from ftproc.core.editing.copies import rounding_step
 from ftproc.core.filtering.records import Uneven
 from ftproc.core.model import kinematics
@@ -92,13 +93,12 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
         by_hand = log.by_hand.of("height")
     if heights is None or not np.isfinite(heights.above_m).any() or settings.height is not None:
         return recording, Common(_prior(log, settings, causal), np.zeros(len(log)))
-    measurement = np.array(log.measurement)
+    measurement = bounded(log.measurement)
     station_m = settings.site[2] if settings.site is not None else 0.0
     if causal:
         return _as_they_come(recording, log, by_hand, station_m)
-    above, slant = heights.above_m - station_m, _cleaned_ranges(recording, settings)
-    step = rounding_step(heights.above_m)
-    above = np.where(by_hand == REJECTED, np.nan, above)
+    above = np.where(by_hand == REJECTED, np.nan, bounded(heights.above_m) - station_m)
+    slant, step = _cleaned_ranges(recording, settings), rounding_step(heights.above_m)
     own, good = screened(log.time_s, above, step)
     good |= by_hand == ACCEPTED
     rejected = np.isfinite(above) & ~good
@@ -130,8 +130,8 @@ def _as_they_come(
     """The recording with elevations by the heights, each with the range of its own row, and what is known of these by
     then; the editor finds their noise and outliers."""
     assert log.heights is not None
-    measurement = np.array(log.measurement)
-    above = np.where(by_hand == REJECTED, np.nan, log.heights.above_m - station_m)
+    measurement = bounded(log.measurement)
+    above = np.where(by_hand == REJECTED, np.nan, bounded(log.heights.above_m) - station_m)
     measurement[:, 2] = elevation(above, measurement[:, 0])
     _check(log, np.isfinite(above) & (measurement[:, 0] > 0), measurement[:, 2])
     ground = measurement[:, 0] * np.cos(measurement[:, 2])

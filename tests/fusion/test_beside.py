@@ -128,3 +128,20 @@ def test_flight_levels_alone_give_a_place(tmp_path):
     assert inside > 0.95
     assert horizontal < 400
     assert np.median(found.trajectory.sigma[:, 2]) > 60
+
+
+@pytest.mark.parametrize("channel", ["range", "azimuth", "elevation", "rate"])
+def test_numbers_that_no_instrument_reads_are_outliers(plain, tmp_path, channel):
+    simulated, reference, _ = plain
+    simulated = with_rates(simulated, 100.0)
+    first, *rest = simulated.stations
+    z, rate = first.log.measurement.copy(), first.log.range_rate.copy()
+    for row, number in ((40, 1e300), (41, -1e300), (90, 1e15)):
+        if channel == "rate":
+            rate[row] = number
+        else:
+            z[row, ("range", "azimuth", "elevation").index(channel)] = number
+    first = replace(first, log=replace(first.log, measurement=z, range_rate=rate))
+    found = fused(replace(simulated, stations=(first, *rest)), tmp_path)
+    off = np.abs(found.trajectory.state[:, :3] - reference.trajectory.state[:, :3])
+    assert (off < 0.5 * reference.trajectory.sigma[:, :3]).all()

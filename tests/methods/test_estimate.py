@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ftproc.core.components import FARTHEST
 from ftproc.core.filtering.records import FilterRun, Model
-from ftproc.methods.estimate import ASSUMED_READING, FARTHEST, MOST_INTERVALS, Estimate, Recording, typical_interval
+from ftproc.methods.estimate import ASSUMED_READING, MOST_INTERVALS, Estimate, Recording, typical_interval
 
 N = 40
 

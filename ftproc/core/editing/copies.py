@@ -38,7 +38,7 @@ NOISE_SHARE, OF_NORMAL = 0.2, 0.2533  # share of third differences that gives th
 BEYOND, ALTERNATE = 5.0, -0.3  # times the noise that count, and correlation of third differences that noise has at most
 TELLS = 0.2  # of the noise: coarser rounding hides whether there is any
 MOVED = 10.0  # times the noise that readings of a target that moves change meanwhile
-PRECISION, COARSER, DIFFERENCES = 1e-11, 10.0, 24  # of the largest reading, from which two differ; times that, for a
+PRECISION, COARSER, DIFFERENCES = 1e-11, 10.0, 24  # of the typical reading, from which two differ; times that, for a
 # step to be one; and differences between neighbouring values, the smallest, from which it is found
 
 
@@ -85,7 +85,7 @@ def rounding_step(channel: FloatArray) -> float:
 def _grid(readings: FloatArray, levels: FloatArray) -> float:
     """The same of readings (m,) that are there; levels: their values in order, each once."""
     steps = np.diff(levels)
-    steps = steps[steps > 1e-12 * np.abs(levels).max(initial=0.0)]
+    steps = steps[steps > ROUNDING * typical(np.abs(levels))] if len(steps) else steps
     if not len(steps):
         return 0.0
     chosen, level = steps[:: 1 + len(steps) // SOME], float(levels[len(levels) // 2])
@@ -108,7 +108,7 @@ def _step(values: FloatArray) -> float:
     single step apart, so it is the greatest common divisor of small differences."""
     levels = distinct(values)
     step, differences = _grid(values, levels), np.diff(levels)
-    least = PRECISION * float(np.abs(values).max(initial=0.0))
+    least = PRECISION * typical(np.abs(values)) if len(values) else 0.0
     differences = differences[differences > least]
     if step > 0 or not len(differences):
         return step

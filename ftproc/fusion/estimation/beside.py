@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from ftproc.core import beside as understanding
+from ftproc.core.components import bounded
 from ftproc.core.editing.copies import rounding_step
 from ftproc.core.filtering import beside as layout
 from ftproc.core.filtering.records import Scalars
@@ -61,12 +62,12 @@ def sides(log: MeasurementLog, place: FloatArray, origin: Geodetic | None) -> tu
     """What a log has beside its readings, and the 1-sigma (2,) of offset m and scale of its heights."""
     found, prior = [], np.zeros(2)
     if log.range_rate is not None and np.isfinite(log.range_rate).any():
-        value = np.array(log.range_rate)
+        value = bounded(log.range_rate)
         side = Side(RANGE_RATE, layout.RATE, value, 1.0, np.isfinite(value).astype(float), place)
         found.append(side._replace(interval=log.station.range_rate_interval_mps))
     if log.heights is not None and np.isfinite(log.heights.above_m).any():
         radius, level = _earth(origin)
-        above, centre = log.heights.above_m - level, np.array([0.0, 0.0, -radius])
+        above, centre = bounded(log.heights.above_m) - level, np.array([0.0, 0.0, -radius])
         own, good = heights.screened(log.time_s, above, rounding_step(log.heights.above_m))
         found.append(Side(HEIGHT, layout.DISTANCE, above, own, good.astype(float), centre, True, level))
         prior = np.array([heights.PRESSURE_M, heights.TEMPERATURE]) * log.heights.barometric

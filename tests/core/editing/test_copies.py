@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ftproc.core.editing.copies import COMPUTED, HELD, INTERPOLATED, MEASURED, without_copies
+from ftproc.core.editing.copies import COMPUTED, HELD, INTERPOLATED, MEASURED, rounding_step, without_copies
 
 N, DT = 600, 0.1
 TIME = DT * np.arange(N)
@@ -157,3 +157,12 @@ def test_a_target_that_rests_a_while_is_measured(noise):
     assert (without_copies(TIME, z)[1] == MEASURED).all()
     slow = 0.98 ** np.abs(np.arange(N)[:, None] - np.arange(N)) @ np.random.default_rng(3).standard_normal((N, 3))
     assert (without_copies(TIME, readings(4, 0.0) + slow * np.array([2.0, 3e-4, 3e-4]))[1] == MEASURED).all()
+
+
+@pytest.mark.parametrize("far", [1e6, 1e12, -1e12])
+def test_the_rounding_shows_beside_a_reading_that_is_none(far):
+    z = rounded(readings())
+    z[7] = far
+    assert [rounding_step(channel) for channel in z[:, 1:].T] == pytest.approx([1e-6, 1e-6])
+    _, kind = without_copies(TIME, z)
+    assert not kind.any()

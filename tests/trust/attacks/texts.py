@@ -7,7 +7,9 @@ import random
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.trust.attacks.attack import HEAD, LINES, ROWS, TEXT, Attack, Make, file, packed
+import numpy as np
+
+from tests.trust.attacks.attack import HEAD, LINES, ROWS, TEXT, A, Attack, E, Make, N, R, T, file, packed
 
 _MB = 1_000_000
 
@@ -256,4 +258,21 @@ def stations(draw: random.Random) -> Iterator[Attack]:
         yield Attack(f"noise {noise}", file("a.csv", TEXT), ("--noise", noise), reads=False)
 
 
-ALL = (names, lines, documents, archives, addresses, times, stations)
+def readings(draw: random.Random) -> Iterator[Attack]:
+    """Single numbers that no instrument reads, in every channel."""
+    rate, above = 40.0 + 0.0 * T, R * np.sin(E)
+    for absent in ("", "elevation_rad"):
+        columns = dict(zip(HEAD.split(","), (T, R, A, E), strict=True), range_rate_mps=rate, height_m=above)
+        columns.pop(absent or "height_m")
+        for name in list(columns)[1:]:
+            for value in ("1e300", "-1e300", "1e18", "-3e11", "7e9"):
+                rows = [[f"{v!r}" for v in row] for row in np.stack(list(columns.values()), 1).tolist()]
+                for k in draw.sample(range(N), 4):
+                    rows[k][list(columns).index(name)] = value
+                text = "\n".join([",".join(columns), *(",".join(row) for row in rows), ""])
+                for way in ((), ("--editing", "forward")):
+                    label = f"{name} of {value}{', without elevations' if absent else ''} {' '.join(way)}".strip()
+                    yield Attack(label, file("a.csv", text), way, reads=True)
+
+
+ALL = (names, lines, documents, archives, addresses, times, stations, readings)
