@@ -86,7 +86,7 @@ RULES: dict[str, tuple[Off, ...]] = {
     "very late stamps": (Off(TWO_PASS, "allow_for_very_late_stamps", _pair),),
     "rejected runs": (Off(TWO_PASS, "reassess_rejected", lambda record, decision, work: (decision, ())),),
     "faults that last": (Off(f"{EDITING}.lasting.settling", "search", _empty),),
-    "jumps that the part around them explains": (Off(f"{EDITING}.lasting.search", "leaves_a_jump", lambda *_: True),),
+    "jumps that the part around them explains": (Off(f"{EDITING}.lasting.search", "left_of", lambda part, jump, *_: jump),),
     "clocks that jump in a gap": (Off(f"{EDITING}.lasting.clock", "gaps", _empty),),
     "noise of what is rejected": (Off(TWO_PASS, "_rejects_many", lambda *_: False),),
     "others that are as likely": (Off(TWO_PASS, "others", _empty),),

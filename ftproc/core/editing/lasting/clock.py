@@ -132,8 +132,8 @@ def _first(scene: Scene, weight: FloatArray, curve: Curve) -> Iterator[float]:
     time_s, z = scene.log.time_s[after], scene.log.measurement[after]
     interval_s = scene.setting.interval_s()
     tried_s = np.arange(-COMPARED * interval_s, time_s[0] - log.time_s[0], interval_s / PLACES)
-    away = np.stack([_away(log.time_s, state, time_s - late_s, z) for late_s in tried_s])
-    off = np.abs(away) / np.sqrt(scene.at_median.noise_variance)
+    away = _away(log.time_s, state, (time_s - tried_s[:, None]).ravel(), np.tile(z, (len(tried_s), 1)))
+    off = np.abs(away).reshape(len(tried_s), len(z), 3) / np.sqrt(scene.at_median.noise_variance)
     loss = np.nanmedian(off[:, :, np.isfinite(z).any(0)], 1).sum(1)
     inner = np.flatnonzero((loss[1:-1] <= loss[:-2]) & (loss[1:-1] <= loss[2:])) + 1
     for k in sorted(inner.tolist(), key=lambda k: loss[k])[:TRIED]:

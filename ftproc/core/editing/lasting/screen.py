@@ -9,6 +9,7 @@ The same of the curves of a patch that was followed.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -29,29 +30,33 @@ LEFT = 6.0  # in log-likelihood. With the process noise of the part: up to 5.4 w
 HIDDEN = 25.0  # the same by the typical process noise of the part, where it may have grown for the jump: turns 20
 
 
-def leaves_a_jump(part: Scene, jump: Jump, around: tuple[int, int], without: Weighed) -> bool:
-    """Whether one of the ways of a jump makes a part of a log likelier than it is without a fault. around: the sample
-    of the part about which the jump is, and how far from it at most."""
+def left_of(part: Scene, jump: Jump, around: tuple[int, int], without: Weighed) -> Jump:
+    """A jump with those of its ways that make a part of a log likelier than it is without a fault, and with that of a
+    clock, if there are any: it is no linear problem. around: the sample of the part about which it is, and how far
+    from it at most."""
     edges = edges_about(len(part.possible), *around)
-    if (CLOCK,) in jump.ways and gain_at_a_gap(part, around[0], without.weight, without.model) > LEFT:
-        return True
 
-    def gain(log: Observations, model: Model) -> float:
+    def gain(way: tuple[int, ...], log: Observations, model: Model) -> float:
         """With a step of some channels at one of the edges, as if each were off alone."""
         channels, starts = [(channel, jump.station) for channel in way], part.starts(log)
         return sum(float(scan.steps_of(log, model, starts, part.setting, c, edges)[1:].max()) for c in channels)
 
-    for way in jump.ways:
+    def leaves(way: tuple[int, ...]) -> bool:
         taken_in = _with_rejected(part, way, jump.station, around, without.weight)
-        if _is_more_than(LEFT, part, gain, without, taken_in):
+        if _is_more_than(LEFT, part, partial(gain, way), without, taken_in):
             return True
-        if len(without.model.jerk) > 1 and gain(part.log, median_level(without.model)) > HIDDEN:
+        if len(without.model.jerk) > 1 and gain(way, part.log, median_level(without.model)) > HIDDEN:
             return True
-    return False
+        return way == (CLOCK,) and gain_at_a_gap(part, around[0], without.weight, without.model) > LEFT
+
+    left = [way for way in jump.ways if leaves(way)]
+    return jump._replace(ways=tuple(way for way in jump.ways if way in left or (left and way == (CLOCK,))))
 
 
 def leaves_curves(part: Scene, curves: Sequence[Curve], least: float, without: Weighed) -> bool:
-    """Whether curves make a part of a log by so much likelier than it is without a fault."""
+    """Whether curves make a part of a log by so much likelier than it is without a fault, and than their terms do by
+    chance."""
+    chance = 0.5 * sum(len(curve.size) for curve in curves)
 
     def gain(log: Observations, model: Model) -> float:
         """With the likeliest sizes."""
@@ -60,7 +65,7 @@ def leaves_curves(part: Scene, curves: Sequence[Curve], least: float, without: W
         score, information = said.score / scale, said.information / scale / scale[:, None]
         return 0.5 * float(score @ np.linalg.lstsq(information, score, rcond=None)[0])
 
-    return _is_more_than(least, part, gain, without, np.maximum(without.weight, part.taking_in(curves)))
+    return _is_more_than(least + chance, part, gain, without, np.maximum(without.weight, part.taking_in(curves)))
 
 
 def _is_more_than(

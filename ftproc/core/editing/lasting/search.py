@@ -31,7 +31,7 @@ from ftproc.core.editing.lasting.scanned import (
     weighed_on,
     worth,
 )
-from ftproc.core.editing.lasting.screen import leaves_a_jump
+from ftproc.core.editing.lasting.screen import left_of
 from ftproc.core.editing.lasting.weighing import Found, Scene, Weighed, as_it_is, weighed
 from ftproc.core.identification.profile import median_level
 
@@ -145,10 +145,10 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     around = jump.sample - near.start, seen.width
     # What was rejected of one station, others may show to be right.
     screened = len(part.rates) == 1 or bool((part.taken_in == part.log.weight).all())
-    if screened and not leaves_a_jump(part, jump, around, as_it_is(part, part.log.weight, part.at_median)):
+    if screened and not (jump := left_of(part, jump, around, as_it_is(part, part.log.weight, part.at_median))).ways:
         return None
     without = weighed(part, part.log.weight, ())
-    if screened and not leaves_a_jump(part, jump, around, without):
+    if screened and not (jump := left_of(part, jump, around, without)).ways:
         return None
     seen.left.append(jump)
     null = max(each.log_probability for each in (without, weighed(part, part.taken_in, ())))

@@ -60,13 +60,13 @@ def test_the_work_is_charged_with_each_sample_that_is_weighed(monkeypatch):
 def test_a_jump_that_the_part_around_it_does_not_leave_is_not_weighed_as_a_step(monkeypatch, seed):
     """A turn jumps by the process noise of the whole flight; by that of the part around it it does not."""
     looked, weighed = [], []
-    jumps, step = search.leaves_a_jump, search._as_step
-    monkeypatch.setattr(search, "leaves_a_jump", lambda *of: looked.append(jumps(*of)) or looked[-1])
+    jumps, step = search.left_of, search._as_step
+    monkeypatch.setattr(search, "left_of", lambda *of: looked.append(jumps(*of)) or looked[-1])
     monkeypatch.setattr(search, "_as_step", lambda *of: weighed.append(1) or step(*of))
     two_pass.edit(*flown(seed=seed), UNKNOWN)
     assert looked
     assert not weighed
-    monkeypatch.setattr(search, "leaves_a_jump", lambda *of: True)
+    monkeypatch.setattr(search, "left_of", lambda part, jump, *_: jump)
     found = two_pass.edit(*flown(seed=seed), UNKNOWN)
     assert weighed
     assert found.faults.steps == ()
