@@ -33,7 +33,7 @@ class Off(NamedTuple):
 
     module: str
     name: str
-    stands: Callable[..., Any]
+    stands: Any
 
 
 class Outcome(NamedTuple):
@@ -86,7 +86,17 @@ RULES: dict[str, tuple[Off, ...]] = {
     "very late stamps": (Off(TWO_PASS, "allow_for_very_late_stamps", _pair),),
     "rejected runs": (Off(TWO_PASS, "reassess_rejected", lambda record, decision, work: (decision, ())),),
     "faults that last": (Off(f"{EDITING}.lasting.settling", "search", _empty),),
-    "jumps that the part around them explains": (Off(f"{EDITING}.lasting.search", "left_of", lambda part, jump, *_: jump),),
+    "jumps that the part around them explains": (
+        Off(f"{EDITING}.lasting.search", "left_of", lambda part, jump, *_: jump),
+    ),
+    "far less than what was found": (
+        Off(f"{EDITING}.lasting.search", "_sharper", _first),
+        Off(f"{EDITING}.lasting.search", "_within_followed", _second),
+    ),
+    "patches of several that were joined": (
+        Off(f"{EDITING}.lasting.search", "_joined", lambda seen, found, new: [*found, new]),
+    ),
+    "jumps that the process noise hides": (Off(f"{EDITING}.lasting.screen", "HIDDEN", np.inf),),
     "clocks that jump in a gap": (Off(f"{EDITING}.lasting.clock", "gaps", _empty),),
     "noise of what is rejected": (Off(TWO_PASS, "_rejects_many", lambda *_: False),),
     "others that are as likely": (Off(TWO_PASS, "others", _empty),),

@@ -47,6 +47,13 @@ class Between(NamedTuple):
         end = next((jump.sample for jump in own if self.high <= jump.sample <= self.end), self.end)
         return self._replace(begin=begin, end=end)
 
+    def is_longest(self, jumps: Sequence[Jump]) -> bool:
+        """Whether what lies between the runs, or the largest jumps in them, is longer than what lies beyond."""
+        sharp = self.at_jumps(jumps)
+        begin = self.low if sharp.begin == self.begin else sharp.begin
+        end = self.high if sharp.end == self.end else sharp.end
+        return end - begin >= max(begin - self.begin, self.end - end)
+
     def runs(self) -> list[Curve]:
         """The rejected runs, each as a patch of its own."""
         return [
@@ -84,10 +91,9 @@ def between_runs(scene: Scene, jumps: Sequence[Jump], within: int) -> list[Betwe
         seen = np.flatnonzero(scene.possible[:, c])
         runs = runs_of(scene.log.weight[seen, c] <= 0, TAKEN_IN).tolist()
         for (k, (a, b)), (m, (d, e)) in itertools.combinations(enumerate(runs), 2):
-            if m - k <= FROM_IT and d - b >= max(b - a, e - d) and e - a <= LONGEST * len(seen):
-                ends = int(seen[a]), int(seen[b]), int(seen[d]), int(seen[e - 1]) + 1
-                found.append((m - k, Between(c, *ends)))
-    return [each for _, each in sorted(found) if each.jumps(jumps, within)][:MOST]
+            if m - k <= FROM_IT and e - a <= LONGEST * len(seen):
+                found.append((m - k, Between(c, int(seen[a]), int(seen[b]), int(seen[d]), int(seen[e - 1]) + 1)))
+    return [each for _, each in sorted(found) if each.is_longest(jumps) and each.jumps(jumps, within)][:MOST]
 
 
 def between_jumps(

@@ -38,6 +38,11 @@ class Curve(NamedTuple):
     def rows(self) -> slice:
         return slice(self.begin, self.end)
 
+    @property
+    def length(self) -> int:
+        """Samples that it acts on."""
+        return self.end - self.begin
+
     def of(self, terms: int) -> Curve:
         """With so many terms, of no size."""
         return self._replace(size=(0.0,) * terms)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from ftproc.core.identification.profile import median_level
 
 ROUNDS = 8  # over a log
 CERTAIN = 4.0  # sigmas of its size from which a component takes part in a fault of several
+FAR_SHORTER = 0.25  # of what is off: what is a little shorter lacks the vague begin of a patch
 OPEN = 12.0  # in log-probability, within which a jump may be one or another: beside agile targets it tells little
 
 
@@ -56,11 +57,36 @@ def search(scene: Scene) -> list[Found]:
     followed = likeliest_followed(first)
     if followed is None:
         return found
+    followed = _within_followed(first, followed)
     beside = [each for each in found if each.adjoins(followed)]
     rest = first._replace(scene=scene.without([c for each in found if each not in beside for c in each.curves]))
     if not beside or _odds_of([followed], rest, *beside) > _odds_of(beside, rest, followed):
         found = [followed, *(each for each in found if each not in beside)]
     return found
+
+
+def _within_followed(seen: Scanned, found: Found) -> Found:
+    """A patch that was followed, or what of it is likelier with one of its ends elsewhere."""
+    n, ends = seen.samples, (found.curves[0].begin, found.curves[0].end)
+    here, channels = seen.near(*ends), [(curve.component, curve.station) for curve in found.curves]
+    part, marks = seen.scene.part(here), [jump.sample for jump in seen.jumps]
+    tried = list[Found]()
+    with contextlib.suppress(ValueError, np.linalg.LinAlgError):
+        known = weighed_on(part, here, [curve.of(len(curve.size)) for curve in found.curves])
+        for end in ends:
+            located = LocatedJump(channels, end, marks, seen.cell, known.model, seen.longest)
+            for curves in _again(part, here, located, known):
+                other = weighed_on(part, here, curves)
+                more = other.log_probability - known.log_probability + prior(curves, n) - prior(found.curves, n)
+                tried.append(Found(in_whole(other, here, n), other.sigma, found.gain + more))
+    return _sharper(found, tried)
+
+
+def _sharper(best: Found, tried: Sequence[Found]) -> Found:
+    """What was found, or the likeliest of what was tried when that was understood, if it is likelier and far shorter:
+    what was found may hold far more than what is off."""
+    shorter = [each for each in tried if each.curves[0].length <= FAR_SHORTER * best.curves[0].length]
+    return max([best, *shorter], key=_gain)
 
 
 def _odds_of(found: Sequence[Found], seen: Scanned, *others: Found) -> float:
@@ -187,16 +213,22 @@ def _best(seen: Scanned, proposed: Sequence[Sequence[Curve]], here: slice, locat
     part, n = seen.scene.part(here), seen.samples
     null = weighed_on(part, here, ()).log_probability
 
+    understood = dict[tuple[Curve, ...], Weighed]()
+
     def outcome(curves: Sequence[Curve]) -> Found:
         found = weighed_on(part, here, curves)
         gain = found.log_probability - null + prior(curves, n)
-        return Found(in_whole(found, here, n), found.sigma, gain)
+        understood[whole := in_whole(found, here, n)] = found
+        return Found(whole, found.sigma, gain)
 
     def odds(of: Found) -> float:
         return of.gain + STAYS * of.stays(n)
 
     outcomes = [outcome(curves) for curves in proposed]
     best = max(outcomes, key=odds)
+    if best.curves[0].component != CLOCK:
+        again = _again(part, here, located._replace(width=seen.cell), understood[best.curves])
+        best = _sharper(best, [outcome(curves) for curves in again if curves not in proposed])
     if not DOUBT <= best.gain < MOST_EACH * part.possible.sum():
         return None
     moves = _moving(best.curves, best.sigma)
@@ -214,6 +246,17 @@ def _best(seen: Scanned, proposed: Sequence[Sequence[Curve]], here: slice, locat
     likeliest = {each.lies(located.sample, n): each for each in nearly}
     likeliest.pop(best.lies(located.sample, n), None)
     return best._replace(others=tuple(likeliest.values()))
+
+
+def _again(part: Scene, here: slice, located: LocatedJump, found: Weighed) -> Iterator[list[Curve]]:
+    """What a jump of a part of a log may be an end of, by the process noise and the outliers of what was found."""
+    scene = part._replace(log=part.log._replace(weight=found.weight), taken_in=found.weight)
+    marks = [mark - here.start for mark in located.marks if here.start < mark < here.stop]
+    own = located._replace(sample=located.sample - here.start, marks=marks, at_median=median_level(found.model))
+    for curves in proposals(scene, own):
+        if curves[0].begin > 0 and curves[0].end < len(part.possible):
+            moved = [(curve.begin + here.start, curve.end + here.start) for curve in curves]
+            yield [curve._replace(begin=a, end=b) for curve, (a, b) in zip(curves, moved, strict=True)]
 
 
 def _moving(curves: Sequence[Curve], sigma: Sequence[float]) -> list[Curve]:
