@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.editing import two_pass
-from ftproc.core.editing.lasting import between
+from ftproc.core.editing.lasting import between, search
 from ftproc.core.editing.lasting.between import MOST, Between, between_jumps, between_runs, together, trimmed
 from ftproc.core.editing.lasting.curves import Curve
 from ftproc.core.editing.lasting.scan import Jump
@@ -102,6 +102,7 @@ def test_two_patches_with_flight_between_them_are_not_one_that_was_followed(monk
     with monkeypatch.context() as without_the_runs:
         without_the_runs.setattr(Between, "runs", lambda self: [])
         assert error_m() < 1.0
+        without_the_runs.setattr(search, "_within_followed", lambda seen, found: found)
         without_the_runs.setattr(between, "leaves_curves", lambda *of: True)
         assert error_m() > 10.0
     monkeypatch.setattr(between, "leaves_curves", lambda *of: True)
