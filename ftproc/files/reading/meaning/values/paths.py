@@ -51,13 +51,14 @@ def middles(angle: FloatArray, count: int) -> FloatArray:
     return np.asarray(middle + np.median(off, axis=1))
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of values that nothing has
 def derived(moment: FloatArray, position: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(n - 1, 3) velocities and (n - 2, 3) accelerations of n positions."""
     velocity = np.diff(position, axis=0) / np.diff(moment)[:, None]
     return velocity, 2 * np.diff(velocity, axis=0) / (moment[2:] - moment[:-2])[:, None]
 
 
-@np.errstate(over="ignore", invalid="ignore")  # values that nothing has
+@np.errstate(over="ignore", invalid="ignore")  # of these, too
 def bent(moment: FloatArray, position: FloatArray, distance: FloatArray) -> float:
     """The acceleration of a path of n medians, or what is left of it without its mean (gravity, thrust), in units of
     v^2 / r; infinite where rows share their times."""
