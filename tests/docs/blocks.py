@@ -142,7 +142,7 @@ BLOCKS = {
     "start": table("python -m tests.bench start", note=TIMES, without="bound"),
     "scale": table("FTPROC_BENCH_ROWS=1e7 python -m tests.bench scale", note=TIMES, without="bound"),
     "live": table("FTPROC_BENCH_ROWS=1e6 python -m tests.bench live", note=TIMES, without="bound"),
-    "reliability": table("python -m tests.trust", note=COUNTS),
+    "security": table("python -m tests.trust security", note=COUNTS),
     "verdicts": table("python -m tests.trust.verdicts 0-19", without="seconds"),
     "hard": table("python -m tests.trust.hard 0-4", without="seconds"),
     "fused-faults": table("python -m tests.trust.fused_faults 0-0", without="seconds"),
