@@ -16,7 +16,11 @@ import numpy as np
 
 from ftproc.core.editing import outlier_chain
 from ftproc.core.editing.decisions import Decision, Record
+from ftproc.core.editing.lasting.between import PER_TERM, TERMS, of_any_shape
+from ftproc.core.editing.lasting.curves import Curve
 from ftproc.core.editing.lasting.faults import MOTION, PATCH, Rival
+from ftproc.core.editing.lasting.scanned import FOLLOWED
+from ftproc.core.editing.lasting.weighing import scene_of, weighed
 from ftproc.core.editing.reassessment import (
     COMPARED_STEPS,
     PROFILE_STEPS,
@@ -99,6 +103,8 @@ def reassess_rejected(record: Record, decision: Decision, work: Work) -> tuple[D
                 best, gain = _likeliest(part, own, run, near.start)
             except ValueError:  # a component has too few readings there
                 continue
+            if gain > 0 and best[run.samples - near.start, run.component].mean() > 0.5:
+                gain = min(gain, _more_than_a_curve(part, own, best, run, near.start))
             if gain > 0:
                 weight[near] = best
             changed = np.flatnonzero(best[:, run.component] != own.weight[:, run.component])
@@ -135,6 +141,21 @@ def _likeliest(part: Record, decision: Decision, run: Run, offset: int) -> tuple
     del found[before.tobytes()]
     gain, other = max(found.values(), key=lambda each: each[0], default=(-np.inf, before))
     return other, gain
+
+
+def _more_than_a_curve(part: Record, decision: Decision, other: FloatArray, run: Run, offset: int) -> float:
+    """By how much more likely motion, by other decisions (n, 3), is than a patch whose readings lie on a curve."""
+    begin, end = int(run.samples[0]) - offset, int(run.samples[-1]) + 1 - offset
+    most = min((end - begin) // PER_TERM, TERMS[0])
+    taken_in = decision.weight.copy()
+    taken_in[run.samples - offset, run.component] = 1.0
+    scene = scene_of(part, _with(part, decision, taken_in), None)
+    try:
+        motion = weighed(scene, other, ())
+        curve = of_any_shape(scene, weighed(scene, taken_in, [Curve(run.component, begin, end, (0.0,) * most)]))
+    except (ValueError, np.linalg.LinAlgError):
+        return np.inf
+    return motion.log_probability + FOLLOWED - curve.log_probability
 
 
 def _ways(part: Record, weight: FloatArray, run: Run, offset: int) -> Iterator[tuple[FloatArray, bool]]:

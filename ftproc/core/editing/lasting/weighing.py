@@ -206,7 +206,7 @@ def _rejections(scene: Scene, weight: FloatArray, smoothed: SmootherRun, model: 
     )  # fmt: skip
 
 
-def scene_of(record: Record, decision: Decision, work: Work) -> Scene:
+def scene_of(record: Record, decision: Decision, work: Work | None) -> Scene:
     """A log as it has been decided on, in which faults that last are sought."""
     log, at_median = record.weighted(decision.weight), median_level(decision.model)
     smoothed = smooth_log(log, decision.model, decision.starts)
