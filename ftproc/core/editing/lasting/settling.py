@@ -1,23 +1,31 @@
-"""The log of a single station without its faults that last: they are sought and taken out, and the rest is decided on
-again, until there are none."""
+"""What follows from the faults of a single station that last: readings of patches are not used, steps are taken out,
+steps that may be an end of a weak patch are left, and the rest is decided on again, until there are none."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.editing.decisions import Decision, Record
-from ftproc.core.editing.lasting.faults import MOTION, Rival, Step, levelled, taken_out, unseen
+from ftproc.core.editing.lasting.curves import CLOCK, Curve
+from ftproc.core.editing.lasting.faults import MOTION, PATCH, STEP, Rival, Step, levelled, taken_out, unseen
+from ftproc.core.editing.lasting.proposals import near_end
+from ftproc.core.editing.lasting.scanned import MARGIN
 from ftproc.core.editing.lasting.search import search
-from ftproc.core.editing.lasting.sorting import sorted_out
-from ftproc.core.editing.lasting.weighing import Scene, scene_of
+from ftproc.core.editing.lasting.weighing import Found, Scene, scene_of
 from ftproc.core.editing.reassessment import log_probability
 from ftproc.core.work import Work
+from ftproc.order_statistics import median
 from ftproc.records import FloatArray
 
+MOVES = 15.0  # in log-probability, before half of a log is moved
+HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
+BEFORE, SEEN = 12, 0.25  # samples before a step, and share of them that may be good
+SURE = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
 STEP_MARGIN = 8.0  # in log-probability, by which steps must explain a log better than late stamps do
 LOST = 100.0  # in log-probability, for each reading that is left out: ten go with the reading itself
 LASTING_ROUNDS = 4  # of the search for faults that last: where one is taken out, another may show
@@ -80,3 +88,70 @@ def _may_be_late_stamps(without: tuple[Record, Decision], levelled_log: tuple[Re
     possible = record.possible & levelled_log[0].possible  # of the same readings
     same = record._replace(possible=possible), decision._replace(weight=decision.weight * possible)
     return log_probability(*levelled_log) < log_probability(*same) + STEP_MARGIN
+
+
+class SortedOut(NamedTuple):
+    """banned (n, 3): readings of patches. steps: that are sure. doubtful: that may be an end of a weak patch. rivals:
+    what else may be, nearly as likely."""
+
+    banned: NDArray[np.bool_]
+    steps: list[Step]
+    doubtful: list[Step]
+    rivals: list[Rival]
+
+
+def sorted_out(scene: Scene, found: Sequence[Found]) -> SortedOut:
+    """What follows from the faults of a log."""
+    n, noise_variance = len(scene.possible), scene.at_median.noise_variance
+    result = SortedOut(np.zeros((n, 3), bool), [], [], [])
+    for each in found:
+        for curve, sigma in zip(each.curves, each.sigma, strict=True):
+            is_level = curve.end == n and len(curve.size) == 1
+            other_target = len(each.curves) == CLOCK and each.gain > MOVES * CLOCK  # no encoder or mount
+            if not is_level or other_target or min(curve.begin, n - curve.begin) < near_end(n):
+                if curve.component != CLOCK and each.gain > MARGIN:
+                    side = slice(0, curve.begin) if curve.end == n and 2 * curve.begin < n else curve.rows
+                    result.banned[side, curve.component] = True
+                    result.rivals.extend(_rivals(each, curve._replace(begin=side.start, end=side.stop), PATCH, None, n))
+                continue
+            if curve.component == CLOCK:
+                large = not _may_be_a_halt(scene, curve)
+            elif not _seen_before(scene, curve):
+                continue
+            else:
+                large = abs(curve.size[0]) > SURE * math.sqrt(noise_variance[curve.component])
+            sure = bool(large and each.gain > MOVES)
+            step = Step(curve.component, curve.begin, curve.size[0], sigma, sure)
+            (result.steps if step.sure else result.doubtful).append(step)
+            result.rivals.extend(_rivals(each, curve, STEP if step.sure else MOTION, step, n))
+    return result
+
+
+def _rivals(found: Found, curve: Curve, chosen: str, step: Step | None, n: int) -> Iterator[Rival]:
+    """What else a fault may be in a component. step: that it was weighed as, if it was."""
+    if chosen == MOTION:
+        yield Rival(curve.component, curve.begin, curve.end, 0.0, chosen, STEP, step)
+    for other in found.others:
+        for each, sigma in zip(other.curves, other.sigma, strict=True):
+            if each.component == curve.component:
+                gain = max(found.gain - other.gain, 0.0)
+                if other.stays(n):
+                    level = Step(each.component, each.begin, each.size[0], sigma)
+                    yield Rival(curve.component, curve.begin, curve.end, gain, chosen, STEP, level)
+                else:
+                    yield Rival(curve.component, each.begin, each.end, gain, chosen, PATCH, step)
+
+
+def _seen_before(scene: Scene, step: Curve) -> bool:
+    """Whether readings just before a step may be good: behind a gap in a component a track may be anywhere."""
+    before = scene.possible[max(step.begin - BEFORE, 0) : step.begin, step.component]
+    return bool(before.mean() > SEEN)
+
+
+def _may_be_a_halt(scene: Scene, clock: Curve) -> bool:
+    """Whether the target may have stood still, or hurried, where its clock seems to jump: to make up for the way that
+    is missing within the jump asks for no more acceleration than things that stand and go have."""
+    (r, _, e), late = scene.log.measurement.T, scene.setting.late
+    speed = np.sqrt(late[:, 0] ** 2 + (r * np.cos(e) * late[:, 1]) ** 2 + (r * late[:, 2]) ** 2)[clock.rows]
+    speed = speed[np.isfinite(speed)]
+    return len(speed) > 0 and 4 * median(speed) < HALTS_MPS2 * abs(clock.size[0])

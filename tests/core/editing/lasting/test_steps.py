@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.editing import two_pass
-from ftproc.core.editing.lasting import faults, sorting
+from ftproc.core.editing.lasting import faults, settling
 from ftproc.core.editing.lasting.curves import CLOCK, Curve, Setting, without
 from ftproc.core.editing.lasting.faults import Shift, Step, levelled
 from ftproc.core.filtering.records import Observations
@@ -123,8 +123,8 @@ def test_a_step_behind_a_gap_of_its_component_is_not_sure(gap, seen):
     possible = np.ones((100, 3), bool)
     possible[60 - gap : 60, 1] = False
     scene = SimpleNamespace(possible=possible)
-    assert sorting._seen_before(scene, Curve(1, 60, 100, (1.0,))) == seen
-    assert sorting._seen_before(scene, Curve(0, 60, 100, (1.0,)))
+    assert settling._seen_before(scene, Curve(1, 60, 100, (1.0,))) == seen
+    assert settling._seen_before(scene, Curve(0, 60, 100, (1.0,)))
 
 
 @pytest.mark.parametrize(("speed_mps", "may_be"), [(2.0, True), (7.0, True), (8.0, False), (200.0, False)])
@@ -136,7 +136,7 @@ def test_a_clock_that_jumps_by_a_second_may_be_a_halt_of_what_is_slow(speed_mps,
     late = -np.gradient(z, 0.1, axis=0)
     z[70] = np.nan
     scene = SimpleNamespace(log=SimpleNamespace(measurement=z), setting=SimpleNamespace(late=late))
-    assert sorting._may_be_a_halt(scene, Curve(CLOCK, 60, 100, (late_s,))) == may_be
+    assert settling._may_be_a_halt(scene, Curve(CLOCK, 60, 100, (late_s,))) == may_be
 
 
 @pytest.mark.parametrize("seed", range(6))
