@@ -47,30 +47,52 @@ class Understood(NamedTuple):
 def without_lasting(
     found: Understood, measurement: FloatArray, decided: Callable[..., tuple[Record, Decision]], work: Work
 ) -> Understood:
-    """The log without the faults that last, decided again as long as there are some."""
+    """The log without the faults that last, decided again as long as there are some: without all that were found, or,
+    where too little is left then, without the likeliest."""
     for _ in range(LASTING_ROUNDS):
-        record, decision = found.record, found.decision
-        if decision.model.coloured:  # which resembles many steps
+        if found.decision.model.coloured:  # which resembles many steps
             break
-        scene = scene_of(record, decision, work)
-        new = sorted_out(scene, search(scene))
-        open_ = [each for each in new.rivals if each.chosen == MOTION]
-        settled = [each for each in found.rivals if each.chosen != MOTION]
-        found = found._replace(doubtful=new.doubtful, rivals=[*settled, *open_], scene=scene)
-        if not new.steps and not new.banned.any():
+        scene = scene_of(found.record, found.decision, work)
+        faults, before = search(scene), found
+        found = _without(before, scene, faults, measurement, decided)
+        if found.record is before.record and (likeliest := _likeliest(faults)):
+            alone = _without(before, scene, likeliest, measurement, decided)
+            found = found if alone.record is before.record else alone
+        if found.record is before.record:
             break
-        steps, banned = (*found.steps, *new.steps), new.banned if found.banned is None else found.banned | new.banned
-        log = record.weighted(decision.weight)
-        moved = levelled(log, scene.at_median.noise_variance, steps)
-        read = taken_out(log._replace(measurement=measurement), scene.at_median, scene.setting, moved)
-        banned = banned | unseen(record.time_s, moved)[:, None]
-        other = decided(read.measurement, banned=banned)
-        if (new.steps and _may_be_late_stamps((record, decision), other)) or (
-            new.banned.any() and _is_lost((record, decision), other, int(new.banned.sum()))
-        ):
-            break
-        found = Understood(*other, steps, banned, new.doubtful, [*settled, *new.rivals], scene)
     return found
+
+
+def _likeliest(faults: Sequence[Found]) -> list[Found]:
+    """The likeliest of several."""
+    return [max(faults, key=lambda each: each.gain)] if len(faults) > 1 else []
+
+
+def _without(
+    found: Understood,
+    scene: Scene,
+    faults: Sequence[Found],
+    measurement: FloatArray,
+    decided: Callable[..., tuple[Record, Decision]],
+) -> Understood:
+    """The log decided on again without some faults of its scene; as it was decided on if that explains it better."""
+    record, decision, new = found.record, found.decision, sorted_out(scene, faults)
+    open_ = [each for each in new.rivals if each.chosen == MOTION]
+    settled = [each for each in found.rivals if each.chosen != MOTION]
+    found = found._replace(doubtful=new.doubtful, rivals=[*settled, *open_], scene=scene)
+    if not new.steps and not new.banned.any():
+        return found
+    steps, banned = (*found.steps, *new.steps), new.banned if found.banned is None else found.banned | new.banned
+    log = record.weighted(decision.weight)
+    moved = levelled(log, scene.at_median.noise_variance, steps)
+    read = taken_out(log._replace(measurement=measurement), scene.at_median, scene.setting, moved)
+    banned = banned | unseen(record.time_s, moved)[:, None]
+    other = decided(read.measurement, banned=banned)
+    if (new.steps and _may_be_late_stamps((record, decision), other)) or (
+        new.banned.any() and _is_lost((record, decision), other, int(new.banned.sum()))
+    ):
+        return found
+    return Understood(*other, steps, banned, new.doubtful, [*settled, *new.rivals], scene)
 
 
 def _is_lost(before: tuple[Record, Decision], other: tuple[Record, Decision], without: int) -> bool:
