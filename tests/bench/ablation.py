@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ftproc.core import threads
+from ftproc.core.editing.lasting.ends import End
 from ftproc.errors import FtprocError
 from ftproc.methods import bridging
 from ftproc.quality.verdict import CONSISTENT
@@ -89,10 +90,13 @@ RULES: dict[str, tuple[Off, ...]] = {
     "jumps that the part around them explains": (
         Off(f"{EDITING}.lasting.search", "left_of", lambda part, jump, *_: jump),
     ),
-    "far less than what was found": (
-        Off(f"{EDITING}.lasting.search", "_sharper", _first),
-        Off(f"{EDITING}.lasting.search", "_within_followed", _second),
+    "jumps by themselves": (
+        Off(f"{EDITING}.lasting.search", "by_itself", lambda *_: End(None, -np.inf)),
+        Off(f"{EDITING}.lasting.search", "instead_of", _nothing),
     ),
+    "patches as often as they are rejected": (Off(f"{EDITING}.lasting.scanned", "_runs", lambda _: np.zeros(0)),),
+    "the likeliest fault alone": (Off(f"{EDITING}.lasting.settling", "_likeliest", _empty),),
+    "rejected runs on a curve": (Off(f"{EDITING}.lasting.rejected_runs", "_more_than_a_curve", lambda *_: np.inf),),
     "patches of several that were joined": (
         Off(f"{EDITING}.lasting.search", "_joined", lambda seen, found, new: [*found, new]),
     ),

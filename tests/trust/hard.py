@@ -64,7 +64,11 @@ SOUND: dict[str, Fault] = {
     "clean": lambda seen, seed: "none" if seed % 2 else "jitter=0.2",
     "abrupt": lambda seen, seed: "none",
 }
-GROUPS = {"patches": PATCHES, "combined": COMBINED, "changes": CHANGES, "dirt": DIRT, "sound": SOUND}
+MANY: dict[str, Fault] = {  # of each component
+    "seldom": lambda seen, seed: "patch=1:4-60:8-200,mixed=1:10-200:8-200",
+    "often": lambda seen, seed: "isolated=0.02:6-300,patch=3:4-60:8-200,mixed=3:10-200:8-200",
+}
+GROUPS = {"patches": PATCHES, "combined": COMBINED, "changes": CHANGES, "dirt": DIRT, "sound": SOUND, "many": MANY}
 #: Of the groups, a little above what is reached.
 BOUNDS = {
     "patches": Bound(wrong=0.16, confident=0.08),
@@ -72,6 +76,7 @@ BOUNDS = {
     "changes": Bound(wrong=0.18, confident=0.03),
     "dirt": Bound(wrong=0.05, confident=0.02),
     "sound": Bound(wrong=0.02, reported=0.22),
+    "many": Bound(wrong=0.6, confident=0.05),
 }
 SEEDS = 5
 SHOWN = {*PATCHES, *COMBINED, "step", "clock"}

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.proposals import LONGEST
 from ftproc.core.editing.lasting.scan import Jump
-from ftproc.core.editing.lasting.scanned import FOLLOWED, MOST_EACH, Scanned, in_whole, prior, weighed_on, worth
+from ftproc.core.editing.lasting.scanned import FOLLOWED, MOST_EACH, Scanned, in_whole, weighed_on, worth
 from ftproc.core.editing.lasting.screen import leaves_curves
 from ftproc.core.editing.lasting.weighing import TAKEN_IN, Found, Scene, Weighed, as_it_is, weighed
 from ftproc.core.identification.stretches import runs_of
@@ -154,7 +154,7 @@ def likeliest_followed(seen: Scanned) -> Found | None:
         part, at_jumps = scene.part(near), [each.at_jumps(seen.jumps) for each in stretches]
         with contextlib.suppress(ValueError, np.linalg.LinAlgError):
             ends = [[curve.within(near) for curve in of_terms(each, TERMS[0])] for each in (stretches, at_jumps)]
-            first = of_few_terms(part, ends, FOLLOWED, prior(ends[0], n))
+            first = of_few_terms(part, ends, FOLLOWED, seen.prior(ends[0]))
             if first is None:
                 continue
             runs = [curve for each in stretches for curve in each.runs()]
@@ -163,7 +163,7 @@ def likeliest_followed(seen: Scanned) -> Found | None:
             best = max(
                 best, weighed_on(part, slice(0, len(part.possible)), best.curves), key=lambda each: each.log_probability
             )
-            gain = best.log_probability - null + prior(best.curves, n)
+            gain = best.log_probability - null + seen.prior(best.curves)
             if gain < MOST_EACH * part.possible.sum():
                 found.append(Found(in_whole(best, near, n), best.sigma, gain))
     return max((each for each in found if each.gain > FOLLOWED), key=lambda each: each.gain, default=None)

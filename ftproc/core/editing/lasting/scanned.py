@@ -12,9 +12,11 @@ from ftproc.core.editing.lasting import clock, scan
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.proposals import CELLS, LONGEST, cell_of
 from ftproc.core.editing.lasting.scan import Jump
-from ftproc.core.editing.lasting.weighing import Scene, Weighed, weighed
+from ftproc.core.editing.lasting.weighing import TAKEN_IN, Scene, Weighed, weighed
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification.scales import scales_of
+from ftproc.core.identification.stretches import runs_of
+from ftproc.records import FloatArray
 
 JUMPS = 5  # that are weighed in a log, by either set of weights
 LEAST_GAIN, TOGETHER = 18.0, 0.03  # of a jump, in log-likelihood; of the largest: components that jump with it
@@ -42,10 +44,22 @@ class Scanned(NamedTuple):
     cell: int
     longest: float
     left: list[Jump]
+    runs: FloatArray
 
     @property
     def samples(self) -> int:
         return len(self.scene.possible)
+
+    def prior(self, curves: Sequence[Curve]) -> float:
+        """Log-odds of there being such a fault, at one of the samples: seldom, or, if it is no longer than twice one
+        of the rejected runs, as often as these are."""
+        n, length = self.samples, curves[0].length
+        stays = curves[0].begin == 0 or curves[0].end == n
+        seldom = PRIOR - math.log(n) * (1 if stays else 2)
+        like_it = self.runs[2 * self.runs >= length]
+        if stays or not len(like_it):
+            return seldom - math.log(3)
+        return float(np.logaddexp(seldom, math.log((0.5 / like_it).sum() / n))) - math.log(3)
 
     def near(self, first: int, last: int) -> slice:
         """The samples that take part in weighing what lies between two, with some readings of each component on either
@@ -63,7 +77,7 @@ def scanned(scene: Scene) -> Scanned:
     log = scene.log._replace(weight=scene.taken_in)
     memory = scales_of(log, scene.at_median.noise_variance).memory_samples(float(scene.at_median.jerk[0, 0]))
     width, around = max(int(memory / 2), SHORTEST_CELL), int(np.clip(MEMORIES * memory, *AROUND))
-    starts, n = scene.starts(log), len(scene.possible)
+    starts, n, runs = scene.starts(log), len(scene.possible), _runs(scene)
     if len(scene.rates) > 1:
         width, cell = max(width, n // CELLS), cell_of(width, n)
         edges, channels = scan.spread([], width, n), list(np.ndindex(len(scene.rates), CLOCK + 1))
@@ -80,7 +94,7 @@ def scanned(scene: Scene) -> Scanned:
         ]
         between = np.stack(gain).reshape(len(scene.rates), CLOCK + 1, -1)
         return Scanned(
-            scene, AROUND[1], width, scan.jumps_between(between, edges, LEAST_GAIN, TOGETHER), cell, LONGEST, []
+            scene, AROUND[1], width, scan.jumps_between(between, edges, LEAST_GAIN, TOGETHER), cell, LONGEST, [], runs
         )
     found = []
     for each in (log, scene.log) if (log.weight != scene.log.weight).any() else (log,):
@@ -91,7 +105,16 @@ def scanned(scene: Scene) -> Scanned:
     found += scan.beside_runs(scene.log.weight, scene.possible, off, LEAST_OFF)[:JUMPS]
     found += clock.gaps(scene.setting, JUMPS)
     longest = LONGEST if memory > REMEMBERED else SHORT
-    return Scanned(scene, around, width, scan.distinct(found), width, longest, [])
+    return Scanned(scene, around, width, scan.distinct(found), width, longest, [], runs)
+
+
+def _runs(scene: Scene) -> FloatArray:
+    """(m,) samples from begin to end of each rejected run."""
+    found = list[int]()
+    for c in range(CLOCK):
+        seen = np.flatnonzero(scene.possible[:, c])
+        found += [seen[b - 1] + 1 - seen[a] for a, b in runs_of(scene.log.weight[seen, c] <= 0, TAKEN_IN)]
+    return np.array(found, float)
 
 
 def worth(scene: Scene) -> bool:
@@ -110,12 +133,6 @@ def weighed_on(part: Scene, near: slice, curves: Sequence[Curve]) -> Weighed:
         jumps = (clock.weighed_jump(part, weight, own[0]) for weight in starts)
         return max(jumps, key=lambda each: each.log_probability)
     return max((weighed(part, weight, own) for weight in starts), key=lambda each: each.log_probability)
-
-
-def prior(curves: Sequence[Curve], n: int) -> float:
-    """Log-odds of there being such a fault, at one of n samples."""
-    ends = 1 if curves[0].begin == 0 or curves[0].end == n else 2
-    return PRIOR - math.log(3) - ends * math.log(n)
 
 
 def in_whole(found: Weighed, near: slice, n: int) -> tuple[Curve, ...]:

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from ftproc.core.editing.lasting.between import likeliest_followed
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
+from ftproc.core.editing.lasting.ends import around, by_itself, instead_of
 from ftproc.core.editing.lasting.proposals import SHORTEST, LocatedJump, exactly, other_end, proposals, steps
 from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.scanned import (
@@ -26,7 +27,6 @@ from ftproc.core.editing.lasting.scanned import (
     STAYS,
     Scanned,
     in_whole,
-    prior,
     scanned,
     weighed_on,
     worth,
@@ -37,7 +37,6 @@ from ftproc.core.identification.profile import median_level
 
 ROUNDS = 8  # over a log
 CERTAIN = 4.0  # sigmas of its size from which a component takes part in a fault of several
-FAR_SHORTER = 0.25  # of what is off: what is a little shorter lacks the vague begin of a patch
 OPEN = 12.0  # in log-probability, within which a jump may be one or another: beside agile targets it tells little
 
 
@@ -57,36 +56,19 @@ def search(scene: Scene) -> list[Found]:
     followed = likeliest_followed(first)
     if followed is None:
         return found
-    followed = _within_followed(first, followed)
-    beside = [each for each in found if each.adjoins(followed)]
-    rest = first._replace(scene=scene.without([c for each in found if each not in beside for c in each.curves]))
-    if not beside or _odds_of([followed], rest, *beside) > _odds_of(beside, rest, followed):
-        found = [followed, *(each for each in found if each not in beside)]
+    short = instead_of(first, followed)
+    for each in [followed] if short is None else short:
+        found = _likelier(first, found, each)
     return found
 
 
-def _within_followed(seen: Scanned, found: Found) -> Found:
-    """A patch that was followed, or what of it is likelier with one of its ends elsewhere."""
-    n, ends = seen.samples, (found.curves[0].begin, found.curves[0].end)
-    here, channels = seen.near(*ends), [(curve.component, curve.station) for curve in found.curves]
-    part, marks = seen.scene.part(here), [jump.sample for jump in seen.jumps]
-    tried = list[Found]()
-    with contextlib.suppress(ValueError, np.linalg.LinAlgError):
-        known = weighed_on(part, here, [curve.of(len(curve.size)) for curve in found.curves])
-        for end in ends:
-            located = LocatedJump(channels, end, marks, seen.cell, known.model, seen.longest)
-            for curves in _again(part, here, located, known):
-                other = weighed_on(part, here, curves)
-                more = other.log_probability - known.log_probability + prior(curves, n) - prior(found.curves, n)
-                tried.append(Found(in_whole(other, here, n), other.sigma, found.gain + more))
-    return _sharper(found, tried)
-
-
-def _sharper(best: Found, tried: Sequence[Found]) -> Found:
-    """What was found, or the likeliest of what was tried when that was understood, if it is likelier and far shorter:
-    what was found may hold far more than what is off."""
-    shorter = [each for each in tried if each.curves[0].length <= FAR_SHORTER * best.curves[0].length]
-    return max([best, *shorter], key=_gain)
+def _likelier(first: Scanned, found: list[Found], new: Found) -> list[Found]:
+    """What was found, or a patch instead of what is beside it, if it explains more."""
+    beside = [each for each in found if each.adjoins(new)]
+    rest = first._replace(scene=first.scene.without([c for each in found if each not in beside for c in each.curves]))
+    if not beside or _odds_of([new], rest, *beside) > _odds_of(beside, rest, new):
+        found = [new, *(each for each in found if each not in beside)]
+    return found
 
 
 def _odds_of(found: Sequence[Found], seen: Scanned, *others: Found) -> float:
@@ -96,7 +78,7 @@ def _odds_of(found: Sequence[Found], seen: Scanned, *others: Found) -> float:
     near = seen.near(min(edges), max(edges))
     with contextlib.suppress(ValueError, np.linalg.LinAlgError):
         likely = weighed_on(seen.scene.part(near), near, [curve.of(len(curve.size)) for curve in curves])
-        return likely.log_probability + sum(prior(each.curves, n) + STAYS * each.stays(n) for each in found)
+        return likely.log_probability + sum(seen.prior(each.curves) + STAYS * each.stays(n) for each in found)
     return -math.inf
 
 
@@ -107,7 +89,7 @@ def _joined(seen: Scanned, found: Sequence[Found], new: Found) -> list[Found]:
     stays = new.stays(n)
     for k, each in enumerate(found):
         middle = _middle(each, new, n)
-        if middle is None:
+        if middle is None or middle.length > 2 * seen.around:
             continue
         step, kept = (new.curves, [each]) if stays else ((), [each, new])
         known = [of.curves[0].of(len(of.curves[0].size)) for of in kept]
@@ -168,13 +150,13 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     """What happened at a jump; None if it is motion."""
     n, near = seen.samples, seen.near(jump.sample, jump.sample)
     part = seen.scene.part(near)
-    around = jump.sample - near.start, seen.width
+    there = jump.sample - near.start, seen.width
     # What was rejected of one station, others may show to be right.
     screened = len(part.rates) == 1 or bool((part.taken_in == part.log.weight).all())
-    if screened and not (jump := left_of(part, jump, around, as_it_is(part, part.log.weight, part.at_median))).ways:
+    if screened and not (jump := left_of(part, jump, there, as_it_is(part, part.log.weight, part.at_median))).ways:
         return None
     without = weighed(part, part.log.weight, ())
-    if screened and not (jump := left_of(part, jump, around, without)).ways:
+    if screened and not (jump := left_of(part, jump, there, without)).ways:
         return None
     seen.left.append(jump)
     null = max(each.log_probability for each in (without, weighed(part, part.taken_in, ())))
@@ -190,13 +172,20 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     if (CLOCK,) in jump.ways and len(part.rates) == 1:  # by the same part of the log
         proposed.append([Curve(CLOCK, located.sample, n, (0.0,), jump.station)])
     ends = [edge for curves in proposed for edge in (curves[0].begin, curves[0].end) if 0 < edge < n]
-    return _best(seen, proposed, seen.near(min(ends), max(ends)), located)
+    whole, alone = seen.near(min(ends), max(ends)), around(seen, located.sample)
+    if whole.stop - whole.start > alone.stop - alone.start:
+        end = by_itself(seen, located.channels, located.sample, seen.prior(in_whole(step, near, n)))
+        if end.short is not None and end.odds > OPEN:
+            return end.short
+    best = _best(seen, proposed, whole, located)
+    short = None if best is None else instead_of(seen, best)
+    return max(short or [best], key=_gain) if best is not None else None
 
 
 def _as_step(seen: Scanned, jump: Jump, way: Sequence[int], null: float) -> tuple[float, LocatedJump, Weighed]:
     """A jump as a step of some components, or of the clock: its gain, where it is, and the log around it. null:
     log-probability without it."""
-    n, near = seen.samples, seen.near(jump.sample, jump.sample)
+    near = seen.near(jump.sample, jump.sample)
     part, channels = seen.scene.part(near), [(c, jump.station) for c in way]
     there = LocatedJump(
         channels, jump.sample - near.start, [each.sample for each in seen.jumps], seen.width, part.at_median
@@ -205,7 +194,7 @@ def _as_step(seen: Scanned, jump: Jump, way: Sequence[int], null: float) -> tupl
     located = there._replace(sample=sample, longest=seen.longest)
     sides = steps(seen.scene, channels, located.sample)
     step = max((weighed_on(part, near, side) for side in sides), key=lambda each: each.log_probability)
-    return step.log_probability - null + prior(sides[0], n), located, step
+    return step.log_probability - null + seen.prior(sides[0]), located, step
 
 
 def _best(seen: Scanned, proposed: Sequence[Sequence[Curve]], here: slice, located: LocatedJump) -> Found | None:
@@ -213,22 +202,16 @@ def _best(seen: Scanned, proposed: Sequence[Sequence[Curve]], here: slice, locat
     part, n = seen.scene.part(here), seen.samples
     null = weighed_on(part, here, ()).log_probability
 
-    understood = dict[tuple[Curve, ...], Weighed]()
-
     def outcome(curves: Sequence[Curve]) -> Found:
         found = weighed_on(part, here, curves)
-        gain = found.log_probability - null + prior(curves, n)
-        understood[whole := in_whole(found, here, n)] = found
-        return Found(whole, found.sigma, gain)
+        gain = found.log_probability - null + seen.prior(curves)
+        return Found(in_whole(found, here, n), found.sigma, gain)
 
     def odds(of: Found) -> float:
         return of.gain + STAYS * of.stays(n)
 
     outcomes = [outcome(curves) for curves in proposed]
     best = max(outcomes, key=odds)
-    if best.curves[0].component != CLOCK:
-        again = _again(part, here, located._replace(width=seen.cell), understood[best.curves])
-        best = _sharper(best, [outcome(curves) for curves in again if curves not in proposed])
     if not DOUBT <= best.gain < MOST_EACH * part.possible.sum():
         return None
     moves = _moving(best.curves, best.sigma)
@@ -246,17 +229,6 @@ def _best(seen: Scanned, proposed: Sequence[Sequence[Curve]], here: slice, locat
     likeliest = {each.lies(located.sample, n): each for each in nearly}
     likeliest.pop(best.lies(located.sample, n), None)
     return best._replace(others=tuple(likeliest.values()))
-
-
-def _again(part: Scene, here: slice, located: LocatedJump, found: Weighed) -> Iterator[list[Curve]]:
-    """What a jump of a part of a log may be an end of, by the process noise and the outliers of what was found."""
-    scene = part._replace(log=part.log._replace(weight=found.weight), taken_in=found.weight)
-    marks = [mark - here.start for mark in located.marks if here.start < mark < here.stop]
-    own = located._replace(sample=located.sample - here.start, marks=marks, at_median=median_level(found.model))
-    for curves in proposals(scene, own):
-        if curves[0].begin > 0 and curves[0].end < len(part.possible):
-            moved = [(curve.begin + here.start, curve.end + here.start) for curve in curves]
-            yield [curve._replace(begin=a, end=b) for curve, (a, b) in zip(curves, moved, strict=True)]
 
 
 def _moving(curves: Sequence[Curve], sigma: Sequence[float]) -> list[Curve]:

@@ -102,7 +102,7 @@ def test_two_patches_with_flight_between_them_are_not_one_that_was_followed(monk
     with monkeypatch.context() as without_the_runs:
         without_the_runs.setattr(Between, "runs", lambda self: [])
         assert error_m() < 1.0
-        without_the_runs.setattr(search, "_within_followed", lambda seen, found: found)
+        without_the_runs.setattr(search, "instead_of", lambda seen, found: None)
         without_the_runs.setattr(between, "leaves_curves", lambda *of: True)
         assert error_m() > 10.0
     monkeypatch.setattr(between, "leaves_curves", lambda *of: True)

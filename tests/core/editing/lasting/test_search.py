@@ -8,7 +8,8 @@ import pytest
 from ftproc import pipeline
 from ftproc.core import work
 from ftproc.core.editing import two_pass
-from ftproc.core.editing.lasting import between, clock, scanned, screen, search, settling
+from ftproc.core.editing.lasting import between, clock, scanned, screen, search, settling, weighing
+from ftproc.core.editing.lasting.curves import Curve
 from ftproc.records import MeasurementLog
 from ftproc.settings import FilterSettings
 from tests.simulated import simulate
@@ -103,8 +104,9 @@ def test_a_jump_beside_which_readings_were_rejected_is_seen_only_with_these_take
 
 @pytest.mark.parametrize(("low", "high"), [(62_000, 76_000), (38_000, 50_000)])
 def test_no_track_runs_away_where_far_more_was_found_than_is_off(low, high):
-    """Two parts of a fighter's flight, at 20 Hz, with patches of 4 to 60 s: a patch of 10 s whose ends lie in runs that
-    were rejected with it, and two of which all between them seemed off; kilometres off without these rules."""
+    """Two parts of a fighter's flight, at 20 Hz, with patches of 4 to 60 samples or 10 to 200: two of which all between
+    them seemed off, and a sine of 178 m, rejected at first, that motion may follow; kilometres, and 16 m, off without
+    these rules."""
     spec = "isolated=0.02:6-300,patch=12:4-60:8-200,mixed=6:10-200:8-200"
     flight = simulate("manoeuvre", seed=8, duration_s=4000.0, dt_s=0.05, outliers=spec)
     rows = slice(low, high)
@@ -113,8 +115,33 @@ def test_no_track_runs_away_where_far_more_was_found_than_is_off(low, high):
     assert np.sqrt((off**2).sum(1).mean()) < 2.0
 
 
-def test_what_was_followed_is_looked_into():
-    """Side lobes of a fighter: 119 m off where the whole of a long curve is left out, 23 without it."""
+def test_the_pieces_of_a_patch_are_found_each_by_itself():
+    """Side lobes of a fighter, in three levels; what was followed from one to the last is less likely at its ends."""
     made = hard.make("sidelobe", 4).simulated
+    found = pipeline.filter_log(made.log, FilterSettings(smooth=True))
+    off = (made.truth.outlier != 0) & np.isfinite(made.log.measurement)
+    assert ((found.outlier != 0) == off).mean() > 0.999
+
+
+@pytest.mark.parametrize(("name", "seed", "rms_m"), [("seldom", 3, 200.0), ("often", 4, 25.0)])
+def test_two_short_patches_are_not_one_long(name, seed, rms_m):
+    """Flights with many patches of seconds: 4,322 and 677 m off where what lies between two of them is left out."""
+    made = hard.make(name, seed).simulated
     off = pipeline.filter_log(made.log, FilterSettings(smooth=True)).state[:, :3] - made.truth.position_m
-    assert np.sqrt((off**2).sum(1).mean()) < 30.0
+    assert np.sqrt((off**2).sum(1).mean()) < rms_m
+
+
+def test_a_patch_is_as_likely_as_those_that_are_rejected():
+    seen = scanned.Scanned(scene_of(10_000), 100, 10, [], 10, 0.5, [], np.full(20, 50.0))
+    alone = seen._replace(runs=np.zeros(0))
+    short, long = ([Curve(0, 1000, 1000 + samples, (0.0,))] for samples in (80, 800))
+    assert seen.prior(short) == pytest.approx(np.log(20 / 3 / 100 / 10_000), abs=0.2)
+    assert seen.prior(short) > alone.prior(short) + 5.0
+    assert seen.prior(long) == alone.prior(long) == alone.prior(short)
+    step = [Curve(0, 1000, 10_000, (0.0,))]
+    assert seen.prior(step) == alone.prior(step)
+
+
+def scene_of(samples):
+    """A scene of so many samples of which nothing else is known."""
+    return weighing.Scene(None, np.ones((samples, 3), bool), None, None, None, False, np.zeros((1, 3, 3)), 4.0, None)
