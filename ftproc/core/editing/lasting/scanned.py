@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -109,10 +110,10 @@ def scanned(scene: Scene) -> Scanned:
 
 
 def _runs(scene: Scene) -> FloatArray:
-    """(m,) samples from begin to end of each rejected run."""
+    """(m,) samples from begin to end of each rejected run of each station."""
     found = list[int]()
-    for c in range(CLOCK):
-        seen = np.flatnonzero(scene.possible[:, c])
+    for (_, own), c in itertools.product(scene.stations(), range(CLOCK)):
+        seen = own[scene.possible[own, c]]
         found += [seen[b - 1] + 1 - seen[a] for a, b in runs_of(scene.log.weight[seen, c] <= 0, TAKEN_IN)]
     return np.array(found, float)
 
