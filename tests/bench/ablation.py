@@ -95,6 +95,7 @@ RULES: dict[str, tuple[Off, ...]] = {
         Off(f"{EDITING}.lasting.search", "instead_of", _nothing),
     ),
     "patches as often as they are rejected": (Off(f"{EDITING}.lasting.scanned", "_runs", lambda _: np.zeros(0)),),
+    "the best of all rounds": (Off(f"{EDITING}.lasting.settling", "AGILE", np.inf),),
     "the likeliest fault alone": (Off(f"{EDITING}.lasting.settling", "_likeliest", _empty),),
     "rejected runs on a curve": (Off(f"{EDITING}.lasting.rejected_runs", "_more_than_a_curve", lambda *_: np.inf),),
     "patches of several that were joined": (

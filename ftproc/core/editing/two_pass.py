@@ -122,7 +122,7 @@ def edit(
     possible = found.record.possible
     if not live:
         found = without_lasting(found, measurement, decided, for_lasting)
-    record, decision, steps, _, doubtful, rivals, scene = found
+    record, decision, steps, _, doubtful, rivals, scene, _ = found
     if decision.stamp_s > 0:  # which explains a clock that seems to jump
         doubtful = [step for step in doubtful if step.component != CLOCK]
         rivals = [rival for rival in rivals if rival.component != CLOCK]

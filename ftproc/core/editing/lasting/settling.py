@@ -18,6 +18,8 @@ from ftproc.core.editing.lasting.scanned import MARGIN
 from ftproc.core.editing.lasting.search import search
 from ftproc.core.editing.lasting.weighing import Found, Scene, scene_of
 from ftproc.core.editing.reassessment import log_probability
+from ftproc.core.identification.profile import median_level
+from ftproc.core.identification.stretches import runs_of
 from ftproc.core.work import Work
 from ftproc.order_statistics import median
 from ftproc.records import FloatArray
@@ -27,13 +29,19 @@ HALTS_MPS2 = 30.0  # acceleration with which things stand still and go on
 BEFORE, SEEN = 12, 0.25  # samples before a step, and share of them that may be good
 SURE = 7.0  # sigmas of the noise: a smaller step may be an end of a weak patch
 STEP_MARGIN = 8.0  # in log-probability, by which steps must explain a log better than late stamps do
-LOST = 100.0  # in log-probability, for each reading that is left out: ten go with the reading itself
+LOST = 90.0  # in log-probability, for each reading that is left out, beyond what goes with it
+AGILE, COSTS = (
+    4.0,
+    3.0,
+)  # times the process noise, and that for each reading: with both a track is lost in the end; true
+# patches of half a minute cost up to 6, in the angles of agile targets, but the target does not seem more agile
 LASTING_ROUNDS = 4  # of the search for faults that last: where one is taken out, another may show
 
 
 class Understood(NamedTuple):
     """A log and the decisions on it without the faults that last: the steps that were taken out, the readings of
-    patches (n, 3), the steps that are in doubt, what else may be nearly as likely, and where they were sought."""
+    patches (n, 3), the steps that are in doubt, what else may be nearly as likely, and where they were sought.
+    probability: log-probability of all that is left."""
 
     record: Record
     decision: Decision
@@ -42,25 +50,48 @@ class Understood(NamedTuple):
     doubtful: Sequence[Step] = ()
     rivals: Sequence[Rival] = ()
     scene: Scene | None = None
+    probability: float = math.nan
 
 
 def without_lasting(
     found: Understood, measurement: FloatArray, decided: Callable[..., tuple[Record, Decision]], work: Work
 ) -> Understood:
     """The log without the faults that last, decided again as long as there are some: without all that were found, or,
-    where too little is left then, without the likeliest."""
+    where too little is left then, without the likeliest. A find may be mended by the next ones, so all of them are
+    followed up; if it is not, what was understood before it counts."""
+    best = found
     for _ in range(LASTING_ROUNDS):
         if found.decision.model.coloured:  # which resembles many steps
             break
         scene = scene_of(found.record, found.decision, work)
         faults, before = search(scene), found
+        if faults and math.isnan(found.probability):
+            best = before = found._replace(probability=log_probability(found.record, found.decision))
         found = _without(before, scene, faults, measurement, decided)
         if found.record is before.record and (likeliest := _likeliest(faults)):
             alone = _without(before, scene, likeliest, measurement, decided)
             found = found if alone.record is before.record else alone
         if found.record is before.record:
-            break
-    return found
+            return found if best.record is before.record else _with_rival(best, found)
+        if not (_process_noise(found) > AGILE * _process_noise(best) and _is_lost(best, found, COSTS)):
+            best = found
+    return best if best is found else _with_rival(best, found)
+
+
+def _process_noise(found: Understood) -> float:
+    """Typical jerk PSD of a log, m2/s5."""
+    return float(median_level(found.decision.model).jerk[0, 0])
+
+
+def _with_rival(best: Understood, found: Understood) -> Understood:
+    """The best of a log, with what was taken for patches in another as something that it may have."""
+    banned = found.banned if best.banned is None or found.banned is None else found.banned & ~best.banned
+    rivals = [
+        Rival(component, begin, end, 0.0, MOTION, PATCH)
+        for component in range(CLOCK)
+        for begin, end in (() if banned is None else runs_of(banned[:, component]).tolist())
+    ]
+    return best._replace(rivals=[*best.rivals, *rivals], scene=found.scene)
 
 
 def _likeliest(faults: Sequence[Found]) -> list[Found]:
@@ -88,16 +119,19 @@ def _without(
     read = taken_out(log._replace(measurement=measurement), scene.at_median, scene.setting, moved)
     banned = banned | unseen(record.time_s, moved)[:, None]
     other = decided(read.measurement, banned=banned)
-    if (new.steps and _may_be_late_stamps((record, decision), other)) or (
-        new.banned.any() and _is_lost((record, decision), other, int(new.banned.sum()))
-    ):
+    if new.steps and _may_be_late_stamps((record, decision), other):
         return found
-    return Understood(*other, steps, banned, new.doubtful, [*settled, *new.rivals], scene)
+    without = Understood(*other, steps, banned, new.doubtful, [*settled, *new.rivals], scene, log_probability(*other))
+    return found if new.banned.any() and _is_lost(found, without, LOST) else without
 
 
-def _is_lost(before: tuple[Record, Decision], other: tuple[Record, Decision], without: int) -> bool:
-    """Whether so many readings are missing that the track is lost in their gap: that makes the others unlikely."""
-    return log_probability(*other) < log_probability(*before) - LOST * without
+def _is_lost(before: Understood, without: Understood, each: float) -> bool:
+    """Whether the readings that are left are less likely than before by more than so much for each that is left out
+    now: where the track is lost in a gap of good ones, or turns where only readings do. One that a patch explains is
+    as likely as a good one is."""
+    left_out = (before.record.possible & ~without.record.possible).sum(0)
+    good = -0.5 * (np.log(2 * np.pi * before.decision.model.noise_variance) + 1.0)
+    return bool(without.probability + left_out @ (good + each) < before.probability)
 
 
 def _may_be_late_stamps(without: tuple[Record, Decision], levelled_log: tuple[Record, Decision]) -> bool:

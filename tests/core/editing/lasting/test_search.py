@@ -131,6 +131,16 @@ def test_two_short_patches_are_not_one_long(name, seed, rms_m):
     assert np.sqrt((off**2).sum(1).mean()) < rms_m
 
 
+def test_a_find_that_loses_the_track_is_taken_back():
+    """A fighter's range seems off for five minutes, from one patch to another: 134 km with all finds kept."""
+    spec = "isolated=0.02:6-300,patch=3:5-80:8-150,mixed=3:10-150:8-200"
+    flight = simulate("manoeuvre", seed=55, duration_s=600.0, dt_s=0.1, outliers=spec)
+    found = pipeline.filter_log(flight.log, FilterSettings(smooth=True))
+    off = found.state[:, :3] - flight.truth.position_m
+    assert np.sqrt((off**2).sum(1).mean()) < 30.0
+    assert found.metadata["summary"]["trust"]["verdict"] == "suspect"
+
+
 def test_a_patch_is_as_likely_as_those_that_are_rejected():
     seen = scanned.Scanned(scene_of(10_000), 100, 10, [], 10, 0.5, [], np.full(20, 50.0))
     alone = seen._replace(runs=np.zeros(0))
