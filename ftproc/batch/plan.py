@@ -85,6 +85,18 @@ def tasks(wanted: Sequence[Wanted], output: str | None, redo: bool = True) -> li
     return planned
 
 
+def in_one_table(wanted: Sequence[Wanted], output: str | None) -> bool:
+    """Whether `-o` names one table for the targets of one log, which it then holds below each other."""
+    targets = len(wanted) > 1 and all(len(each.parts) == 1 and each.recipe.target for each in wanted)
+    one_log = len({each.log for each in wanted}) == 1
+    return targets and one_log and output is not None and output != "-" and _is_table(output)
+
+
+def _is_table(output: str) -> bool:
+    path = Path(output)
+    return layout.table_kind(path) is not None and ANY not in path.name and not path.is_dir()
+
+
 def written(tasks: Sequence[Task], output: str | None, index: str | None) -> list[Output]:
     """All files of these tasks, and the index page if there is one. output: the value of `-o`."""
     made = [output is not None and task.output != output for task in tasks]

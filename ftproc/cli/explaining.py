@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 
+from ftproc.cli import targets
 from ftproc.config.recipe import Recipe
 from ftproc.errors import FtprocError, failure, printable, quoted
 from ftproc.files.layout import CANONICAL
@@ -27,20 +29,27 @@ def explain(recipes: Mapping[str, Recipe], form: str, debug: bool) -> int:
     found: list[dict[str, Any]] = []
     codes = []
     for name, recipe in recipes.items():
+        several = targets.of_log(name, recipe)
         try:
-            log = reading.read(name, **recipe.reading())
+            log = reading.read(name, **_of_the_first(recipe, several).reading())
         except FtprocError as error:
             codes.append(error.exit_code)
             found.append({"log": name, "error": str(error)})
             click.echo(f"ftproc: {failure(error).trace if debug else error}", err=True)
             continue
         found.append(_as_dict(name, log))
+        if several.said:
+            click.echo(f"ftproc: {several.said} Here is the first.", err=True)
         if form == "text":
             click.echo(text(name, log.understood))
             click.echo(_first_rows(log))
     if form == "json":
         click.echo(json.dumps(found[0] if len(found) == 1 else found, indent=2, ensure_ascii=False))
     return 0 if not codes else codes[0] if len(recipes) == 1 else 1
+
+
+def _of_the_first(recipe: Recipe, several: targets.Targets) -> Recipe:
+    return replace(recipe, target=several.named[0]) if several.named else recipe
 
 
 def text(name: str, understood: Mapping[str, Any]) -> str:

@@ -82,8 +82,8 @@ ftproc filter flight.csv --noise 3,0.0002,0.0002 --summary json -o clean.parquet
 @click.option(
     "--target",
     metavar="COLUMN=VALUE|COLUMN",
-    help="One of several targets in a file, such as track=7; a COLUMN alone: a trajectory of each of its values; none: "
-    "there is one target, whatever the rows suggest.",
+    help="One of several targets in a file, such as track=7; a COLUMN alone: a trajectory of each of its values, as "
+    "where the file's standard tells targets apart; none: there is one target, whatever the rows suggest.",
 )
 @click.option("--keep-columns/--no-keep-columns", help="Copy the log's other columns to the trajectory.")
 @click.option(

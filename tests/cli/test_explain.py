@@ -9,10 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.files.zoo import animals
+from tests.files.zoo import animals, radars
 
 ZOO = {animal.name: animal for animal in animals.all_animals()}
 LINES = ["file", "columns", "clock", "readings", "doubtful"]
+
+NO_HEIGHT = "--columns", "height=none"
 
 
 @pytest.fixture
@@ -92,7 +94,36 @@ def test_a_target_and_each_target(run, here, tracks):
     assert [found["target"] for found in json.loads(each.out)] == ["track=7", "track=12"]
     assert run("filter", tracks, "--target", "none", "-o", "all.csv").code == 0
     assert 'did you mean "track"?' in run("filter", tracks, "--target", "trak", "-o", "each").err
-    assert "name a directory" in run("filter", tracks, "--target", "track", "-o", "one.csv").err
+    assert "name a directory" in run("filter", tracks, "--target", "track", "-o", "-").err
+
+
+def test_targets_in_one_table_name_themselves_in_a_column(run, here, tracks):
+    assert run("filter", tracks, "--target", "track", "-o", "each/").code == 0
+    for name in ("all.csv", "all.parquet"):
+        assert run("filter", tracks, "--target", "track", "-o", name, "--jobs", "2").code == 0
+    table = pd.read_csv("all.csv")
+    assert list(table.columns[:2]) == ["target", "row"]
+    assert table["target"].drop_duplicates().tolist() == [7, 12]  # in the order of the log
+    for target in (7, 12):
+        alone = pd.read_csv(f"each/a.{target}.trajectory.csv")
+        pd.testing.assert_frame_equal(
+            table[table["target"] == target].drop(columns="target").reset_index(drop=True), alone, check_dtype=False
+        )
+    again = pd.read_parquet("all.parquet")
+    assert again["target"].tolist() == table["target"].astype(str).tolist()
+    np.testing.assert_array_equal(again["x_m"], table["x_m"])
+    metadata = json.loads(Path("all.json").read_text())
+    assert list(metadata["targets"]) == ["7", "12"]
+    assert metadata["targets"]["7"]["summary"]["rows"] == 120
+    assert sorted(path.name for path in Path().iterdir()) == ["a.csv", "all.csv", "all.json", "all.parquet", "each"]
+
+
+def test_a_target_that_fails_leaves_the_others_in_the_table(run, here, tracks):
+    with Path(tracks).open("a") as log:
+        log.write("1.0,,,,3\n")
+    done = run("filter", tracks, "--target", "track", "-o", "all.csv")
+    assert done.code == 1
+    assert pd.read_csv("all.csv")["target"].drop_duplicates().tolist() == [7, 12]
 
 
 def test_rows_are_left_out_by_conditions_and_counted(run, here):
@@ -170,3 +201,40 @@ def test_utc_stands_there_only_where_the_zone_is_known(run, here, head, stamp, s
     Path("log.csv").write_text(f"{head}range_m,azimuth_rad,elevation_rad\n{rows}")
     assert run("filter", "log.csv", "-o", "out.csv").code == 0
     assert ("time_utc" in Path("out.csv").read_text()) == stands
+
+
+def plots(name: str, *wanted: dict[str, int]) -> None:
+    """ASTERIX 048, the plots of each aircraft or radar behind those of the one before."""
+    found = [radars.block(48, radars.plot_048(*row, **each)) for each in wanted for row in radars.readings()]
+    Path(name).write_bytes(b"".join(found))
+
+
+def test_the_targets_that_a_standard_tells_apart_get_a_trajectory_each(run, here):
+    plots("a.ast", {"icao": 0x3C660C}, {"icao": 0x4BAACD})
+    said = 'holds 2 targets by column "I220.ACAddr" (3C660C, 4BAACD): a trajectory of each. '
+    done = run("filter", "a.ast", *NO_HEIGHT, "-o", "all.csv")
+    assert done.code == 0
+    assert f"{said}--target I220.ACAddr=3C660C makes one." in done.err
+    assert pd.read_csv("all.csv")["target"].drop_duplicates().tolist() == ["3C660C", "4BAACD"]
+    for one in ("--target", "--where"):
+        done = run("filter", "a.ast", *NO_HEIGHT, one, "I220.ACAddr=4BAACD", "-o", "one.csv")
+        assert (done.code, done.err) == (0, "")
+    shown = run("filter", "a.ast", *NO_HEIGHT, "--explain")
+    assert said in shown.err
+    assert "do not meet I220.ACAddr=3C660C" in shown.out
+
+
+def test_stations_that_measure_one_after_the_other_get_a_trajectory_each(run, here):
+    plots("a.ast", {"sic": 1}, {"sic": 2})
+    done = run("filter", "a.ast", *NO_HEIGHT, "-o", "each/")
+    assert done.code == 0
+    assert 'holds 2 stations by column "I010.SIC" (1, 2): a trajectory of each' in done.err
+    assert "for one of all, ftproc filter --fuse --write-config a.ast prints a range file" in done.err
+    assert len(list(Path("each").glob("*.csv"))) == 2
+
+
+def test_stations_that_measure_in_turns_are_asked_about(run, here):
+    rows = list(radars.readings())
+    two = [radars.block(48, radars.plot_048(*row, sic=sic)) for row in rows for sic in (1, 2)]
+    Path("a.ast").write_bytes(b"".join(two))
+    assert "--where I010.SIC=NAME" in run("filter", "a.ast", *NO_HEIGHT, "-o", "all.csv").err

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import click
 
-from ftproc import report
+from ftproc import __version__, report
 from ftproc.batch import plan, run, table
 from ftproc.batch.tasks import Outcome, Task, model_for, with_method
-from ftproc.cli import again, explaining, process
+from ftproc.cli import again, explaining, process, targets
 from ftproc.cli.command import stated
 from ftproc.cli.filtering.recipes import followed, station_files
 from ftproc.cli.progress import Progress
 from ftproc.config.recipe import Recipe
-from ftproc.errors import InputError, UsageError, printable
+from ftproc.errors import UsageError, printable
 from ftproc.files import conventions
-from ftproc.files.options import ABSENT, parse_widths
 from ftproc.files.writing import geodesy, maps, outputs
 from ftproc.files.writing.decisions import write as write_decisions
 from ftproc.files.writing.outputs import Output
@@ -77,7 +79,12 @@ def filter_logs(request: Request, recipes: Mapping[str, Recipe], debug: bool) ->
         raise UsageError("--jobs is for processes on this machine, --scheduler for a cluster; give one of the two.")
     if request.report is not None:
         report.check(request.report)
-    tasks, index = _planned(request, recipes)
+    with contextlib.ExitStack() as until_written:
+        return _filtered(request, _planned(request, recipes, until_written), recipes, debug)
+
+
+def _filtered(request: Request, planned: Planned, recipes: Mapping[str, Recipe], debug: bool) -> int:
+    tasks, index, together = planned
     for text in _readings(recipes.values()):
         notify(text)
     done: list[Outcome] = []
@@ -85,19 +92,22 @@ def filter_logs(request: Request, recipes: Mapping[str, Recipe], debug: bool) ->
     with Progress("filtering", len(tasks)) as progress:
         outcomes = run.run(tasks, request.jobs, notify, request.scheduler, progress.step)
         for outcome in outcomes:
+            outcome = replace(outcome, task=replace(outcome.task, output=together)) if together else outcome
             done.append(outcome)
             progress.clear()
             try:
                 _show(outcome, request.summary, debug)
             except OSError as error:  # a full or closed standard output: the other logs do not need it
                 unsaid = error
+    if together is not None and any(outcome.failure is None for outcome in done):
+        _write_together([task for task, outcome in zip(tasks, done, strict=True) if outcome.failure is None], together)
     if index is not None:
         write_index(table.entries(done), index)
     if request.table is not None:
         table.write(done, request.table)
     if request.write_decisions is not None:
         _write_decisions(done, request.write_decisions)
-    if request.again is not None and done[0].failure is None and done[0].task.output != "-":
+    if request.again is not None and together is None and done[0].failure is None and done[0].task.output != "-":
         for difference in request.again.differences(done[0].task.output):
             notify(difference)
     try:
@@ -110,8 +120,17 @@ def filter_logs(request: Request, recipes: Mapping[str, Recipe], debug: bool) ->
     return failures[0] if len(done) == 1 and failures else int(bool(failures))
 
 
-def _planned(request: Request, recipes: Mapping[str, Recipe]) -> tuple[list[Task], str | None]:
-    """The tasks, and the index page if there is one, with all outputs checked against all inputs."""
+class Planned(NamedTuple):
+    """The tasks, the index page if there is one, and the table in which their trajectories end, if it is one for all:
+    then they are written elsewhere first."""
+
+    tasks: list[Task]
+    index_page: str | None
+    together: str | None
+
+
+def _planned(request: Request, recipes: Mapping[str, Recipe], until_written: contextlib.ExitStack) -> Planned:
+    """What is to be done, with all outputs checked against all inputs. until_written: gets the directory of parts."""
     if request.table is not None:
         table.check(request.table)
     left_out = dict[str, None]()
@@ -121,7 +140,9 @@ def _planned(request: Request, recipes: Mapping[str, Recipe]) -> tuple[list[Task
     if request.output is None and any(each.recipe.settings.method in each.parts for each in wanted):
         raise UsageError("--method all writes several trajectories: name a directory with -o.")
     redo = request.redo or len(wanted) == 1 or request.write_decisions is not None
-    tasks = plan.tasks(wanted, request.output, redo)
+    together = request.output if request.scheduler is None and plan.in_one_table(wanted, request.output) else None
+    folder = until_written.enter_context(tempfile.TemporaryDirectory(prefix="ftproc-")) if together else ""
+    tasks = plan.tasks(wanted, str(Path(folder, "*.parquet")) if together else request.output, redo or bool(together))
     by_hand = next((each.decisions for each in recipes.values() if each.decisions is not None), None)
     if by_hand is not None:
         by_hand.check(list(dict.fromkeys(task.station for task in tasks)))
@@ -132,8 +153,19 @@ def _planned(request: Request, recipes: Mapping[str, Recipe]) -> tuple[list[Task
     tasks = [replace(task, report=page, takes_decisions=taken) for task, page in zip(tasks, pages, strict=True)]
     named = {"--table": request.table, "--write-decisions": request.write_decisions}
     more = [Output(name, option) for option, name in named.items() if name is not None]
-    outputs.check([*plan.written(tasks, request.output, index), *more], _inputs(request, recipes.values()))
-    return tasks, index
+    if together is None:
+        written = plan.written(tasks, request.output, index)
+    else:
+        written = [*outputs.trajectory(together), *plan.pages_written(pages, index)]
+    outputs.check([*written, *more], _inputs(request, recipes.values()))
+    return Planned(tasks, index, together)
+
+
+def _write_together(tasks: Sequence[Task], target: str) -> None:
+    """The trajectories of all targets of a log in one table."""
+    from ftproc.batch import together
+
+    together.write({task.recipe.target.partition("=")[2]: task.output for task in tasks}, __version__, target)
 
 
 def _inputs(request: Request, recipes: Iterable[Recipe]) -> list[str]:
@@ -154,14 +186,16 @@ def _write_decisions(done: Sequence[Outcome], target: str) -> None:
 def _wanted(log: str, recipe: Recipe, left_out: dict[str, None]) -> Iterator[plan.Wanted]:
     """The trajectories of a log: one, or one of each target and of each method. left_out gets why others are not."""
     registry.check_parameters(recipe.settings)
-    targets = _targets(log, recipe)
+    several = targets.of_log(log, recipe)
+    if several.said:
+        notify(several.said)
     methods = _applicable(recipe, left_out) if recipe.settings.method == EVERY else [""]
-    for target in targets or [recipe.target]:
+    for target in several.named or [recipe.target]:
         for method in methods:
-            own = {"method": method, **({"target": target} if targets else {})}
+            own = {"method": method, **({"target": target} if several.named else {})}
             origin = recipe.origin.stating({name: value for name, value in own.items() if value})
             found = replace(with_method(recipe, method) if method else recipe, target=target, origin=origin)
-            value = target.partition("=")[2] if targets else ""
+            value = target.partition("=")[2] if several.named else ""
             yield plan.Wanted(log, found, tuple(filter(None, (value, method))))
 
 
@@ -176,22 +210,6 @@ def _readings(recipes: Iterable[Recipe]) -> list[str]:
             named = "" if recipe.station.azimuth_from else " (unless the azimuth's name says north)"
             found.append(f"positions on the earth: {axes}{named}, z is up")
     return list(dict.fromkeys(found))
-
-
-def _targets(log: str, recipe: Recipe) -> list[str]:
-    """COLUMN=VALUE of each target in a log, if the option names a column; none if it does not. The value of a log that
-    cannot be read is left out: reading it again gives the message."""
-    from ftproc.files.reading.logs import targets
-
-    column = recipe.target
-    if column in ("", ABSENT) or "=" in column:
-        return []
-    if log == "-":
-        raise UsageError("--target COLUMN reads a log twice, which standard input does not allow; name a file.")
-    try:
-        return [f"{column}={value}" for value in targets(log, column, parse_widths(recipe.widths))]
-    except InputError:
-        return [column]
 
 
 def _applicable(recipe: Recipe, left_out: dict[str, None]) -> list[str]:

@@ -113,19 +113,6 @@ def _of_target(log: MeasurementLog, extract: Extract) -> MeasurementLog:
     return replace(log, understood={**log.understood, "target": picked}) if picked else log
 
 
-def targets(source: tables.Source, column: str, widths: tuple[int, ...] = ()) -> tuple[str, ...]:
-    """The values of a column that tells targets apart, the first first. Raises InputError."""
-    header = tables.read_header(source, widths)
-    index = rows.position(header.source, header.names, column, "--target")
-    cells = rows.cells(header.load([], [index]).column(0))
-    values = tuple(dict.fromkeys(cell for cell in cells.tolist() if cell))
-    if not 0 < len(values) <= several.MOST_TARGETS:
-        raise InputError(
-            f'{header.source}: column "{column}" has {len(values)} values, which are no targets; name another column.'
-        )
-    return values
-
-
 def _conditions(header: TableHeader, extract: Extract) -> tuple[Condition, ...]:
     if extract.target in ("", ABSENT):
         return extract.where
@@ -222,9 +209,7 @@ def _kept(plan: _Plan, table: pa.Table, chosen: list[int]) -> tuple[IntArray | N
     if not plan.conditions:
         return None, ()
     header = plan.header
-    indices = {c: rows.position(header.source, header.names, c.column, "--where") for c in plan.conditions}
-    cells = {condition: table.column(chosen.index(index)) for condition, index in indices.items()}
-    mask = rows.meeting(header.source, cells, header.decimal_comma)
+    mask = rows.meeting(header, plan.conditions, table, chosen)
     kept = np.flatnonzero(mask)
     wanted = " and ".join(str(condition) for condition in plan.conditions)
     if not kept.size:

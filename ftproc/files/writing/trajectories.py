@@ -72,7 +72,7 @@ def write(trajectory: Trajectory, target: Target, without: Sequence[str] = ()) -
         return
     map_kind = layout.map_kind(target)
     drawn = maps.as_bytes(trajectory, map_kind) if map_kind else b""
-    with _with_sidecar(target) as (stream, text):
+    with with_sidecar(target) as (stream, text):
         if map_kind:
             stream.write(drawn)
         else:
@@ -92,7 +92,7 @@ def write_parts(parts: Iterable[Trajectory], metadata: Callable[[], Mapping[str,
         whole = joined([*first, *stretches])
         write(replace(whole, metadata={**whole.metadata, **metadata()}), target)
         return
-    with _with_sidecar(target) as (stream, text):
+    with with_sidecar(target) as (stream, text):
         with tables.growing(stream, tables.kind_of(target)) as file:
             for stretch in itertools.chain(first, stretches):
                 file.append(to_table(stretch).replace_schema_metadata(None))
@@ -112,7 +112,7 @@ def _can_stream(stretch: Trajectory, target: Target) -> bool:
 
 
 @contextlib.contextmanager
-def _with_sidecar(target: Target) -> Iterator[tuple[BinaryIO, BinaryIO]]:
+def with_sidecar(target: Target) -> Iterator[tuple[BinaryIO, BinaryIO]]:
     """Streams of a file and of its metadata, which appear one after the other when both are on the disk; of a file that
     holds its own, nothing becomes of the second stream.
 

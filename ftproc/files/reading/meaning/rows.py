@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +15,8 @@ from ftproc.files.reading.meaning.questions import listed
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+    from ftproc.files.reading.formats.header import TableHeader
 
 _TESTS = {"<=": np.less_equal, ">=": np.greater_equal, "!=": np.not_equal, "=": np.equal, "<": np.less, ">": np.greater}
 
@@ -34,13 +36,15 @@ def position(source: str, names: list[str], name: str, option: str) -> int:
     )
 
 
-def meeting(source: str, conditions: Mapping[Condition, pa.ChunkedArray], decimal_comma: bool) -> NDArray[np.bool_]:
-    """(n,) which rows meet all conditions. Raises InputError for an order among words."""
-    kept = None
-    for condition, column in conditions.items():
-        mask = _mask(source, condition, column, decimal_comma)
-        kept = mask if kept is None else kept & mask
-    assert kept is not None
+def meeting(
+    header: TableHeader, conditions: Sequence[Condition], table: pa.Table, chosen: Sequence[int]
+) -> NDArray[np.bool_]:
+    """(n,) which rows of a table meet all conditions. chosen: where its columns are in the file. Raises InputError for
+    an order among words."""
+    kept = np.ones(table.num_rows, bool)
+    for condition in conditions:
+        index = position(header.source, header.names, condition.column, "--where")
+        kept &= _mask(header.source, condition, table.column(chosen.index(index)), header.decimal_comma)
     return kept
 
 

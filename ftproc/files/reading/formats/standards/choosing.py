@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from ftproc.errors import InputError, quoted
@@ -28,35 +28,47 @@ def refuse_open(header: TableHeader, stated_by_user: Mapping[str, object]) -> No
 
 def refuse_several(header: TableHeader, extract: Extract, kept: IntArray | None) -> None:
     """Raise InputError, a question, if the rows that are kept (None: all) are of several targets or stations."""
-    stated = header.stated
-    if stated.target and extract.target == "":
-        values = _values(header, stated.target, kept)
-        if len(values) > 1:
-            say = f"--target {quoted(f'{stated.target}={values[0]}')}"
-            raise InputError(
-                f'{header.source}: it holds {len(values)} targets by column "{stated.target}" ({_shown(values)}). Say '
-                f"{say} for one, or leave the value out for a trajectory of each."
-            )
-    cells = _cells(header, stated.station, kept) if stated.station else []
-    values = list(dict.fromkeys(cells))
-    if len(values) > 1:
-        in_turns = sum(map(operator.ne, cells, cells[1:])) > _IN_TURNS * len(cells)
-        one = "NAME" if in_turns else values[0]
+    column, found = told_apart(header, extract, kept)
+    if not found:
+        return
+    if column == header.stated.target:
         raise InputError(
-            f'{header.source}: it holds the readings of {len(values)} stations by column "{stated.station}" '
-            f"({_shown(values)}), which no one trajectory can mix. Say --where {quoted(f'{stated.station}={one}')} for "
-            f"one; for all, ftproc filter --fuse --write-config {quoted(header.source)} prints a range file."
+            f'{header.source}: it holds {len(found)} targets by column "{column}" ({shown(found)}). Say --target '
+            f"{quoted(f'{column}={found[0]}')} for one, or leave the value out for a trajectory of each."
         )
+    one = "NAME" if in_turns(header, column, kept) else found[0]
+    raise InputError(
+        f'{header.source}: it holds the readings of {len(found)} stations by column "{column}" '
+        f"({shown(found)}), which no one trajectory can mix. Say --where {quoted(f'{column}={one}')} for "
+        f"one; for all, ftproc filter --fuse --write-config {quoted(header.source)} prints a range file."
+    )
+
+
+def told_apart(header: TableHeader, extract: Extract, kept: IntArray | None) -> tuple[str, list[str]]:
+    """The column by which the standard of a file tells several targets apart, or the stations of one target, and its
+    values in the rows that are kept, the first first; no values if there is one of each."""
+    target = header.stated.target if extract.target == "" else ""
+    for column in filter(None, (target, header.stated.station)):
+        found = values(header, column, kept)
+        if len(found) > 1:
+            return column, found
+    return "", []
+
+
+def in_turns(header: TableHeader, column: str, kept: IntArray | None) -> bool:
+    """Whether the rows of a column change their value so often that its stations measure at one time."""
+    cells = _cells(header, column, kept)
+    return bool(sum(map(operator.ne, cells, cells[1:])) > _IN_TURNS * len(cells))
 
 
 def conditions(header: TableHeader) -> list[Condition]:
     """The conditions that pick the rows of each station of a file; none for a file of one."""
     name = header.stated.station
-    values = _values(header, name, None) if name else []
-    return [Condition(name, "=", value) for value in values] if len(values) > 1 else []
+    found = values(header, name, None) if name else []
+    return [Condition(name, "=", value) for value in found] if len(found) > 1 else []
 
 
-def _values(header: TableHeader, column: str, kept: IntArray | None) -> list[str]:
+def values(header: TableHeader, column: str, kept: IntArray | None) -> list[str]:
     """The values of a column, the first first."""
     return list(dict.fromkeys(_cells(header, column, kept)))
 
@@ -67,5 +79,6 @@ def _cells(header: TableHeader, column: str, kept: IntArray | None) -> list[str]
     return [cell for cell in rows.cells(cells if kept is None else cells.take(kept)).tolist() if cell]
 
 
-def _shown(values: list[str]) -> str:
-    return ", ".join(values[:_SHOWN]) + (", ..." if len(values) > _SHOWN else "")
+def shown(found: Sequence[str]) -> str:
+    """The first of some values."""
+    return ", ".join(found[:_SHOWN]) + (", ..." if len(found) > _SHOWN else "")
