@@ -114,6 +114,8 @@ def test_targets_in_one_table_name_themselves_in_a_column(run, here, tracks):
     np.testing.assert_array_equal(again["x_m"], table["x_m"])
     metadata = json.loads(Path("all.json").read_text())
     assert list(metadata["targets"]) == ["7", "12"]
+    for name in ("all.csv", "all.parquet"):
+        assert "the trajectories of 2 targets (7, 12)" in run("score", name, "--truth", "each/a.7.trajectory.csv").err
     assert metadata["targets"]["7"]["summary"]["rows"] == 120
     assert sorted(path.name for path in Path().iterdir()) == ["a.csv", "all.csv", "all.json", "all.parquet", "each"]
 

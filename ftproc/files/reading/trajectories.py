@@ -16,6 +16,7 @@ from ftproc.files.layout import POSITION, Target
 from ftproc.files.reading import columns
 from ftproc.files.reading.formats import content, tables
 from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.formats.standards.choosing import shown
 from ftproc.records import ACCEPTED, FloatArray, Trajectory
 
 _MOST_METADATA = 16 << 20  # bytes
@@ -30,6 +31,12 @@ def read(source: tables.Source) -> Trajectory:
     header = tables.read_header(source)
     if set(layout.MEASUREMENT) & set(header.names) and not set(POSITION) & set(header.names):
         raise InputError(f"{header.source}: this is a log, no trajectory: ftproc filter {quoted(header.source)}.")
+    beside = metadata(source, header)
+    if several := beside.get("targets"):
+        raise InputError(
+            f"{header.source}: this has the trajectories of {len(several)} targets ({shown(list(several))}). "
+            "Filter the log with --target COLUMN=VALUE for one, or with -o DIRECTORY/ for a file of each."
+        )
     known = [name for name in layout.TRAJECTORY if name in header.names or name in ("time_s", *POSITION)]
     others = [name for name in header.names if name not in layout.TRAJECTORY]
     found, extra = columns.load(header, known, others)
@@ -52,7 +59,7 @@ def read(source: tables.Source) -> Trajectory:
         outlier=columns.outlier_flags(header, found, highest=ACCEPTED)[order],
         nis=group(("nis",))[:, 0],
         correction=group(layout.CORRECTION),
-        metadata=metadata(source, header),
+        metadata=beside,
         extra=extra.take(order) if others else None,
     )
 
