@@ -86,7 +86,9 @@ def suspicious(s: Mapping[str, Any]) -> Iterator[str]:
         named = "; ".join(step_in_words(step, s) for step in s["doubtful_steps"][:MOST_STEPS])
         yield f"either {named}, or readings beside it are a patch of outliers: the estimate takes them for good"
     for rival in s["rivals"][:MOST_STEPS]:
-        yield f"{rival['what']}: that is less likely by {rival['nats']:.1f} in log-probability only"
+        less = f"less likely by {rival['nats']:.1f} in log-probability only"
+        more = "likelier by the readings around it, but the track is lost with it"
+        yield f"{rival['what']}: that is {less if rival['nats'] >= 0 else more}"
     if s["clock_set_back"]:
         back = s["clock_set_back"]
         yield f"the time goes back by {-back['by_s']:.3g} s at row {back['row']}, and rows before and after it overlap"

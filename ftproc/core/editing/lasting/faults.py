@@ -56,7 +56,8 @@ MOTION, PATCH, STEP = "motion", "a patch of outliers", "a step that stays"
 
 class Rival(NamedTuple):
     """What the readings [begin, end) of a component were taken for, MOTION, PATCH or STEP, and what else they may be:
-    that is less likely by `gain` only, in log-probability. step: that was taken out, or would be, if either is one."""
+    that is less likely by `gain` only, in log-probability, or, below zero, likelier by what is around it, while the
+    track is lost with it. step: that was taken out, or would be, if either is one."""
 
     component: int
     begin: int

@@ -59,12 +59,13 @@ def without_lasting(
     """The log without the faults that last, decided again as long as there are some: without all that were found, or,
     where too little is left then, without the likeliest. A find may be mended by the next ones, so all of them are
     followed up; if it is not, what was understood before it counts."""
-    best = found
+    best, told = found, 0.0
     for _ in range(LASTING_ROUNDS):
         if found.decision.model.coloured:  # which resembles many steps
             break
         scene = scene_of(found.record, found.decision, work)
         faults, before = search(scene), found
+        told = max(told, *(each.gain for each in faults), 0.0)
         if faults and math.isnan(found.probability):
             best = before = found._replace(probability=log_probability(found.record, found.decision))
         found = _without(before, scene, faults, measurement, decided)
@@ -72,10 +73,10 @@ def without_lasting(
             alone = _without(before, scene, likeliest, measurement, decided)
             found = found if alone.record is before.record else alone
         if found.record is before.record:
-            return found if best.record is before.record else _with_rival(best, found)
+            return found if best.record is before.record else _with_rival(best, found, told)
         if not (_process_noise(found) > AGILE * _process_noise(best) and _is_lost(best, found, COSTS)):
             best = found
-    return best if best is found else _with_rival(best, found)
+    return best if best is found else _with_rival(best, found, told)
 
 
 def _process_noise(found: Understood) -> float:
@@ -83,11 +84,12 @@ def _process_noise(found: Understood) -> float:
     return float(median_level(found.decision.model).jerk[0, 0])
 
 
-def _with_rival(best: Understood, found: Understood) -> Understood:
-    """The best of a log, with what was taken for patches in another as something that it may have."""
+def _with_rival(best: Understood, found: Understood, told: float) -> Understood:
+    """The best of a log, with what was taken for patches in another as something that it may have. told: in
+    log-probability, by how much they were likelier where they are."""
     banned = found.banned if best.banned is None or found.banned is None else found.banned & ~best.banned
     rivals = [
-        Rival(component, begin, end, 0.0, MOTION, PATCH)
+        Rival(component, begin, end, -told, MOTION, PATCH)
         for component in range(CLOCK)
         for begin, end in (() if banned is None else runs_of(banned[:, component]).tolist())
     ]

@@ -138,7 +138,9 @@ def test_a_find_that_loses_the_track_is_taken_back():
     found = pipeline.filter_log(flight.log, FilterSettings(smooth=True))
     off = found.state[:, :3] - flight.truth.position_m
     assert np.sqrt((off**2).sum(1).mean()) < 30.0
-    assert found.metadata["summary"]["trust"]["verdict"] == "suspect"
+    trust = found.metadata["summary"]["trust"]
+    assert trust["verdict"] == "suspect"
+    assert any("range from 124.7 to 404.3 s" in why and "the track is lost with it" in why for why in trust["reasons"])
 
 
 def test_a_patch_is_as_likely_as_those_that_are_rejected():
