@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from ftproc.files.reading import targets
 from tests.files.zoo import animals, radars
 
 ZOO = {animal.name: animal for animal in animals.all_animals()}
@@ -240,3 +241,28 @@ def test_stations_that_measure_in_turns_are_asked_about(run, here):
     two = [radars.block(48, radars.plot_048(*row, sic=sic)) for row in rows for sic in (1, 2)]
     Path("a.ast").write_bytes(b"".join(two))
     assert "--where I010.SIC=NAME" in run("filter", "a.ast", *NO_HEIGHT, "-o", "all.csv").err
+
+
+def test_a_log_that_cannot_be_looked_into_fails_by_itself(run, here, monkeypatch):
+    plots("a.ast", {"icao": 0x3C660C}, {"icao": 0x4BAACD})
+    Path("b.csv").write_text("time_s,range_m\n" + "".join(f"{k},{1000 + k}\n" for k in range(60)))
+    monkeypatch.setattr(targets, "targets", lambda *_: 1 / 0)
+    done = run("filter", "a.ast", "b.csv", *NO_HEIGHT, "-o", "each/")
+    assert done.code == 1
+    assert "a.ast: it holds 2 targets" in done.err
+    assert Path("each/b.trajectory.csv").exists()
+
+
+def test_a_name_of_a_target_is_printed_without_its_control_characters(run, here):
+    rows = [f"{k};201;{10 + k / 100:.6f};{k};5307;;\x07{k % 2}" for k in range(60)]
+    Path("a.csv").write_text("\n".join(["TIME;SIC;RHO;THETA;MODE 3/A;FL;TA", *rows]))
+    said = run("filter", "a.csv", "-o", "each/").err
+    assert 'holds 2 targets by column "TA"' in said
+    assert "\x07" not in said
+
+
+@pytest.mark.parametrize("beside", ['{"targets": 3}', '{"targets": ["a"]}'])
+def test_what_another_program_wrote_beside_a_trajectory_is_no_table_of_targets(run, here, beside):
+    Path("a.csv").write_text("time_s,x_m,y_m,z_m\n" + "".join(f"{k},{k},0,0\n" for k in range(9)))
+    Path("a.json").write_text(beside)
+    assert run("score", "a.csv", "--truth", "a.csv").code == 0

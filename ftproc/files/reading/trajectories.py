@@ -32,7 +32,7 @@ def read(source: tables.Source) -> Trajectory:
     if set(layout.MEASUREMENT) & set(header.names) and not set(POSITION) & set(header.names):
         raise InputError(f"{header.source}: this is a log, no trajectory: ftproc filter {quoted(header.source)}.")
     beside = metadata(source, header)
-    if several := beside.get("targets"):
+    if isinstance(several := beside.get("targets"), dict):
         raise InputError(
             f"{header.source}: this has the trajectories of {len(several)} targets ({shown(list(several))}). "
             "Filter the log with --target COLUMN=VALUE for one, or with -o DIRECTORY/ for a file of each."
