@@ -112,7 +112,7 @@ def test_of_a_clock_that_was_set_back_the_side_with_fewer_rows_is_left_out() -> 
 
 def test_another_convention_that_was_remarked_on_comes_first() -> None:
     """Zenith angles under a name that does not say so."""
-    log = flight(21, "patch=4:10-40:30-200,isolated=0.02").log
+    log = flight(21, "isolated=0.4:6-60").log
     table = pd.DataFrame({"time_s": log.time_s, "range_m": log.measurement[:, 0], "azimuth_rad": log.measurement[:, 1]})
     table["elevation_rad"] = np.pi / 2 - log.measurement[:, 2]
     filtering, _ = found(logs.read(table), SMOOTH)

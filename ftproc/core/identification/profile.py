@@ -127,6 +127,16 @@ def from_knot(model: Model, time_s: FloatArray, span: slice) -> tuple[slice, Mod
     return slice(min(start, span.start), span.stop), model._replace(jerk=model.jerk[first : last + 1])
 
 
+def of_part(model: Model, time_s: FloatArray) -> Model:
+    """The model for a part of the log of which it is, with these times (m,) since that began: each knot of the part has
+    the density that holds in its middle."""
+    if not math.isfinite(model.knot_s):
+        return model
+    knots = max(math.ceil((time_s[-1] - time_s[0]) / model.knot_s), 1)
+    middle = (time_s[0] + (np.arange(knots) + 0.5) * model.knot_s) / model.knot_s
+    return model._replace(jerk=model.jerk[np.clip(middle.astype(np.int64), 0, len(model.jerk) - 1)])
+
+
 def with_allowance(log: Observations, model: Model, scales: Scales | None = None) -> Model:
     """The model with a little more jerk than is likeliest, and nowhere less than shows in a knot of its profile.
     scales: of the log, if they are known."""

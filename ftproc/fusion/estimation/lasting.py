@@ -76,7 +76,7 @@ def find(decided: Decided, gate: float, jerk_known: bool, work: Work) -> list[Fo
     at_median = median_level(decided.model)
     scene = Scene(
         log, possible, taken_in, setting, at_median, jerk_known, decided.rates, gate, decided.residual, decided.state,
-        decided.sigma, work,
+        decided.sigma, work=work,
     )  # fmt: skip
     return [each for each in search(scene) if each.gain > MARGIN]
 

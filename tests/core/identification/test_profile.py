@@ -7,7 +7,7 @@ import pytest
 
 from ftproc.core.filtering.records import Model
 from ftproc.core.filtering.smoother import smooth_log
-from ftproc.core.identification.profile import fit_profile, from_knot
+from ftproc.core.identification.profile import fit_profile, from_knot, of_part
 from ftproc.core.model import motion
 from ftproc.core.model.frames import from_cartesian
 from tests import naive
@@ -58,3 +58,16 @@ def test_a_stretch_keeps_the_pieces_of_the_profile_that_it_lies_in():
             at, of = (p.jerk[motion.knot_index(t + 1e-6, p), 0] for p in (part, whole))
             assert at == of
         assert len(own.jerk) == len({motion.knot_index(t, whole) for t in time[span]})
+
+
+def test_a_part_has_the_process_noise_of_the_log_to_half_a_knot():
+    time = 0.1 * np.arange(600)
+    model = Model(SIGMA**2, np.arange(1.0, 21.0)[:, None] * motion.isotropic(1.0), 3.0)
+    whole = model.profile(time)
+    for low, high in ((0, 600), (95, 250), (240, 242), (570, 600)):
+        part = of_part(model, time[low:high] - time[0]).profile(time[low:high])
+        for t in time[low:high]:
+            near = [whole.jerk[motion.knot_index(t + shift, whole), 0] for shift in (-1.5, 0.0, 1.5)]
+            assert min(near) <= part.jerk[motion.knot_index(t, part), 0] <= max(near)
+    level = model._replace(jerk=model.jerk[:1], knot_s=np.inf)
+    assert of_part(level, time) is level

@@ -9,8 +9,10 @@ as many terms as explain it.
 from __future__ import annotations
 
 import contextlib
+import functools
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -20,8 +22,8 @@ from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.proposals import LONGEST
 from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.scanned import FOLLOWED, MOST_EACH, Scanned, in_whole, weighed_on, worth
-from ftproc.core.editing.lasting.screen import leaves_curves
-from ftproc.core.editing.lasting.weighing import TAKEN_IN, Found, Scene, Weighed, as_it_is, weighed
+from ftproc.core.editing.lasting.screen import leaves_curves, may_leave_curves
+from ftproc.core.editing.lasting.weighing import TAKEN_IN, Found, Scene, Weighed, weighed
 from ftproc.core.identification.stretches import runs_of
 from ftproc.core.work import for_lasting_faults
 from ftproc.records import FloatArray
@@ -146,38 +148,48 @@ def likeliest_followed(seen: Scanned) -> Found | None:
     if len(seen.scene.rates) > 1:
         return None
     found, n, work = list[Found](), seen.samples, for_lasting_faults(seen.samples)  # so that enough is left for jumps
-    scene = seen.scene._replace(work=work)
+    scene, tried = seen.scene._replace(work=work), list[list[list[Curve]]]()
+
+    @functools.cache
+    def without(begin: int, end: int, taken_in: bool) -> Weighed:
+        part = scene.part(slice(begin, end))
+        return weighed(part, part.taken_in if taken_in else part.log.weight, ())
+
     for stretches in followed(seen):
         if not worth(scene):
             break
         near = seen.near(min(each.begin for each in stretches), max(each.end for each in stretches))
-        part, at_jumps = scene.part(near), [each.at_jumps(seen.jumps) for each in stretches]
+        part, at_jumps = scene.stretch(near), [each.at_jumps(seen.jumps) for each in stretches]
+        ends = [[curve.within(near) for curve in of_terms(each, TERMS[0])] for each in (stretches, at_jumps)]
+        if ends in tried:
+            continue
+        tried.append(ends)
         with contextlib.suppress(ValueError, np.linalg.LinAlgError):
-            ends = [[curve.within(near) for curve in of_terms(each, TERMS[0])] for each in (stretches, at_jumps)]
-            first = of_few_terms(part, ends, FOLLOWED, seen.prior(ends[0]))
+            span = near.start, near.stop
+            first = of_few_terms(part, ends, FOLLOWED, seen.prior(ends[0]), partial(without, *span, False))
             if first is None:
                 continue
             runs = [curve for each in stretches for curve in each.runs()]
-            null = max(weighed_on(part, near, curves).log_probability for curves in ((), runs))
+            null = max(without(*span, False), without(*span, True), weighed_on(part, near, runs), key=_likelihood)
             best = of_any_shape(part, first)
-            best = max(
-                best, weighed_on(part, slice(0, len(part.possible)), best.curves), key=lambda each: each.log_probability
-            )
-            gain = best.log_probability - null + seen.prior(best.curves)
+            best = max(best, weighed_on(part, slice(0, len(part.possible)), best.curves), key=_likelihood)
+            gain = best.log_probability - null.log_probability + seen.prior(best.curves)
             if gain < MOST_EACH * part.possible.sum():
                 found.append(Found(in_whole(best, near, n), best.sigma, gain))
     return max((each for each in found if each.gain > FOLLOWED), key=lambda each: each.gain, default=None)
 
 
-def of_few_terms(part: Scene, ends: Sequence[Sequence[Curve]], least: float, prior: float) -> Weighed | None:
+def of_few_terms(
+    part: Scene, ends: Sequence[Sequence[Curve]], least: float, prior: float, without: Callable[[], Weighed]
+) -> Weighed | None:
     """The likeliest of curves of a few terms with these ends; None if those with the last ends explain the part of a
     log no better than motion does, and most terms too little for a gain of so much with this prior: motion that does
-    not follow the patch leaves more to them."""
-    most, weight = [curve.of(max(TERMS)) for curve in ends[-1]], part.log.weight
-    if not leaves_curves(part, most, least - prior, as_it_is(part, weight, part.at_median)):
+    not follow the patch leaves more to them. without: weighs the part without any."""
+    few, most = ends[-1], [curve.of(max(TERMS)) for curve in ends[-1]]
+    if not may_leave_curves(part, few, most, least - prior):
         return None
-    without, first = weighed(part, weight, ()), weighed(part, weight, ends[-1])
-    if first.log_probability > without.log_probability or leaves_curves(part, most, least, without):
+    first = weighed(part, part.log.weight, few)
+    if first.log_probability > without().log_probability or leaves_curves(part, most, least, without()):
         return _likeliest(part, ends[:-1], first)
     return None
 
@@ -193,4 +205,8 @@ def of_any_shape(part: Scene, best: Weighed) -> Weighed:
 
 def _likeliest(part: Scene, of: Iterable[Sequence[Curve]], *others: Weighed) -> Weighed:
     tried = (weighed(part, part.log.weight, curves) for curves in of)
-    return max((*others, *tried), key=lambda each: each.log_probability)
+    return max((*others, *tried), key=_likelihood)
+
+
+def _likelihood(of: Weighed) -> float:
+    return of.log_probability

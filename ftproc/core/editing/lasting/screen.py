@@ -56,16 +56,28 @@ def left_of(part: Scene, jump: Jump, around: tuple[int, int], without: Weighed) 
 def leaves_curves(part: Scene, curves: Sequence[Curve], least: float, without: Weighed) -> bool:
     """Whether curves make a part of a log by so much likelier than it is without a fault, and than their terms do by
     chance."""
-    chance = 0.5 * sum(len(curve.size) for curve in curves)
+    gain, taken_in = partial(_gain, part, curves), np.maximum(without.weight, part.taking_in(curves))
+    return _is_more_than(least, part, gain, without, taken_in)
 
-    def gain(log: Observations, model: Model) -> float:
-        """With the likeliest sizes."""
-        said = said_of(log, model, part.starts(log), columns_of(curves, part.setting))
-        scale = np.sqrt(np.maximum(np.diag(said.information), 1e-300))
-        score, information = said.score / scale, said.information / scale / scale[:, None]
-        return 0.5 * float(score @ np.linalg.lstsq(information, score, rcond=None)[0])
 
-    return _is_more_than(least + chance, part, gain, without, np.maximum(without.weight, part.taking_in(curves)))
+def may_leave_curves(part: Scene, few: Sequence[Curve], most: Sequence[Curve], least: float) -> bool:
+    """The same at the typical process noise of the log, before the part's own is sought; and whether the process noise
+    as it was decided leaves anything to them: few terms make the part likelier, or most do without all that it has more
+    than is typical."""
+    weight = part.log.weight
+    by_median, decided = (as_it_is(part, weight, model) for model in (part.at_median, part.own or part.at_median))
+    if not leaves_curves(part, few, LEFT, decided):
+        least = max(least, LEFT + decided.log_probability - by_median.log_probability)
+    return leaves_curves(part, most, least, by_median)
+
+
+def _gain(part: Scene, curves: Sequence[Curve], log: Observations, model: Model) -> float:
+    """In log-likelihood, by curves of the likeliest sizes; without what their terms gain by chance."""
+    said = said_of(log, model, part.starts(log), columns_of(curves, part.setting))
+    scale = np.sqrt(np.maximum(np.diag(said.information), 1e-300))
+    score, information = said.score / scale, said.information / scale / scale[:, None]
+    found = float(score @ np.linalg.lstsq(information, score, rcond=None)[0])
+    return 0.5 * (found - sum(len(curve.size) for curve in curves))
 
 
 def _is_more_than(

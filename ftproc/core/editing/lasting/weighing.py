@@ -19,7 +19,7 @@ from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, SmootherRun, smooth_log
 from ftproc.core.identification.likelihood import fit_jerk
-from ftproc.core.identification.profile import fit_profile, median_level, roughness
+from ftproc.core.identification.profile import fit_profile, median_level, of_part, roughness
 from ftproc.core.identification.stretches import runs_of
 from ftproc.core.identification.uneven_noise import rates
 from ftproc.core.model import stations
@@ -55,6 +55,7 @@ class Scene(NamedTuple):
     residual: FloatArray
     track: FloatArray | None = None
     doubt: FloatArray | None = None
+    own: Model | None = None
     work: Work | None = None
 
     def part(self, near: slice | IntArray) -> Scene:
@@ -65,6 +66,11 @@ class Scene(NamedTuple):
             track=None if self.track is None else self.track[near],
             doubt=None if self.doubt is None else self.doubt[near],
         )  # fmt: skip
+
+    def stretch(self, near: slice) -> Scene:
+        """Some of the samples, with the process noise that they have in the log."""
+        part = self.part(near)
+        return part._replace(own=self.own and of_part(self.own, part.log.time_s - self.log.time_s[0]))
 
     def without(self, curves: Sequence[Curve]) -> Scene:
         """With curves taken out of the readings."""
@@ -214,7 +220,7 @@ def scene_of(record: Record, decision: Decision, work: Work | None) -> Scene:
     setting = Setting(record.time_s, late_of(log, smoothed.state))
     return Scene(
         log, record.possible, weight, setting, at_median, record.fixed.jerk, decision.rates[None], record.gate,
-        smoothed.residual, work=work,
+        smoothed.residual, own=decision.model, work=work,
     )  # fmt: skip
 
 

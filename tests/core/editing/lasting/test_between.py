@@ -10,11 +10,13 @@ from ftproc.core.editing.lasting import between, search
 from ftproc.core.editing.lasting.between import MOST, Between, between_jumps, between_runs, together, trimmed
 from ftproc.core.editing.lasting.curves import Curve
 from ftproc.core.editing.lasting.scan import Jump
+from ftproc.core.editing.lasting.weighing import Scene
 from ftproc.simulation import simulate
 from tests.core.editing.lasting.scenes import N, scene
 from tests.trust import hard
 
 UNKNOWN = two_pass.Known(np.full(3, np.nan), None, 4.0)
+SCREENS = "leaves_curves", "may_leave_curves"
 PATCHES = "isolated=0.01:6-300,offset=2:8-30:8-200,ramp=1:10-30:20-200,burst=1:8-20:10-100,nan=0.01"
 
 
@@ -103,16 +105,18 @@ def test_two_patches_with_flight_between_them_are_not_one_that_was_followed(monk
         without_the_runs.setattr(Between, "runs", lambda self: [])
         assert error_m() < 1.0
         without_the_runs.setattr(search, "instead_of", lambda seen, found: None)
-        without_the_runs.setattr(between, "leaves_curves", lambda *of: True)
+        for screen in SCREENS:
+            without_the_runs.setattr(between, screen, lambda *of: True)
         assert error_m() > 10.0
-    monkeypatch.setattr(between, "leaves_curves", lambda *of: True)
+    for screen in SCREENS:
+        monkeypatch.setattr(between, screen, lambda *of: True)
     assert error_m() < 1.0
 
 
 @pytest.mark.compiled
-def test_hardly_any_curves_are_weighed_where_nothing_was_followed(monkeypatch):
-    """A flight of turns with rejected runs on either side of them."""
-    flight, weighed = simulate("manoeuvre", seed=261, duration_s=60.0, dt_s=0.1, outliers=PATCHES), between.weighed
+def test_no_curves_are_weighed_where_nothing_was_followed(monkeypatch):
+    """A flight of turns with rejected runs on either side of them, whose process noise is known to be larger there."""
+    flight, weighed = simulate("manoeuvre", seed=101, duration_s=120.0, dt_s=0.1, outliers=PATCHES), between.weighed
     few, stretches, each = between.of_few_terms, list[object](), list[object]()
     monkeypatch.setattr(between, "of_few_terms", lambda *of: stretches.append(0) or few(*of))
     monkeypatch.setattr(between, "weighed", lambda *of: each.append(0) or weighed(*of))
@@ -120,11 +124,16 @@ def test_hardly_any_curves_are_weighed_where_nothing_was_followed(monkeypatch):
     def weighings():
         stretches.clear(), each.clear()
         two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN)
-        return len(each) / len(stretches)
+        assert stretches
+        return len(each)
 
-    assert weighings() < 1
-    monkeypatch.setattr(between, "leaves_curves", lambda *of: True)
-    assert weighings() > 6
+    assert weighings() == 0
+    with monkeypatch.context() as without_its_own:
+        without_its_own.setattr(Scene, "stretch", lambda scene, near: scene.part(near)._replace(own=None))
+        assert weighings() >= 4
+    for screen in SCREENS:
+        monkeypatch.setattr(between, screen, lambda *of: True)
+    assert weighings() > 6 * len(stretches)
 
 
 @pytest.mark.compiled
