@@ -5,9 +5,11 @@ from __future__ import annotations
 import pytest
 
 from ftproc.core import work
-from ftproc.core.editing.lasting import proposals
+from ftproc.core.editing.lasting import proposals, search, weighing
+from ftproc.files.writing import ranges
 from ftproc.fusion import flight, range_file
 from ftproc.settings import FilterSettings
+from ftproc.simulation import simulate_range
 
 
 def fused(folder):
@@ -34,3 +36,16 @@ def test_a_scan_beside_a_jump_has_no_wider_cells_in_a_longer_flight(width, n):
     assert cell <= 2 * proposals.FARTHEST // proposals.CELLS
     assert cell * proposals.CELLS >= min(n, 2 * proposals.FARTHEST) - proposals.CELLS
     assert cell == width or width > 50 or n > width * proposals.CELLS
+
+
+def test_a_jump_that_is_none_asks_for_no_process_noise_of_its_own(tmp_path, monkeypatch):
+    ranges.write(simulate_range("range-theodolites", 1, 60.0), str(tmp_path / "range"), None)
+    fit_jerk, jump, fits, jumps = weighing.fit_jerk, search._at, list[object](), list[object]()
+    monkeypatch.setattr(weighing, "fit_jerk", lambda *of: fits.append(0) or fit_jerk(*of))
+    monkeypatch.setattr(search, "_at", lambda *of: jumps.append(0) or jump(*of))
+    fused(tmp_path / "range")
+    assert jumps
+    assert not fits
+    monkeypatch.setattr(search, "_left_as_steps", lambda seen, jump: jump)
+    fused(tmp_path / "range")
+    assert len(fits) > 5 * len(jumps)

@@ -31,7 +31,7 @@ from ftproc.core.editing.lasting.scanned import (
     weighed_on,
     worth,
 )
-from ftproc.core.editing.lasting.screen import left_of
+from ftproc.core.editing.lasting.screen import LEFT, left_of
 from ftproc.core.editing.lasting.weighing import Found, Scene, Weighed, as_it_is, weighed
 from ftproc.core.identification.profile import median_level
 
@@ -153,7 +153,9 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     there = jump.sample - near.start, seen.width
     # What was rejected of one station, others may show to be right.
     screened = len(part.rates) == 1 or bool((part.taken_in == part.log.weight).all())
-    if screened and not (jump := left_of(part, jump, there, as_it_is(part, part.log.weight, part.at_median))).ways:
+    by_median = as_it_is(part, part.log.weight, part.at_median)
+    jump = left_of(part, jump, there, by_median) if screened else _left_as_steps(seen, jump)
+    if not jump.ways:
         return None
     without = weighed(part, part.log.weight, ())
     if screened and not (jump := left_of(part, jump, there, without)).ways:
@@ -180,6 +182,16 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     best = _best(seen, proposed, whole, located)
     short = None if best is None else instead_of(seen, best)
     return max(short or [best], key=_gain) if best is not None else None
+
+
+def _left_as_steps(seen: Scanned, jump: Jump) -> Jump:
+    """A jump with those of its ways that as a step make the log around it likelier with its typical process noise,
+    before it is weighed with its own."""
+    typical = seen._replace(scene=seen.scene._replace(fixed=True))
+    part = typical.scene.part(seen.near(jump.sample, jump.sample))
+    null = max(weighed(part, weight, ()).log_probability for weight in (part.log.weight, part.taken_in))
+    steps = ((way, _as_step(typical, jump, way, null)[2]) for way in jump.ways)
+    return jump._replace(ways=tuple(way for way, step in steps if step.log_probability > null + LEFT))
 
 
 def _as_step(seen: Scanned, jump: Jump, way: Sequence[int], null: float) -> tuple[float, LocatedJump, Weighed]:
