@@ -8,6 +8,7 @@ the patch. Each way is decided with a jerk profile of its own, in which no other
 from __future__ import annotations
 
 import contextlib
+import functools
 import itertools
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -125,8 +126,12 @@ def _likeliest(part: Record, decision: Decision, run: Run, offset: int) -> tuple
     unknown = before.copy()
     unknown[here, run.component] = 0.0
     unfollowed = with_profile(part, _with(part, decision, unknown), PROFILE_STEPS)
-    found = {before.tobytes(): (0.0, before)}
-    one, decided = log_probability(part, _with(part, decision, before)), dict[bytes, FloatArray]()
+    found, decided = {before.tobytes(): (0.0, before)}, dict[bytes, FloatArray]()
+
+    @functools.cache
+    def as_before() -> float:
+        return log_probability(part, _with(part, decision, before))
+
     for way, follows in _ways(part, before, run, offset):
         with contextlib.suppress(ValueError):  # a component has too few readings there
             if follows:
@@ -136,7 +141,7 @@ def _likeliest(part: Record, decision: Decision, run: Run, offset: int) -> tuple
                 other = _decided(part, decision._replace(weight=way), unfollowed, here, decided)
             if other.tobytes() not in found:
                 prior = SELDOM if run.moves(before, other, offset) and not follows else -MARGIN
-                gain = log_probability(part, _with(part, decision, other)) - one + prior
+                gain = log_probability(part, _with(part, decision, other)) - as_before() + prior
                 found[other.tobytes()] = gain, other
     del found[before.tobytes()]
     gain, other = max(found.values(), key=lambda each: each[0], default=(-np.inf, before))
