@@ -61,10 +61,12 @@ def fed(path: Path, rows: Iterator[str]) -> threading.Thread:
     return thread
 
 
-def wait_until_read(process: int, log: Path) -> None:
-    """Until a process has opened a file."""
+def wait_until_read(process: subprocess.Popen[str], log: Path) -> None:
+    """Until a process has opened a file, or has ended."""
     for _ in range(600):
-        for descriptor in Path(f"/proc/{process}/fd").glob("*"):
+        if process.poll() is not None:
+            return
+        for descriptor in Path(f"/proc/{process.pid}/fd").glob("*"):
             with contextlib.suppress(OSError):
                 if descriptor.readlink() == log:
                     return
@@ -84,7 +86,7 @@ def stopped(directory: Path, number: int, *options: str, rows: int = 0) -> tuple
     before it is stopped."""
     command = [PROGRAM, "filter", "log", "--follow", "-o", "out.csv", *options]
     with subprocess.Popen(command, cwd=directory, stderr=subprocess.PIPE, text=True) as process:
-        wait_until_read(process.pid, directory / "log")
+        wait_until_read(process, directory / "log")
         time.sleep(RUNNING_S)
         if rows:
             wait_for_rows(directory / "out.csv", rows)

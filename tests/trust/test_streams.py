@@ -13,7 +13,7 @@ import pytest
 
 from tests.trust import streams
 
-MANY, PARTS, TRIED = 75, 12, 4  # streams, parts of them, and how many of these are tried here
+MANY, PARTS, TRIED = 75, 12, 2  # streams, parts of them, and how many of these are tried here
 MOST_MEMORY_KB = 3 << 19  # 1.5 GB
 
 
