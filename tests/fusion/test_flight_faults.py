@@ -41,7 +41,7 @@ def test_stations_contradict_each_other_where_one_that_takes_part_is_rejected_or
 def test_stations_that_contradict_each_other_tell_no_motion(monkeypatch, contradict, expected):
     found, asked = SimpleNamespace(unexamined=1, stations=[], weight=[]), []
     monkeypatch.setattr(flight_faults, "_contradict", lambda _: contradict)
-    monkeypatch.setattr(flight_faults, "_with_even_clocks", lambda readings, settle: (readings, found))
+    monkeypatch.setattr(flight_faults, "_without_largest_jumps", lambda readings, settle: (readings, found))
     monkeypatch.setattr(flight_faults.lasting.Readings, "of", lambda _: None)
     monkeypatch.setattr(flight_faults.beside, "fitted", lambda flight, *_: flight)
     monkeypatch.setattr(flight_faults.engine, "last", lambda flight, names: asked.append(names) or flight)

@@ -1,9 +1,9 @@
 """The flight of several stations, and what is wrong with one of them: settled, faults proposed, settled without them.
 
 Where a settled flight has more noise than its components show alone, or rejects many readings, each station is left
-out, and a jump of its clock is proposed by the track of the others, if these agree. The likeliest flight without one is
-kept, if it is likelier than the flight with it. All other faults that last are weighed on the settled flight
-(`lasting`).
+out, and the likeliest jump of its clock, or of a channel, is proposed by the track of the others, if these agree. The
+likeliest flight without one is kept, if it is likelier than the flight with it. All other faults that last are weighed
+on the settled flight (`lasting`).
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from ftproc.core.editing.patch_likelihood import log_probability_of_all
 from ftproc.core.identification.motion_models import WHITE
 from ftproc.core.identification.profile import roughness
 from ftproc.core.work import for_lasting_faults
-from ftproc.fusion.estimation import beside, clock_jumps, engine, lasting
-from ftproc.fusion.estimation.clock_jumps import Jump
+from ftproc.fusion.estimation import beside, engine, jumps_beside, lasting
 from ftproc.fusion.estimation.constants import Likelihood
 from ftproc.fusion.estimation.engine import Alone, Current
 from ftproc.fusion.estimation.events import Seen
+from ftproc.fusion.estimation.jumps_beside import Jump
 from ftproc.fusion.estimation.lasting import Readings
 
 LASTING_ROUNDS = 3  # of the search for faults that last: where one is taken out, another may show
@@ -41,7 +41,7 @@ def fuse(
     """The fused flight, or a stretch. names: of the models of motion to choose from. known: what others have said.
     progress: takes each round. Raises Alone."""
     settle = partial(engine.settled, gate=gate, jerk_psd=jerk_psd, known=known, progress=progress)
-    readings, current = _with_even_clocks(Readings.of(stations), settle)
+    readings, current = _without_largest_jumps(Readings.of(stations), settle)
     work = for_lasting_faults(len(current.events.time_s), len(stations))
     for _ in range(LASTING_ROUNDS):
         if current.unexamined or lasting.contradicted(current.stations, current.weight):
@@ -62,8 +62,8 @@ def fuse(
     return current._replace(unexamined=current.unexamined + work.passed)
 
 
-def _with_even_clocks(readings: Readings, settle: Settle) -> tuple[Readings, Current]:
-    """The readings without the jumps of clocks that are likelier than none, and their flight."""
+def _without_largest_jumps(readings: Readings, settle: Settle) -> tuple[Readings, Current]:
+    """The readings without the jumps that are likelier than none, and their flight."""
     current = settle(readings)
     for _ in range(LASTING_ROUNDS):
         if not (_contradict(current) or _rejects_many(current)):
@@ -93,25 +93,28 @@ def _rejects_many(current: Current) -> bool:
 
 
 def _without_jumps(readings: Readings, current: Current, settle: Settle) -> Iterator[tuple[int, Jump, Current]]:
-    """The jumps of the clock of each station, as the track of the others tells them, and the flights without them."""
+    """The likeliest jump of each station, as the track of the others tells it, and the flights without it."""
     for s, station in enumerate(readings.stations):
         banned = [np.ones_like(each) if k == s else each for k, each in enumerate(readings.banned)]
         with contextlib.suppress(Alone):
             others = settle(readings._replace(banned=banned))
             if _contradict(others):
                 continue  # it is one of these
-            jump = clock_jumps.propose(station, current.own[s], others.events.time_s, others.found.run.state)
-            if jump is not None and jump.gain > MARGIN:
-                yield s, jump, settle(_without(readings, s, jump))
+            jumps = jumps_beside.propose(station, current.own[s], others.events.time_s, others.found.run.state)
+            likeliest = max(jumps, key=lambda jump: jump.gain, default=None)
+            if likeliest is not None and likeliest.gain > MARGIN:
+                for jump in likeliest.sides():
+                    yield s, jump, settle(_without(readings, s, jump))
 
 
 def _as_all_tell(readings: Readings, s: int, jump: Jump, first: Current, settle: Settle) -> tuple[Readings, Current]:
     """The readings without a jump of station s of the size that all stations tell, and their flight. first: the flight
     without the jump as the others told it."""
     run = first.found.run
-    more_s = clock_jumps.rest_of(jump, s, first.events, first.log, first.model, first.start, run.state)
+    more = jumps_beside.rest_of(jump, s, first.events, first.log, first.model, first.start, run.state)
     gap_s = float(np.diff(readings.stations[s].time_s)[jump.row - 1])
-    found = _without(readings, s, jump._replace(size_s=min(jump.size_s + more_s, gap_s)))
+    most = gap_s if jump.channel == CLOCK else math.inf
+    found = _without(readings, s, jump._replace(size=min(jump.size + more, most)))
     with contextlib.suppress(Alone):
         if score(flight := settle(found)) > score(first):
             return found, flight._replace(steps=found.steps)
@@ -121,7 +124,8 @@ def _as_all_tell(readings: Readings, s: int, jump: Jump, first: Current, settle:
 
 def _without(readings: Readings, s: int, jump: Jump) -> Readings:
     stations = [jump.taken_out(each) if k == s else each for k, each in enumerate(readings.stations)]
-    step = lasting.Step(stations[s].name, CLOCK, float(readings.stations[s].time_s[jump.row]), jump.size_s)
+    at_s, size = readings.stations[s].time_s[jump.row], jump.size if jump.later else -jump.size
+    step = lasting.Step(stations[s].name, jump.channel, float(at_s), size)
     return readings._replace(stations=stations, steps=(*readings.steps, step))
 
 
