@@ -17,6 +17,8 @@ import numpy as np
 
 from ftproc.core import threads
 from ftproc.core.editing.lasting.ends import End
+from ftproc.core.editing.lasting.screen import leaves_curves
+from ftproc.core.editing.lasting.weighing import as_it_is
 from ftproc.errors import FtprocError
 from ftproc.methods import bridging
 from ftproc.quality.verdict import CONSISTENT
@@ -51,6 +53,10 @@ def _no_reading(measurement: Any, *_: Any) -> Any:
 
 def _as_read(time_s: Any, measurement: Any) -> Any:
     return measurement.copy(), np.zeros(measurement.shape, np.uint8)
+
+
+def _at_typical_noise(part: Any, few: Any, most: Any, least: float) -> bool:
+    return leaves_curves(part, most, least, as_it_is(part, part.log.weight, part.at_median))
 
 
 def _same_screen(screen: Callable[..., Any], *arguments: Any) -> Any:
@@ -105,7 +111,13 @@ RULES: dict[str, tuple[Off, ...]] = {
     "clocks that jump in a gap": (Off(f"{EDITING}.lasting.clock", "gaps", _empty),),
     "noise of what is rejected": (Off(TWO_PASS, "_rejects_many", lambda *_: False),),
     "others that are as likely": (Off(TWO_PASS, "others", _empty),),
-    "curves that leave too little to a patch": (Off(f"{EDITING}.lasting.between", "leaves_curves", lambda *_: True),),
+    "curves that leave too little to a patch": (
+        Off(f"{EDITING}.lasting.between", "leaves_curves", lambda *_: True),
+        Off(f"{EDITING}.lasting.between", "may_leave_curves", lambda *_: True),
+    ),
+    "what the process noise of the log leaves to a patch": (
+        Off(f"{EDITING}.lasting.between", "may_leave_curves", _at_typical_noise),
+    ),
     "patches that were followed": (Off(f"{EDITING}.lasting.search", "likeliest_followed", _nothing),),
     "one-sided errors": (Off(TWO_PASS, "_one_sided", _empty),),
     "patches between jumps": (Off(f"{EDITING}.jump_patches", "find", lambda time_s, *_: np.zeros(len(time_s))),),
