@@ -153,8 +153,10 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     there = jump.sample - near.start, seen.width
     # What was rejected of one station, others may show to be right.
     screened = len(part.rates) == 1 or bool((part.taken_in == part.log.weight).all())
-    by_median = as_it_is(part, part.log.weight, part.at_median)
-    jump = left_of(part, jump, there, by_median) if screened else _left_as_steps(seen, jump)
+    if screened:
+        jump = left_of(part, jump, there, as_it_is(part, part.log.weight, part.at_median))
+    else:
+        jump = _left_as_steps(seen, jump)
     if not jump.ways:
         return None
     without = weighed(part, part.log.weight, ())
