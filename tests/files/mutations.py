@@ -81,11 +81,12 @@ def _zenith(angle: FloatArray) -> FloatArray:
 
 
 BARE, DEG, RAD = "t,R,A,E", "time_s,range_m,az_deg,el_deg", "time_s,range_m,az_rad,el_rad"
+OWN = "time_s,range_m,azimuth_rad,elevation_rad"
 
 
 def kinds() -> Iterator[Kind]:
     """All kinds of mutation."""
-    yield Kind("nothing changed, SI", "time_s,range_m,azimuth_rad,elevation_rad", lambda f: [*f])
+    yield Kind("nothing changed, SI", OWN, lambda f: [*f])
     yield Kind("nothing changed, deg", DEG, lambda f: [f.t, f.r, _deg(f.a), _deg(f.e)])
     yield from _angles()
     yield from _lengths()
@@ -112,6 +113,11 @@ def _angles() -> Iterator[Kind]:
     yield Kind("zenith, unsaid", "t,range_m,A,E", lambda f: [f.t, f.r, _deg(f.a), _deg(_zenith(f.e))], True)
     yield Kind("zenith named deg", DEG, lambda f: [f.t, f.r, _deg(f.a), _deg(_zenith(f.e))])
     yield Kind("zenith named rad", RAD, lambda f: [f.t, f.r, f.a, _zenith(f.e)])
+    yield Kind("zenith in own names", OWN, lambda f: [f.t, f.r, f.a, _zenith(f.e)])
+    yield Kind("deg in own names", OWN, lambda f: [f.t, f.r, _deg(f.a), _deg(f.e)])
+    yield Kind("exchanged in own names", OWN, lambda f: [f.t, f.r, f.e, f.a])
+    yield Kind("km in own names", OWN, lambda f: [f.t, f.r / 1e3, f.a, f.e], unknowable=True)
+    yield Kind("ms in own names", OWN, lambda f: [f.t * 1e3, f.r, f.a, f.e])
     yield Kind("zenith called V", "t,range_m,Hz_deg,V_deg", lambda f: [f.t, f.r, _deg(f.a), _deg(_zenith(f.e))], True)
     yield Kind("V of an elevation", "t,range_m,Hz_deg,V_deg", lambda f: [f.t, f.r, _deg(f.a), _deg(f.e)], True)
     yield Kind("downwards", DEG, lambda f: [f.t, f.r, _deg(f.a), -_deg(f.e)], unknowable=True)

@@ -124,6 +124,8 @@ def _in_own_names(log: Known, way: Way) -> bool:
     """Whether a way contradicts none but the program's own names, which nobody gives by mistake."""
     units = dict(zip(QUANTITIES, way.units, strict=True))
     own = {q: c._replace(unit=units[q] or c.unit) for q, c in log.found.items() if ways.is_canonical(c)}
+    if "elevation" in own:
+        own["elevation"] = own["elevation"]._replace(zenith=way.zenith)
     return log._replace(found={**log.found, **own}).allows(way)
 
 

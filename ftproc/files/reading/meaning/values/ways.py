@@ -103,7 +103,7 @@ def _units(log: Known, quantity: str) -> Iterator[tuple[Unit | None, float]]:
             yield UNITS[quantity][name], _SURVEYORS_GRAD if grad else prior
         return
     yield column.unit, 1.0
-    if (_is_sure(column) and not is_canonical(column)) or (quantity == "time" and not log.numbered):
+    if _is_sure(column) or (quantity == "time" and not log.numbered):
         return
     prior, others = _OTHER[kind]
     if is_canonical(column):
@@ -115,7 +115,7 @@ def _units(log: Known, quantity: str) -> Iterator[tuple[Unit | None, float]]:
 
 def _is_sure(column: Column) -> bool:
     """Whether nothing is weighed against what a column is said to be."""
-    return bool(column.unit_stated_by_user or column.notation or is_canonical(column) or len(column.roles) > 1)
+    return bool(column.unit_stated_by_user or column.notation or len(column.roles) > 1)
 
 
 def is_canonical(column: Column) -> bool:
@@ -129,12 +129,7 @@ def _angles(
     """Units of the angles, whether the elevation is a zenith angle and the angles exchanged; and how likely that is."""
     elevation = log.found.get("elevation")
     zeniths = [(log.is_zenith, 1.0)]
-    if (
-        elevation is not None
-        and log.station.elevation_from is None
-        and not elevation.zenith
-        and elevation.name != CANONICAL["elevation"]
-    ):
+    if elevation is not None and log.station.elevation_from is None and not elevation.zenith:
         surveyors = elevation.key in plausibility.SURVEYORS
         zeniths.append((True, _ZENITH_BY_SURVEYORS if surveyors else _ZENITH))
     exchanges = [(False, 1.0)]
