@@ -16,7 +16,8 @@ from ftproc.core.filtering.records import FilterRun
 from ftproc.core.model.frames import line_of_sight_axes
 from ftproc.records import FloatArray, IntArray
 
-SETTLING = 25  # samples after (re-)initialization that are neither learned from nor corrected
+SETTLING = 25  # samples after (re-)initialization that are not learned from, nor corrected where the filter begins at a
+# smoothed state: there the error is another, and the correction makes it 1.06 times larger (radar, 1 Hz)
 APPLIED = 6  # outputs that are applied to the trajectory: position and velocity
 LOS_NAMES = ("radial", "cross", "up", "radial velocity", "cross velocity", "up velocity")
 
@@ -69,11 +70,12 @@ def lever_m(position_m: FloatArray) -> FloatArray:
     return np.stack([np.ones_like(distance), np.maximum(ground, 1e-3 * distance), distance], axis=1)
 
 
-def usable(run: FilterRun, start: int, stop: int) -> BoolArray:
-    """(m,) true where the filter has settled, is not coasting (some component was used) and has finite sigmas."""
+def usable(run: FilterRun, start: int, stop: int, settling: int = SETTLING) -> BoolArray:
+    """(m,) true where the filter has had so many samples to settle, is not coasting (some component was used) and has
+    finite sigmas."""
     sigma = run.los_sigma[start:stop]
     fit: BoolArray = (
-        (run.since_start[start:stop] >= SETTLING)
+        (run.since_start[start:stop] >= settling)
         & np.any(run.weight[start:stop] > 0.0, axis=1)
         & np.all(np.isfinite(sigma) & (sigma > 0.0), axis=1)
         & np.all(np.isfinite(run.state[start:stop]), axis=1)
@@ -154,11 +156,11 @@ class Features(ABC):
         """The inverse of `to_cartesian`."""
         return los.from_cartesian(cartesian) / self.unit(los)
 
-    def inputs(self, run: FilterRun, start: int, stop: int) -> tuple[FloatArray, BoolArray]:
+    def inputs(self, run: FilterRun, start: int, stop: int, settling: int = SETTLING) -> tuple[FloatArray, BoolArray]:
         """Inputs (m, d), zero where not valid, and the mask (m,) of valid samples."""
         with np.errstate(invalid="ignore", divide="ignore"):
             raw = self._raw(run, start, stop)
-        valid = usable(run, start, stop) & np.all(np.isfinite(raw), axis=1)
+        valid = usable(run, start, stop, settling) & np.all(np.isfinite(raw), axis=1)
         raw[~valid] = 0.0
         return raw, valid
 

@@ -62,7 +62,7 @@ class LiveCorrection:
         proof = _faded(_regression(run, first, last), fading, self.proof)
         self.proof, self.wanted = proof[-1], wanted[-1]
         gain = ((proof[:, :1] + PRIOR * WORTH) / (proof[:, 1:] + WORTH)).clip(0.0, 1.0)
-        return self._in_steps(LineOfSight(new.state[:, :3], sigma), wanted * gain, fading > 0)
+        return self._in_steps(LineOfSight(new.state[:, :3], sigma), wanted * gain, fading > 0, stage.bound)
 
     def _usual(self, sigma: FloatArray, fading: FloatArray) -> FloatArray:
         """Sigmas (n, 6), none much larger than the usual ones; zero where they are none."""
@@ -73,16 +73,18 @@ class LiveCorrection:
         usual = seen[:, :1] / np.maximum(seen[:, 1:], np.finfo(float).tiny)
         return np.where(known, np.minimum(sigma, USUAL * usual), 0.0)
 
-    def _in_steps(self, los: LineOfSight, target: FloatArray, goes_on: BoolArray) -> FloatArray:
-        """What is applied (n, 6) in x y z, on the way to a target along the line of sight."""
-        found, step = np.zeros_like(target), STEP * los.sigma.reshape(-1, 2, 3)
+    def _in_steps(self, los: LineOfSight, target: FloatArray, goes_on: BoolArray, bound: FloatArray) -> FloatArray:
+        """What is applied (n, 6) in x y z, on the way to a target along the line of sight, never above so many sigmas
+        (6,): these may collapse from row to row, when the noise is found anew."""
+        found, sigma = np.zeros_like(target), los.sigma.reshape(-1, 2, 3)
+        step, most = STEP * sigma, bound.reshape(2, 3) * sigma
         for k, wanted in enumerate(target.reshape(-1, 2, 3)):
             if not goes_on[k] or not step[k].all():
                 self.applied = np.zeros((2, 3))
             elif wanted.any() or self.applied.any():
                 axes = los.axes[k]
                 along = self.applied @ axes.T
-                self.applied = (along + (wanted - along).clip(-step[k], step[k])) @ axes
+                self.applied = (along + (wanted - along).clip(-step[k], step[k])).clip(-most[k], most[k]) @ axes
             found[k] = self.applied.ravel()
         return found
 
@@ -90,7 +92,7 @@ class LiveCorrection:
 def _output(run: FilterRun, stage: Stage, first: int) -> FloatArray:
     """(m, 6) output for the samples from the first on, in sigmas, with the stage's gain and bound. One row at a time,
     because the last bits of a product of matrices depend on how many there are."""
-    raw, usable = stage.features.inputs(run, first, len(run.time_s))
+    raw, usable = stage.features.inputs(run, first, len(run.time_s), settling=0)
     found = [output_of(stage, raw[k : k + 1], usable[k : k + 1]).values for k in range(len(raw))]
     return np.clip(np.concatenate(found) * stage.gain, -stage.bound, stage.bound)
 

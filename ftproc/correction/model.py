@@ -110,7 +110,7 @@ def _stage_card(name: str, stage: Stage) -> list[str]:
     return [
         f"{name}: feature set {stage.features.name!r}, {network}",
         f"data: sha256 {stage.fingerprint}",
-        f"bounded to {_range(stage.bound)} sigma; zero while coasting, just after (re-)initialization and "
+        f"bounded to {_range(stage.bound)} sigma; zero while coasting, just after (re-)initialization (but live) and "
         "outside the range of the training data",
         *verdict,
     ]

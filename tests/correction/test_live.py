@@ -94,6 +94,26 @@ def test_the_innovations_prove_the_gain(share: float) -> None:
     assert along[-1] == pytest.approx(np.clip(share, 0.0, 1.0) * whole, abs=0.15)
 
 
+def test_a_correction_is_bounded_by_the_sigmas_of_its_row() -> None:
+    """Where these collapse from row to row, as the noise is found anew."""
+    run, _ = track(MEMORY, 1.0)
+    run.los_sigma[-9:] = 0.01
+    values = LiveCorrection().of(run, constant("motion", 1.5))
+    along = np.abs(los_of(run, np.ones(len(values), bool)).from_cartesian(values))
+    assert along[-10].min() > 0.5
+    assert along[-9:].max() < 2.0 * 0.01 + 1e-9
+
+
+def test_a_track_is_corrected_from_its_first_row_on() -> None:
+    """A filter that began without a smoother, unlike that after two-pass editing, lags from the beginning."""
+    run, packaged = flown(20.0, 0.0), model_file.named("packaged")
+    assert packaged is not None
+    values = LiveCorrection().of(run, packaged.filter)
+    first = int(np.flatnonzero((run.weight > 0).any(1))[0])
+    assert np.flatnonzero(values.any(1))[0] <= first + 2
+    assert not correct(run, packaged.filter, run.state).values[first : first + SETTLING].any()
+
+
 def test_innovations_that_say_nothing_leave_the_usual_gain() -> None:
     run, whole = track(2 * SETTLING, -1.0, noise=1e3)
     values = LiveCorrection().of(run, constant("motion", 1.0))
