@@ -36,12 +36,17 @@ class Output(NamedTuple):
     outside: BoolArray
 
 
-def network_output(run: FilterRun, stage: Stage, start: int, stop: int, smoothed: FloatArray | None = None) -> Output:
+def network_output(
+    run: FilterRun, stage: Stage, start: int, stop: int, smoothed: FloatArray | None = None,
+    los: LineOfSight | None = None,
+) -> Output:  # fmt: skip
     """The network's output for samples start:stop, before gain and bound. smoothed: (n, 9) the smoother's states, by
-    which the output of a feature set that must be proven is multiplied by what they prove in these samples."""
+    which the output of a feature set that must be proven is multiplied by what they prove in these samples. los: of
+    these samples, if it is known."""
     found = output_of(stage, *stage.features.inputs(run, start, stop))
     if stage.features.proven:
-        gain = 0.0 if smoothed is None else _own_gain(run, stage, slice(start, stop), smoothed, found)
+        los = LineOfSight.of(run, start, stop) if los is None else los
+        gain = 0.0 if smoothed is None else _own_gain(run, stage, slice(start, stop), smoothed, found, los)
         found.values[:] *= gain
     return found
 
@@ -56,10 +61,12 @@ def output_of(stage: Stage, raw: FloatArray, usable: BoolArray) -> Output:
     return Output(values, usable, usable & ~inside)
 
 
-def _own_gain(run: FilterRun, stage: Stage, rows: slice, smoothed: FloatArray, found: Output) -> FloatArray:
+def _own_gain(
+    run: FilterRun, stage: Stage, rows: slice, smoothed: FloatArray, found: Output, los: LineOfSight
+) -> FloatArray:
     """(6,) what the smoother's states prove of the output for these rows."""
     later = smoothed[rows, :APPLIED] - run.state[rows, :APPLIED]
-    los, values = LineOfSight.of(run, rows.start, rows.stop), np.clip(found.values, -stage.bound, stage.bound)
+    values = np.clip(found.values, -stage.bound, stage.bound)
     return own_gain(los, values, later, run.time_s[rows], found.usable)
 
 
@@ -94,8 +101,9 @@ def correct(run: FilterRun, stage: Stage, smoothed: FloatArray | None = None) ->
     chunk = max(n, 1) if stage.features.proven else CHUNK
     for start in range(0, n, chunk):
         stop = min(start + chunk, n)
-        output = network_output(run, stage, start, stop, smoothed)
-        values[start:stop] = bounded(LineOfSight.of(run, start, stop), stage, output.values * stage.gain)
+        los = LineOfSight.of(run, start, stop)
+        output = network_output(run, stage, start, stop, smoothed, los)
+        values[start:stop] = bounded(los, stage, output.values * stage.gain)
         outside += int(output.outside.sum())
         usable += int(output.usable.sum())
     unproven = stage.features.proven and not values.any()

@@ -41,7 +41,10 @@ class LineOfSight:
 
     def rows(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> LineOfSight:
         """Of the samples of a mask, or of these numbers."""
-        return LineOfSight(self.position_m[rows], self.sigma[rows])
+        found = LineOfSight(self.position_m[rows], self.sigma[rows])
+        if "axes" in self.__dict__:
+            found.__dict__["axes"] = self.axes[rows]
+        return found
 
     @cached_property
     def axes(self) -> FloatArray:
@@ -51,13 +54,13 @@ class LineOfSight:
     def from_cartesian(self, cartesian: FloatArray) -> FloatArray:
         """Position and velocity (n, 6) in x, y, z as components along the axes."""
         pairs = cartesian.reshape(len(cartesian), 2, 3)
-        along: FloatArray = np.einsum("nij,npj->npi", self.axes, pairs).reshape(len(cartesian), 6)
+        along: FloatArray = (pairs @ self.axes.transpose(0, 2, 1)).reshape(len(cartesian), 6)
         return along
 
     def to_cartesian(self, along: FloatArray) -> FloatArray:
         """The inverse of `from_cartesian`."""
         pairs = along.reshape(len(along), 2, 3)
-        cartesian: FloatArray = np.einsum("nij,npi->npj", self.axes, pairs).reshape(len(along), 6)
+        cartesian: FloatArray = (pairs @ self.axes).reshape(len(along), 6)
         return cartesian
 
 

@@ -120,7 +120,7 @@ class _Motion:
 
 def _rms(values: FloatArray) -> FloatArray:
     """(n, 1) root mean square of (n, m)."""
-    return np.asarray(np.sqrt(np.mean(values**2, axis=1, keepdims=True)))
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", values, values) / values.shape[1]))[:, None]
 
 
 def _compressed(values: FloatArray) -> FloatArray:
