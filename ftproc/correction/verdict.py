@@ -48,7 +48,7 @@ class ComponentVerdict:
 class Verdict:
     """by: "flight" or "block", the unit that is held out. training, validation, test: numbers of these. validated:
     position on the validation data, by which feature sets are compared. position, velocity: on the untouched test
-    data."""
+    data. in_turn: the validation is by the training flights, each left out once."""
 
     by: str
     training: int
@@ -58,6 +58,7 @@ class Verdict:
     validated: Ratio | None
     position: Ratio | None
     velocity: Ratio | None
+    in_turn: bool = False
 
     @property
     def helps(self) -> bool:
@@ -67,7 +68,8 @@ class Verdict:
     def sentences(self) -> list[str]:
         """The verdict in plain sentences, one per line."""
         unit = "flights" if self.by == "flight" else "blocks of at least 30 s"
-        lines = [f"Trained on {self.training} {unit}, validated on {self.validation}, tested on {self.test}."]
+        by = "each validated by what the others taught" if self.in_turn else f"validated on {self.validation}"
+        lines = [f"Trained on {self.training} {unit}, {by}, tested on {self.test}."]
         if not self.helps:
             return [*lines, f"No significant improvement on the held-out {unit}: the correction is zero."]
         lines += [f"  {component}." for component in self.components]

@@ -7,7 +7,7 @@ hundreds of sigmas, beside which the others would not be seen."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from ftproc.correction.apply import bounded, network_output
 from ftproc.correction.features import APPLIED, LineOfSight
 from ftproc.correction.model import Stage
+from ftproc.correction.network import Weights
 from ftproc.correction.training.bootstrap import Blocks
 from ftproc.correction.training.samples import Flight, Piece, Split
 from ftproc.correction.verdict import ComponentVerdict, Ratio, Verdict
@@ -36,12 +37,15 @@ class _HeldOut:
     blocks: Blocks
 
 
-def _held_out(stage: Stage, flights: Sequence[Flight], pieces: Sequence[Piece]) -> _HeldOut:
+def _held_out(
+    stage: Stage, flights: Sequence[Flight], pieces: Sequence[Piece], left_out: Mapping[Piece, Weights]
+) -> _HeldOut:
     position, sigma, output, error = [np.empty((0, 3))], [np.empty((0, 6))], [np.empty((0, 6))], [np.empty((0, 6))]
     times = []
-    for number, start, stop in pieces:
-        flight = flights[number]
-        found = network_output(flight.run, stage, start, stop, flight.smoothed)
+    for piece in pieces:
+        number, start, stop = piece
+        flight, mine = flights[number], replace(stage, weights=left_out.get(piece, stage.weights))
+        found = network_output(flight.run, mine, start, stop, flight.smoothed)
         piece_error = flight.error[start:stop, :APPLIED]
         keep = found.usable & np.all(np.isfinite(piece_error), axis=1)
         position.append(flight.run.state[start:stop, :3][keep])
@@ -137,9 +141,15 @@ class _Ratios:
         return Ratio(float(np.sqrt(total[0] / total[1])), float(low), float(high))
 
 
-def with_verdict(stage: Stage, flights: Sequence[Flight], parts: Split, rng: np.random.Generator) -> Stage:
-    """The stage with its gain and verdict, from the held-out parts of `flights`."""
-    validation, test = (_held_out(stage, flights, pieces) for pieces in (parts.validation, parts.test))
+def with_verdict(
+    stage: Stage, flights: Sequence[Flight], parts: Split, rng: np.random.Generator,
+    left_out: Mapping[Piece, Weights] | None = None,
+) -> Stage:  # fmt: skip
+    """The stage with its gain and verdict, from the held-out parts of `flights`. left_out: the weights that were
+    learned without each piece, if all but the test's are held out in turn."""
+    left_out = left_out or {}
+    validation = _held_out(stage, flights, [*left_out] or parts.validation, left_out)
+    test = _held_out(stage, flights, parts.test, {})
     gain, proof = _proven_gain(stage, validation, rng)
     stage = replace(stage, gain=gain)
     validated = _Ratios(stage, validation, rng).of(slice(0, 3))
@@ -150,9 +160,10 @@ def with_verdict(stage: Stage, flights: Sequence[Flight], parts: Split, rng: np.
     )
     verdict = Verdict(
         by=parts.by,
-        training=len(parts.training),
-        validation=len(parts.validation),
+        training=len(left_out or parts.training),
+        validation=len(left_out or parts.validation),
         test=len(parts.test),
+        in_turn=bool(left_out),
         components=components,
         validated=validated,
         position=ratios.of(slice(0, 3)),

@@ -23,6 +23,7 @@ APART = 8  # samples left out between two blocks of a flight, for neighbours sha
 VALIDATION_SHARE, TEST_SHARE = 1 / 3, 1 / 6
 MOST_VALIDATION, MOST_TEST = 60, 30  # pieces: more prove no more
 MOST_SAMPLES = 40_000  # for back-propagation
+BOUND_SIGMA = 2.0  # bound on a correction where sigmas are consistent
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,12 @@ class Samples(NamedTuple):
         return Samples(self.inputs[rows], self.targets[rows])
 
     def and_(self, others: Samples) -> Samples:
-        return Samples(*(np.concatenate(pair) for pair in zip(self, others, strict=True)))
+        return Samples.of([self, others])
+
+    @classmethod
+    def of(cls, tables: Sequence[Samples]) -> Samples:
+        """All of several tables."""
+        return cls(*(np.concatenate(each) for each in zip(*tables, strict=True)))
 
     def thinned(self, most: int, rng: np.random.Generator) -> Samples:
         """At most so many of the samples, in their order."""
@@ -132,11 +138,13 @@ def split(flights: Sequence[Flight], rng: np.random.Generator) -> Split:
     return Split(tuple(order[held:]), tuple(order[tests:held]), tuple(order[:tests]), by)
 
 
-def samples(flights: Sequence[Flight], pieces: Sequence[Piece], features: Features) -> Samples:
+def samples(
+    flights: Sequence[Flight], pieces: Sequence[Piece], features: Features, among: int | None = None
+) -> Samples:
     """The samples in `pieces` that are valid and have truth, not normalised; of each piece at most so many as the
     feature set wants, or more where there are few pieces, at even distances, so that long flights count no more than
-    others."""
-    most = None if features.most is None else max(features.most, MOST_SAMPLES // max(len(pieces), 1))
+    others. among: the number of pieces, if there are others."""
+    most = None if features.most is None else max(features.most, MOST_SAMPLES // max(among or len(pieces), 1))
     inputs, targets = [np.empty((0, features.input_size))], [np.empty((0, features.output_size))]
     for number, start, stop in pieces:
         flight = flights[number]

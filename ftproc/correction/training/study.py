@@ -19,8 +19,8 @@ from ftproc.correction.training.descent import Problem
 from ftproc.correction.training.genetic import GeneticSettings
 from ftproc.correction.training.initial_weights import SEARCH_SAMPLES, initial_weights
 from ftproc.correction.training.parallel import each
+from ftproc.correction.training.prepared import prepare
 from ftproc.correction.training.samples import Flight, Samples
-from ftproc.correction.training.train import prepare
 from ftproc.records import FloatArray
 from ftproc.settings import TrainSettings
 

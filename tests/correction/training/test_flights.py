@@ -70,6 +70,8 @@ def test_a_fleet_begins_with_the_packaged_network(hidden):
     assert model.settings["start"] == ("packaged" if hidden is None else "genetic")
     if hidden is None:
         np.testing.assert_array_equal(network.pack(model.filter.weights), network.pack(packaged.filter.weights))
+        np.testing.assert_array_equal(model.filter.envelope.precision, packaged.filter.envelope.precision)
+        np.testing.assert_array_equal(model.filter.bound_sigma, packaged.filter.bound_sigma)
 
 
 def test_a_fleet_whose_errors_are_others_has_a_network_near_the_packaged_one():

@@ -13,8 +13,9 @@ from ftproc.correction.feature_sets import named
 from ftproc.correction.features import SETTLING
 from ftproc.correction.model import Model, Stage
 from ftproc.correction.model_file import to_bytes
+from ftproc.correction.training.prepared import prepare
 from ftproc.correction.training.samples import Flight, samples, split
-from ftproc.correction.training.train import prepare, train
+from ftproc.correction.training.train import train
 from ftproc.errors import InputError, UsageError
 from ftproc.settings import TrainSettings
 from tests.correction import fake
