@@ -35,7 +35,7 @@ from tests.trust.tables import Bound, Given
 
 SCENARIOS = tuple(name for name in RANGE_SCENARIOS if name not in ("range", "range-gnss", "range-surveillance"))
 LASTS_S = 60.0
-BOUND = Bound(wrong=0.45, confident=0.05)  # of all faults but a drift, a little above what is reached
+BOUND = Bound(wrong=0.2, confident=0.05)  # of all faults but a drift, a little above what is reached
 SEEDS = 3
 HELD = InstrumentErrors(range_held=4, azimuth_held=4, elevation_held=4)
 Draw = np.random.Generator
