@@ -8,6 +8,8 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import settings
 
+from ftproc.cli import progress
+
 # Several processes share the processors; the examples are the same in every run, so that a failure is one of the code.
 settings.register_profile("suite", deadline=None, derandomize=True)
 settings.load_profile("suite")
@@ -22,3 +24,9 @@ def _hears_interruptions() -> Iterator[None]:
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _says_nothing_of_its_slowness() -> None:
+    """A work of more than a minute says how far it is, which on a slow machine is no error of what it prints."""
+    progress.LINE_S = 3600.0
