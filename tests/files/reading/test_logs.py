@@ -96,6 +96,24 @@ def test_nan_never_becomes_zero_nor_a_zero_nan(make: Make) -> None:
     assert np.array_equal(log.measurement, [[0, NAN, 0], [NAN, 0, NAN]], equal_nan=True)
 
 
+@pytest.mark.parametrize("times", [1, 3])
+@pytest.mark.parametrize(("column", "number"), [(1, 0), (1, -1), (1, -9999), (2, -9999), (3, -99999)])
+def test_a_number_that_no_reading_is_is_missing_from_its_first_time_on(
+    make: Make, column: int, number: int, times: int
+) -> None:
+    """Live rows must not depend on how often it comes later."""
+    rows = [[k, 5000 + 15 * k, 0.5 + 0.001 * k, 0.2 + 0.001 * k] for k in range(60)]
+    for k in (7, 30, 50)[:times]:
+        rows[k][column] = number
+    lines = "\n".join(",".join(map(str, row)) for row in rows)
+    found = logs.read(make(f"time_s,range_m,azimuth_rad,elevation_rad\n{lines}\n"))
+    assert np.isnan(found.measurement[:, column - 1]).sum() == times
+    assert np.isnan(found.measurement).sum() == times
+    assert f"is {number} {'once' if times == 1 else '3 times'}, which is taken for a missing reading" in str(
+        found.remarks
+    )
+
+
 def test_an_absent_column_is_missing_throughout(make: Make) -> None:
     log = logs.read(make("time_s,elevation_rad,azimuth_rad\n0,0.5,1\n"))
     assert np.array_equal(log.measurement, [[NAN, 1, 0.5]], equal_nan=True)
