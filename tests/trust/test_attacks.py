@@ -46,6 +46,8 @@ def test_a_judge_that_sees(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "was refused" in running.lost(bad._replace(reads=True))
     assert 'does not say "word"' in running.lost(bad._replace(says="word"))
     monkeypatch.setattr(running, "MOST_MB", 10)
+    assert running.lost(good) == ""  # for all of it may be this process's own
+    monkeypatch.setattr(running, "own_mb", lambda: 0)
     assert "took" in running.lost(good)
     monkeypatch.setattr(running, "_ADDRESSES", 120 << 20)
     assert running.lost(good) != ""
