@@ -16,8 +16,9 @@ from ftproc.core.filtering.records import FilterRun
 from ftproc.core.model.frames import line_of_sight_axes
 from ftproc.records import FloatArray, IntArray
 
-SETTLING = 25  # samples after (re-)initialization that are not learned from, nor corrected where the filter begins at a
-# smoothed state: there the error is another, and the correction makes it 1.06 times larger (radar, 1 Hz)
+#: Samples after (re-)initialization that are not learned from, nor corrected where the filter begins at a smoothed
+#: state: its error is another there, and the correction makes it 1.06 times larger (radar, 1 Hz).
+SETTLING = 25
 APPLIED = 6  # outputs that are applied to the trajectory: position and velocity
 LOS_NAMES = ("radial", "cross", "up", "radial velocity", "cross velocity", "up velocity")
 

@@ -68,7 +68,7 @@ def _on_the_earth(source: tables.Source, name: str, frame: Frame | None) -> Trut
 
 def _refuse_sentinel(header: TableHeader, column: FloatArray, name: str) -> None:
     """Raise InputError for a number such as -9999 that stands out."""
-    number = readings.sentinel(column, fewest=1) if len(column) >= _FEWEST else None
+    number = readings.sentinel(column) if len(column) >= _FEWEST else None
     if number is not None:
         raise InputError(
             f'{header.source}: {row_named(int(np.argmax(column == number)))}, column "{name}": {number:.10g} stands '

@@ -97,7 +97,9 @@ def test_nan_never_becomes_zero_nor_a_zero_nan(make: Make) -> None:
 
 
 @pytest.mark.parametrize("times", [1, 3])
-@pytest.mark.parametrize(("column", "number"), [(1, 0), (1, -1), (1, -9999), (2, -9999), (3, -99999)])
+@pytest.mark.parametrize(
+    ("column", "number"), [(1, 0), (1, -1), (1, -9999), (1, 99999), (2, 9999), (2, -999), (3, -99999)]
+)
 def test_a_number_that_no_reading_is_is_missing_from_its_first_time_on(
     make: Make, column: int, number: int, times: int
 ) -> None:
@@ -109,9 +111,8 @@ def test_a_number_that_no_reading_is_is_missing_from_its_first_time_on(
     found = logs.read(make(f"time_s,range_m,azimuth_rad,elevation_rad\n{lines}\n"))
     assert np.isnan(found.measurement[:, column - 1]).sum() == times
     assert np.isnan(found.measurement).sum() == times
-    assert f"is {number} {'once' if times == 1 else '3 times'}, which is taken for a missing reading" in str(
-        found.remarks
-    )
+    often = "once" if times == 1 else "3 times"
+    assert f"is {number} {often}, which is taken for a missing reading" in str(found.remarks)
 
 
 def test_an_absent_column_is_missing_throughout(make: Make) -> None:

@@ -47,7 +47,7 @@ _LIMITS = (
 _NO_RANGE = (0.0, -1.0)
 NUMBERS = (*(sign * value for value in (*_NINES, *_LIMITS) for sign in (1, -1)), *_NO_RANGE)
 
-_LOWEST_ANGLE = -6400.0  # a turn in mil, the unit of the largest numbers
+_FEWEST = 10  # values among which one stands out
 _FAR = 20.0  # typical steps from the neighbours, for a number that stands out among others
 _DMS = (
     r"^(?P<sign>[+-]?)(?P<deg>\d{1,3})\s*[°ºd:\- ]\s*(?P<min>\d{1,2}(?:[.,]\d+)?)\s*(?:['’′m:\- ]\s*"
@@ -140,14 +140,13 @@ def _candidates(values: FloatArray, quantity: str) -> list[float]:
     return [number for number in sought if (values == number).any()]
 
 
-def sentinel(values: FloatArray, quantity: str = "", fewest: int = 2) -> float | None:
-    """The first of NUMBERS that stands out, at least so many times, or None. Once is enough for what cannot be a
-    reading: how often it comes later must not change what a row is."""
+def sentinel(values: FloatArray, quantity: str = "") -> float | None:
+    """The first of NUMBERS that stands out, or None. Among _FEWEST values once is enough: how often it comes later must
+    not change what a row is."""
     for number in _candidates(values, quantity):
-        found = values == number
-        impossible = quantity == "range" and number < -1
-        once = number <= 0 if quantity == "range" else number < _LOWEST_ANGLE
-        if (once or np.count_nonzero(found) >= fewest) and _stands_out(values, found, number, impossible):
+        found, impossible = values == number, quantity == "range" and number < -1
+        enough = impossible or len(values) >= _FEWEST or np.count_nonzero(found) > 1
+        if enough and _stands_out(values, found, number, impossible):
             return number
     return None
 
