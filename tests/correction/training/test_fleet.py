@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from ftproc.correction import model_file, network
 from ftproc.correction.feature_sets import named
@@ -38,6 +39,18 @@ def test_each_flight_is_judged_by_what_the_others_taught() -> None:
         tables = [data.normalised(samples(flights, [each], known.features, len(pieces))) for each in others]
         alone = fleet._near(known, Samples.of(tables), len(others), SETTINGS, silent)
         np.testing.assert_array_equal(network.pack(found[piece]), network.pack(alone))
+
+
+def test_of_more_flights_several_are_left_out_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fleet, "MOST_FITS", 2)
+    flights, known = fake.flights(1, 8, lag=2.0), packaged()
+    data = prepare(flights, named("motion"), 0, known)
+    found, _ = fleet._left_out(known, flights, data, SETTINGS, silent)
+    pieces = [*data.parts.training, *data.parts.validation]
+    assert sorted(found) == sorted(pieces)
+    first = network.pack(found[pieces[0]])
+    alike = [np.array_equal(network.pack(found[piece]), first) for piece in pieces]
+    assert alike == [k % 2 == 0 for k in range(len(pieces))]
 
 
 def test_the_weights_that_left_a_flight_out_decide_the_gain() -> None:
