@@ -35,14 +35,15 @@ def read_log(source: Any, *, config: str | Path | None = None, **options: Any) -
     """A log from a file of any kind that `ftproc filter` reads, a pandas DataFrame or a pyarrow Table.
 
     config: a station file. options: units, columns, azimuth_from, keep_columns, station (see
-    `ftproc.files.reading.logs.read`), widths, where, target (as on the command line); they win over it. The log's
+    `ftproc.files.reading.logs.read`), widths, where, target (as on the command line); they win over it. signal: read
+    the strength of the signal too, for a model that learned from it. The log's
     `understood` says how the file was understood. Raises InputError, UsageError.
     """
     from ftproc.files.reading import logs
 
     extracting = {name: options.pop(name) for name in ("widths", "where", "target") if name in options}
     recipe = replace(_recipe(config), **extracting)
-    return logs.read(source, **{**recipe.reading(), **options})
+    return logs.read(source, **{**recipe.reading(options.pop("signal", False)), **options})
 
 
 def filter_log(
@@ -71,11 +72,12 @@ def filter_log(
     settings = settings or recipe.settings
     if site is not None:
         settings = replace(settings, site=site)
-    reading = {} if azimuth_from is None else {"azimuth_from": azimuth_from}
+    reading: dict[str, Any] = {} if azimuth_from is None else {"azimuth_from": azimuth_from}
     if reading and isinstance(log, MeasurementLog):
         raise UsageError("azimuth_from is for reading a log, and this one was read already; give it to read_log.")
     if isinstance(model, str):
         model = model_file.named(recipe.model if model == PACKAGED else model)
+    reading["signal"] = model is not None and model.hears
     read = log if isinstance(log, MeasurementLog) else read_log(log, config=config, **reading)
     if decisions is not None:
         by_hand = decisions if isinstance(decisions, Decisions) else read_decisions(decisions)
@@ -90,13 +92,19 @@ def train(
 
     filtering: the settings of the filter that it is made for. Raises InputError, UsageError.
     """
+    from ftproc.correction import feature_sets
     from ftproc.correction.training.flights import train_flights
 
+    settings = settings or TrainSettings()
+    signal = feature_sets.hears(settings.features)
     read = [
-        (log if isinstance(log, MeasurementLog) else read_log(log), None if truth is None else _truth(truth))
+        (
+            log if isinstance(log, MeasurementLog) else read_log(log, signal=signal),
+            None if truth is None else _truth(truth),
+        )
         for log, truth in pairs
     ]
-    return train_flights(read, settings or TrainSettings(), filtering)
+    return train_flights(read, settings, filtering)
 
 
 def simulate(scenario: str, **options: Any) -> Simulation:

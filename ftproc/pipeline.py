@@ -88,6 +88,7 @@ class Filtering:
                 "at_once": self.at_once is not None,
                 "plots_at_once": 0 if self.at_once is None else self.at_once.plots,
                 "correction_linear": None if stage is None else stage.linear,
+                "correction_missing": self._missing() if stage is not None and not stage.features.proven else "",
                 "correction_lost_by_smoothing": model is not None and stage is None and model.filter.lost_by_smoothing,
                 **self.effects.summary(),
             }
@@ -122,30 +123,36 @@ class Filtering:
         stage = self._stage
         if stage is None or not stage.helps:
             return "gain 0: no correction applied"
-        if self.statistics.largest_m == 0:
-            why_not = self.why_not or "no sample is like those it was trained on"
+        if why_not := self._missing():
             return f"gain {stage.gain.max():.2g}, but {why_not}: no correction applied"
         size = f"{self.statistics.largest_m:.3g} m, {self.statistics.largest_sigma:.2g} sigma"
         by = "innovations" if self.live is not None else "smoother"
         proven = f", proven by the {by} of this run" if stage.features.proven else ""
         return f"gain {stage.gain.max():.2g}: corrections of up to {size}{proven}"
 
+    def _missing(self) -> str:
+        """Why a network with a gain has corrected nothing, or ""."""
+        nothing = self.statistics.largest_m == 0 and self._stage is not None and self._stage.helps
+        return (self.why_not or "no sample is like those it was trained on") if nothing else ""
+
     def _corrected(self, part: Part, model: Model) -> Correction:
         """What the network of the stage adds."""
         from ftproc.correction.apply import Correction, correct
         from ftproc.correction.live import LiveCorrection, corrects
 
-        estimate = part.estimate
+        estimate, signal_db = part.estimate, self.log.signal_db
+        if signal_db is not None:
+            signal_db = signal_db[part.first : part.first + len(estimate.label)]
         if corrects(model.filter, self.method.editing(self.settings), self.settings.lag_s):
             self.live = self.live or LiveCorrection()
             values = np.zeros((len(estimate.label), 6))
             values[part.low : part.high] = self.live.of(estimate.run.rows(part.low, part.high), model.filter)
             return Correction(values, 0.0)
         if estimate.smoothed is None:
-            return correct(estimate.run, model.filter, estimate.hindsight)
+            return correct(estimate.run, model.filter, estimate.hindsight, signal_db)
         if model.smoother is None:
             return Correction(np.zeros((len(estimate.run.time_s), 6)), 0.0)
-        return correct(estimate.smoothed_run, model.smoother)
+        return correct(estimate.smoothed_run, model.smoother, signal_db=signal_db)
 
     def _trajectory(self, part: Part) -> Trajectory:
         """The rows of a part that count, corrected, and added to the statistics."""

@@ -109,18 +109,16 @@ class ByHand(NamedTuple):
 class MeasurementLog:
     """One tracker's log, checked, in SI units and in time order.
 
-    name: what the user called it (a path, or `<stdin>`), for messages and provenance.
-    time_s: (n,) finite, never decreasing; equal times are separate measurements at one instant.
-    measurement: (n, 3) slant range m, azimuth rad, elevation rad; NaN where missing.
-    row: (n,) 0-based row number in the file the user gave.
+    name: what the user called its file. row: (n,) of that, from 0. time_s: (n,) finite, never decreasing; equal times
+    are separate measurements. measurement: (n, 3) slant range m, azimuth rad, elevation rad; NaN where missing.
     frame: `local` (x by the log's own convention) or `north-east-up` (azimuth from north).
     rows_in_file, rows_without_time, rows_out_of_order, duplicate_times: counts and row numbers of what was read.
-    extra: the other columns of the file, row for row with `time_s`; only if they were asked for.
-    station: what is known of the instrument, already applied. epoch: the instant of time zero (ISO 8601) or "".
-    remarks: how the file was understood, for the user. understood: the same in full, see
-    `files.reading.understanding`. sha256: of the file's bytes, "" if it was none. by_hand: the engineer's decisions on
-    its readings, if there are any. heights: of the target, where the log has them instead of elevations. range_rate:
-    (n,) m/s, positive when going away or, in some logs, when coming closer; NaN where missing; None without.
+    extra: the other columns of the file, row for row with `time_s`; only if they were asked for. station: what is
+    known of the instrument, already applied. epoch: the instant of time zero (ISO 8601) or "".
+    remarks: how the file was understood, for the user. understood: the same in full, see `files.reading.understanding`.
+    sha256: of the file's bytes, "" if it was none. by_hand: the engineer's decisions on its readings, if there are any.
+    heights: of the target, where the log has them instead of elevations. range_rate: (n,) m/s, positive when going away
+    or, in some logs, when coming closer. signal_db: (n,) strength of the signal, if asked for. None without.
     """
 
     name: str
@@ -141,6 +139,7 @@ class MeasurementLog:
     by_hand: ByHand | None = None
     heights: Heights | None = None
     range_rate: FloatArray | None = None
+    signal_db: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -151,6 +150,7 @@ class MeasurementLog:
 
     def stretch(self, rows: slice) -> MeasurementLog:
         """Some of its rows, in memory; counts and remarks of the whole log stay unchanged."""
+        rates, signal = self.range_rate, self.signal_db
         arrays = (np.array(self.time_s[rows]), np.array(self.measurement[rows]), np.array(self.row[rows]))
         forget(self.time_s, self.measurement, self.row)
         extra = None if self.extra is None else self.extra.slice(rows.start, rows.stop - rows.start)
@@ -158,7 +158,7 @@ class MeasurementLog:
         return replace(
             self, time_s=arrays[0], measurement=arrays[1], row=arrays[2], extra=extra, by_hand=by_hand,
             heights=None if self.heights is None else self.heights.part(rows),
-            range_rate=None if self.range_rate is None else self.range_rate[rows],
+            range_rate=None if rates is None else rates[rows], signal_db=None if signal is None else signal[rows],
         )  # fmt: skip
 
 

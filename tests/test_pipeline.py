@@ -72,7 +72,7 @@ def test_same_log_same_trajectory(flight):
 
 def test_correction_is_estimate_minus_plain_filter(flight, monkeypatch):
     added = np.random.default_rng(1).normal(size=(len(flight.log), 6))
-    monkeypatch.setattr(apply, "correct", lambda run, model, smoothed: Correction(added, 0.25))
+    monkeypatch.setattr(apply, "correct", lambda run, model, smoothed, signal_db: Correction(added, 0.25))
     plain = pipeline.filter_log(flight.log)
     corrected = pipeline.filter_log(flight.log, model=model_file.named("packaged"))
     np.testing.assert_array_equal(corrected.correction, added)

@@ -110,14 +110,15 @@ def _filtered(task: Task, notify: Notify | None) -> Outcome:
     from ftproc.quality import next_steps, provenance, summary
 
     started, recipe = time.perf_counter(), task.recipe
-    log = logs.read(task.at(task.log), **recipe.reading())
+    model = model_file.named(recipe.model)
+    log = logs.read(task.at(task.log), **recipe.reading(signal=model is not None and model.hears))
     if task.folder:
         log = replace(log, name=task.log)  # as the user named it
     if recipe.decisions is not None:
         log = recipe.decisions.applied(log, task.station)
     geodesy.check_axes(log, recipe.settings)
     taken: list[Line] = []
-    filtering = pipeline.Filtering(log, recipe.settings, model_file.named(recipe.model))
+    filtering = pipeline.Filtering(log, recipe.settings, model)
     command = partial(recipe.origin.command, task.log)
 
     @cache

@@ -45,8 +45,8 @@ def _number(name: str, least: int, default: int, text: str) -> Callable[[options
     help="Input of the network: motion (what the target does: corrects the lag of the filter in manoeuvres, where the "
     "smoother of the same flight proves it), window (the last innovations: corrects a wrong noise or jerk PSD, of any "
     "tracker), instrument (the target's position: corrects the repeatable errors of one tracker, which smoothing "
-    "leaves), mount (position and motion: servo lag, circles and range walk too), correction (as in Zuo et al. 2021), "
-    "or auto: of the first three the best one on held-out flights.",
+    "leaves), mount (position and motion: servo lag, circles and range walk too), echo (that and the strength of the "
+    "signal, in dB), correction (as in Zuo et al. 2021), or auto: of the first three the best one on held-out flights.",
 )
 @click.option(
     "--hidden",

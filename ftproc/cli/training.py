@@ -14,7 +14,7 @@ from ftproc.cli.progress import Progress
 from ftproc.config.reading import load
 from ftproc.config.recipe import Recipe
 from ftproc.core import compiled
-from ftproc.correction import model, model_file
+from ftproc.correction import feature_sets, model, model_file
 from ftproc.correction.training import stages, study
 from ftproc.correction.training.flights import filtered_flights, train_flights
 from ftproc.correction.training.initial_weights import GENETIC
@@ -97,7 +97,8 @@ def run(request: Request) -> None:
 def _read(request: Request) -> list[tuple[MeasurementLog, Truth | None]]:
     """The logs with their truths, or with None where none are given."""
     stated = {name: text for name in ("units", "columns") if (text := getattr(request, name)) is not None}
-    logs = [api.read_log(log, config=request.config, **stated) for log in request.logs]
+    signal = feature_sets.hears(request.features)
+    logs = [api.read_log(log, config=request.config, signal=signal, **stated) for log in request.logs]
     site = request.site or (Recipe.of(load(request.config)).settings.site if request.config else None)
     truths: list[Truth | None] = [None] * len(logs)
     for k, (name, log) in enumerate(zip(request.truths, logs, strict=False)):

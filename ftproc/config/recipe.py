@@ -74,10 +74,10 @@ class Recipe:
         found: Recipe = _picked(cls, known)
         return found
 
-    def reading(self) -> dict[str, Any]:
-        """The arguments for `files.reading.logs.read`."""
+    def reading(self, signal: bool = False) -> dict[str, Any]:
+        """The arguments for `files.reading.logs.read`. signal: with the strength of the signal."""
         plain = {name: getattr(self, name) for name in ("units", "columns", "station", "keep_columns")}
-        extract = Extract(parse_widths(self.widths), parse_where(self.where), self.target)
+        extract = Extract(parse_widths(self.widths), parse_where(self.where), self.target, signal)
         return {**plain, "extract": extract}
 
 

@@ -38,12 +38,12 @@ class Output(NamedTuple):
 
 def network_output(
     run: FilterRun, stage: Stage, start: int, stop: int, smoothed: FloatArray | None = None,
-    los: LineOfSight | None = None,
+    los: LineOfSight | None = None, signal_db: FloatArray | None = None,
 ) -> Output:  # fmt: skip
     """The network's output for samples start:stop, before gain and bound. smoothed: (n, 9) the smoother's states, by
     which the output of a feature set that must be proven is multiplied by what they prove in these samples. los: of
-    these samples, if it is known."""
-    found = output_of(stage, *stage.features.inputs(run, start, stop))
+    these samples, if it is known. signal_db: (n,) of all samples, if the log has it."""
+    found = output_of(stage, *stage.features.inputs(run, start, stop, signal_db=signal_db))
     if stage.features.proven:
         los = LineOfSight.of(run, start, stop) if los is None else los
         gain = 0.0 if smoothed is None else _own_gain(run, stage, slice(start, stop), smoothed, found, los)
@@ -85,11 +85,14 @@ def bounded(los: LineOfSight, stage: Stage, output: FloatArray) -> FloatArray:
     return values
 
 
-def correct(run: FilterRun, stage: Stage, smoothed: FloatArray | None = None) -> Correction:
+def correct(
+    run: FilterRun, stage: Stage, smoothed: FloatArray | None = None, signal_db: FloatArray | None = None
+) -> Correction:
     """The correction of a run of n samples: (n, 6), to be added to position and velocity.
 
     smoothed: (n, 9) the smoother's states of the same run, where there are any: what a feature set that must be proven
-    is held against. Such a run is corrected as a whole, others a chunk at a time.
+    is held against. Such a run is corrected as a whole, others a chunk at a time. signal_db: (n,) strength of the
+    signal, if the log has it.
     """
     n = len(run.time_s)
     values = np.zeros((n, APPLIED))
@@ -97,12 +100,14 @@ def correct(run: FilterRun, stage: Stage, smoothed: FloatArray | None = None) ->
         return Correction(values, 0.0)
     if stage.features.proven and smoothed is None:
         return Correction(values, 0.0, "there is no smoother of this run that could prove it")
+    if stage.features.heard and signal_db is None:
+        return Correction(values, 0.0, "the log has no strength of the signal in dB")
     outside = usable = 0
     chunk = max(n, 1) if stage.features.proven else CHUNK
     for start in range(0, n, chunk):
         stop = min(start + chunk, n)
         los = LineOfSight.of(run, start, stop)
-        output = network_output(run, stage, start, stop, smoothed, los)
+        output = network_output(run, stage, start, stop, smoothed, los, signal_db)
         values[start:stop] = bounded(los, stage, output.values * stage.gain)
         outside += int(output.outside.sum())
         usable += int(output.usable.sum())

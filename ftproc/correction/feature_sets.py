@@ -15,7 +15,7 @@ import numpy as np
 
 from ftproc.core.filtering.records import FilterRun
 from ftproc.correction.features import APPLIED, LOS_NAMES, Features, LineOfSight, innovations, lever_m
-from ftproc.correction.instrument_features import InstrumentFeatures, MountFeatures
+from ftproc.correction.instrument_features import EchoFeatures, InstrumentFeatures, MountFeatures
 from ftproc.correction.motion_features import MotionFeatures
 from ftproc.errors import UsageError
 from ftproc.records import FloatArray
@@ -90,7 +90,11 @@ class WindowFeatures(Features):
 
 
 FEATURES: dict[str, Features] = {
-    f.name: f for f in (CorrectionFeatures(), WindowFeatures(), MotionFeatures(), InstrumentFeatures(), MountFeatures())
+    features.name: features
+    for features in (
+        *(CorrectionFeatures(), WindowFeatures(), MotionFeatures()),
+        *(InstrumentFeatures(), MountFeatures(), EchoFeatures()),
+    )
 }
 
 
@@ -99,3 +103,8 @@ def named(name: str) -> Features:
     if name not in FEATURES:
         raise UsageError(f"there is no feature set {name!r}; choose one of {', '.join(FEATURES)}")
     return FEATURES[name]
+
+
+def hears(name: str) -> bool:
+    """Whether the feature set of that name, if there is one, needs the strength of the signal."""
+    return name in FEATURES and FEATURES[name].heard

@@ -19,6 +19,8 @@ from ftproc.records import FloatArray, IntArray
 #: Samples after (re-)initialization that are not learned from, nor corrected where the filter begins at a smoothed
 #: state: its error is another there, and the correction makes it 1.06 times larger (radar, 1 Hz).
 SETTLING = 25
+#: Where an echo may begin to be weak: receivers detect from about 13 dB above their noise on.
+WEAK_DB = (10.0, 20.0, 30.0)
 APPLIED = 6  # outputs that are applied to the trajectory: position and velocity
 LOS_NAMES = ("radial", "cross", "up", "radial velocity", "cross velocity", "up velocity")
 
@@ -112,6 +114,12 @@ def _earlier(values: FloatArray, lag: int, since: IntArray) -> FloatArray:
     return np.where(since >= lag, moved, 0.0)
 
 
+def echo(signal_db: FloatArray) -> FloatArray:
+    """(m, 4) of the strength of the signal: itself, and what a weak one adds below each of WEAK_DB."""
+    tenth = signal_db / 10
+    return np.stack([tenth, *(np.log1p(10 ** (weak / 10 - tenth)) for weak in WEAK_DB)], axis=1)
+
+
 class Features(ABC):
     """A feature set: its name, the names of its outputs (the first six, or fewer, are applied), and the mappings, over
     the m samples `start:stop` of a filter run or of one with the smoother's states.
@@ -121,6 +129,7 @@ class Features(ABC):
     where the smoother of the same flight proves it. hidden: usual units of the hidden layer.
     most: samples of a flight that are learned from; None: all. restarts: fits from other first weights, of which the
     best on validation data is kept. share: of the errors learned from that bounds a correction at twice its largest.
+    heard: the strength of the signal is among the inputs.
     """
 
     name: ClassVar[str]
@@ -133,6 +142,7 @@ class Features(ABC):
     most: ClassVar[int | None] = None
     restarts: ClassVar[int] = 1
     share: ClassVar[float] = 0.683
+    heard: ClassVar[bool] = False
 
     @property
     @abstractmethod
@@ -160,10 +170,15 @@ class Features(ABC):
         """The inverse of `to_cartesian`."""
         return los.from_cartesian(cartesian) / self.unit(los)
 
-    def inputs(self, run: FilterRun, start: int, stop: int, settling: int = SETTLING) -> tuple[FloatArray, BoolArray]:
-        """Inputs (m, d), zero where not valid, and the mask (m,) of valid samples."""
+    def inputs(
+        self, run: FilterRun, start: int, stop: int, settling: int = SETTLING, signal_db: FloatArray | None = None
+    ) -> tuple[FloatArray, BoolArray]:
+        """Inputs (m, d), zero where not valid, and the mask (m,) of valid samples. signal_db: (n,) of the whole run."""
         with np.errstate(invalid="ignore", divide="ignore"):
             raw = self._raw(run, start, stop)
+        if self.heard:
+            strength = np.full(stop - start, np.nan) if signal_db is None else signal_db[start:stop]
+            raw = np.concatenate([raw, echo(strength)], axis=1)
         valid = usable(run, start, stop, settling) & np.all(np.isfinite(raw), axis=1)
         raw[~valid] = 0.0
         return raw, valid

@@ -1,5 +1,6 @@
 """`instrument`: where the target is, for what an instrument gets wrong there on every flight. `mount`:
-what a mount and its encoders do wrong beyond their setting up.
+what a mount and its encoders do wrong beyond their setting up. `echo`: the same where the strength of the signal tells
+how far a weak one is read too long.
 
 The columns are those in which the errors are linear, so that a few flights are enough; what is not linear in them is
 left to the hidden layer. Across the line of sight an error of the azimuth is cos E as large: of a circle that is off
@@ -11,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ftproc.core.filtering.records import FilterRun
-from ftproc.correction.features import APPLIED, LOS_NAMES, Features, LineOfSight
+from ftproc.correction.features import APPLIED, LOS_NAMES, WEAK_DB, Features, LineOfSight
 from ftproc.records import FloatArray
 
 USUAL_M, USUAL_MPS = 10_000.0, 300.0
@@ -87,3 +88,14 @@ class MountFeatures(InstrumentFeatures):
             outward / USUAL_MPS,
         ]
         return np.concatenate([super()._raw(run, start, stop), np.stack(more, axis=1)], axis=1)
+
+
+class EchoFeatures(MountFeatures):
+    """Those of `mount`, and of the strength of the signal, see `features.echo`. Targets as there."""
+
+    name = "echo"
+    heard = True
+
+    @property
+    def floor(self) -> FloatArray:
+        return np.array((*super().floor, *(0.3,) * (1 + len(WEAK_DB))))

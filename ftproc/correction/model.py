@@ -86,6 +86,11 @@ class Model:
         return self.stages[FILTER]
 
     @property
+    def hears(self) -> bool:
+        """Whether it needs the strength of the signal."""
+        return any(stage.helps and stage.features.heard for stage in self.stages.values())
+
+    @property
     def smoother(self) -> Stage | None:
         return self.stages.get(SMOOTHER)
 

@@ -32,11 +32,13 @@ class Condition(NamedTuple):
 
 class Extract(NamedTuple):
     """What of a file is read. widths: of the columns of a text, in characters. where: conditions on its rows. target:
-    COLUMN=VALUE for one of several, or `none`: there is only one, whatever the rows suggest."""
+    COLUMN=VALUE for one of several, or `none`: there is only one, whatever the rows suggest. signal: the strength of
+    the signal too, if there is a column of it in dB."""
 
     widths: tuple[int, ...] = ()
     where: tuple[Condition, ...] = ()
     target: str = ""
+    signal: bool = False
 
 
 def parse_widths(given: str | Sequence[int] | None) -> tuple[int, ...]:

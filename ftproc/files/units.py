@@ -39,6 +39,7 @@ _SPEEDS = (
     *(Unit("mps"), Unit("kmps", 1e3), Unit("kmh", divide=3.6), Unit("kt", 1852.0, 3600.0), Unit("fps", 0.3048)),
     *(Unit("mph", 0.44704), Unit("mmps", divide=1e3), Unit("cmps", divide=1e2)),
 )
+_LEVELS = (Unit("db"),)  # over any reference
 _ANGLES = (
     Unit("rad"),
     Unit("deg", math.pi, 180.0),
@@ -62,7 +63,7 @@ _ANGLES = (
 UNITS: Mapping[str, Mapping[str, Unit]] = {
     quantity: {unit.name: unit for unit in units}
     for quantity, units in zip(
-        (*QUANTITIES, *FURTHER_ALIASES), (_TIMES, _LENGTHS, _ANGLES, _ANGLES, _HEIGHTS, _SPEEDS), strict=True
+        (*QUANTITIES, *FURTHER_ALIASES), (_TIMES, _LENGTHS, _ANGLES, _ANGLES, _HEIGHTS, _SPEEDS, _LEVELS), strict=True
     )
 }
 
@@ -87,6 +88,7 @@ SPELLINGS: Mapping[str, tuple[str, ...]] = {
     "fps": ("ft/s", "ft/sec"),
     "mmps": ("mm/s",),
     "cmps": ("cm/s",),
+    "db": ("dbm", "dbw", "dbsm", "dbhz", "dbmv", "dbfs", "decibel", "decibels", "дб", "дбм", "分贝"),
     "nmi": ("nauticalmile", "nauticalmiles", "nautmile", "nautmiles", "nautmi", "nautical"),
     "mi": ("mile", "miles", "smi", "sm", "statutemile", "statutemiles"),
     "yd": ("yds", "yard", "yards"),

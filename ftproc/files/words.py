@@ -73,6 +73,13 @@ FURTHER_ALIASES: Mapping[str, tuple[str, ...]] = {
         vitesseradiale velocidadradial радиальнаяскорость 径向速度
         """
     ),
+    "signal": _split(
+        """
+        signal signalstrength signallevel signalpower strength snr sn signaltonoise signaltonoiseratio rssi cn0 echo
+        echostrength echolevel echopower power receivedpower rxpower returnpower returnstrength amplitude agc
+        signalstarke signalpegel empfangspegel отношениесигналшум уровеньсигнала 信噪比 信号强度
+        """
+    ),
 }
 
 #: Names that other things have too: used where no column has one of ALIASES.

@@ -57,6 +57,8 @@ def remarks(s: Mapping[str, Any]) -> list[Remark]:
     if s.get("correction_lost_by_smoothing"):
         text = "the model corrects the filter only: the smoothed estimate is not corrected"
         found.append(Remark(CONSISTENT, text))
+    if s.get("correction_missing"):
+        found.append(Remark(CONSISTENT, f"the model corrects nothing: {s['correction_missing']}"))
     if s["correction_largest_m"] > 0:
         outside = f"none for the {100 * s['correction_outside_training']:.1f} % of samples outside its training data"
         size = f"up to {s['correction_largest_m']:.3g} m, {s['correction_largest_sigma']:.2g} sigma"

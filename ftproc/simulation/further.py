@@ -10,6 +10,7 @@ from ftproc.core.model.earth import MEAN_RADIUS_M
 from ftproc.records import FloatArray, Heights, MeasurementLog
 
 ELEVATION, FLIGHT_LEVEL, RANGE_RATE, AMBIGUOUS = "elevation", "flight_level", "range_rate", "ambiguous"
+SIGNAL = "signal_db"  # a column
 INTERVAL_MPS = 60.0  # in which an ambiguous range rate repeats
 RATE_MPS, WRONG_RATES, WRONG_MPS = 0.5, 0.02, (10.0, 200.0)  # 1-sigma of range rates, share of outliers, their sizes
 LEVEL_M, STEP = 30.48, 0.25  # of a flight level; to which a transponder rounds them
@@ -41,6 +42,15 @@ def measured(
     station_m, offset_m = level
     levels = _levels(position_m, station_m, OFFSET_M * rng.standard_normal() if offset_m is None else offset_m, rng)
     return replace(log, extra=pa.table({FLIGHT_LEVEL: levels}), heights=Heights(levels * LEVEL_M, barometric=True))
+
+
+def with_signal(log: MeasurementLog, signal_db: FloatArray) -> MeasurementLog:
+    """The log with the strength of the signal (n,) at its rows."""
+    import pyarrow as pa
+
+    column = pa.array(signal_db)
+    extra = pa.table({SIGNAL: column}) if log.extra is None else log.extra.append_column(SIGNAL, column)
+    return replace(log, extra=extra, signal_db=signal_db)
 
 
 def _with_rates(

@@ -13,6 +13,7 @@ from ftproc.simulation.kinematics import Flight
 
 REFRACTION_SCALE_HEIGHT_M = 8000.0
 DIFFERENCE_S = 0.01  # over which rates of angles are taken
+WALKS_AT_DB, STRENGTH_DB = 13.0, 0.5  # of an echo at `range_walk_at_m`, and 1-sigma of its measurement
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,8 @@ class InstrumentErrors:
     *_eccentricity_rad, *_ellipticity_rad: first and second harmonic of the error of a divided circle, zero at the angle
     circle_zero_rad.
     range_walk_m: by which a range is read longer, times log(1 + (range / range_walk_at_m)^4): the echo gets weaker.
+    echo_db, echo_s: 1-sigma of first-order Gauss-Markov changes of the echo's strength, by the aspect of the target, of
+    which the log then has a column; and their correlation time.
     *_wander_*: 1-sigma of a first-order Gauss-Markov offset of the component; wander_s: its correlation time.
     stamp_jitter_s: 1-sigma by which the instant of a sample differs from its time stamp, the same for its components.
     *_rounding_*: step to which the readings are rounded, 0 for none.
@@ -50,6 +53,8 @@ class InstrumentErrors:
     circle_zero_rad: float = 0.0
     range_walk_m: float = 0.0
     range_walk_at_m: float = 10_000.0
+    echo_db: float = 0.0
+    echo_s: float = 5.0
     range_wander_m: float = 0.0
     azimuth_wander_rad: float = 0.0
     elevation_wander_rad: float = 0.0
@@ -72,9 +77,9 @@ class InstrumentErrors:
 PERFECT = InstrumentErrors()
 
 
-def systematic(position: FloatArray, errors: InstrumentErrors) -> FloatArray:
+def systematic(position: FloatArray, errors: InstrumentErrors, echo_db: FloatArray | float = 0.0) -> FloatArray:
     """(n, 3) range m, azimuth rad, elevation rad that a noiseless instrument reads for (n, 3) true
-    positions in m.
+    positions in m. echo_db: (n,) by which the echo is stronger than usual at this range.
 
     Order as the light travels: refraction, tilted axis, collimation, circles, zero-set. Azimuth is not yet wrapped.
     """
@@ -84,7 +89,7 @@ def systematic(position: FloatArray, errors: InstrumentErrors) -> FloatArray:
         reading = from_cartesian(to_cartesian(reading) @ _tilt(errors).T)
     # Within 1 mrad of the zenith no collimation error is defined: the mount cannot point there.
     reading[:, 1] += errors.collimation_rad / np.maximum(np.cos(reading[:, 2]), 1e-3)
-    reading += _walk_and_circles(reading, errors)
+    reading += _walk_and_circles(reading, errors, echo_db)
     zero_set = np.array([errors.range_zero_m, errors.azimuth_zero_rad, errors.elevation_zero_rad])
     return np.asarray(reading + zero_set)
 
@@ -100,9 +105,25 @@ def servo_lag(flight: Flight, time_s: FloatArray, errors: InstrumentErrors) -> F
     return lag
 
 
-def _walk_and_circles(reading: FloatArray, errors: InstrumentErrors) -> FloatArray:
+def echoes(time_s: FloatArray, errors: InstrumentErrors, rng: np.random.Generator) -> FloatArray:
+    """(n,) dB by which the echo is stronger than usual at its range."""
+    changes: FloatArray = errors.echo_db * unit_noise(time_s, errors.echo_s, None, rng)[:, 0]
+    return changes
+
+
+def strength(
+    range_m: FloatArray, echo_db: FloatArray, errors: InstrumentErrors, rng: np.random.Generator
+) -> FloatArray:
+    """(n,) dB above the noise of the receiver, as it measures the strength of an echo."""
+    usual = WALKS_AT_DB - 40 * np.log10(np.maximum(range_m, 1.0) / errors.range_walk_at_m)
+    measured: FloatArray = usual + echo_db + STRENGTH_DB * rng.standard_normal(len(range_m))
+    return measured
+
+
+def _walk_and_circles(reading: FloatArray, errors: InstrumentErrors, echo_db: FloatArray | float) -> FloatArray:
     """(n, 3) range walk m, and errors of the two circles rad."""
-    walk = errors.range_walk_m * np.log1p((reading[:, 0] / errors.range_walk_at_m) ** 4)
+    weakness = (reading[:, 0] / errors.range_walk_at_m) ** 4 / 10 ** (np.asarray(echo_db) / 10)
+    walk = errors.range_walk_m * np.log1p(weakness)
     azimuth, elevation = (reading[:, 1:] - errors.circle_zero_rad).T
     return np.stack(
         [

@@ -13,10 +13,10 @@ LARGEST = {
     "mislevel_azimuth_rad": 2 * math.pi, "collimation_rad": 0.1, "refraction": 0.01, "servo_lag_s": 1.0,
     "servo_lag_s2": 1.0, "azimuth_eccentricity_rad": 0.1, "azimuth_ellipticity_rad": 0.1,
     "elevation_eccentricity_rad": 0.1, "elevation_ellipticity_rad": 0.1, "circle_zero_rad": 2 * math.pi,
-    "range_walk_m": 1e4, "range_walk_at_m": 1e7, "range_wander_m": 1e5, "azimuth_wander_rad": 0.1,
-    "elevation_wander_rad": 0.1, "wander_s": 1e5, "stamp_jitter_s": 10.0, "range_rounding_m": 1e5,
-    "azimuth_rounding_rad": 0.1, "elevation_rounding_rad": 0.1, "range_held": 1000, "azimuth_held": 1000,
-    "elevation_held": 1000,
+    "range_walk_m": 1e4, "range_walk_at_m": 1e7, "echo_db": 40.0, "echo_s": 1e5, "range_wander_m": 1e5,
+    "azimuth_wander_rad": 0.1, "elevation_wander_rad": 0.1, "wander_s": 1e5, "stamp_jitter_s": 10.0,
+    "range_rounding_m": 1e5, "azimuth_rounding_rad": 0.1, "elevation_rounding_rad": 0.1, "range_held": 1000,
+    "azimuth_held": 1000, "elevation_held": 1000,
 }  # fmt: skip
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180, "arcsec": math.pi / 648_000}
 
@@ -36,6 +36,9 @@ name.
   circle_zero_deg       zero at this angle
   range_walk_m          weak echoes read longer, by this times log(1 + (range / range_walk_at_m)^4),
   range_walk_at_m       with this range (10000 m)
+  echo_db               echoes get stronger and weaker, by the aspect of the target, with this 1 sigma; the log then has
+                        a column of their strength, by which they walk,
+  echo_s                with this correlation time (5 s)
   range_wander_m, azimuth_wander_mrad, elevation_wander_mrad
                         1 sigma of a first-order Gauss-Markov offset,
   wander_s              with this correlation time (1 s)
@@ -77,7 +80,7 @@ def _least(name: str) -> float:
     """The smallest value of a field: what is no offset has no sign."""
     if name.endswith(("_held", "_at_m")):
         return 1.0
-    return 0.0 if any(word in name for word in ("wander", "jitter", "rounding")) else -LARGEST[name]
+    return 0.0 if any(word in name for word in ("wander", "jitter", "rounding", "echo")) else -LARGEST[name]
 
 
 def _size(written: str, value: str, scale: float, bounds: tuple[float, float]) -> float:

@@ -13,14 +13,16 @@ from ftproc.errors import UsageError
 from ftproc.records import FloatArray, IntArray, MeasurementLog, Truth
 from ftproc.simulation.contamination import contaminate
 from ftproc.simulation.flights import FLIGHTS
-from ftproc.simulation.further import measured
+from ftproc.simulation.further import measured, with_signal
 from ftproc.simulation.instrument import (
     InstrumentErrors,
+    echoes,
     gauss_markov_offsets,
     held,
     readable,
     rounded,
     servo_lag,
+    strength,
     systematic,
     unit_noise,
 )
@@ -33,7 +35,19 @@ MAX_DURATION_S = 1e5
 MAX_ROWS = 10_000_000
 
 # One child generator each, so that flight and noise do not depend on the outlier specification.
-_STREAMS = ("plan", "flight", "times", "noise", "outliers", "gaps", "duplicates", "instrument", "clock", "further")
+_STREAMS = (
+    "plan",
+    "flight",
+    "times",
+    "noise",
+    "outliers",
+    "gaps",
+    "duplicates",
+    "instrument",
+    "clock",
+    "further",
+    "echoes",
+)
 
 
 @dataclass(frozen=True)
@@ -124,7 +138,8 @@ def measure(flight: Flight, plan: Plan, sigma: FloatArray, name: str, seed: int 
     visible, hidden = (jumps(grid, each, streams["clock"]) for each in (spec.clock, spec.late))
     late = plan.instrument.stamp_jitter_s * rng.standard_normal(len(grid))
     taken = (np.clip(grid + late, grid[0], grid[-1]) if late.any() else grid) - hidden
-    exact = systematic(flight.at(taken)[0], plan.instrument) - servo_lag(flight, taken, plan.instrument)
+    echo_db = echoes(grid, plan.instrument, streams["echoes"])
+    exact = systematic(flight.at(taken)[0], plan.instrument, echo_db) - servo_lag(flight, taken, plan.instrument)
     exact += gauss_markov_offsets(grid, plan.instrument, rng)
     usual = np.asarray(plan.noise * unit_noise(grid, spec.correlation_s, spec.tails_dof, streams["noise"]))
     noise, _ = contaminate(usual, spec.noise, sigma, plan.dt_s, streams["clock"])
@@ -149,6 +164,9 @@ def measure(flight: Flight, plan: Plan, sigma: FloatArray, name: str, seed: int 
     )
     state = flight.at(log.time_s)
     log = measured(log, *state[:2], plan.further, streams["further"])
+    if plan.instrument.echo_db:
+        found = strength(exact[:, 0], echo_db, plan.instrument, streams["echoes"])
+        log = with_signal(log, found[rows][order])
     truth = Truth(name, log.time_s, *state, code[order])
     return Simulation(log, truth, plan.noise, readable(clean)[order])
 

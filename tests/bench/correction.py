@@ -34,6 +34,7 @@ ALL = InstrumentErrors(**{
     **{name: value for each in (SERVO, CIRCLES, THEODOLITE) for name, value in vars(each).items() if value},
     "range_zero_m": -3.0, "range_walk_m": 6.0, "range_walk_at_m": 9000.0,
 })  # fmt: skip
+FADING = InstrumentErrors(range_walk_m=6.0, range_walk_at_m=9000.0, echo_db=6.0)
 
 HEADER = ("what is wrong", "flights learned from", "features", "filter", "velocity", "smoother")
 
@@ -69,6 +70,8 @@ CASES = {
     "servo": Case("servo lag", instrument=SERVO, features="mount"),
     "circles": Case("circles off their axes", instrument=CIRCLES, features="mount"),
     "all": Case("all of these, and range walk", instrument=ALL, features="mount"),
+    "range": Case("walk of ranges whose echoes fade", instrument=FADING, features="mount"),
+    "strength": Case("the same, with the strength of the signal", instrument=FADING, features="echo"),
 }
 
 
@@ -125,7 +128,8 @@ def result(case: Case, new: int = NEW, settings: TrainSettings | None = None) ->
             for flight in runs:
                 error = flight.error[:, :6]
                 used = model.stages.get(stage)
-                left = error if used is None else error - correct(flight.run, used, flight.smoothed).values
+                beside = flight.smoothed, flight.signal_db
+                left = error if used is None else error - correct(flight.run, used, *beside).values
                 known = np.isfinite(error).all(1)
                 pairs.append([np.sum(e[known][:, columns] ** 2) for e in (left, error)])
             squares[f"{stage} {quantity}"] = np.array(pairs)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pandas
 import pytest
 
+from ftproc import api
 from ftproc.correction.training import descent, study
+from ftproc.settings import TrainSettings
 from tests.cli.conftest import Result, on_the_earth
 
 PROJECT = Path(__file__).parents[2]
@@ -100,6 +103,36 @@ def test_a_linear_model_says_so_on_its_card_and_in_the_summary(run, here):
         used = run("filter", circle, "--model", "linear.safetensors", smooth, "-o", "t.csv")
         assert "linear correction up to" in used.out
         assert "network correction" not in used.out
+
+
+def test_the_strength_of_the_signal_tells_how_a_range_walks(run, here):
+    names = [(f"{k}.csv", f"{k}.truth.csv") for k in range(9)]
+    faulty = ("--duration", 60, "--dt", 0.1, "--instrument", "range_walk_m=6,range_walk_at_m=9000,echo_db=6")
+    for k, (log, truth) in enumerate(names):
+        made = run("simulate", "--scenario", "manoeuvre-clean", "--seed", k, *faulty, "-o", log, "--truth", truth)
+        assert made.code == 0, made.err
+    past = [part for log, truth in names[:-1] for part in ("--log", log, "--truth", truth)]
+    trained = run("train", *past, *SMALL, "--features", "echo", "-o", "echo.safetensors")
+    assert trained.code == 0, trained.err
+    left = {}
+    for model in ("none", "echo.safetensors"):
+        used = run("filter", names[-1][0], "--smooth", "--model", model, "-o", "t.csv")
+        assert ("correction up to" in used.out) == (model != "none")
+        axes = ["x_m", "y_m", "z_m"]
+        off = pandas.read_csv("t.csv")[axes].to_numpy() - pandas.read_csv(names[-1][1])[axes].to_numpy()
+        left[model] = np.sqrt(np.mean(off**2))
+    assert left["echo.safetensors"] < 0.5 * left["none"]
+    bare = pandas.read_csv(names[-1][0]).drop(columns="signal_db")
+    bare.to_csv("bare.csv", index=False)
+    used = run("filter", "bare.csv", "--model", "echo.safetensors", "-o", "t.csv")
+    assert "the model corrects nothing: the log has no strength of the signal in dB" in used.out
+    refused = run("train", "--log", "bare.csv", "--features", "echo", "-o", "m")
+    assert "needs the strength of the signal in dB, in a column of every log" in refused.err
+    trained = api.train(names[:-1], TrainSettings(features="echo", population=6, generations=2, epochs=5))
+    assert trained.hears
+    assert api.filter_log(names[-1][0], model=trained).correction.any()
+    assert not api.filter_log(api.read_log(names[-1][0]), model=trained).correction.any()
+    assert api.filter_log(api.read_log(names[-1][0], signal=True), model=trained).correction.any()
 
 
 @pytest.mark.parametrize(("optimiser", "epochs"), [("momentum", 1000), ("l-bfgs", 400)])

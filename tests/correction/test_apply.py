@@ -78,7 +78,7 @@ def test_the_output_is_applied_within_two_sigmas(output: float) -> None:
 @pytest.mark.parametrize("name", FEATURES)
 def test_every_feature_set_is_bounded_along_the_line_of_sight(name: str) -> None:
     filtered = fake.run(np.random.default_rng(1))
-    values = correct(filtered, constant(name, 1e4), ahead(filtered, 3.0)).values
+    values = correct(filtered, constant(name, 1e4), ahead(filtered, 3.0), np.full(600, 20.0)).values
     along = LineOfSight.of(filtered, 0, 600).from_cartesian(values) / filtered.los_sigma
     assert np.abs(along).max() == pytest.approx(2.0)
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from ftproc.core.model.frames import to_cartesian
 from ftproc.correction.feature_sets import FEATURES, named
-from ftproc.correction.features import SETTLING, Features, LineOfSight
+from ftproc.correction.features import SETTLING, Features, LineOfSight, echo
 from ftproc.errors import UsageError
 from ftproc.simulation.instrument import InstrumentErrors, systematic
 from tests.correction import fake
@@ -145,7 +145,8 @@ def test_valid_is_false_while_coasting_settling_or_without_numbers(features: Fea
     state[400, 7] = np.nan
     sigma[410, 2] = 0.0
     sigma[420, 5] = np.inf
-    x, valid = features.inputs(filtered._replace(since_start=since, state=state, los_sigma=sigma), 0, 600)
+    run = filtered._replace(since_start=since, state=state, los_sigma=sigma)
+    x, valid = features.inputs(run, 0, 600, signal_db=np.full(600, 20.0))
     expected = np.ones(600, bool)
     expected[:SETTLING] = expected[300 : 300 + SETTLING] = expected[100:110] = False
     expected[[400, 410, 420]] = False
@@ -235,3 +236,25 @@ def test_the_errors_of_a_mount_are_linear_in_its_features() -> None:
     left = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
     assert np.sqrt((target**2).mean(0))[1:].min() > 2e-4
     assert np.sqrt((left**2).mean(0))[1:].max() < 1e-5
+
+
+def test_a_range_that_walks_is_linear_in_the_strength_of_its_echo() -> None:
+    strength = np.linspace(-10.0, 50.0, 500)
+    for detected_db in (13.0, 17.0):  # between the levels of the features
+        walk = np.log1p(10 ** ((detected_db - strength) / 10))
+        columns = np.concatenate([echo(strength), np.ones((500, 1))], axis=1)
+        left = walk - columns @ np.linalg.lstsq(columns, walk, rcond=None)[0]
+        assert np.abs(left).max() < 0.02 * walk.max()
+
+
+def test_rows_without_a_strength_are_not_corrected() -> None:
+    run = fake.run(np.random.default_rng(0))
+    strength = np.full(600, 20.0)
+    strength[300:310] = np.nan
+    x, valid = named("echo").inputs(run, 100, 600, signal_db=strength)
+    assert x.shape == (500, named("echo").input_size)
+    assert np.flatnonzero(~valid).tolist() == list(range(200, 210))
+    assert not named("echo").inputs(run, 100, 600)[1].any()
+    without, same = named("mount").inputs(run, 100, 600)
+    assert same.all()
+    assert (x[valid][:, :22] == without[valid]).all()

@@ -102,3 +102,25 @@ def test_what_is_not_understood_is_a_sentence(text: str, sentence: str) -> None:
         parse_instrument(text)
     assert str(raised.value).startswith("--instrument: ")
     assert sentence in str(raised.value)
+
+
+def test_ranges_walk_as_their_echoes_fade() -> None:
+    text = "range_walk_m=6,range_walk_at_m=9000,echo_db=8,echo_s=4"
+    how = {"seed": 3, "duration_s": 200.0, "noise": (0, 0, 0), "outliers": "none"}
+    flight = simulate("manoeuvre-clean", instrument=parse_instrument(text), **how)
+    signal_db = flight.log.signal_db
+    assert signal_db is not None
+    assert flight.log.extra is not None
+    assert flight.log.extra.column("signal_db").to_numpy().tolist() == signal_db.tolist()
+    distance = np.linalg.norm(flight.truth.position_m, axis=1)
+    off = flight.log.measurement[:, 0] - distance
+    weak = np.expm1(off / 6)  # the power at which walking begins, over that of the echo
+    np.testing.assert_allclose(-10 * np.log10(weak), signal_db - 13, atol=2.5)
+    changes = -10 * np.log10(weak) + 40 * np.log10(distance / 9000)
+    assert np.std(changes) == pytest.approx(8, rel=0.3)
+    step = flight.log.time_s[1] - flight.log.time_s[0]
+    assert np.corrcoef(changes[1:], changes[:-1])[0, 1] == pytest.approx(np.exp(-step / 4), abs=0.02)
+    steady = simulate("manoeuvre-clean", instrument=parse_instrument(text.replace("echo_db=8", "echo_db=0")), **how)
+    assert steady.log.extra is None
+    assert steady.log.signal_db is None
+    assert (steady.log.measurement[:, 1:] == flight.log.measurement[:, 1:]).all()

@@ -71,7 +71,7 @@ def filtered_flights(
         except ValueError as cause:
             raise sanity.no_start(log, cause) from cause
         for stage, flight in _flown(log, truth, estimate, proven=method.editing(filtering) == "two-pass").items():
-            flights[stage].append(flight)
+            flights[stage].append(replace(flight, signal_db=log.signal_db))
     progress("filtering", len(pairs), len(pairs))
     return {stage: found for stage, found in flights.items() if found}
 

@@ -45,7 +45,7 @@ def _held_out(
     for piece in pieces:
         number, start, stop = piece
         flight, mine = flights[number], replace(stage, weights=left_out.get(piece, stage.weights))
-        found = network_output(flight.run, mine, start, stop, flight.smoothed)
+        found = network_output(flight.run, mine, start, stop, flight.smoothed, signal_db=flight.signal_db)
         piece_error = flight.error[start:stop, :APPLIED]
         keep = found.usable & np.all(np.isfinite(piece_error), axis=1)
         position.append(flight.run.state[start:stop, :3][keep])

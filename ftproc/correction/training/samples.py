@@ -33,12 +33,14 @@ class Flight:
 
     truth_position: (n, 3) m. truth_velocity: (n, 3) m/s, differenced from the position when None. Rows without truth
     are NaN and are not used. smoothed: (n, 9) the smoother's states, by which a filter's correction can be proven.
+    signal_db: (n,) strength of the signal, if the log has it.
     """
 
     run: FilterRun
     truth_position: FloatArray
     truth_velocity: FloatArray | None = None
     smoothed: FloatArray | None = None
+    signal_db: FloatArray | None = None
 
     @cached_property
     def error(self) -> FloatArray:
@@ -148,7 +150,7 @@ def samples(
     inputs, targets = [np.empty((0, features.input_size))], [np.empty((0, features.output_size))]
     for number, start, stop in pieces:
         flight = flights[number]
-        x, valid = features.inputs(flight.run, start, stop)
+        x, valid = features.inputs(flight.run, start, stop, signal_db=flight.signal_db)
         t = features.targets(LineOfSight.of(flight.run, start, stop).rows(valid), flight.error[start:stop][valid])
         known = np.all(np.isfinite(t), axis=1)
         every = 1 if most is None else max(-(-int(known.sum()) // most), 1)

@@ -46,6 +46,11 @@ def _candidates(stage: str, flights: Sequence[Flight], settings: TrainSettings) 
     if settings.features == AUTO:
         return tuple(name for name in CANDIDATES[stage] if provable or not named(name).proven)
     features = named(settings.features)
+    if features.heard and any(flight.signal_db is None for flight in flights):
+        raise UsageError(
+            f"the feature set {features.name!r} needs the strength of the signal in dB, in a column of every log: its "
+            "name says so (snr_db), or --columns signal=NAME --units signal=dB"
+        )
     if stage == FILTER and features.proven and not provable:
         raise UsageError(
             f"the feature set {features.name!r} needs ga-bpnn-ukf with --editing two-pass, whose smoother proves it"

@@ -1,7 +1,9 @@
-"""What a log holds beside range, azimuth and elevation: range rates, and heights where no elevation is measured.
+"""What a log holds beside range, azimuth and elevation: range rates, heights where no elevation is measured, and, for a
+network that learned from it, the strength of the signal.
 
 Names and units are those of `words.FURTHER_ALIASES` and `units.UNITS`. Where neither the name nor
-`--units` says the unit, a height is asked about, because the positions rest on it, and a rate is left out with a word.
+`--units` says the unit, a height is asked about, because the positions rest on it; others are left out, a rate with a
+word.
 """
 
 from __future__ import annotations
@@ -22,12 +24,12 @@ from ftproc.files.units import SPELLINGS, UNITS, Unit, unit_named
 from ftproc.files.words import FURTHER_ALIASES
 from ftproc.records import FloatArray, Heights
 
-HEIGHT, RANGE_RATE = "height", "range_rate"
+HEIGHT, RANGE_RATE, SIGNAL = "height", "range_rate", "signal"
 #: Words of names by which a height is geometric; any other is taken for a barometric one. And names of flight levels.
 _GEOMETRIC = ("geo", "gnss", "gps", "msl", "ellips", "height_m")
 _LEVELS = ("flightlevel", "fl", "modec", "flugflache", "эшелон", "飞行高度层")
 _CLOSING = ("closing", "closure")  # begin the names of rates that count inward
-_WHAT = {HEIGHT: "the height of the target", RANGE_RATE: "the range rate"}
+_WHAT = {HEIGHT: "the height of the target", RANGE_RATE: "the range rate", SIGNAL: "the strength of the signal"}
 
 
 class Further(NamedTuple):
@@ -49,8 +51,9 @@ class Further(NamedTuple):
 
     def described(self) -> dict[str, Any]:
         """As `understanding` describes columns."""
-        kinds = ("geometric", "barometric") if self.quantity == HEIGHT else ("outward", "inward, by its name")
-        return {"column": self.name, "unit": self.unit.name, "unit_from": kinds[self.other_kind], "why": "its name"}
+        kinds = {HEIGHT: ("geometric", "barometric"), RANGE_RATE: ("outward", "inward, by its name")}
+        kind = kinds.get(self.quantity, ("over any reference",))[self.other_kind]
+        return {"column": self.name, "unit": self.unit.name, "unit_from": kind, "why": "its name"}
 
 
 def of_rows(beside: tuple[Further, ...], header: TableHeader, row: Any) -> dict[str, Any]:
@@ -58,19 +61,21 @@ def of_rows(beside: tuple[Further, ...], header: TableHeader, row: Any) -> dict[
     found = {each.quantity: each.read(header)[row] for each in beside}
     height = next((each for each in beside if each.quantity == HEIGHT), None)
     heights = Heights(found[HEIGHT], height.other_kind) if height else None
-    return {"heights": heights, "range_rate": found.get(RANGE_RATE)}
+    return {"heights": heights, "range_rate": found.get(RANGE_RATE), "signal_db": found.get(SIGNAL)}
 
 
 def find(
-    header: TableHeader, found: Mapping[str, Any], units: Mapping[str, str], columns: Mapping[str, str]
+    header: TableHeader, found: Mapping[str, Any], units: Mapping[str, str], columns: Mapping[str, str], signal: bool
 ) -> tuple[Further, ...]:
-    """The range rate of a log with ranges, and its height, where it has ranges and azimuths, but no elevations.
+    """The range rate of a log with ranges, and its height, where it has ranges and azimuths, but no elevations; the
+    strength of its signal, if that is wanted.
 
     found: the columns of the log by quantity. units, columns: as stated by the user. Raises InputError where the user
     names a column that is not there, and, with a question, for a quantity whose unit is not known.
     """
     wanted = [RANGE_RATE] if "range" in found else []
     wanted += [HEIGHT] if {"range", "azimuth"} <= set(found) and "elevation" not in found else []
+    wanted += [SIGNAL] if signal or SIGNAL in columns else []
     taken = {index for column in found.values() for index in column.positions}
     return tuple(_found(header, wanted, taken, units, columns))
 
@@ -92,6 +97,8 @@ def _found(
             continue
         apart = _all_apart(quantity, header.names, header.units)
         indices = [k for k, name in enumerate(apart) if k not in taken and _means(quantity, name)]
+        if quantity != HEIGHT:  # of no known unit it is none
+            indices = [k for k in indices if _unit(quantity, apart[k], units.get(quantity))] or indices
         indices = [_stated(header, quantity, stated)] if stated else indices
         if len(indices) > 1 and not header.is_of_a_standard:
             both = listed([header.names[index] for index in indices])
@@ -128,7 +135,7 @@ def _described(header: TableHeader, quantity: str, index: int, name: Name, state
     text, unit = header.names[index], _unit(quantity, name, stated)
     if unit is None and header.is_of_a_standard and quantity == RANGE_RATE:
         unit = unit_named(quantity, "mps")
-    if unit is None and quantity == RANGE_RATE:
+    if unit is None and quantity != HEIGHT:
         return None
     if unit is None:
         raise InputError(
@@ -148,7 +155,7 @@ def _other_kind(quantity: str, text: str, name: Name, unit: Unit) -> bool:
     """Whether a height is barometric, a rate closing."""
     if quantity == HEIGHT:
         return unit.name == "fl" or not any(word in text.lower() for word in _GEOMETRIC)
-    return any(word.startswith(_CLOSING) for word in (name.core(), name.stem))
+    return quantity == RANGE_RATE and any(word.startswith(_CLOSING) for word in (name.core(), name.stem))
 
 
 def _apart(quantity: str, text: str, unit: str) -> Name:

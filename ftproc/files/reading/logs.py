@@ -30,7 +30,7 @@ Found = Mapping[str, schema.Column]
 
 class _Plan(NamedTuple):
     """What is read of a table, and how. others: positions of the columns that are kept beside. notes: on what its
-    values have shown. beside: range rates and heights. open: what may be such."""
+    values have shown. beside: range rates, heights and strengths of the signal. open: what may be such."""
 
     header: TableHeader
     found: Found
@@ -68,7 +68,7 @@ def read(
     azimuth_from: `x` (A = atan2(y, x), the default) or `north`, which makes the frame `north-east-up`.
     keep_columns: carry the file's other columns through as `extra`.
     station: what else is known of the instrument, see `conventions`.
-    extract: which of several targets, conditions on rows, widths of columns.
+    extract: which of several targets, conditions on rows, widths of columns, whether the strength of the signal too.
 
     Rows are counted from 0 without the header, in messages as in `row`; empty lines do not count. Rows without a time
     are listed and left out. Readings of any size stay in: editing judges outliers, such as a negative range.
@@ -92,11 +92,11 @@ def read(
         index = proposal.the_moments(header, range(len(header.names)))
         column_of = column_of if index is None else {**column_of, "time": str(index + 1)}
     found = schema.resolve(header.source, header.names, unit_of, column_of, header.units, propose)
-    beside = further.find(header, found, unit_of, column_of)
+    beside = further.find(header, found, unit_of, column_of, extract.signal)
     plan = _Plan(header, found, station, _conditions(header, extract), extract=extract, beside=beside)
     plan = plan._replace(open=tuple(further.doubts(header, beside, column_of)))
     if keep_columns:
-        wanted = [*plan.positions(), *(each.position for each in beside)]
+        wanted = [*plan.positions(), *(each.position for each in beside if each.quantity != further.SIGNAL)]
         plan = plan._replace(others=tuple(index for index in range(len(header.names)) if index not in wanted))
         _check_others(header, plan.others)
     whole = plan.others or plan.conditions or beside or header.stated.target or header.stated.station

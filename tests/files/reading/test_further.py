@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from ftproc.errors import InputError, UsageError
+from ftproc.files.options import Extract
 from ftproc.files.reading import logs
+
+HEARD = Extract(signal=True)
 
 
 def table(tmp_path, head, cells=("350", "351", "")):
@@ -116,3 +119,30 @@ def test_doppler_in_hertz_is_no_range_rate(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("time_s,range_m,azimuth_rad,elevation_rad,Doppler (Hz)\n0,50000,0.1,0.1,35\n1,50100,0.1,0.1,36\n")
     assert logs.read(path).range_rate is None
+
+
+@pytest.mark.parametrize("head", ["signal_db", "SNR (dB)", "RSSI [dBm]", "Rx power/dBW", "信噪比_dB"])
+def test_the_strength_of_the_signal_is_read_where_it_is_wanted(tmp_path, head):
+    path = table(tmp_path, head, ("-31.5", "-9999", "", *map(str, range(-40, -30))))
+    assert logs.read(path).signal_db is None
+    log = logs.read(path, extract=HEARD, keep_columns=True)
+    np.testing.assert_array_equal(log.signal_db, [-31.5, np.nan, np.nan, *range(-40, -30)])
+    assert log.understood["columns"]["signal"] == {
+        "column": head, "unit": "db", "unit_from": "over any reference", "why": "its name"
+    }  # fmt: skip
+    assert log.extra.column_names == [head]
+    assert logs.read(path, extract=HEARD, columns="signal=none").signal_db is None
+    assert log.stretch(slice(0, 2)).signal_db.size == 2
+
+
+def test_a_strength_of_no_known_unit_is_stated_or_none(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time_s,range_m,azimuth_rad,SNR,RSSI_dBm,AGC\n0,50000,0.1,3,-80,7\n1,50100,0.1,4,-81,8\n")
+    assert logs.read(path, extract=HEARD).signal_db.tolist() == [-80, -81]
+    both = {"columns": "signal=AGC", "units": "signal=dB"}
+    assert logs.read(path, **both).signal_db.tolist() == [7, 8]
+    assert logs.read(path, extract=HEARD, columns="signal=AGC").signal_db is None
+    two = tmp_path / "two.csv"
+    two.write_text(path.read_text().replace("SNR", "SNR_dB"))
+    with pytest.raises(InputError, match="SNR_dB, RSSI_dBm could each be the strength of the signal"):
+        logs.read(two, extract=HEARD)
