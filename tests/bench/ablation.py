@@ -18,7 +18,7 @@ import numpy as np
 from ftproc.core import threads
 from ftproc.core.editing.lasting.ends import End
 from ftproc.core.editing.lasting.screen import leaves_curves
-from ftproc.core.editing.lasting.weighing import as_it_is
+from ftproc.core.editing.lasting.weighing import as_it_is, scene_of
 from ftproc.errors import FtprocError
 from ftproc.methods import bridging
 from ftproc.quality.verdict import CONSISTENT
@@ -55,6 +55,10 @@ def _as_read(time_s: Any, measurement: Any) -> Any:
     return measurement.copy(), np.zeros(measurement.shape, np.uint8)
 
 
+def _in_sight(found: Any, work: Any) -> Any:
+    return scene_of(found.record, found.decision, work)
+
+
 def _at_typical_noise(part: Any, few: Any, most: Any, least: float) -> bool:
     return leaves_curves(part, most, least, as_it_is(part, part.log.weight, part.at_median))
 
@@ -88,6 +92,7 @@ TWO_PASS = f"{EDITING}.two_pass"
 RULES: dict[str, tuple[Off, ...]] = {
     "correlated noise": (Off(TWO_PASS, "allow_for_colour", _second),),
     "noise that drifts": (Off(TWO_PASS, "allow_for_drift", _pair),),
+    "jumps that hide in noise that drifts": (Off(f"{EDITING}.lasting.settling", "_hidden_by_drift", _in_sight),),
     "tails": (Off(TWO_PASS, "allow_for_tails", _pair),),
     "late stamps": (Off(TWO_PASS, "late_stamps", _nothing),),
     "very late stamps": (Off(TWO_PASS, "allow_for_very_late_stamps", _pair),),

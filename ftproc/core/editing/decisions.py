@@ -40,7 +40,8 @@ class Record(NamedTuple):
     """What stays the same while decisions are made: the log, the readings that may be good at all (n, 3), what
     screening trusts (n, 3) and the noise 1-sigma (3,) that it saw, what the user has fixed, the gate in sigmas, the
     1-sigma (3,) that rounding alone makes, what work is left for alternatives, and how the noise of single readings
-    differs, if it does. white: whether the noise is taken for white and even. accepted: (n, 3), by hand."""
+    differs, if it does; surely: if it grows only where neighbours differ more, too. white: whether the noise is taken
+    for white and even. accepted: (n, 3), by hand."""
 
     time_s: FloatArray
     measurement: FloatArray
@@ -54,6 +55,7 @@ class Record(NamedTuple):
     uneven: Uneven | None = None
     white: bool = False
     accepted: NDArray[np.bool_] | None = None
+    surely: Uneven | None = None
 
     def with_accepted(self, weight: FloatArray) -> FloatArray:
         """Weights (n, 3) with the readings used that are good by hand."""
@@ -256,17 +258,16 @@ def _has_tails(off: FloatArray, gate: float, count: int) -> bool:
 
 
 def allow_for_drift(record: Record, decision: Decision, rejected: bool = False) -> tuple[Record, Decision]:
-    """The record with noise whose variance drifts, and the decisions made again, if it does. rejected: by what was
-    rejected, too, which may be most where the noise has grown."""
+    """The record with noise that drifts, and the decisions made again, if it does. rejected: by what was, too."""
     weight = record.possible.astype(float) if rejected else decision.weight
-    residuals = None if _repeats(record, decision) else _residuals(record, decision)
-    drifting = None if residuals is None else uneven_noise.drift(record.weighted(weight), *residuals)
+    residuals = _residuals(record, decision)
+    drifting = None if _repeats(record, decision) else uneven_noise.drift(record.weighted(weight), *residuals)
     if drifting is None:
         return record, decision
-    uneven = record.uneven or Uneven.none(len(record.time_s))
-    record = record._replace(uneven=Uneven(uneven.times * drifting, uneven.late * np.sqrt(drifting)))
-    again = decide(record, decision._replace(model=median_level(decision.model), drifts=True), tune_first=True)
-    return record, again
+    drifted, known = uneven_noise.drifted, record.surely if decision.drifts else record.uneven
+    surely = drifted(known, uneven_noise.drift(record.weighted(weight), *residuals, by_neighbours=True))
+    record = record._replace(uneven=drifted(record.uneven, drifting), surely=surely)
+    return record, decide(record, decision._replace(model=median_level(decision.model), drifts=True), tune_first=True)
 
 
 def _repeats(record: Record, decision: Decision) -> bool:
@@ -294,7 +295,6 @@ def allow_for_colour(record: Record, decision: Decision) -> Decision:
 
 
 def _keep_most(decided: FloatArray, screened: FloatArray) -> FloatArray:
-    """The decisions (n, 3), but for a component of which almost nothing would be left: a diverged filter calls
-    everything bad, and screening knows better."""
+    """The decisions (n, 3), but for a component that loses almost all: a diverged filter calls everything bad."""
     lost = totals(decided) < FEWEST_KEPT * totals(screened)
     return np.where(lost, screened, decided)

@@ -128,10 +128,13 @@ def _normal(square: FloatArray, variance: FloatArray) -> FloatArray:
     return -0.5 * (np.log(variance) + square / variance)
 
 
-def drift(log: Observations, residual: FloatArray, variance: FloatArray) -> FloatArray | None:
+def drift(
+    log: Observations, residual: FloatArray, variance: FloatArray, by_neighbours: bool = False
+) -> FloatArray | None:
     """(n, 3) how many times the variance of a component that of each reading is, where it drifts; None if in none.
 
-    residual, variance: (n, 3) leave-one-out, of the smoother."""
+    residual, variance: (n, 3) leave-one-out, of the smoother. by_neighbours: it grows only where the differences of
+    neighbours do; where a track goes astray beside a jump, the residuals grow together."""
     found = np.ones_like(log.weight)
     for c in range(3):
         seen = np.flatnonzero((log.weight[:, c] > 0) & np.isfinite(variance[:, c]))
@@ -139,8 +142,11 @@ def drift(log: Observations, residual: FloatArray, variance: FloatArray) -> Floa
         if size < SHORTEST_WINDOW:
             continue
         count = len(seen) // size
-        square = residual[seen, c] ** 2 / variance[seen, c]
-        level = np.log(np.maximum(_of_windows(square, count, lambda rows: medians(rows.T)), SMALLEST) / CHI2_MEDIAN)
+        r, v = residual[seen, c], variance[seen, c]
+        level = _levels(r**2 / v, count)
+        if by_neighbours:
+            beside = _levels(np.diff(r, prepend=r[:1]) ** 2 / (v + np.r_[v[:1], v[:-1]]), count)
+            level = np.minimum(level, beside + median(level) - median(beside))
         chance = MEDIAN_SPREAD**2 / size
         drifting = float(np.var(level)) - chance
         if drifting < max(LEAST_DRIFT**2, 3 * chance * math.sqrt(2 / count)):
@@ -152,6 +158,19 @@ def drift(log: Observations, residual: FloatArray, variance: FloatArray) -> Floa
         middle, even = (np.pad(each, 1, mode="reflect", reflect_type="odd") for each in (middle, even))
         found[:, c] = np.exp(np.interp(log.time_s, middle, even))
     return found if (found != 1).any() else None
+
+
+def drifted(uneven: Uneven | None, drifting: FloatArray | None) -> Uneven | None:
+    """Noise of readings that differs so many times (n, 3) in variance from what is known already."""
+    if drifting is None:
+        return uneven
+    known = uneven or Uneven.none(len(drifting))
+    return Uneven(known.times * drifting, known.late * np.sqrt(drifting))
+
+
+def _levels(square: FloatArray, count: int) -> FloatArray:
+    """(count,) ln(variance) of windows of normalised squares (n,)."""
+    return np.log(np.maximum(_of_windows(square, count, lambda rows: medians(rows.T)), SMALLEST) / CHI2_MEDIAN)
 
 
 def _of_windows(values: FloatArray, count: int, what: Callable[[FloatArray], FloatArray]) -> FloatArray:

@@ -244,6 +244,20 @@ def test_a_drift_is_followed_however_long_the_log(n):
     assert np.std(off) < 0.4 * np.std(np.log(swell))
 
 
+@pytest.mark.parametrize("lasts", [60, 200])
+def test_where_a_track_goes_astray_beside_a_jump_neighbours_do_not_differ_more(lasts):
+    """Residuals of one sign that come slowly, up to twenty sigmas, change it, and go."""
+    a = matched(4, 3000)
+    run, k = smooth_log(a.log, a.model, a.starts, RESIDUALS), np.arange(3000) - 1500
+    astray = 20 * np.sign(k + 0.5) * np.exp(-np.abs(k) / lasts) * np.sqrt(run.residual_variance[:, 1])
+    residual = run.residual.copy()
+    residual[:, 1] += astray
+    assert uneven_noise.drift(a.log, residual, run.residual_variance) is not None
+    assert uneven_noise.drift(a.log, residual, run.residual_variance, by_neighbours=True) is None
+    residual[:, 1] = run.residual[:, 1] * (1 + np.abs(astray) / np.sqrt(run.residual_variance[:, 1]))
+    assert (uneven_noise.drift(a.log, residual, run.residual_variance, by_neighbours=True)[:, 1] > 30).any()
+
+
 @pytest.mark.parametrize(("n", "count"), [(120, 2), (130, 7), (7, 7), (61, 6)])
 def test_windows_are_those_of_numpy(n, count):
     values = np.random.default_rng(n).normal(size=n)

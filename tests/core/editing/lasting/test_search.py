@@ -123,6 +123,17 @@ def test_the_pieces_of_a_patch_are_found_each_by_itself():
     assert ((found.outlier != 0) == off).mean() > 0.999
 
 
+@pytest.mark.parametrize(("name", "seed"), [("offset", 3), ("walkoff", 4)])
+def test_a_jump_does_not_hide_in_noise_that_seems_to_grow(name, seed):
+    """A bullet at 1000 Hz and a sea-skimmer: the range is off for a second by 45 sigmas, and walks off by 11 and comes
+    back at once. The track was 331 and 44 sigmas off, and the verdict consistent."""
+    made = hard.make(name, seed).simulated
+    found = pipeline.filter_log(made.log, FilterSettings(smooth=True))
+    off = (found.state[:, :3] - made.truth.position_m) / found.sigma[:, :3]
+    assert np.abs(off).max() < 5
+    assert found.metadata["summary"]["trust"]["verdict"] != "consistent"
+
+
 @pytest.mark.parametrize(("name", "seed", "rms_m"), [("seldom", 3, 200.0), ("often", 4, 25.0)])
 def test_two_short_patches_are_not_one_long(name, seed, rms_m):
     """Flights with many patches of seconds: 4,322 and 677 m off where what lies between two of them is left out."""
