@@ -122,7 +122,7 @@ def edit(
     possible = found.record.possible
     if not live:
         found = without_lasting(found, measurement, decided, for_lasting)
-    record, decision, steps, _, doubtful, rivals, scene, _ = found
+    record, decision, steps, _, doubtful, rivals, scene, _, first = found
     if decision.stamp_s > 0:  # which explains a clock that seems to jump
         doubtful = [step for step in doubtful if step.component != CLOCK]
         rivals = [rival for rival in rivals if rival.component != CLOCK]
@@ -134,14 +134,14 @@ def edit(
     )
     if segment_of is None and not short:
         decision = allow_for_colour(record, decision)
-    log = record.weighted(decision.weight)
+    log, first = record.weighted(decision.weight), decision.weight if first is None else first
     if known.jerk_psd is None:
         profile = fit_profile(log, decision.starts, decision.model, PROFILE_STEPS)
         decision = decision._replace(model=with_allowance(log, profile))
     shifts, read = tuple[Shift, ...](), log._replace(measurement=measurement)
     if scene is not None and steps:
-        log, steps, shifts = refined(read, decision.model, scene.setting, steps)
-    otherwise = () if scene is None else others(read, possible, decision.model, scene.setting, steps, rivals)
+        log, steps, shifts = refined(read, decision.model, scene.setting, steps, first)
+    otherwise = () if scene is None else others(read, possible, decision.model, scene.setting, steps, rivals, first)
     leaning = [] if live else _one_sided(log, decision.model, record.rounding)
     shifts += tuple(Shift(one.component, 0, len(time_s), one.sigma) for one in leaning)
     said = tuple(rival for rival in rivals if rival.chosen != MOTION or rival.other != STEP if rival.gain < OPEN)

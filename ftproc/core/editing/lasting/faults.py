@@ -105,15 +105,15 @@ class Faults(NamedTuple):
 
 
 def refined(
-    log: Observations, model: Model, setting: Setting, steps: Sequence[Step]
+    log: Observations, model: Model, setting: Setting, steps: Sequence[Step], first: FloatArray
 ) -> tuple[Observations, tuple[Step, ...], tuple[Shift, ...]]:
     """A log without its steps, those with the sizes that all the record tells, and what was moved. log: as it was
-    read."""
+    read. first: see `taken_out`."""
     n = len(log.time_s)
     if not steps:
         return log, (), ()
     clock = [step for step in steps if step.component == CLOCK]
-    on_time = taken_out(log, model, setting, levelled(log, model.noise_variance, clock))
+    on_time = taken_out(log, model, setting, levelled(log, model.noise_variance, clock), first)
     curves = [Curve(s.component, s.sample, n, (s.size,)) for s in sorted(steps, key=_when) if s.component != CLOCK]
     known = tuple(clock)
     if curves:
@@ -126,16 +126,19 @@ def refined(
         )
     moved = levelled(log, model.noise_variance, known)
     shifts = tuple(Shift(c.component, c.begin, c.end, _sigma(known, c)) for c in moved)
-    return taken_out(log, model, setting, moved), tuple(sorted(known, key=_when)), shifts
+    return taken_out(log, model, setting, moved, first), tuple(sorted(known, key=_when)), shifts
 
 
 def _when(step: Step) -> int:
     return step.sample
 
 
-def taken_out(log: Observations, model: Model, setting: Setting, moved: Sequence[Curve]) -> Observations:
+def taken_out(
+    log: Observations, model: Model, setting: Setting, moved: Sequence[Curve], first: FloatArray
+) -> Observations:
     """The log without what has to be taken out of its readings: those of a clock that is late are moved to their time
-    stamps along the track that they show at the times at which they were taken."""
+    stamps along the track that they show at the times at which they were taken. first: (n, 3) weights as they were
+    decided on before: of samples that no reading was taken at, the readings count for that track all the same."""
     rest = log._replace(measurement=without(log.measurement, setting, [c for c in moved if c.component != CLOCK]))
     time_s = _taken_s(log.time_s, moved)
     late = time_s != log.time_s
@@ -143,7 +146,8 @@ def taken_out(log: Observations, model: Model, setting: Setting, moved: Sequence
         return rest
     order = np.argsort(time_s, kind="stable")
     sorted_s, level = time_s[order], model._replace(jerk=medians(model.jerk)[None], knot_s=math.inf)
-    taken = rest.part(order)._replace(time_s=sorted_s)
+    read = np.where(unseen(log.time_s, moved)[:, None], first, log.weight)
+    taken = rest.part(order)._replace(time_s=sorted_s, weight=read[order])
     state = smooth_log(taken, level, find_starts(taken, model.noise_variance, float(level.jerk[0, 0]))).state
     there, here = between(sorted_s, state, log.time_s[late]), between(sorted_s, state, time_s[late])
     z = rest.measurement.copy()
@@ -212,10 +216,10 @@ def spread(state: FloatArray, shifts: Sequence[Shift]) -> tuple[FloatArray, Floa
 
 def others(
     read: Observations, possible: NDArray[np.bool_], model: Model, setting: Setting, steps: Sequence[Step],
-    rivals: Sequence[Rival],
+    rivals: Sequence[Rival], first: FloatArray,
 ) -> Iterator[Observations]:  # fmt: skip
     """The log by each of some rivals. read: with the readings as they were read and the weights as decided. possible
-    (n, 3): readings that may be good. steps: that were taken out."""
+    (n, 3): readings that may be good. steps: that were taken out. first: see `taken_out`."""
     for rival in islice(sorted(rivals, key=lambda each: each.gain), MOST):
         weight, rows = read.weight.copy(), slice(rival.begin, rival.end)
         if rival.chosen == PATCH or rival.other == PATCH:
@@ -224,7 +228,7 @@ def others(
         if rival.other == STEP and rival.step is not None:
             left.append(rival.step)
         log = read._replace(weight=weight)
-        yield taken_out(log, model, setting, levelled(log, model.noise_variance, left))
+        yield taken_out(log, model, setting, levelled(log, model.noise_variance, left), first)
 
 
 def _same(one: Step, other: Step | None) -> bool:

@@ -41,7 +41,7 @@ LASTING_ROUNDS = 4  # of the search for faults that last: where one is taken out
 class Understood(NamedTuple):
     """A log and the decisions on it without the faults that last: the steps that were taken out, the readings of
     patches (n, 3), the steps that are in doubt, what else may be nearly as likely, and where they were sought.
-    probability: log-probability of all that is left."""
+    probability: log-probability of all that is left. first: (n, 3) weights, as if there were none of these faults."""
 
     record: Record
     decision: Decision
@@ -51,6 +51,7 @@ class Understood(NamedTuple):
     rivals: Sequence[Rival] = ()
     scene: Scene | None = None
     probability: float = math.nan
+    first: FloatArray | None = None
 
 
 def without_lasting(
@@ -126,12 +127,14 @@ def _without(
     steps, banned = (*found.steps, *new.steps), new.banned if found.banned is None else found.banned | new.banned
     log = record.weighted(decision.weight)
     moved = levelled(log, scene.at_median.noise_variance, steps)
-    read = taken_out(log._replace(measurement=measurement), scene.at_median, scene.setting, moved)
+    first = decision.weight if found.first is None else found.first
+    read = taken_out(log._replace(measurement=measurement), scene.at_median, scene.setting, moved, first)
     banned = banned | unseen(record.time_s, moved)[:, None]
     other = decided(read.measurement, banned=banned)
     if new.steps and _may_be_late_stamps((record, decision), other):
         return found
-    without = Understood(*other, steps, banned, new.doubtful, [*settled, *new.rivals], scene, log_probability(*other))
+    rivals, probability = [*settled, *new.rivals], log_probability(*other)
+    without = Understood(*other, steps, banned, new.doubtful, rivals, scene, probability, first)
     return found if new.banned.any() and _is_lost(found, without, LOST) else without
 
 

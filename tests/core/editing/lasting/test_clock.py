@@ -9,6 +9,7 @@ from ftproc import pipeline
 from ftproc.core.editing.lasting import clock
 from ftproc.core.editing.lasting.curves import CLOCK, Curve, Setting
 from ftproc.core.model.moving import between
+from ftproc.records import PATCH
 from ftproc.settings import FilterSettings
 from tests.core.editing.lasting.scenes import N, scene
 from tests.simulated import simulate
@@ -29,6 +30,16 @@ def test_a_jump_of_the_clock_of_an_agile_target_is_found_and_taken_out(seed, siz
     seen = late.log.time_s > size_s  # from the clock's first moment on
     error = (found.state[:, :3] - late.truth.position_m)[seen]
     assert np.sqrt(np.mean((error**2).sum(1))) < most_m
+
+
+def test_readings_that_no_stamp_is_left_for_tell_the_track_all_the_same():
+    """The first stamps are 1.9 s too early: when the readings are moved on, none is left for the first samples, but
+    those after them lie on a track that the first readings tell."""
+    late = hard.make("clock", 0).simulated
+    found = pipeline.filter_log(late.log, FilterSettings(smooth=True))
+    first = np.flatnonzero(late.log.time_s > 1.9)[:20]
+    assert (found.outlier[: first[0]] == PATCH).all()
+    assert np.abs(found.state[first, :3] - late.truth.position_m[first]).max() < 0.3  # 2.5 m by the later ones alone
 
 
 @pytest.mark.parametrize(

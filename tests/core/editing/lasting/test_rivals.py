@@ -14,7 +14,7 @@ from tests.trust import hard
 
 def logs(*rivals, steps=(), whole=None):
     whole = whole or scene()
-    return list(others(whole.log, whole.possible, whole.at_median, whole.setting, steps, rivals))
+    return list(others(whole.log, whole.possible, whole.at_median, whole.setting, steps, rivals, whole.log.weight))
 
 
 def test_of_a_patch_that_may_be_motion_the_readings_are_used_and_the_other_way_round():
