@@ -174,11 +174,11 @@ class Features(ABC):
         self, run: FilterRun, start: int, stop: int, settling: int = SETTLING, signal_db: FloatArray | None = None
     ) -> tuple[FloatArray, BoolArray]:
         """Inputs (m, d), zero where not valid, and the mask (m,) of valid samples. signal_db: (n,) of the whole run."""
-        with np.errstate(invalid="ignore", divide="ignore"):
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             raw = self._raw(run, start, stop)
-        if self.heard:
-            strength = np.full(stop - start, np.nan) if signal_db is None else signal_db[start:stop]
-            raw = np.concatenate([raw, echo(strength)], axis=1)
+            if self.heard:
+                strength = np.full(stop - start, np.nan) if signal_db is None else signal_db[start:stop]
+                raw = np.concatenate([raw, echo(strength)], axis=1)
         valid = usable(run, start, stop, settling) & np.all(np.isfinite(raw), axis=1)
         raw[~valid] = 0.0
         return raw, valid

@@ -138,7 +138,8 @@ def measure(flight: Flight, plan: Plan, sigma: FloatArray, name: str, seed: int 
     visible, hidden = (jumps(grid, each, streams["clock"]) for each in (spec.clock, spec.late))
     late = plan.instrument.stamp_jitter_s * rng.standard_normal(len(grid))
     taken = (np.clip(grid + late, grid[0], grid[-1]) if late.any() else grid) - hidden
-    echo_db = echoes(grid, plan.instrument, streams["echoes"])
+    fades = plan.instrument.echo_db > 0
+    echo_db = echoes(grid, plan.instrument, streams["echoes"]) if fades else np.zeros(len(grid))
     exact = systematic(flight.at(taken)[0], plan.instrument, echo_db) - servo_lag(flight, taken, plan.instrument)
     exact += gauss_markov_offsets(grid, plan.instrument, rng)
     usual = np.asarray(plan.noise * unit_noise(grid, spec.correlation_s, spec.tails_dof, streams["noise"]))
@@ -164,7 +165,7 @@ def measure(flight: Flight, plan: Plan, sigma: FloatArray, name: str, seed: int 
     )
     state = flight.at(log.time_s)
     log = measured(log, *state[:2], plan.further, streams["further"])
-    if plan.instrument.echo_db:
+    if fades:
         found = strength(exact[:, 0], echo_db, plan.instrument, streams["echoes"])
         log = with_signal(log, found[rows][order])
     truth = Truth(name, log.time_s, *state, code[order])
