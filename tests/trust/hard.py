@@ -72,11 +72,11 @@ GROUPS = {"patches": PATCHES, "combined": COMBINED, "changes": CHANGES, "dirt": 
 #: Of the groups, a little above what is reached.
 BOUNDS = {
     "patches": Bound(wrong=0.1, confident=0.02),
-    "combined": Bound(wrong=0.37, confident=0.05),
+    "combined": Bound(wrong=0.4, confident=0.05),
     "changes": Bound(wrong=0.12, confident=0.02),
     "dirt": Bound(wrong=0.05, confident=0.02),
     "sound": Bound(wrong=0.02, reported=0.22),
-    "many": Bound(wrong=0.45, confident=0.05),
+    "many": Bound(wrong=0.6, confident=0.05),
 }
 SEEDS = 5
 SHOWN = {*PATCHES, *COMBINED, "step", "clock"}
