@@ -88,7 +88,7 @@ SPELLINGS: Mapping[str, tuple[str, ...]] = {
     "fps": ("ft/s", "ft/sec"),
     "mmps": ("mm/s",),
     "cmps": ("cm/s",),
-    "db": ("dbm", "dbw", "dbsm", "dbhz", "dbmv", "dbfs", "decibel", "decibels", "дб", "дбм", "分贝"),
+    "db": ("dbm", "dbw", "dbsm", "dbhz", "db-hz", "dbmv", "dbfs", "decibel", "decibels", "дб", "дбм", "分贝"),
     "nmi": ("nauticalmile", "nauticalmiles", "nautmile", "nautmiles", "nautmi", "nautical"),
     "mi": ("mile", "miles", "smi", "sm", "statutemile", "statutemiles"),
     "yd": ("yds", "yard", "yards"),

@@ -76,6 +76,7 @@ FURTHER_ALIASES: Mapping[str, tuple[str, ...]] = {
     "signal": _split(
         """
         signal signalstrength signallevel signalpower strength snr sn signaltonoise signaltonoiseratio rssi cn0 echo
+        rxlevel receivedlevel peakpower
         echostrength echolevel echopower power receivedpower rxpower returnpower returnstrength amplitude agc
         signalstarke signalpegel empfangspegel отношениесигналшум уровеньсигнала 信噪比 信号强度
         """

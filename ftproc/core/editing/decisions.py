@@ -259,13 +259,13 @@ def _has_tails(off: FloatArray, gate: float, count: int) -> bool:
 
 def allow_for_drift(record: Record, decision: Decision, rejected: bool = False) -> tuple[Record, Decision]:
     """The record with noise that drifts, and the decisions made again, if it does. rejected: by what was, too."""
-    weight = record.possible.astype(float) if rejected else decision.weight
-    residuals = _residuals(record, decision)
-    drifting = None if _repeats(record, decision) else uneven_noise.drift(record.weighted(weight), *residuals)
-    if drifting is None:
+    if _repeats(record, decision):
+        return record, decision
+    log = record.weighted(record.possible.astype(float) if rejected else decision.weight)
+    if (drifting := uneven_noise.drift(log, *(residuals := _residuals(record, decision)))) is None:
         return record, decision
     drifted, known = uneven_noise.drifted, record.surely if decision.drifts else record.uneven
-    surely = drifted(known, uneven_noise.drift(record.weighted(weight), *residuals, by_neighbours=True))
+    surely = drifted(known, uneven_noise.drift(log, *residuals, by_neighbours=True))
     record = record._replace(uneven=drifted(record.uneven, drifting), surely=surely)
     return record, decide(record, decision._replace(model=median_level(decision.model), drifts=True), tune_first=True)
 

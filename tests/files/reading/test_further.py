@@ -121,7 +121,9 @@ def test_doppler_in_hertz_is_no_range_rate(tmp_path):
     assert logs.read(path).range_rate is None
 
 
-@pytest.mark.parametrize("head", ["signal_db", "SNR (dB)", "RSSI [dBm]", "Rx power/dBW", "信噪比_dB"])
+@pytest.mark.parametrize(
+    "head", ["signal_db", "SNR (dB)", "RSSI [dBm]", "Rx power/dBW", "CN0 [dB-Hz]", "RxLevel_dBm", "信噪比_dB"]
+)
 def test_the_strength_of_the_signal_is_read_where_it_is_wanted(tmp_path, head):
     path = table(tmp_path, head, ("-31.5", "-9999", "", *map(str, range(-40, -30))))
     assert logs.read(path).signal_db is None
