@@ -43,7 +43,7 @@ def heights(position: FloatArray) -> FloatArray:
 
 def last_state(log: Observations, model: Model, starts: list[Start]) -> Start:
     """State and covariance that the filter has after the last sample of a log; correlated noise counts as white."""
-    model = model._replace(noise_variance=model.reading_variance, wander_variance=np.zeros(3)).causal
+    model = model._replace(noise_variance=model.reading_variance, markov_variance=np.zeros(3)).causal
     start, filters, n = starts[-1], model.filter(starts[-1]), len(log.time_s)
     samples, profile = log.samples(model.noise_variance), model.profile_of(log)
     run_weighted(Span(start.sample, n, start.sample), samples, profile, filters, False, empty_rows(n))

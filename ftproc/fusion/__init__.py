@@ -1,5 +1,5 @@
 """Several stations on one flight: the range file, the readings of all in one series of events, the stations' biases and
-clocks, editing with the others in view, and the outputs.
+clocks, editing that counts on the other stations, and the outputs.
 
 Stands on `core`, `config`, `files` and `quality`; `cli` calls it. A single station goes the way of a single log.
 """

@@ -241,12 +241,12 @@ def usual_of(record: Recording, settings: FilterSettings) -> Model | None:
         return None
     variance, markov = (
         np.median([getattr(edited.model, name) for edited in found], 0)
-        for name in ("noise_variance", "wander_variance")
+        for name in ("noise_variance", "markov_variance")
     )
-    tau_s = np.exp(np.median([np.log(edited.model.fade_s) for edited in found], 0))
+    tau_s = np.exp(np.median([np.log(edited.model.tau_s) for edited in found], 0))
     levels = np.array([median_level(edited.model).jerk for edited in found])
     jerk = np.exp(np.median(np.log(levels), 0))
-    return Model(variance, jerk, wander_variance=markov, fade_s=tau_s)
+    return Model(variance, jerk, markov_variance=markov, tau_s=tau_s)
 
 
 def _span(record: Recording, settings: FilterSettings, rows: slice) -> two_pass.Edited | None:

@@ -113,7 +113,7 @@ class RunStatistics:
             other = estimate.alternative.model
             self.slow_noise_likelier |= estimate.alternative.likelier
             self.slow_noise_separable &= estimate.alternative.separable
-            self.slow_noise_s = max(self.slow_noise_s, float(other.fade_s[other.wander_variance > 0].max()))
+            self.slow_noise_s = max(self.slow_noise_s, float(other.tau_s[other.markov_variance > 0].max()))
         self.unexamined += estimate.unexamined
         self.smoothed_sigma_m = None if self.absent else estimate.smoothed_sigma_m
         if estimate.screened_out is not None:

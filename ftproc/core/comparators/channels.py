@@ -4,7 +4,7 @@ outliers"; Zhang and Zhang, "reliable Kalman filter"): no geometry, no other com
 A component is (n,) readings, NaN where missing; differences of an azimuth are taken the short way round, so values
 may leave [-pi, pi). Intervals are the real ones; a threshold holds for one typical interval and grows with it.
 
-What a reading is held against is a short polynomial through the values before it. The papers' own targets hardly move
+What a reading is held against is a short polynomial through the values before it. The papers' own targets move little
 from reading to reading: degree 0 through one value is their rule to the letter, degree 1 or 2 is the same rule for a
 target that flies.
 """
@@ -153,7 +153,7 @@ def gate(time: Vector, z: Vector, how: Predictor, check_first: bool) -> Vector:
 def least_squares(time: Vector, z: Vector, how: Predictor) -> tuple[Vector, Vector]:
     """Cleaned values (n,) and weights (n,): a reading further than the threshold from the polynomial through the last
     values is replaced by it, once there are as many as its window holds. When `longest` in a row are, the last of them
-    are believed instead.
+    are used instead.
 
     On even intervals the line through four values weighs them -1/2, 0, 1/2, 1, the latest most.
     """

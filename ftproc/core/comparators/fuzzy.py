@@ -1,5 +1,5 @@
-"""How far a reading is to be believed, from its normalised innovation: the two fuzzy systems of Shao et al. 2020
-(their tables 2 and 3, figures 3 and 4), and the chi-square quantiles on which their edges rest.
+"""The weight of a reading, from its normalised innovation: the two fuzzy systems of Shao et al. 2020 (their
+tables 2 and 3, figures 3 and 4), and the chi-square quantiles on which their edges rest.
 
 A normalised innovation rho of m readings is small (S) up to the 75 % point of chi-square with m degrees of freedom,
 medium (M) about the 99 % point and big (B) from the 99.99 % point on, with straight lines between, so that the three

@@ -1,6 +1,6 @@
 """Interacting multiple models (Blom and Bar-Shalom 1988; for theodolites Zhang, Li and He 2012): several unscented
 Kalman filters side by side that differ in the jerk they expect, and a Markov chain that says how readily the target
-changes from calm flight to a manoeuvre. Every filter begins a step from a mixture of them all."""
+begins or ends a manoeuvre. Every filter begins a step from a mixture of them all."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
     enpf        the analysis members are a proposal; weights, resampling (the "weighted EnKF" of Papadakis et al. 2010)
     enpf-chi2   the same behind a chi-square gate
     renpf       the posterior sampled by Markov chains that begin at the analysis members; the prior is a sum of
-                Gaussians about the predicted members, and fuzzy weights say how far the reading is believed
+                Gaussians about the predicted members, and fuzzy weights weigh the reading
 
 Equations 18 and 20 and steps 3, 5 and 7 of the paper are not in its text; what stands here is the construction that
 its words leave open, after Silverman 1986 (width of the Gaussians), Liu and West 2001 (centres drawn together, so

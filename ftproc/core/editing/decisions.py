@@ -164,7 +164,7 @@ def _alike(model: Model, starts: list[Start], before: _Smoothed) -> bool:
     if [start.sample for start in starts] != [start.sample for start in before.starts]:
         return False
     one, other = (
-        np.concatenate([m.noise_variance, m.jerk.ravel(), m.wander_variance, m.fade_s]) for m in (model, before.model)
+        np.concatenate([m.noise_variance, m.jerk.ravel(), m.markov_variance, m.tau_s]) for m in (model, before.model)
     )
     same = model.knot_s == before.model.knot_s and len(one) == len(other)
     return same and bool((np.abs(one - other) <= ALIKE * other).all())

@@ -25,10 +25,10 @@ class Backward(Protocol):
 
     v, w, nu: v, W, U N of the smoother's head. state, cov: of the smoothed estimate (of the covariance only the blocks
     of position and velocity, and the diagonal; if `paths` is not zero also those of velocity with acceleration, for
-    the sigmas of `kinematics`, whose gradients `path` holds). pn: P N. q: coefficients of Q. vague: whether
+    the sigmas of `kinematics`, whose gradients `path` holds). pn: P N. q: coefficients of Q. unobserved: whether
     the covariance before comes from this one, see `heads`; later: this one, whole; inverse, gain: M and C. residual,
-    variance: leave-one-out. noise, wander: the two sums of the score so far, see `smoother`, of the white noise and of
-    the offsets' variances; fade_score: of their correlation times. n_first: N+ of the first sample.
+    variance: leave-one-out. noise, markov: the two sums of the score so far, see `smoother`, of the white noise and of
+    the offsets' variances; tau_score: of their correlation times. n_first: N+ of the first sample.
     """
 
     r: Annotated[FloatArray, 9]
@@ -40,15 +40,15 @@ class Backward(Protocol):
     cov: Annotated[FloatArray, 9, 9]
     pn: Annotated[FloatArray, 9]
     q: Annotated[FloatArray, 3, 3]
-    vague: float
+    unobserved: float
     later: Annotated[FloatArray, 9, 9]
     inverse: Annotated[FloatArray, 9, 9]
     gain: Annotated[FloatArray, 9, 9]
     residual: Annotated[FloatArray, 3]
     variance: Annotated[FloatArray, 3]
     noise: Annotated[FloatArray, 2, 3]
-    wander: Annotated[FloatArray, 2, 3]
-    fade_score: Annotated[FloatArray, 3]
+    markov: Annotated[FloatArray, 2, 3]
+    tau_score: Annotated[FloatArray, 3]
     n_first: Annotated[FloatArray, 9, 9]
     path: Annotated[FloatArray, 6, 6]
     paths: float
@@ -255,26 +255,26 @@ def score_jerk(back: Backward, interval: float, sums: FloatArray, piece: int) ->
 
 
 @part
-def score_wander(back: Backward, f: Filter, interval: float) -> None:
+def score_markov(back: Backward, f: Filter, interval: float) -> None:
     """Add to the score of the offsets' variances, by their logarithms: over an interval, or of the first state
     (infinite)."""
     for i in range(OFFSETS, len(back.r)):
-        if f.fade_s[i - OFFSETS] >= motion.FOREVER_S:
+        if f.tau_s[i - OFFSETS] >= motion.FOREVER_S:
             continue
-        fade = math.exp(-interval / f.fade_s[i - OFFSETS])
-        half = 0.5 * (1 - fade * fade) * f.wander[i - OFFSETS]
-        back.wander[0, i - OFFSETS] += half * back.r[i] * back.r[i]
-        back.wander[1, i - OFFSETS] += half * back.n[i, i]
+        kept = math.exp(-interval / f.tau_s[i - OFFSETS])
+        half = 0.5 * (1 - kept * kept) * f.markov[i - OFFSETS]
+        back.markov[0, i - OFFSETS] += half * back.r[i] * back.r[i]
+        back.markov[1, i - OFFSETS] += half * back.n[i, i]
 
 
 @part
-def score_fade(back: Backward, earlier: Any, f: Filter, interval: float) -> None:
+def score_tau(back: Backward, earlier: Any, f: Filter, interval: float) -> None:
     """Add to the score of the offsets' correlation times, by their logarithms, over the interval since an earlier
     update, which was retained with its state: r' dPhi x+ + 1/2 (r r' - N) : d(Phi P+ Phi' + Q)."""
     x, p, r, n, t = earlier.x, earlier.p, back.r, back.n, interval
     for i in range(OFFSETS, len(x)):
-        fade = math.exp(-t / f.fade_s[i - OFFSETS])
-        slope = fade * t / f.fade_s[i - OFFSETS]
+        kept = math.exp(-t / f.tau_s[i - OFFSETS])
+        slope = kept * t / f.tau_s[i - OFFSETS]
         total = r[i] * x[i]
         for j in range(3):
             position = p[j, i] + t * p[3 + j, i] + 0.5 * t * t * p[6 + j, i]
@@ -282,6 +282,6 @@ def score_fade(back: Backward, earlier: Any, f: Filter, interval: float) -> None
             total += (r[i] * r[3 + j] - n[i, 3 + j]) * (p[3 + j, i] + t * p[6 + j, i])
             total += (r[i] * r[6 + j] - n[i, 6 + j]) * p[6 + j, i]
         for j in range(OFFSETS, len(x)):
-            total += (r[i] * r[j] - n[i, j]) * math.exp(-t / f.fade_s[j - OFFSETS]) * p[j, i]
-        lost = fade * f.wander[i - OFFSETS] * (r[i] * r[i] - n[i, i])
-        back.fade_score[i - OFFSETS] += slope * (total - lost)
+            total += (r[i] * r[j] - n[i, j]) * math.exp(-t / f.tau_s[j - OFFSETS]) * p[j, i]
+        lost = kept * f.markov[i - OFFSETS] * (r[i] * r[i] - n[i, i])
+        back.tau_score[i - OFFSETS] += slope * (total - lost)

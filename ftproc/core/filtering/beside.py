@@ -5,9 +5,9 @@ A scalar knows a point c, by which it is one of two kinds, with d = |x - c| and 
     RATE       h = u . v, the range rate of a station at c; gradient (v - h u) / d by position, u by velocity
     DISTANCE   h = d; gradient u by position. About the centre of the earth it is a height, less the earth's radius
 
-What the bend of h adds where position and velocity are vague is the mean tr(C P_xv), half of tr(C P_xx), and to the
-variance tr(C P_xx C P_vv), half of tr(C P_xx C P_xx), with C = (I - u u') / d. The update and its way back are those of
-`ukf` and `smoother` for a single component whose H sees the velocity too.
+What the bend of h adds where position and velocity are poorly known is the mean tr(C P_xv), half of tr(C P_xx), and to
+the variance tr(C P_xx C P_vv), half of tr(C P_xx C P_xx), with C = (I - u u') / d. The update and its way back are
+those of `ukf` and `smoother` for a single component whose H sees the velocity too.
 
 The scalars of a log are an array (kinds, n, WIDTH), which the sweeps fill: value m/s or m, and variance, weight (of a
 mean, of how many; below zero it is yet to be decided by the innovation), innovation and its variance (after a way back

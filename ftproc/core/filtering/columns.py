@@ -142,6 +142,6 @@ def said_of(log: Observations, model: Model, starts: list[Start], columns: Colum
         quiet = np.zeros(m, np.int64)
         sums = _Sums(*columns, np.zeros((9, m)), np.zeros((3, m)), np.zeros(m), quiet, score, information)
         first = zeros(FILTER)
-        first["x"][0], first["p"][0], first["fade_s"] = start.state, start.covariance, motion.FOREVER_S
+        first["x"][0], first["p"][0], first["tau_s"] = start.state, start.covariance, motion.FOREVER_S
         likelihood += _sweep_columns(Span(start.sample, stop, start.sample), samples, profile, first, sums)
     return Said(likelihood, score, information + np.tril(information, -1).T)

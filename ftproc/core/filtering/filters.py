@@ -16,7 +16,7 @@ FloatArray = NDArray[np.float64]
 class Filter(Protocol):
     """The record of a filter: its state, and what one measurement update computes on its way.
 
-    x, p: state and covariance, SI units. noise, late: of this sample, see `records.Sample`. wander, fade_s: variance
+    x, p: state and covariance, SI units. noise, late: of this sample, see `records.Sample`. markov, tau_s: variance
     and correlation time of the offset of each component. jerk: density of the jerk along each axis, see `motion`. q:
     coefficients of Q. z_hat: predicted measurement. e: innovation. used: weight of each component, zero for none. h: H
     on the position. s: innovation covariance. root: L^-1, whose rows and columns are zero for components not used. c,
@@ -29,8 +29,8 @@ class Filter(Protocol):
     p: Annotated[FloatArray, 9, 9]
     noise: Annotated[FloatArray, 3]
     late: Annotated[FloatArray, 3]
-    wander: Annotated[FloatArray, 3]
-    fade_s: Annotated[FloatArray, 3]
+    markov: Annotated[FloatArray, 3]
+    tau_s: Annotated[FloatArray, 3]
     jerk: Annotated[FloatArray, 3]
     q: Annotated[FloatArray, 3, 3]
     z_hat: Annotated[FloatArray, 3]

@@ -54,7 +54,7 @@ def _move(f: Filter, profile: motion.Profile, before: int, after: int, interval:
         forces.travel(f, profile.motion, before, after, interval)
     else:
         motion.predict(f, interval)
-    motion.wander(f, interval)
+    motion.decorrelate(f, interval)
 
 
 @part

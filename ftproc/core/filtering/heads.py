@@ -7,8 +7,8 @@ filter predicts for the next sample,
 
     C = Phi^-1 (I - Q M)        P^s = C P^s_next C' + C Q Phi'^-1
 
-Where the prediction is vague M vanishes, and P^s is that of the next sample, carried back in time. Of the offsets,
-whose Phi may vanish but whose covariance is never vague, C has the rows of P Phi' M, and P^s those of P - C Phi P.
+Where the state is poorly observed M vanishes, and P^s is that of the next sample, carried back in time. Of the offsets,
+whose Phi may vanish but whose covariance is never so wide, C has the rows of P Phi' M, and P^s those of P - C Phi P.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ftproc.core.model import forces, motion
 
 FloatArray = NDArray[np.float64]
 
-VAGUE = 1e4  # times the smoothed variance: with less, P - P N P keeps eight of its sixteen digits
+UNOBSERVED = 1e4  # times the smoothed variance: with less, P - P N P keeps eight of its sixteen digits
 LEAST_SHARE = 3e-8  # of a variance: less cannot be told from what a sweep rounds off
 SINGULAR = 1e-14  # share of a variance that the others leave of it: less is rounding
 
@@ -39,18 +39,18 @@ def store(memory: Any, f: Filter, samples: Any, profile: motion.Profile, k: int,
     back, after = memory.back[0], memory.after
     here, first = after[k - low], k == low and b == 0
     backward.estimate(back, here)
-    vague = back.vague > 0
-    if vague:
+    unobserved = back.unobserved > 0
+    if unobserved:
         motion.drive(f, profile, samples[k + 1].time_s)
-        vague = carry(back, f, here, samples[k + 1].time_s - samples[k].time_s, profile.motion, k)
+        unobserved = carry(back, f, here, samples[k + 1].time_s - samples[k].time_s, profile.motion, k)
     if first:
-        back.vague = 1.0
+        back.unobserved = 1.0
     elif k > low:
-        back.vague = is_vague(back, after[k - 1 - low])
+        back.unobserved = is_poorly_observed(back, after[k - 1 - low])
     else:
-        back.vague = is_vague(back, memory.before[b])
-    if back.vague > 0:
-        if not vague:
+        back.unobserved = is_poorly_observed(back, memory.before[b])
+    if back.unobserved > 0:
+        if not unobserved:
             complete(back, here)
         for i in range(len(back.cov)):
             for j in range(len(back.cov)):
@@ -59,11 +59,11 @@ def store(memory: Any, f: Filter, samples: Any, profile: motion.Profile, k: int,
 
 
 @part
-def is_vague(back: Backward, earlier: Any) -> float:
+def is_poorly_observed(back: Backward, earlier: Any) -> float:
     """Whether the filter knew far less at an earlier sample than the record tells in the end: one or zero."""
     found = 0.0
     for i in range(OFFSETS):
-        if earlier.p[i, i] > VAGUE * back.cov[i, i]:
+        if earlier.p[i, i] > UNOBSERVED * back.cov[i, i]:
             found = 1.0
     return found
 
@@ -107,7 +107,7 @@ def carry(back: Backward, f: Filter, after: Posterior, interval: float, by: moti
         forces.couple(f)
         forces.linearise(f, by.course[k + 1], by, 0.5 * interval, 0.0)
         forces.unkick_covariance(f, back.later)
-    motion.wander(f, interval)
+    motion.decorrelate(f, interval)
     if not invert(p, m, c, back.pn):
         return False
     _gain(back, f, after, interval, by.acts)
@@ -152,7 +152,7 @@ def _gain(back: Backward, f: Filter, after: Posterior, interval: float, coupled:
             p[o, 3 + i] = after.p[o, 3 + i] + t * after.p[o, 6 + i]
             p[o, 6 + i] = after.p[o, 6 + i]
         for i in range(OFFSETS, size):
-            p[o, i] = after.p[o, i] * math.exp(-t / f.fade_s[i - OFFSETS])
+            p[o, i] = after.p[o, i] * math.exp(-t / f.tau_s[i - OFFSETS])
         for j in range(size):
             c[o, j] = 0.0
             for a in range(size):

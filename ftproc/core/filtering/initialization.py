@@ -25,22 +25,22 @@ WIDEST_BRIDGE = 0.06  # of the range, over a gap of all components
 WIDEST_BLIND_BRIDGE = 0.2  # of the range, over a gap of one component: the others hold the track meanwhile
 FEWEST_READINGS = 8  # of each component after a gap, for a start of its own
 INFLATION = 3.0  # on every sigma of the first state: its readings are filtered again, so it must weigh little
-WIDEST_IN_RANGES = 0.1  # the position must not be so vague that the target may be behind the station
+WIDEST_IN_RANGES = 0.1  # the position must not be so poorly known that the target may be behind the station
 ONE_SECOND = 1.0  # in which a target may have passed its own range, if all its readings are of one instant
 
 
 def first_start(log: Observations, noise_variance: FloatArray) -> Start:
-    """The start of a log: at its first sample, or, where its position would be too vague there, where every component
-    has been seen once. Errors as in `first_state`."""
+    """The start of a log: at its first sample, or, where its position would be too poorly known there, where every
+    component has been seen once. Errors as in `first_state`."""
     everything = slice(0, len(log.time_s))
     start = first_state(log, noise_variance, 0, everything)
-    if not _vague(start) <= INFLATION * WIDEST_BRIDGE:
+    if not _position_sigma(start) <= INFLATION * WIDEST_BRIDGE:
         seen = int(((log.weight > 0) & np.isfinite(log.measurement)).argmax(0).max())
         start = first_state(log, noise_variance, seen, everything) if seen > 0 else start
     return start
 
 
-def _vague(start: Start) -> float:
+def _position_sigma(start: Start) -> float:
     """1-sigma of a start's position, in ranges."""
     (x, y, z), covariance = start.state[:3].tolist(), start.covariance
     return math.sqrt(covariance[0, 0] + covariance[1, 1] + covariance[2, 2]) / max(math.hypot(x, y, z), NO_RANGE_M)

@@ -109,6 +109,6 @@ class Scores(NamedTuple):
 
     log_likelihood: float
     noise: Slope
-    wander: Slope
-    fade: FloatArray
+    markov: Slope
+    tau: FloatArray
     jerk: Slope

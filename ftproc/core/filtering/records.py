@@ -203,7 +203,7 @@ class Model(NamedTuple):
     """The noise of the measurements, and of the motion.
 
     noise_variance: (3,) of white noise, m^2, rad^2, rad^2, or (stations, 3). jerk: (m, 3) density of the jerk along x,
-    y and z, m^2/s^5, each row holding for `knot_s` seconds from the first sample on. wander_variance, fade_s: (3,) of
+    y and z, m^2/s^5, each row holding for `knot_s` seconds from the first sample on. markov_variance, tau_s: (3,) of
     the noise that is correlated in time (first-order Gauss-Markov), which adds to the white; zero for none. motion:
     what moves the target beside its jerk, whose densities are then along the path, across it, and upward.
     """
@@ -211,14 +211,14 @@ class Model(NamedTuple):
     noise_variance: FloatArray
     jerk: FloatArray
     knot_s: float = math.inf
-    wander_variance: FloatArray = np.zeros(3)
-    fade_s: FloatArray = np.ones(3)
+    markov_variance: FloatArray = np.zeros(3)
+    tau_s: FloatArray = np.ones(3)
     motion: Motion = WHITE_JERK
 
     @property
     def coloured(self) -> bool:
         """Whether some of the noise is correlated in time."""
-        return any(self.wander_variance.tolist())
+        return any(self.markov_variance.tolist())
 
     def of(self, span: slice) -> Model:
         """The model of a stretch of the log."""
@@ -232,12 +232,12 @@ class Model(NamedTuple):
     @property
     def reading_variance(self) -> FloatArray:
         """(3,) variance of the noise of a single reading."""
-        variance: FloatArray = self.noise_variance + self.wander_variance
+        variance: FloatArray = self.noise_variance + self.markov_variance
         return variance
 
     def correlation(self, interval_s: float) -> FloatArray:
         """(3,) of the noise of readings that are so far apart."""
-        found: FloatArray = self.wander_variance / self.reading_variance * np.exp(-interval_s / self.fade_s)
+        found: FloatArray = self.markov_variance / self.reading_variance * np.exp(-interval_s / self.tau_s)
         return found
 
     def profile(self, time_s: FloatArray) -> Profile:
@@ -253,9 +253,9 @@ class Model(NamedTuple):
         """An array of one `filters.Filter` record at a start; of one `filters.Coloured` if some noise is correlated."""
         filters = zeros(COLOURED if self.coloured else FILTER)
         filters["x"][0, :9], filters["p"][0, :9, :9] = start.state, start.covariance
-        filters["wander"][0], filters["fade_s"][0] = self.wander_variance, self.fade_s
+        filters["markov"][0], filters["tau_s"][0] = self.markov_variance, self.tau_s
         if self.coloured:
-            filters["p"][0, 9:, 9:] = np.diag(self.wander_variance)
+            filters["p"][0, 9:, 9:] = np.diag(self.markov_variance)
         return filters
 
 

@@ -135,7 +135,7 @@ def _go_back(back: Any, f: Filter, samples: Samples, k: int, profile: motion.Pro
     motion.adjoint(back, interval)
     if acts:
         forces.kick_back(back, f, profile.motion, k - 1, interval)
-    motion.wander_back(back, interval, f.fade_s)
+    motion.decorrelate_back(back, interval, f.tau_s)
 
 
 def _swept_through(
@@ -196,14 +196,14 @@ def _swept_through(
                 beside.absorb(back.r, back.n, back.pn, profile.beside, k)
             _carry_back(memory, update, sample, k, interval, k - low, wanted)
             if k > span.first:
-                backward.score_wander(back, f, interval)
+                backward.score_markov(back, f, interval)
                 if k > low:
-                    backward.score_fade(back, after[k - 1 - low], f, interval)
+                    backward.score_tau(back, after[k - 1 - low], f, interval)
                 else:
-                    backward.score_fade(back, before[b], f, interval)
+                    backward.score_tau(back, before[b], f, interval)
                 _go_back(back, f, samples, k, profile, jerk, wanted)
             else:
-                backward.score_wander(back, f, math.inf)
+                backward.score_markov(back, f, math.inf)
     return likelihood
 
 
@@ -230,20 +230,20 @@ def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) ->
     sweep = _sweep_coloured if model.coloured else _sweep
     estimates = empty(ESTIMATED, n if wanted == STATES else 0)
     residuals = scratch(LEFT, n if wanted >= RESIDUALS else 0)
-    (noise, wander), fade, jerk = np.zeros((2, 2, 3)), np.zeros(3), np.zeros((len(model.jerk), 2, 3))
+    (noise, markov), tau, jerk = np.zeros((2, 2, 3)), np.zeros(3), np.zeros((len(model.jerk), 2, 3))
     likelihood, found = 0.0, list[Start]()
     for start, stop in between(starts, n):
         memory = memory_of(stop - start.sample, model.filter(start), estimates, residuals)
         memory.back["paths"] = paths
         likelihood += sweep(Span(start.sample, stop, start.sample), samples, profile, memory, jerk, wanted)
         noise += memory.back["noise"][0]
-        wander += memory.back["wander"][0]
-        fade += memory.back["fade_score"][0]
+        markov += memory.back["markov"][0]
+        tau += memory.back["tau_score"][0]
         if wanted >= HEADS or (wanted == RESIDUALS and 0 < start.sample == starts[0].sample):
             back, p = memory.back[0], memory.after["p"][0]
             covariance = back["cov"] if wanted == STATES else heads.smoothed_covariance(p, back["n_first"])
             found.append(Start(start.sample, back["state"][:9].copy(), covariance[:9, :9].copy()))
-    slopes = (Slope(*noise), Slope(*wander), fade, Slope(jerk[:, 0] * model.jerk, jerk[:, 1] * model.jerk))
+    slopes = (Slope(*noise), Slope(*markov), tau, Slope(jerk[:, 0] * model.jerk, jerk[:, 1] * model.jerk))
     return _Swept(Scores(likelihood, *slopes), estimates, residuals, tuple(found), profile.beside)
 
 

@@ -18,7 +18,7 @@ The update is done with whitened innovations. With S = C + R = L L',
 which equals the form with the gain K = U' L^-1 in fewer steps, and leaves P symmetric to the last bit.
 
 Noise that is correlated in time is part of the state where the record is `Coloured`: z = h(x) + b + v with an offset b
-of each component that wanders (Gauss-Markov, see `motion.wander`). What is said of H above then holds for [H, I].
+of each component (Gauss-Markov, see `motion.decorrelate`). What is said of H above then holds for [H, I].
 """
 
 from __future__ import annotations

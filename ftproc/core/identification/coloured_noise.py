@@ -88,10 +88,10 @@ def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fi
     theta = search.run(min(tries, key=lambda theta: search.cost(theta).value), STEPS)
     found = [search.model(theta), *(search.model(search.along(theta, factor)) for factor in (0.5, 2.0))]
     model = found[0]
-    neighbours = np.exp(-scales.interval_s / model.fade_s) * model.wander_variance / model.reading_variance
+    neighbours = np.exp(-scales.interval_s / model.tau_s) * model.markov_variance / model.reading_variance
     correlated = neighbours > NEGLIGIBLE
     model, fastest, slowest = (
-        each._replace(wander_variance=np.where(correlated, each.wander_variance, 0.0)) for each in found
+        each._replace(markov_variance=np.where(correlated, each.markov_variance, 0.0)) for each in found
     )
     level = fit_profile(part, starts, fit_level(part, starts, white, fixed), PROFILE_STEPS)
     gain = likelihood_of(part, fit_profile(part, starts, model, PROFILE_STEPS), starts)
@@ -102,7 +102,7 @@ def fit_coloured(log: Observations, starts: list[Start], white: Model, fixed: Fi
         slowest,
         likelier=bool(correlated.any()) and gain > LEAST_GAIN * int(correlated.sum()),
         possible=bool(correlated.any()) and gain > LEAST_GAIN,
-        separable=float(fastest.fade_s[correlated].max(initial=0.0)) < scales.span_s / INDEPENDENT,
+        separable=float(fastest.tau_s[correlated].max(initial=0.0)) < scales.span_s / INDEPENDENT,
     )
 
 
@@ -134,13 +134,13 @@ class _Search:
     def model(self, theta: FloatArray) -> Model:
         """The model of some parameters."""
         white, markov, tau = np.exp(theta[:9]).reshape(3, 3)
-        return Model(white, shaped(theta[9:10], theta[10]), wander_variance=markov, fade_s=tau)
+        return Model(white, shaped(theta[9:10], theta[10]), markov_variance=markov, tau_s=tau)
 
     def cost(self, theta: FloatArray) -> optimizer.Point:
         """Minus the log-likelihood."""
         found = score_log(self.log, self.model(theta), self.starts)
-        level, variances = of_level(found, theta[10]), (found.noise, found.wander)
-        slope = np.r_[*(-each.score for each in variances), -found.fade, level.gradient]
+        level, variances = of_level(found, theta[10]), (found.noise, found.markov)
+        slope = np.r_[*(-each.score for each in variances), -found.tau, level.gradient]
         curvature = np.r_[*(each.curvature for each in variances), self.of_taus, level.curvature]
         return optimizer.Point(level.value, slope, curvature)
 

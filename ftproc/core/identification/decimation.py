@@ -25,7 +25,7 @@ IntArray = NDArray[np.int64]
 SHARE = 0.5  # of the filter's memory, that is merged
 MOST = 16  # readings in a group
 FEWEST, PER_KNOT = 500, 4  # groups of a log, and to a knot of the jerk profile
-CALMER = 0.9  # share of the flight with less jerk than the memory is computed for
+QUIETER_SHARE = 0.9  # share of the flight with less jerk than the memory is computed for
 OFTEN = 0.7  # of the readings of the component that is seen most: else means of few stand at the wrong times
 ROUNDING = 0.01  # of a reading: times are rounded, and must not decide where the number comes out even
 
@@ -35,7 +35,7 @@ def how_many(scales: Scales, model: Model, knot_s: float) -> int:
     if model.coloured:
         return 1
     noise = float(scales.noise_m.min()) ** 2
-    jerk_psd = max(quantile(model.jerk[:, 0], CALMER), 1e-300)
+    jerk_psd = max(quantile(model.jerk[:, 0], QUIETER_SHARE), 1e-300)
     memory = (noise * scales.interval_s / jerk_psd) ** (1 / 6)
     wanted = min(SHARE * memory, knot_s / PER_KNOT, scales.span_s / FEWEST) / scales.interval_s
     return int(np.clip(wanted + ROUNDING, 1, MOST))

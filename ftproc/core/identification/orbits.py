@@ -28,7 +28,7 @@ ABOVE_M = 100e3  # where the air ends
 FARTHEST_TURN = 0.005  # rad, over which the motion goes on in one step
 EARTH_RADPS = 7.292115e-5  # its rotation
 LATITUDES, NORTHS = np.radians([-60, -30, 0, 30, 60]), np.radians(np.arange(0, 360, 45))
-CALMER = (1.0, 1e-2, 1e-4)  # times the jerk that stands in for the earth's rotation while it is not known
+LESS_JERK = (1.0, 1e-2, 1e-4)  # times the jerk that stands in for the earth's rotation while it is not known
 STEPS, ROUNDS, TURNS = 12, 3, 16  # of the search for noise and jerk; of both searches; of that for the rotation
 HOPELESS = 200.0  # in log-likelihood: a still earth that is so far behind is no start (a satellite's is ahead, by 65)
 NARROWER = 0.5  # times the angle of a turn, after one that leads nowhere
@@ -67,7 +67,7 @@ def fit(track: Track, model: Model, rival: float = -math.inf) -> tuple[Model, fl
     turning = [
         still._replace(jerk=times * still.jerk, motion=still.motion._replace(rotation=_rotation(np.array(direction))))
         for direction in itertools.product(LATITUDES, NORTHS)
-        for times in CALMER
+        for times in LESS_JERK
     ]
     best = max(turning, key=track.likelihood)
     for _ in range(ROUNDS):
@@ -93,9 +93,9 @@ def _settled(track: Track, model: Model) -> Model:
     """The likeliest noise and level of the jerk, linearised about its own track."""
     first = model.noise_variance[0] if model.noise_variance.ndim > 1 else model.noise_variance
     of_stations, log_noise, level = model.noise_variance / first, np.log(first), math.log(model.jerk[0, 0])
-    less, calmer = FARTHEST
-    lower = np.r_[np.where(track.known, log_noise, log_noise - less), level - calmer, -RATIO_BOUND]
-    upper = np.r_[np.where(track.known, log_noise, log_noise + less), level + calmer, RATIO_BOUND]
+    less, lower_jerk = FARTHEST
+    lower = np.r_[np.where(track.known, log_noise, log_noise - less), level - lower_jerk, -RATIO_BOUND]
+    upper = np.r_[np.where(track.known, log_noise, log_noise + less), level + lower_jerk, RATIO_BOUND]
 
     def of(theta: FloatArray) -> Model:
         noise = np.exp(theta[:3]) * of_stations

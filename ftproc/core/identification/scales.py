@@ -1,6 +1,6 @@
 """What a log says of its own scales: its interval, its noise in metres, and the memory of a filter over it.
 
-A track that wanders with jerk density q, seen with noise sigma every T seconds, is averaged by its filter over about
+A track with jerk density q, seen with noise sigma every T seconds, is averaged by its filter over about
 (sigma^2 T / q)^(1/6) seconds. That time, the filter's memory, is the yardstick of everything that depends on how fast
 the target moves; so a flight and its copy in other units of length and time give the same result in these units.
 """

@@ -134,7 +134,7 @@ def drift(
     """(n, 3) how many times the variance of a component that of each reading is, where it drifts; None if in none.
 
     residual, variance: (n, 3) leave-one-out, of the smoother. by_neighbours: it grows only where the differences of
-    neighbours do; where a track goes astray beside a jump, the residuals grow together."""
+    neighbours do; where a track diverges beside a jump, the residuals grow together."""
     found = np.ones_like(log.weight)
     for c in range(3):
         seen = np.flatnonzero((log.weight[:, c] > 0) & np.isfinite(variance[:, c]))

@@ -60,7 +60,7 @@ class Scored(Adjoint, Protocol):
 
 
 @part
-def linearise(f: Forced, x: FloatArray, by: Motion, h: float, vague: float) -> None:
+def linearise(f: Forced, x: FloatArray, by: Motion, h: float, variance: float) -> None:
     """Fill kick and push of a kick of h seconds at a state x (9,), whose acceleration has this variance."""
     w0, w1, w2 = 2 * by.rotation[0, 0], 2 * by.rotation[0, 1], 2 * by.rotation[0, 2]
     v0, v1, v2, a0, a1, a2 = x[3], x[4], x[5], x[6], x[7], x[8]
@@ -75,7 +75,7 @@ def linearise(f: Forced, x: FloatArray, by: Motion, h: float, vague: float) -> N
     i2 = 1 / (v0 * v0 + v1 * v1 + v2 * v2 + AT_REST_MPS * AT_REST_MPS)
     dd = max(d0 * d0 + d1 * d1 + d2 * d2, LEAST_FORCE)
     vd, ad, va = v0 * d0 + v1 * d1 + v2 * d2, a0 * d0 + a1 * d1 + a2 * d2, v0 * a0 + v1 * a1 + v2 * a2
-    known = dd / (dd + vague)
+    known = dd / (dd + variance)
     turns, pressed = known * by.turns * i2, known * by.pressed
     swell = pressed * (2 * va * i2 - rv * ir / SCALE_HEIGHT_M)
     v, a, d, r = (v0, v1, v2), (a0, a1, a2), (d0, d1, d2), (r0, r1, r2)
@@ -122,8 +122,8 @@ def _rotate(f: Forced, x: FloatArray, w0: float, w1: float, w2: float, turns: fl
 
 @part
 def orient(f: Forced, x: FloatArray, y: FloatArray) -> None:
-    """The axes of the jerk between two states (9,): t, shorter than one where the target hardly moves, and u, shorter
-    where the path is steep."""
+    """The axes of the jerk between two states (9,): t, shorter than one where the target is nearly at rest, and u,
+    shorter where the path is steep."""
     v0, v1, v2 = 0.5 * (x[3] + y[3]), 0.5 * (x[4] + y[4]), 0.5 * (x[5] + y[5])
     i2 = 1 / (v0 * v0 + v1 * v1 + v2 * v2 + AT_REST_MPS * AT_REST_MPS)
     i, k = math.sqrt(i2), v2 * i2

@@ -160,44 +160,44 @@ def predict(f: Moving, interval: float) -> None:
             p[6 + i, 6 + j] = p[6 + j, 6 + i] = aa
 
 
-class Wandering(Protocol):
-    """x and P of a record whose state ends with three offsets that wander, their variances and correlation times."""
+class GaussMarkov(Protocol):
+    """x and P of a record whose state ends with three Gauss-Markov offsets, their variances and correlation times."""
 
     x: FloatArray
     p: FloatArray
-    wander: FloatArray
-    fade_s: FloatArray
+    markov: FloatArray
+    tau_s: FloatArray
 
 
 @part
-def wander(f: Wandering, interval: float) -> None:
+def decorrelate(f: GaussMarkov, interval: float) -> None:
     """The offsets b of the measurements after an interval, in place, and their covariances with the motion:
     b <- exp(-|T| / tau) b + w, where the variance of w keeps that of b (Gauss-Markov)."""
     n = len(f.x)
     for i in range(9, n):
-        fade = math.exp(-abs(interval) / f.fade_s[i - 9])
-        f.x[i] *= fade
+        kept = math.exp(-abs(interval) / f.tau_s[i - 9])
+        f.x[i] *= kept
         for j in range(n):
             if j != i:
-                f.p[i, j] *= fade
+                f.p[i, j] *= kept
                 f.p[j, i] = f.p[i, j]
-        f.p[i, i] = fade * fade * f.p[i, i] + (1 - fade * fade) * f.wander[i - 9]
+        f.p[i, i] = kept * kept * f.p[i, i] + (1 - kept * kept) * f.markov[i - 9]
 
 
 @part
-def wander_back(b: Adjoint, interval: float, fade_s: FloatArray) -> None:
-    """The backward counterpart of `wander` for r and N."""
+def decorrelate_back(b: Adjoint, interval: float, tau_s: FloatArray) -> None:
+    """The backward counterpart of `decorrelate` for r and N."""
     n = len(b.r)
     for i in range(9, n):
-        if fade_s[i - 9] >= FOREVER_S:
+        if tau_s[i - 9] >= FOREVER_S:
             continue
-        fade = math.exp(-abs(interval) / fade_s[i - 9])
-        b.r[i] *= fade
+        kept = math.exp(-abs(interval) / tau_s[i - 9])
+        b.r[i] *= kept
         for j in range(n):
             if j != i:
-                b.n[i, j] *= fade
+                b.n[i, j] *= kept
                 b.n[j, i] = b.n[i, j]
-        b.n[i, i] *= fade * fade
+        b.n[i, i] *= kept * kept
 
 
 @part

@@ -27,7 +27,7 @@ class Targets(NamedTuple):
 
 def targets(source: tables.Source, extract: Extract) -> Targets:
     """Those in the rows that are wanted, by the column that is named as `target`, or, where none is, by the one that
-    the standard of the file has for it; none if there is one, or if stations measure in turns, as those that follow one
+    the standard of the file has for it; none if there is one, or if stations take turns, as those that follow one
     target do. Raises InputError."""
     header = tables.read_header(source, extract.widths)
     column, found = extract.target, list[str]()

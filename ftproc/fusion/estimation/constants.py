@@ -189,15 +189,15 @@ def not_observable(constants: Constants, names: list[str]) -> list[str]:
     found = ["common clock"] if common else []
     sigma, prior = constants.sigma, constants.prior
     for parameter, word in enumerate(WORDS):
-        vague = [
+        unknown = [
             n
             for n, s, p in zip(names, sigma[:, parameter], prior[:, parameter], strict=True)
             if p > 0 and s >= OBSERVED * p
         ]
-        if not vague or (parameter == CLOCK and common):
+        if not unknown or (parameter == CLOCK and common):
             continue
-        if len(vague) > 1 and len(vague) == int((prior[:, parameter] > 0).sum()):
+        if len(unknown) > 1 and len(unknown) == int((prior[:, parameter] > 0).sum()):
             found.append(f"common {word}")
         else:
-            found.append(f"{word} of {', '.join(vague)}")
+            found.append(f"{word} of {', '.join(unknown)}")
     return found

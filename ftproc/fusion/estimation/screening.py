@@ -62,9 +62,9 @@ def agreeing(station: Seen, screened: Screened, track: Track) -> FloatArray:
         if known.sum() < FEWEST:
             continue
         middle = np.median(off[known, c])
-        vague = np.median(track.sigma) / (1.0 if c == 0 else max(float(np.median(expected[known, 0])), 1.0))
+        track_sigma = np.median(track.sigma) / (1.0 if c == 0 else max(float(np.median(expected[known, 0])), 1.0))
         unknown = station.prior[c] + station.prior[CLOCK] * float(np.median(rate[known, c])) + screened.sigma[c]
-        if abs(middle) > GROSS * unknown + GROSS_TRACK * vague:
+        if abs(middle) > GROSS * unknown + GROSS_TRACK * track_sigma:
             weight[:, c] = 0.0  # a wrong place, convention or clock: no bias explains it
             continue
         scatter = 1.4826 * np.median(np.abs(off[known, c] - middle))

@@ -62,7 +62,7 @@ def test_a_component_keeps_what_screening_trusts_if_almost_nothing_is_left():
 @pytest.mark.parametrize("settled", [True, False])
 def test_decisions_under_correlated_noise_are_taken_only_if_they_stand_still(monkeypatch, settled):
     before = decisions.Decision(np.ones((4, 3)), Model(np.ones(3), np.ones((1, 6))), [], np.ones((3, 3)))
-    slower, faster = (before.model._replace(fade_s=np.full(3, fade_s)) for fade_s in (2.0, 1.0))
+    slower, faster = (before.model._replace(tau_s=np.full(3, tau_s)) for tau_s in (2.0, 1.0))
     found = Coloured(before.model, faster, slower, True, True, True)
     after = before._replace(weight=np.zeros((4, 3)), model=faster, slowest=slower, settled=settled)
     monkeypatch.setattr(decisions, "smooth_log", lambda *args, **options: None)

@@ -138,7 +138,7 @@ def test_single_sample_and_reading_variance():
     found = run(a)
     assert found.state.shape == (1, 9)
     assert np.isfinite(found.state).all()
-    coloured = Model(SIGMA**2, a.model.jerk, wander_variance=SIGMA**2 * [0.5, 0.0, 2.0], fade_s=np.full(3, 2.0))
+    coloured = Model(SIGMA**2, a.model.jerk, markov_variance=SIGMA**2 * [0.5, 0.0, 2.0], tau_s=np.full(3, 2.0))
     np.testing.assert_allclose(coloured.reading_variance, SIGMA**2 * [1.5, 1, 3])
     np.testing.assert_allclose(coloured.correlation(2.0), np.array([1 / 3, 0, 2 / 3]) / np.e)
     np.testing.assert_array_equal(a.model.reading_variance, SIGMA**2)

@@ -21,11 +21,11 @@ VAGUE = np.diag(np.repeat([50.0, 1e3, 1e3], 3) ** 2)
 VAGUER = np.diag(np.repeat([50.0, 1e4, 1e6], 3) ** 2)
 
 
-def record(times, q=1.0, wander=0.0, fade_s=3.0, covariance=VAGUE):
+def record(times, q=1.0, markov=0.0, tau_s=3.0, covariance=VAGUE):
     """A straight flight far away, on which h is as good as linear."""
     truth = np.array([[6e7 + 100 * t, -7e7, 3e7, 100.0, 0.0, 0.0, 0.0, 0.0, 0.0] for t in times])
     z = np.array([naive.measure(x) for x in truth])
-    model = Model(SIGMA**2, isotropic(q), wander_variance=wander * SIGMA**2, fade_s=np.full(3, fade_s))
+    model = Model(SIGMA**2, isotropic(q), markov_variance=markov * SIGMA**2, tau_s=np.full(3, tau_s))
     log = Observations(np.asarray(times, float), z, np.ones_like(z))
     return log, model, [Start(0, truth[0], covariance)], truth
 
@@ -43,15 +43,15 @@ def batch(log, model, starts, truth):
 
     first = np.zeros((size, size))
     first[:9, :9] = starts[0].covariance
-    first[9:, 9:] = np.diag(model.wander_variance[: size - 9])
+    first[9:, 9:] = np.diag(model.markov_variance[: size - 9])
     add(np.linalg.cholesky(first), (0, np.eye(size)))
     for k in range(n):
         if k:
             t = log.time_s[k] - log.time_s[k - 1]
             phi, q = np.zeros((size, size)), np.zeros((size, size))
             phi[:9, :9], q[:9, :9] = naive.transition(t), naive.van_loan(t, model.jerk[0])
-            fade = np.exp(-t / model.fade_s[: size - 9])
-            phi[9:, 9:], q[9:, 9:] = np.diag(fade), np.diag((1 - fade**2) * model.wander_variance[: size - 9])
+            kept = np.exp(-t / model.tau_s[: size - 9])
+            phi[9:, 9:], q[9:, 9:] = np.diag(kept), np.diag((1 - kept**2) * model.markov_variance[: size - 9])
             add(np.linalg.cholesky(q), (k - 1, -phi), (k, np.eye(size)))
         seen = np.flatnonzero(log.weight[k] > 0)
         h = np.hstack([naive.jacobian(truth[k]), np.eye(3)])[seen][:, :size]
@@ -62,10 +62,10 @@ def batch(log, model, starts, truth):
     return (np.linalg.norm(inverse, axis=1) / scale).reshape(n, size)[:, :9]
 
 
-@pytest.mark.parametrize("wander", [0.0, 2.0])
+@pytest.mark.parametrize("markov", [0.0, 2.0])
 @pytest.mark.parametrize(("dt", "covariance"), [(0.5, VAGUE), (0.02, VAGUE), (0.02, VAGUER)])
-def test_first_sigmas_are_those_of_the_whole_record(dt, covariance, wander):
-    case = record(dt * np.arange(30), wander=wander, covariance=covariance)
+def test_first_sigmas_are_those_of_the_whole_record(dt, covariance, markov):
+    case = record(dt * np.arange(30), markov=markov, covariance=covariance)
     found = smoother.smooth_log(*case[:3])
     np.testing.assert_allclose(found.sigma, batch(*case), rtol=2e-3)
     np.testing.assert_allclose(np.sqrt(np.diag(found.heads[0].covariance)), found.sigma[0], rtol=1e-9)
@@ -80,10 +80,10 @@ def test_the_plain_difference_would_not_hold():
 
 
 @pytest.mark.parametrize("gap_s", [3.0, 30.0])
-@pytest.mark.parametrize("wander", [0.0, 2.0])
-def test_sigmas_around_a_gap(gap_s, wander):
+@pytest.mark.parametrize("markov", [0.0, 2.0])
+def test_sigmas_around_a_gap(gap_s, markov):
     times = np.r_[0.1 * np.arange(15), gap_s + 0.1 * np.arange(15)]
-    case = record(times, q=1e-3, wander=wander, covariance=np.diag(np.repeat([5.0, 3.0, 2.0], 3) ** 2))
+    case = record(times, q=1e-3, markov=markov, covariance=np.diag(np.repeat([5.0, 3.0, 2.0], 3) ** 2))
     np.testing.assert_allclose(smoother.smooth_log(*case[:3]).sigma, batch(*case), rtol=5e-3)
 
 

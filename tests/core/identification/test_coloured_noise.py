@@ -19,18 +19,18 @@ from tests.simulated import simulate
 
 UNKNOWN = np.full(3, np.nan)
 SHARES = np.array([0.7, 2.0, 0.4])  # variance of the offsets, in that of the white noise
-FADES = np.array([0.8, 2.5, 0.3])  # s
+TAUS = np.array([0.8, 2.5, 0.3])  # s
 
 
-def coloured(a, wander=SHARES, fade=FADES):
+def coloured(a, markov=SHARES, tau=TAUS):
     """The model of a track with offsets."""
-    return a.model._replace(wander_variance=wander * a.model.noise_variance, fade_s=fade)
+    return a.model._replace(markov_variance=markov * a.model.noise_variance, tau_s=tau)
 
 
 def test_offsets_that_fade_at_once_are_white_noise():
     """Between two samples nothing of them is left: the filter is that of the sum of the two noises."""
     a = matched(1, 200, missing=0.3, irregular=True)
-    model = coloured(a, fade=np.full(3, 1e-4))
+    model = coloured(a, tau=np.full(3, 1e-4))
     white = a.model._replace(noise_variance=a.model.noise_variance * (1 + SHARES))
     one, other = smooth_log(a.log, model, a.starts), smooth_log(a.log, white, a.starts)
     assert one.log_likelihood == pytest.approx(other.log_likelihood, rel=1e-12)
@@ -66,7 +66,7 @@ def test_scores_are_the_slopes_of_the_likelihood(monkeypatch, block):
     model = coloured(a)
     scores = score_log(a.log, model, a.starts)
     step = 1e-4
-    by_name = {"noise_variance": scores.noise.score, "wander_variance": scores.wander.score, "fade_s": scores.fade}
+    by_name = {"noise_variance": scores.noise.score, "markov_variance": scores.markov.score, "tau_s": scores.tau}
     for name, score in by_name.items():
         for c in range(3):
             value = []

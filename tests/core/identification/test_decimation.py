@@ -102,7 +102,7 @@ def test_no_more_is_merged_than_memory_and_knots_bear(knot_s):
     assert count == int(np.clip(bound + decimation.ROUNDING, 1, decimation.MOST))
     short = scales._replace(span_s=2.5 * decimation.FEWEST * scales.interval_s)
     assert decimation.how_many(short, model, knot_s) == min(count, 2)
-    assert decimation.how_many(scales, model._replace(wander_variance=np.ones(3)), knot_s) == 1
+    assert decimation.how_many(scales, model._replace(markov_variance=np.ones(3)), knot_s) == 1
 
 
 def test_components_that_are_seen_seldom_are_not_merged_and_no_mean_stands_at_a_wrong_time():

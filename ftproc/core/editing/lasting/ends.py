@@ -1,4 +1,4 @@
-"""A jump by itself: what it is on the log around it alone, before it is taken for an end of something long.
+"""A jump alone: what it is on the log around it, before it is taken for an end of something long.
 
 Two short patches that were missed look, from afar, like one long curve from an edge of one to an edge of the other,
 which explains both jumps at the price of one fault, and leaves out all that is good between them. Around each of the
@@ -26,7 +26,7 @@ TERMS = (1, 2, 3)  # of what a part of the log sees of a long curve
 
 
 class End(NamedTuple):
-    """What a jump is by itself. short: the likeliest short patch that begins or ends there, None if no fault is
+    """What a jump alone is. short: the likeliest short patch that begins or ends there, None if no fault is
     likelier. odds: in log-probability, of it, or of a patch that is rejected there, to an end of a long fault."""
 
     short: Found | None
@@ -34,12 +34,12 @@ class End(NamedTuple):
 
 
 def around(seen: Scanned, sample: int) -> slice:
-    """The part of the log on which a jump is weighed by itself."""
+    """The part of the log on which a jump is weighed alone."""
     return seen.near(max(sample - seen.around, 0), min(sample + seen.around, seen.samples))
 
 
 def by_itself(seen: Scanned, channels: Channels, sample: int, one_end: float) -> End:
-    """What a jump of some channels, or of one of them, is by itself. one_end: log-odds of a long fault that has it as
+    """What a jump of some channels, or of one of them, is alone. one_end: log-odds of a long fault that has it as
     an end."""
     with contextlib.suppress(ValueError, np.linalg.LinAlgError):  # the part does not tell
         return _by_itself(seen, channels, sample, one_end)
@@ -66,9 +66,9 @@ def _by_itself(seen: Scanned, channels: Channels, sample: int, one_end: float) -
 
 
 def instead_of(seen: Scanned, found: Found) -> list[Found] | None:
-    """The short patches that explain the ends of a long fault better, each by itself; None if none do, or if it is not
-    long. A patch may as well lie beyond an end as within it, and where it begins may be vague: that bounds what an end
-    tells of what lies within it."""
+    """The short patches that explain the ends of a long fault better, each alone; None if none do, or if it is not
+    long. A patch may as well lie beyond an end as within it, and where it begins may be uncertain: that bounds what an
+    end tells of what lies within it."""
     n, curves = seen.samples, found.curves
     edges = [edge for edge in (curves[0].begin, curves[0].end) if 0 < edge < n]
     parts = [around(seen, edge) for edge in edges]

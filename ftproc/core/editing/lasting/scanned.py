@@ -28,7 +28,7 @@ SHORTEST_CELL = 2  # samples in a cell of a scan
 REMEMBERED, SHORT = 2.5, 0.12  # samples that a filter remembers: with fewer, a long curve may as well be the target's
 # motion, and this share of the log is the longest
 PRIOR, DOUBT, MARGIN = -6.0, -6.0, 8.0  # log-odds of such a fault at a jump; with which it is reported, and taken out
-STAYS = -4.0  # log-odds of a step that stays or a clock that jumps, to a patch: where one begins slowly is vague
+STAYS = -4.0  # log-odds of a step that stays or a clock that jumps, to a patch: where one begins slowly is uncertain
 MOST_EACH = 20.0  # of log-probability, of each reading: where more is gained, the part without the fault was lost
 FOLLOWED = 25.0  # the same of a patch that motion explains but for its ends: turns gain 18 without one
 

@@ -83,8 +83,8 @@ def without_lasting(
 
 
 def _hidden_by_drift(found: Understood, work: Work) -> Scene:
-    """The scene of a log whose noise grows only where neighbours differ more: where a channel jumps and the track goes
-    astray beside it, noise seems to grow for a while, and hides the jump."""
+    """The scene of a log whose noise grows only where neighbours differ more: where a channel jumps and the track
+    diverges beside it, noise seems to grow for a while, and hides the jump."""
     return scene_of(found.record._replace(uneven=found.record.surely), found.decision, work)
 
 
