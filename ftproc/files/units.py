@@ -11,6 +11,8 @@ from typing import NamedTuple
 from ftproc.files.words import FURTHER_ALIASES, QUANTITIES
 from ftproc.records import FloatArray
 
+LIGHT_MPS = 299_792_458.0
+
 
 class Unit(NamedTuple):
     """SI value = value * multiply / divide. Two factors, so that milliseconds divide by an exact 1000."""
@@ -32,7 +34,14 @@ _TIMES = (
 )
 _LENGTHS = (
     *(Unit("m"), Unit("km", 1e3), Unit("ft", 0.3048), Unit("nmi", 1852.0), Unit("nm", 1852.0), Unit("mi", 1609.344)),
-    *(Unit("yd", 0.9144), Unit("kyd", 914.4), Unit("kft", 304.8), Unit("cm", divide=1e2), Unit("mm", divide=1e3)),
+    *(
+        Unit("yd", 0.9144),
+        Unit("kyd", 914.4),
+        Unit("kft", 304.8),
+        Unit("cm", divide=1e2),
+        Unit("mm", divide=1e3),
+        Unit("dmi", 1828.8),
+    ),
 )
 _HEIGHTS = (*_LENGTHS, Unit("fl", 30.48))  # of 100 ft
 _SPEEDS = (
@@ -92,6 +101,7 @@ SPELLINGS: Mapping[str, tuple[str, ...]] = {
     "nmi": ("nauticalmile", "nauticalmiles", "nautmile", "nautmiles", "nautmi", "nautical"),
     "mi": ("mile", "miles", "smi", "sm", "statutemile", "statutemiles"),
     "yd": ("yds", "yard", "yards"),
+    "dmi": ("datamile", "datamiles"),  # of 6000 ft, of radars
     "kyd": ("kyds", "kyard", "kyards", "kiloyard", "kiloyards"),
     "cm": ("centimeter", "centimeters", "centimetre", "centimetres"),
     "mm": ("millimeter", "millimeters", "millimetre", "millimetres"),

@@ -22,10 +22,12 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
         time t timestamp datetime utc gps tod sod tow sow epoch irig irigb jd mjd seconds secs sec elapsed
         elapsedtime elapsedseconds timeofday secondsofday secofday secsofday timeofweek secondsofweek gpstime
         gpstow gpsseconds utctime timeutc timegps utctimestamp utcdatetime datetimeutc dateandtime unix
-        unixtime posix posixtime epochtime timesinceepoch secondssinceepoch juliandate julianday
-        modifiedjuliandate datenum stamp zulu utcsec irigtime sampletime timetag clock systime itow utcsod
-        utctod utcseconds timestamputc unixtimestamp excel exceldate exceltime missiontime ts met
-        missionelapsedtime gmt gmttime localtime timecode ticks filetime secondsaftermidnight
+        unixtime posix posixtime timesinceepoch secondssinceepoch juliandate julianday
+        modifiedjuliandate datenum stamp zulu utcsec irigtime sampletime timetag clock
+        timeepoch epochtime zeitpunkt systime itow utcsod utctod utcseconds timestamputc unixtimestamp excel
+        exceldate exceltime missiontime ts met
+        missionelapsedtime gmt gmttime localtime timecode smpte ltc vitc hms hhmmss hhmmssmmm ticks filetime
+        secondsaftermidnight
         secondspastmidnight secondssincemidnight secspastmidnight secpastmidnight secsaftermidnight
         timepastmidnight timeaftermidnight timesincemidnight utcofposition timez zulutime
         zeit uhrzeit temps heure tiempo
@@ -42,7 +44,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     ),
     "azimuth": _split(
         """
-        azimuth az a azimuthangle azangle azim azi azmth bearing brg azimut acimut azymut azimute gisement
+        azimuth az a azimuthangle azangle azim azi azmth azm bearing brg azimut acimut azymut azimute gisement
         baring peilung seitenwinkel азимут пеленг 方位角 方位 방위각
         """
     ),
@@ -129,6 +131,7 @@ QUALIFIERS = frozenset(
         """
     measured meas raw obs observed target tgt track trk radar sensor tracker polar value angle reading laser
     instrument theodolite anchor aoa rot rotor rotator antenna ant the true los look to from corrected station angular
+    actual act ist istwert gemessen mesure mesuree medido medida misurato
     """
     )
 )
@@ -141,6 +144,7 @@ NOT_UNITS = frozenset(
     mode sd var variance rms outlier velocity speed vel doppler acc cmd command commanded offset corr lag
     correction width beamwidth max min ground horizontal cov uncertainty idx index count no number code lock
     signal power servo encoder counts raw true truth
+    soll sollwert setpoint consigne
     filt filtered smooth smoothed pred predicted prediction sac sic cat category fl typ len trn tn
     """
     )
@@ -157,10 +161,28 @@ OTHER_THINGS = frozenset(
     id sensor sensorid station code mode squawk icao callsign target track trackid number no index idx count
     date day month year hour minute min second sec hours minutes
     snr rcs db power amplitude mag magnitude temp temperature pressure humidity voltage battery quality status flag
-    fl flightlevel pred predicted prediction cmd command commanded
+    fl flightlevel pred predicted prediction cmd command commanded soll sollwert setpoint consigne
+    variation declination magvar hd horizontal ground vertical vd
     """
     )
 )
+
+
+#: Words of a column that holds the readings of another after a correction, or the correction itself.
+CORRECTED = frozenset(_split("corr corrected calibrated cal compensated comp refined adjusted"))
+
+#: Cells that mean "no reading", beside the empty cell.
+MISSING_WORDS = (
+    *("", "NaN", "nan", "NAN", "-NaN", "-nan", "NA", "N/A", "n/a", "#NA", "#N/A", "#N/A N/A", "<NA>"),
+    *("NULL", "Null", "null", "None", "none", "1.#IND", "-1.#IND", "1.#QNAN", "-1.#QNAN"),
+)
+
+#: What an azimuth may count from beside an axis or true north: words of its name, its mark behind the unit, and words
+#: of the column that is to be added to it.
+TURNED = {
+    "the head of the carrier": (frozenset(_split("relative rel body bow")), "R", frozenset(_split("heading hdg yaw"))),
+    "magnetic north": (frozenset(_split("magnetic mag")), "M", frozenset(_split("variation declination magvar"))),
+}
 
 
 def plain_letters(text: str) -> str:

@@ -19,10 +19,9 @@ from ftproc.files.options import parse_columns, parse_units, parse_widths
 from ftproc.files.reading import converting, understanding
 from ftproc.files.reading.clocks.growing import Stamps
 from ftproc.files.reading.formats import layout
-from ftproc.files.reading.formats.csvtext import MISSING_WORDS
 from ftproc.files.reading.meaning import schema
 from ftproc.files.units import UNITS
-from ftproc.files.words import DEPRESSIONS, QUANTITIES
+from ftproc.files.words import DEPRESSIONS, MISSING_WORDS, QUANTITIES
 from ftproc.live import beside
 from ftproc.live.beside import RATE
 from ftproc.live.growing import Block, Say, no_row, no_table

@@ -21,7 +21,7 @@ from ftproc.files.reading.meaning.numbers import Origin, numbers
 from ftproc.files.reading.meaning.questions import answer, listed
 from ftproc.files.reading.meaning.readings import sentinel
 from ftproc.files.units import SPELLINGS, UNITS, Unit, unit_named
-from ftproc.files.words import FURTHER_ALIASES
+from ftproc.files.words import FURTHER_ALIASES, WEAK_ALIASES
 from ftproc.records import FloatArray, Heights
 
 HEIGHT, RANGE_RATE, SIGNAL = "height", "range_rate", "signal"
@@ -141,9 +141,16 @@ def _described(header: TableHeader, quantity: str, index: int, name: Name, state
         raise InputError(
             f'{header.source}: column "{text}" is the height of the target in a unit that its name does not state. Say '
             f"--units {HEIGHT}=ft (or {', '.join(UNITS[HEIGHT])}), or --columns {HEIGHT}={ABSENT} if it is something "
-            "else."
+            f"else{_as_angle(text, name)}."
         )
     return Further(quantity, index, text, unit, _other_kind(quantity, text, name, unit))
+
+
+def _as_angle(text: str, name: Name) -> str:
+    """What is said of an altitude that may be an elevation, as astronomers call it."""
+    if name.stem not in WEAK_ALIASES["elevation"]:
+        return ""
+    return f", or {answer([text], {'elevation': 0})} --units elevation=deg if it is an angle above the horizon"
 
 
 def _unit(quantity: str, name: Name, stated: str | None) -> Unit | None:
@@ -168,7 +175,8 @@ def _apart(quantity: str, text: str, unit: str) -> Name:
     if not ending or (before and before[-1].isalnum()):
         return taken_apart(text, unit)
     found = taken_apart(before.rstrip(" _.,:([{</-"))
-    if ending == "fl" and found.stem not in FURTHER_ALIASES[HEIGHT]:
+    level = unit_named(HEIGHT, ending) == UNITS[HEIGHT]["fl"]
+    if level and found.stem not in FURTHER_ALIASES[HEIGHT]:
         found = found._replace(stem="fl")
     return found._replace(foreign=False, unit=ending)
 
@@ -179,6 +187,7 @@ _SPELT = {quantity: [word for unit in UNITS[quantity] for word in SPELLINGS.get(
 def _means(quantity: str, name: Name) -> bool:
     unit = unit_named(quantity, name.unit) if name.unit else None
     known = {name.stem, name.core()} & {*FURTHER_ALIASES[quantity]} != set()
+    known |= quantity == HEIGHT and unit is not None and name.stem in ("elevation", "elev")
     return known and not name.foreign and (not name.unit or unit is not None)
 
 

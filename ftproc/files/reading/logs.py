@@ -17,7 +17,7 @@ from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.formats.standards import choosing
-from ftproc.files.reading.meaning import rows, schema, several
+from ftproc.files.reading.meaning import questions, rows, schema, several, statements
 from ftproc.files.reading.meaning.values import deciding, plausibility, stamps
 from ftproc.records import FloatArray, IntArray, MeasurementLog
 from ftproc.settings import Station
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 Found = Mapping[str, schema.Column]
+_FEWEST = 10  # rows of one time that say nothing of when each was taken
 
 
 class _Plan(NamedTuple):
@@ -84,6 +85,8 @@ def read(
     unit_of, column_of = parse_units(units), parse_columns(columns)
     header = tables.read_header(source, extract.widths)
     choosing.refuse_open(header, {**unit_of, **column_of})
+    header = statements.with_units_beside(header)
+    statements.refuse_unheard(header, station, unit_of)
     column_of = {**header.stated.columns, **column_of}
     if header.stated.azimuth_from and station.azimuth_from is None:
         station = replace(station, azimuth_from=header.stated.azimuth_from)
@@ -176,6 +179,7 @@ def _at_once(plan: _Plan) -> MeasurementLog:
         return _at_once(plan._replace(found={**found, **packed}, notes=judged.doubts))
     quantities = converting.in_other_units(converted.quantities, converted.found, judged.found)
     quantities["time"], spread = stamps.spread(quantities)
+    _refuse_one_time(header, found["time"], quantities["time"])
     extra = table.select(list(range(len(chosen), table.num_columns))) if plan.others else None
     log = _in_time_order(header.source, quantities, extra if kept is None or extra is None else extra.take(kept))
     if kept is not None:
@@ -233,7 +237,7 @@ def _explained(
     words = (*notes, *doubtful)
     axis = understanding.knows_axis(plan.station, plan.found)
     understood = understanding.describe(plan.header, plan.found, clock, station, words, axis, plan.beside)
-    understood["assumed"] = list(judged.conditions)
+    understood["assumed"] = [*judged.conditions, *understanding.assumed_of(plan.found)]
     digest = plan.header.sha256()
     return replace(log, remarks=(*remarks, *words), understood=understood, station=station, sha256=digest)
 
@@ -246,6 +250,18 @@ def _check_others(header: TableHeader, others: Iterable[int]) -> None:
                 f'{header.source}: column "{name}" is there twice, so both cannot be kept; rename one, '
                 "or leave --keep-columns out."
             )
+
+
+def _refuse_one_time(header: TableHeader, column: schema.Column, time: FloatArray) -> None:
+    """Ask for the time where that of all rows is the same: a date alone, or a number that was cut."""
+    known = time[np.isfinite(time)]
+    if known.size >= _FEWEST and (known == known[0]).all():
+        others = [name for index, name in enumerate(header.names) if index not in column.positions]
+        raise InputError(
+            f'{header.source}: all {known.size} rows have the same time in "{column.name}", so it does not say when '
+            f"each was taken. If another column does, say --columns time=NAME, or time='{column.name}+NAME' for a date "
+            f"and a time of day; the others are: {questions.listed(others)}."
+        )
 
 
 def _in_time_order(source: str, quantities: Mapping[str, FloatArray], extra: pa.Table | None) -> MeasurementLog:

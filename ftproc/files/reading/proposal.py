@@ -42,7 +42,7 @@ _NOISE_RAD, _MOST_NOISE_RAD = 1e-6, 0.02  # of the angles of an instrument
 _SPEED_MPS = (0.3, 75_000.0)
 _UPRIGHT_RAD = 1.65  # beyond any elevation
 _FAR = 400.0  # a number that is no angle
-_UNITS = {"range": (("m", 1.0), ("km", 0.5), ("nmi", 0.2)), "angle": (("deg", 1.0), ("rad", 1.0))}
+_UNITS = {"range": (("m", 1.0), ("km", 0.5), ("nmi", 0.2)), "angle": (("deg", 1.0), ("rad", 1.0), ("gon", 0.3))}
 
 
 class _Try(NamedTuple):
@@ -119,10 +119,11 @@ def _times(
     """Columns that may be the time: of text alone or two together, or of numbers that go forward and do not count."""
     texts = [index for index in cells if index not in numbers][:4]
     stamps = [(index,) for index in texts]
-    yield from (each for each in [*itertools.permutations(texts, 2), *stamps] if _goes(_clock(header, each)))
+    written = [each for each in [*itertools.permutations(texts, 2), *stamps] if _goes(_clock(header, each))]
+    yield from written
     forward = [index for index, values in numbers.items() if _goes(values) and not _is_other(header.names[index])]
     steady = [index for index in forward if (numbers[index][1:] == numbers[index][:-1] + 1).all()]
-    spare = len(forward) > 1
+    spare = len(forward) > 1 or bool(written)
     counters = [index for index in steady if spare or header.names[index].lower().strip("#. ") in _COUNTERS]
     yield from ((index,) for index in forward if index not in counters)
 
@@ -153,6 +154,7 @@ def _best(
         varied = [
             index for index, values in numbers.items()
             if index not in time and np.ptp(values[np.isfinite(values)]) > 0 and not _is_other(header.names[index])
+            and not (values[1:] == values[:-1] + 1).all()
         ][:_MOST_TRIED]  # fmt: skip
         kinds = [QUANTITIES[1:]] if len(varied) > 2 else [QUANTITIES[1:3], QUANTITIES[2:]]
         tries = [

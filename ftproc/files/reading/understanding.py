@@ -15,7 +15,7 @@ from ftproc.files.reading.meaning import names
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.questions import answer, listed
 from ftproc.files.reading.meaning.schema import Column
-from ftproc.files.words import NOT_UNITS
+from ftproc.files.words import NOT_UNITS, TURNED
 from ftproc.records import COMPONENTS
 from ftproc.settings import Station
 
@@ -51,7 +51,7 @@ def describe(
             *_absent(found, [] if header.is_of_a_standard or HEIGHT in [each.quantity for each in beside] else unused),
             *doubts,
             *clock.doubts,
-            *([] if header.is_of_a_standard or axis_is_known else [_AXIS]),
+            *([] if header.is_of_a_standard or axis_is_known else [_axis(found)]),
         ],
     }
 
@@ -113,7 +113,7 @@ def lines(understood: Understood) -> list[tuple[str, str]]:
 def as_named(station: Station, found: Mapping[str, Column]) -> Station:
     """The station with what the names of the angles' columns say."""
     zenith = "elevation" in found and found["elevation"].zenith
-    north = "azimuth" in found and names.says_north(found["azimuth"].name)
+    north = "azimuth" in found and _is_from_north(found["azimuth"])
     return replace(
         station,
         elevation_from=station.elevation_from or ("zenith" if zenith else "horizon"),
@@ -126,4 +126,21 @@ def knows_axis(station: Station, found: Mapping[str, Column]) -> bool:
     names, whose azimuths count from x."""
     azimuth = found.get("azimuth")
     stated = station.azimuth_from or station.azimuth_sense
-    return bool(azimuth is None or stated or azimuth.name == CANONICAL["azimuth"] or names.says_north(azimuth.name))
+    return bool(azimuth is None or stated or azimuth.name == CANONICAL["azimuth"] or _is_from_north(azimuth))
+
+
+def assumed_of(found: Mapping[str, Column]) -> list[str]:
+    """What must hold for an azimuth whose name says that it counts from a direction which may change."""
+    azimuth = found.get("azimuth")
+    turns = azimuth is not None and "added" not in azimuth.roles and names.counts_from(taken_apart(azimuth.name))
+    return [f"{turns}, from which the azimuth counts, stays where it is"] if turns == next(iter(TURNED)) else []
+
+
+def _axis(found: Mapping[str, Column]) -> str:
+    """The doubt about where azimuths count from."""
+    what = names.counts_from(taken_apart(found["azimuth"].name)) if "azimuth" in found else ""
+    return f"the azimuth counts from {what}" if what else _AXIS
+
+
+def _is_from_north(azimuth: Column) -> bool:
+    return "added" in azimuth.roles or names.says_north(azimuth.name)

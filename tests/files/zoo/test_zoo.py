@@ -16,12 +16,13 @@ from ftproc.records import MeasurementLog
 from ftproc.settings import Station
 from tests.files.zoo.animals import all_animals
 from tests.files.zoo.flight import Animal, flight
+from tests.files.zoo.neighbours import all_neighbours
 from tests.files.zoo.others import all_others
 from tests.files.zoo.radars import all_radars
 from tests.files.zoo.standards import all_standards
 from tests.files.zoo.strangers import all_strangers
 
-ANIMALS = [*all_animals(), *all_others(), *all_strangers(), *all_radars(), *all_standards()]
+ANIMALS = [*all_animals(), *all_others(), *all_strangers(), *all_radars(), *all_standards(), *all_neighbours()]
 MOST_QUESTIONS = 0.1  # share of the animals
 
 

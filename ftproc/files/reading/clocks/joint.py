@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ftproc.files import arrow, leap_seconds
-from ftproc.files.reading.clocks import notations, numeric, times
+from ftproc.files.reading.clocks import notations, numeric, timecode, times
 from ftproc.files.reading.clocks.clock import DAY_S, WEEK_S, Clock, unrolled
 from ftproc.files.reading.meaning.numbers import Origin, as_text, numbers, parsed, without_text
 from ftproc.files.reading.meaning.schema import Column
@@ -19,6 +19,9 @@ from ftproc.records import FloatArray, IntArray
 if TYPE_CHECKING:
     import pyarrow as pa
 
+#: Days counted from: the count of 1970-01-01, and where counts lie. A Julian day begins at noon.
+_JULIAN = 2440587.5
+_DAY_COUNTS = ((25569, 3e4, 4.9e4), (40587, 5.5e4, 7e4), (_JULIAN, 2.4e6, 2.5e6))
 _SEVERAL_DATES = ("the date can be read in several ways, so it is left open",)
 
 
@@ -27,13 +30,13 @@ def read(columns: Mapping[str, pa.ChunkedArray], origin: Origin, described: Colu
     units = dict(zip(described.roles, described.written, strict=True))
     fraction = columns.get("fraction")
     if fraction is None:
-        return _of_parts(columns, origin, units)
+        return _of_parts(columns, origin, units, described)
     rest = {role: column for role, column in columns.items() if role != "fraction"}
     if set(rest) == {"time"}:
         alone = described._replace(roles=("value",), unit=unit_named("time", units["time"]) or described.unit)
         whole = times.read(rest["time"], origin, alone._replace(unit_in_name=bool(units["time"])))
     else:
-        whole = _of_parts(rest, origin, units)
+        whole = _of_parts(rest, origin, units, described)
     return _with_fraction(whole, numbers(fraction, origin), UNITS["time"][described.fraction])
 
 
@@ -48,10 +51,20 @@ def _with_fraction(clock: Clock, fraction: FloatArray, unit: Unit) -> Clock:
     )
 
 
-def _of_parts(columns: Mapping[str, pa.ChunkedArray], origin: Origin, units: Mapping[str, str]) -> Clock:
+def _of_parts(
+    columns: Mapping[str, pa.ChunkedArray], origin: Origin, units: Mapping[str, str], described: Column
+) -> Clock:
     if "week" in columns:
         return _gps(columns, origin, unit_named("time", units["tow"]))
-    clock = _own_moments(columns["time"], origin, unit_named("time", units["time"])) if "time" in columns else None
+    if "date" in columns and (whole := _days_with_fractions(columns["date"], origin)) is not None:
+        return numeric.read(
+            whole, described._replace(roles=("value",), unit=UNITS["time"]["d"], key="day"), origin.source
+        )
+    clock = (
+        _own_moments(columns["time"], origin, described, unit_named("time", units["time"]))
+        if "time" in columns
+        else None
+    )
     if isinstance(clock, Clock):
         return clock
     second = clock if clock is not None else _parts_of_day(columns, origin)
@@ -86,7 +99,7 @@ def _gps(columns: Mapping[str, pa.ChunkedArray], origin: Origin, unit: Unit | No
     return Clock(whole, leap_seconds.gps_epoch(first), words, notes)
 
 
-def _own_moments(column: pa.ChunkedArray, origin: Origin, unit: Unit | None) -> FloatArray | Clock:
+def _own_moments(column: pa.ChunkedArray, origin: Origin, described: Column, unit: Unit | None) -> FloatArray | Clock:
     """(n,) seconds of the day of a time beside a date; or its clock, if it has dates of its own."""
     import pyarrow as pa
 
@@ -100,18 +113,27 @@ def _own_moments(column: pa.ChunkedArray, origin: Origin, unit: Unit | None) -> 
         text = as_text(column)
         values = parsed(text, origin.decimal_comma)
         if values is None:
-            return _of_day_or_stamped(text, origin)
+            return _of_day_or_stamped(text, origin, described)
     if unit is not None:
         return unit.to_si(values)
     known = values[np.isfinite(values)]
     if known.size and known.max() <= 1.0:  # Excel's fraction of a day
         return np.round(values * DAY_S, 6)
-    if known.size and known.max() > DAY_S and numeric.is_hhmmss(values):
-        return numeric.from_hhmmss(values)
+    if known.size and (per_second := numeric.digits_behind(values, described)):
+        return numeric.from_hhmmss(values / per_second)
     return values / 1e3 if known.size and DAY_S * 2 < known.max() <= DAY_S * 1e3 else values
 
 
-def _of_day_or_stamped(text: pa.ChunkedArray, origin: Origin) -> FloatArray | Clock:
+def _days_with_fractions(column: pa.ChunkedArray, origin: Origin) -> FloatArray | None:
+    """(n,) day counts such as modified Julian dates that have the time of day behind the point; None of others."""
+    values = without_text(column)
+    known = np.zeros(0) if values is None else values[np.isfinite(values)]
+    return values if known.size > 1 and np.ptp(known % 1.0) > 0 else None
+
+
+def _of_day_or_stamped(text: pa.ChunkedArray, origin: Origin, described: Column) -> FloatArray | Clock:
+    if (code := timecode.read(text, origin, described)) is not None:
+        return code.time_s
     for moments in notations.matching(text, notations.STAMPS).values():
         if not moments.has_day:
             return moments.second
@@ -168,12 +190,10 @@ def _dates_in_cells(column: pa.ChunkedArray, origin: Origin) -> tuple[IntArray, 
         return _dates_in_text(pa.chunked_array([pa.array([f"{value:06.0f}" for value in filled], pa.string())]), origin)
     if middle < 367:
         return origin.whole_days(filled), False
-    start = next(
-        (start for start, low, high in ((25569, 3e4, 4.9e4), (40587, 5.5e4, 7e4)) if low <= middle < high), None
-    )
+    start = next((start for start, low, high in _DAY_COUNTS if low <= middle < high), None)
     if start is None:
         raise origin.bad_cell(0, f"{values[0]:g}", "a date")
-    return origin.whole_days(filled - start), True
+    return origin.whole_days(filled - start), start != _JULIAN or bool((filled % 1.0 == 0.5).all())
 
 
 def _dates_in_text(text: pa.ChunkedArray, origin: Origin) -> tuple[IntArray, bool]:

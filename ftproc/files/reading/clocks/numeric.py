@@ -34,6 +34,7 @@ _STEMS = {
     **dict.fromkeys(("tod", "sod", "timeofday", "secondsofday", "secofday", "utcsod", "utctod", "day"), "day"),
     **dict.fromkeys((f"{unit}{word}midnight" for unit in ("secs", "seconds", "sec", "time")
                      for word in ("past", "after", "since")), "day"),
+    **dict.fromkeys(("hms", "hhmmss", "hhmmssmmm", "hhmmsssss"), "digits"),
     **dict.fromkeys(("utc", "utctime", "timeutc", "zulu", "irig", "irigb", "irigtime", "daytime"), "day"),
 }  # fmt: skip
 _UNIX_FROM, _UNIX_TO = 1e8, 2.9e9  # s: 1973 to 2061
@@ -46,6 +47,7 @@ _TICKS = (
 )
 _SURELY_UNIX = 1.5e9  # s: 2017; from there on seconds since 1980 are in the future
 _GPS_FROM = 3e8
+_BEHIND = (1e3, 1e2, 1e1, 1e6)  # digits of the second behind hhmmss, without a point
 _SAMPLE = 2000  # times by which the size and the step are judged
 _LARGEST = 1e300  # two larger numbers would overflow in a mean
 _MOST_DAYS_STEP = 5e-4  # in s it would be a rate of 2 kHz, in days it is 43 s
@@ -79,7 +81,7 @@ def read(values: FloatArray, column: Column, source: str = "") -> Clock:
     if kind in ("", "unix", "day") and _is_calendar(known):
         return _of_calendar(values)
     if _is_hhmmss(kind, column.notation, values, most):
-        seconds, notes = unrolled(from_hhmmss(values), DAY_S)
+        seconds, notes = unrolled(from_hhmmss(values / (digits_behind(values, column) or 1.0)), DAY_S)
         return Clock(seconds, "", "time of day as hhmmss, in s since midnight", notes)
     period = {"day": DAY_S, "week": WEEK_S, "gps": WEEK_S}.get(kind)
     if kind in ("day", "week") and period and 2 * period < most <= 1e3 * period:
@@ -144,8 +146,19 @@ def is_hhmmss(values: FloatArray) -> bool:
     return bool(((known >= 0) & (known < 240_000) & (minute < 60) & (second < 60)).all())
 
 
+def digits_behind(values: FloatArray, column: Column) -> float:
+    """By how much numbers written as hhmmss with digits of the second behind it are to be divided: 1 without such
+    digits, 0 for other numbers."""
+    most = float(np.nanmax(values))
+    named = next((word for word in (column.key, column.notation) if word.startswith("hhmmss") or word == "hms"), "")
+    for by in (10.0 ** max(len(named) - 6, 0),) if named else (1.0, *_BEHIND):
+        if is_hhmmss(values / by) and (named or most > DAY_S * (1.0 if by == 1.0 else 1e3) or _jumps(values / by)):
+            return by
+    return 1.0 if named and is_hhmmss(values) else 0.0
+
+
 def _is_hhmmss(kind: str, notation: str, values: FloatArray, most: float) -> bool:
-    if notation.startswith("hhmmss"):
+    if notation.startswith("hhmmss") or kind == "digits":
         return True
     return kind in ("day", "") and DAY_S < most < 240_000 and is_hhmmss(values) and (kind == "day" or _jumps(values))
 

@@ -11,7 +11,7 @@ import numpy as np
 from ftproc.errors import InputError
 from ftproc.files import arrow, leap_seconds
 from ftproc.files.moments import NO_ZONE
-from ftproc.files.reading.clocks import notations, numeric
+from ftproc.files.reading.clocks import notations, numeric, timecode
 from ftproc.files.reading.clocks.clock import DAY_S, HOUR_S, Clock, unrolled
 from ftproc.files.reading.meaning.numbers import Origin, as_text, not_a_number, numbers, parsed, without_text
 from ftproc.files.reading.meaning.schema import Column
@@ -55,6 +55,7 @@ def read(column: pa.ChunkedArray, origin: Origin, described: Column) -> Clock:
         text = as_text(column)
         if parsed(text, origin.decimal_comma) is None:
             counted_up = _with_unit(text)
+            counted_up = counted_up or timecode.read(text, origin, described)
             return _on_gps(stamped(text, origin), described) if counted_up is None else counted_up
         column = text
     return numeric.read(numbers(column, origin), described, origin.source)

@@ -10,6 +10,7 @@ import csv
 import io
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -19,15 +20,10 @@ from ftproc.files.reading.formats import blocks, content, encoding, layout, trim
 from ftproc.files.reading.formats.header import Blocks, TableHeader
 from ftproc.files.reading.formats.layout import BLANKS
 from ftproc.files.reading.formats.standards import catalogue
+from ftproc.files.words import MISSING_WORDS
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-#: Cells that mean "no reading", beside the empty cell.
-MISSING_WORDS = (
-    *("", "NaN", "nan", "NAN", "-NaN", "-nan", "NA", "N/A", "n/a", "#NA", "#N/A", "#N/A N/A", "<NA>"),
-    *("NULL", "Null", "null", "None", "none", "1.#IND", "-1.#IND", "1.#QNAN", "-1.#QNAN"),
-)
 
 _QUOTED_COMMA = re.compile(rb'"[+-]?\d+,(?:\d{1,2}|\d{4,})"')  # a decimal comma, that does not separate thousands
 _HEAD = 1 << 20  # bytes of a large file that contain its header line
@@ -55,7 +51,7 @@ def text_bytes(data: bytes, room: limits.Room, widths: Sequence[int] = ()) -> Ta
         return known
     text = split(name, data, widths)
     commas = text.delimiter != "," or len(_QUOTED_COMMA.findall(text.body, 0, _HEAD)) > 2
-    return TableHeader(text.source, text.names, text.load, commas, units=text.units, form=text.form)
+    return TableHeader(text.source, text.names, text.load, commas, units=text.units, form=text.form, above=text.above)
 
 
 def _described(data: bytes, room: limits.Room, cut: bool = False) -> TableHeader | None:
@@ -82,9 +78,8 @@ def _large_file(name: str, path: Path) -> TableHeader:
         bodies = blocks.of_file(path, head.source, head.body_offset, head.delimiter, before)
         return Blocks((head._replace(body=body, odd_quotes=False).load(numeric, ()) for body in bodies), rows)
 
-    return TableHeader(
-        name, head.names, load, head.delimiter != ",", blocks=in_blocks, units=head.units, form=head.form
-    )
+    header = TableHeader(name, head.names, load, head.delimiter != ",", blocks=in_blocks, units=head.units)
+    return replace(header, form=head.form, above=head.above)
 
 
 class CsvText(NamedTuple):
@@ -92,7 +87,7 @@ class CsvText(NamedTuple):
 
     body: the rows in UTF-8. odd_quotes: an odd number of quotation marks: an unclosed one may swallow all rows after
     it. body_offset: of the body in the file, bytes. widths: of the columns, or nothing. units: a row of units.
-    encoding: if it is not UTF-8. form: the layout in words.
+    encoding: if it is not UTF-8. form: the layout in words. above: the lines above the names.
     """
 
     source: str
@@ -105,6 +100,7 @@ class CsvText(NamedTuple):
     units: Sequence[str] = ()
     encoding: str = ""
     form: str = ""
+    above: Sequence[str] = ()
 
     def load(self, numeric: Sequence[int], others: Sequence[int]) -> pa.Table:
         """Columns `numeric`, then `others`, by position.
@@ -237,7 +233,10 @@ def _plain(data: bytes) -> tuple[list[str], str, int] | None:
     if found is None:
         return None
     line = found[1].decode("utf-8", "replace")
-    delimiter = max(",;\t", key=line.count)
+    below = layout.LINE.match(data, found.end())
+    first = below[1].decode("utf-8", "replace") if below else ""
+    alike = (mark for mark in "\t;" if 0 < line.count(mark) == first.count(mark))  # before decimal commas
+    delimiter = next(alike, max(",;\t", key=line.count))
     if line.count(delimiter) >= trimming.MOST_MARKS:
         return None
     names = layout.split(line, delimiter)
@@ -271,6 +270,7 @@ def _searched(source: str, data: bytes, widths: Sequence[int]) -> tuple[CsvText,
     parts += [f"{found.above} lines above the table"] if found.above else []
     parts += ["a row of units" if found.row_of_units else "units stated above the table"] if found.units else []
     text = CsvText(source, names, found.separator, memoryview(b""), False, widths=widths, units=found.units)
+    text = text._replace(above=found.said)
     return text._replace(form=", ".join(parts)), start
 
 

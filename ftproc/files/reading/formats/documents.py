@@ -18,6 +18,7 @@ from ftproc.files.reading.formats.standards import asterix
 _DEEPEST = 12  # objects inside each other
 _HELD, _REFERENCE = 64, 16  # bytes that an object or list takes in memory, and one that is in it
 _BETWEEN = re.compile(r"[\s,]*")  # two documents
+_UNIT_KEYS = ("unit", "units", "uom")  # and its unit
 _VALUES = ("val", "value")  # keys under which decoders put the value of an item, beside its meaning
 
 
@@ -69,7 +70,12 @@ def _parsed(name: str, text: str) -> Any:
 
 def _records(found: Any) -> Iterable[Mapping[str, Any]]:
     """The objects of a document, one for each reading."""
-    return _of_rows(found) or (_of_columns(found) if _is_columns(found) else _deepest_list(found))
+    records = _of_rows(found) or (_of_columns(found) if _is_columns(found) else _deepest_list(found))
+    units = found.get("units") if isinstance(found, Mapping) else None
+    if not isinstance(units, Mapping) or not all(isinstance(unit, str) for unit in units.values()):
+        return records
+    called = {name: f"{name} [{unit}]" for name, unit in units.items()}
+    return ({called.get(name, name): cell for name, cell in record.items()} for record in records)
 
 
 def _loaded(text: str) -> Any:
@@ -115,7 +121,10 @@ def _of_rows(found: Any) -> Iterable[Mapping[str, Any]]:
         return list(found.values())
     rows, names = found, None
     if isinstance(found, Mapping):
-        rows, names = found.get("data", found.get("values")), found.get("columns", found.get("names"))
+        rows, names = next(
+            ((found[of], found.get(by)) for of in ("data", "values", "rows") for by in ("columns", "names", "fields")
+             if of in found and (by in found or by == "fields")), (None, None)
+        )  # fmt: skip
     if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
         return []
     width = len(rows[0])
@@ -167,7 +176,8 @@ def flat(source: str, value: Any, prefix: str, depth: int) -> Iterator[tuple[str
     if isinstance(value, Mapping) and depth < _DEEPEST:
         inner = next((key for key in _VALUES if key in value), None)
         if prefix and inner is not None:
-            yield from flat(source, value[inner], prefix, depth + 1)
+            unit = next((value[key] for key in _UNIT_KEYS if isinstance(value.get(key), str)), "")
+            yield from flat(source, value[inner], f"{prefix} [{unit}]" if unit else prefix, depth + 1)
             return
         for key, item in value.items():
             yield from flat(source, item, f"{prefix}.{key}" if prefix else str(key), depth + 1)

@@ -48,8 +48,9 @@ class TableHeader:
     load: (numeric positions, other positions) -> table of these columns, the numeric ones first.
     decimal_comma: numbers may have decimal commas. metadata: key-value pairs of the file.
     blocks: numeric positions -> these columns block by block if the file is large, else None.
-    units: the cells of a row of units under the names, or nothing. form: the kind of file and how it is laid out.
-    stated: by the standard of the file. sha256: of the bytes of the file, as it is stored; "" of a table in memory.
+    units: the cells of a row of units under the names, or nothing. above: the lines above the
+    names. form: the kind of file and how it is laid out. stated: by the standard of the file. sha256: of the bytes of
+    the file, as it is stored; "" of a table in memory.
     """
 
     source: str
@@ -60,6 +61,7 @@ class TableHeader:
     blocks: Callable[[Sequence[int]], Blocks | None] = lambda numeric: None
     units: Sequence[str] = ()
     form: str = ""
+    above: Sequence[str] = ()
     stated: Stated = _NOTHING
     sha256: Callable[[], str] = lambda: ""
 
@@ -85,6 +87,13 @@ def of_arrow(
         units=units,
         form=form,
     )
+
+
+def units_of(schema: pa.Schema) -> list[str]:
+    """The units that the metadata of each field states, "" where none; nothing if none does."""
+    stated = [{key.lower(): text for key, text in (field.metadata or {}).items()} for field in schema]
+    units = [(each.get(b"unit") or each.get(b"units") or b"").decode("utf-8", "replace") for each in stated]
+    return units if any(units) else []
 
 
 def is_log(names: Sequence[str], units: Mapping[str, str]) -> bool:

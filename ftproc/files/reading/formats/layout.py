@@ -46,6 +46,9 @@ _UNNAMED = {
 }
 _NUMBERED = re.compile(r"^\d+\s*[:=)]\s*(?=[^\W\d])")  # a number before a name: `1:time`
 _ENUMERATED = re.compile(r"[\s#%;*]*+(?:columns?|col|fields?)?[\s.]*+#?(\d++)\s*+[:=.)-]\s*([^\W\d].*)", re.IGNORECASE)
+_CALLED = re.compile(
+    r"^\s*(?:columns?|fields?|names?|header)\s*[:=]\s*", re.IGNORECASE
+)  # before the names in a comment
 _NOTHING = re.compile(r"\s*[\"']?(nan|null|none|n/?a|nil|[-*?.]+|)[\"']?\s*", re.IGNORECASE)
 
 
@@ -53,7 +56,7 @@ class Layout(NamedTuple):
     """names: of the columns, numbers from 1 where the file has none. first: number of the first line of data, among
     the lines as `lines` numbers them. separator: one character, or BLANKS. units: cells of a row of units. above:
     lines that are neither. named: there is a line of names. cells: in a row. row_of_units: else lines above state
-    the units."""
+    the units. said: the lines above the names."""
 
     names: list[str]
     first: int
@@ -63,6 +66,7 @@ class Layout(NamedTuple):
     named: bool
     cells: int
     row_of_units: bool
+    said: Sequence[str] = ()
 
 
 def find(lines: Sequence[str], widths: Sequence[int] = ()) -> Layout | None:
@@ -184,10 +188,11 @@ def _with_names(
     if len(units) != len(found):
         units = []
     first, row_of_units = filled[top], bool(units)
+    said = [lines[number] for number in filled[: max(index, 0)]]
     if names is not None and not units:
-        units = units_stated([lines[number] for number in filled[: max(index, 0)]], names)
+        units = units_stated(said, names)
     return Layout(found, first, separator, units, max(index, 0) if names is not None else top, names is not None, width,
-                  row_of_units)  # fmt: skip
+                  row_of_units, said)  # fmt: skip
 
 
 def _enumerated(above: Sequence[str], width: int) -> list[str] | None:
@@ -219,6 +224,8 @@ def _heading(line: str, separator: str, width: int, block: Sequence[str], widths
     if mark and not widths:
         bare = line.replace(mark, "", 1) if separator != BLANKS else line.replace(mark, " " * len(mark), 1)
         bare = re.sub(r"^(\s*)[#%/]+", r"\1", bare)
+    if mark:
+        bare = _CALLED.sub("", bare)
     ways = [split(bare, separator, widths)]
     if separator == BLANKS:
         ways += [re.split(r"\s{2,}|\t", bare.strip()), _joined_brackets(bare), _aligned(bare, block, width)]

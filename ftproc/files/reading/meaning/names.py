@@ -15,6 +15,7 @@ from ftproc.files.words import (
     ONLY_BY_UNIT,
     QUALIFIERS,
     QUANTITIES,
+    TURNED,
     WEAK_ALIASES,
     ZENITH_ALIASES,
     plain_letters,
@@ -37,6 +38,7 @@ _COUNTS = re.compile(
 )
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 _NOT_WORDS = re.compile(r"(?:[^\w°]|_)+")
+_OF_FRAMES = re.compile(r"(\d+(?:\.\d+)?)\s*(?:fps|frames?(?:\s*/\s*s| per second)?)", re.IGNORECASE)
 _NUMBERED = re.compile(r"^\d+\s*[:=)]\s*(?=[^\W\d])")  # the number of a column before its name
 _OF_UTC = ("utc", "gmt")  # behind the name of a time
 _VALUE = re.compile(r"[._/](val|value)$", re.IGNORECASE)  # how decoders end the path of a value
@@ -53,10 +55,14 @@ _FOREIGN = frozenset(
 NOTATIONS = frozenset(
     [
         *("utc", "gps", "gpst", "hms", "hhmmss", "dms", "ddmmss", "dddmmss", "dmmss", "zulu", "z", "tai"),
+        *("degmin", "degminsec"),
         *("t", "true"),  # from true north
     ]
 )
 
+
+#: Notations in words of degrees, as digits.
+_DEGREES = {"degmin": "ddmm", "degminsec": "ddmmss"}
 
 #: Words of azimuths that count clockwise from north, and how else it is written.
 _FROM_NORTH = frozenset(("bearing", "brg", "taz", "north", "clockwise", "cw", "peilung", "пеленг"))
@@ -119,8 +125,10 @@ def taken_apart(text: str, unit: str = "") -> Name:
         squeezed = _squeezed(inside)
         if known:
             plain, found = before, known
+        elif frames := _OF_FRAMES.fullmatch(inside):
+            plain, notation = before, f"{frames[1]}fps"
         elif squeezed in NOTATIONS or "hh" in squeezed or "dd" in squeezed or "yy" in squeezed:
-            plain, notation = before, squeezed
+            plain, notation = before, _DEGREES.get(squeezed, squeezed)
         elif inside.lower() in _FOREIGN:
             plain, foreign = before, True
         elif inside:
@@ -156,9 +164,19 @@ def _unit_inside(text: str) -> str:
     return next((part for part in re.split(r"[\s,;]+", text) if _is_unit(part)), "")
 
 
+def counts_from(name: Name) -> str:
+    """What an azimuth of this name counts from, one of TURNED; "" where the name does not say so."""
+    inside = set(re.findall(r"[A-Z]+", name.text[name.text.rfind("(") :])) if name.text.endswith(")") else set()
+    found = (what for what, (words, mark, _) in TURNED.items() if words & {*name.words} or mark in inside)
+    is_azimuth = {name.stem, name.core(), *name.words} & {*ALIASES["azimuth"]} - {"a"}
+    return next(found, "") if is_azimuth else ""
+
+
 def says_north(text: str) -> bool:
     """Whether the name of an azimuth says that it counts clockwise from true north."""
     name = taken_apart(text)
+    if counts_from(name):
+        return False
     from_north = name.notation in ("t", "true") or name.words[:1] == ("true",) or _FROM_NORTH & {name.stem, *name.words}
     return bool(from_north or _EAST_OF_NORTH.search(text))
 
@@ -175,7 +193,7 @@ def _is_unit(word: str) -> bool:
 def _is_name(text: str) -> bool:
     """Whether the whole text is a name without a unit: `sec`, `gps_sec`, `epoch`."""
     key = _NOT_WORDS.sub("", re.split(r"[./]", text.lower())[-1])
-    if key == "ts" and text.lower() != key:  # t_s is a time in s, TS a time stamp
+    if key in ("ts", "azm") and text.lower() != key:  # t_s is a time in s, TS a time stamp; AZ_M holds minutes
         return False
     return any(key in table[quantity] for table in (ALIASES, WEAK_ALIASES) for quantity in QUANTITIES)
 

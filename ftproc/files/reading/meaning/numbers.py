@@ -13,7 +13,7 @@ import numpy as np
 
 from ftproc.errors import InputError, quoted, row_named
 from ftproc.files import arrow
-from ftproc.files.reading.formats.csvtext import MISSING_WORDS
+from ftproc.files.words import MISSING_WORDS
 from ftproc.records import FloatArray, IntArray
 
 if TYPE_CHECKING:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable, Mapping, Sequence
 
-from ftproc.files.reading.meaning.names import Name, taken_apart
-from ftproc.files.words import ALIASES, WEAK_ALIASES
+from ftproc.files.reading.meaning.names import Name, counts_from, taken_apart
+from ftproc.files.units import unit_named
+from ftproc.files.words import ALIASES, TURNED, WEAK_ALIASES, ZENITH_ALIASES
 
 _SECONDS_OF_WEEK = frozenset(
     ["tow", "sow", "gpstow", "gpssow", "timeofweek", "secondsofweek", "secofweek", "itow", "gpsseconds", "weekseconds"]
@@ -23,6 +25,11 @@ _TIME = {
     "minute": ("minute", "minutes", "min", "mins", "mi", "mn", "mm", "m", "utcminute", "utcmin"),
     "second": ("second", "seconds", "sec", "secs", "ss", "s", "utcsecond", "utcsec", "tvsec"),
 }
+#: Counts of days that are the date of a time of day beside them.
+_DAY_COUNTS = frozenset(("mjd", "jd", "modifiedjuliandate", "juliandate", "julianday"))
+#: Names of a time of day that need a date beside them: `ms of day`, `UT (h)`, `FracDay`.
+_OF_DAY = re.compile(r"(?P<unit>[a-z]*?)(?:of|past|after|since)?(?:the)?(?:day|midnight)")
+_OF_DAY_STEMS = frozenset(("msod", "fracday", "fractionofday", "dayfraction", "dayfrac", "ut", "hour", "hours", "hrs"))
 #: Stems of the names of a fraction of the second beside whole seconds -> its unit.
 FRACTIONS = {
     **dict.fromkeys(("ms", "msec", "msecs", "millis", "millisec", "millisecs", "millisecond", "milliseconds"), "ms"),
@@ -84,6 +91,10 @@ def _time(names: Mapping[int, Name]) -> dict[str, int] | None:
 
     clock = [k for k, name in names.items() if name.stem in ALIASES["time"] and name.stem not in _ELAPSED]
     hms = {role: one(role) for role in ("hour", "minute", "second")}
+    if hms["second"] is None:  # SS.SSS
+        hms["second"] = _only(names, lambda name: len(name.stem) > 1 and not name.stem.strip("s"))
+    if hms["minute"] is None and hms["hour"] is not None and hms["hour"] + 1 in names:  # the second of two MM
+        hms["minute"] = hms["hour"] + 1 if names[hms["hour"] + 1].stem in _TIME["minute"] else None
     week = one("week")
     if week is not None:
         of_week = _only(names, lambda name: name.stem in _SECONDS_OF_WEEK)
@@ -92,15 +103,21 @@ def _time(names: Mapping[int, Name]) -> dict[str, int] | None:
     fraction = _fraction(names)
     clock = [index for index in clock if index != fraction]
     calendar = {role: one(role) for role in ("year", "month", "day")}
-    if calendar["month"] is None and hms["hour"] is None:  # MM beside YYYY and DD
-        calendar["month"] = _only(names, lambda name: name.stem == "mm")
+    if calendar["month"] is None:  # MM beside YYYY and DD
+        minute = None if hms["hour"] is None else hms["minute"]
+        calendar["month"] = _only({k: names[k] for k in names if k != minute}, lambda name: name.stem == "mm")
     days = {role: index for role, index in calendar.items() if index is not None}
     if len(days) < 3:
         days = {role: index for role in ("year", "doy") if (index := one(role)) is not None}
         days = days if "doy" in days else {}
     date = one("date")
+    counted = _only(names, lambda name: name.stem in _DAY_COUNTS)
+    if date is None and not days and counted is not None:
+        date, clock = counted, [index for index in clock if index != counted]
     if date is not None:
         days = {"date": date}
+        of_day = _only({k: names[k] for k in names if k != date}, lambda name: unit_of_day(name) is not None)
+        clock += [of_day] if not clock and None in hms.values() and of_day is not None else []
     if None not in hms.values():
         days |= {role: index for role, index in hms.items() if index is not None}
     else:
@@ -125,13 +142,38 @@ def _spellings(name: Name) -> set[str]:
     return {name.stem, core, name.stem + name.unit.lower(), core + name.unit.lower()} - {""}
 
 
+def unit_of_day(name: Name) -> str | None:
+    """The unit of a time of day beside a date, such as `Msec of day` or `UT (h)`, "" where its name states none; None
+    of other names."""
+    text = re.sub("[^a-z]", "", name.text.lower())
+    if {name.stem, text} & _OF_DAY_STEMS:
+        return "ms" if name.stem == "msod" else name.unit or ("h" if name.stem[0] == "h" else "")
+    found = _OF_DAY.fullmatch(text)
+    if found is None or not found["unit"] or unit_named("time", found["unit"]) is None:
+        return None
+    return found["unit"]
+
+
 def unit_of_fraction(name: Name) -> str:
     """The unit of a fraction of the second."""
     return next(FRACTIONS[word] for word in (*_spellings(name), name.unit.lower()) if word in FRACTIONS)
 
 
+def turned(names: Mapping[int, Name]) -> dict[str, int] | None:
+    """The columns of an azimuth that counts from the head of the carrier, or from magnetic north, and of what is to be
+    added to it: {"azimuth": position, "added": position}."""
+    for what, (_, _, words) in TURNED.items():
+        mine = _only(names, lambda name, what=what: counts_from(name) == what)  # type: ignore[misc]
+        added = _only(names, lambda name, words=words: bool(words & {*name.words}) and not name.foreign)  # type: ignore[misc]
+        if mine is not None and added is not None and added != mine:
+            return {"azimuth": mine, "added": added}
+    return None
+
+
 def _angle(quantity: str, names: Mapping[int, Name]) -> dict[str, int] | None:
-    for stem in (*ALIASES[quantity], *WEAK_ALIASES[quantity]):
+    if quantity == "azimuth" and (roles := turned(names)) is not None:
+        return roles
+    for stem in (*ALIASES[quantity], *WEAK_ALIASES[quantity], *(ZENITH_ALIASES if quantity == "elevation" else ())):
         mine = {index: name.unit.lower() for index, name in names.items() if name.stem == stem}
         fits = {role: [index for index, unit in mine.items() if unit in words] for role, words in _ANGLE.items()}
         known = {role: only[0] for role, only in fits.items() if len(only) == 1}

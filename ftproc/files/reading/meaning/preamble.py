@@ -16,6 +16,8 @@ _PAIRS = (  # the first that finds any
     re.compile(rf"{_NAME}\s+{_STATED}"),
 )
 _IN_BRACKETS = re.compile(rf"{_NAME}\s*[\[(](?P<unit>[^\])]{{1,20}})[\])]")
+_ALL = re.compile(r"^(?:all|the)\s+", re.IGNORECASE)
+_IN = re.compile(rf"{_NAME}\s+(?:(?:is|are)\s+)?in\s+(?P<unit>[^\W\d_]+(?: miles)?)", re.IGNORECASE)  # ranges in feet
 _SEVERAL = 2  # names with units in brackets in one line, which needs no word for units
 _MOST_LINES, _LONGEST = 200, 300  # that are searched: above the table, and characters of one
 _GROUPS = {
@@ -30,7 +32,11 @@ def units_stated(above: Sequence[str], names: Sequence[str]) -> list[str]:
     apart = [taken_apart(name) for name in names]
     short = [line for line in above[-_MOST_LINES:] if len(line) <= _LONGEST]
     stated = {quantity: unit for line in short for quantity, unit in _pairs(line).items()}
-    units = ["" if name.unit or name.notation else _of(name, stated) for name in apart]
+    listed = next((units for line in short if (units := _listed(line, len(names)))), [""] * len(names))
+    units = [
+        "" if name.unit or name.notation else unit or _of(name, stated)
+        for name, unit in zip(apart, listed, strict=True)
+    ]
     return units if any(units) else []
 
 
@@ -38,8 +44,16 @@ def _pairs(line: str) -> dict[str, str]:
     """The quantities of a line and their units as written."""
     if not _UNIT.search(line):
         found = _found(_IN_BRACKETS, line)
-        return found if len(found) >= _SEVERAL else {}
+        return found if len(found) >= _SEVERAL else _found(_IN, line)
     return next(filter(None, (_found(pattern, _UNIT.sub(" ", line)) for pattern in _PAIRS)), {})
+
+
+def _listed(line: str, columns: int) -> list[str]:
+    """The units of all columns in their order, `Units: s, yd, deg, deg`; nothing of other lines."""
+    _, word, behind = line.partition(found[0]) if (found := _UNIT.search(line)) else ("", "", "")
+    units = re.split(r"\s*[,;|\t]\s*|\s+", behind.strip(" :=\t")) if word else []
+    right = len(units) == columns and all(any(unit_named(q, unit) for q in QUANTITIES) for unit in units)
+    return units if right else []
 
 
 def _found(pattern: re.Pattern[str], line: str) -> dict[str, str]:
@@ -47,7 +61,7 @@ def _found(pattern: re.Pattern[str], line: str) -> dict[str, str]:
         quantity: pair["unit"]
         for pair in pattern.finditer(line)
         for word in re.split(r"\s+and\s+|\s*[&/]\s*", pair["name"])
-        for name in (taken_apart(word),)
+        for name in (taken_apart(_ALL.sub("", word)),)
         for quantity in _GROUPS.get(name.stem, filter(name.means, QUANTITIES))
         if unit_named(quantity, pair["unit"])
     }

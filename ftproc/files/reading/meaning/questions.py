@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from ftproc.errors import InputError, nearest, quoted
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
-from ftproc.files.reading.meaning.names import Name, taken_apart
-from ftproc.files.units import UNITS, unit_named
-from ftproc.files.words import ALIASES, EITHER_ANGLE, NOT_UNITS, OTHER_THINGS, QUANTITIES
+from ftproc.files.reading.meaning.names import Name, counts_from, taken_apart
+from ftproc.files.units import LIGHT_MPS, UNITS, unit_named
+from ftproc.files.words import ALIASES, EITHER_ANGLE, NOT_UNITS, ONLY_BY_UNIT, OTHER_THINGS, QUANTITIES, WEAK_ALIASES
 
+_COUNTS = frozenset(("counts", "count", "cnt", "cnts", "ticks"))
+_FLIGHTS = frozenset(("tof", "timeofflight", "flighttime", "roundtriptime", "rtt", "laufzeit"))
+_HORIZONTAL = frozenset(("hd", "horizontaldistance", "horizontalrange", "groundrange", "grounddistance", "hdist"))
 #: Words of NOT_UNITS with which a column may still be the quantity.
 _OF_THE_QUANTITY = frozenset(["true", "corr", "raw", "ref"])
 
@@ -51,10 +55,53 @@ def listed(names: Sequence[str]) -> str:
 
 def refuse_twice(source: str, names: Sequence[str], name: str) -> None:
     if names.count(name) > 1:
+        numbers = [str(index + 1) for index, each in enumerate(names) if each == name]
         raise InputError(
-            f'{source}: column "{name}" is there {names.count(name)} times; '
-            f"rename or delete all but one. Its columns are: {listed(names)}."
+            f'{source}: column "{name}" is there {len(numbers)} times; rename or delete all but one, or say with '
+            f"--columns which columns are meant by their numbers (here {' or '.join(numbers)}). "
+            f"Its columns are: {listed(names)}."
         )
+
+
+def refuse_side_by_side(source: str, apart: Sequence[Name], stated: Collection[str]) -> None:
+    """Ask which of several targets or stations is meant whose readings stand side by side in each row."""
+    groups: dict[str, dict[str, int]] = {}
+    for index, name in enumerate(apart):
+        for quantity in QUANTITIES[1:]:
+            if (mark := _mark(name, quantity)) is not None:
+                groups.setdefault(mark, {}).setdefault(quantity, index)
+    shared = [columns for columns in groups.values() if len(columns) > 1]
+    if len(shared) < 2 or set(shared[0]) <= set(stated):
+        return
+    names = [name.text for name in apart]
+    ways = " or ".join(answer(names, columns) for columns in shared[:6])
+    raise InputError(
+        f"{source}: the readings of {len(shared)} targets or stations stand side by side in each row. Say which one is "
+        f"meant: {ways}."
+    )
+
+
+def refuse_positions(source: str, apart: Sequence[Name]) -> None:
+    """Raise InputError for the track of a receiver on board."""
+    words = {word for name in apart for word in (name.stem, *name.words)}
+    if words & {"lat", "latitude"} and words & {"lon", "lng", "long", "longitude"}:
+        raise InputError(
+            f"{source}: positions by latitude and longitude, not readings of an instrument that tracks a target. As "
+            'one station of a range file they are used with kind = "position"; as --truth, by score and train.'
+        )
+
+
+def _mark(name: Name, quantity: str) -> str | None:
+    """What distinguishes a column of a quantity from others of the same, such as T1 or 2; None of other columns."""
+    known = {*ALIASES[quantity], *WEAK_ALIASES[quantity]} - {""}
+    if name.foreign or NOT_UNITS & {*name.words} or (name.unit and unit_named(quantity, name.unit) is None):
+        return None
+    for k, word in enumerate(name.words):
+        rest = "".join((*name.words[:k], *name.words[k + 1 :]))
+        if rest in known and re.fullmatch(r"[a-z]*\d+|[a-z]", word) and word not in known:
+            return word
+    found = re.fullmatch(r"(\D+)(\d+)", name.stem)
+    return found[2] if found and found[1] in known else None
 
 
 def refuse_unknown_unit(source: str, apart: Sequence[Name], free: Sequence[int], quantity: str) -> None:
@@ -87,15 +134,44 @@ def refuse_alike(source: str, apart: Sequence[Name], free: Sequence[int], quanti
     for index in free if quantity != "time" else ():
         name = apart[index]
         words = {name.stem, *name.words}
+        _refuse_scale(source, apart, index, quantity)
         either = quantity != "range" and name.core() in EITHER_ANGLE
+        if quantity == "elevation" and unit_named("height", name.unit):
+            continue
         another = words & OTHER_THINGS or name.is_zenith() or any(name.means(each) for each in QUANTITIES)
         alike = known & words or (name.is_in_a_unit_of(quantity) and not another)
-        if not name.foreign and (either or (alike and not other & words)):
+        bare = name.stem in ONLY_BY_UNIT and name.stem in WEAK_ALIASES[quantity] and not {name.stem} & OTHER_THINGS
+        if not name.foreign and (either or bare or (alike and not other & words)):
             say = answer([each.text for each in apart], {quantity: index})
+            turns = counts_from(name) if quantity == "azimuth" else ""
+            only = f" if {turns}, from which it counts, stays where it is" if turns else ""
             raise InputError(
-                f'{source}: column "{name.text}" may be the {quantity}. Say {say}, or '
+                f'{source}: column "{name.text}" may be the {quantity}. Say {say}{only}, or '
                 f"--columns {quantity}={ABSENT} if it is something else."
             )
+
+
+def _refuse_scale(source: str, apart: Sequence[Name], index: int, quantity: str) -> None:
+    """Ask for the scale of readings that are counts of an encoder, or times of flight."""
+    name, names = apart[index], [each.text for each in apart]
+    words = {name.stem, *name.words, *re.findall(r"[^\W\d_]+", name.text.lower())}
+    if quantity == "range" and words & _HORIZONTAL:
+        raise InputError(
+            f'{source}: column "{name.text}" is a horizontal distance, and ranges are slant ones. Divide it by the '
+            f"cosine of the elevation and name it a slant range, or say --columns range={ABSENT} to leave it out."
+        )
+    if quantity == "range" and words & _FLIGHTS:
+        unit = unit_named("time", name.unit)
+        scale = f"{LIGHT_MPS / 2 * (unit.multiply / unit.divide if unit else 1.0):.9g} m"
+        what = f"times of flight{'' if unit else ' in a unit that its name does not state'}"
+    elif words & _COUNTS and words & {*ALIASES[quantity]} and quantity != "range":
+        scale, what = "1/65536 turn", "counts of an encoder (with the number of its counts in a turn)"
+    else:
+        return
+    raise InputError(
+        f'{source}: column "{name.text}" may be the {quantity} as {what}. Say {answer(names, {quantity: index})} '
+        f"--units '{quantity}={scale}', or --columns {quantity}={ABSENT} if it is something else."
+    )
 
 
 def refuse_either(source: str, apart: Sequence[Name], free: Sequence[int]) -> None:
@@ -118,10 +194,15 @@ def _units_unknown(apart: Sequence[Name], free: Sequence[int], quantity: str) ->
         if name.foreign or NOT_UNITS & {*name.words, name.unit.lower()}:
             continue
         known = any(unit_named(quantity, word) for word in name.unit.split())
-        if name.unit and name.stem in ALIASES[quantity] and (len(name.stem) > 1 or known):
+        if quantity == "elevation" and unit_named("height", name.unit):  # a height
+            continue
+        weak = name.stem in WEAK_ALIASES[quantity] and len(name.stem) > 2 and name.stem not in ONLY_BY_UNIT
+        if name.unit and ((name.stem in ALIASES[quantity] and (len(name.stem) > 1 or known)) or weak):
             yield index, name.unit
-        elif not name.unit and len(name.words) == 2 and name.words[0] in ALIASES[quantity] and len(name.words[0]) > 1:
-            yield index, name.words[1]
+        elif not name.unit and len(name.words) == 2:
+            first, last = name.words
+            if len(first) > 1 and first in ALIASES[quantity] and last not in ALIASES[quantity]:
+                yield index, last
 
 
 def check_complete(source: str, names: Sequence[str], found: Mapping[str, tuple[int, ...]], propose: Propose) -> None:

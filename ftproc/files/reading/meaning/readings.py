@@ -21,7 +21,7 @@ from ftproc.files.reading.meaning.numbers import (
     without_text,
 )
 from ftproc.files.reading.meaning.schema import Column
-from ftproc.files.units import UNITS, unit_named
+from ftproc.files.units import UNITS, si_unit, unit_named
 from ftproc.files.words import DEPRESSIONS
 from ftproc.order_statistics import median, quantile
 from ftproc.records import FloatArray
@@ -55,6 +55,7 @@ _DMS = (
 )
 _WITH_UNIT = r"^(?P<number>[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[A-Za-z°º]+)$"
 _PACKED = re.compile(r"d+m+s+f*")  # notations of degrees, minutes and seconds in the digits of one number
+_MINUTES = re.compile(r"d+m+")  # of degrees and minutes
 _MOST_TURN = 720.0  # deg
 _MOST_WORDS = 3  # that stand for missing numbers in one column
 
@@ -69,6 +70,8 @@ class Readings(NamedTuple):
 
 def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) -> Readings:
     """The readings of one quantity. Raises InputError for the first cell that is no finite number."""
+    if "added" in described.roles:
+        return _turned([numbers(column, origin) for column in columns], described)
     if len(columns) > 1:
         degrees, minutes, *seconds = (numbers(column, origin) for column in columns)
         sign = np.where(np.signbit(degrees), -1.0, 1.0)
@@ -101,7 +104,21 @@ def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) 
         words += (f'"{described.name}" counts downwards and is turned round',)
     if _PACKED.fullmatch(described.notation) and described.quantity != "range":
         return Readings(_from_digits(values), _in_degrees(described), words)
+    if _MINUTES.fullmatch(described.notation) and described.quantity != "range":  # 302.4705: 302 degrees, 47.05 minutes
+        whole = np.trunc(np.round(values, 9))
+        return Readings(whole + (values - whole) * 100 / 60, _in_degrees(described), words)
     return Readings(values, described, words)
+
+
+def _turned(angles: Sequence[FloatArray], described: Column) -> Readings:
+    """Azimuths from north: those from the carrier's head and its heading, or from magnetic north and the variation."""
+    stated = [unit_named("azimuth", word) for word in described.written]
+    units = [unit or next(filter(None, stated), described.unit) for unit in stated]
+    known = any(stated)
+    if units[0] == units[1] and not known:
+        return Readings(angles[0] + angles[1], described)
+    total = units[0].to_si(angles[0]) + units[1].to_si(angles[1])
+    return Readings(total, described._replace(unit=UNITS["azimuth"]["rad"], unit_in_name=True))
 
 
 def without_sentinels(found: Mapping[str, Readings]) -> dict[str, Readings]:
@@ -246,12 +263,18 @@ def _with_units(text: pa.ChunkedArray, origin: Origin, described: Column) -> Rea
         return None
     written = [word for word in pc.unique(pc.struct_field(fields, "unit")).to_pylist() if word]
     from_north = described.quantity == "azimuth" and written in (["T"], ["TN"])
-    units = {unit_named(described.quantity, word) for word in written}
-    unit = units.pop() if len(units) == 1 else None
-    if unit is None and not from_north:
+    each = {word: unit_named(described.quantity, word) for word in written}
+    units = set(each.values())
+    unit = next(iter(units)) if len(units) == 1 else None
+    if None in units and not from_north:
         return None
     cells = pc.replace_substring(pc.struct_field(fields, "number"), ",", ".")
     values = numbers(pc.if_else(pc.equal(cells, ""), None, cells).cast(pa.float64()), origin)
+    if len(units) > 1:  # 613.6 m ... 1.2 km
+        factor = {word: found.multiply / found.divide for word, found in each.items() if found}
+        words = pc.struct_field(fields, "unit").to_pylist()
+        values = values * np.array([factor.get(word, np.nan) for word in words])
+        unit = si_unit(described.quantity)
     return Readings(values, described if unit is None else described._replace(unit=unit, unit_in_name=True))
 
 

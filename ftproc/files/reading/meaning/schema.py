@@ -23,7 +23,7 @@ from ftproc.files.reading.meaning import parts, questions
 from ftproc.files.reading.meaning.names import Name, taken_apart
 from ftproc.files.reading.meaning.questions import Propose, answer, listed
 from ftproc.files.units import Unit, si_unit, unit_named
-from ftproc.files.words import GERMAN, QUANTITIES
+from ftproc.files.words import ALIASES, CORRECTED, GERMAN, QUANTITIES, WEAK_ALIASES, ZENITH_ALIASES
 
 _OF_A_TRAJECTORY = ("row", "x_m", "vx_mps", "sigma_x_m", "outlier_range", "nis")
 
@@ -81,10 +81,9 @@ def resolve(
         raise InputError(f"{source}: this is a trajectory that ftproc wrote, no log: ftproc score {source}.")
     apart = [taken_apart(name, unit) for name, unit in zip(names, unit_row or [""] * len(names), strict=True)]
     if any(name.stem in GERMAN for name in apart):  # whose Grad are degrees, unless the values say otherwise
-        apart = [
-            name._replace(unit="") if re.search(r"[(\[] *grad *[)\]]$", name.text, re.I) else name for name in apart
-        ]
+        apart = [name._replace(unit="") if re.search(r"\bgrad *[)\]]?$", name.text, re.I) else name for name in apart]
     table = _Table(source, names, apart, units)
+    questions.refuse_side_by_side(source, apart, columns)
     found: dict[str, Column] = {}
     taken = {index for name in columns.values() if name != ABSENT for index in table.indices(name)}
     for quantity in QUANTITIES:
@@ -97,6 +96,8 @@ def resolve(
         if column is not None:
             found[quantity] = column
             taken |= set(column.positions)
+    if not {"range", "azimuth"} & {*found, *columns}:
+        questions.refuse_positions(source, apart)
     questions.check_complete(source, names, {q: column.positions for q, column in found.items()}, propose)
     for quantity in QUANTITIES:
         if quantity not in found and columns.get(quantity) != ABSENT:
@@ -127,7 +128,6 @@ class _Table(NamedTuple):
         return [index for part in found for index in part] if all(found) else []
 
     def column(self, quantity: str, position: int, why: str, others: Sequence[str] = ()) -> Column:
-        questions.refuse_twice(self.source, self.names, self.names[position])
         name, unit = self.apart[position], self.units.get(quantity)
         stated = unit_named(quantity, name.unit) if name.unit else None
         chosen = (unit_named(quantity, unit) if unit else stated) or si_unit(quantity)
@@ -144,11 +144,17 @@ class _Table(NamedTuple):
         unit = self.units.get(quantity)
         chosen = (unit and unit_named(quantity, unit)) or si_unit(quantity)
         name = " + ".join(self.names[index] for index in indices)
-        written = tuple(self.apart[index].unit for index in indices)
+        written = tuple(
+            (parts.unit_of_day(self.apart[index]) or self.apart[index].unit)
+            if role == "time"
+            else self.apart[index].unit
+            for role, index in roles.items()
+        )
         time = self.apart[roles["time"]] if "time" in roles else self.apart[indices[0]]
         fraction = parts.unit_of_fraction(self.apart[roles["fraction"]]) if "fraction" in roles else ""
         return Column(
             quantity, indices, name, chosen, unit is not None, False, tuple(roles), time.stem, time.notation, why,
+            zenith=quantity == "elevation" and self.apart[indices[0]].stem in ZENITH_ALIASES,
             written=written, fraction=fraction,
         )  # fmt: skip
 
@@ -182,6 +188,8 @@ def _named(table: _Table, quantity: str, name: str) -> Column:
             f"{nearest(name, table.names) or '.'} Its columns are: {listed(table.names)}."
         )
     if len(indices) == 1:
+        if not name.isdecimal():
+            questions.refuse_twice(table.source, table.names, name)
         return table.column(quantity, indices[0], "--columns")
     roles = parts.together(quantity, [table.apart[index] for index in indices])
     if roles is None:
@@ -190,6 +198,13 @@ def _named(table: _Table, quantity: str, name: str) -> Column:
             "Date+Time, Week+Seconds, Day+Time, Hour+Minute+Second and Degrees+Minutes+Seconds."
         )
     return table.joint(quantity, {role: indices[k] for role, k in roles.items()}, "--columns")
+
+
+def _is_corrected(name: Name, quantity: str) -> bool:
+    """Whether a column may hold the readings of the quantity after a correction."""
+    rest = name._replace(words=tuple(word for word in name.words if word not in CORRECTED))
+    return quantity != "time" and len(rest.words) < len(name.words) and not name.foreign \
+        and rest.core() in (*ALIASES[quantity], *WEAK_ALIASES[quantity])  # fmt: skip
 
 
 def _recognised(table: _Table, quantity: str, free: Sequence[int]) -> Column | None:
@@ -205,16 +220,20 @@ def _recognised(table: _Table, quantity: str, free: Sequence[int]) -> Column | N
     if not fits:
         zenith = [index for index in free if quantity == "elevation" and table.apart[index].is_zenith()]
         if zenith:
+            questions.refuse_twice(table.source, names, names[zenith[0]])
             return table.column(quantity, zenith[0], "its name, that of a zenith angle")
         questions.refuse_unknown_unit(table.source, table.apart, free, quantity)
         return None
     for index in fits:
         questions.refuse_twice(table.source, names, names[index])
     kinds = {(name.stem, name.unit, name.notation) for name in (table.apart[index] for index in fits)}
+    corrected = [index for index in free if index not in fits and _is_corrected(table.apart[index], quantity)]
+    if corrected:  # or what was corrected
+        fits, kinds = [fits[0], *corrected], set()
     if len(fits) > 1 and (quantity != "time" or len(kinds) < len(fits)):
         raise InputError(
             f"{table.source}: columns {' and '.join(names[index] for index in fits)} could each be the {quantity}. "
-            f"Say which one it is with {answer(names, {quantity: fits[0]})}."
+            f"Say which one it is: {' or '.join(answer(names, {quantity: index}) for index in fits[:3])}."
         )
     name, unit = table.apart[fits[0]], table.units.get(quantity)
     column = table.column(quantity, fits[0], "its name", [names[index] for index in fits[1:]])

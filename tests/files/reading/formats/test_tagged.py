@@ -43,7 +43,10 @@ def test_records_on_one_line_may_lack_a_value(make: Make) -> None:
 def test_a_name_that_comes_again_on_a_line_is_asked_about(make: Make, second: str) -> None:
     text = "".join(f"TRK t={k / 10} r={8000 + k} a=0.{k} e=0.2 {second.format(s=9000 + k)}\n" for k in ROWS)
     path = make(text, "a.txt")
-    assert "columns 1:r and 2:r could each be the range. Say which one it is with --columns range=1:r" in refused(path)
+    assert (
+        "columns 1:r and 2:r could each be the range. Say which one it is: --columns range=1:r or --columns range=2:r"
+        in refused(path)
+    )
     columns = "range=2:r" if "a=" not in second else "range=2:r,azimuth=2:a,elevation=2:e"
     assert logs.read(path, columns=columns).measurement[3, 0] == 9003
 

@@ -11,7 +11,7 @@ from ftproc.errors import InputError, first_line
 from ftproc.files.limits import Room
 from ftproc.files.reading.formats import content
 from ftproc.files.reading.formats.columnar import sizes
-from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.formats.header import TableHeader, units_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -44,7 +44,7 @@ def read(name: str, path: Path, room: Room) -> TableHeader:
             room.check(sum(map(sizes.unpacked, table.columns)), table.num_rows)
             return table.select([indices.index(index) for index in (*numeric, *others)])
 
-    return TableHeader(name, names, load, metadata=schema.metadata or {}, form="Arrow")
+    return TableHeader(name, names, load, metadata=schema.metadata or {}, units=units_of(schema), form="Arrow")
 
 
 @contextlib.contextmanager

@@ -103,7 +103,7 @@ def by_names(header: TableHeader) -> TableHeader:
         return header
     columns = {quantity: header.names[found[0]] for quantity, found in indices.items()}
     time = _named(tuple(header.names), _QUANTITIES["time"])
-    units = ["deg" if name == columns["azimuth"] else "" for name in header.names]
+    units = ["deg" if name == columns["azimuth"] else "s" * (name == time) for name in header.names]
     if max(map(_float, header.load([], indices["range"]).column(0).to_pylist()), default=0.0) <= _FARTHEST_NMI:
         units[indices["range"][0]] = "nmi"
     target = next((header.names[plain.index(word)] for word in _OF_TARGETS if word in plain), "")
@@ -214,7 +214,7 @@ def stated(header: TableHeader, category: int, table: Sparse) -> TableHeader:
     names = tuple(header.names)
     columns = {quantity: _named(names, roles) for quantity, roles in _QUANTITIES.items()}
     columns = {quantity: name for quantity, name in columns.items() if name} | {"elevation": ABSENT}
-    unit = {columns.get("range", ""): _PLOTS[category], columns.get("azimuth", ""): "deg"}
+    unit = {columns.get("range", ""): _PLOTS[category], columns.get("azimuth", ""): "deg", columns.get("time", ""): "s"}
     ranges = (_float(cell) for cell in table.columns[columns["range"]][1])
     if max(ranges, default=0.0) > _FARTHEST_NMI and _PLOTS[category] == "nmi":
         del unit[columns["range"]]

@@ -17,8 +17,8 @@ from ftproc.errors import InputError
 from ftproc.files.limits import Room
 from ftproc.files.reading.formats.header import Stated, TableHeader
 from ftproc.files.reading.formats.sparse import Sparse
+from ftproc.files.units import LIGHT_MPS
 
-LIGHT_MPS = 299_792_458.0
 _DAY_S = 86400.0
 _RECORDS = {"10": "full rate", "11": "normal points", "30": "pointing angles"}
 _TIMED_AT = {"0": -0.5, "1": 0.0, "2": 0.5}  # ground receive, target, ground transmit: times of flight to the target

@@ -20,8 +20,9 @@ from ftproc.files import leap_seconds
 from ftproc.files.limits import Room
 from ftproc.files.reading.formats.header import Stated, TableHeader
 from ftproc.files.reading.formats.sparse import Sparse
+from ftproc.files.units import LIGHT_MPS
 
-_LIGHT_KMPS = 299_792.458
+_LIGHT_KMPS = LIGHT_MPS / 1e3
 _LEAF = re.compile(r"<(?:\w{1,20}:)?(\w{1,60})(?:\s[^<>]*+)?>([^<>]*+)</|<(/?)(?:\w{1,20}:)?(metadata|data)>")
 _ANGLES = {
     "RADEC": "right ascension and declination",

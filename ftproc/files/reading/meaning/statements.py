@@ -1,0 +1,69 @@
+"""What is said beside a table of its units and conventions: in columns of units, and in the lines above it, about which
+the user is asked where the program would take them otherwise."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+
+from ftproc.errors import InputError
+from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.meaning.names import taken_apart
+from ftproc.files.reading.meaning.numbers import as_text
+from ftproc.files.reading.meaning.questions import answer
+from ftproc.files.units import unit_named
+from ftproc.files.words import QUANTITIES
+from ftproc.settings import Station
+
+_OF_UNITS = re.compile(r"[\s._/-]*(?:units?|uom|einheit|unité)$", re.IGNORECASE)
+_VALUE = re.compile(r"[\s._/-]*(?:val|value)$", re.IGNORECASE)
+#: What a line above the table may say -> the quantity that it is about, what that means, and the options that say it.
+_CONVENTIONS = (
+    (r"two[- ]?way|round[- ]?trip", "range", "ranges there and back", "--units 'range=0.5 m' (half of each)"),
+    (r"zenith(?:al)?[ -](?:distance|angle)", "elevation", "angles from the zenith", "--elevation-from zenith"),
+    (r"(?:from|zero at|counted from|south is zero) (?:the )?south\b", "azimuth", "azimuths from south",
+     "azimuth_from = \"north\" and azimuth_zero_deg = 180 in the [station] of a station file"),
+)  # fmt: skip
+
+
+def with_units_beside(header: TableHeader) -> TableHeader:
+    """The header with the units that columns of their own state: `Range unit` beside `Range`. Raises InputError where
+    such a column names several."""
+    about = {index: _OF_UNITS.sub("", name) for index, name in enumerate(header.names) if _OF_UNITS.search(name)}
+    units = list(header.units) or [""] * len(header.names)
+    for index, base in about.items():
+        fits = [k for k, name in enumerate(header.names) if k != index and _VALUE.sub("", name).lower() == base.lower()]
+        if len(fits) != 1 or not base:
+            continue
+        cells = {cell.strip() for cell in as_text(header.load([], [index]).column(0)).unique().to_pylist() if cell}
+        known = {cell for cell in cells if any(unit_named(quantity, cell) for quantity in QUANTITIES)}
+        if len(known) > 1:
+            raise InputError(
+                f'{header.source}: column "{header.names[index]}" names several units, {" and ".join(sorted(known))}; '
+                f'one is understood. Convert "{header.names[fits[0]]}" to one of them.'
+            )
+        if known and known == cells and not units[fits[0]]:
+            units[fits[0]] = known.pop()
+    return replace(header, units=units) if any(units) else header
+
+
+def refuse_unheard(header: TableHeader, station: Station, stated: Mapping[str, str]) -> None:
+    """Ask where a line above the table says a convention that nothing else has settled. stated: the units that the user
+    has named."""
+    settled = {
+        "range": "range" in stated,
+        "elevation": station.elevation_from is not None,
+        "azimuth": station.azimuth_from is not None or station.azimuth_zero_rad != 0.0,
+    }
+    for pattern, quantity, what, say in _CONVENTIONS:
+        line = next((line for line in header.above if re.search(pattern, line, re.IGNORECASE)), None)
+        if line is not None and not settled[quantity]:
+            if quantity == "range":
+                index = next((k for k, name in enumerate(header.names) if taken_apart(name).means("range")), 0)
+                say = f"{answer(header.names, {'range': index})} {say}"
+            otherwise = {"range": "range=m", "elevation": "--elevation-from horizon", "azimuth": "--azimuth-from north"}
+            raise InputError(
+                f'{header.source}: a line above the table, "{line.strip()[:80]}", speaks of {what}. If these are such, '
+                f"say {say}; if not, {'--units ' if quantity == 'range' else ''}{otherwise[quantity]}."
+            )
