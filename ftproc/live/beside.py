@@ -23,11 +23,13 @@ RATE = len(QUANTITIES)  # the column of range rates, after those of all logs
 
 
 class Columns(NamedTuple):
-    """The columns, and the height of the station, m. Heights stand in the column of elevations until they are these."""
+    """The columns, the height of the station, m, and what is known of the target's if none is measured. Heights
+    stand in the column of elevations until they are these."""
 
     rate: Further | None = None
     height: Further | None = None
     own_m: float = 0.0
+    prior: heights.Prior | None = None
 
     @classmethod
     def of(cls, names: Sequence[str], row: Sequence[str], found: Mapping[str, Any], recipe: Recipe) -> Columns:
@@ -36,7 +38,10 @@ class Columns(NamedTuple):
         rate, height = (further.by_name(each, *stated) for each in (further.RANGE_RATE, further.HEIGHT))
         plane = {"range", "azimuth"} <= set(found) and "elevation" not in found
         site = recipe.settings.site
-        return cls(rate, height if plane and recipe.settings.height is None else None, site[2] if site else 0.0)
+        specified = recipe.settings.height
+        height = height if plane and specified is None else None
+        prior = heights.Prior(*specified, heights.SPECIFIED) if specified else heights.ANY
+        return cls(rate, height, site[2] if site else 0.0, prior if plane and height is None else None)
 
     @property
     def barometric(self) -> bool | None:

@@ -19,18 +19,18 @@ from ftproc.files.options import parse_columns, parse_units, parse_widths
 from ftproc.files.reading import converting, understanding
 from ftproc.files.reading.clocks.growing import Stamps
 from ftproc.files.reading.formats import layout
-from ftproc.files.reading.meaning import schema
+from ftproc.files.reading.meaning import schema, several
 from ftproc.files.units import UNITS
 from ftproc.files.words import DEPRESSIONS, MISSING_WORDS, QUANTITIES
 from ftproc.live import beside
 from ftproc.live.beside import RATE
-from ftproc.live.growing import Block, Say, no_row, no_table
+from ftproc.live.lines.growing import Block, Say, SeveralTargets, no_row, no_table
 from ftproc.quality.sanity import LATEST_S
 from ftproc.records import FloatArray, MeasurementLog
 from ftproc.settings import Station
 
 _MOST_LINES = 20  # that are no comments, among which the names and the first row must be,
-_MOST_HEAD, _LARGEST_HEAD = 2000, 1 << 22  # and of all lines to the first row, as in a complete log, and characters
+_MOST_HEAD, _LARGEST_HEAD = 2000, 1 << 22  # and of all lines to the first row, and characters
 _SAMPLE = 100  # rows that judge assumptions
 _OTHERS = {"time": "ms", "range": "km", "azimuth": "deg", "elevation": "deg"}  # units, as examples
 _MISSING = frozenset(MISSING_WORDS)
@@ -131,8 +131,10 @@ class Reader:
         return found.first
 
     def _judge(self) -> None:
-        """Say what the first rows show against what was assumed."""
+        """Say what the first rows show against what was assumed. Raises InputError for rows of several targets."""
         if self._table is not None and self._sample is not None and np.isfinite(self._sample[:, 0]).any():
+            if not self._recipe.target and several.alternate(self._sample[:, 1:4]):
+                raise SeveralTargets(several.question(self._source, self._table.names))
             doubt = self._table.doubt(self._sample)
             if doubt:
                 self._say(doubt)
@@ -217,11 +219,8 @@ class _Table(NamedTuple):
     def _row(self, number: int, cells: Sequence[str], moments: Mapping[str, float]) -> list[float]:
         where = f"{self.source}: line {number}"
         if len(cells) != len(self.names):
-            what = "cell" if len(cells) == 1 else "cells"
-            raise InputError(
-                f"{where} has {len(cells)} {what} where the header has {len(self.names)}. Complete the row, or delete "
-                "it."
-            )
+            cells_are = f"{len(cells)} cell{'s' * (len(cells) != 1)} where the header has {len(self.names)}"
+            raise InputError(f"{where} has {cells_are}. Complete the row, or delete it.")
         row = [np.nan] * (RATE + 1)
         self.beside.fill(row, cells)
         for k, quantity in enumerate(QUANTITIES):

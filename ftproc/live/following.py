@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ftproc.errors import InputError
-from ftproc.live.growing import Say
+from ftproc.live.lines.growing import Say
 from ftproc.live.sources import File, opened
 from ftproc.live.state import Entry, Kind, StateFile
 from ftproc.live.stop import Source, Stop
@@ -89,7 +89,7 @@ class Following:
             yield from self.stream.take(entry.data, entry.now_s, self.stop)
         elif self.stream.due_s <= entry.now_s:
             self._keep(entry)
-            yield from self.stream.tick(entry.now_s)
+            yield from self.stream.tick(entry.now_s, self.stop)
 
     def _keep(self, entry: Entry) -> None:
         if self._state is not None:

@@ -58,12 +58,14 @@ class Live:
         range_rates: bool = False,
         barometric: bool | None = None,
         model: Model | str | None = PACKAGED,
+        prior: heights.Prior | None = None,
     ) -> None:
         """settings: editing `live` (also where they say `two-pass`, the default) or `forward`. late_s: at most the lag;
         None for the lag. range_rates: whether the rows have columns of range rates. barometric: whether the heights
         are that stand for the elevations (by `ftproc.methods.heights.elevation`); None where these are measured. model:
         the network's correction, as in `ftproc.filter_log`; rows with range, azimuth and elevation alone have one, with
-        `live` and lag 0. Raises UsageError, ModelError."""
+        `live` and lag 0. prior: of the height, where no elevation or height is measured. Raises UsageError,
+        ModelError."""
         self.resume(settings or FilterSettings(), model)
         self._correction = LiveCorrection()
         self.late, editor = 0, live.editor(self.settings)
@@ -74,7 +76,7 @@ class Live:
         self._row: list[int] = []  # their numbers,
         self._came_s: list[float] = []  # and when each came, or the one after it
         self._taken, self._left_s = 0, -math.inf
-        self._rates, self._barometric = range_rates, barometric
+        self._rates, self._barometric, self._prior = range_rates, barometric, prior
 
     def resume(self, settings: FilterSettings, model: Model | str | None) -> None:
         """Go on with these settings and this model, when all else is as it was kept."""
@@ -85,6 +87,11 @@ class Live:
             raise UsageError(f"Live runs {registry.MAIN} with editing live or forward, not smoothed.")
         self.settings, self._model = settings, live_model(model, settings.editing, settings.lag_s)
         self._coasting: LiveEditor | None = None
+
+    @property
+    def late_s(self) -> float:
+        """By how much less than this a row may be late."""
+        return self._late_s
 
     @property
     def waiting(self) -> int:
@@ -227,7 +234,9 @@ class Live:
             if model is not None and plain:
                 correction = self._correction.of(estimate.run, model.filter)
             parts.append(
-                _trajectory(row[low:high], time_s[low:high], estimate, correction, self._rates, self._barometric)
+                _trajectory(
+                    row[low:high], time_s[low:high], estimate, correction, self._rates, self._barometric, self._prior
+                )
             )
             low = high
         return joined(parts) if parts else _trajectory(row[:0], time_s[:0], None, np.empty((0, 6)))
@@ -240,8 +249,10 @@ def _trajectory(
     correction: FloatArray,
     rates: bool = False,
     barometric: bool | None = None,
+    prior: heights.Prior | None = None,
 ) -> Trajectory:
-    """The rows of an estimate with their correction (n, 6); none without one. rates, barometric: as in `Live`."""
+    """The rows of an estimate with their correction (n, 6); none without one. rates, barometric, prior: as in
+    `Live`."""
     n = len(row)
     if estimate is None:
         none = np.empty((0, 3))
@@ -264,8 +275,13 @@ def _trajectory(
         cleaned_sigma = heights.elevated(common, slice(None), cleaned, cleaned_sigma)
         label, column = heights.labelled(label)
         columns |= column
-    if absent:  # the filter ran on stand-ins; what depends on them is not published
-        state[:], sigma[:], path_sigma[:], label[:, absent] = np.nan, np.nan, np.nan, MISSING
+    if tuple(absent) == heights.ABSENT and prior is not None:
+        common = heights.Common(prior, np.zeros(n))
+        state, sigma, path_sigma = heights.placed(common, slice(None), state, sigma, path_sigma)
+    elif absent:  # the filter ran on stand-ins; what depends on them is not published
+        state[:], sigma[:], path_sigma[:] = np.nan, np.nan, np.nan
+    if absent:
+        label[:, absent] = MISSING
         cleaned[:, absent], cleaned_sigma[:, absent] = np.nan, np.nan
     return Trajectory(
         "live",

@@ -18,7 +18,7 @@ from ftproc.correction.live import live_model
 from ftproc.files.conventions import frame
 from ftproc.files.writing import atomic, geodesy, maps, outputs, streams
 from ftproc.live.following import Following
-from ftproc.live.growing import Say
+from ftproc.live.lines.growing import Say
 from ftproc.live.outputs.page import Page
 from ftproc.live.outputs.rows import Output, written
 from ftproc.live.state import StateFile

@@ -34,6 +34,12 @@ def is_network(source: str) -> bool:
     return source.partition("://")[0] in NETWORK
 
 
+def cannot_be_corrected(source: str) -> bool:
+    """Whether what comes is gone when it has come: from the network, a serial line, or a pipe with a name."""
+    path = None if source == "-" else remote.local(source)
+    return is_network(source) or (path is not None and path.exists() and not path.is_file())
+
+
 @contextlib.contextmanager
 def opened(source: str) -> Iterator[Source]:
     """A file of this machine, `-`, `udp://HOST:PORT` or `tcp://HOST:PORT`. Raises InputError."""

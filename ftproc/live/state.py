@@ -28,7 +28,9 @@ from ftproc.core.model import motion
 from ftproc.correction import live as correction
 from ftproc.errors import InputError, OutputError
 from ftproc.files.writing import atomic
-from ftproc.live import forms, growing, live, order, plots
+from ftproc.live import live, order, times
+from ftproc.live.lines import forms, growing, plots
+from ftproc.methods import heights
 
 MAGIC = b"ftproc state 1\n"
 _HEAD = struct.Struct("<Q16s")  # size and digest of what is known
@@ -44,7 +46,8 @@ _KINDS: dict[str, Any] = {
         pace.Pace, pace.Clock, pieces.Sizes, readings.Columns, readings.Labels, readings.Repeats, rows.Waiting,
         rows.Published, records.Model, records.Start, smoother.SmootherRun, two_pass.Known, track.Track,
         gate.GateSettings, by_hand.Accepted, motion.Motion, beside.Rates,
-        turning.Second, turning.Turning, correction.LiveCorrection, records.FilterRun,
+        heights.Prior, times.Times, times.Pause, turning.Second, turning.Turning, correction.LiveCorrection,
+        records.FilterRun,
     )
 }  # fmt: skip
 _FUNCTIONS = {"edit": two_pass.edit}

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -13,13 +13,14 @@ import numpy as np
 from ftproc.config.recipe import Recipe
 from ftproc.errors import InputError, UsageError
 from ftproc.files.options import ABSENT
-from ftproc.live import forms
 from ftproc.live.columns import Reader
-from ftproc.live.growing import LINES, Block, Lines, Say
+from ftproc.live.lines import forms
+from ftproc.live.lines.growing import LINES, Block, Lines, Say, SeveralTargets
+from ftproc.live.lines.plots import Plots, is_asterix
 from ftproc.live.live import Live
-from ftproc.live.plots import Plots, is_asterix
-from ftproc.live.sources import is_network
+from ftproc.live.sources import cannot_be_corrected, is_network
 from ftproc.live.stop import Stop
+from ftproc.live.times import Pause, Rows, Times, Verdict
 from ftproc.records import FloatArray, IntArray, Trajectory
 from ftproc.settings import Station
 
@@ -27,27 +28,18 @@ AT_ONCE_S = 0.1  # that a push of some rows may take, about, so that a stop is h
 LATE = 100  # rows that came too late, after which it is said
 SAID = 3  # lines that are not understood, after which no more of them are named
 MOST_TARGETS = 256
-COAST_ROWS, SHORTEST_S = 10_000, 1e-3  # rows that are coasted in a pause, and their interval
 
 
 class Stream:
     """A log that is followed. tracks: by the target; one, of no name, where nobody asked for a target.
 
     taken, timed, untimed: rows that have been read, that are used, and that have no time. bad: lines that were not
-    understood. others: rows of more targets than are followed. unused: rows that had been read when a stop was overdue.
-    fault: the row for which nothing more is read.
+    understood. wrong: rows whose time is. others: rows of more targets than are followed. unused: rows that had been
+    read when a stop was overdue. fault: the row for which nothing more is read.
     """
 
-    kept_apart = (
-        "source",
-        "recipe",
-        "target",
-        "coast_s",
-        "fault",
-        "_say",
-        "_reader",
-        "_only",
-    )  # from what is kept for a crash
+    #: Of what is kept for a crash.
+    kept_apart = ("source", "recipe", "target", "coast_s", "fault", "_say", "_reader", "_only")
 
     def __init__(self, source: str, recipe: Recipe, say: Say, coast_s: float = 0.0) -> None:
         """coast_s: how long a track goes on in a pause. Raises UsageError."""
@@ -58,10 +50,10 @@ class Stream:
         self.source, self.recipe, self.coast_s, self._say = source, recipe, coast_s, say
         self.target, _, self._only = ("" if recipe.target == ABSENT else recipe.target).partition("=")
         self.tracks = dict[str, Live]()
-        self.taken = self.timed = self.bad = self.others = self.unused = self.untimed = 0
+        self.taken = self.timed = self.bad = self.others = self.unused = self.untimed = self.wrong = 0
+        self._times, self._late_before = dict[str, Times](), 0
         self.fault: InputError | None = None
-        self._came_s = dict[str, float]()  # when the newest reading of each track came
-        self._coasted = dict[str, int]()  # rows since then
+        self._pauses = dict[str, Pause]()
         self._lines: Lines | Plots = Lines(source)
         self._form = forms.Form()
         self._reader, self._head = Reader(source, recipe, say), list[str]()
@@ -75,7 +67,7 @@ class Stream:
     @property
     def late(self) -> int:
         """Rows that came too late to be used."""
-        return sum(track.late for track in self.tracks.values())
+        return self._late_before + sum(track.late for track in self.tracks.values())
 
     def understand_again(self) -> None:
         """When the rest is as it was kept: the table, from its first lines."""
@@ -107,18 +99,28 @@ class Stream:
                 return
             yield from self._rows(block, now_s, stop)
 
-    def tick(self, now_s: float) -> Iterator[Trajectory]:
+    def tick(self, now_s: float, stop: Stop) -> Iterator[Trajectory]:
         """The rows that are published when nothing comes until a time of the clock."""
         for name, track in self.tracks.items():
+            if self._confirmed_s(name) <= now_s:
+                yield from self._sorted(name, self._times[name].rest(), now_s, stop)
             if track.due_s <= now_s:
                 yield from self._named(name, track.due(now_s))
-            if self._coast_s(name) <= now_s:
-                yield from self._named(name, self._coast(name))
+            if self._pauses[name].due_s(track, self.coast_s) <= now_s:
+                yield from self._named(name, self._pauses[name].coast(track))
 
     @property
     def due_s(self) -> float:
         """When there is something to do, by the clock."""
-        return min((min(track.due_s, self._coast_s(name)) for name, track in self.tracks.items()), default=math.inf)
+        return min(
+            (min(track.due_s, self._pauses[name].due_s(track, self.coast_s), self._confirmed_s(name))
+             for name, track in self.tracks.items()), default=math.inf
+        )  # fmt: skip
+
+    def _confirmed_s(self, name: str) -> float:
+        """When a row far ahead has waited for the next one for long enough."""
+        times = self._times[name]
+        return self._pauses[name].came_s + times.wait_s if times.waiting else math.inf
 
     def finish(self, stop: Stop) -> Iterator[Trajectory]:
         """The rows that wait, when nothing more comes. Raises InputError, when they are out, for a row that was not
@@ -134,17 +136,22 @@ class Stream:
             self.fault = self.fault or error
         if self.unused:
             self._say(f"{self.source}: stopped before {self.unused} rows that had been read were used.")
-        for name, track in self.tracks.items():
-            yield from self._named(name, track.finish())
+        for name in self.tracks:
+            yield from self._sorted(name, self._times[name].rest(), math.inf, stop)
+            yield from self._named(name, self.tracks[name].finish())
         if self.fault is not None:
             raise self.fault
 
     def _say_what_is_left_out(self) -> None:
+        if not self.timed and self._only and self.taken > self.untimed:
+            raise InputError(f"{self.source}: no row meets {self.target}={self._only}; check the column and the value.")
         if not self.timed:
             raise InputError(f"{self.source}: no row has a time, so nothing is written; fill the times in.")
         for count, what in (
             (self.untimed, "rows have no time, and are left out"),
             (self.bad, "lines were not understood, and are left out"),
+            (self.wrong, "rows have times far ahead of those around them, and are left out"),
+            (self._form.damaged, "sentences have a wrong checksum, and are left out"),
             (self.others, f"rows are of other targets than the first {MOST_TARGETS}, and are left out"),
         ):
             if count:
@@ -171,7 +178,8 @@ class Stream:
         one_by_one = bool(self.target) or type(self._form) is not forms.Form
         if not one_by_one:
             readings, fault, _ = self._understood(block)
-            one_by_one = fault is not None and is_network(self.source)
+            one_by_one = fault is not None and cannot_be_corrected(self.source)
+            one_by_one &= not isinstance(fault, SeveralTargets)
             if not one_by_one:
                 yield readings, fault, ""
         if one_by_one:
@@ -192,8 +200,8 @@ class Stream:
         return readings, fault, table.texts[-1]
 
     def _leave_out(self, fault: InputError) -> None:
-        """A line of the network may be damaged; a log that has a bad one is corrected first."""
-        if not is_network(self.source):
+        """A line of the network or of a serial line may be damaged; a log that has a bad one is corrected first."""
+        if not cannot_be_corrected(self.source) or isinstance(fault, SeveralTargets):
             self.fault = fault
             return
         self.bad += 1
@@ -214,11 +222,43 @@ class Stream:
             if len(self.tracks) >= MOST_TARGETS:
                 self.others += len(timed)
                 return
-            beside, model = self._reader.beside, self.recipe.model
-            self.tracks[name] = Live(self.recipe.settings, None, beside.rate is not None, beside.barometric, model)
-        self._came_s[name], self._coasted[name] = now_s, 0
-        for part in self._push(self.tracks[name], readings[timed], numbers, now_s, stop):
-            yield from self._named(name, part)
+            self.tracks[name], self._times[name] = self._new_track(), Times()
+        self._pauses[name] = Pause(now_s)
+        times = self._times[name]
+        if not math.isfinite(times.interval_s):
+            times.interval_s = self.tracks[name].interval_s
+        yield from self._sorted(name, times.sorted(readings[timed], numbers, self.tracks[name].late_s), now_s, stop)
+
+    def _new_track(self) -> Live:
+        beside = self._reader.beside
+        return Live(
+            self.recipe.settings, None, beside.rate is not None, beside.barometric, self.recipe.model, beside.prior
+        )
+
+    def _sorted(
+        self, name: str, found: Iterable[tuple[Verdict, Rows]], now_s: float, stop: Stop
+    ) -> Iterator[Trajectory]:
+        """What is published of rows whose times are judged."""
+        for verdict, (readings, numbers) in found:
+            if verdict == Verdict.WRONG:
+                self.wrong += 1
+                if self.wrong <= SAID:
+                    more = " No more of them are named." if self.wrong == SAID else ""
+                    self._say(
+                        f"{self.source}: row {numbers[0]} has the time {readings[0, 0]:.10g} s, far ahead of the rows "
+                        f"around it, and is left out.{more}"
+                    )
+                continue
+            if verdict == Verdict.NEW:
+                before, track = self.tracks[name], self._new_track()
+                self._say(
+                    f"{self.source}: the times go back from {before.newest_s:.10g} to {readings[0, 0]:.10g} s and on "
+                    "from there; a new track begins."
+                )
+                yield from self._named(name, before.finish())
+                self._late_before, self.tracks[name] = self._late_before + before.late, track
+            for part in self._push(self.tracks[name], readings, numbers, now_s, stop):
+                yield from self._named(name, part)
 
     def _push(
         self, track: Live, readings: FloatArray, numbers: IntArray, now_s: float, stop: Stop
@@ -253,21 +293,3 @@ class Stream:
                     both = part.extra.append_column(self.target, names)
                 part = replace(part, extra=both)
             yield part
-
-    # -- pauses -----------------------------------------------------------------------------------------------------
-
-    def _coast_s(self, name: str) -> float:
-        """When the next row of a pause is due: an interval later than one that would have come in time."""
-        track, count = self.tracks[name], self._coasted[name] + 1
-        if not self.coast_s or track.waiting or count > COAST_ROWS:
-            return math.inf
-        after_s = count * max(track.interval_s, SHORTEST_S)
-        return (
-            self._came_s[name] + after_s + track.wait_s + track.interval_s
-            if after_s < self.coast_s + SHORTEST_S / 2
-            else math.inf
-        )
-
-    def _coast(self, name: str) -> Trajectory:
-        track, self._coasted[name] = self.tracks[name], self._coasted[name] + 1
-        return track.coast(self._coasted[name] * max(track.interval_s, SHORTEST_S))

@@ -9,7 +9,7 @@ from ftproc.config.recipe import Recipe
 from ftproc.errors import InputError
 from ftproc.files.reading import logs
 from ftproc.live.columns import Reader
-from ftproc.live.growing import Block
+from ftproc.live.lines.growing import Block
 from ftproc.settings import FilterSettings, Station
 from tests.simulated import simulate
 

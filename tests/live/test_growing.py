@@ -13,7 +13,7 @@ import pytest
 
 from ftproc.errors import InputError
 from ftproc.live import sources
-from ftproc.live.growing import LINES, Lines
+from ftproc.live.lines.growing import LINES, Lines
 from ftproc.live.sources import opened
 from ftproc.live.stop import Stop
 

@@ -9,7 +9,7 @@ import pytest
 
 from ftproc.config.recipe import Recipe
 from ftproc.errors import InputError
-from ftproc.live.plots import Plots, is_asterix
+from ftproc.live.lines.plots import Plots, is_asterix
 from ftproc.live.sources import Udp
 from ftproc.live.state import packed, unpacked
 from ftproc.live.stop import Stop

@@ -17,7 +17,7 @@ from ftproc.core.editing import two_pass
 from ftproc.core.filtering.records import Start
 from ftproc.errors import InputError
 from ftproc.live import publishing, sources, state
-from ftproc.live.growing import Lines
+from ftproc.live.lines.growing import Lines
 from ftproc.live.publishing import Request, follow_log
 from ftproc.live.state import Entry, Kind, StateFile, packed, unpacked
 from ftproc.settings import FilterSettings

@@ -5,9 +5,12 @@ from __future__ import annotations
 import functools
 import json
 import operator
+from dataclasses import replace
 
 import numpy as np
+import pytest
 
+import ftproc
 from ftproc.config.recipe import Recipe
 from ftproc.errors import InputError
 from ftproc.live import stream as streams
@@ -35,7 +38,7 @@ def followed(texts, recipe=Recipe(settings=SETTINGS), source="-", coast_s=0.0): 
         for k, text in enumerate(texts):
             found += list(stream.take(text.encode(), 0.1 * k, stop))
             while stream.due_s <= 0.1 * k:
-                found += list(stream.tick(stream.due_s))
+                found += list(stream.tick(stream.due_s, stop))
         found += list(stream.finish(stop))
     except InputError as error:
         said.append(str(error))
@@ -146,3 +149,97 @@ def test_rows_leave_and_coast_in_a_pause():
     np.testing.assert_allclose(time_s[row < 0], rows()[49][0] + 0.1 * np.arange(1, 21))
     np.testing.assert_array_equal(state[row >= 0], joined(plain, "state"))
     assert np.isfinite(state[row < 0]).all()
+
+
+def with_times(change):
+    """The rows of a log as text, the times of some of which are others."""
+    found = rows()
+    for index, time_s in change.items():
+        found[index][0] = time_s
+    return [HEADER, *(",".join(map(repr, row)) + "\n" for row in found)]
+
+
+@pytest.mark.parametrize("at", [1, 7, 40, ROWS - 2])
+def test_a_time_far_ahead_is_left_out_and_blinds_no_later_row(at):
+    _, parts, said = followed(with_times({at: 150.0}))
+    plain = followed([text for k, text in enumerate(csv()) if k != at + 1])[1]
+    np.testing.assert_array_equal(joined(parts, "time_s"), joined(plain, "time_s"))
+    np.testing.assert_array_equal(joined(parts, "state"), joined(plain, "state"))
+    assert joined(parts, "row").tolist() == [k for k in range(ROWS) if k != at]
+    assert f"row {at} has the time 150 s, far ahead of the rows around it, and is left out" in said[0]
+    assert "1 rows have times far ahead" in said[-1]
+
+
+def test_a_pause_is_no_wrong_time():
+    """Each row is there, whatever comes after it; the row after a pause waits for the next one or a little while."""
+    later = {k: rows()[k][0] + 500.0 for k in range(40, ROWS)}
+    _, parts, said = followed(with_times(later))
+    assert joined(parts, "row").tolist() == list(range(ROWS))
+    assert not said
+    _, parts, _ = followed(with_times({ROWS - 1: 500.0}))
+    assert joined(parts, "row").tolist() == list(range(ROWS))
+    found = followed([*with_times({ROWS - 1: 500.0}), *[""] * 20], source="udp://:1")[1]
+    assert found[-1].row.tolist() == [ROWS - 1]
+
+
+def test_a_clock_that_is_set_back_begins_a_new_track():
+    back = {k: rows()[k][0] - 3600.0 for k in range(30, ROWS)}
+    stream, parts, said = followed(with_times(back))
+    assert joined(parts, "row").tolist() == list(range(ROWS))
+    assert "the times go back from 2.9 to -3597 s and on from there; a new track begins" in said[0]
+    assert stream.late == 0
+
+
+def test_a_few_rows_that_are_too_late_are_counted():
+    """Less than a clock that is set back would make late."""
+    few = {k: rows()[k][0] - 3600.0 for k in range(30, 40)}
+    stream, parts, _ = followed(with_times(few))
+    assert joined(parts, "row").tolist() == [k for k in range(ROWS) if not 30 <= k < 40]
+    assert stream.late == 10
+
+
+def two_targets():
+    """The rows of two targets in turns."""
+    found = []
+    for k, row in enumerate(rows()):
+        found += [f"{','.join(map(repr, row))},A\n", f"{row[0]!r},{9000.0 + 3 * k!r},{2 + k / 500!r},0.5,B\n"]
+    return [HEADER.replace("\n", ",track\n"), *found]
+
+
+def test_the_rows_of_several_targets_are_no_one_track():
+    _, _, said = followed(two_targets(), source="udp://:1")
+    assert "the rows alternate between tracks. Say --target track for a track of each, or --target none" in said[-1]
+    stream, _, said = followed(two_targets(), Recipe(settings=SETTINGS, target="track"))
+    assert sorted(stream.tracks) == ["A", "B"]
+    assert not said
+    assert not followed(two_targets(), Recipe(settings=SETTINGS, target="none"))[2]
+
+
+def test_a_target_that_never_comes_is_named():
+    assert "no row meets track=C; check" in followed(two_targets(), Recipe(settings=SETTINGS, target="track=C"))[2][-1]
+
+
+@pytest.mark.parametrize(("height", "sigma_m"), [((150.0, 20.0), 20.0), (None, 6000.0)])
+def test_a_prior_of_the_height_makes_positions_as_in_a_complete_log(height, sigma_m):
+    settings = replace(SETTINGS, height=height)
+    texts = [line.rpartition(",")[0] + "\n" for line in csv()]
+    parts = followed(texts, Recipe(settings=settings))[1]
+    log = replace(flight().log.stretch(slice(0, ROWS)), measurement=flight().log.measurement[:ROWS] * [1, 1, np.nan])
+    whole = ftproc.filter_log(log, settings)
+    np.testing.assert_array_equal(joined(parts, "state"), whole.state)
+    np.testing.assert_array_equal(joined(parts, "sigma"), whole.sigma)
+    assert np.nanmax(joined(parts, "sigma")[:, 2]) == sigma_m
+
+
+def test_sentences_with_a_wrong_checksum_are_counted():
+    sentences = [f"$RATTM,01,{1 + k / 500:.3f},45.0,T,,,,,,N,,T,,{k // 60:02d}{k % 60:02d}00.00,A" for k in range(59)]
+    texts = [f"{each}*{'00' if k % 10 == 5 else checksum(each)}\r\n" for k, each in enumerate(sentences)]
+    _, _, said = followed(texts)
+    assert any("sentences have a wrong checksum, and are left out" in each for each in said)
+
+
+def checksum(sentence):
+    code = 0
+    for byte in sentence[1:].encode():
+        code ^= byte
+    return f"{code:02X}"

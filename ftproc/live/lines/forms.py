@@ -13,7 +13,7 @@ from typing import Any
 
 from ftproc.errors import InputError
 from ftproc.files.reading.formats.documents import flat
-from ftproc.live.growing import Block
+from ftproc.live.lines.growing import Block
 
 DAY_S = 86_400.0
 #: Distances of a TTM sentence in m: nautical miles, kilometres, statute miles.
@@ -29,7 +29,10 @@ def of(line: str) -> Form | None:
 
 
 class Form:
-    """The form of lines; here that of a table, whose lines stay what they are."""
+    """The form of lines; here that of a table, whose lines stay what they are. damaged: lines left out by their own
+    checksum."""
+
+    damaged = 0
 
     def table(self, source: str, block: Block) -> Block:
         """The lines of a table for some lines. Raises InputError for what is not of this form."""
@@ -103,13 +106,14 @@ class Nmea(Form):
     dropped, other ones passed over."""
 
     def __init__(self) -> None:
-        self.kind, self.cycle = "", Cycle(DAY_S)
+        self.kind, self.cycle, self.damaged = "", Cycle(DAY_S), 0
 
     def table(self, source: str, block: Block) -> Block:
         lines = list[str]()
         for line in block.texts:
             found = _SENTENCE.fullmatch(line.strip())
             if found is None or not _is_sound(found):
+                self.damaged += found is not None
                 lines.append("")
                 continue
             kind = "TTM" if found[1].endswith("TTM") else found[1]

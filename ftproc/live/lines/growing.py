@@ -14,6 +14,10 @@ LINES = 4096  # that are taken at once, of those that are there
 Say = Callable[[str], None]
 
 
+class SeveralTargets(InputError):
+    """The rows are of several targets, and nobody has said by which column they are told apart."""
+
+
 class Block(NamedTuple):
     """Complete lines, without their ends, and the number of the first one in its file, from 1."""
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from ftproc.files.reading.formats.standards import octets
-from ftproc.live.forms import DAY_S, Cycle
-from ftproc.live.growing import LINES, Block
+from ftproc.live.lines.forms import DAY_S, Cycle
+from ftproc.live.lines.growing import LINES, Block
 
 NAMES = ("time_s", "target", "range_m", "azimuth_deg")
 NMI_M = 1852.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -48,7 +48,7 @@ def refuse(header: TableHeader, found: Mapping[str, schema.Column], log: Measure
     free = [index for index, name in enumerate(header.names) if index not in used and header.names.count(name) == 1]
     mixed = alternate(log.measurement)
     if not mixed:
-        free = [index for index in free if _numbers_targets(header.names[index])]
+        free = [index for index in free if numbers_targets(header.names[index])]
     column = column_of(log.measurement, _cells(header, free[:_MOST_COLUMNS], log.row)) if free else None
     if column is not None:
         first, count = column.values[0], len(column.values)
@@ -73,7 +73,15 @@ def refuse(header: TableHeader, found: Mapping[str, schema.Column], log: Measure
         )
 
 
-def _numbers_targets(name: str) -> bool:
+def question(source: str, columns: Sequence[str]) -> str:
+    """The same of rows that are not all there yet. columns: names of the log's."""
+    names = [name for name in columns if numbers_targets(name)]
+    which = f"Say --target {quoted(names[0])} for a track of each, or" if names else "Send each on its own, or say"
+    return f"{source}: the rows alternate between tracks. {which} --target none if it is one target after all."
+
+
+def numbers_targets(name: str) -> bool:
+    """Whether the name of a column is one of those that number targets."""
     apart = names.taken_apart(name)
     return apart.stem in WORDS or bool(WORDS & set(apart.words))
 

@@ -1,0 +1,1 @@
+"""Bytes that come -> lines (`growing`), plots (`plots`) or lines of a table (`forms`)."""
