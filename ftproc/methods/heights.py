@@ -41,8 +41,7 @@ CHANGES_S = 300.0  # correlation time of an unknown height, for the sigmas of it
 LEAST_M = 0.1  # 1-sigma of a height: no instrument is so good
 STEEPEST = 0.9  # sine of the elevation: nearer to the vertical the azimuth says nothing of x and y
 MOST_OUTSIDE = 0.1  # share of heights that may be larger than the range
-FEWEST, BLOCKS = 3, 64  # readings in a block, and blocks, for the speed
-MOST_OF_BLOCKS = 0.9  # of the speeds between blocks
+FEWEST, BLOCKS, MOST_OF_BLOCKS = 3, 64, 0.9  # readings in a block, and blocks, for the speed; and of these speeds
 
 
 class Prior(NamedTuple):

@@ -64,7 +64,7 @@ def overwriting(target: Target, given: str, option: str = "-o") -> OutputError:
 def check_name(path: Path) -> None:
     """Raise OutputError for a name that no usual file system holds, also where its directory is not there yet."""
     if len(os.fsencode(path.name)) > _LONGEST:
-        raise _output_error(path, OSError(errno.ENAMETOOLONG, ""))
+        raise output_error(path, OSError(errno.ENAMETOOLONG, ""))
 
 
 def check_target(target: Target) -> None:
@@ -80,7 +80,7 @@ def check_target(target: Target) -> None:
         if not directory.is_dir():
             raise OSError(errno.ENOTDIR if directory.exists() else errno.ENOENT, "")
     except OSError as error:
-        raise _output_error(path, error) from error
+        raise output_error(path, error) from error
 
 
 @contextlib.contextmanager
@@ -116,7 +116,7 @@ def replacing(target: Target, synced: bool = True) -> Iterator[BinaryIO]:
             if synced:
                 _sync_directory(path.parent)
     except OSError as error:
-        raise _output_error(near, error) from error
+        raise output_error(near, error) from error
 
 
 @contextlib.contextmanager
@@ -145,7 +145,7 @@ def growing(target: Target, kept: bool = False) -> Iterator[BinaryIO]:
             os.fsync(file.fileno())
             kept = path.exists() and os.path.samestat(os.fstat(file.fileno()), path.stat())
     except OSError as error:
-        raise _output_error(near, error) from error
+        raise output_error(near, error) from error
     if not kept:
         raise OutputError(f"{target}: removed or replaced while it was written, so its rows are lost; filter again.")
 
@@ -212,7 +212,7 @@ def _resolved(path: Path) -> Path:
     return found
 
 
-def _output_error(path: Path, error: OSError) -> OutputError:
+def output_error(path: Path, error: OSError) -> OutputError:
     directory = path.parent
     with contextlib.suppress(OSError):
         if path.is_symlink():

@@ -3,8 +3,12 @@ written again with the footer until it is large enough to stay."""
 
 from __future__ import annotations
 
+import contextlib
 import io
+import os
+import tempfile
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from ftproc.files.layout import METADATA_KEY
@@ -16,6 +20,7 @@ if TYPE_CHECKING:
 
 GROUP = 8192  # rows of a row group that stays
 _MAGIC = b"PAR1"
+_ROOM = (2, 1 << 20)  # for a row group and a footer: times its size in memory, and bytes
 
 
 class GrowingParquet:
@@ -25,13 +30,14 @@ class GrowingParquet:
         """known: of a run whose work is now done again, as `known` gave it."""
         self._stream = stream
         self._end, self._groups, self._tables = len(_MAGIC), list[Any](), list[Any]()
+        self._tail = _MAGIC
         if known is None:
             stream.write(_MAGIC)
             return
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        self._end = known["end"]
+        self._end, self._tail = known["size"], known["tail"]
         self._groups = [pq.read_metadata(pa.BufferReader(each)) for each in known["groups"]]
         self._tables = [pa.ipc.open_stream(each).read_all() for each in known["tables"]]
 
@@ -48,12 +54,20 @@ class GrowingParquet:
         (table,) = self._tables
         data, group = _row_group(table, self._end)
         footer = _footer(table.schema, [*self._groups, group], metadata())
-        self._stream.seek(self._end)
-        self._stream.write(data + footer)
-        self._stream.truncate(self._end + len(data) + len(footer))
+        try:
+            self._end_with(data + footer)
+        except OSError:
+            with contextlib.suppress(OSError):  # without the rows for which there is no room
+                self._end_with(_footer(table.schema, self._groups, metadata()))
+            raise
         if table.num_rows >= GROUP:
-            self._end, self._tables = self._end + len(data), []
+            self._end, self._tail, self._tables = self._end + len(data), data[-len(_MAGIC) :], []
             self._groups.append(group)
+
+    def _end_with(self, data: bytes) -> None:
+        self._stream.seek(self._end)
+        self._stream.write(data)
+        self._stream.truncate(self._end + len(data))
 
     def known(self) -> Mapping[str, Any]:
         """All that goes on from here."""
@@ -66,21 +80,11 @@ class GrowingParquet:
             return bytes(sink.getvalue().to_pybytes())
 
         groups = [_MAGIC + _alone(each) for each in self._groups]
-        return {"end": self._end, "groups": groups, "tables": [stream(each) for each in self._tables]}
+        tables = [stream(each) for each in self._tables]
+        return {"size": self._end, "tail": self._tail, "groups": groups, "tables": tables}
 
 
-class _At(io.BytesIO):
-    """A part of a file that begins at a place of it."""
-
-    def __init__(self, begin: int) -> None:
-        super().__init__()
-        self._begin = begin
-
-    def tell(self) -> int:
-        return self._begin + super().tell()
-
-
-def _writer(sink: io.BytesIO, schema: pa.Schema) -> Any:
+def _writer(sink: Any, schema: pa.Schema) -> Any:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -90,18 +94,27 @@ def _writer(sink: io.BytesIO, schema: pa.Schema) -> Any:
 
 
 def _row_group(table: pa.Table, begin: int) -> tuple[bytes, Any]:
-    """The bytes of a row group that begins at a place of the file, and what the footer says of it."""
+    """The bytes of a row group that begins at a place of the file, and what the footer says of it. The writer counts
+    from where its file is, and begins at 0 only: so it writes into a file of holes, that is moved on in between."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    sink = _At(begin - len(_MAGIC))  # with which the writer begins
-    with _writer(sink, table.schema) as writer:
-        writer.write_table(table, row_group_size=table.num_rows)
-        size = sink.tell() - begin
-    whole = sink.getvalue()
-    length = int.from_bytes(whole[-8:-4], "little") + 8
-    footer = pq.read_metadata(pa.BufferReader(_MAGIC + whole[-length:]))
-    return whole[len(_MAGIC) : len(_MAGIC) + size], footer
+    descriptor, name = tempfile.mkstemp(prefix="ftproc-")
+    try:
+        os.truncate(descriptor, begin + _ROOM[0] * table.nbytes + _ROOM[1])
+        with pa.memory_map(name, "r+") as file:
+            with _writer(file, table.schema) as writer:
+                file.seek(begin)
+                writer.write_table(table, row_group_size=table.num_rows)
+                size = file.tell() - begin
+            end = file.tell()
+            file.seek(begin)
+            data = file.read(end - begin)
+        length = int.from_bytes(data[-8:-4], "little") + 8
+        return data[:size], pq.read_metadata(pa.BufferReader(_MAGIC + data[-length:]))
+    finally:
+        os.close(descriptor)
+        Path(name).unlink()
 
 
 def _footer(schema: pa.Schema, groups: list[Any], metadata: Mapping[str, Any]) -> bytes:

@@ -6,12 +6,13 @@ from __future__ import annotations
 import contextlib
 import gzip
 import json
+import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, BinaryIO, Protocol
 
-from ftproc.errors import UsageError
+from ftproc.errors import OutputError, UsageError
 from ftproc.files import layout, remote
 from ftproc.files.layout import Target, sidecar
 from ftproc.files.writing import atomic, csvtext, outputs, tables, trajectories
@@ -20,6 +21,7 @@ from ftproc.long_records import joined
 from ftproc.records import Trajectory
 
 GROWING = (".csv", ".csv.gz", ".jsonl", ".parquet")
+TAIL = 256  # bytes by which a file is known again
 EVERY_S = 0.5  # at the latest rows are seen in a file, and counted in its metadata
 
 Metadata = Callable[[], Mapping[str, Any]]
@@ -51,6 +53,9 @@ class Output:
         self._open = contextlib.ExitStack()
         self._frame: Mapping[str, Any] = {}
         self._shown_s, self._new = -EVERY_S, False
+        self._place: os.stat_result | None = None  # of the file, as the system knows it
+        if known is not None and self.kind is not None and name != outputs.STREAM:
+            _refuse_changed(name, known)
 
     def __enter__(self) -> Output:
         return self
@@ -70,14 +75,18 @@ class Output:
         if self._file is None:
             self._frame = part.metadata
             self._file = self._made()
-        self._file.add(part)
+        with self._named():
+            self._file.add(part)
         self._new = True
 
     def pause(self) -> None:
         """Let rows be seen that have waited for it."""
-        grows = self.kind is not None and self.name != outputs.STREAM
-        if grows and self._new and time.monotonic() - self._shown_s >= EVERY_S:
-            self._show()
+        if self._place is not None and time.monotonic() - self._shown_s >= EVERY_S:
+            self._shown_s = time.monotonic()
+            if not _is_at(self._place, self.name):
+                raise OutputError(f"{self.name}: removed or replaced while it was written; its rows so far are lost.")
+            if self._new:
+                self._show()
 
     def line(self, text: str) -> bool:
         """Write a line that is no row; whether it is the place for that."""
@@ -96,12 +105,24 @@ class Output:
 
     def _show(self) -> None:
         assert self._file is not None
-        self._file.show(lambda: self.complete)
+        with self._named():
+            self._file.show(lambda: self.complete)
         beside = described(self.name)
         if beside is not None and self.kind is not None:
             with atomic.replacing(beside, synced=False) as text:
                 text.write(trajectories.to_json(self.complete, indent=2) + b"\n")
         self._shown_s, self._new = time.monotonic(), False
+
+    @contextlib.contextmanager
+    def _named(self) -> Iterator[None]:
+        """Errors of the system name the file; those of standard output are named where it was opened."""
+        try:
+            yield
+        except OSError as error:
+            near = remote.local(self.name)
+            if self.name == outputs.STREAM or near is None:
+                raise
+            raise atomic.output_error(near, error) from error
 
     def _made(self) -> File:
         if self.kind is None:
@@ -109,9 +130,33 @@ class Output:
         if self.name == outputs.STREAM:
             return _Text(self._open.enter_context(atomic.standard_output()), self.kind, None)
         stream = self._open.enter_context(atomic.growing(self.name, self._known is not None))
+        near = remote.local(self.name)
+        self._place = near.stat() if near is not None and near.is_file() else None
         if self.kind == ".parquet":
             return GrowingParquet(stream, self._known)
         return (_Packed if self.kind == ".csv.gz" else _Text)(stream, self.kind, self._known)
+
+
+def _is_at(place: os.stat_result, name: str) -> bool:
+    """Whether the file of that name is still the one that is written."""
+    near = remote.local(name)
+    return near is not None and near.exists() and os.path.samestat(place, near.stat())
+
+
+def _refuse_changed(name: str, known: Mapping[str, Any]) -> None:
+    """Raise OutputError for a file that is not as the run before has left it, up to what that knew of it."""
+    near = remote.local(name)
+    if near is None or (near.exists() and not near.is_file()):
+        return
+    found = b""
+    with contextlib.suppress(FileNotFoundError), near.open("rb") as file:
+        file.seek(known["size"] - len(known["tail"]))
+        found = file.read(len(known["tail"]))
+    if found != known["tail"]:
+        raise OutputError(
+            f"{name}: it was deleted, cut or replaced since the run before, which --state goes on with. Bring it back, "
+            "or delete it and the state to begin again."
+        )
 
 
 def growing_kind(name: str, form: str) -> str | None:
@@ -140,13 +185,15 @@ def described(name: str) -> Target | None:
 
 class _Text:
     """CSV, or an object of JSON a line: each row is seen at once. What a run whose work is done again had written after
-    it kept what it knew, is not written twice."""
+    it kept what it knew, is written again."""
 
     def __init__(self, stream: BinaryIO, kind: str, known: Mapping[str, Any] | None) -> None:
         self._stream, self._as_json = stream, kind == ".jsonl"
-        self._size = 0 if known is None else known["size"]
+        self._size: int = 0 if known is None else known["size"]
+        self._tail: bytes = b"" if known is None else known["tail"]
         self._with_header = self._size == 0
-        self._again = 0 if known is None else max(stream.seek(0, 2) - self._size, 0)
+        if known is not None:
+            stream.truncate(stream.seek(self._size))
 
     def add(self, part: Trajectory) -> None:
         table = trajectories.to_table(part)
@@ -158,40 +205,35 @@ class _Text:
             self._with_header = False
 
     def write(self, data: bytes) -> None:
-        self._size += len(data)
-        again = min(self._again, len(data))
-        self._again -= again
-        if again < len(data):
-            self._stream.write(data[again:])
+        try:
+            self._stream.write(data)
+        except OSError:
+            with contextlib.suppress(OSError):  # half a row
+                self._stream.truncate(self._size)
+            raise
+        self._size, self._tail = self._size + len(data), (self._tail + data)[-TAIL:]
 
     def show(self, metadata: Metadata) -> None:
         pass
 
     def known(self) -> Mapping[str, Any]:
-        return {"size": self._size}
+        return {"size": self._size, "tail": self._tail}
 
 
 class _Packed(_Text):
     """CSV packed by gzip: a member of the file each time that it is shown."""
 
     def __init__(self, stream: BinaryIO, kind: str, known: Mapping[str, Any] | None) -> None:
-        super().__init__(stream, kind, None)
+        super().__init__(stream, kind, known)
         self._rows = list[bytes]()
-        self._end = 0 if known is None else known["size"]
-        self._with_header = self._end == 0
-        if known is not None:
-            stream.truncate(stream.seek(self._end))
 
     def write(self, data: bytes) -> None:
         self._rows.append(data)
 
     def show(self, metadata: Metadata) -> None:
         if self._rows:
-            self._end += self._stream.write(gzip.compress(b"".join(self._rows), mtime=0))
-            self._rows = []
-
-    def known(self) -> Mapping[str, Any]:
-        return {"size": self._end}
+            rows, self._rows = b"".join(self._rows), []
+            super().write(gzip.compress(rows, mtime=0))
 
 
 class _AtEnd:
