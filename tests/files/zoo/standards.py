@@ -159,6 +159,9 @@ def ships() -> Iterator[Animal]:
         return checked(f"GPZDA,{all_times[k]},{day},00,00")
 
     yield animal("times of their own", [_ttm(k, times[k]) for k in rows], utc="")
+    twice = [[_ttm(k, times[k]), _ttm(k, times[k]).replace(",T,", ",R,", 1)] for k in rows]
+    yield animal("sentences with a wrong checksum among others", [each for pair in twice[:40] for each in pair]
+                 + [each for each, _ in twice[40:]], utc="")  # fmt: skip
     yield animal("the clock of ZDA", [line for k in rows for line in (zda(k), _ttm(k))])
     rmc = [checked(f"GPRMC,{t},A,4807.0,N,01131.0,E,000.1,084.4,310524,,,A") for t in times]
     yield animal("the clock of RMC, kilometres", [line for k in rows for line in (rmc[k], _ttm(k, unit="K"))])

@@ -17,7 +17,7 @@ from ftproc.files.reading.formats.header import Stated, TableHeader
 from ftproc.files.reading.formats.sparse import Sparse
 
 _SENTENCE = re.compile(
-    r"(?P<before>[^$!]{0,60}?)[$!](?P<type>[A-Z][A-Z0-9]{2,7}),(?P<body>[^*]*?),?(?:\*[0-9A-Fa-f]{2})?"
+    r"(?P<before>[^$!]{0,60}?)[$!](?P<type>[A-Z][A-Z0-9]{2,7}),(?P<body>[^*]*?)(?P<comma>,?)(?:\*(?P<code>[0-9A-Fa-f]{2}))?"
 )
 _MOSTLY = 0.6  # of the lines of a text are sentences
 #: The time that a logger writes before a sentence: seconds or ms since 1970, also in a tag block; or a stamp.
@@ -81,12 +81,17 @@ def read(text: str, room: limits.Room) -> TableHeader | None:
     """The targets of TTM sentences; else the fields of the sentence of which there are the most, such as
     `$PTRK,120000.05,1234.5*42`. None if most lines are no sentences. Raises InputError for positions alone."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
-    sentences = [_Sentence(m["before"], m["type"], m["body"].split(",")) for m in map(_SENTENCE.fullmatch, lines) if m]
+    found = [match for line in lines if (match := _SENTENCE.fullmatch(line))]
+    sound = [match for match in found if _is_sound(match)]
+    damaged = len(found) - len(sound)
+    if damaged < _MOSTLY * len(found):  # else nobody has reckoned the checksums
+        found = sound
+    sentences = [_Sentence(match["before"], match["type"], match["body"].split(",")) for match in found]
     if not sentences or len(sentences) < _MOSTLY * len(lines):
         return None
     kinds = Counter(each.kind for each in sentences)
     if any(kind[-3:] == "TTM" for kind in kinds):
-        return _targets(sentences, room)
+        return _targets(sentences, room, damaged)
     held = [what for kind in kinds if (what := _POSITIONS.get(kind[-3:]))]
     if held and all(len(kind) == 5 for kind in kinds):
         raise InputError(
@@ -95,8 +100,17 @@ def read(text: str, room: limits.Room) -> TableHeader | None:
     return _fields(sentences, kinds, len(lines), room)
 
 
-def _targets(sentences: Sequence[_Sentence], room: limits.Room) -> TableHeader:
-    columns, ship, left = Sparse(room), _Ship(), Counter[str]()
+def _is_sound(match: re.Match[str]) -> bool:
+    """Whether the checksum of a sentence is right, if it has one."""
+    code = 0
+    for byte in f"{match['type']},{match['body']}{match['comma']}".encode():
+        code ^= byte
+    return match["code"] is None or int(match["code"], 16) == code
+
+
+def _targets(sentences: Sequence[_Sentence], room: limits.Room, damaged: int) -> TableHeader:
+    columns, ship = Sparse(room), _Ship()
+    left = Counter({"sentences with a wrong checksum": damaged} if damaged else {})
     relative, rows = False, list[tuple[list[str], dict[str, float | str | None]]]()
     for each in sentences:
         ship.hear(each)
