@@ -216,3 +216,21 @@ def test_a_bad_line_is_named(tmp_path):
         done = subprocess.run(command, stdin=stream, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert 'line 3: the range is "far", which is no number' in done.stderr
+
+
+@pytest.mark.parametrize(("at", "lag_s", "pause_s"), [(60, 0.5, 3.0), (100, 1.0, 2.9), (143, 2.5, 40.0)])
+def test_rows_before_a_pause_do_not_hang_on_when_they_leave(at, lag_s, pause_s):
+    """By the clock, one by one, or with the reading after the pause."""
+    log = simulate("manoeuvre", seed=5, duration_s=15.0, dt_s=0.05).log
+    times = log.time_s + pause_s * (np.arange(len(log)) >= at)
+    settings = FilterSettings(editing="live", lag_s=lag_s)
+    at_once, by_the_clock = ftproc.Live(settings), ftproc.Live(settings)
+    whole = [at_once.push(times, *log.measurement.T), at_once.finish()]
+    found = []
+    for k, now_s in enumerate(times.tolist()):
+        while by_the_clock.due_s <= now_s - 1e-9:
+            found.append(by_the_clock.due(by_the_clock.due_s))
+        found.append(by_the_clock.push(now_s, *log.measurement[k], np.array([k]), now_s))
+    found.append(by_the_clock.finish())
+    for name in ("state", "sigma", "outlier"):
+        np.testing.assert_array_equal(*(np.concatenate([getattr(p, name) for p in parts]) for parts in (found, whole)))

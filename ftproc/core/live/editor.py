@@ -85,6 +85,7 @@ class LiveEditor:
                 if np.isfinite(measurement[low, list(self.absent)]).any():
                     self._begin_again()
                     continue
+                found += self._before_a_pause(self.window, float(time_s[low]))
                 high = self._slice_end(time_s, measurement, low)
                 if self.lag_s > 0:
                     found += self._due(float(time_s[high - 1]))
@@ -161,6 +162,16 @@ class LiveEditor:
         """Number of the first row that is kept."""
         return self.count - len(self.waiting.time_s if self.window is None else self.window)
 
+    def _before_a_pause(self, window: Window, time_s: float) -> list[Published]:
+        """Where a row that no refresh has seen must leave before this time: those before it, as they are by then, which
+        is when its lag has passed; and a refresh."""
+        unseen = window.time_s[self.refreshed - self._first :]
+        if self.lag_s == 0 or not len(unseen) or time_s <= unseen[0] + self.lag_s:
+            return []
+        found = self._due(float(unseen[0]) + self.lag_s)
+        self._refresh(window)
+        return found
+
     def _slice_end(self, time_s: FloatArray, measurement: FloatArray, low: int) -> int:
         """How far the rows can be taken at once: to the next turn, the next gap, the first reading of a component that
         was absent, or where a row must leave that no refresh has seen."""
@@ -169,9 +180,6 @@ class LiveEditor:
         high = low + self.clock.rows_to_turn(time_s[low:], due)
         if self.lag_s > 0:
             unseen = np.concatenate([self.window.time_s[self.refreshed - self._first :], time_s[low:high]])
-            if time_s[low] > unseen[0] + self.lag_s:
-                self._refresh(self.window)
-                return self._slice_end(time_s, measurement, low)
             high = low + int(np.searchsorted(time_s[low:high], unseen[0] + self.lag_s, side="right"))
         gaps = np.flatnonzero(np.diff(time_s[low:high]) > self.pace.longest_s)
         high = low + int(gaps[0]) + 1 if len(gaps) else high
