@@ -221,14 +221,14 @@ class _Table(NamedTuple):
         if len(cells) != len(self.names):
             cells_are = f"{len(cells)} cell{'s' * (len(cells) != 1)} where the header has {len(self.names)}"
             raise InputError(f"{where} has {cells_are}. Complete the row, or delete it.")
-        row = [np.nan] * (RATE + 1)
+        row, decimal = [np.nan] * (RATE + 1), "," if self.separator == "," else "."
         self.beside.fill(row, cells)
         for k, quantity in enumerate(QUANTITIES):
             column = self.found.get(quantity)
             if column is None or (text := cells[column.position]) in _MISSING:
                 continue
             try:
-                row[k] = moments[text] if k == 0 and text in moments else float(text)
+                row[k] = moments[text] if k == 0 and text in moments else float(text.replace(",", decimal, 1))
             except ValueError:
                 raise InputError(
                     f'{where}: the {quantity} is "{text[:40]}", which is no number; expected a number of '

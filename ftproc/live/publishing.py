@@ -187,7 +187,7 @@ class _Counts:
 
     def said(self, stream: Stream) -> str:
         """The counts in words."""
-        found = [f"{self.rows} rows"]
+        found = [f"{self.rows} row{'s' * (self.rows != 1)}"]
         found += [f"{self.unknown} without an estimate"] if self.unknown else []
         found += [f"{self.coasted} coasted"] if self.coasted else []
         found += [f"{stream.late} came too late to be used"] if stream.late else []

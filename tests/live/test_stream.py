@@ -243,3 +243,10 @@ def checksum(sentence):
     for byte in sentence[1:].encode():
         code ^= byte
     return f"{code:02X}"
+
+
+def test_decimal_commas_are_understood_where_the_separator_is_another():
+    texts = [text.replace(",", ";").replace(".", ",") for text in csv()]
+    _, parts, said = followed(texts)
+    np.testing.assert_array_equal(joined(parts, "state"), joined(followed(csv())[1], "state"))
+    assert not said

@@ -68,10 +68,18 @@ def check(outputs: Sequence[Output], inputs: Iterable[Target]) -> None:
     folders = {path.parent: each.option for each in outputs if each.made and (path := _path(each)) is not None}
     for folder, option in folders.items():
         make(folder, option)
+    faults = dict[str, OutputError]()
     for each in outputs:
-        atomic.check_target(each.target)
-        if each.ours:
-            _check_own(each)
+        try:
+            atomic.check_target(each.target)
+            if each.ours:
+                _check_own(each)
+        except OutputError as error:
+            faults[str(each.target)] = error
+    if faults:
+        first, *others = faults
+        also = f" The same or the like holds of {', '.join(others[:20])}." if others else ""
+        raise OutputError(f"{faults[first]}{also}") from faults[first]
 
 
 def make(folder: Path, option: str = "-o") -> None:

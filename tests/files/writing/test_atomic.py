@@ -196,6 +196,15 @@ def test_an_input_is_never_overwritten_by_any_name(tmp_path: Path, monkeypatch: 
         assert f"this is the input {log}, which is never overwritten. Give another name with -o." in str(caught.value)
 
 
+def test_all_outputs_that_cannot_be_written_are_named(tmp_path: Path) -> None:
+    for name in ("a.csv", "b.csv", "d.csv"):
+        (tmp_path / name).mkdir()
+    with pytest.raises(OutputError) as caught:
+        check([Output(tmp_path / f"{name}.csv") for name in "abcd"], [])
+    assert str(caught.value).startswith(f"{tmp_path}/a.csv: ")
+    assert f"The same or the like holds of {tmp_path}/b.csv, {tmp_path}/d.csv." in str(caught.value)
+
+
 def test_other_files_and_streams_may_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("log.csv").write_bytes(b"log")

@@ -5,9 +5,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import scipy.io
 
 from tests.files.zoo.animals import DEG_A, DEG_E, FIRST_UTC, NORTH, SOD, F
 from tests.files.zoo.flight import Animal, clock, dms, fixed, flight, lines, written
@@ -101,6 +105,25 @@ def said() -> Iterator[Animal]:
     yield _log("units that change from cell to cell", lines("t,Range,Az (deg),El (deg)", F.t, cells, A, E))
     german = lines("Zeit, s;Entfernung, m;Azimut, Grad;Elevation, Grad", F.t, R, A, E, separator=";")
     yield _log("units behind commas, and decimal commas", german.replace(".", ","))
+    yield Animal("units of a structure of MATLAB", _structure, NORTH, 0)
+    yield Animal("units in the metadata of fields", _fields, NORTH, 0)
+    zenith = lines("# zenith angles in gon\nt,Range (m),Hz (gon),Zenith (gon)", F.t, R, fixed(DEG_A / 0.9, 6),
+                   fixed(100 - DEG_E / 0.9, 6))  # fmt: skip
+    yield _log("a comment that says what the names say", zenith)
+
+
+def _structure(directory: Path) -> Path:
+    units = {"t": "s", "range": "ft", "az": "mil", "el": "mil"}
+    track = {"t": F.t, "range": F.r / 0.3048, "az": DEG_A * 6400 / 360, "el": DEG_E * 6400 / 360, "units": units}
+    scipy.io.savemat(directory / "a.mat", {"trk": track})
+    return directory / "a.mat"
+
+
+def _fields(directory: Path) -> Path:
+    columns = {"t": (F.t, "s"), "range": (F.r / 1852, "nmi"), "az": (DEG_A, "deg"), "el": (DEG_E, "deg")}
+    schema = pa.schema([pa.field(name, pa.float64(), metadata={"unit": unit}) for name, (_, unit) in columns.items()])
+    pq.write_table(pa.table([values for values, _ in columns.values()], schema), directory / "a.parquet")
+    return directory / "a.parquet"
 
 
 def asked() -> Iterator[Animal]:

@@ -140,7 +140,7 @@ def refuse_alike(source: str, apart: Sequence[Name], free: Sequence[int], quanti
             continue
         another = words & OTHER_THINGS or name.is_zenith() or any(name.means(each) for each in QUANTITIES)
         alike = known & words or (name.is_in_a_unit_of(quantity) and not another)
-        bare = name.stem in ONLY_BY_UNIT and name.stem in WEAK_ALIASES[quantity] and not {name.stem} & OTHER_THINGS
+        bare = quantity == "range" and name.stem == "d"
         if not name.foreign and (either or bare or (alike and not other & words)):
             say = answer([each.text for each in apart], {quantity: index})
             turns = counts_from(name) if quantity == "azimuth" else ""
@@ -229,6 +229,7 @@ def check_complete(source: str, names: Sequence[str], found: Mapping[str, tuple[
         none_moves = (
             "" if proposed.answer or not seen else " No choice of them gives a target that clearly moves like one."
         )
+        say = say if proposed.answer else none.replace("NAME", "NUMBER")
         raise InputError(
             f"{source}: there is no line of column names.{seen}{none_moves} Say which column is which by their "
             f"numbers, such as {say}."

@@ -51,9 +51,10 @@ def with_units_beside(header: TableHeader) -> TableHeader:
 def refuse_unheard(header: TableHeader, station: Station, stated: Mapping[str, str]) -> None:
     """Ask where a line above the table says a convention that nothing else has settled. stated: the units that the user
     has named."""
+    names = [taken_apart(name) for name in header.names]
     settled = {
-        "range": "range" in stated,
-        "elevation": station.elevation_from is not None,
+        "range": "range" in stated or not any(name.means("range") for name in names),
+        "elevation": station.elevation_from is not None or any(name.is_zenith() for name in names),
         "azimuth": station.azimuth_from is not None or station.azimuth_zero_rad != 0.0,
     }
     for pattern, quantity, what, say in _CONVENTIONS:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +77,13 @@ def _of_fields(fields: dict[str, Any]) -> vectors.Table:
     parts = ({f"{name}.{k}": column for k, column in vectors.columns(each).items()} for name, each in wide.items())
     columns = vectors.vectors({**arrays, **{name: each for part in parts for name, each in part.items()}})
     numeric = any(each.dtype.kind in "iuf" for each in columns.values())
-    return vectors.in_memory(columns if numeric else {})
+    return vectors.in_memory(columns if numeric else {}, _units(fields, columns))
+
+
+def _units(fields: dict[str, Any], columns: Iterable[str]) -> dict[str, str]:
+    """The unit of each column that a structure beside them states, `trk.units.range`."""
+    stated = _fields(fields.get("units", fields.get("unit"))) or {}
+    return {name: unit if isinstance(unit := stated.get(name), str) else "" for name in columns} if stated else {}
 
 
 def _of_cells(cells: Any) -> vectors.Table:
