@@ -279,7 +279,7 @@ def _moved(prior: Prior, state: FloatArray, sigma: FloatArray) -> tuple[FloatArr
     open_m = np.abs(ends - ground).max(0) / 2
     _add(wide, 0, along, open_m)
     _add(wide, 3, along, np.hypot(np.abs(speed) * open_m, np.abs(z) * prior.sigma_m / CHANGES_S) / ground)
-    found[np.isnan(state).any(1)] = wide[np.isnan(state).any(1)] = np.nan
+    found[np.isnan(state[:, :3]).any(1)] = wide[np.isnan(state[:, :3]).any(1)] = np.nan
     return found, wide
 
 
