@@ -1,9 +1,9 @@
 """Times of a stream that cannot be right: one far ahead that no later row confirms, and a clock that was set back.
 
-A row whose time is far ahead of all before it waits for the next row. If that is near it, there was a pause; if that is
-near the rows before, the time was wrong, and the row is left out: one damaged digit would make all rows after it too
-late. Rows that are too late for their lag wait as well: so many in a row, whose times go on, are of a clock that was
-set back, and a new track begins with them. And how a track goes on in a pause.
+A row whose time is far ahead of all before it waits for the next row. If that is nearer to the rows before, the time
+was wrong, and the row is left out: one damaged digit would make all rows after it too late. Else there was a pause.
+Rows that are too late for their lag wait as well: so many in a row, whose times go on, are of a clock that was set
+back, and a new track begins with them. And how a track goes on in a pause.
 """
 
 from __future__ import annotations
@@ -97,12 +97,12 @@ class Times:
         time_s = float(row[0][0, 0])
         if self._ahead:
             (held,) = self._ahead
-            self._ahead = []
-            if abs(time_s - float(held[0][0, 0])) < self._far_s:
-                self.newest_s = float(held[0][0, 0])
-                yield Verdict.NEXT, held
-            else:
+            ahead_s, self._ahead = float(held[0][0, 0]), []
+            if time_s - self.newest_s < ahead_s - time_s:
                 yield Verdict.WRONG, held
+            else:
+                self.newest_s = ahead_s
+                yield Verdict.NEXT, held
         if time_s - self.newest_s >= self._far_s and math.isfinite(self.newest_s):
             self._ahead = [row]
             return

@@ -182,6 +182,13 @@ def test_a_pause_is_no_wrong_time():
     assert found[-1].row.tolist() == [ROWS - 1]
 
 
+@pytest.mark.parametrize("interval_s", [0.05, 5.0, 60.0, 3600.0])
+def test_rows_that_are_far_apart_are_all_there(interval_s):
+    _, parts, said = followed(with_times({k: k * interval_s for k in range(ROWS)}))
+    assert joined(parts, "row").tolist() == list(range(ROWS))
+    assert not said
+
+
 def test_a_clock_that_is_set_back_begins_a_new_track():
     back = {k: rows()[k][0] - 3600.0 for k in range(30, ROWS)}
     stream, parts, said = followed(with_times(back))

@@ -16,6 +16,7 @@ from ftproc.files.words import ALIASES, EITHER_ANGLE, NOT_UNITS, ONLY_BY_UNIT, O
 _COUNTS = frozenset(("counts", "count", "cnt", "cnts", "ticks"))
 _FLIGHTS = frozenset(("tof", "timeofflight", "flighttime", "roundtriptime", "rtt", "laufzeit"))
 _HORIZONTAL = frozenset(("hd", "horizontaldistance", "horizontalrange", "groundrange", "grounddistance", "hdist"))
+_MOST_WORDS = 6  # of a name that may number its target
 #: Words of NOT_UNITS with which a column may still be the quantity.
 _OF_THE_QUANTITY = frozenset(["true", "corr", "raw", "ref"])
 
@@ -94,7 +95,9 @@ def refuse_positions(source: str, apart: Sequence[Name]) -> None:
 def _mark(name: Name, quantity: str) -> str | None:
     """What distinguishes a column of a quantity from others of the same, such as T1 or 2; None of other columns."""
     known = {*ALIASES[quantity], *WEAK_ALIASES[quantity]} - {""}
-    if name.foreign or NOT_UNITS & {*name.words} or (name.unit and unit_named(quantity, name.unit) is None):
+    if len(name.words) > _MOST_WORDS or name.foreign or NOT_UNITS & {*name.words}:
+        return None
+    if name.unit and unit_named(quantity, name.unit) is None:
         return None
     for k, word in enumerate(name.words):
         rest = "".join((*name.words[:k], *name.words[k + 1 :]))
