@@ -166,7 +166,11 @@ def _unit_inside(text: str) -> str:
 
 def counts_from(name: Name) -> str:
     """What an azimuth of this name counts from, one of TURNED; "" where the name does not say so."""
-    inside = set(re.findall(r"[A-Z]+", re.sub(r".*[(\[]", "", name.text))) if name.text.endswith((")", "]")) else set()
+    inside = (
+        set(re.findall(r"[A-Z]+", name.text[max(map(name.text.rfind, "([")) :]))
+        if name.text.endswith((")", "]"))
+        else set()
+    )
     found = (what for what, (words, mark, _) in TURNED.items() if words & {*name.words} or mark in inside)
     is_azimuth = {name.stem, name.core(), *name.words} & {*ALIASES["azimuth"]} - {"a"}
     return next(found, "") if is_azimuth else ""

@@ -232,7 +232,6 @@ def check_complete(source: str, names: Sequence[str], found: Mapping[str, tuple[
         none_moves = (
             "" if proposed.answer or not seen else " No choice of them gives a target that clearly moves like one."
         )
-        say = say if proposed.answer else none.replace("NAME", "NUMBER")
         raise InputError(
             f"{source}: there is no line of column names.{seen}{none_moves} Say which column is which by their "
             f"numbers, such as {say}."

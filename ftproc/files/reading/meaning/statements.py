@@ -4,7 +4,7 @@ the user is asked where the program would take them otherwise."""
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ftproc.errors import InputError
@@ -16,8 +16,7 @@ from ftproc.files.units import unit_named
 from ftproc.files.words import QUANTITIES
 from ftproc.settings import Station
 
-_OF_UNITS = re.compile(r"[\s._/-]*(?:units?|uom|einheit|unité)$", re.IGNORECASE)
-_VALUE = re.compile(r"[\s._/-]*(?:val|value)$", re.IGNORECASE)
+_OF_UNITS, _VALUE = ("units", "unit", "uom", "einheit", "unité"), ("value", "val")  # how names of columns end
 #: What a line above the table may say -> the quantity that it is about, what that means, and the options that say it.
 _CONVENTIONS = (
     (r"two[- ]?way|round[- ]?trip", "range", "ranges there and back", "--units 'range=0.5 m' (half of each)"),
@@ -30,10 +29,11 @@ _CONVENTIONS = (
 def with_units_beside(header: TableHeader) -> TableHeader:
     """The header with the units that columns of their own state: `Range unit` beside `Range`. Raises InputError where
     such a column names several."""
-    about = {index: _OF_UNITS.sub("", name) for index, name in enumerate(header.names) if _OF_UNITS.search(name)}
+    about = {index: base for index, name in enumerate(header.names) if (base := _before(name, _OF_UNITS)) is not None}
+    plain = [name.lower() if (base := _before(name, _VALUE)) is None else base for name in header.names]
     units = list(header.units) or [""] * len(header.names)
     for index, base in about.items():
-        fits = [k for k, name in enumerate(header.names) if k != index and _VALUE.sub("", name).lower() == base.lower()]
+        fits = [k for k, name in enumerate(plain) if k != index and name == base]
         if len(fits) != 1 or not base:
             continue
         cells = {cell.strip() for cell in as_text(header.load([], [index]).column(0)).unique().to_pylist() if cell}
@@ -46,6 +46,13 @@ def with_units_beside(header: TableHeader) -> TableHeader:
         if known and known == cells and not units[fits[0]]:
             units[fits[0]] = known.pop()
     return replace(header, units=units) if any(units) else header
+
+
+def _before(name: str, endings: Sequence[str]) -> str | None:
+    """What stands before one of the endings in a name, in small letters; None without one."""
+    small = name.lower()
+    ending = next((ending for ending in endings if small.endswith(ending)), None)
+    return None if ending is None else small[: -len(ending)].rstrip(" ._/-")
 
 
 def refuse_unheard(header: TableHeader, station: Station, stated: Mapping[str, str]) -> None:
