@@ -29,7 +29,7 @@ from ftproc.simulation import Simulation, simulate
 from tests.trust import cases
 
 GOOD, AFTER = 150, 60  # rows before what is bad, and after it
-MANY = 6000  # rows of what is bad, where it is many
+MANY = 4000  # rows of what is bad, where it is many
 LIMIT_S = 120  # for one; the slowest, at 1e-14 s under a lag of an hour, takes 45 s on an idle machine
 FAR_M = 500.0  # from the truth: nothing good is published so far off
 SETTLED = 40  # rows after which the track has begun
