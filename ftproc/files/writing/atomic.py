@@ -212,7 +212,8 @@ def _resolved(path: Path) -> Path:
     return found
 
 
-def output_error(path: Path, error: OSError) -> OutputError:
+def output_error(path: Path, error: OSError, written: str = "nothing was written") -> OutputError:
+    """The error of the system in a sentence. written: what holds all the same when there is no more room."""
     directory = path.parent
     with contextlib.suppress(OSError):
         if path.is_symlink():
@@ -224,11 +225,11 @@ def output_error(path: Path, error: OSError) -> OutputError:
         errno.EACCES: f"no permission to write in {directory}; choose another place.",
         errno.EPERM: f"no permission to write in {directory}; choose another place.",
         errno.EROFS: f"{directory} cannot be written to (read-only); choose another place.",
-        errno.ENOSPC: "the disk is full; nothing was written. Make room or choose another place.",
-        errno.EDQUOT: "the disk quota is used up; nothing was written. Make room or choose another place.",
+        errno.ENOSPC: f"the disk is full; {written}. Make room or choose another place.",
+        errno.EDQUOT: f"the disk quota is used up; {written}. Make room or choose another place.",
         errno.ELOOP: "this is a symbolic link to itself; delete it, or give another name.",
         errno.ENAMETOOLONG: "the name is too long for the file system; give a shorter one.",
-        errno.EFBIG: "the file is larger than the system allows; nothing was written. Choose another place.",
+        errno.EFBIG: f"the file is larger than the system allows; {written}. Choose another place.",
     }
     if error.errno == errno.ENOENT and directory.is_dir():  # such as /proc
         reasons[errno.ENOENT] = f"no file can be made in {directory}; choose another place."

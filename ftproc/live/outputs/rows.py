@@ -122,7 +122,7 @@ class Output:
             near = remote.local(self.name)
             if self.name == outputs.STREAM or near is None:
                 raise
-            raise atomic.output_error(near, error) from error
+            raise atomic.output_error(near, error, "what was written before is whole") from error
 
     def _made(self) -> File:
         if self.kind is None:
