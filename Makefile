@@ -9,7 +9,7 @@ FLAGS =
 MODEL_FLAGS = --scenario family --flights 800 --seed 2021 --features motion
 FUZZ = csv gzip parquet feather mat nc npz h5 json names truth trajectory station model header kernel
 FUZZ_SECONDS = 600
-OLDEST = tests/files tests/config tests/correction tests/test_pipeline.py tests/docs/test_readme.py
+OLDEST = tests/files tests/live/test_outputs.py tests/config tests/correction tests/test_pipeline.py tests/docs/test_readme.py
 KERNELS ?= tests/core
 
 .DEFAULT_GOAL := help

@@ -123,8 +123,8 @@ def _footer(schema: pa.Schema, groups: list[Any], metadata: Mapping[str, Any]) -
     import pyarrow.parquet as pq
 
     sink = io.BytesIO()
-    with _writer(sink, schema) as writer:
-        writer.add_key_value_metadata({METADATA_KEY: trajectories.to_json(metadata, indent=None)})
+    with _writer(sink, schema.with_metadata({METADATA_KEY: trajectories.to_json(metadata, indent=None)})):
+        pass
     found = pq.read_metadata(pa.BufferReader(sink.getvalue()))
     for each in groups:
         found.append_row_groups(each)
