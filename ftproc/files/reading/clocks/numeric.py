@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from ftproc.files import leap_seconds
@@ -47,6 +49,7 @@ _TICKS = (
 )
 _SURELY_UNIX = 1.5e9  # s: 2017; from there on seconds since 1980 are in the future
 _GPS_FROM = 3e8
+_DIGITS = re.compile(r"hms|hhmmss(?:m*|s*|f*)")  # names of such numbers
 _BEHIND = (1e3, 1e2, 1e1, 1e6)  # digits of the second behind hhmmss, without a point
 _SAMPLE = 2000  # times by which the size and the step are judged
 _LARGEST = 1e300  # two larger numbers would overflow in a mean
@@ -150,7 +153,7 @@ def digits_behind(values: FloatArray, column: Column) -> float:
     """By how much numbers written as hhmmss with digits of the second behind it are to be divided: 1 without such
     digits, 0 for other numbers."""
     most = float(np.nanmax(values))
-    named = next((word for word in (column.key, column.notation) if word.startswith("hhmmss") or word == "hms"), "")
+    named = next((word for word in (column.key, column.notation) if _DIGITS.fullmatch(word)), "")
     for by in (10.0 ** max(len(named) - 6, 0),) if named else (1.0, *_BEHIND):
         if is_hhmmss(values / by) and (named or most > DAY_S * (1.0 if by == 1.0 else 1e3) or _jumps(values / by)):
             return by

@@ -46,7 +46,8 @@ def read(text: pa.ChunkedArray, origin: Origin, column: Column) -> Clock | None:
     stated = _PER_SECOND.fullmatch(column.notation)
     named = stated or cells.drops or column.key in _NAMES or column.notation in _FRAMES
     most = float(np.nanmax(cells.frame))
-    rate = float(stated[1]) if stated else next((float(each) for each in _RATES if most == each - 1), None)
+    full = bool((np.diff(cells.second) > 0).any())  # a second has passed, so its last frame has been seen
+    rate = float(stated[1]) if stated else next((float(each) for each in _RATES if full and most == each - 1), None)
     if cells.drops:
         rate = rate or 30.0
     if rate is None and named:
@@ -54,7 +55,8 @@ def read(text: pa.ChunkedArray, origin: Origin, column: Column) -> Clock | None:
             f'{origin.source}: "{column.name}" holds time codes, whose frames go up to {most:.0f}; nothing says how '
             'many there are in a second. Rename it so that it does, such as to "Timecode (25 fps)".'
         )
-    if not named and not (rate is not None and _is_evenly(cells.second + cells.frame / rate)):
+    # Sixty of something may be seconds, behind day, hour and minute.
+    if not named and not (rate and rate < 60 and _is_evenly(cells.second + cells.frame / rate)):
         if most < 60:
             return None  # day of year and time of day
         return _clock(cells.second + cells.frame / 100, "hours, minutes, seconds and hundredths")

@@ -163,10 +163,10 @@ def turned(names: Mapping[int, Name]) -> dict[str, int] | None:
     """The columns of an azimuth that counts from the head of the carrier, or from magnetic north, and of what is to be
     added to it: {"azimuth": position, "added": position}."""
     for what, (_, _, words) in TURNED.items():
-        mine = _only(names, lambda name, what=what: counts_from(name) == what)  # type: ignore[misc]
-        added = _only(names, lambda name, words=words: bool(words & {*name.words}) and not name.foreign)  # type: ignore[misc]
-        if mine is not None and added is not None and added != mine:
-            return {"azimuth": mine, "added": added}
+        mine = [index for index, name in names.items() if counts_from(name) == what]
+        added = [index for index, name in names.items() if words & {*name.words} and not name.foreign]
+        if len(mine) == len(added) == 1 and mine != added:
+            return {"azimuth": mine[0], "added": added[0]}
     return None
 
 

@@ -167,7 +167,7 @@ def _refuse_scale(source: str, apart: Sequence[Name], index: int, quantity: str)
         unit = unit_named("time", name.unit)
         scale = f"{LIGHT_MPS / 2 * (unit.multiply / unit.divide if unit else 1.0):.9g} m"
         what = f"times of flight{'' if unit else ' in a unit that its name does not state'}"
-    elif words & _COUNTS and words & {*ALIASES[quantity]} and quantity != "range":
+    elif quantity != "range" and words & _COUNTS and words & {each for each in ALIASES[quantity] if len(each) > 1}:
         scale, what = "1/65536 turn", "counts of an encoder (with the number of its counts in a turn)"
     else:
         return

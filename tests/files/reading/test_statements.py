@@ -1,0 +1,94 @@
+"""What stands beside the readings is asked about or refused where the program would take it otherwise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ftproc.errors import InputError
+from ftproc.files.reading import logs
+from ftproc.settings import Station
+
+PLAIN = "time_s,range_m,azimuth_deg,elevation_deg"
+ROWS = "".join(f"{k},{9000 + 40 * k},{30 + 0.1 * k},{10 + 0.02 * k}\n" for k in range(60))
+Log = Callable[..., Path]
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Log:
+    def made(head: str = PLAIN, rows: str = ROWS) -> Path:
+        path = tmp_path / "a.csv"
+        path.write_text(f"{head}\n{rows}")
+        return path
+
+    return made
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence", "otherwise"),
+    [
+        ("# two-way range", "ranges there and back. If these are such, say --columns range=range_m --units", "range=m"),
+        ("# vertical angle is a zenith distance", "say --elevation-from zenith; if not, --elevation-from horizon", ""),
+        ("# azimuth counted from south", "azimuth_zero_deg = 180 in the [station] of a station file", "north"),
+    ],
+)
+def test_a_line_above_the_table_is_heard(log: Log, line: str, sentence: str, otherwise: str) -> None:
+    path = log(f"{line}\n{PLAIN}")
+    with pytest.raises(InputError) as question:
+        logs.read(path)
+    assert line in str(question.value)
+    assert sentence in str(question.value)
+    station = Station(elevation_from="horizon", azimuth_from="north" if otherwise == "north" else None)
+    assert len(logs.read(path, units=otherwise if "=" in otherwise else None, station=station)) == 60
+
+
+@pytest.mark.parametrize(
+    ("head", "sentence"),
+    [
+        ("Time (s),HD (m),Az (deg),El (deg)", '"HD (m)" is a horizontal distance, and ranges are slant ones'),
+        ("Time (s),D,Az (deg),El (deg)", 'column "D" may be the range. Say --columns range=D'),
+        ("Time (s),Slant (Dm),Az (deg),El (deg)", '"Dm" in column "Slant (Dm)" is not a unit of range'),
+        ("Time (s),latitude,longitude,elevation", "positions by latitude and longitude, not readings"),
+    ],
+)
+def test_what_is_no_slant_range_is_not_left_out_without_a_word(log: Log, head: str, sentence: str) -> None:
+    with pytest.raises(InputError) as question:
+        logs.read(log(head))
+    assert sentence in str(question.value)
+
+
+def test_times_that_are_all_the_same_are_refused(log: Log) -> None:
+    path = log("Date,Lap,range_m,azimuth_deg,elevation_deg", "".join(f"2024-05-14,{row}\n" for row in ROWS.split()))
+    with pytest.raises(InputError, match=r'all 60 rows have the same time in "Date".*Lap'):
+        logs.read(path)
+
+
+def test_units_that_change_from_row_to_row_are_named(log: Log) -> None:
+    rows = "".join(f"{k},{9000 + k},{'m' if k % 2 else 'ft'},30,10\n" for k in range(60))
+    with pytest.raises(InputError, match='"Range unit" names several units, ft and m'):
+        logs.read(log("Time (s),Range,Range unit,Az (deg),El (deg)", rows))
+
+
+@pytest.mark.parametrize(("head", "moving"), [("Relative Bearing (deg)", True), ("Bearing (deg M)", False)])
+def test_bearings_that_are_not_true_are_not_from_north(log: Log, head: str, moving: bool) -> None:
+    path = log(f"Time (s),Range (m),{head},El (deg)")
+    found = logs.read(path, columns={"azimuth": head})
+    assert found.understood["axis_is_known"] is False
+    assert any("stays where it is" in each for each in found.understood["assumed"]) == moving
+
+
+@pytest.mark.parametrize("rows", [24, 25, 30, 60, 200])
+def test_day_hour_minute_and_second_are_no_time_codes(log: Log, rows: int) -> None:
+    """However few there are, so that the seconds go as far as frames do."""
+    cells = "".join(f"05:10:{k // 60:02d}:{k % 60:02d},{9000 + 40 * k},{30 + k / 10},10\n" for k in range(rows))
+    found = logs.read(log("Time,range_m,azimuth_deg,elevation_deg", cells))
+    np.testing.assert_allclose(found.time_s - found.time_s[0], np.arange(rows), atol=1e-6)
+
+
+def test_a_zone_behind_hhmmss_is_no_digit(log: Log) -> None:
+    cells = "".join(f"1010{10 + k},{9000 + 40 * k},{30 + k / 10},10\n" for k in range(9))
+    found = logs.read(log("Time (HHMMSS Z),range_m,azimuth_deg,elevation_deg", cells))
+    assert found.time_s[0] == pytest.approx(36610)
