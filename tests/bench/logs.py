@@ -29,6 +29,8 @@ SEEDS = (300, 301)
 LONGEST_S = 240.0
 #: Seconds between the readings of a total station, and its 1-sigma m, rad, rad.
 DRONES = {"1": (0.02, 3e-5, 3e-5), "0.5": (0.005, 1e-5, 1e-5), "0.2": (0.002, 1e-5, 1e-5)}
+#: Seconds between the ranges of an instrument, and from each to the angles that belong to it.
+APART = {"5": 0.006, "0.5": 0.001}
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 
 
@@ -52,6 +54,7 @@ def names() -> list[str]:
     ]
     faults = [f"fault/{name}/{seed}" for name in faulty_logs.CLASSES for seed in SEEDS]
     slow = [f"drone/{dt_s}/{seed}" for dt_s in DRONES for seed in SEEDS]
+    slow += [f"apart/{dt_s}/{seed}" for dt_s in APART for seed in SEEDS]
     fused = [f"range/{name}/{seed}" for name in RANGES for seed in SEEDS]
     samples = [f"sample/{path.name}/0" for path in sorted(SAMPLES.iterdir()) if _is_log(path)]
     return [*samples, "range/sample/0", *scenarios, *effects, *faults, *slow, *fused]
@@ -104,6 +107,11 @@ def _drone(what: str, seed: int, room: Path) -> Seen:
     return Seen(log, log.time_s, position_m)
 
 
+def _apart(what: str, seed: int, room: Path) -> Seen:
+    log, position_m = drone.apart(seed, float(what), APART[what])
+    return Seen(log, log.time_s, position_m)
+
+
 def _range(what: str, seed: int, room: Path) -> Seen:
     if what == "sample":
         return Seen(SAMPLES / "range")
@@ -124,6 +132,7 @@ _MAKERS: dict[str, Callable[[str, int, Path], Seen]] = {
     "effect": _effect,
     "fault": _fault,
     "drone": _drone,
+    "apart": _apart,
     "range": _range,
 }
 

@@ -13,7 +13,7 @@ from ftproc.core.filtering.smoother import likelihood_of
 from ftproc.core.identification import likelihood
 from ftproc.core.model.motion import isotropic
 from ftproc.settings import FilterSettings
-from tests.drone import seen
+from tests.drone import apart, seen
 
 
 def outcome(seed, dt_s, sigma):
@@ -54,3 +54,15 @@ def test_most_noise_is_within_the_doubt():
         worse = likelihood_of(observations, found._replace(noise_variance=more), starts)
         limit = likelihood.NOISE_STEP ** (2 * likelihood.NOISE_STEPS) * model.noise_variance[c]
         assert worse < likelihood_of(observations, model, starts) - likelihood.DOUBT or found.noise_variance[c] >= limit
+
+
+@pytest.mark.parametrize(("dt_s", "late_s", "most_m"), [(5.0, 0.006, 15.0), (0.5, 0.001, 1.0)])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_angles_with_stamps_of_their_own(dt_s, late_s, most_m, seed):
+    """Milliseconds after the ranges: half of the intervals are a thousandth of the others. Positions were 1e8 m off."""
+    log, position = apart(seed, dt_s, late_s)
+    found = pipeline.filter_log(log, FilterSettings(smooth=True))
+    error = found.state[:, :3] - position
+    assert np.sqrt((error**2).sum(1).mean()) < most_m
+    assert (np.abs(error) < 5 * found.sigma[:, :3]).all(1).mean() > 0.98
+    assert found.metadata["summary"]["trust"]["verdict"] == "consistent"

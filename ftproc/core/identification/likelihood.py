@@ -40,6 +40,7 @@ FIRST_MEMORIES = (
     12.0,
     30.0,
 )  # intervals, of which the likeliest is where the search for the jerk begins
+LONGER = 2.5  # times, from memory to memory, up to as many mean intervals: in bunches the typical one is far too short
 UNFORESEEN = 8.0  # times the noise, of a prediction: with more, a reading says nothing of its own noise
 DOUBT = 3.0  # in log-likelihood, by which more noise may be less likely and is not excluded
 NOISE_STEP, NOISE_STEPS = 2.0, 6  # by which the noise is raised, and how often
@@ -78,7 +79,15 @@ def first_jerk(log: Observations, noise_variance: FloatArray, shortest: float = 
         return found if math.isfinite(found) else -math.inf
 
     memories = [memory for memory in FIRST_MEMORIES if memory >= shortest]
+    while memories[-1] * LONGER <= FIRST_MEMORIES[-1] * _bunched(log, scales):
+        memories.append(LONGER * memories[-1])
     return max((scales.jerk_psd(memory * scales.interval_s) for memory in memories), key=likelihood)
+
+
+def _bunched(log: Observations, scales: Scales) -> float:
+    """The mean interval of a log, in typical ones: far more than one where readings come in bunches, as of an
+    instrument whose angles have stamps milliseconds after those of its ranges."""
+    return scales.span_s / max(len(log.time_s) - 1, 1) / scales.interval_s
 
 
 def without_noise(log: Observations, sigma: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
