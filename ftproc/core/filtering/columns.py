@@ -7,17 +7,21 @@ zero; what it would do otherwise is linear in them, with D = d(reading)/db, U an
     S <- Phi S + jolts      C = L^-1 (D + H S)      S <- S - U' C
     information += C' C     score += C' y
 
+for the scalars beside the readings, with D = 0, and then for the readings,
+
 so that ln p(readings | b) = ln p(readings | 0) + score' b - b' information b / 2, with the trajectory integrated out.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import kernel, part, zeros
+from ftproc.core.filtering import beside
 from ftproc.core.filtering.filters import FILTER, Filter, Filters
 from ftproc.core.filtering.forward import Span, advance
 from ftproc.core.filtering.memory import scratch
@@ -71,14 +75,35 @@ class _Sums(NamedTuple):
 
 
 @part
-def _carry(f: Filter, k: int, interval: float, low: int, high: int, sums: Any) -> None:
-    """Take the columns [low, high) over an interval and an update."""
+def _carry_over(row: FloatArray, low: int, high: int, sums: Any) -> None:
+    """Take the columns [low, high) over a scalar beside the readings; see `beside`."""
+    if not (math.isfinite(row[beside.VALUE]) and row[beside.WEIGHT] > 0):
+        return
+    s, white, score, information = sums.state, sums.white, sums.score, sums.information
+    for c in range(low, high):
+        total = 0.0
+        for j in range(6):
+            total += row[beside.G + j] * s[j, c]
+        white[0, c] = total
+        score[c] += total * row[beside.Y]
+        for e in range(low, c + 1):
+            information[c, e] += total * white[0, e]
+    for i in range(9):
+        for c in range(low, high):
+            s[i, c] -= row[beside.U + i] * white[0, c]
+
+
+@part
+def _carry(f: Filter, k: int, interval: float, low: int, high: int, scalars: Cube, sums: Any) -> None:
+    """Take the columns [low, high) over an interval and an update, with the scalars beside the readings."""
     s, white, g, u, root, y = sums.state, sums.white, f.g, f.u, f.root, f.y
     score, information, h, width = sums.score, sums.information, 0.5 * interval * interval, sums.design.shape[2]
     for i in range(3):
         for c in range(low, high):
             s[i, c] += interval * s[i + 3, c] + h * s[i + 6, c]
             s[i + 3, c] += interval * s[i + 6, c]
+    for kind in range(len(scalars)):
+        _carry_over(scalars[kind, k], low, high, sums)
     for c in range(low, high):
         d0 = d1 = d2 = 0.0
         if sums.begin[c] <= k < sums.end[c]:
@@ -124,12 +149,14 @@ def _sweep_columns(span: Span, samples: Samples, profile: motion.Profile, filter
             high += 1
         while low < high and not _acts(f, sums, low, k):
             low += 1
+        if len(profile.beside) > 0:
+            likelihood += beside.take(f.x, f.p, profile.beside, k)
         _, gained = take_in(f, samples[k])
         likelihood += gained
         for c in range(low, high):
             if sums.begin[c] == k and sums.jolt[c] >= 0:
                 sums.state[sums.jolt[c], c] += 1.0
-        _carry(f, k, interval, low, high, sums)
+        _carry(f, k, interval, low, high, profile.beside, sums)
     return likelihood
 
 
@@ -137,7 +164,7 @@ def said_of(log: Observations, model: Model, starts: list[Start], columns: Colum
     """What a log says of the columns with a model of white noise; each start forgets what was before it."""
     n, m = len(log.time_s), len(columns.begin)
     score, information, likelihood = np.zeros(m), np.zeros((m, m)), 0.0
-    samples, profile = log.samples(model.reading_variance, scratch(SAMPLE, n)), model.profile(log.time_s)
+    samples, profile = log.samples(model.reading_variance, scratch(SAMPLE, n)), model.profile_of(log)
     for start, stop in between(starts, n):
         quiet = np.zeros(m, np.int64)
         sums = _Sums(*columns, np.zeros((9, m)), np.zeros((3, m)), np.zeros(m), quiet, score, information)

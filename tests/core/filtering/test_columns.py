@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ftproc.core.filtering.beside import DISTANCE
 from ftproc.core.filtering.columns import Columns, said_of
-from ftproc.core.filtering.records import Start
+from ftproc.core.filtering.records import Scalars, Start
 from ftproc.core.filtering.smoother import likelihood_of
 from ftproc.core.model.frames import from_cartesian, wrap
 from tests.core.tracks import SIGMA, matched
@@ -28,6 +29,7 @@ def curves(n):
     return Columns(design, begin, end, np.full(4, -1))
 
 
+CENTRE = np.array([0.0, 0.0, -6.37e6])  # of the earth, m
 SIZE = np.array([1.0, 1.0, 1.0, 1.0]) * [SIGMA[0], SIGMA[1], SIGMA[2], 1.0]
 
 
@@ -106,3 +108,27 @@ def test_a_jolt_is_a_step_of_the_state(element):
     there = likelihood_of(a.log._replace(measurement=z), a.model, a.starts)
     expected = said.score[0] * size - 0.5 * said.information[0, 0] * size**2
     assert there - said.log_likelihood == pytest.approx(expected, rel=0.05, abs=0.3)
+
+
+def test_scalars_beside_the_readings_count():
+    """Heights and range rates, some of them missing or rejected: likelihood, slope and bend as without columns."""
+    a, draw = track(), np.random.default_rng(4)
+    n, columns = len(a.time), curves(len(a.time))
+    rate = (a.truth[:, :3] * a.truth[:, 3:6]).sum(1) / np.linalg.norm(a.truth[:, :3], axis=1)
+    heights = np.linalg.norm(a.truth[:, :3] - CENTRE, axis=1)
+    weight = (draw.random((2, n)) > 0.2).astype(float)
+    scalars = (
+        Scalars.rates(rate + draw.standard_normal(n), 1.0, weight[0]),
+        Scalars(heights + 30 * draw.standard_normal(n), np.full(n, 900.0), weight[1], DISTANCE, CENTRE),
+    )
+    log = a.log._replace(beside=scalars)
+    said = said_of(log, a.model, a.starts, columns)
+    assert said.log_likelihood == pytest.approx(likelihood_of(log, a.model, a.starts), rel=1e-12)
+    alone = said_of(a.log, a.model, a.starts, columns)
+    assert (np.diag(said.information) > 1.001 * np.diag(alone.information)).any()
+    for _ in range(10):
+        b = 3 * SIZE * draw.standard_normal(4)
+        expected = said.log_likelihood + said.score @ b - 0.5 * b @ said.information @ b
+        moved = log._replace(measurement=a.z - columns.design @ b)
+        likely = likelihood_of(moved, a.model, a.starts)
+        assert likely == pytest.approx(expected, abs=2e-3 * (1 + b @ said.information @ b))
