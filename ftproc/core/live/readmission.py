@@ -18,9 +18,12 @@ from numpy.typing import NDArray
 from ftproc.core.editing import outlier_chain, patch_likelihood
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
+from ftproc.core.identification.profile import fit_profile, roughness, with_allowance
+from ftproc.core.identification.scales import Scales
 from ftproc.records import FloatArray
 
 ROUNDS = 3  # of smoothing and deciding
+MOVES_STEPS = 6  # of the search for the process noise of a target that begins to move
 MARGIN = 5.0  # by which the log-probability of other decisions must be better
 
 
@@ -34,6 +37,14 @@ class Open(NamedTuple):
     start: Start
     rates: FloatArray
     accepted: NDArray[np.bool_] | bool = False
+
+
+def decided(case: Open, gate: float, profile: Model, scales: Scales | None) -> tuple[Open, Model]:
+    """The decisions made again, and the process noise without its allowance. gate: in sigmas. scales: see
+    `readmitted`."""
+    case = settled(case, gate)
+    other = readmitted(case, profile, scales)
+    return (case, profile) if other is None else (settled(other[0], gate), other[1])
 
 
 def settled(case: Open, gate: float) -> Open:
@@ -50,15 +61,27 @@ def settled(case: Open, gate: float) -> Open:
     return case
 
 
-def readmitted(case: Open) -> FloatArray | None:
-    """Other decisions (n, 3), if they are likelier."""
+def readmitted(case: Open, profile: Model, scales: Scales | None) -> tuple[Open, Model] | None:
+    """Other decisions, if they are likelier, and the process noise for them: as it is, or, if scales are given, that by
+    which the target has begun to move; a turn that begins is off any track with the jerk of a straight leg."""
     runs = {c: run for c in range(3) if len(run := _rejected(case, c)) >= patch_likelihood.SHORTEST_RUN}
     if not runs:
         return None
     tried = [case.log.weight, *_others(case.log.weight, runs)]
     found = [_log_probability(case, weight) for weight in tried]
     best = int(np.argmax(found))
-    return tried[best] if found[best] > found[0] + MARGIN else None
+    if found[best] > found[0] + MARGIN:
+        return case._replace(log=case.log._replace(weight=tried[best])), profile
+    if scales is None:
+        return None
+    weight = case.log.weight.copy()
+    for c, run in runs.items():
+        weight[run, c] = 1.0
+    log = case.log._replace(weight=weight)
+    profile = fit_profile(log, [case.start], profile, MOVES_STEPS, scales)
+    moves = case._replace(log=log, model=with_allowance(log, profile, scales))
+    gain = _log_probability(moves, weight) - roughness(moves.model) - found[0] + roughness(case.model)
+    return (moves, profile) if gain > MARGIN else None
 
 
 def _others(weight: FloatArray, runs: dict[int, NDArray[np.int64]]) -> Iterator[FloatArray]:

@@ -25,7 +25,7 @@ from ftproc.core.live import beside
 from ftproc.core.live.pieces import BLOCK, Sizes, filtered, later, piece, predicted, stretched
 from ftproc.core.live.predictive_chain import OPEN, chains_of
 from ftproc.core.live.readings import Columns, Labels, Repeats, labelled, typical, used_lately
-from ftproc.core.live.readmission import Open, readmitted, settled
+from ftproc.core.live.readmission import Open, decided
 from ftproc.core.live.turning import Case, Turning
 from ftproc.core.live.whole import Whole
 from ftproc.records import FloatArray, IntArray
@@ -253,10 +253,8 @@ class Window:
         scales = scales_of(log, self.model.noise_variance)
         self.allowed = self._with_allowance(log, scales)
         by_hand = self.known.accepted.of(log.time_s, log.measurement)
-        case = settled(Open(log, self.kept["possible"][near], self.allowed, self.anchor, self.rates, by_hand), gate)
-        other = readmitted(case)
-        if other is not None:
-            case = settled(case._replace(log=log._replace(weight=other)), gate)
+        case = Open(log, self.kept["possible"][near], self.allowed, self.anchor, self.rates, by_hand)
+        case, self.model = decided(case, gate, self.model, scales if self.known.jerk_psd is None else None)
         log = beside.decided(case.log, self.allowed, self.anchor)
         self.kept["weight"][near] = log.weight
         if self.known.jerk_psd is None:
