@@ -11,11 +11,21 @@ from numpy.typing import NDArray
 
 from ftproc.core.identification.stretches import runs_of
 from ftproc.files import layout
-from ftproc.fusion.estimation import constants as posterior
-from ftproc.fusion.estimation.events import CLOCK
+from ftproc.fusion import notes
+from ftproc.fusion.estimation.constants import WORDS
+from ftproc.fusion.estimation.events import APART_M, CLOCK, OFFSET
 from ftproc.fusion.estimation.whole import Fused
 from ftproc.quality import consistency, faults
-from ftproc.quality.verdict import CONSISTENT, MANY_REJECTED, SUSPECT, TOO_MANY_REJECTED, UNRELIABLE, Remark, cut_short
+from ftproc.quality.verdict import (
+    CONSISTENT,
+    MANY_REJECTED,
+    SUSPECT,
+    TOO_MANY_REJECTED,
+    UNRELIABLE,
+    Remark,
+    cut_short,
+    too_fast,
+)
 from ftproc.records import FloatArray
 
 WRONG_S, WRONG_ROWS = 3.0, 6  # seconds and rows that all of a station's readings are rejected: another target
@@ -121,11 +131,10 @@ def component_figures(fused: Fused, s: int) -> dict[str, Any]:
 def remarks(fused: Fused, zero_s: float) -> list[Remark]:
     """All remarks on a fused flight. zero_s: the logs' time of the first reading."""
     return [
-        *_clocks(fused),
-        *_beside(fused),
+        *notes.notes(fused, zero_s),
         *_steps(fused, zero_s),
-        *_unobserved(fused),
         *_improbable(fused),
+        *too_fast(consistency.least_acceleration(fused.track.state, fused.track.sigma)),
         *_scattered(fused),
         *_correlated(fused),
         *_rejections(fused),
@@ -136,42 +145,16 @@ def remarks(fused: Fused, zero_s: float) -> list[Remark]:
     ]
 
 
-def _clocks(fused: Fused) -> Iterator[Remark]:
-    prior = fused.constants.prior[:, CLOCK]
-    if len(prior) > 1 and not prior.any():
-        text = "all clocks are taken as exact (clock_offset_sigma_s = 0 everywhere): none is estimated"
-        yield Remark(CONSISTENT, text)
-    elif (prior > 0).all():
-        text = "no clock is the reference (clock_offset_sigma_s = 0): the time of all is known as well as"
-        yield Remark(CONSISTENT, f"{text} the best of them")
-
-
-def _beside(fused: Fused) -> Iterator[Remark]:
-    """What was done with copies, and with what stands beside the readings."""
-    for station in fused.stations:
-        for c in station.components:
-            measured = int(np.isfinite(station.measurement[:, c]).sum())
-            for text in faults.copies_in_words(station.names[c], faults.copies(station.copied[c]), measured):
-                yield Remark(CONSISTENT, f"{station.name}: {text}")
-    for station, sides in zip(fused.stations, fused.beside, strict=False):
-        for each in sides.values():
-            if each.side.why:
-                yield Remark(CONSISTENT, f"{station.name}: {each.side.why}")
-            elif each.side.closing:
-                text = "the range rates count inward, as the motion shows, and are turned round"
-                yield Remark(CONSISTENT, f"{station.name}: {text}")
-
-
-def _unobserved(fused: Fused) -> Iterator[Remark]:
-    unobserved = posterior.not_observable(fused.constants, [station.name for station in fused.stations])
-    if unobserved:
-        yield Remark(CONSISTENT, f"cannot be told: {'; '.join(unobserved)} (1-sigma stays at the prior's)")
-
-
 def _improbable(fused: Fused) -> Iterator[Remark]:
     c = fused.constants
     for s, station in enumerate(fused.stations):
-        for j, word in enumerate(posterior.WORDS):
+        if c.prior[s, OFFSET] == APART_M:
+            heard = [k for k in range(len(fused.stations)) if k != s and c.prior[k, OFFSET] > 0]
+            off = f"{c.estimate[s, OFFSET] - c.estimate[heard[0], OFFSET]:+.3g} m"
+            text = f"the heights of {station.name} lie {off} above those of {fused.stations[heard[0]].name}"
+            text += ": another setting of the air's pressure, or another zero, of one of them?"
+            yield Remark(SUSPECT, f"{text} The estimate allows for it")
+        for j, word in enumerate(WORDS):
             if c.prior[s, j] > 0 and abs(c.estimate[s, j]) > IMPROBABLE * c.prior[s, j]:
                 times = abs(c.estimate[s, j]) / c.prior[s, j]
                 yield Remark(

@@ -136,9 +136,8 @@ def _alone(range_: Range, log: MeasurementLog, settings: FilterSettings, model: 
     """A single station: filtered as any log, and seen from the origin."""
     instrument = range_.instruments[0]
     own = instrument.recipe.settings
-    settings = replace(
-        settings, noise=settings.noise or own.noise, jerk_psd_m2ps5=settings.jerk_psd_m2ps5 or own.jerk_psd_m2ps5
-    )
+    both = {name: getattr(settings, name) or getattr(own, name) for name in ("noise", "height", "jerk_psd_m2ps5")}
+    settings = replace(settings, **both)
     found = pipeline.filter_log(log, settings, model)
     turned = _from_origin(found, instrument, log.frame)
     (seen,), _ = logs.as_seen(range_.instruments, [log])

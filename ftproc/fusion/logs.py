@@ -20,6 +20,7 @@ from ftproc.fusion import positions
 from ftproc.fusion.estimation import beside
 from ftproc.fusion.estimation.events import Seen
 from ftproc.fusion.range_file import POSITION, Instrument, Range
+from ftproc.methods import heights
 from ftproc.quality import sanity
 from ftproc.records import ACCEPTED, REJECTED, FloatArray, MeasurementLog
 
@@ -78,7 +79,8 @@ def as_seen(
                 sides, instrument.times, instrument.away_m, copied,
             )
         )  # fmt: skip
-    return seen, zero
+    priors = [heights.prior_of(log, each.recipe.settings) for each, log in zip(instruments, found, strict=True)]
+    return beside.with_prior(seen, priors, origin), zero
 
 
 def epoch(found: Sequence[MeasurementLog]) -> str:
@@ -101,10 +103,11 @@ def _shifts(instruments: Sequence[Instrument], found: Sequence[MeasurementLog]) 
 
 
 def check_overlap(range_: Range, seen: Sequence[Seen]) -> None:
-    """Raise InputError for a station whose times have nothing in common with those of the others."""
+    """Raise InputError for a station whose times have nothing in common with those of the others, if it cannot have
+    handed the target over to them: two that see its place, with a pause shorter than either log."""
     for k, station in enumerate(seen):
         others = [other for j, other in enumerate(seen) if j != k]
-        if not others or any(_overlap(station, other, 0.0) > 0 for other in others):
+        if not others or any(_overlap(station, other, 0.0) > 0 or _hands_over(station, other) for other in others):
             continue
         first, last = station.time_s[0], station.time_s[-1]
         spans = ", ".join(f"{other.name} {other.time_s[0]:.6g} to {other.time_s[-1]:.6g} s" for other in others)
@@ -121,6 +124,12 @@ def check_overlap(range_: Range, seen: Sequence[Seen]) -> None:
             f"{range_.path}: {station.name} ({first:.6g} to {last:.6g} s after the first reading) overlaps with no "
             f"other station ({spans}); {cure}."
         )
+
+
+def _hands_over(one: Seen, other: Seen) -> bool:
+    spans = [float(each.time_s[-1] - each.time_s[0]) for each in (one, other)]
+    place = all({0, 1} <= set(each.components) and (2 in each.components or each.beside) for each in (one, other))
+    return bool(place and -_overlap(one, other, 0.0) < min(spans))
 
 
 def _overlap(one: Seen, other: Seen, added: float) -> float:

@@ -91,7 +91,7 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
     if log.by_hand is not None:
         by_hand = log.by_hand.of("height")
     if heights is None or not np.isfinite(heights.above_m).any() or settings.height is not None:
-        return recording, Common(_prior(log, settings, causal), np.zeros(len(log)))
+        return recording, Common(prior_of(log, settings, causal), np.zeros(len(log)))
     measurement = bounded(log.measurement)
     station_m = settings.site[2] if settings.site is not None else 0.0
     if causal:
@@ -195,10 +195,10 @@ def _scatter(values: FloatArray) -> float:
     return median(np.abs(np.diff(seen, 2))) * 1.4826 / math.sqrt(6) if len(seen) > FEWEST else 0.0
 
 
-def _prior(log: MeasurementLog, settings: FilterSettings, causal: bool) -> Prior:
+def prior_of(log: MeasurementLog, settings: FilterSettings, causal: bool = False) -> Prior:
+    """What is known of the height where a log tells nothing of it. causal: whether its later rows are not known yet."""
     if settings.height is not None:
-        height, sigma = settings.height
-        return Prior(height, sigma, SPECIFIED)
+        return Prior(*settings.height, SPECIFIED)
     if causal:
         return ANY
     return SLOW if _fastest(log.time_s, log.measurement) < SLOW_MPS else FAST

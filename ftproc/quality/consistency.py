@@ -18,6 +18,7 @@ BULK, FAR_OFF = (
     31,
     5.0,
 )  # readings, of which more than half have such a residual in units of its 1-sigma: noise never does that
+SURE = 3.0  # sigmas by which an acceleration is larger than zero
 MOST_INTERVALS = 20  # that are listed
 
 
@@ -82,3 +83,9 @@ def poorly_observable(time_s: FloatArray, sigma: FloatArray, unit: str = "m") ->
     ]
     longest = sorted(found, key=lambda s: s["from_s"] - s["to_s"])[:MOST_INTERVALS]
     return sorted(longest, key=lambda s: s["from_s"])
+
+
+def least_acceleration(state: FloatArray, sigma: FloatArray) -> float:
+    """The largest acceleration, m/s2, that a target had surely, by states (n, 9) and their 1-sigma (n, 9)."""
+    least = np.sqrt((state[:, 6:] ** 2).sum(1)) - SURE * np.sqrt((sigma[:, 6:] ** 2).sum(1))
+    return float(np.max(least, initial=0.0, where=np.isfinite(least)))

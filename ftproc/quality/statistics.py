@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 UNITS = ("m", "rad", "rad")
 GAP_INTERVALS = 3.0  # median intervals that make a gap
 MOST_KEPT = 250_000  # samples whose sigmas are kept; of more, the largest of every few
-SURE = 3.0  # sigmas by which an acceleration is larger than zero
 
 
 class RunStatistics:
@@ -86,8 +85,7 @@ class RunStatistics:
         self._add_gaps(time_s)
         self._add_changes(cleaned)
         if not self.absent:
-            least = np.sqrt(sums(best.state[:, 6:] ** 2)) - SURE * np.sqrt(sums(best.sigma[:, 6:] ** 2))
-            self.acceleration = max(self.acceleration, float(np.max(least, initial=0.0, where=np.isfinite(least))))
+            self.acceleration = max(self.acceleration, consistency.least_acceleration(best.state, best.sigma))
         finite = np.isfinite(run.nis)
         self.nis_sum += float(run.nis[finite].sum())
         self.nis_count += int(finite.sum())

@@ -20,7 +20,8 @@ FEWEST_OVERLOOKED, OVERLOOKED = (
 MANY_REJECTED, TOO_MANY_REJECTED = 0.25, 0.5  # share of a component's readings. With a third of all readings outliers,
 # one flight in five diverges, and nearly all of these have more than a quarter rejected.
 
-FASTEST_MPS2 = 1000.0  # of acceleration: 100 g, of the hardest interceptors
+FASTEST_MPS2, NEVER_MPS2 = 1e3, 1e4  # of acceleration: 100 g, of the hardest interceptors; ten times as much, of
+# nothing that has left its barrel
 CHANCE_RAD = 0.25  # of noise: readings at chance over half a turn have 0.9, over a quarter 0.45, no instrument 0.1
 TOO_WIDE = 0.5  # innovation ratio below which the sigmas are far too large
 
@@ -195,12 +196,16 @@ def _sigmas(s: Mapping[str, Any]) -> Iterator[Remark]:
         yield Remark(wrong if likelier else CONSISTENT if s["slow_noise_separable"] else SUSPECT, text)
 
 
+def too_fast(least_mps2: float) -> Iterator[Remark]:
+    """An acceleration that was surely reached, and that almost nothing has."""
+    if least_mps2 > FASTEST_MPS2:
+        text = f"the readings ask for an acceleration of {least_mps2:.3g} m/s2, which almost nothing that flies reaches"
+        yield Remark(SUSPECT if least_mps2 < NEVER_MPS2 else UNRELIABLE, text)
+
+
 def _no_flight(s: Mapping[str, Any]) -> Iterator[Remark]:
     """What no flight explains."""
-    least = s.get("acceleration_at_least_mps2", 0.0)
-    if least > FASTEST_MPS2:
-        text = f"the readings ask for an acceleration of {least:.3g} m/s2, which almost nothing that flies reaches"
-        yield Remark(SUSPECT, text)
+    yield from too_fast(s.get("acceleration_at_least_mps2", 0.0))
     yield from _left_behind(s)
     for name, part in s["components"].items():
         if (part.get("noise_rad") or 0.0) > CHANCE_RAD:

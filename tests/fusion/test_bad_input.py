@@ -94,6 +94,20 @@ def test_no_overlap(run, folder):
     refused(run, 1, "theodolite3", "overlaps with no other station", "leave the station out")
 
 
+def test_a_target_that_is_handed_over(run, folder):
+    """One station sees it before a pause, another after it: no overlap is needed where both see its place."""
+    log = pd.read_csv(folder / "radar.csv")
+    log[log.time_s < 25].to_csv(folder / "radar.csv", index=False)
+    log[log.time_s > 27].to_csv(folder / "next.csv", index=False)
+    path = folder / "range.toml"
+    first, *sections = path.read_text().split("\n[station.")
+    (radar,) = (each for each in sections if each.startswith("radar"))
+    path.write_text("\n[station.".join([first, radar, radar.replace("radar", "next")]))
+    found = run("filter", "--fuse", "range.toml", "-o", "best.parquet")
+    assert found.code == 0
+    assert "saw the target at other times than all others" in found.out + found.err
+
+
 def test_readings_that_meet_nowhere(run, folder):
     text = (folder / "range.toml").read_text()
     parts = text.split("\n[station.")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from ftproc.files.writing import ranges
@@ -128,6 +130,50 @@ def test_flight_levels_alone_give_a_place(tmp_path):
     assert inside > 0.95
     assert horizontal < 400
     assert np.median(found.trajectory.sigma[:, 2]) > 60
+
+
+def two_radars(folder, seed, more_m=(0.0, 0.0)):
+    """Without elevations; what is added to the heights of each, NaN for none of them. What is simulated, and fused."""
+    simulated = simulate_range(SURVEILLANCE, seed=seed, duration_s=250.0)
+    simulated = replace(simulated, stations=simulated.stations[:2])
+    ranges.write(simulated, str(folder), None)
+    for name, more in zip(("surveillance1", "surveillance2"), more_m, strict=True):
+        log = pd.read_csv(folder / f"{name}.csv")
+        log["flight_level"] += more / 30.48
+        log.dropna(axis=1, how="all").to_csv(folder / f"{name}.csv", index=False)
+    return simulated, flight.fuse(range_file.load(str(folder / "range.toml")), SMOOTH)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 4])
+def test_faults_are_sought_with_the_heights_in_mind(tmp_path, seed):
+    """Each seeming step once gained a thousand in log-likelihood, as the heights did not count beside it."""
+    found = two_radars(tmp_path, seed)[1].trajectory.metadata["summary"]
+    assert found["trust"]["verdict"] == "consistent"
+    for station in found["stations"].values():
+        assert station["components"]["range"]["rejected"] < 0.1 * station["components"]["range"]["good"]
+
+
+def test_where_nobody_tells_the_height_a_prior_stands_for_it(tmp_path):
+    simulated, found = two_radars(tmp_path, 2, (np.nan, np.nan))
+    summary, track = found.trajectory.metadata["summary"], found.trajectory
+    assert "no station tells the height: it is taken for that of an aircraft, 6000 m" in " ".join(summary["notes"])
+    assert summary["trust"]["verdict"] == "consistent"
+    assert errors(simulated, found)[1] > 0.95
+    at = [np.interp(track.time_s, simulated.truth.time_s, axis) for axis in simulated.truth.position_m[:, :2].T]
+    assert np.sqrt(((track.state[:, :2] - np.stack(at, 1)) ** 2).sum(1).mean()) < 300
+    assert not any("height" in name for name in found.edited["surveillance1"].column_names)
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_heights_of_one_station_may_be_others(tmp_path, seed):
+    """Those of another setting of the air's pressure, 400 m off: the track is as good as without."""
+    simulated, found = two_radars(tmp_path, seed, (0.0, 400.0))
+    (horizontal, _), inside = errors(simulated, found)
+    trust = found.trajectory.metadata["summary"]["trust"]
+    assert trust["verdict"] == "suspect"
+    assert re.search(r"the heights of surveillance. lie .*another setting of the air's", " ".join(trust["reasons"]))
+    assert inside > 0.9
+    assert horizontal < 400
 
 
 @pytest.mark.parametrize("channel", ["range", "azimuth", "elevation", "rate"])

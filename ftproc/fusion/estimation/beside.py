@@ -2,14 +2,15 @@
 
 A height is the distance from the centre of the earth, and has an offset and a scale that are not known: those of the
 pressure and of the temperature of the air; the other stations tell them. Heights are used from the beginning, because
-without them a radar without elevations sees no place. Range rates are looked at when the readings are decided on, as
+without them a radar without elevations sees no place. Where no station tells the height, a prior stands for it, with an
+offset that is as uncertain as that is. Range rates are looked at when the readings are decided on, as
 those of a single log are.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -20,11 +21,11 @@ from ftproc.core.editing.copies import rounding_step
 from ftproc.core.filtering import beside as layout
 from ftproc.core.filtering.records import Scalars
 from ftproc.core.model.earth import ECCENTRICITY2, MEAN_RADIUS_M, RADIUS_M, Geodetic
-from ftproc.fusion.estimation.events import Events, Seen, Side
+from ftproc.fusion.estimation.events import OFFSET, Events, Seen, Side
 from ftproc.methods import heights
 from ftproc.records import FloatArray, IntArray, MeasurementLog
 
-HEIGHT, RANGE_RATE = "height", "range_rate"
+HEIGHT, RANGE_RATE, ASSUMED = "height", "range_rate", "assumed height"
 NO_HEIGHTS = "the heights make the readings less likely: none is used"
 SHORTEST_M = 1.0  # of a distance over the ground
 
@@ -74,6 +75,30 @@ def sides(log: MeasurementLog, place: FloatArray, origin: Geodetic | None) -> tu
     return tuple(found), prior
 
 
+def with_prior(stations: list[Seen], priors: Sequence[heights.Prior], origin: Geodetic | None) -> list[Seen]:
+    """The stations with what is known of the height beforehand, where none of them tells it: those with ranges and
+    azimuths."""
+    plane = [{0, 1} <= set(station.components) for station in stations]
+    told = any(2 in each.components or any(s.kind == layout.DISTANCE for s in each.beside) for each in stations)
+    if told or not any(plane):
+        return stations
+    radius, level = _earth(origin)
+    centre, found = np.array([0.0, 0.0, -radius]), list(stations)
+    for s, (station, prior) in enumerate(zip(stations, priors, strict=True)):
+        if plane[s]:
+            above = float(np.linalg.norm(station.place - centre)) - radius + prior.height_m
+            value, ones = np.full(len(station.time_s), above), np.ones(len(station.time_s))
+            side = Side(ASSUMED, layout.DISTANCE, value, prior.sigma_m, ones, centre, True, level)
+            words = f"{prior.height_m:g} m above {station.name}, 1 sigma {prior.sigma_m:g} m"
+            if prior.why != heights.SPECIFIED:
+                words = f"that of {prior.why}, {words} (height.prior_m of its station states another)"
+            biases = station.prior.copy()
+            biases[OFFSET] = prior.sigma_m
+            side = side._replace(why=f"no station tells the height: it is taken for {words}")
+            found[s] = station._replace(beside=(*station.beside, side), prior=biases)
+    return found
+
+
 def _earth(origin: Geodetic | None) -> tuple[float, float]:
     """Radius of the earth at the origin of the range, and the height of that, m."""
     if origin is None:
@@ -88,7 +113,7 @@ def with_elevations(
     """Stations, weights (rows, 3) and noise (m, 3) for a first track: with the elevations that heights stand for."""
     found, weights, wide = list(stations), list(weight), sigma.copy()
     for s, station in enumerate(stations):
-        side = next((each for each in station.beside if each.name == HEIGHT), None)
+        side = next((each for each in station.beside if each.kind == layout.DISTANCE), None)
         if side is None or not {0, 1} <= set(station.components) or 2 in station.components:
             continue
         z, weights[s], prior = station.measurement.copy(), weight[s].copy(), station.prior.copy()
@@ -144,7 +169,9 @@ def fitted(current: Flight, gate: float, smoothed: Callable[[Flight], Flight]) -
     """A flight whose readings are decided on, with the noise of what stands beside them, and its outliers. current:
     `engine.Current`. smoothed: the same smoothed again."""
     for s, station in enumerate(current.stations):
-        for j in range(len(station.beside)):
+        for j, side in enumerate(station.beside):
+            if side.name == ASSUMED:
+                continue
             current = _fitted(current, s, j, gate, smoothed)
     return current
 

@@ -4,7 +4,8 @@ The likelihood is quadratic about the biases it was linearised at (Friedland's c
 common shift of all clocks is the same flight a little later: the likelihood is flat along it, but not the linearised
 one, which takes the shift for jerk; so its information along that direction is taken out. Other directions of which
 the readings say next to nothing are left to the prior. Barometric heights are those of one transponder: their offset
-and scale, which are common to all stations that hear it, are those of the first.
+and scale, which are common to all stations that hear it, are those of the first. Heights that are known otherwise well
+are others'.
 """
 
 from __future__ import annotations
@@ -82,7 +83,9 @@ class Constants(NamedTuple):
     def before(cls, prior: FloatArray, known: Likelihood | None = None) -> Constants:
         """Before any reading, or with what others say."""
         known = Likelihood.nothing(prior.size) if known is None else known
-        heard, prior = np.flatnonzero(prior[:, OFFSET] > 0), prior.copy()
+        prior = prior.copy()
+        heard = np.flatnonzero(prior[:, OFFSET] > 0)
+        heard = heard[prior[heard, OFFSET] == prior[heard[:1], OFFSET]]
         shared: IntArray = parameters(heard.tolist()).reshape(-1, PARAMETERS)[:, OFFSET:]
         prior.ravel()[shared[1:]] = 0.0
         return cls(*_posterior(prior, known, shared), prior, known, shared=shared)

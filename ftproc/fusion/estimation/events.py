@@ -14,6 +14,7 @@ from ftproc.core.model.stations import levelled
 from ftproc.records import COMPONENTS, FloatArray, IntArray
 
 CLOCK, OFFSET, SCALE = 5, 6, 7  # among the parameters of a station
+APART_M = 1000.0  # 1-sigma of the offset of heights that are not those of the transponder that other stations hear
 
 
 class Side(NamedTuple):

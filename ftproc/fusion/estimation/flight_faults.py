@@ -24,7 +24,7 @@ from ftproc.core.work import for_lasting_faults
 from ftproc.fusion.estimation import beside, engine, jumps_beside, lasting
 from ftproc.fusion.estimation.constants import Likelihood
 from ftproc.fusion.estimation.engine import Alone, Current
-from ftproc.fusion.estimation.events import Seen
+from ftproc.fusion.estimation.events import APART_M, OFFSET, Seen
 from ftproc.fusion.estimation.jumps_beside import Jump
 from ftproc.fusion.estimation.lasting import Readings
 
@@ -41,7 +41,7 @@ def fuse(
     """The fused flight, or a stretch. names: of the models of motion to choose from. known: what others have said.
     progress: takes each round. Raises Alone."""
     settle = partial(engine.settled, gate=gate, jerk_psd=jerk_psd, known=known, progress=progress)
-    readings, current = _without_largest_jumps(Readings.of(stations), settle)
+    readings, current = _without_largest_jumps(*_with_own_heights(Readings.of(stations), settle), settle)
     work = for_lasting_faults(len(current.events.time_s), len(stations))
     for _ in range(LASTING_ROUNDS):
         if current.unexamined or lasting.contradicted(current.stations, current.weight):
@@ -62,9 +62,26 @@ def fuse(
     return current._replace(unexamined=current.unexamined + work.passed)
 
 
-def _without_largest_jumps(readings: Readings, settle: Settle) -> tuple[Readings, Current]:
+def _with_own_heights(readings: Readings, settle: Settle) -> tuple[Readings, Current]:
+    """The readings, and their flight; if it contradicts itself, with heights of one station that are not those of the
+    transponder that the others hear, where that is likelier."""
+    first = current = settle(readings)
+    heard = [s for s, station in enumerate(readings.stations) if station.prior[OFFSET] > 0]
+    if len(heard) < 2 or not (not first.settled or _contradict(first) or _rejects_many(first)):
+        return readings, first
+    for s in heard:
+        stations, prior = list(readings.stations), readings.stations[s].prior.copy()
+        prior[OFFSET] = APART_M
+        stations[s] = stations[s]._replace(prior=prior)
+        with contextlib.suppress(Alone):
+            found = settle(readings._replace(stations=stations))
+            if score(found) > score(current) + (MARGIN if current is first else 0.0):
+                current = found
+    return readings._replace(stations=current.stations), current
+
+
+def _without_largest_jumps(readings: Readings, current: Current, settle: Settle) -> tuple[Readings, Current]:
     """The readings without the jumps that are likelier than none, and their flight."""
-    current = settle(readings)
     for _ in range(LASTING_ROUNDS):
         if not (_contradict(current) or _rejects_many(current)):
             break

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -20,10 +20,10 @@ from ftproc.core.identification import motion_models
 from ftproc.core.model import kinematics
 from ftproc.core.model.stations import levelled
 from ftproc.fusion.estimation import engine, flight_faults, motions
-from ftproc.fusion.estimation.beside import Aside, expected
+from ftproc.fusion.estimation.beside import ASSUMED, Aside, expected
 from ftproc.fusion.estimation.constants import FARTHEST, Constants, Likelihood, parameters
 from ftproc.fusion.estimation.engine import Current
-from ftproc.fusion.estimation.events import CLOCK, Seen
+from ftproc.fusion.estimation.events import CLOCK, Seen, Side
 from ftproc.fusion.estimation.lasting import Step
 from ftproc.fusion.estimation.motions import Motive
 from ftproc.records import FloatArray, IntArray
@@ -155,7 +155,7 @@ def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, sm
     """The stretches one after the other; smoothed with these biases if they are several."""
     sizes = [len(station.time_s) for station in stations]
     weight, possible, residual, variance, position = ([np.full((n, 3), np.nan) for n in sizes] for _ in range(5))
-    beside = tuple({side.name: Aside.before(side) for side in station.beside} for station in stations)
+    beside = tuple({side.name: Aside.before(side) for side in _measured(station)} for station in stations)
     chosen, tracks = list[tuple[Motive, int]](), list[Track]()
     noise, own = np.zeros((len(stations), 3)), np.full((len(stations), 3), np.inf)
     for each in found:
@@ -171,7 +171,7 @@ def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, sm
             weight[s][rows], possible[s][rows] = current.weight[k][near], current.possible[k][near]
             residual[s][rows], variance[s][rows] = run.residual[at], run.residual_variance[at]
             position[s][rows] = best.state[at, :3]
-            for side in current.stations[k].beside:
+            for side in _measured(current.stations[k]):
                 left = current.found.beside[events.names.index(side.name), at]
                 cleaned = expected(side, best.state[at], current.constants.estimate[k])
                 beside[s][side.name] = beside[s][side.name].with_(rows, side, near, left, cleaned)
@@ -192,6 +192,11 @@ def _joined(stations: list[Seen], found: list[Stretch], constants: Constants, sm
         tuple(step for each in found for step in each.current.steps), beside, tuple(chosen),
         _last(found[-1].current, best),
     )  # fmt: skip
+
+
+def _measured(station: Seen) -> Iterator[Side]:
+    """What a station measures beside its readings."""
+    return (side for side in station.beside if side.name != ASSUMED)
 
 
 def _last(current: Current, best: FilterRun | SmootherRun) -> tuple[Start, Model] | None:
