@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ftproc.core.identification.stretches import runs_of
 from ftproc.files import layout
 from ftproc.fusion import notes
-from ftproc.fusion.estimation.constants import WORDS
+from ftproc.fusion.estimation.constants import IMPROBABLE, WORDS
 from ftproc.fusion.estimation.events import APART_M, CLOCK, OFFSET
 from ftproc.fusion.estimation.whole import Fused
 from ftproc.quality import consistency, faults
@@ -34,7 +34,6 @@ DETERMINED, UNCHECKED_S = 3, 10.0  # components that determine a place with noth
 SILENT_S, SILENT_INTERVALS = 10.0, 25.0  # without a reading
 LATE = 0.03  # of the flight
 SCATTERED = 5.0  # times its own noise
-IMPROBABLE = 4.0  # prior sigmas of a bias
 FEWEST = 10  # readings of a component, for its share of rejections to mean anything
 CORRELATED, CORRELATED_SIGMAS = 0.3, 4.0  # of residuals that follow each other: coefficient, and in its 1-sigma
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from ftproc.files.writing import ranges
+from ftproc.fusion import flight, range_file
 from ftproc.fusion.estimation import flight_faults
+from ftproc.settings import FilterSettings
+from ftproc.simulation import simulate_range
 
 
 def current(used=(0.9, 0.9), possible=(1, 1), noise=1.0, unexamined=0):
@@ -41,10 +46,46 @@ def test_stations_contradict_each_other_where_one_that_takes_part_is_rejected_or
 def test_stations_that_contradict_each_other_tell_no_motion(monkeypatch, contradict, expected):
     found, asked = SimpleNamespace(unexamined=1, stations=[], weight=[]), []
     monkeypatch.setattr(flight_faults, "_contradict", lambda _: contradict)
-    monkeypatch.setattr(flight_faults, "_without_largest_jumps", lambda readings, settle: (readings, found))
+    monkeypatch.setattr(flight_faults, "_explained", lambda readings, settle: (readings, found))
     monkeypatch.setattr(flight_faults.lasting.Readings, "of", lambda _: None)
     monkeypatch.setattr(flight_faults.beside, "fitted", lambda flight, *_: flight)
     monkeypatch.setattr(flight_faults.engine, "last", lambda flight, names: asked.append(names) or flight)
     found.events, found._replace = SimpleNamespace(time_s=np.zeros(3)), lambda **_: found
     assert flight_faults.fuse([], 3.0, None, ("white-jerk", "orbital"), None, print) is found
     assert asked == [expected]
+
+
+def _placed(folder, lower_m):
+    """A flight with a theodolite that stands so much lower than its range file says; its RMS error, and the verdict."""
+    simulated = simulate_range("range-radar", seed=3, duration_s=40.0)
+    ranges.write(simulated, str(folder), None)
+    path = folder / "range.toml"
+    before, own = path.read_text().split("[station.theodolite3]")
+    own = re.sub(r"height_m = (\S+)", lambda found: f"height_m = {float(found[1]) - lower_m}", own, count=1)
+    path.write_text(f"{before}[station.theodolite3]{own}")
+    found = flight.fuse(range_file.load(str(path)), FilterSettings(smooth=True)).trajectory
+    truth = simulated.truth
+    at = np.stack([np.interp(found.time_s, truth.time_s, axis) for axis in truth.position_m.T], 1)
+    return np.sqrt(((found.state[:, :3] - at) ** 2).sum(1).mean()), found.metadata["summary"]["trust"]
+
+
+def test_a_station_at_a_wrong_place_is_left_out_where_the_others_agree(tmp_path_factory):
+    """Above the sea instead of the ellipsoid: the others were blamed, and the track was ten times as far off."""
+    right, _ = _placed(tmp_path_factory.mktemp("right"), 0.0)
+    wrong, trust = _placed(tmp_path_factory.mktemp("wrong"), 47.0)
+    assert wrong < 2 * right
+    assert trust["verdict"] == "suspect"
+    assert "theodolite3 contradicts the others: most of its readings are rejected" in " ".join(trust["reasons"])
+
+
+def test_a_station_is_left_out_only_if_the_others_can_disagree():
+    """Three components make a place: that two stations with no more agree says nothing; nor does it by odd biases."""
+    stations = [SimpleNamespace(components=each) for each in ((0, 1, 2), (1, 2), (0,))]
+    readings, pair = SimpleNamespace(stations=stations), SimpleNamespace(stations=stations[:2])
+    probable, odd = (SimpleNamespace(constants=SimpleNamespace(farthest=each)) for each in (3.0, 5.0))
+    assert flight_faults._left_out(readings, {2: probable}) == (2, probable)
+    assert flight_faults._left_out(readings, {0: probable, 1: probable, 2: odd}) == (1, probable)
+    assert flight_faults._left_out(readings, {1: probable, 2: probable}) is None
+    assert flight_faults._left_out(readings, {0: probable}) is None
+    assert flight_faults._left_out(pair, {1: probable}) is None
+    assert flight_faults._left_out(readings, {}) is None

@@ -30,6 +30,7 @@ WORDS = (
 ALLOWANCE = 1.95  # on the variance that the readings leave: manoeuvres are not white jerk, noise is not quite white
 LEAST_SEEN = 0.05  # of the prior's information: less in a direction says nothing
 OBSERVED = 0.9  # of the prior's 1-sigma: a parameter that stays above it is not observable
+IMPROBABLE = 4.0  # prior sigmas of a bias, from which its range file is in doubt
 FARTHEST = 6.0  # prior sigmas that a bias may be off: more of it is a wrong place, clock or target
 
 
@@ -100,6 +101,12 @@ class Constants(NamedTuple):
         """(m, PARAMETERS) whether the flight shows more of it than was known."""
         observed: NDArray[np.bool_] = self.sigma < OBSERVED * self.prior
         return observed
+
+    @property
+    def farthest(self) -> float:
+        """The largest bias, in its 1-sigma before."""
+        free = self.prior > 0
+        return float((np.abs(self.estimate[free]) / self.prior[free]).max(initial=0.0))
 
     def columns(self) -> FloatArray:
         """Directions for `core.filtering.biases`: a root of the covariance."""

@@ -2,8 +2,9 @@
 
 Where a settled flight has more noise than its components show alone, or rejects many readings, each station is left
 out, and the likeliest jump of its clock, or of a channel, is proposed by the track of the others, if these agree. The
-likeliest flight without one is kept, if it is likelier than the flight with it. All other faults that last are weighed
-on the settled flight (`lasting`).
+likeliest flight without one is kept, if it is likelier than the flight with it. If it still contradicts itself, as by a
+station at a wrong place, and all agree without one station only, that one is left out. All other faults that last are
+weighed on the settled flight (`lasting`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.core.editing.lasting.curves import CLOCK
 from ftproc.core.editing.lasting.scanned import MARGIN, PRIOR
@@ -22,12 +24,13 @@ from ftproc.core.identification.motion_models import WHITE
 from ftproc.core.identification.profile import roughness
 from ftproc.core.work import for_lasting_faults
 from ftproc.fusion.estimation import beside, engine, jumps_beside, lasting
-from ftproc.fusion.estimation.constants import Likelihood
+from ftproc.fusion.estimation.constants import IMPROBABLE, Likelihood
 from ftproc.fusion.estimation.engine import Alone, Current
 from ftproc.fusion.estimation.events import APART_M, OFFSET, Seen
 from ftproc.fusion.estimation.jumps_beside import Jump
 from ftproc.fusion.estimation.lasting import Readings
 
+DETERMINED = 3  # components that a place takes: more show whether they agree
 LASTING_ROUNDS = 3  # of the search for faults that last: where one is taken out, another may show
 NOISIER, REJECTED = 2.0, 0.2  # times the noise that a component shows alone, and share of its readings that are
 # rejected: more is a fault of its station, or of another
@@ -41,7 +44,7 @@ def fuse(
     """The fused flight, or a stretch. names: of the models of motion to choose from. known: what others have said.
     progress: takes each round. Raises Alone."""
     settle = partial(engine.settled, gate=gate, jerk_psd=jerk_psd, known=known, progress=progress)
-    readings, current = _without_largest_jumps(*_with_own_heights(Readings.of(stations), settle), settle)
+    readings, current = _explained(Readings.of(stations), settle)
     work = for_lasting_faults(len(current.events.time_s), len(stations))
     for _ in range(LASTING_ROUNDS):
         if current.unexamined or lasting.contradicted(current.stations, current.weight):
@@ -60,6 +63,11 @@ def fuse(
         names = (WHITE,)  # no motion can be told
     current = engine.last(beside.fitted(current, gate, lambda each: engine.at(each, each.constants)), names)
     return current._replace(unexamined=current.unexamined + work.passed)
+
+
+def _explained(readings: Readings, settle: Settle) -> tuple[Readings, Current]:
+    """The readings without what is wrong with a station as a whole, and their flight."""
+    return _without_largest_jumps(*_with_own_heights(readings, settle), settle)
 
 
 def _with_own_heights(readings: Readings, settle: Settle) -> tuple[Readings, Current]:
@@ -86,12 +94,49 @@ def _without_largest_jumps(readings: Readings, current: Current, settle: Settle)
         if not (_contradict(current) or _rejects_many(current)):
             break
         least = score(current) + MARGIN - PRIOR + math.log(len(current.events.time_s))
-        tried = _without_jumps(readings, current, settle)
+        agree = _others_that_agree(readings, settle)
+        tried = _without_jumps(readings, current, agree, settle)
         s, jump, first = max(tried, key=lambda each: score(each[2]), default=(0, None, current))
-        if jump is None or score(first) < least:
-            break
-        readings, current = _as_all_tell(readings, s, jump, first, settle)
+        if jump is not None and score(first) >= least:
+            found, flight = _as_all_tell(readings, s, jump, first, settle)
+            if not (_contradict(flight) and _left_out(readings, agree)):
+                readings, current = found, flight
+                continue
+        if _contradict(current) and (alone := _left_out(readings, agree)):
+            s, current = alone
+            readings = readings._replace(banned=_banned(readings, s))
+        break
     return readings, current
+
+
+def _others_that_agree(readings: Readings, settle: Settle) -> dict[int, Current]:
+    """The flights of all stations but one, by that, as far as they do not contradict each other."""
+    found = {}
+    for s in range(len(readings.stations)):
+        with contextlib.suppress(Alone):
+            others = settle(readings._replace(banned=_banned(readings, s)))
+            if not _contradict(others):
+                found[s] = others
+    return found
+
+
+def _left_out(readings: Readings, agree: dict[int, Current]) -> tuple[int, Current] | None:
+    """The one station without which all others agree, by probable biases, if these would show that they do not, and
+    their flight."""
+    found = None
+    for s, flight in agree.items():
+        others = [len(each.components) for k, each in enumerate(readings.stations) if k != s]
+        if len(others) < 2 or sum(others) <= DETERMINED or flight.constants.farthest > IMPROBABLE:
+            continue
+        if found is not None:
+            return None
+        found = s, flight
+    return found
+
+
+def _banned(readings: Readings, s: int) -> list[NDArray[np.bool_]]:
+    """Readings that are not used, if none of station s are."""
+    return [np.ones_like(each) if k == s else each for k, each in enumerate(readings.banned)]
 
 
 def _contradict(current: Current) -> bool:
@@ -109,14 +154,14 @@ def _rejects_many(current: Current) -> bool:
     )
 
 
-def _without_jumps(readings: Readings, current: Current, settle: Settle) -> Iterator[tuple[int, Jump, Current]]:
-    """The likeliest jump of each station, as the track of the others tells it, and the flights without it."""
-    for s, station in enumerate(readings.stations):
-        banned = [np.ones_like(each) if k == s else each for k, each in enumerate(readings.banned)]
+def _without_jumps(
+    readings: Readings, current: Current, agree: dict[int, Current], settle: Settle
+) -> Iterator[tuple[int, Jump, Current]]:
+    """The likeliest jump of each station, as the track of the others, if these agree, tells it, and the flights without
+    it."""
+    for s, others in agree.items():
+        station = readings.stations[s]
         with contextlib.suppress(Alone):
-            others = settle(readings._replace(banned=banned))
-            if _contradict(others):
-                continue  # it is one of these
             jumps = jumps_beside.propose(station, current.own[s], others.events.time_s, others.found.run.state)
             likeliest = max(jumps, key=lambda jump: jump.gain, default=None)
             if likeliest is not None and likeliest.gain > MARGIN:
