@@ -128,8 +128,7 @@ def check_overlap(range_: Range, seen: Sequence[Seen]) -> None:
 
 def _hands_over(one: Seen, other: Seen) -> bool:
     spans = [float(each.time_s[-1] - each.time_s[0]) for each in (one, other)]
-    place = all({0, 1} <= set(each.components) and (2 in each.components or each.beside) for each in (one, other))
-    return bool(place and -_overlap(one, other, 0.0) < min(spans))
+    return one.sees_place and other.sees_place and bool(-_overlap(one, other, 0.0) < min(spans))
 
 
 def _overlap(one: Seen, other: Seen, added: float) -> float:

@@ -11,6 +11,8 @@ import pytest
 from ftproc.files.writing import ranges
 from ftproc.fusion import flight, range_file
 from ftproc.fusion.estimation import flight_faults
+from ftproc.fusion.estimation.constants import Constants
+from ftproc.fusion.estimation.events import APART_M, OFFSET, SCALE
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate_range
 
@@ -46,13 +48,25 @@ def test_stations_contradict_each_other_where_one_that_takes_part_is_rejected_or
 def test_stations_that_contradict_each_other_tell_no_motion(monkeypatch, contradict, expected):
     found, asked = SimpleNamespace(unexamined=1, stations=[], weight=[]), []
     monkeypatch.setattr(flight_faults, "_contradict", lambda _: contradict)
-    monkeypatch.setattr(flight_faults, "_explained", lambda readings, settle: (readings, found))
+    monkeypatch.setattr(flight_faults, "_explained", lambda readings, *_: (readings, found))
     monkeypatch.setattr(flight_faults.lasting.Readings, "of", lambda _: None)
     monkeypatch.setattr(flight_faults.beside, "fitted", lambda flight, *_: flight)
     monkeypatch.setattr(flight_faults.engine, "last", lambda flight, names: asked.append(names) or flight)
     found.events, found._replace = SimpleNamespace(time_s=np.zeros(3)), lambda **_: found
     assert flight_faults.fuse([], 3.0, None, ("white-jerk", "orbital"), None, print) is found
     assert asked == [expected]
+
+
+def test_heights_that_are_others_have_an_offset_of_their_own():
+    """The other stations hear one transponder, be it the first that has its own; no stated 1-sigma means so."""
+    cases = {(80.0, 80.0, APART_M): [0, 1], (APART_M, 80.0, 80.0): [1, 2], (1e3, 1e3, 80.0): [0, 1, 2]}
+    for offsets, shared in cases.items():
+        prior = np.zeros((3, 8))
+        prior[:, OFFSET], prior[:, SCALE] = offsets, 0.02
+        found = Constants.before(prior)
+        assert (found.shared // 8)[:, 0].tolist() == shared
+        assert found.prior[shared[1:], OFFSET].tolist() == [0.0] * (len(shared) - 1)
+        assert np.count_nonzero(found.prior[:, OFFSET]) == 3 - len(shared) + 1
 
 
 def _placed(folder, lower_m):

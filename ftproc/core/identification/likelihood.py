@@ -79,7 +79,7 @@ def first_jerk(log: Observations, noise_variance: FloatArray, shortest: float = 
         return found if math.isfinite(found) else -math.inf
 
     memories = [memory for memory in FIRST_MEMORIES if memory >= shortest]
-    while memories[-1] * LONGER <= FIRST_MEMORIES[-1] * _bunched(log, scales):
+    while memories[-1] * LONGER <= FIRST_MEMORIES[-1] * _bunched(log, scales) < math.inf:
         memories.append(LONGER * memories[-1])
     return max((scales.jerk_psd(memory * scales.interval_s) for memory in memories), key=likelihood)
 

@@ -3,8 +3,8 @@
 A height is the distance from the centre of the earth, and has an offset and a scale that are not known: those of the
 pressure and of the temperature of the air; the other stations tell them. Heights are used from the beginning, because
 without them a radar without elevations sees no place. Where no station tells the height, a prior stands for it, with an
-offset that is as uncertain as that is. Range rates are looked at when the readings are decided on, as
-those of a single log are.
+offset that is as uncertain as that is. Range rates are looked at when the readings are decided on, as those of a single
+log are.
 """
 
 from __future__ import annotations

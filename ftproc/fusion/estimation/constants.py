@@ -4,8 +4,8 @@ The likelihood is quadratic about the biases it was linearised at (Friedland's c
 common shift of all clocks is the same flight a little later: the likelihood is flat along it, but not the linearised
 one, which takes the shift for jerk; so its information along that direction is taken out. Other directions of which
 the readings say next to nothing are left to the prior. Barometric heights are those of one transponder: their offset
-and scale, which are common to all stations that hear it, are those of the first. Heights that are known otherwise well
-are others'.
+and scale, which are common to all stations that hear it, are those of the first; heights that are others' (APART_M)
+have their own.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.filtering.biases import PARAMETERS, Biased, Directions
-from ftproc.fusion.estimation.events import CLOCK, OFFSET
+from ftproc.fusion.estimation.events import APART_M, CLOCK, OFFSET
 from ftproc.records import FloatArray, IntArray
 
 NAMES = (
@@ -85,8 +85,7 @@ class Constants(NamedTuple):
         """Before any reading, or with what others say."""
         known = Likelihood.nothing(prior.size) if known is None else known
         prior = prior.copy()
-        heard = np.flatnonzero(prior[:, OFFSET] > 0)
-        heard = heard[prior[heard, OFFSET] == prior[heard[:1], OFFSET]]
+        heard = np.flatnonzero((prior[:, OFFSET] > 0) & (prior[:, OFFSET] != APART_M))
         shared: IntArray = parameters(heard.tolist()).reshape(-1, PARAMETERS)[:, OFFSET:]
         prior.ravel()[shared[1:]] = 0.0
         return cls(*_posterior(prior, known, shared), prior, known, shared=shared)

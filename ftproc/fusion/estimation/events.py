@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,8 @@ from ftproc.core.model.stations import levelled
 from ftproc.records import COMPONENTS, FloatArray, IntArray
 
 CLOCK, OFFSET, SCALE = 5, 6, 7  # among the parameters of a station
-APART_M = 1000.0  # 1-sigma of the offset of heights that are not those of the transponder that other stations hear
+APART_M = math.nextafter(1e3, 2e3)  # 1-sigma of the offset of heights that are not those of the transponder that other
+# stations hear: no number that a range file states
 
 
 class Side(NamedTuple):
@@ -83,6 +85,12 @@ class Seen(NamedTuple):
     def components(self) -> list[int]:
         """Those of which it has a reading."""
         return [int(c) for c in np.flatnonzero(np.isfinite(self.measurement).any(0))]
+
+    @property
+    def sees_place(self) -> bool:
+        """Whether its readings, or a height in place of the elevation, determine where the target is."""
+        high = 2 in self.components or any(side.kind == layout.DISTANCE for side in self.beside)
+        return high and {0, 1} <= set(self.components)
 
 
 class Events(NamedTuple):

@@ -39,12 +39,12 @@ Settle = Callable[[Readings], Current]
 
 def fuse(
     stations: list[Seen], gate: float, jerk_psd: float | None, names: tuple[str, ...], known: Likelihood,
-    progress: Callable[[int], None],
+    progress: Callable[[int], None], stretch: bool = False,
 ) -> Current:  # fmt: skip
-    """The fused flight, or a stretch. names: of the models of motion to choose from. known: what others have said.
-    progress: takes each round. Raises Alone."""
+    """The fused flight, or a stretch of a longer one, in all of which the biases have one prior. names: of the models
+    of motion to choose from. known: what others have said. progress: takes each round. Raises Alone."""
     settle = partial(engine.settled, gate=gate, jerk_psd=jerk_psd, known=known, progress=progress)
-    readings, current = _explained(Readings.of(stations), settle)
+    readings, current = _explained(Readings.of(stations), settle, stretch)
     work = for_lasting_faults(len(current.events.time_s), len(stations))
     for _ in range(LASTING_ROUNDS):
         if current.unexamined or lasting.contradicted(current.stations, current.weight):
@@ -65,17 +65,19 @@ def fuse(
     return current._replace(unexamined=current.unexamined + work.passed)
 
 
-def _explained(readings: Readings, settle: Settle) -> tuple[Readings, Current]:
+def _explained(readings: Readings, settle: Settle, stretch: bool) -> tuple[Readings, Current]:
     """The readings without what is wrong with a station as a whole, and their flight."""
-    return _without_largest_jumps(*_with_own_heights(readings, settle), settle)
+    begun = (readings, settle(readings)) if stretch else _with_own_heights(readings, settle)
+    return _without_largest_jumps(*begun, settle)
 
 
 def _with_own_heights(readings: Readings, settle: Settle) -> tuple[Readings, Current]:
     """The readings, and their flight; if it contradicts itself, with heights of one station that are not those of the
     transponder that the others hear, where that is likelier."""
     first = current = settle(readings)
-    heard = [s for s, station in enumerate(readings.stations) if station.prior[OFFSET] > 0]
-    if len(heard) < 2 or not (not first.settled or _contradict(first) or _rejects_many(first)):
+    hears = [any(side.name == beside.HEIGHT for side in station.beside) for station in readings.stations]
+    heard = [s for s, station in enumerate(readings.stations) if hears[s] and station.prior[OFFSET] > 0]
+    if len(heard) < 2 or (first.settled and not _contradict(first) and not _rejects_many(first)):
         return readings, first
     for s in heard:
         stations, prior = list(readings.stations), readings.stations[s].prior.copy()

@@ -105,7 +105,8 @@ def fuse(
         known = _likelihood(found, prior.size)
         say = functools.partial(_say, progress, k * engine.MOST_ROUNDS, (len(edges) - 1) * engine.MOST_ROUNDS)
         try:
-            current = flight_faults.fuse(there, gate, jerk_psd, names, known.of(parameters(seen)), say)
+            said = known.of(parameters(seen))
+            current = flight_faults.fuse(there, gate, jerk_psd, names, said, say, stretch=len(edges) > 2)
         except engine.Alone:
             if len(edges) == 2:
                 raise
