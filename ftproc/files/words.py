@@ -21,7 +21,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
         """
         time t timestamp datetime utc gps tod sod tow sow epoch irig irigb jd mjd seconds secs sec elapsed
         elapsedtime elapsedseconds timeofday secondsofday secofday secsofday timeofweek secondsofweek gpstime
-        gpstow gpsseconds utctime timeutc timegps utctimestamp utcdatetime datetimeutc dateandtime unix
+        gpstow gpstimeofweek gpsseconds utctime timeutc timegps utctimestamp utcdatetime datetimeutc dateandtime unix
         unixtime posix posixtime timesinceepoch secondssinceepoch juliandate julianday
         modifiedjuliandate datenum stamp zulu utcsec irigtime sampletime timetag clock
         timeepoch epochtime zeitpunkt systime itow utcsod utctod utcseconds timestamputc unixtimestamp excel
@@ -105,11 +105,24 @@ WEAK_ALIASES: Mapping[str, tuple[str, ...]] = {
     ),
 }
 
+#: Words beside a name of the time that say whose it is, and from when it counts: `log_time`, `time since boot`.
+OF_TIMES = frozenset(
+    _split(
+        """
+    unix posix utc gps gmt local system sys host pc cpu computer server client logger sensor radar plot track target
+    log logged record recorded recording rec recv received receive rx reception acquisition acq capture captured
+    measurement measured meas sample sampled sampling observation obs event frame packet message msg data
+    since from after of start begin launch liftoff takeoff release boot power on origin epoch zero t0 rel relative
+    elapsed mission test run day week midnight sec secs second seconds
+    """
+    )
+)
+
 #: Weak aliases that need a unit, because alone they are a height, a place or anything.
 ONLY_BY_UNIT = ("alt", "altitude", "site", "d", "hr", "z", "vz", "β", "ε")
 
 #: Names of angles of which none says whether it is the azimuth, and from where the other one counts.
-EITHER_ANGLE = ("theta", "phi", "pan", "tilt")
+EITHER_ANGLE = ("theta", "phi", "psi", "alpha", "θ", "φ", "ψ", "α", "pan", "tilt")
 
 #: Names in German, in which Grad are degrees.
 GERMAN = frozenset(_split("zeit uhrzeit entfernung schragentfernung schragdistanz hohenwinkel distanz"))

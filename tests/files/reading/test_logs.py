@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from ftproc.errors import FtprocError, UsageError
+from ftproc.errors import FtprocError, InputError, UsageError
 from ftproc.files.reading import logs
 from ftproc.files.reading.meaning import readings
 from ftproc.files.writing import flights
@@ -199,3 +199,10 @@ def test_a_workbook_of_several_logs_is_asked_about(tmp_path: Path) -> None:
             frame.to_excel(book, sheet_name=title, index=False)
     assert f"several logs, in the sheets one, the other. Name one behind #, such as '{path}#one'." in refused(path)
     assert len(logs.read(f"{path}#the other")) == 2
+
+
+def test_names_in_another_order_among_the_rows_are_refused(tmp_path: Path) -> None:
+    log = tmp_path / "joined.csv"
+    log.write_text("t,range_m,az_deg\n" + "0,100,5\n" * 9 + "t,az_deg,range_m\n" + "1,5,100\n" * 9)
+    with pytest.raises(InputError, match=r"joined\.csv: names of columns stand among the rows.*t, az_deg, range_m"):
+        logs.read(log)

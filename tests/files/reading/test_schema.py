@@ -277,3 +277,17 @@ def test_a_truth_is_not_explained_as_a_log() -> None:
     sentence = refused(["time_s", "x_m", "y_m", "z_m"])
     assert "ftproc score TRAJECTORY --truth log.csv" in sentence
     assert "--columns" not in sentence
+
+
+def test_a_time_in_ms_is_no_fraction_of_itself() -> None:
+    assert found(["seconds_ms", "range_m", "azimuth_rad", "elevation_rad"])["time"] == ("seconds_ms", "ms")
+
+
+def test_of_two_times_with_words_beside_none_is_taken() -> None:
+    message = refused(["recv_time_s", "sensor_time_s", "range_m", "azimuth_rad"])
+    assert "recv_time_s and sensor_time_s could each be the time" in message
+
+
+@pytest.mark.parametrize("name", ["flight_time_s", "dwell_time_ms", "time_to_go_s", "time_error_ms"])
+def test_durations_are_no_time(name: str) -> None:
+    assert "no time column" in refused([name, "range_m", "azimuth_rad", "elevation_rad"])

@@ -13,9 +13,12 @@ from tests.files.zoo.animals import DEG_A, DEG_E, FIRST_UTC, NORTH, SOD, F
 from tests.files.zoo.flight import Animal, clock, fixed, lines, written
 
 UTC = {"first_s": SOD, "utc": FIRST_UTC}
+DAY = {"first_s": SOD}
+UNIX = {"first_s": F.moments()[0].astype("datetime64[s]").astype(float), "utc": FIRST_UTC}
 STAMPS = [moment[:-3] for moment in clock(F.moments(), "%Y-%m-%d %H:%M:%S.%f")]
 R, A, E = fixed(F.r, 3), fixed(DEG_A, 6), fixed(DEG_E, 6)
 N = len(F.t)
+NUMBERS = [str(number) for number in F.moments().astype("datetime64[us]").astype(int).tolist()]
 
 
 def _log(name: str, content: str | bytes, file: str = "a.log", **more: Any) -> Animal:
@@ -23,9 +26,9 @@ def _log(name: str, content: str | bytes, file: str = "a.log", **more: Any) -> A
 
 
 def _each(pattern: str) -> str:
-    """A line for each row: stamp {0}, time {1}, range {2}, azimuth {3} and elevation {4} in deg."""
+    """A line for each row: stamp {0}, time {1}, range {2}, azimuth {3} and elevation {4} in deg, time of day {5}."""
     rows = zip(STAMPS, F.t, R, A, E, strict=True)
-    return "".join(pattern.format(stamp, f"{t:.2f}", r, a, e) + "\n" for stamp, t, r, a, e in rows)
+    return "".join(pattern.format(stamp, f"{t:.2f}", r, a, e, stamp[11:]) + "\n" for stamp, t, r, a, e in rows)
 
 
 def loggers() -> Iterator[Animal]:
@@ -42,11 +45,60 @@ def loggers() -> Iterator[Animal]:
         ("a dictionary of Python", "{{'time': {1}, 'range': {2}, 'az': {3}, 'el': {4}}}", {}),
         ("ROS prints", "time: {1}\nrange: {2}\nazimuth: {3}\nelevation: {4}\n---", {}),
         ("XML", '<p t="{1}" range="{2}" az="{3}" el="{4}"/>', {}),
+        (
+            "syslog",
+            "May 31 {5} host trackd[311]: rng={2}m az={3}deg el={4}deg snr=13.2",
+            DAY,
+        ),
+        ("a list of YAML", "- time: {1}\n  range: {2}\n  azimuth: {3}\n  elevation: {4}", {}),
     ):
         yield _log(name, _each(pattern), **more)
+    unix = (
+        f"track,site=A range_m={r},az_deg={a},el_deg={e},n=3i {at}000\n"
+        for at, r, a, e in zip(NUMBERS, R, A, E, strict=True)
+    )
+    yield _log("points of a database", "".join(unix), **UNIX)
     among = _each("{0} DEBUG R={2} AZ={3} EL={4}").splitlines(keepends=True)
     among[40:40] = [f"{STAMPS[40]} INFO Tracker locked, mode=AUTO\n"]
     yield _log("a logger with other lines", "".join(among), **UTC)
+
+
+def markup() -> Iterator[Animal]:
+    """XML with an element for each reading, or for each column."""
+    values = (
+        "<range unit='m'>{2}</range>",
+        "<azimuth unit='deg'>{3}</azimuth>",
+        "<elevation unit='deg'>{4}</elevation>",
+    )
+    elements = _each("<plot><time unit='s'>{1}</time>" + "".join(values) + "</plot>")
+    head = '<?xml version="1.0"?>\n<log xmlns="urn:range"><head><site lat="48.1" lon="11.2"/></head>\n'
+    yield _log("elements", f"{head}{elements}</log>", "a.xml")
+    yield _log("elements, broken off", f"{head}{elements}<plot><time unit='s'>", "a.xml")
+    inner = _each("<m><at>{0}</at><polar><range_m>{2}</range_m><az_deg>{3}</az_deg><el_deg>{4}</el_deg></polar></m>")
+    yield _log("elements in elements", f"<log>{inner.replace('at>', 'timestamp>')}</log>", "a.xml", **UTC)
+    columns = zip(
+        ("time", "range", "azimuth", "elevation"), ("s", "m", "deg", "deg"), (map(str, F.t), R, A, E), strict=True
+    )
+    lists = "".join(f'<{name} unit="{unit}">{" ".join(cells)}</{name}>' for name, unit, cells in columns)
+    yield _log("an element for each column", f"<log>{lists}</log>", "a.xml")
+
+
+def names() -> Iterator[Animal]:
+    """Of times with words beside, and of angles that leave open which is which."""
+    unix = [f"{number / 1e6:.3f}" for number in map(int, NUMBERS)]
+    for head, times, more in (
+        ("time_unix_s", unix, UNIX),
+        ("log_time_us", NUMBERS, UNIX),
+        ("time since launch [s]", map(str, F.t), {}),
+        ("time_of_day_s", fixed(F.sod(), 3), DAY),
+    ):
+        yield _log(f"a time named {head}", lines(f"{head},range_m,az_deg,el_deg", times, R, A, E), **more)
+    rad = lines("t,rho,psi,theta", F.t, R, fixed(F.a, 7), fixed(F.e, 7))
+    say = {"columns": "azimuth=psi,elevation=theta"}
+    yield _log("angles named psi and theta", rad, asks="--columns azimuth=psi,elevation=theta", answer=say)
+    other = lines("t,range,ha,inc2", F.t, R, A, E)
+    yield _log("an angle with a name that nobody knows", other, asks="--columns elevation=inc2",
+               answer={"columns": "elevation=inc2"})  # fmt: skip
 
 
 def sentences() -> Iterator[Animal]:
@@ -212,5 +264,5 @@ def _german(directory: Path) -> Path:
 
 
 def all_strangers() -> Iterator[Animal]:
-    for house in (loggers, sentences, encodings, clocks, units, missing, tables):
+    for house in (loggers, markup, names, sentences, encodings, clocks, units, missing, tables):
         yield from house()

@@ -29,7 +29,7 @@ _STEMS = {
     **dict.fromkeys(("jd", "juliandate", "julianday"), "jd"),
     "datenum": "datenum",
     **dict.fromkeys(("excel", "exceldate", "exceltime"), "excel"),
-    **dict.fromkeys(("tow", "sow", "timeofweek", "secondsofweek", "gpstow", "itow"), "week"),
+    **dict.fromkeys(("tow", "sow", "timeofweek", "secondsofweek", "gpstow", "gpstimeofweek", "itow"), "week"),
     **dict.fromkeys(("gps", "gpstime", "timegps", "gpsseconds", "gpst"), "gps"),
     **dict.fromkeys(("unix", "unixtime", "posix", "posixtime", "epoch", "epochtime"), "unix"),
     **dict.fromkeys(("timestamp", "unixtimestamp"), "unix"),

@@ -218,7 +218,7 @@ def split(source: str, data: bytes, widths: Sequence[int] = (), cut: bool = Fals
         found, start = _searched(source, text.data, widths)
     body = memoryview(text.data)[start:]
     if not cut:
-        body, dropped = trimming.rows_only(body, found.names, found.delimiter, widths)
+        body, dropped = trimming.rows_only(source, body, found.names, found.delimiter, widths)
         found = found._replace(form=found.form + dropped)
     odd = text.data.count(b'"', start) % 2 == 1
     separated = f"text, separated by {_SEPARATOR_NAMES[found.delimiter]}" if not widths else "text in fixed widths"

@@ -18,7 +18,7 @@ from ftproc.files.reading.formats.standards import asterix
 _DEEPEST = 12  # objects inside each other
 _HELD, _REFERENCE = 64, 16  # bytes that an object or list takes in memory, and one that is in it
 _BETWEEN = re.compile(r"[\s,]*")  # two documents
-_UNIT_KEYS = ("unit", "units", "uom")  # and its unit
+UNIT_KEYS = ("unit", "units", "uom")  # and its unit
 _VALUES = ("val", "value")  # keys under which decoders put the value of an item, beside its meaning
 
 
@@ -41,6 +41,14 @@ def json_file(name: str, path: Path, room: limits.Room) -> TableHeader:
     if not columns.columns:
         raise InputError(f"{name}: it holds no objects with values; expected one object for each reading.")
     return columns.header("JSON objects")
+
+
+def of_records(found: Any, form: str, room: limits.Room) -> TableHeader | None:
+    """The table of what a document holds, values inside each other; None if it holds no rows."""
+    columns = Sparse(room)
+    for record in _records(found):
+        columns.add(flat(room.name, record, "", 0))
+    return columns.header(form) if columns.rows > 1 and len(columns.columns) > 1 else None
 
 
 def plots(text: str, room: limits.Room) -> TableHeader | None:
@@ -176,7 +184,7 @@ def flat(source: str, value: Any, prefix: str, depth: int) -> Iterator[tuple[str
     if isinstance(value, Mapping) and depth < _DEEPEST:
         inner = next((key for key in _VALUES if key in value), None)
         if prefix and inner is not None:
-            unit = next((value[key] for key in _UNIT_KEYS if isinstance(value.get(key), str)), "")
+            unit = next((value[key] for key in UNIT_KEYS if isinstance(value.get(key), str)), "")
             yield from flat(source, value[inner], f"{prefix} [{unit}]" if unit else prefix, depth + 1)
             return
         for key, item in value.items():

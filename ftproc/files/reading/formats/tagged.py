@@ -24,8 +24,11 @@ _VALUE = (
     r"|(?>[^\s,;{}=:\"'|]+)(?!\s*[=:]))"
 )
 _PAIR = re.compile(rf"(?<![\w.]){_NAME}\s*[=:]\s*{_VALUE}")
-_LEADING = re.compile(rf"\W*({_STAMP}|\d+\.\d+)(?=[\s,;|\])])")
+_LEADING = re.compile(rf"\W*(?:[A-Z][a-z]{{2}} +\d{{1,2}} +)?({_STAMP}|\d+\.\d+)(?=[\s,;|\])])")  # Jun  3 of syslog
+_TRAILING = re.compile(r"\s(\d{10,19})\s*$")  # since 1970, at the end of a point of a database
+_COUNTED = re.compile(r"[+-]?\d+[iu]")  # whole numbers there
 _RECORD = re.compile(r"\n-{3,}\s*\n")  # between records of one pair to a line
+_ITEM = re.compile(r"\n(?=[ \t]*- +[^\W\d]\w*:)")  # before an item of a list of them, as in YAML
 _FEWEST = 2  # pairs in a row
 _WHOLE = 0.7  # of the records on one line hold each reading
 
@@ -39,8 +42,7 @@ def pairs(text: str, room: limits.Room) -> TableHeader | None:
         for record in _records(line):
             found = _pairs(record)
             if _has_reading(found):
-                stamp = _LEADING.match(record)
-                columns.add({**found, "Timestamp": stamp[1].replace(",", ".")}.items() if stamp else found.items())
+                columns.add(_stamped(record, found).items())
             else:
                 others += bool(record.strip())
     again = {key.partition(":")[2] for key in columns.columns if key.startswith("2:")}
@@ -48,9 +50,20 @@ def pairs(text: str, room: limits.Room) -> TableHeader | None:
     return columns.header(form, {key: f"1:{key}" for key in again}, decimal_comma=True)
 
 
+def _stamped(record: str, found: dict[str, str]) -> dict[str, str]:
+    """The values of a record with the time that stands in front of it, or behind it."""
+    if leading := _LEADING.match(record):
+        return {**found, "Timestamp": leading[1].replace(",", ".")}
+    if trailing := _TRAILING.search(record):
+        plain = {name: cell[:-1] if _COUNTED.fullmatch(cell) else cell for name, cell in found.items()}
+        return {**plain, "Timestamp": trailing[1]}
+    return found
+
+
 def _rows(text: str) -> list[str]:
-    if len(_RECORD.findall(text)) > 2:
-        return [record.replace("\n", "; ") for record in _RECORD.split(text)]
+    for between in (_RECORD, _ITEM):
+        if len(between.findall(text)) > 2:
+            return [record.replace("\n", "; ") for record in between.split(text)]
     return text.splitlines()
 
 

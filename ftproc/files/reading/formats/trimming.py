@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ftproc.errors import InputError
 from ftproc.files import limits
 from ftproc.files.reading.formats import layout
 
@@ -49,14 +50,17 @@ def unboxed(data: bytes) -> bytes:
     return re.sub(rb"(?m)^[ \t]*\|(.*)\|[ \t]*(?=\r?$)", rb"\1", without_rules)
 
 
-def rows_only(body: memoryview, names: Sequence[str], separator: str, widths: Sequence[int]) -> tuple[memoryview, str]:
-    """The rows without lines of text among and below them, and in words what was left out."""
+def rows_only(
+    source: str, body: memoryview, names: Sequence[str], separator: str, widths: Sequence[int]
+) -> tuple[memoryview, str]:
+    """The rows without lines of text among and below them, and in words what was left out. Raises InputError where
+    other names stand among them."""
     whole, words = body.tobytes(), ""
     if _has_comments(whole):
         comments = [m.span() for m in _COMMENT.finditer(whole) if not _is_row(m[0], names, separator, widths)]
         whole = _without(whole, comments)
         words += f", {len(comments)} comment lines among the rows" if comments else ""
-    repeated = _repeated_names(whole, names, separator, widths)
+    repeated = _repeated_names(source, whole, names, separator, widths)
     if repeated:
         whole = _without(whole, repeated)
         words += f", the names repeated {len(repeated)} times"
@@ -133,7 +137,9 @@ def _has_comments(whole: bytes) -> bool:
     return bool(marks) and re.search(rb"(?m)^[ \t]*(?:#|%|//|!)", whole) is not None
 
 
-def _repeated_names(whole: bytes, names: Sequence[str], separator: str, widths: Sequence[int]) -> list[tuple[int, int]]:
+def _repeated_names(
+    source: str, whole: bytes, names: Sequence[str], separator: str, widths: Sequence[int]
+) -> list[tuple[int, int]]:
     """Where the names stand once more among the rows, as on each page of a printout or in files that were put together;
     with the lines around them that are no rows."""
     first = next(filter(None, names), "").encode()
@@ -142,7 +148,9 @@ def _repeated_names(whole: bytes, names: Sequence[str], separator: str, widths: 
     found: list[tuple[int, int]] = []
     bare = _bare("".join(names))
     for line in re.finditer(rb"(?m)^[^\r\n]*" + re.escape(first) + rb"[^\r\n]*(?:\r\n|\r|\n|\Z)", whole):
-        if _bare(line[0].decode("utf-8", "replace")) != bare:
+        text = line[0].decode("utf-8", "replace").strip()
+        if _bare(text) != bare:
+            _refuse_other_names(source, layout.split(text, separator, widths), names)
             continue
         start, end = line.span()
         floor = found[-1][1] if found else 0
@@ -159,6 +167,15 @@ def _repeated_names(whole: bytes, names: Sequence[str], separator: str, widths: 
             end = below.end()
         found.append((start, end))
     return found
+
+
+def _refuse_other_names(source: str, cells: Sequence[str], names: Sequence[str]) -> None:
+    """Raise InputError for names that stand among the rows, and are not those above them."""
+    if len(cells) == len(names) and not any(map(layout.is_data, ([cell] for cell in cells if cell))):
+        raise InputError(
+            f"{source}: names of columns stand among the rows, and are not those above: {', '.join(cells)[:200]}. Two "
+            "logs were put together; make a file of each, and join their trajectories."
+        )
 
 
 def _bare(line: str) -> str:

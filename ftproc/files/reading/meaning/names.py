@@ -12,6 +12,7 @@ from ftproc.files.units import unit_named
 from ftproc.files.words import (
     ALIASES,
     EITHER_ANGLE,
+    OF_TIMES,
     ONLY_BY_UNIT,
     QUALIFIERS,
     QUANTITIES,
@@ -40,6 +41,7 @@ _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 _NOT_WORDS = re.compile(r"(?:[^\w°]|_)+")
 _OF_FRAMES = re.compile(r"(\d+(?:\.\d+)?)\s*(?:fps|frames?(?:\s*/\s*s| per second)?)", re.IGNORECASE)
 _NUMBERED = re.compile(r"^\d+\s*[:=)]\s*(?=[^\W\d])")  # the number of a column before its name
+_TIMES = ("time", "timestamp", "stamp", "t")
 _OF_UTC = ("utc", "gmt")  # behind the name of a time
 _VALUE = re.compile(r"[._/](val|value)$", re.IGNORECASE)  # how decoders end the path of a value
 
@@ -90,7 +92,13 @@ class Name(NamedTuple):
             if self.stem in aliases[quantity]:
                 return rank
         core = self.core()
-        return 2 if core in (*ALIASES[quantity], *WEAK_ALIASES[quantity]) and core != self.stem else 0
+        known = core in (*ALIASES[quantity], *WEAK_ALIASES[quantity]) and core != self.stem
+        return 2 if known or (quantity == "time" and self._is_of_a_time()) else 0
+
+    def _is_of_a_time(self) -> bool:
+        """Whether it is a time with words that say whose it is, or from when it counts."""
+        times = [word for word in self.words if word in _TIMES]
+        return len(times) == 1 < len(self.words) and OF_TIMES.issuperset({*self.words} - {*times})
 
     def core(self) -> str:
         """The stem without words that say nothing about the quantity, such as `radar1`."""
@@ -215,7 +223,7 @@ def _suffix(text: str) -> tuple[str, str, bool]:
     if found:
         longer = _LAST.fullmatch(found[1])
         pair = f"{longer[2]} {found[2]}" if longer else ""
-        if longer and pair and _is_unit(pair) and not _is_unit(found[2] + found[2]):
+        if longer and len(found[2]) > 1 and _is_unit(pair) and not _is_unit(found[2] + found[2]):
             return _without_in(longer[1]), pair, False
         if _is_unit(found[2]):
             return _without_in(found[1]), found[2], False

@@ -131,8 +131,13 @@ def _time(names: Mapping[int, Name]) -> dict[str, int] | None:
 def _fraction(names: Mapping[int, Name]) -> int | None:
     """The column of a fraction of the second: `ms`, or `stamp.nanosec` beside `stamp.sec`."""
     seconds = [name for name in names.values() if {name.stem, name.unit.lower()} & set(_TIME["second"])]
-    whole = {name.stem for name in seconds} | {word for name in seconds for word in name.text.lower().split(".")[-2:-1]}
-    beside = _only(names, lambda name: name.unit.lower() in FRACTIONS and name.stem in whole)
+
+    def beside_seconds(name: Name) -> bool:
+        whole = [other for other in seconds if other is not name]
+        words = {word for other in whole for word in (other.stem, *other.text.lower().split(".")[-2:-1])}
+        return name.unit.lower() in FRACTIONS and name.stem in words
+
+    beside = _only(names, beside_seconds)
     return _only(names, lambda name: bool(_spellings(name) & set(FRACTIONS))) if beside is None else beside
 
 

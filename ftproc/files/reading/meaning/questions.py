@@ -11,7 +11,16 @@ from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
 from ftproc.files.reading.meaning.names import Name, counts_from, taken_apart
 from ftproc.files.units import LIGHT_MPS, UNITS, unit_named
-from ftproc.files.words import ALIASES, EITHER_ANGLE, NOT_UNITS, ONLY_BY_UNIT, OTHER_THINGS, QUANTITIES, WEAK_ALIASES
+from ftproc.files.words import (
+    ALIASES,
+    EITHER_ANGLE,
+    FURTHER_ALIASES,
+    NOT_UNITS,
+    ONLY_BY_UNIT,
+    OTHER_THINGS,
+    QUANTITIES,
+    WEAK_ALIASES,
+)
 
 _COUNTS = frozenset(("counts", "count", "cnt", "cnts", "ticks"))
 _FLIGHTS = frozenset(("tof", "timeofflight", "flighttime", "roundtriptime", "rtt", "laufzeit"))
@@ -130,8 +139,11 @@ def refuse_hours(source: str, name: Name, quantity: str) -> None:
         )
 
 
-def refuse_alike(source: str, apart: Sequence[Name], free: Sequence[int], quantity: str) -> None:
-    """Ask about a column that may be the quantity, so that it is not left out without a word."""
+def refuse_alike(
+    source: str, apart: Sequence[Name], free: Sequence[int], quantity: str, doubtful: bool = False
+) -> None:  # fmt: skip
+    """Ask about a column that may be the quantity, so that it is not left out without a word. doubtful: the other angle
+    has a name that this one may have too, so any column with a name that is not known may be it."""
     known = {alias for alias in ALIASES[quantity] if len(alias) > 1}
     other = NOT_UNITS - _OF_THE_QUANTITY
     for index in free if quantity != "time" else ():
@@ -144,7 +156,8 @@ def refuse_alike(source: str, apart: Sequence[Name], free: Sequence[int], quanti
         another = words & OTHER_THINGS or name.is_zenith() or any(name.means(each) for each in QUANTITIES)
         alike = known & words or (name.is_in_a_unit_of(quantity) and not another)
         bare = quantity == "range" and name.stem == "d"
-        if not name.foreign and (either or bare or (alike and not other & words)):
+        unknown = doubtful and not another and not any(name.stem in known for known in FURTHER_ALIASES.values())
+        if not name.foreign and (either or bare or ((alike or unknown) and not other & words)):
             say = answer([each.text for each in apart], {quantity: index})
             turns = counts_from(name) if quantity == "azimuth" else ""
             only = f" if {turns}, from which it counts, stays where it is" if turns else ""

@@ -101,7 +101,9 @@ def resolve(
     questions.check_complete(source, names, {q: column.positions for q, column in found.items()}, propose)
     for quantity in QUANTITIES:
         if quantity not in found and columns.get(quantity) != ABSENT:
-            questions.refuse_alike(source, apart, [k for k in range(len(names)) if k not in taken], quantity)
+            azimuth = found.get("azimuth") if quantity == "elevation" and "azimuth" not in columns else None
+            doubtful = azimuth is not None and apart[azimuth.position].means("azimuth") == 2
+            questions.refuse_alike(source, apart, [k for k in range(len(names)) if k not in taken], quantity, doubtful)
     return found
 
 
@@ -230,7 +232,8 @@ def _recognised(table: _Table, quantity: str, free: Sequence[int]) -> Column | N
     corrected = [index for index in free if index not in fits and _is_corrected(table.apart[index], quantity)]
     if corrected:  # or what was corrected
         fits, kinds = [fits[0], *corrected], set()
-    if len(fits) > 1 and (quantity != "time" or len(kinds) < len(fits)):
+    weak = all(table.apart[index].means(quantity) == 2 for index in fits)
+    if len(fits) > 1 and (quantity != "time" or weak or len(kinds) < len(fits)):
         raise InputError(
             f"{table.source}: columns {' and '.join(names[index] for index in fits)} could each be the {quantity}. "
             f"Say which one it is: {' or '.join(answer(names, {quantity: index}) for index in fits[:3])}."

@@ -10,7 +10,7 @@ from ftproc.errors import InputError
 from ftproc.files.limits import Room
 from ftproc.files.reading.formats import content, documents, tagged
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.formats.standards import asterix, crd, gsi, kinds, meteors, nmea, tdm
+from ftproc.files.reading.formats.standards import asterix, crd, gsi, kinds, markup, meteors, nmea, tdm
 
 _HEAD = 1 << 16  # bytes in which a format is recognised
 
@@ -70,6 +70,7 @@ TEXTS = (
         "a prism in it, export times, circles and slope distances as .csv"),
     _no("Topcon GTS", r"\A_'[^\r\n]{0,200}_\(", f"a field book of a total station (Topcon), {_SURVEY}"),
     _no("Sokkia SDR", r"\A00NM(?:SDR|\w\w)", f"a field book of a total station (SDR), {_SURVEY}"),
+    _of("XML", r"\A\s*<(?:\?xml\b|[A-Za-z][\w:.-]*[\s>])", markup.read),
     _of("names and values", r"[=:]\s*[\"']?[+-]?\.?\d", tagged.pairs),
 )  # fmt: skip
 
