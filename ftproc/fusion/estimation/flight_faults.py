@@ -33,7 +33,7 @@ from ftproc.fusion.estimation.lasting import Readings
 DETERMINED = 3  # components that a place takes: more show whether they agree
 LASTING_ROUNDS = 3  # of the search for faults that last: where one is taken out, another may show
 NOISIER, REJECTED = 2.0, 0.2  # times the noise that a component shows alone, and share of its readings that are
-# rejected: more is a fault of its station, or of another
+# rejected, less those between that are not: more is a fault of its station, or of another
 Settle = Callable[[Readings], Current]
 
 
@@ -150,10 +150,14 @@ def _contradict(current: Current) -> bool:
 
 
 def _rejects_many(current: Current) -> bool:
-    return any(
-        (np.where(each > 0, 1 - weight, 0.0).sum(0) > REJECTED * each.sum(0)).any()
-        for each, weight in zip(current.possible, current.weight, strict=True)
-    )
+    """Whether of some component so many readings are rejected in one stretch, as behind a jump; outliers scattered over
+    the flight are none."""
+    for possible, weight in zip(current.possible, current.weight, strict=True):
+        beyond = np.cumsum(np.where(possible > 0, np.where(weight > 0, -1.0, 1.0), 0.0), axis=0)
+        before = np.minimum.accumulate(np.vstack([np.zeros(3), beyond[:-1]]), axis=0)
+        if (np.max(beyond - before, axis=0, initial=0.0) > REJECTED * possible.sum(0)).any():
+            return True
+    return False
 
 
 def _without_jumps(
