@@ -1,5 +1,5 @@
 """What instruments see that read seldom: a total station of a drone, which is agile, and a laser ranger whose angles
-have stamps of their own."""
+have stamps of their own; and an aircraft that holds, whose turns are short and far apart."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ DRONE = replace(
 PLACE = np.array([200.0, 60.0, 0.0])  # m
 FAR = np.array([9000.0, 4000.0, 500.0])
 LASTS_S = 240.0
+LEG_S, TURN_S = 400.0, 60.0  # of an aircraft that holds
 
 
 def seen(seed: int, dt_s: float, sigma: tuple[float, ...]) -> tuple[MeasurementLog, FloatArray]:
@@ -36,13 +37,36 @@ def apart(seed: int, dt_s: float, late_s: float) -> tuple[MeasurementLog, FloatA
     return log, position
 
 
+def holding(seed: int, dt_s: float, lasts_s: float) -> tuple[MeasurementLog, FloatArray]:
+    """A log of an aircraft that holds, level and straight for some six minutes between half turns of one, as a radar
+    sees it: 8 m, 0.4 and 0.6 mrad. And the true positions (n, 3) m."""
+    rng = np.random.default_rng(seed)
+    step_s, speed_mps, roll_in_s = 0.02, 200.0, 2.0
+    time = np.arange(0.0, lasts_s, step_s)
+    rate, begin_s = np.zeros(len(time)), LEG_S
+    while begin_s < lasts_s - TURN_S:
+        within = np.clip((time - begin_s) / roll_in_s, 0, 1) * np.clip((begin_s + TURN_S - time) / roll_in_s, 0, 1)
+        rate += np.pi / (TURN_S - roll_in_s) * within
+        begin_s += TURN_S + rng.uniform(0.9, 1.1) * LEG_S
+    heading = rng.uniform(0, 2 * np.pi) + step_s * np.cumsum(rate)
+    along = step_s * speed_mps * np.cumsum(np.stack([np.cos(heading), np.sin(heading)], 1), axis=0)
+    every = round(dt_s / step_s)
+    position = np.column_stack([along + np.array([5e4, -6e4]), np.full(len(time), 6e3)])[::every]
+    return _noisy(position, time[::every], (8.0, 4e-4, 6e-4), rng), position
+
+
 def read(
     airframe: Airframe, place: FloatArray, time: FloatArray, sigma: tuple[float, ...], seed: int
 ) -> tuple[MeasurementLog, FloatArray]:
     """A log of four minutes of an aircraft about a place (3,) m, at times (n,)."""
     rng = np.random.default_rng(seed)
     position = fly(airframe, LASTS_S, rng).at(time)[0] + place
+    return _noisy(position, time, sigma, rng), position
+
+
+def _noisy(
+    position: FloatArray, time: FloatArray, sigma: tuple[float, ...], rng: np.random.Generator
+) -> MeasurementLog:
     z = from_cartesian(position) + np.array(sigma) * rng.standard_normal((len(time), 3))
     z[:, 1] = wrap(z[:, 1])
-    log = MeasurementLog(name="drone", time_s=time, measurement=z, row=np.arange(len(time)), rows_in_file=len(time))
-    return log, position
+    return MeasurementLog(name="drone", time_s=time, measurement=z, row=np.arange(len(time)), rows_in_file=len(time))

@@ -140,6 +140,7 @@ RULES: dict[str, tuple[Off, ...]] = {
     "patches with one edge": (Off(f"{EDITING}.alternatives", "_at_edges", lambda log, weight, search: weight.copy()),),
     "alternatives as they are": (Off(f"{EDITING}.reassessment", "_or_as_they_are", _second),),
     "starts by the mean interval too": (Off(f"{IDENTIFICATION}.likelihood", "_bunched", lambda *_: 0.0),),
+    "turns between the spans": (Off(TWO_PASS, "_may_miss_turns", lambda *_: False),),
     "another start": (Off(TWO_PASS, "_forgets", lambda *_: False),),
     "reassessment": (Off(TWO_PASS, "reassess", _second),),
     "turns taken for patches": (Off(TWO_PASS, "screen", _same_screen),),

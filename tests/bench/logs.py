@@ -31,6 +31,7 @@ LONGEST_S = 240.0
 DRONES = {"1": (0.02, 3e-5, 3e-5), "0.5": (0.005, 1e-5, 1e-5), "0.2": (0.002, 1e-5, 1e-5)}
 #: Seconds between the ranges of an instrument, and from each to the angles that belong to it.
 APART = {"5": 0.006, "0.5": 0.001}
+HELD_S = 1200.0  # of an aircraft that holds, at 10 Hz
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 
 
@@ -55,6 +56,7 @@ def names() -> list[str]:
     faults = [f"fault/{name}/{seed}" for name in faulty_logs.CLASSES for seed in SEEDS]
     slow = [f"drone/{dt_s}/{seed}" for dt_s in DRONES for seed in SEEDS]
     slow += [f"apart/{dt_s}/{seed}" for dt_s in APART for seed in SEEDS]
+    slow += [f"holding/0.1/{seed}" for seed in SEEDS]
     fused = [f"range/{name}/{seed}" for name in RANGES for seed in SEEDS]
     samples = [f"sample/{path.name}/0" for path in sorted(SAMPLES.iterdir()) if _is_log(path)]
     return [*samples, "range/sample/0", *scenarios, *effects, *faults, *slow, *fused]
@@ -112,6 +114,11 @@ def _apart(what: str, seed: int, room: Path) -> Seen:
     return Seen(log, log.time_s, position_m)
 
 
+def _holding(what: str, seed: int, room: Path) -> Seen:
+    log, position_m = drone.holding(seed, float(what), HELD_S)
+    return Seen(log, log.time_s, position_m)
+
+
 def _range(what: str, seed: int, room: Path) -> Seen:
     if what == "sample":
         return Seen(SAMPLES / "range")
@@ -133,6 +140,7 @@ _MAKERS: dict[str, Callable[[str, int, Path], Seen]] = {
     "fault": _fault,
     "drone": _drone,
     "apart": _apart,
+    "holding": _holding,
     "range": _range,
 }
 

@@ -13,7 +13,7 @@ from ftproc.core.filtering.smoother import likelihood_of
 from ftproc.core.identification import likelihood
 from ftproc.core.model.motion import isotropic
 from ftproc.settings import FilterSettings
-from tests.drone import CRUISER, FAR, apart, read, seen
+from tests.drone import CRUISER, FAR, apart, holding, read, seen
 
 
 def outcome(seed, dt_s, sigma):
@@ -74,3 +74,14 @@ def test_turns_are_followed_live(seed):
     log, position = read(CRUISER, FAR, np.arange(0.0, 240.0, 0.5), (1.0, 1e-4, 1e-4), seed)
     found = pipeline.filter_log(log, FilterSettings(editing="live"))
     assert np.sqrt(np.nanmean(((found.state[:, :3] - position) ** 2).sum(1))) < 2.5
+
+
+@pytest.mark.parametrize(
+    ("seed", "dt_s", "lasts_s"), [(1, 0.1, 1200.0), (2, 0.1, 1200.0), (3, 0.1, 1200.0), (4, 0.1, 6500.0)]
+)
+def test_turns_between_the_spans_that_stand_for_a_long_log_are_flown(seed, dt_s, lasts_s):
+    """They were taken for outliers, and the track was lost, by up to 200 km; the last is edited in segments."""
+    log, position = holding(seed, dt_s, lasts_s)
+    found = pipeline.filter_log(log, FilterSettings(smooth=True))
+    assert np.sqrt(((found.state[:, :3] - position) ** 2).sum(1).mean()) < 10
+    assert found.metadata["summary"]["trust"]["verdict"] == "consistent"

@@ -41,7 +41,7 @@ class Record(NamedTuple):
     screening trusts (n, 3) and the noise 1-sigma (3,) that it saw, what the user has fixed, the gate in sigmas, the
     1-sigma (3,) that rounding alone makes, what work is left for alternatives, and how the noise of single readings
     differs, if it does; surely: if it grows only where neighbours differ more, too. white: whether the noise is taken
-    for white and even. accepted: (n, 3), by hand."""
+    for white and even. accepted: (n, 3), by hand. whole: no spans stand for a long log."""
 
     time_s: FloatArray
     measurement: FloatArray
@@ -56,6 +56,7 @@ class Record(NamedTuple):
     white: bool = False
     accepted: NDArray[np.bool_] | None = None
     surely: Uneven | None = None
+    whole: bool = False
 
     def with_accepted(self, weight: FloatArray) -> FloatArray:
         """Weights (n, 3) with the readings used that are good by hand."""
@@ -114,10 +115,9 @@ def decide(record: Record, initial: Decision, tune_first: bool) -> Decision:
     while rounds < MAX_ROUNDS and not settled:
         log = record.weighted(weight)
         if rounds < TUNING_ROUNDS and (tune_first or rounds > 0) and not model.coloured:
-            model = fit_level(log, starts, model, record.fixed, record.sigma, record.rounding)
+            model = fit_level(log, starts, model, record.fixed, record.sigma, record.rounding, record.whole)
         last = _smoothed(log, model, starts, last)
-        noise = model.reading_variance
-        good = outlier_chain.classify(*last.residuals, noise, rates, record.gate)
+        good = outlier_chain.classify(*last.residuals, model.reading_variance, rates, record.gate)
         mean += (good - mean) / max(rounds - TUNING_ROUNDS + 1, 1)
         decided = record.with_accepted(_keep_most(np.where(record.possible, mean > 0.5, 0.0), record.screened))
         settled = int((decided != weight).sum()) <= STILL * weight.size and (rounds > 0 or not tune_first)

@@ -37,7 +37,7 @@ from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start, Uneven
 from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
 from ftproc.core.identification import one_sided, uneven_noise
-from ftproc.core.identification.likelihood import Fixed, first_jerk
+from ftproc.core.identification.likelihood import Fixed, first_jerk, is_long
 from ftproc.core.identification.nearby import residuals_near, samples_around
 from ftproc.core.identification.one_sided import OneSided
 from ftproc.core.identification.profile import fit_profile, median_level, with_allowance
@@ -47,6 +47,11 @@ from ftproc.core.model.motion import isotropic
 from ftproc.core.work import WORK, Work, for_lasting_faults
 from ftproc.records import FloatArray
 
+STIFFER, TURNS = (
+    10.0,
+    1000.0,
+)  # times less jerk than at the start of the search: the spans of a long log may lie between
+# its turns; the gain in log-probability with which they do: from 2,100, where motion would follow patches up to 660
 COARSE = 0.5  # of a component's noise: rounding that makes so much of it decides how its readings repeat
 FORGETS, REMEMBERED = 0.8, 5.0  # intervals that a filter remembers: with fewer it follows each reading; another start
 STAMP_ROUNDS = 3  # of estimating how late each time stamp is
@@ -108,9 +113,9 @@ def edit(
 ) -> Edited:
     """Edit a whole log, or a segment of a long one. time_s (n,), measurement (n, 3).
 
-    segment_of: of a segment, the noise of the whole log, which is taken as it is, and its typical jerk, with which the
-    search starts. live: of a window that moves on, in which faults that stay are not looked for. short: too short to
-    tell whether the noise is uneven or correlated: it is taken for white.
+    segment_of: of a segment, the noise of the whole log, which is taken as it is, and its typical jerk, which counts
+    where noise is correlated. live: of a window that moves on, in which faults that stay are not looked for. short: too
+    short to tell whether the noise is uneven or correlated: it is taken for white.
     Raises ValueError when a component has no reading that agrees with its neighbours.
     """
     accepted = known.accepted.of(time_s, measurement)
@@ -206,10 +211,27 @@ def _first(
     `first_jerk`."""
     log, noise = record.weighted(weight), np.where(np.isfinite(known.sigma), known.sigma, record.sigma) ** 2
     jerk_psd = known.jerk_psd
-    model = segment_of or Model(noise, isotropic(first_jerk(log, noise, shortest) if jerk_psd is None else jerk_psd))
+    if segment_of is not None and (segment_of.coloured or jerk_psd is not None):  # no level is sought
+        model = segment_of
+    else:
+        level = first_jerk(log, noise, shortest) if jerk_psd is None else jerk_psd
+        model = Model(noise if segment_of is None else segment_of.noise_variance, isotropic(level))
     rates = np.tile(np.array(outlier_chain.START_RATES), (3, 1))
     starts = find_starts(log, model.noise_variance, float(model.jerk[0, 0]))
-    return record, decide(record, Decision(weight, model, starts, rates), tune_first=True)
+    begun = Decision(weight, model, starts, rates)
+    found = record, decide(record, begun, tune_first=True)
+    if _may_miss_turns(found, begun):
+        whole = record._replace(whole=True)
+        other = whole, decide(whole, begun, tune_first=True)
+        found = other if not log_probability(*other) <= log_probability(*found) + TURNS else found
+    return found
+
+
+def _may_miss_turns(found: tuple[Record, Decision], begun: Decision) -> bool:
+    """Whether the spans that stand for a long log showed far less jerk than the search for it began with: the target
+    may turn between them only, and its turns be taken for outliers."""
+    much_stiffer = found[1].model.jerk[0, 0] * STIFFER < begun.model.jerk[0, 0]
+    return much_stiffer and not found[0].whole and is_long(found[0].time_s)
 
 
 def _examined(record: Record, decision: Decision, known: Known) -> tuple[Record, Decision]:

@@ -55,12 +55,17 @@ class Fixed(NamedTuple):
     jerk: bool
 
 
+def is_long(time_s: FloatArray) -> bool:
+    """Whether spans stand for a log with these times (n,) s."""
+    return len(time_s) > SPANS * SPAN
+
+
 def representative(
     log: Observations, starts: list[Start], noise_variance: FloatArray, jerk_psd: float
 ) -> tuple[Observations, list[Start]]:
     """The whole log if it is short, else SPANS spans spread evenly over it, each with its own start."""
     n = len(log.time_s)
-    if n <= SPANS * SPAN:
+    if not is_long(log.time_s):
         return log, starts
     spans = [slice(first, first + SPAN) for first in np.linspace(0, n - SPAN, SPANS).astype(int).tolist()]
     found = stretches_of(log, spans, noise_variance, jerk_psd)
@@ -105,15 +110,18 @@ def fit_level(
     fixed: Fixed,
     expected_sigma: FloatArray | None = None,
     least_sigma: FloatArray | float = 0.0,
+    whole: bool = False,
 ) -> Model:
     """The likeliest noise variances and single jerk density with its vertical share, starting from `guess`.
 
-    fixed: what stays as guessed. expected_sigma: (3,) noise that NOISE_GROWTH counts from, if not the guess.
-    least_sigma: (3,) that it cannot be below.
+    whole: no spans stand for a long log. fixed: what stays as guessed. expected_sigma: (3,) noise that NOISE_GROWTH
+    counts from, if not the guess. least_sigma: (3,) that it cannot be below.
     """
     if fixed.noise.all() and fixed.jerk:
         return guess
-    part, starts = representative(log, starts, guess.noise_variance, float(guess.jerk[0, 0]))
+    part = log
+    if not whole:
+        part, starts = representative(log, starts, guess.noise_variance, float(guess.jerk[0, 0]))
     scales = scales_of(log, guess.noise_variance)
     log_noise = np.log(guess.noise_variance)
     expected = np.sqrt(guess.noise_variance) if expected_sigma is None else expected_sigma
