@@ -269,7 +269,8 @@ def _carries(fused: Fused, s: int, during: Stretch) -> bool:
 
 
 def _poorly(fused: Fused, zero_s: float) -> Iterator[Remark]:
-    for part in consistency.poorly_observable(fused.track.time_s, fused.track.sigma[:, :3])[:3]:
+    found = consistency.poorly_observable(fused.track.time_s, fused.track.sigma[:, :3])
+    for part in [each for each in found if each["to_s"] > each["from_s"]][:3]:  # the first of a filter is no stretch
         when = f"from {part['from_s'] + zero_s:.6g} to {part['to_s'] + zero_s:.6g} s"
         yield Remark(SUSPECT, f"the position is poorly observable {when}: 1 sigma up to {part['sigma_m']:.3g} m")
 

@@ -32,8 +32,8 @@ from ftproc.fusion.estimation.lasting import Readings
 
 DETERMINED = 3  # components that a place takes: more show whether they agree
 LASTING_ROUNDS = 3  # of the search for faults that last: where one is taken out, another may show
-NOISIER, REJECTED = 2.0, 0.2  # times the noise that a component shows alone, and share of its readings that are
-# rejected, less those between that are not: more is a fault of its station, or of another
+NOISIER, REJECTED, TOGETHER = 2.0, 0.2, 0.1  # times the noise that a component shows alone, and shares of its readings
+# that are rejected in all and in one stretch: more is a fault of its station, or of another
 Settle = Callable[[Readings], Current]
 
 
@@ -150,12 +150,14 @@ def _contradict(current: Current) -> bool:
 
 
 def _rejects_many(current: Current) -> bool:
-    """Whether of some component so many readings are rejected in one stretch, as behind a jump; outliers scattered over
-    the flight are none."""
+    """Whether many readings of some component are rejected, and of these enough in one stretch, as behind a jump; those
+    between that are used count against it. Outliers scattered over the flight are none."""
     for possible, weight in zip(current.possible, current.weight, strict=True):
-        beyond = np.cumsum(np.where(possible > 0, np.where(weight > 0, -1.0, 1.0), 0.0), axis=0)
+        rejected = (possible > 0) & (weight <= 0)
+        beyond = np.cumsum(np.where(possible > 0, np.where(rejected, 1.0, -1.0), 0.0), axis=0)
         before = np.minimum.accumulate(np.vstack([np.zeros(3), beyond[:-1]]), axis=0)
-        if (np.max(beyond - before, axis=0, initial=0.0) > REJECTED * possible.sum(0)).any():
+        longest = np.max(beyond - before, axis=0, initial=0.0)
+        if ((rejected.sum(0) > REJECTED * possible.sum(0)) & (longest > TOGETHER * possible.sum(0))).any():
             return True
     return False
 
