@@ -27,6 +27,8 @@ def with_derived(trajectory: Trajectory, settings: FilterSettings) -> Trajectory
     already: with them the vertical is that below the target. Raises UsageError as `with_columns`."""
     if not settings.derived:
         return trajectory
-    columns = arrow.table(Derived.of(trajectory).columns())
+    known = trajectory.metadata.get("settings") or {}  # of a stretch of a log nothing stands there yet
+    stated = {**trajectory.metadata, "settings": {**known, "site": settings.site}}
+    columns = arrow.table(Derived.of(replace(trajectory, metadata=stated)).columns())
     extra = columns if trajectory.extra is None else tables.with_extra(trajectory.extra, columns)
     return replace(trajectory, extra=extra)

@@ -9,6 +9,7 @@ import pymap3d
 import pytest
 
 import ftproc
+from ftproc.derived.columns import with_derived
 from ftproc.derived.quantities import Derived, load_factor
 from ftproc.files import arrow
 from ftproc.records import Trajectory
@@ -147,3 +148,11 @@ def test_a_fused_flight_has_sigmas_in_every_row():
     assert derived.from_north
     assert np.isfinite(found.trajectory.path_sigma).all()
     assert "sigma_track_deg" in found.trajectory.extra.column_names
+
+
+def test_a_site_makes_north_known_in_a_stretch_whose_metadata_do_not_say_it_yet():
+    """As the command writes them; the track was counted from x, and right turns were negative."""
+    stretch = replace(flown([0.0, 10.0, 0.0], [1.0, 0.0, 0.0]), metadata={"frame": "local"})
+    found = with_derived(stretch, FilterSettings(site=(48.0, 11.0, 600.0), derived=True)).extra
+    assert found.column("track_deg").to_pylist() == pytest.approx([0.0] * len(stretch))
+    assert found.column("turn_rate_degps")[0].as_py() > 0
