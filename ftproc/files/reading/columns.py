@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ftproc.errors import InputError, nearest, row_named
-from ftproc.files.layout import OUTLIER, POSITION, TRAJECTORY
+from ftproc.files.layout import OUTLIER, POSITION, TRAJECTORY, VELOCITY
 from ftproc.files.reading.clocks.times import seconds
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning.names import Name, taken_apart
@@ -21,8 +22,13 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 #: Columns that may be in other units, and their quantities in `units`; and how such columns are called.
-_IN_UNITS = {"time_s": "time", **dict.fromkeys(POSITION, "range")}
-_SUCH = {"time_s": ("time_ms", "time_us"), **{name: (f"{name[0]}_km", f"{name[0]}_ft") for name in POSITION}}
+_IN_UNITS = {"time_s": "time", **dict.fromkeys(POSITION, "range"), **dict.fromkeys(VELOCITY, "range_rate")}
+_SUCH = {
+    "time_s": ("time_ms", "time_us"),
+    **{name: (f"{name[0]}_km", f"{name[0]}_ft") for name in POSITION},
+    **{name: (f"{name[:2]}_kmh", f"{name[:2]}_kt") for name in VELOCITY},
+}
+_SPEED = re.compile(r"(v[xyz])[\s_/.,([{<]+(.*?)[)\]}>]?")  # vx_kmh, vx [km/h]
 
 
 def load(
@@ -30,9 +36,9 @@ def load(
 ) -> tuple[dict[str, FloatArray], pa.Table]:
     """Columns `names` as float64 (n,), NaN where missing, and a table of `others`.
 
-    A time or a position may be in another unit: `time_ms`, `x_km`. A timestamp becomes seconds as in a log. Raises
-    InputError for a column that is absent or there twice, for a cell that is no finite number, and for a table without
-    rows.
+    A time, a position or a velocity may be in another unit: `time_ms`, `x_km`, `vx_kt`. A timestamp becomes seconds as
+    in a log. Raises InputError for a column that is absent or there twice, for a cell that is no finite number, and for
+    a table without rows.
     """
     called = {name: _called(header, name) for name in names}
     for name in others:
@@ -81,13 +87,25 @@ def _flags(header: TableHeader, column: FloatArray, name: str, highest: int) -> 
 
 
 def _called(header: TableHeader, wanted: str) -> Name:
-    """The column that is called so, or that is the same time or position in another unit. Raises InputError."""
+    """The column that is called so, or that is the same time, position or velocity in another unit. Raises
+    InputError."""
     stem = wanted.rpartition("_")[0]
-    apart = [taken_apart(name) for name in header.names] if wanted not in header.names and wanted in _IN_UNITS else []
+    apart = [_apart(name) for name in header.names] if wanted not in header.names and wanted in _IN_UNITS else []
     fits = [name for name in apart if name.stem == stem and unit_named(_IN_UNITS[wanted], name.unit)]
     name = fits[0].text if len(fits) == 1 else wanted
     _require_once(header, name)
-    return taken_apart(name)
+    return _apart(name)
+
+
+def has_velocities(header: TableHeader) -> bool:
+    """Whether a column has the name of a velocity along an axis, in whatever unit."""
+    return any(_SPEED.fullmatch(name.lower()) for name in header.names)
+
+
+def _apart(text: str) -> Name:
+    """A name with its unit; speeds are none of a log's readings, so their units are nothing to `taken_apart`."""
+    speed = _SPEED.fullmatch(text.lower())
+    return Name(text, speed[1], (speed[1],), speed[2]) if speed else taken_apart(text)
 
 
 def _unit(wanted: str, called: Name) -> Unit:

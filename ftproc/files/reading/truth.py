@@ -38,7 +38,8 @@ def read(source: tables.Source, frame: Frame | None = None) -> Truth:
     if positions.is_geodetic(header):
         return _on_the_earth(source, header.source, frame)
     flag_names = [name for name in OUTLIER if name in header.names]
-    needed = ["time_s", *POSITION, *_whole_group(header, VELOCITY), *_whole_group(header, ACCELERATION)]
+    speeds = VELOCITY if columns.has_velocities(header) else ()
+    needed = ["time_s", *POSITION, *speeds, *_whole_group(header, ACCELERATION)]
     found, _ = columns.load(header, [*needed, *flag_names])
     for name in needed:
         columns.require_present(header, found[name], name)

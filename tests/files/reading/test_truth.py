@@ -152,3 +152,18 @@ def test_a_position_too_large_in_metres(tmp_path):
     path.write_text("time_s,x_km,y_m,z_m\n0,1e308,2,3\n1,2,3,4\n")
     with pytest.raises(InputError, match=r'truth\.csv: row 0 .*, column "x_km": "inf" is not finite'):
         truth.read(path)
+
+
+@pytest.mark.parametrize(
+    ("names", "mps"),
+    [("vx_kmh,vy_kmh,vz_kmh", 1 / 3.6), ("vx [kt],vy [kt],vz [kt]", 1852 / 3600), ("vx_mps,vy_mps,vz_mps", 1)],
+)
+def test_velocities_may_be_in_other_units(make: Make, names: str, mps: float) -> None:
+    found = truth.read(make(f"time_s,x_m,y_m,z_m,{names}\n0,1,2,3,10,20,30\n1,1,2,3,10,20,30\n"))
+    assert found.velocity_mps is not None
+    np.testing.assert_allclose(found.velocity_mps, [[10 * mps, 20 * mps, 30 * mps]] * 2)
+
+
+def test_a_velocity_in_a_unit_that_nobody_knows_is_not_left_out_in_silence(make: Make) -> None:
+    with pytest.raises(InputError, match=r'no column "vz_mps".*vz_kmh, vz_kt'):
+        truth.read(make("time_s,x_m,y_m,z_m,vx_kmh,vy_kmh,vz_furlongs\n0,1,2,3,10,20,30\n"))
