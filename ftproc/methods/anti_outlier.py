@@ -35,7 +35,7 @@ from ftproc.methods import bridging, live, preparing, range_rates
 from ftproc.methods.bridging import Bridged
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
 from ftproc.order_statistics import median
-from ftproc.records import FloatArray
+from ftproc.records import ISOLATED, PATCH, FloatArray
 from ftproc.settings import FilterSettings
 
 Run = TypeVar("Run", FilterRun, SmootherRun)
@@ -104,8 +104,7 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     for away in _elsewhere(edited, others, settings.jerk_psd_m2ps5 is not None):
         run, smoothed = _reaching(run, away, rows), smoothed and _reaching(smoothed, away, rows)
     run, smoothed = over.filtered(run), smoothed and over.smoothed(smoothed)
-    shifts = edited.faults.shifts
-    if shifts:
+    if shifts := edited.faults.shifts:
         run, smoothed = _widened(run, shifts), smoothed and _widened(smoothed, shifts)
     could_be = hindsight = None
     if smoothed is not None and not settings.smooth:
@@ -113,8 +112,9 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
             could_be = median(np.sqrt((smoothed.sigma[:, :3] ** 2).sum(1)))
         hindsight, smoothed = smoothed.state, None
     decision = edited.decision
+    stand_still = decision.settled or not np.isin(label, (ISOLATED, PATCH)).any()  # else where would one look?
     return Estimate(
-        run, label, motion.model, smoothed, again, decision.settled,
+        run, label, motion.model, smoothed, again, stand_still,
         unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts,
         alternative=decision.alternative,
         faults=edited.faults, motion=motion, smoothed_sigma_m=could_be, hindsight=hindsight,

@@ -139,3 +139,19 @@ def test_lost_lock_is_reported_and_smoothed_on_each_side():
 def test_seed_literal_gain_form_runs(dirty, edited):
     for found in (edited("forward"), edited("forward", gain_form=True)):
         assert error(found.run, dirty) < 3
+
+
+@pytest.mark.parametrize("rejected", [False, True])
+def test_decisions_that_reject_nothing_stand_still(clean, monkeypatch, rejected):
+    """Clean hovers were suspect, with no reading flagged that one could have looked at."""
+    edit = anti_outlier.two_pass.edit
+
+    def unsettled(*given):
+        found = edit(*given)
+        weight = found.log.weight.copy()
+        weight[50, 0] = 0.0 if rejected else weight[50, 0]
+        decision = found.decision._replace(settled=False)
+        return found._replace(decision=decision, log=found.log._replace(weight=weight))
+
+    monkeypatch.setattr(anti_outlier.two_pass, "edit", unsettled)
+    assert anti_outlier.estimate(readings(clean), FilterSettings()).settled is not rejected
