@@ -47,11 +47,10 @@ from ftproc.core.model.motion import isotropic
 from ftproc.core.work import WORK, Work, for_lasting_faults
 from ftproc.records import FloatArray
 
-STIFFER, TURNS = (
-    10.0,
-    1000.0,
-)  # times less jerk than at the start of the search: the spans of a long log may lie between
-# its turns; the gain in log-probability with which they do: from 2,100, where motion would follow patches up to 660
+STIFFER = (
+    100.0  # times less jerk by the spans of a long log than at the start of the search, and than by the whole: they
+)
+# lie between its turns; from 170, where patches are left that motion would follow up to 30
 COARSE = 0.5  # of a component's noise: rounding that makes so much of it decides how its readings repeat
 FORGETS, REMEMBERED = 0.8, 5.0  # intervals that a filter remembers: with fewer it follows each reading; another start
 STAMP_ROUNDS = 3  # of estimating how late each time stamp is
@@ -223,15 +222,18 @@ def _first(
     if _may_miss_turns(found, begun):
         whole = record._replace(whole=True)
         other = whole, decide(whole, begun, tune_first=True)
-        found = other if not log_probability(*other) <= log_probability(*found) + TURNS else found
+        found = likelier(found, other) if _much_stiffer(found[1], other[1]) else found
     return found
 
 
 def _may_miss_turns(found: tuple[Record, Decision], begun: Decision) -> bool:
     """Whether the spans that stand for a long log showed far less jerk than the search for it began with: the target
     may turn between them only, and its turns be taken for outliers."""
-    much_stiffer = found[1].model.jerk[0, 0] * STIFFER < begun.model.jerk[0, 0]
-    return much_stiffer and not found[0].whole and is_long(found[0].time_s)
+    return _much_stiffer(found[1], begun) and not found[0].whole and is_long(found[0].time_s)
+
+
+def _much_stiffer(one: Decision, other: Decision) -> bool:
+    return bool(one.model.jerk[0, 0] * STIFFER < other.model.jerk[0, 0])
 
 
 def _examined(record: Record, decision: Decision, known: Known) -> tuple[Record, Decision]:
