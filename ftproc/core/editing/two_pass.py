@@ -47,10 +47,8 @@ from ftproc.core.model.motion import isotropic
 from ftproc.core.work import WORK, Work, for_lasting_faults
 from ftproc.records import FloatArray
 
-STIFFER = (
-    100.0  # times less jerk by the spans of a long log than at the start of the search, and than by the whole: they
-)
-# lie between its turns; from 170, where patches are left that motion would follow up to 30
+STIFFER = 100.0  # times less jerk by the spans of a long log than at the start of the search, and than by the whole:
+# they lie between its turns; from 170, where patches are left that motion would follow up to 30
 COARSE = 0.5  # of a component's noise: rounding that makes so much of it decides how its readings repeat
 FORGETS, REMEMBERED = 0.8, 5.0  # intervals that a filter remembers: with fewer it follows each reading; another start
 STAMP_ROUNDS = 3  # of estimating how late each time stamp is
