@@ -103,3 +103,16 @@ def test_a_station_is_left_out_only_if_the_others_can_disagree():
     assert flight_faults._left_out(readings, {0: probable}) is None
     assert flight_faults._left_out(pair, {1: probable}) is None
     assert flight_faults._left_out(readings, {}) is None
+
+
+def test_rejected_readings_ask_for_a_jump_only_where_many_lie_in_one_stretch():
+    def rejects_many(rejected):
+        weight = np.ones((1000, 3))
+        weight[rejected, 1] = 0.0
+        return flight_faults._rejects_many(SimpleNamespace(possible=[np.ones((1000, 3))], weight=[weight]))
+
+    scattered = np.arange(0, 1000, 4)
+    assert not rejects_many(scattered)
+    assert not rejects_many(slice(700, 880))  # fewer than a fifth in all
+    assert rejects_many(slice(700, 1000))
+    assert rejects_many(np.union1d(scattered, np.arange(500, 650)))

@@ -156,7 +156,7 @@ def refuse_alike(
         another = words & OTHER_THINGS or name.is_zenith() or any(name.means(each) for each in QUANTITIES)
         alike = known & words or (name.is_in_a_unit_of(quantity) and not another)
         bare = quantity == "range" and name.stem == "d"
-        unknown = doubtful and not another and not any(name.stem in known for known in FURTHER_ALIASES.values())
+        unknown = doubtful and not another and not any(name.stem in stems for stems in FURTHER_ALIASES.values())
         if not name.foreign and (either or bare or ((alike or unknown) and not other & words)):
             say = answer([each.text for each in apart], {quantity: index})
             turns = counts_from(name) if quantity == "azimuth" else ""
