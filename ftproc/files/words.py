@@ -176,6 +176,7 @@ OTHER_THINGS = frozenset(
     snr rcs db power amplitude mag magnitude temp temperature pressure humidity voltage battery quality status flag
     fl flightlevel pred predicted prediction cmd command commanded soll sollwert setpoint consigne
     variation declination magvar hd horizontal ground vertical vd
+    remark remarks comment comments note notes name label text info description operator prism
     """
     )
 )

@@ -291,3 +291,8 @@ def test_of_two_times_with_words_beside_none_is_taken() -> None:
 @pytest.mark.parametrize("name", ["flight_time_s", "dwell_time_ms", "time_to_go_s", "time_error_ms"])
 def test_durations_are_no_time(name: str) -> None:
     assert "no time column" in refused([name, "range_m", "azimuth_rad", "elevation_rad"])
+
+
+def test_remarks_are_no_elevation() -> None:
+    assert "elevation" not in found(["time_s", "dist_m", "hz_deg", "remark"])
+    assert "elevation=q" in refused(["time_s", "dist_m", "hz_deg", "q"])
