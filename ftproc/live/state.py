@@ -23,7 +23,20 @@ import numpy as np
 from ftproc.core import by_hand, compiled
 from ftproc.core.editing import gate, track, two_pass
 from ftproc.core.filtering import records, smoother
-from ftproc.core.live import beside, doubt, editor, pace, pieces, readings, recursive, rows, turning, whole, window
+from ftproc.core.live import (
+    beside,
+    doubt,
+    editor,
+    kept,
+    pace,
+    pieces,
+    readings,
+    recursive,
+    rows,
+    turning,
+    whole,
+    window,
+)
 from ftproc.core.model import motion
 from ftproc.correction import live as correction
 from ftproc.errors import InputError, OutputError
@@ -43,9 +56,9 @@ _KINDS: dict[str, Any] = {
         live.Live, order.Order, order.Left, order._Copy, growing.Lines, forms.Form, forms.Json, forms.Nmea,
         forms.Cycle, plots.Plots,
         editor.LiveEditor, window.Window, recursive.GatedWindow, recursive.Gating, whole.Whole, doubt.Doubt,
-        pace.Pace, pace.Clock, pieces.Sizes, readings.Columns, readings.Labels, readings.Repeats, rows.Waiting,
-        rows.Published, records.Model, records.Start, smoother.SmootherRun, two_pass.Known, track.Track,
-        gate.GateSettings, by_hand.Accepted, motion.Motion, beside.Rates,
+        pace.Pace, pace.Clock, pieces.Sizes, readings.Columns, kept.Kept, readings.Labels,
+        readings.Repeats, rows.Waiting, rows.Published, records.Model, records.Start, smoother.SmootherRun,
+        two_pass.Known, track.Track, gate.GateSettings, by_hand.Accepted, motion.Motion, beside.Rates,
         heights.Prior, times.Times, times.Pause, turning.Second, turning.Turning, correction.LiveCorrection,
         records.FilterRun,
     )

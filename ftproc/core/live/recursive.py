@@ -69,8 +69,8 @@ class GatedWindow(Window):
         super()._adopt(found, samples)
         if self.track is None:
             rows, label = super().shown(0, len(self))
-            self.gated, self.gated_labels = Columns(rows=rows, label=label, used=super().decided), Labels()
-            self.gated_labels.reset(super().decided, self.measurement)
+            self.gated, self.gated_labels = Columns(rows=rows, label=label, used=self.kept["weight"]), Labels()
+            self.gated_labels.reset(self.kept["weight"], self.measurement)
             self.track, self.second = Track(0, self.filters.copy(), gate.gate_of(self.how)), Second()
             self.second.filters = self.filters.copy()
             self._accompany(self.track)
@@ -150,7 +150,3 @@ class GatedWindow(Window):
 
     def shown(self, low: int, high: int) -> tuple[Any, FloatArray]:
         return self.gated["rows"][low:high].copy(), self.gated["label"][low:high].copy()
-
-    @property
-    def decided(self) -> FloatArray:
-        return self.gated["used"]  # type: ignore[no-any-return]

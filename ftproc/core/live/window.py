@@ -17,15 +17,18 @@ import numpy as np
 from ftproc.core.editing import two_pass
 from ftproc.core.filtering.beside import OPEN as RATE_OPEN
 from ftproc.core.filtering.forward import Span
-from ftproc.core.filtering.records import Model, Observations, Start, Uneven, empty_rows
+from ftproc.core.filtering.records import Model, Observations, Start, Uneven
 from ftproc.core.filtering.smoother import PATHS, SmootherRun, smooth_log
 from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.identification.scales import Scales, scales_of
 from ftproc.core.live import beside
+from ftproc.core.live.kept import Kept
+from ftproc.core.live.newest import levels
+from ftproc.core.live.newest.deciding import decided
+from ftproc.core.live.newest.readmission import KEPT, Open
 from ftproc.core.live.pieces import BLOCK, Sizes, filtered, later, piece, predicted, stretched
 from ftproc.core.live.predictive_chain import OPEN, chains_of
-from ftproc.core.live.readings import Columns, Labels, Repeats, labelled, typical, used_lately
-from ftproc.core.live.readmission import Open, decided
+from ftproc.core.live.readings import Labels, Repeats, labelled, typical, used_lately
 from ftproc.core.live.turning import Case, Turning
 from ftproc.core.live.whole import Whole
 from ftproc.records import FloatArray, IntArray
@@ -55,11 +58,7 @@ class Window:
         self.reacquired, self.left, self.forgotten, self.begun = list[int](), 0, 0, -1
         self.under_way: Whole | None = None
         self.turning = Turning(acts=not (known.white_jerk or stand_ins))
-        nothing, ones, self.side = np.zeros((0, 3)), np.ones((0, 3)), beside.Rates()
-        self.kept = Columns(
-            time_s=np.empty(0), measurement=nothing, possible=nothing > 0, weight=nothing, times=ones, late=nothing,
-            label=np.zeros((0, beside.WIDTH)), rate=np.empty(0), rate_weight=np.empty(0), rows=empty_rows(0),
-        )  # fmt: skip
+        self.kept, self.side = Kept.nothing(), beside.Rates()
         self._bar(self._take(time_s, measurement))
 
     def __len__(self) -> int:
@@ -72,18 +71,13 @@ class Window:
 
     @property
     def measurement(self) -> FloatArray:
-        """(n, 3) their readings."""
+        """(n, 3) their readings, without what is taken out of them."""
         return self.kept["measurement"]  # type: ignore[no-any-return]
 
     @property
     def came(self) -> FloatArray:
-        """(n, 4) these with the range rates."""
-        return np.column_stack([self.measurement, self.kept["rate"]])
-
-    @property
-    def decided(self) -> FloatArray:
-        """(n, 3) one for the readings that are used, else zero."""
-        return self.kept["weight"]  # type: ignore[no-any-return]
+        """(n, 4) these as they came, with the range rates."""
+        return self.kept.came
 
     @property
     def learns(self) -> bool:
@@ -91,13 +85,15 @@ class Window:
         return True
 
     def shown(self, low: int, high: int) -> tuple[Any, FloatArray]:
-        """Copies of the `Row` records and of the labels (m, 4) of some samples."""
-        return self.kept["rows"][low:high].copy(), self.kept["label"][low:high].copy()
+        """See `Kept.shown`."""
+        return self.kept.shown(low, high)
 
     def smoothed(self) -> SmootherRun:
         """The newest part, smoothed with the decisions as they are."""
-        log = self._observed(slice(self.near, len(self)))
-        return self.turning.smoothed(log, self.anchor, smooth_log(log, self.allowed, [self.anchor], PATHS))
+        log = self.kept.observed(slice(self.near, len(self)), self.side)
+        found = self.turning.smoothed(log, self.anchor, smooth_log(log, self.allowed, [self.anchor], PATHS))
+        levels.widen(found, self.kept["level"][self.near :], self.kept["level_sigma"][self.near :])
+        return found
 
     def used_lately(self, count: int) -> FloatArray:
         return used_lately(self.measurement, self.kept["weight"], count)
@@ -146,7 +142,7 @@ class Window:
         self.side, kept["rate_weight"][samples] = beside.learned(found.log, found.model, found.starts, rate)
         starts = [start._replace(sample=int(samples[start.sample])) for start in found.starts]
         if len(new):
-            log, start = self._observed(slice(0, len(self))), starts[-1]
+            log, start = self.kept.observed(slice(0, len(self)), self.side), starts[-1]
             span = Span(start.sample, len(self), start.sample)
             rows, left = self._filtered(log, span, found.model, found.model.filter(start))
             kept["weight"][new], kept["rate_weight"][new] = rows["weight"][new], left[new]
@@ -169,7 +165,7 @@ class Window:
     def _ahead(self, starts: list[Start], model: Model, sample: int) -> Start:
         """The prediction at a sample, from the last start that is not after it."""
         start = [s for s in starts if s.sample <= sample][-1]
-        log, filters = beside.without(self._observed(slice(0, sample + 1)), sample), model.filter(start)
+        log, filters = beside.without(self.kept.observed(slice(0, sample + 1), self.side), sample), model.filter(start)
         self._filtered(log, Span(start.sample, sample + 1, start.sample), model, filters)
         return predicted(filters)
 
@@ -192,8 +188,8 @@ class Window:
         """Filter the next readings, each decided on when it comes."""
         n = len(self)
         stuck = self._take(time_s, measurement)
-        first_s = float(self.time_s[self.near])
-        log, span = self._observed(slice(n - 1, n + len(time_s))), Span(1, 1 + len(time_s), 0)
+        first_s, span = float(self.time_s[self.near]), Span(1, 1 + len(time_s), 0)
+        log = self.kept.observed(slice(n - 1, n + len(time_s)), self.side)
         rows, left = self._filtered(log, span, self.allowed, self.filters, self.chains, first_s)
         self.turning.append(log, span, rows, first_s)
         rows["since_start"] += self.kept["rows"]["since_start"][n - 1]
@@ -209,10 +205,9 @@ class Window:
         measurement, rate = np.split(beside.widened(measurement), [beside.RATE], axis=1)
         accepted, possible = self.known.accepted.of(time_s, measurement), np.isfinite(measurement)
         possible[:, 0] &= measurement[:, 0] > 0
-        self.kept.append(
-            time_s=time_s, measurement=measurement, possible=possible, weight=np.zeros((m, 3)),
-            times=np.tile(self.next_times, (m, 1)), late=np.tile(self.next_late, (m, 1)), rows=empty_rows(m),
-            label=np.zeros((m, beside.WIDTH)), rate=rate[:, 0], rate_weight=np.full(m, RATE_OPEN),
+        self.kept.take(
+            measurement, time_s=time_s, possible=possible, times=np.tile(self.next_times, (m, 1)),
+            late=np.tile(self.next_late, (m, 1)), rate=rate[:, 0], rate_weight=np.full(m, RATE_OPEN),
         )  # fmt: skip
         moving = measurement.copy()
         moving[:, self.stand_ins] = np.nan
@@ -229,14 +224,6 @@ class Window:
             self.kept["possible"][samples, c] = False
             self.kept["weight"][samples, c] = 0.0
 
-    def _observed(self, span: slice) -> Observations:
-        """Some samples with the decisions on them (copies)."""
-        time_s, measurement, weight, times, late = (
-            self.kept[name][span].copy() for name in ("time_s", "measurement", "weight", "times", "late")
-        )
-        sides = self.side.scalars(self.kept["rate"][span].copy(), self.kept["rate_weight"][span].copy())
-        return Observations(time_s, measurement, weight, Uneven(times, late), beside=sides)
-
     def _filtered(
         self, log: Observations, span: Span, model: Model, filters: Any, chains: Any = None, first_s: float = math.nan
     ) -> tuple[Any, FloatArray]:
@@ -249,33 +236,40 @@ class Window:
         self._slide()
         near = slice(self.near, len(self))
         self.model = stretched(self.model, float(self.time_s[-1] - self.time_s[self.near]))
-        log, gate = self._observed(near), self.known.gate
+        log, gate = self.kept.observed(near, self.side), self.known.gate
         scales = scales_of(log, self.model.noise_variance)
         self.allowed = self._with_allowance(log, scales)
-        by_hand = self.known.accepted.of(log.time_s, log.measurement)
-        case = Open(log, self.kept["possible"][near], self.allowed, self.anchor, self.rates, by_hand)
-        case, self.model = decided(case, gate, self.model, scales if self.known.jerk_psd is None else None)
+        by_hand, kept = self.known.accepted.of(log.time_s, log.measurement), self.kept
+        before = Open(log, self.allowed, self.anchor, self.rates, by_hand, *(kept[name][near] for name in KEPT))
+        jumps, free = self.forgotten + self.near > self.begun and not self.white, self.known.jerk_psd is None
+        case, self.model = decided(before, gate, self.model, scales if free else None, jumps)
+        if case.level is not before.level:
+            self.under_way, self.anchor = None, case.start  # an edit of all knows nothing of it
+            for name in KEPT:
+                kept[name][near] = getattr(case, name)
+            kept["measurement"][near] = case.log.measurement
         log = beside.decided(case.log, self.allowed, self.anchor)
-        self.kept["weight"][near] = log.weight
-        if self.known.jerk_psd is None:
+        kept["weight"][near] = log.weight
+        if free:
             self.model = fit_profile(log, [self.anchor], self.model, JERK_STEPS, scales)
             self.allowed = self._with_allowance(log, scales)
         self.filters, self.chains = self.allowed.filter(self.anchor), self._chains(self.allowed)
         rows, left = self._filtered(log, Span(0, len(log.time_s), 0), self.allowed, self.filters, self.chains)
         self.turning.refresh(Case(log, self.allowed, self.anchor, scales), rows)
         rows["since_start"] += self.forgotten + self.near - self.begun
-        self.kept["rows"][near] = rows
-        self.kept["rate_weight"][near] = left
+        kept["rows"][near], kept["rate_weight"][near] = rows, left
         used, came = np.column_stack([log.weight, left]), self.came[near]
-        self.kept["label"][near] = labelled(used, came)
+        kept["label"][near] = labelled(used, came)
         self.labels.reset(used, came)
-        self.next_times, self.next_late = typical(self.kept["times"], self.kept["late"])
+        self.next_times, self.next_late = typical(kept["times"], kept["late"])
 
     def _chains(self, model: Model) -> Any:
         return chains_of(self.rates, model.reading_variance, self.known.gate)
 
     def _with_allowance(self, log: Observations, scales: Scales) -> Model:
-        return self.model if self.known.jerk_psd is not None else with_allowance(log, self.model, scales)
+        if self.known.jerk_psd is not None:
+            return self.model
+        return with_allowance(log, self.model, scales)
 
     def _slide(self) -> None:
         """Move the newest part on, by whole pieces of its jerk profile, unless that leaves it far too long."""
@@ -289,7 +283,7 @@ class Window:
             ahead = min(ahead, int(np.searchsorted(times, first_s + pieces * self.model.knot_s)))
         if ahead <= self.near:
             return
-        log = beside.without(self._observed(slice(self.near, ahead + 1)), -1)
+        log = beside.without(self.kept.observed(slice(self.near, ahead + 1), self.side), -1)
         filters = self.allowed.filter(self.anchor)
         self._filtered(log, Span(0, len(log.time_s), 0), self.allowed, filters)
         self.anchor, self.near = predicted(filters), ahead

@@ -8,8 +8,9 @@ import pytest
 from ftproc.core.editing import outlier_chain
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification.scales import scales_of
-from ftproc.core.live import readmission
-from ftproc.core.live.readmission import Open
+from ftproc.core.live.newest import readmission
+from ftproc.core.live.newest.deciding import decided
+from ftproc.core.live.newest.readmission import Open
 from ftproc.core.model.frames import from_cartesian
 from tests.core.tracks import matched
 
@@ -24,13 +25,13 @@ def case(rejected, patch=slice(0), components=(0,), sigmas=15.0):
         weight[-rejected:, c] = 0.0
         z[patch, c] += sigmas * np.sqrt(a.model.noise_variance[c])
     log = a.log._replace(measurement=z, weight=weight)
-    return Open(log, np.isfinite(z), a.model, a.starts[0], RATES)
+    return Open(log, a.model, a.starts[0], RATES, np.zeros(z.shape, bool), np.isfinite(z), 0.0 * z, 0.0 * z)
 
 
 def readmitted(open_):
     """The decisions taken instead, with the process noise as it is."""
     found = readmission.readmitted(open_, open_.model, None)
-    return None if found is None else found[0].log.weight
+    return None if found is None or found.gain <= readmission.MARGIN else found.case.log.weight
 
 
 @pytest.mark.parametrize("components", [(0,), (2,), (0, 1), (0, 1, 2)])
@@ -92,7 +93,7 @@ def turning(begun, off_mps2=4.0):
     weight = a.weight.copy()
     weight[-begun + 2 :, :2] = 0.0
     log = a.log._replace(measurement=z, weight=weight)
-    return Open(log, np.isfinite(z), a.model, a.starts[0], RATES), position
+    return Open(log, a.model, a.starts[0], RATES, np.zeros(z.shape, bool), np.isfinite(z), 0.0 * z, 0.0 * z), position
 
 
 @pytest.mark.parametrize("begun", [16, 20])
@@ -101,7 +102,7 @@ def test_a_target_that_begins_to_turn_is_followed(begun):
     open_, position = turning(begun)
     assert readmitted(open_) is None
     scales = scales_of(open_.log, open_.model.noise_variance)
-    found, profile = readmission.decided(open_, 4.0, open_.model, scales)
+    found, profile = decided(open_, 4.0, open_.model, scales, jumps=True)
     assert found.log.weight[-begun + 2 :].mean() > 0.9
     assert profile.jerk.max() > 1e3 * open_.model.jerk.max()
     run = smooth_log(found.log, found.model, [found.start])
@@ -111,6 +112,6 @@ def test_a_target_that_begins_to_turn_is_followed(begun):
 def test_a_patch_is_no_turn():
     open_ = case(24, slice(96, 120), (0, 1), sigmas=200.0)
     scales = scales_of(open_.log, open_.model.noise_variance)
-    found, profile = readmission.decided(open_, 4.0, open_.model, scales)
+    found, profile = decided(open_, 4.0, open_.model, scales, jumps=False)
     assert profile is open_.model
     assert not found.log.weight[96:, :2].any()

@@ -22,29 +22,33 @@ from ftproc.core.identification.profile import fit_profile, roughness, with_allo
 from ftproc.core.identification.scales import Scales
 from ftproc.records import FloatArray
 
+KEPT = ("possible", "level", "level_sigma")
 ROUNDS = 3  # of smoothing and deciding
 MOVES_STEPS = 6  # of the search for the process noise of a target that begins to move
 MARGIN = 5.0  # by which the log-probability of other decisions must be better
 
 
 class Open(NamedTuple):
-    """What is open: the log with the decisions (n, 3) so far, which of its readings are possible (n, 3), the model, the
-    start, the rates (3, 3) of outliers, and which readings are good by hand (n, 3)."""
+    """What is open: the log with the decisions (n, 3) so far, the model, the start, the rates (3, 3) of outliers; which
+    of its readings are good by hand, which are possible, what is taken out of them and its 1-sigma, (n, 3) each, the
+    last three by the names of KEPT."""
 
     log: Observations
-    possible: NDArray[np.bool_]
     model: Model
     start: Start
     rates: FloatArray
-    accepted: NDArray[np.bool_] | bool = False
+    accepted: NDArray[np.bool_]
+    possible: NDArray[np.bool_]
+    level: FloatArray
+    level_sigma: FloatArray
 
 
-def decided(case: Open, gate: float, profile: Model, scales: Scales | None) -> tuple[Open, Model]:
-    """The decisions made again, and the process noise without its allowance. gate: in sigmas. scales: see
-    `readmitted`."""
-    case = settled(case, gate)
-    other = readmitted(case, profile, scales)
-    return (case, profile) if other is None else (settled(other[0], gate), other[1])
+class Other(NamedTuple):
+    """Another case, the process noise for it without its allowance, and the gain in log-probability."""
+
+    case: Open
+    profile: Model
+    gain: float
 
 
 def settled(case: Open, gate: float) -> Open:
@@ -61,27 +65,26 @@ def settled(case: Open, gate: float) -> Open:
     return case
 
 
-def readmitted(case: Open, profile: Model, scales: Scales | None) -> tuple[Open, Model] | None:
-    """Other decisions, if they are likelier, and the process noise for them: as it is, or, if scales are given, that by
+def readmitted(case: Open, profile: Model, scales: Scales | None) -> Other | None:
+    """Other decisions, the likeliest, and the process noise for them: as it is, or, if scales are given, that by
     which the target has begun to move; a turn that begins is off any track with the jerk of a straight leg."""
-    runs = {c: run for c in range(3) if len(run := _rejected(case, c)) >= patch_likelihood.SHORTEST_RUN}
+    runs = {c: run for c in range(3) if len(run := rejected(case, c)) >= patch_likelihood.SHORTEST_RUN}
     if not runs:
         return None
     tried = [case.log.weight, *_others(case.log.weight, runs)]
-    found = [_log_probability(case, weight) for weight in tried]
+    found = [log_probability(case, weight) for weight in tried]
     best = int(np.argmax(found))
-    if found[best] > found[0] + MARGIN:
-        return case._replace(log=case.log._replace(weight=tried[best])), profile
-    if scales is None:
-        return None
+    other = Other(case._replace(log=case.log._replace(weight=tried[best])), profile, found[best] - found[0])
+    if other.gain > MARGIN or scales is None:
+        return other
     weight = case.log.weight.copy()
     for c, run in runs.items():
         weight[run, c] = 1.0
     log = case.log._replace(weight=weight)
     profile = fit_profile(log, [case.start], profile, MOVES_STEPS, scales)
     moves = case._replace(log=log, model=with_allowance(log, profile, scales))
-    gain = _log_probability(moves, weight) - roughness(moves.model) - found[0] + roughness(case.model)
-    return (moves, profile) if gain > MARGIN else None
+    gain = log_probability(moves, weight) - roughness(moves.model) - found[0] + roughness(case.model)
+    return Other(moves, profile, gain) if gain > other.gain else other
 
 
 def _others(weight: FloatArray, runs: dict[int, NDArray[np.int64]]) -> Iterator[FloatArray]:
@@ -95,14 +98,14 @@ def _others(weight: FloatArray, runs: dict[int, NDArray[np.int64]]) -> Iterator[
             yield other
 
 
-def _rejected(case: Open, c: int) -> NDArray[np.int64]:
+def rejected(case: Open, c: int) -> NDArray[np.int64]:
     """The samples whose readings of a component are rejected, after the last one that is good."""
     seen = np.flatnonzero(case.possible[:, c])
     good = np.flatnonzero(case.log.weight[seen, c] > 0)
     return seen[good[-1] + 1 if len(good) else 0 :]
 
 
-def _log_probability(case: Open, weight: FloatArray) -> float:
+def log_probability(case: Open, weight: FloatArray) -> float:
     """Log-probability of all readings with these decisions."""
     log = case.log._replace(weight=weight)
     smoothed = smooth_log(log, case.model, [case.start], RESIDUALS)

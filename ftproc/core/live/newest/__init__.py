@@ -1,0 +1,1 @@
+"""The newest part of a window: which understanding of its readings holds."""

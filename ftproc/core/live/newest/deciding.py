@@ -1,0 +1,28 @@
+"""Which understanding of the newest part holds: as it is decided on, with its last readings taken in again, or with
+readings that have jumped beside the track."""
+
+from __future__ import annotations
+
+from ftproc.core.filtering.records import Model
+from ftproc.core.identification.scales import Scales
+from ftproc.core.live.newest import levels
+from ftproc.core.live.newest.readmission import MARGIN, Open, readmitted, settled
+
+COMPONENTS = 3  # that may jump at once
+
+
+def decided(case: Open, gate: float, profile: Model, scales: Scales | None, jumps: bool) -> tuple[Open, Model]:
+    """The likeliest case, and the process noise without its allowance. gate: in sigmas. scales: see `readmitted`.
+    jumps: whether readings may jump, as the track is old enough to tell."""
+    case = settled(case, gate)
+    for _ in range(COMPONENTS):
+        other = readmitted(case, profile, scales)
+        rival = 0.0 if other is None else max(other.gain, 0.0)
+        level = levels.likeliest(case) if jumps else None
+        if level is not None and level[1] > rival + MARGIN:
+            case = settled(level[0], gate)
+            continue
+        if other is not None and rival > MARGIN:
+            return settled(other.case, gate), other.profile
+        break
+    return case, profile

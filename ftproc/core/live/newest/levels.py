@@ -1,0 +1,230 @@
+"""Readings of a component that have jumped beside the track and go on there, as after a slip of an encoder.
+
+A run of rejected readings may have a constant offset. Then they tell how the target moves all the same: the offset is
+taken out of them, and of those that follow, until they are back. The sigmas allow for its uncertain size. Were they
+left out, the track would lose sight of the target, and follow them in the end.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ftproc.core.editing import patch_likelihood
+from ftproc.core.editing.lasting.curves import Curve, Fitted, Setting, columns_of, fitted
+from ftproc.core.editing.lasting.faults import Shift, spread
+from ftproc.core.filtering.columns import said_of
+from ftproc.core.filtering.records import Observations, Start
+from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
+from ftproc.core.live.newest.readmission import Open, log_probability, rejected
+from ftproc.core.model.frames import line_of_sight_axes, wrap
+from ftproc.order_statistics import median
+from ftproc.records import FloatArray, IntArray
+
+LIKELIER = 3.0  # and the margin, by which a jump must be likelier than that the track has followed a patch: steps are
+# by 10 and more, where walks off the track end up to 6
+WELL = 3.0  # sigmas of the noise, as 1-sigma of a jump that is taken out
+NEARLY = 0.5  # of what the readings were off, within which they are back
+JUMPED, BACK = 4, 2  # readings in a row that show it
+SHORTEST, LONGER = 8, math.sqrt(2)  # readings of an earlier patch that is tried, and times as many in the next
+
+
+@np.errstate(all="ignore")  # where times stand still numbers may overflow; what comes of it has no gain
+def likeliest(case: Open) -> tuple[Open, float] | None:
+    """The case if the newest readings of a component are off by a constant, or by none any more, and the gain in
+    log-probability; the likeliest of such."""
+    tried = list[tuple[Open, float]]()
+    runs = {c: run for c in range(3) if len(run := rejected(case, c)) >= BACK}
+    if not runs:
+        return None
+    smoothed = smooth_log(case.log, case.model, [case.start], RESIDUALS)
+    for c, run in runs.items():
+        sigma = math.sqrt(case.model.reading_variance[c])
+        off = smoothed.residual[run, c]
+        if case.level[-1, c] != 0:
+            within = patch_likelihood.OFF_CURVE * math.hypot(sigma, case.level_sigma[-1, c])
+            back = run[np.abs(off + case.level[-1, c]) <= within]
+            if len(back) >= BACK:
+                tried.append(_back(case, c, back))
+            jumped = np.flatnonzero(case.level[:, c] * (case.log.weight[:, c] > 0))
+            if case.level[0, c] == 0 and len(jumped):
+                _, now = _with_jump(case, case.log.measurement + case.level, c, jumped)
+                tried += [(other, likely - now) for other, likely in _without(case, c, jumped, run)]
+        if len(run) >= JUMPED:
+            away = np.abs(off - median(off))
+            together = run[away <= max(patch_likelihood.OFF_CURVE * sigma, 2.5 * median(away))]
+            if len(together) >= JUMPED:
+                jump, patches = (
+                    [*_well_known(case, c, _nearly_back(case, c, together, *_jumped(case, c, together)))],
+                    list(_earlier_patches(case, c, run)),
+                )
+                tried += [*_over(jump, patches, LIKELIER), *_over(patches, jump)]
+    found = [(_with_others(case, other), gain) for other, gain in tried if math.isfinite(gain)]
+    return max(found, key=lambda each: each[1], default=None)
+
+
+def _with_others(case: Open, other: Open) -> Open:
+    """Where readings of a component are back, those of others are that have jumped with them, as another target has."""
+    back = (case.level[-1] != 0) & (other.level[-1] == 0)
+    for c, d in itertools.product(np.flatnonzero(back), np.flatnonzero(other.level[-1] != 0)):
+        if ((case.level[:, c] != 0) == (case.level[:, d] != 0)).all():
+            since = int(np.flatnonzero(other.log.weight[:, c] > case.log.weight[:, c])[0])
+            other = _off_the_track(other, int(d), np.arange(since, len(case.level)), abs(float(case.level[-1, d])))
+    return other
+
+
+def _over(
+    some: list[tuple[Open, float]], others: list[tuple[Open, float]], by: float = 0.0
+) -> list[tuple[Open, float]]:
+    """Some cases with their gains over the likeliest of others, and so much more."""
+    rival = max([0.0, *(gain + by for _, gain in others)])
+    return [(case, gain - rival) for case, gain in some]
+
+
+def _well_known(case: Open, c: int, jumped: tuple[Open, float]) -> Iterator[tuple[Open, float]]:
+    """A jump from a track that was known about as well as readings tell; one that followed a patch seldom is."""
+    if jumped[0].level_sigma[-1, c] < WELL * math.sqrt(case.model.reading_variance[c]):
+        yield jumped
+
+
+def _jumped(case: Open, c: int, run: IntArray) -> tuple[Open, float]:
+    """The readings of a run have jumped, and all that follow."""
+    jump, likely = _with_jump(case, case.log.measurement, c, run)
+    level, sigma = case.level.copy(), case.level_sigma.copy()
+    level[run[0] :, c] += jump.curves[0].size[0]
+    sigma[run[0] :, c] = np.sqrt(sigma[run[0] :, c] ** 2 + jump.covariance[0, 0])
+    return _levelled(case, run, c, level, sigma), likely - log_probability(case, case.log.weight)
+
+
+def _nearly_back(case: Open, c: int, run: IntArray, jumped: Open, gain: float) -> tuple[Open, float]:
+    """The readings that have jumped once more are back if they are much nearer than before, as another target moves:
+    then the track has drifted with them, by what they are off now."""
+    before, now = case.level[-1, c], jumped.level[-1, c]
+    if not abs(now) < NEARLY * abs(before):
+        return jumped, gain
+    return _off_the_track(case, c, run, abs(float(now))), gain
+
+
+def _off_the_track(case: Open, c: int, run: IntArray, drift: float) -> Open:
+    """The readings of a run are back, and what has jumped before does not count; the track may have drifted by so much
+    with it."""
+    level, sigma, possible = case.level.copy(), case.level_sigma.copy(), case.possible.copy()
+    off = level[:, c] != 0
+    off[run[0] :] = False
+    level[:, c] = sigma[:, c] = 0.0
+    possible[off, c] = False
+    back = _levelled(case, run, c, level, sigma)._replace(possible=possible)
+    back.log.weight[off, c] = 0.0
+    if case.level[0, c] == 0:
+        return back
+    time_s = case.log.time_s
+    return back._replace(start=_widened(case.start, c, drift, 1 / max(time_s[run[0]] - time_s[0], 1e-300)))
+
+
+def _with_jump(case: Open, measurement: FloatArray, c: int, run: IntArray) -> tuple[Fitted, float]:
+    """A constant for what a run is off by, and the log-probability of all readings with it."""
+    log = case.log._replace(measurement=measurement, weight=_used(case, run, c))
+    curve, setting = Curve(c, int(run[0]), len(log.time_s), (0.0,)), Setting(log.time_s, np.zeros((len(log.time_s), 3)))
+    jump = fitted(log, case.model, [case.start], setting, [curve])
+    begins, stays = case.rates[c, 1:].tolist()
+    there = math.log(begins) + len(run) * math.log(stays)
+    return jump, jump.log_probability + there + _rejections(case, jump.log)
+
+
+def _back(case: Open, c: int, run: IntArray) -> tuple[Open, float]:
+    """Nothing is to be taken out of the readings of a run any more; which tells what was to be before."""
+    log, n = case.log._replace(weight=_used(case, run, c)), len(case.log.time_s)
+    level, variance = float(case.level[-1, c]), float(case.level_sigma[-1, c]) ** 2
+    curve = Curve(c, int(run[0]), n, (0.0,))
+    said = said_of(log, case.model, [case.start], columns_of([curve], Setting(log.time_s, np.zeros((n, 3)))))
+    score, information = float(said.score[0]), float(said.information[0, 0])
+    left = score + information * level  # by which the offset is less than the level, within its sigma
+    likely = said.log_likelihood - score * level - 0.5 * information * level**2
+    likely += 0.5 * left**2 / (information + 1 / variance) - 0.5 * math.log1p(information * variance)
+    gain = likely + _rejections(case, log) - log_probability(case, case.log.weight)
+    levels, sigma = case.level.copy(), case.level_sigma.copy()
+    levels[levels[:, c] != 0, c] -= left / (information + 1 / variance)
+    levels[run[0] :, c] = sigma[run[0] :, c] = 0.0
+    start = case.start if case.level[0, c] == 0 else _widened(case.start, c, math.sqrt(variance))
+    return _levelled(case, run, c, levels, sigma)._replace(start=start), gain
+
+
+def _without(case: Open, c: int, off: IntArray, run: IntArray) -> Iterator[tuple[Open, float]]:
+    """Some readings were a patch and do not count, and those of a run are good beside a track without them; and how
+    likely that is."""
+    possible, level, sigma = case.possible.copy(), case.level.copy(), case.level_sigma.copy()
+    possible[off, c] = False
+    level[:, c] = sigma[:, c] = 0.0
+    none = _levelled(case, run[:0], c, level, sigma)
+    weight = none.log.weight.copy()
+    weight[off, c] = 0.0
+    none = none._replace(log=none.log._replace(weight=weight))
+    smoothed = smooth_log(none.log, case.model, [case.start], RESIDUALS)
+    spread = np.sqrt(smoothed.residual_variance[run, c])
+    back = run[np.abs(smoothed.residual[run, c]) <= patch_likelihood.OFF_CURVE * spread]
+    if len(off) and len(back) >= BACK:
+        other = none._replace(log=none.log._replace(weight=_used(none, back, c)))
+        yield other._replace(possible=possible), log_probability(other, other.log.weight)
+
+
+def _earlier_patches(case: Open, c: int, run: IntArray) -> Iterator[tuple[Open, float]]:
+    """The readings before a run were a patch, which the track has followed."""
+    now, good = log_probability(case, case.log.weight), np.flatnonzero(case.log.weight[:, c] > 0)
+    length = float(SHORTEST)
+    while case.level[-1, c] == 0 and length < len(good):
+        yield from ((other, likely - now) for other, likely in _without(case, c, good[-int(length) :], run))
+        length *= LONGER
+
+
+def _levelled(case: Open, run: IntArray, c: int, level: FloatArray, sigma: FloatArray) -> Open:
+    """With other levels taken out of the readings, and those of a run used."""
+    z = case.log.measurement + case.level - level
+    z[:, 1] = wrap(z[:, 1])
+    log = case.log._replace(measurement=z, weight=_used(case, run, c))
+    return case._replace(log=log, level=level, level_sigma=sigma)
+
+
+def _used(case: Open, run: IntArray, c: int) -> FloatArray:
+    """The decisions (n, 3), with a run good."""
+    weight = case.log.weight.copy()
+    weight[run, c] = 1.0
+    return weight
+
+
+def _rejections(case: Open, log: Observations) -> float:
+    smoothed = smooth_log(log, case.model, [case.start], RESIDUALS)
+    return patch_likelihood.log_probability_of_all(
+        log.time_s, smoothed.residual, smoothed.residual_variance, log.weight, case.possible,
+        case.model.reading_variance, case.rates,
+    )  # fmt: skip
+
+
+def _widened(start: Start, c: int, sigma: float, rate: float = 0.0) -> Start:
+    """A start that allows for an offset of a component with this 1-sigma, which has grown at a rate, per s."""
+    x, covariance = start.state, start.covariance.copy()
+    length = (1.0, float(np.hypot(x[0], x[1])), float(np.linalg.norm(x[:3])))[c]
+    moves = line_of_sight_axes(x[None, :3])[0, c] * length * sigma
+    covariance[:3, :3] += np.outer(moves, moves)
+    covariance[3:6, 3:6] += np.outer(moves, moves) * rate**2
+    return start._replace(covariance=covariance)
+
+
+def widen(found: Any, level: FloatArray, sigma: FloatArray) -> None:
+    """Let the sigmas of rows or of a smoothed log allow for the sizes of levels (n, 3) with these 1-sigmas."""
+    if sigma.any():
+        axes, lines = spread(found.state, list(_shifts(level, sigma)))
+        found.sigma[:, :3] = np.sqrt(found.sigma[:, :3] ** 2 + axes)
+        found.los_sigma[:, :3] = np.sqrt(found.los_sigma[:, :3] ** 2 + lines)
+
+
+def _shifts(level: FloatArray, sigma: FloatArray) -> Iterator[Shift]:
+    """What is taken out of readings, from the offsets and their 1-sigmas (n, 3)."""
+    for c in np.flatnonzero(level.any(0)):
+        edges = np.flatnonzero(np.diff(sigma[:, c])) + 1
+        for low, high in itertools.pairwise([0, *edges.tolist(), len(sigma)]):
+            if sigma[low, c] > 0:
+                yield Shift(int(c), low, high, float(sigma[low, c]))

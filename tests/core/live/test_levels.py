@@ -1,0 +1,86 @@
+"""Readings that jump beside a live track: bridged while they are off, and as they come when they are back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ftproc.core.editing.two_pass import Known
+from ftproc.core.live.editor import LiveEditor
+from ftproc.records import GOOD, PATCH
+from tests import drone
+
+NOISE = (0.5, 3e-4, 3e-4)  # m, rad, rad
+TIME_S = np.arange(0, 60, 0.05)
+AUTOMATIC = Known(np.full(3, np.nan), None, 4.0)
+NEARLY = 0.97  # of the rows, within 5 sigma: where a manoeuvre begins a few are not
+
+
+def flown(change=None, lag_s=0.0, keep=None):
+    """Errors in sigmas (n,), the largest of the axes, and labels (n, 4) of a flight; change: what is done to its
+    readings. keep: which of its rows there are."""
+    log, position = drone.read(drone.CRUISER, drone.FAR, TIME_S, NOISE, 5)
+    time_s, z = log.time_s, log.measurement.copy()
+    if change is not None:
+        change(time_s, z)
+    rows = slice(None) if keep is None else keep(time_s)
+    editor = LiveEditor(AUTOMATIC, lag_s)
+    out = [*editor.push(time_s[rows], z[rows]), *editor.finish()]
+    state, sigma = (np.concatenate([each.rows[name] for each in out]) for name in ("state", "sigma"))
+    off = np.abs(state[:, :3] - position[rows]) / sigma[:, :3]
+    return time_s[rows], off.max(1), np.concatenate([each.label for each in out])
+
+
+def jump(component, sigmas, begin_s, end_s=np.inf):
+    def change(time_s, z):
+        z[(time_s >= begin_s) & (time_s < end_s), component] += sigmas * NOISE[component]
+
+    return change
+
+
+@pytest.mark.parametrize("lag_s", [0.0, 1.0])
+@pytest.mark.parametrize(("component", "sigmas"), [(0, 30.0), (1, -20.0), (2, 25.0)])
+def test_a_step_that_stays_is_bridged(component, sigmas, lag_s):
+    time_s, off, label = flown(jump(component, sigmas, 30.0), lag_s)
+    after = time_s > 30.5
+    assert (off[after] < 5).mean() > NEARLY
+    assert (label[after, component] == PATCH).mean() > 0.99
+    assert (label[:, [c for c in range(3) if c != component]] == GOOD).mean() > 0.9
+
+
+@pytest.mark.parametrize("component", [0, 1, 2])
+def test_after_a_patch_with_an_offset_readings_count_again(component):
+    time_s, off, label = flown(jump(component, 25.0, 30.0, 38.0))
+    assert (off[time_s > 30] < 5).mean() > NEARLY
+    assert (label[(time_s > 30.5) & (time_s < 38), component] == PATCH).mean() > 0.99
+    assert (label[time_s > 38.5, component] == GOOD).mean() > 0.98
+
+
+def test_another_target_is_left_together():
+    def change(time_s, z):
+        for c in range(3):
+            jump(c, 30.0 + c, 30.0, 40.0)(time_s, z)
+
+    time_s, off, label = flown(change)
+    assert (off[time_s > 30] < 5).mean() > NEARLY
+    assert (label[time_s > 40.5, :3] == GOOD).mean() > 0.98
+
+
+def test_where_a_track_has_followed_a_patch_the_return_is_no_jump():
+    def change(time_s, z):
+        rows = (time_s >= 30) & (time_s < 30.8)
+        z[rows, 1] += 25 * NOISE[1] * (time_s[rows] - 30) / 0.8
+
+    time_s, off, label = flown(change)
+    assert (off[time_s > 32] < 5).mean() > NEARLY
+    assert (label[time_s > 32, 1] == GOOD).mean() > 0.98
+
+
+def test_a_track_that_begins_on_a_patch_returns():
+    time_s, off, _ = flown(jump(1, 25.0, 0.0, 3.0))
+    assert (off[time_s > 6] < 5).mean() > NEARLY
+
+
+def test_clean_flights_have_no_levels():
+    _, _, label = flown()
+    assert (label[:, :3] == PATCH).mean() < 0.01
