@@ -56,7 +56,7 @@ _KINDS: dict[str, Any] = {
         live.Live, order.Order, order.Left, order._Copy, growing.Lines, forms.Form, forms.Json, forms.Nmea,
         forms.Cycle, plots.Plots,
         editor.LiveEditor, window.Window, recursive.GatedWindow, recursive.Gating, whole.Whole, doubt.Doubt,
-        pace.Pace, pace.Clock, pieces.Sizes, readings.Columns, kept.Kept, readings.Labels,
+        pace.Pace, pace.Clock, pieces.Sizes, readings.Columns, kept.Kept, pieces.Flown, readings.Labels,
         readings.Repeats, rows.Waiting, rows.Published, records.Model, records.Start, smoother.SmootherRun,
         two_pass.Known, track.Track, gate.GateSettings, by_hand.Accepted, motion.Motion, beside.Rates,
         heights.Prior, times.Times, times.Pause, turning.Second, turning.Turning, correction.LiveCorrection,

@@ -190,6 +190,7 @@ class LiveEditor:
         """After a gap that may be too long to bridge, all of the window is edited as soon as a track can begin."""
         if time_s - window.time_s[-1] > self.pace.longest_s:
             self.next_edit = min(self.next_edit, self.count + FEWEST_READINGS + 1)
+            window.expect_gap(time_s)
 
     def _next_turn(self, window: Window) -> int:
         """How many rows there are when there is something to do again."""

@@ -33,6 +33,27 @@ class Sizes(NamedTuple):
         return CROWDED * max(self.near, CROWD)
 
 
+class Flown(NamedTuple):
+    """How hard the target has manoeuvred so far: the largest density (3,) of its jerk."""
+
+    jerk: FloatArray = np.zeros(3)
+
+    def with_pieces(self, model: Model, count: int) -> Flown:
+        """With the first pieces of a profile."""
+        return Flown(np.maximum(self.jerk, model.jerk[:count].max(0, initial=0.0)))
+
+    def unseen(self, model: Model, time_s: FloatArray) -> Model:
+        """The model with a profile over samples at these times (n,): in pieces that lie in a gap, of which nothing
+        tells, the target may manoeuvre as hard as ever; a filter bridges it with the piece in which it ends."""
+        if not math.isfinite(model.knot_s):
+            return model
+        model = stretched(model, float(time_s[-1] - time_s[0]))
+        empty = np.ones(len(model.jerk), bool)
+        empty[np.minimum((time_s - time_s[0] + 1e-9) / model.knot_s, len(empty) - 1).astype(int)] = False
+        empty[1:] |= empty[:-1]
+        return model._replace(jerk=np.where(empty[:, None], np.maximum(model.jerk, self.jerk), model.jerk))
+
+
 def predicted(filters: Any) -> Start:
     """A filter's state as the start of what follows."""
     return Start(0, filters["x"][0, :9].copy(), filters["p"][0, :9, :9].copy())

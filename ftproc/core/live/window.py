@@ -26,7 +26,7 @@ from ftproc.core.live.kept import Kept
 from ftproc.core.live.newest import levels
 from ftproc.core.live.newest.deciding import decided
 from ftproc.core.live.newest.readmission import KEPT, Open
-from ftproc.core.live.pieces import BLOCK, Sizes, filtered, later, piece, predicted, stretched
+from ftproc.core.live.pieces import BLOCK, Flown, Sizes, filtered, later, piece, predicted, stretched
 from ftproc.core.live.predictive_chain import OPEN, chains_of
 from ftproc.core.live.readings import Labels, Repeats, labelled, typical, used_lately
 from ftproc.core.live.turning import Case, Turning
@@ -52,7 +52,7 @@ class Window:
         stand_ins: tuple[int, ...] = (),
     ) -> None:  # fmt: skip
         self.known, self.sizes, self.stand_ins, self.near = known, sizes, stand_ins, 0
-        self.repeats, self.labels = Repeats(), Labels()
+        self.repeats, self.labels, self.flown = Repeats(), Labels(), Flown()
         self.next_times, self.next_late = np.ones(3), np.zeros(3)  # how the noise of the next readings differs
         # Samples of re-acquisition; how many left before their lag, are kept no more, came before the track's start.
         self.reacquired, self.left, self.forgotten, self.begun = list[int](), 0, 0, -1
@@ -198,6 +198,11 @@ class Window:
         kept["label"][n:] = self.labels.add(used, self.came[n:])
         self._bar(stuck)
 
+    def expect_gap(self, next_s: float) -> None:
+        """The next reading comes after a gap."""
+        if self.known.jerk_psd is None:
+            self.allowed = self.flown.unseen(self.allowed, np.append(self.time_s[self.near :], next_s))
+
     def _take(self, time_s: FloatArray, measurement: FloatArray) -> list[tuple[IntArray, int]]:
         """Keep the next readings, undecided where they may be good at all: no target is at the station, or behind it,
         and none stands still to the last digit. Samples and component of the readings that were repeated so."""
@@ -269,7 +274,7 @@ class Window:
     def _with_allowance(self, log: Observations, scales: Scales) -> Model:
         if self.known.jerk_psd is not None:
             return self.model
-        return with_allowance(log, self.model, scales)
+        return self.flown.unseen(with_allowance(log, self.model, scales), log.time_s)
 
     def _slide(self) -> None:
         """Move the newest part on, by whole pieces of its jerk profile, unless that leaves it far too long."""
@@ -288,5 +293,6 @@ class Window:
         self._filtered(log, Span(0, len(log.time_s), 0), self.allowed, filters)
         self.anchor, self.near = predicted(filters), ahead
         passed = piece(float(times[ahead]) - first_s, self.model)
+        self.flown = self.flown.with_pieces(self.model, passed)
         self.model = self.model._replace(jerk=later(self.model.jerk, passed))
         self.turning.passed(passed)

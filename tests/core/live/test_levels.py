@@ -7,6 +7,7 @@ import pytest
 
 from ftproc.core.editing.two_pass import Known
 from ftproc.core.live.editor import LiveEditor
+from ftproc.core.model.frames import from_cartesian
 from ftproc.records import GOOD, PATCH
 from tests import drone
 
@@ -84,3 +85,20 @@ def test_a_track_that_begins_on_a_patch_returns():
 def test_clean_flights_have_no_levels():
     _, _, label = flown()
     assert (label[:, :3] == PATCH).mean() < 0.01
+
+
+def test_after_a_gap_sigmas_allow_for_a_manoeuvre_in_it():
+    """The target pushes and brakes by turns, and the gap begins when it has done neither for a while."""
+    time_s = np.arange(0, 80, 0.05)
+    push = 3.0 * np.sign(np.sin(2 * np.pi * time_s / 26.0)) * (np.abs(np.sin(2 * np.pi * time_s / 26.0)) > 0.2)
+    along = np.cumsum(np.cumsum(push) * 0.05) * 0.05
+    position = np.array([1500.0, 900.0, 300.0]) + along[:, None] * np.array([0.8, 0.6, 0.1])
+    rng = np.random.default_rng(4)
+    z = from_cartesian(position) + rng.normal(size=position.shape) * (2.0, 2e-4, 2e-4)
+    rows = (time_s < 64) | (time_s > 69)
+    editor = LiveEditor(AUTOMATIC)
+    out = [*editor.push(time_s[rows], z[rows]), *editor.finish()]
+    state, sigma = (np.concatenate([each.rows[name] for each in out]) for name in ("state", "sigma"))
+    off = np.abs(state[:, :3] - position[rows]) / sigma[:, :3]
+    after = (time_s[rows] > 69) & (time_s[rows] < 70)
+    assert off[after].max() < 5
