@@ -118,6 +118,9 @@ def _directory(output: str, several: bool) -> str | None:
     path = Path(output)
     if ANY in path.name and layout.ending(path, (*layout.TABLES, *layout.MAPS)):
         return None
+    endings = ", ".join((*layout.TABLES, *layout.MAPS))
+    if ANY in path.name and not path.is_dir():
+        raise UsageError(f"-o {output}: end the name in {endings}, or give a directory, which ends in /.")
     if output != "-" and (output.endswith("/") or path.is_dir()):
         return output
     if output == "-" or layout.table_kind(path) or layout.map_kind(path):
@@ -125,9 +128,7 @@ def _directory(output: str, several: bool) -> str | None:
             raise UsageError(f"-o {output}: there are several trajectories to write; name a directory.")
         return None
     if path.suffix and not several:
-        raise UsageError(
-            f"-o {output}: end the name in {', '.join((*layout.TABLES, *layout.MAPS))}, or in / if it is a directory."
-        )
+        raise UsageError(f"-o {output}: end the name in {endings}, or in / if it is a directory.")
     return output
 
 

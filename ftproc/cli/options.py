@@ -47,9 +47,9 @@ def noise_or_auto(text: Any) -> Noise | None:
         return None
     parts = str(text).split(",")
     values = _triple(",".join("1" if _is_auto(part) else part for part in parts))
-    if values is None or min(values) < 0:
+    if values is None:
         raise click.BadParameter(f'"{text}" is not {_NOISE_FORM}.')
-    if min(values) == 0:
+    if min(values) <= 0:
         raise click.BadParameter(f'"{text}": a sigma of zero means readings without error; give a larger one.')
     first, second, third = (None if _is_auto(part) else value for part, value in zip(parts, values, strict=True))
     return first, second, third

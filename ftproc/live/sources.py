@@ -64,7 +64,7 @@ def opened(source: str) -> Iterator[Source]:
 def _address(source: str) -> tuple[str, tuple[str, int]]:
     try:
         parts = urlsplit(source)
-        if parts.port is not None and not parts.path.strip("/") and not parts.query:
+        if parts.port and not parts.path.strip("/") and not parts.query:
             return parts.scheme, (parts.hostname or "", parts.port)
     except ValueError:
         pass

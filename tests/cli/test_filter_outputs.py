@@ -66,6 +66,7 @@ def test_several_logs(here):
     [
         (["a.csv", "b.csv"], "c.csv", "-o c.csv: there are several trajectories to write; name a directory"),
         (["a.csv", "b.csv"], "-", "-o -: there are several"),
+        (["a.csv", "b.csv"], "d/*", "-o d/*: end the name in .csv,"),
         (["a.csv", "-"], "d", "- stands for one log on standard input"),
         (
             ["a.csv"],

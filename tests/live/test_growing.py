@@ -158,6 +158,7 @@ def test_many_lines_are_taken_some_at_a_time():
         ("s3://bucket/a.csv", "--follow reads a file of this machine, udp://HOST:PORT, tcp://HOST:PORT, or - for"),
         ("udp://127.0.0.1", "this is no address; expected such as udp://0.0.0.0:5000 or tcp://10.0.0.7:5000."),
         ("tcp://127.0.0.1:99999", "this is no address"),
+        ("tcp://:0", "this is no address"),
         ("udp://192.0.2.1:5000", "cannot be listened to"),
         ("udp://no.such.host.invalid:5000", "there is no such host"),
     ],
