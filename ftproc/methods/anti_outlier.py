@@ -14,13 +14,11 @@ import contextlib
 import itertools
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 
 from ftproc.core import impact, threads
 from ftproc.core.editing import two_pass
-from ftproc.core.editing.lasting.faults import Shift, spread
 from ftproc.core.filtering import forward
 from ftproc.core.filtering.beside import WIDTH
 from ftproc.core.filtering.initialization import WIDEST_BLIND_BRIDGE, find_starts
@@ -29,20 +27,15 @@ from ftproc.core.filtering.smoother import PATHS, STATES, SmootherRun, likelihoo
 from ftproc.core.identification import likelihood, motion_models
 from ftproc.core.identification.motion_models import Chosen
 from ftproc.core.identification.profile import ALLOWANCE, fit_profile, median_level, with_allowance
-from ftproc.core.model import kinematics
-from ftproc.core.model.frames import line_of_sight_axes
 from ftproc.methods import bridging, live, preparing, range_rates
 from ftproc.methods.bridging import Bridged
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
+from ftproc.methods.widening import reaching, widened, worse_of
 from ftproc.order_statistics import median
 from ftproc.records import ISOLATED, PATCH, FloatArray
 from ftproc.settings import FilterSettings
 
-Run = TypeVar("Run", FilterRun, SmootherRun)
-
 LONGEST_WHOLE = 60_000  # samples of a log that is edited as a whole
-HALFWAY = 0.5  # of the distance to where another understanding puts the target is added to the sigmas
-APART, BESIDE = 0.1, 0.5  # of the largest such distance, from which tracks part; and of the rows that are nearby then
 KEPT = 30_000  # samples of a segment, without its margins,
 KEPT_MARGINS = 12  # or so many times its margin
 MOST_PIECES = 20  # of a track: what is re-initialized so often shows no motion (two targets in turn: 115)
@@ -98,14 +91,15 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     motion, (run, smoothed, left) = _followed(motion, white, wanted)
     for other in _as_likely(edited, known, run):
         filtered, other_smoothed, _ = _with_motion(motion, other, wanted)
-        run = _worse_of(run, filtered)
-        smoothed = smoothed and other_smoothed and _worse_of(smoothed, other_smoothed)
+        run = worse_of(run, filtered)
+        smoothed = smoothed and other_smoothed and worse_of(smoothed, other_smoothed)
     rows = 1 + int(np.flatnonzero(edited.weight.any(1))[-1])
-    for away in _elsewhere(edited, others, settings.jerk_psd_m2ps5 is not None):
-        run, smoothed = _reaching(run, away, rows), smoothed and _reaching(smoothed, away, rows)
+    fixed = settings.jerk_psd_m2ps5 is not None
+    for away in (*_elsewhere(edited, others, fixed), *_by_rival(motion, smoothed)):
+        run, smoothed = reaching(run, away, rows), smoothed and reaching(smoothed, away, rows)
     run, smoothed = over.filtered(run), smoothed and over.smoothed(smoothed)
     if shifts := edited.faults.shifts:
-        run, smoothed = _widened(run, shifts), smoothed and _widened(smoothed, shifts)
+        run, smoothed = widened(run, shifts), smoothed and widened(smoothed, shifts)
     could_be = hindsight = None
     if smoothed is not None and not settings.smooth:
         if usual is None:  # else it is of one segment
@@ -198,40 +192,12 @@ def _elsewhere(edited: two_pass.Edited, others: Sequence[Observations], fixed: b
             yield np.where(np.isfinite(away), away, 0.0)
 
 
-def _reaching(run: Run, away: FloatArray, rows: int) -> Run:
-    """A run with sigmas that reach HALFWAY to where another understanding puts the target, away (n, 9) from it. rows:
-    up to the last reading; what follows is extrapolated."""
-    from scipy.ndimage import maximum_filter1d
-
-    far = np.linalg.norm(away[:rows, :3], axis=1)
-    width = 1 + int(BESIDE * (far > APART * far.max()).sum())
-
-    def reach(of: FloatArray) -> FloatArray:
-        nearby = maximum_filter1d(np.abs(of[:rows]), width, axis=0)
-        return HALFWAY * np.concatenate([nearby, np.abs(of[rows:])])
-
-    sigma, los_sigma = np.hypot(run.sigma, reach(away)), run.los_sigma.copy()
-    sight = line_of_sight_axes(run.state[:, :3])
-    for lines in (slice(0, 3), slice(3, 6)):
-        along = np.einsum("kij,kj->ki", sight, away[:, lines])
-        los_sigma[:, lines] = np.hypot(los_sigma[:, lines], reach(along))
-    path_sigma = kinematics.widened(run.state, run.path_sigma, run.sigma, sigma)
-    return run._replace(sigma=sigma, los_sigma=los_sigma, path_sigma=path_sigma)
-
-
-def _worse_of(run: Run, other: Run) -> Run:
-    """A run with sigmas that are the larger of its own and of another's."""
-    names = ("sigma", "los_sigma", "path_sigma")
-    return run._replace(**{name: np.maximum(getattr(run, name), getattr(other, name)) for name in names})
-
-
-def _widened(run: Run, shifts: Sequence[Shift]) -> Run:
-    """A run with sigmas that allow for the uncertain sizes of the shifts that were taken out of its readings."""
-    sigma, los_sigma = run.sigma.copy(), run.los_sigma.copy()
-    along_axes, along_lines = spread(run.state, shifts)
-    sigma[:, :3] = np.sqrt(sigma[:, :3] ** 2 + along_axes)
-    los_sigma[:, :3] = np.sqrt(los_sigma[:, :3] ** 2 + along_lines)
-    return run._replace(sigma=sigma, los_sigma=los_sigma)
+def _by_rival(motion: Chosen, smoothed: SmootherRun | None) -> Iterator[FloatArray]:
+    """(n, 9) how far away from a smoothed track that by another motion is which explains the log about as well."""
+    rival = motion.rival
+    if rival is not None and smoothed is not None:
+        away = rival.of_rows(smooth_log(rival.log, rival.model, rival.starts, STATES)).state - smoothed.state
+        yield np.where(np.isfinite(away), away, 0.0)
 
 
 def usual_of(record: Recording, settings: FilterSettings) -> Model | None:

@@ -34,6 +34,7 @@ NOTHING = np.zeros(3, bool)
 STEPS = 3  # of the search for a profile
 MARGIN = 8.0  # in log-likelihood, by which a model must explain a log better than white jerk does: with less, the luck
 # of a single flight decides which is the better one
+CLOSE = 2 * MARGIN  # with less, white jerk is as good as another model, or that as good as white jerk
 FARTHEST_TURN = 0.2  # rad, over which the motion goes on in one step
 MOST_STEPS = 100  # in a gap
 LIFT, SHARE = 0.5, 0.3  # gravities of lift, and the share of a flight with less of it, that may be ballistic
@@ -45,7 +46,7 @@ class Chosen(NamedTuple):
 
     name: in MODELS. model: with the profile that was fitted, and, of an orbit, the noise. gain: by how much more likely
     the log is than with white jerk, in log-likelihood. log, starts: those to run over, with steps in the gaps. row:
-    (n,) where the log's own samples are among these.
+    (n,) where the log's own samples are among these. rival: another motion that explains the log about as well.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Chosen(NamedTuple):
     log: Observations
     starts: list[Start]
     row: IntArray | None = None
+    rival: Chosen | None = None
 
     def share(self, of: float) -> Chosen:
         """What such a share of the samples has of the gain."""
@@ -62,7 +64,8 @@ class Chosen(NamedTuple):
     def with_beside(self, scalars: Scalars) -> Chosen:
         """The same with these scalars of the log's own samples in place of its own."""
         spread = scalars if self.row is None else scalars.spread(self.row, len(self.log.time_s))
-        return self._replace(log=self.log._replace(beside=(spread,)))
+        rival = None if self.rival is None else self.rival.with_beside(scalars)
+        return self._replace(log=self.log._replace(beside=(spread,)), rival=rival)
 
     def of_rows(self, run: Run) -> Run:
         """A run over the log with its steps, of the log's own samples."""
@@ -90,9 +93,12 @@ def choose(
         return Chosen(WHITE, white, 0.0, log, starts)
     fitted, short, course = _fitted(log, starts, white, others, known)
     best = max(fitted, key=lambda each: _finite(each.gain))
+    other = Chosen(WHITE, white, best.gain, log, starts)
     if best.gain > MARGIN or WHITE not in names:
-        return _about_its_track(best, log, short, course, white)
-    return Chosen(WHITE, white, best.gain, log, starts)
+        found = _about_its_track(best, log, short, course, white)
+        return found._replace(rival=other if WHITE in names and best.gain < CLOSE else None)
+    rival = _about_its_track(best, log, short, course, white, again=False) if best.gain > 0 else None
+    return other._replace(rival=rival)
 
 
 def _fitted(
@@ -126,12 +132,14 @@ def _fitted(
     return found, short.log, course
 
 
-def _about_its_track(found: Chosen, log: Observations, short: Observations, course: FloatArray, white: Model) -> Chosen:
+def _about_its_track(
+    found: Chosen, log: Observations, short: Observations, course: FloatArray, white: Model, again: bool = True
+) -> Chosen:
     """A motion that was fitted to a short log along a course (m, 9), linearised about the track of the log that it is
-    for."""
+    for; again: and about the track that follows."""
     track = course if found.log is short else smooth_log(found.log, white, found.starts).state
     model = found.model._replace(motion=found.model.motion.about(track))
-    if short is log:  # else the samples are far closer than the motion is followed
+    if short is log and again:  # else the samples are far closer than the motion is followed
         track = smooth_log(found.log, model, found.starts).state
         model = model._replace(motion=model.motion.about(track))
     return found._replace(model=model)

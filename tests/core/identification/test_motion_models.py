@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from ftproc import pipeline
-from ftproc.core.filtering.records import Uneven
+from ftproc.core.filtering.initialization import find_starts
+from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import smooth_log
 from ftproc.core.identification import motion_models
 from ftproc.core.identification.motion_models import MODELS, WHITE, choose, with_steps
 from ftproc.core.identification.profile import fit_profile, with_allowance
+from ftproc.core.model.motion import isotropic
 from ftproc.methods import preparing
 from ftproc.settings import AUTO, MOTIONS, FilterSettings
 from ftproc.simulation import simulate
@@ -23,6 +25,7 @@ from tests.trust import hard
 pytestmark = pytest.mark.compiled
 
 SMOOTH = FilterSettings(smooth=True)
+MOTIONS_TRIED = (WHITE, "turning-force")
 
 
 def errors(flight, **settings):
@@ -72,6 +75,38 @@ def test_a_flight_of_white_jerk_stays_one(seed):
     assert found.model is model
     assert found.log is log
     assert found.row is None
+
+
+def test_a_motion_that_is_about_as_likely_is_a_rival(monkeypatch):
+    """The one that is not chosen, whichever that is."""
+    log = simulate("manoeuvre-clean", seed=1).log
+    a = Observations(log.time_s[:600], log.measurement[:600], np.ones((600, 3)))
+    noise = np.array([5.0, 2e-4, 2e-4]) ** 2
+    white = Model(noise, isotropic(100.0))
+    starts = find_starts(a, noise, 100.0)
+    white = with_allowance(a, fit_profile(a, starts, white, 3))
+    names = (WHITE, "turning-force")
+    assert choose(a, starts, white, names).rival is None  # far likelier
+    monkeypatch.setattr(motion_models, "CLOSE", np.inf)
+    found = choose(a, starts, white, names)
+    assert (found.name, found.rival.name) == ("turning-force", WHITE)
+    monkeypatch.setattr(motion_models, "MARGIN", np.inf)
+    found = choose(a, starts, white, names)
+    assert (found.name, found.rival.name) == (WHITE, "turning-force")
+    assert choose(a, starts, white, ("turning-force",)).rival is None
+
+
+def test_sigmas_allow_for_a_rival(monkeypatch):
+    """They reach half the way to where it puts the target, where that is far."""
+    flight = simulate("manoeuvre-clean", seed=1)
+    (alone, turns), sigma = (pipeline.filter_log(flight.log, replace(SMOOTH, motion=m)) for m in MOTIONS_TRIED), []
+    for margin in (motion_models.MARGIN, np.inf):
+        monkeypatch.setattr(motion_models, "MARGIN", margin)
+        monkeypatch.setattr(motion_models, "CLOSE", 2 * margin)
+        sigma.append(pipeline.filter_log(flight.log, SMOOTH).sigma[:, :3])
+    far = np.abs(alone.state[:, :3] - turns.state[:, :3])
+    assert (sigma[1] >= np.hypot(alone.sigma[:, :3], 0.4 * far)).mean() > 0.95
+    assert (sigma[1] > sigma[0]).mean() > 0.9
 
 
 def test_a_single_name_is_taken():
