@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import Observations, Uneven, empty_rows
 from ftproc.core.live.beside import WIDTH, Rates
@@ -32,13 +33,15 @@ class Kept(Columns):
         """(n, 4) readings as they came, with the range rates."""
         return np.column_stack([_moved(self["measurement"], self["level"]), self["rate"]])
 
-    def take(self, measurement: FloatArray, **new: Any) -> None:
-        """Add samples, with readings (n, 3) whose levels are those of the newest sample."""
+    def take(self, measurement: FloatArray, accepted: NDArray[np.bool_], **new: Any) -> None:
+        """Add samples, with readings (n, 3) whose levels are those of the newest sample, up to one that is good by hand
+        (n, 3)."""
         n = len(measurement)
         level, sigma = (self[name][-1].copy() if len(self) else np.zeros(3) for name in ("level", "level_sigma"))
-        levels_of = np.tile(level, (n, 1))
+        holds = ~np.logical_or.accumulate(accepted)
+        level = level * holds
         self.append(
-            measurement=_moved(measurement, -levels_of), level=levels_of, level_sigma=np.tile(sigma, (n, 1)),
+            measurement=_moved(measurement, -level), level=level, level_sigma=sigma * holds,
             weight=np.zeros((n, 3)), label=np.zeros((n, WIDTH)), rows=empty_rows(n), **new,
         )  # fmt: skip
 

@@ -211,7 +211,7 @@ class Window:
         accepted, possible = self.known.accepted.of(time_s, measurement), np.isfinite(measurement)
         possible[:, 0] &= measurement[:, 0] > 0
         self.kept.take(
-            measurement, time_s=time_s, possible=possible, times=np.tile(self.next_times, (m, 1)),
+            measurement, accepted, time_s=time_s, possible=possible, times=np.tile(self.next_times, (m, 1)),
             late=np.tile(self.next_late, (m, 1)), rate=rate[:, 0], rate_weight=np.full(m, RATE_OPEN),
         )  # fmt: skip
         moving = measurement.copy()

@@ -7,6 +7,7 @@ import pytest
 
 from ftproc.core.editing.two_pass import Known
 from ftproc.core.live.editor import LiveEditor
+from ftproc.core.live.kept import Kept
 from ftproc.core.model.frames import from_cartesian
 from ftproc.records import GOOD, PATCH
 from tests import drone
@@ -55,6 +56,38 @@ def test_after_a_patch_with_an_offset_readings_count_again(component):
     assert (off[time_s > 30] < 5).mean() > NEARLY
     assert (label[(time_s > 30.5) & (time_s < 38), component] == PATCH).mean() > 0.99
     assert (label[time_s > 38.5, component] == GOOD).mean() > 0.98
+
+
+def test_patches_that_follow_each_other_are_left_one_by_one():
+    """Those that are over stay bridged by what they were off."""
+
+    def change(time_s, z):
+        jump(1, 25.0, 30.0, 32.0)(time_s, z)
+        jump(1, -40.0, 33.0, 35.0)(time_s, z)
+        jump(1, 60.0, 36.0, 37.0)(time_s, z)
+
+    time_s, off, label = flown(change)
+    assert (off[time_s > 30] < 5).mean() > NEARLY
+    assert (label[time_s > 37.5, 1] == GOOD).mean() > 0.98
+
+
+def test_a_reading_that_is_good_by_hand_is_as_it_came():
+    """And those that follow."""
+    kept = Kept.nothing()
+    kept.take(np.ones((2, 3)), np.zeros((2, 3), bool), **of(2))
+    kept["level"][-1], kept["level_sigma"][-1] = (0.1, 0.2, 0.3), 0.01
+    by_hand = np.zeros((3, 3), bool)
+    by_hand[1, 1] = True
+    kept.take(np.ones((3, 3)), by_hand, **of(3))
+    np.testing.assert_allclose(kept["measurement"][2:], [[0.9, 0.8, 0.7], [0.9, 1.0, 0.7], [0.9, 1.0, 0.7]])
+    np.testing.assert_allclose(kept.came[2:, :3], 1.0)
+
+
+def of(n):
+    """What else is kept of n samples."""
+    none = np.zeros(n)
+    names = ("possible", "times", "late")
+    return {name: np.ones((n, 3)) for name in names} | {"time_s": none, "rate": none, "rate_weight": none}
 
 
 def test_another_target_is_left_together():

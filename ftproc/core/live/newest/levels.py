@@ -50,10 +50,7 @@ def likeliest(case: Open) -> tuple[Open, float] | None:
             back = run[np.abs(off + case.level[-1, c]) <= within]
             if len(back) >= BACK:
                 tried.append(_back(case, c, back))
-            jumped = np.flatnonzero(case.level[:, c] * (case.log.weight[:, c] > 0))
-            if case.level[0, c] == 0 and len(jumped):
-                _, now = _with_jump(case, case.log.measurement + case.level, c, jumped)
-                tried += [(other, likely - now) for other, likely in _without(case, c, jumped, run)]
+            tried += _was_a_patch(case, c, run)
         if len(run) >= JUMPED:
             away = np.abs(off - median(off))
             together = run[away <= max(patch_likelihood.OFF_CURVE * sigma, 2.5 * median(away))]
@@ -71,10 +68,17 @@ def _with_others(case: Open, other: Open) -> Open:
     """Where readings of a component are back, those of others are that have jumped with them, as another target has."""
     back = (case.level[-1] != 0) & (other.level[-1] == 0)
     for c, d in itertools.product(np.flatnonzero(back), np.flatnonzero(other.level[-1] != 0)):
-        if ((case.level[:, c] != 0) == (case.level[:, d] != 0)).all():
+        if _begin(case, int(c)) == _begin(case, int(d)):
             since = int(np.flatnonzero(other.log.weight[:, c] > case.log.weight[:, c])[0])
-            other = _off_the_track(other, int(d), np.arange(since, len(case.level)), abs(float(case.level[-1, d])))
+            run = since + np.flatnonzero(case.possible[since:, d])
+            other = _off_the_track(other, int(d), run, abs(float(case.level[-1, d]))) if len(run) else other
     return other
+
+
+def _begin(case: Open, c: int) -> int:
+    """The first sample of the stretch in which the newest reading of a component lies, where that has a level."""
+    none = np.flatnonzero(case.level[:, c] == 0)
+    return int(none[-1]) + 1 if len(none) else 0
 
 
 def _over(
@@ -113,16 +117,15 @@ def _off_the_track(case: Open, c: int, run: IntArray, drift: float) -> Open:
     """The readings of a run are back, and what has jumped before does not count; the track may have drifted by so much
     with it."""
     level, sigma, possible = case.level.copy(), case.level_sigma.copy(), case.possible.copy()
-    off = level[:, c] != 0
-    off[run[0] :] = False
-    level[:, c] = sigma[:, c] = 0.0
-    possible[off, c] = False
+    begin, since = _begin(case, c), int(run[0])
+    level[begin:, c] = sigma[begin:, c] = 0.0
+    possible[begin:since, c] = False
     back = _levelled(case, run, c, level, sigma)._replace(possible=possible)
-    back.log.weight[off, c] = 0.0
-    if case.level[0, c] == 0:
+    back.log.weight[begin:since, c] = 0.0
+    if begin > 0:
         return back
     time_s = case.log.time_s
-    return back._replace(start=_widened(case.start, c, drift, 1 / max(time_s[run[0]] - time_s[0], 1e-300)))
+    return back._replace(start=_widened(case.start, c, drift, 1 / max(time_s[since] - time_s[0], 1e-300)))
 
 
 def _with_jump(case: Open, measurement: FloatArray, c: int, run: IntArray) -> tuple[Fitted, float]:
@@ -146,11 +149,22 @@ def _back(case: Open, c: int, run: IntArray) -> tuple[Open, float]:
     likely = said.log_likelihood - score * level - 0.5 * information * level**2
     likely += 0.5 * left**2 / (information + 1 / variance) - 0.5 * math.log1p(information * variance)
     gain = likely + _rejections(case, log) - log_probability(case, case.log.weight)
-    levels, sigma = case.level.copy(), case.level_sigma.copy()
-    levels[levels[:, c] != 0, c] -= left / (information + 1 / variance)
+    levels, sigma, begin = case.level.copy(), case.level_sigma.copy(), _begin(case, c)
+    levels[begin:, c] -= left / (information + 1 / variance)
     levels[run[0] :, c] = sigma[run[0] :, c] = 0.0
-    start = case.start if case.level[0, c] == 0 else _widened(case.start, c, math.sqrt(variance))
+    start = case.start if begin > 0 else _widened(case.start, c, math.sqrt(variance))
     return _levelled(case, run, c, levels, sigma)._replace(start=start), gain
+
+
+def _was_a_patch(case: Open, c: int, run: IntArray) -> Iterator[tuple[Open, float]]:
+    """The readings that have jumped were a patch with more than an offset."""
+    begin = _begin(case, c)
+    jumped = begin + np.flatnonzero(case.log.weight[begin:, c] > 0)
+    if begin > 0 and len(jumped):
+        raw = case.log.measurement.copy()
+        raw[begin:, c] += case.level[begin:, c]
+        _, now = _with_jump(case, raw, c, jumped)
+        yield from ((other, likely - now) for other, likely in _without(case, c, jumped, run))
 
 
 def _without(case: Open, c: int, off: IntArray, run: IntArray) -> Iterator[tuple[Open, float]]:
@@ -158,7 +172,8 @@ def _without(case: Open, c: int, off: IntArray, run: IntArray) -> Iterator[tuple
     likely that is."""
     possible, level, sigma = case.possible.copy(), case.level.copy(), case.level_sigma.copy()
     possible[off, c] = False
-    level[:, c] = sigma[:, c] = 0.0
+    begin = _begin(case, c)
+    level[begin:, c] = sigma[begin:, c] = 0.0
     none = _levelled(case, run[:0], c, level, sigma)
     weight = none.log.weight.copy()
     weight[off, c] = 0.0
