@@ -50,7 +50,7 @@ def noise_or_auto(text: Any) -> Noise | None:
     if values is None:
         raise click.BadParameter(f'"{text}" is not {_NOISE_FORM}.')
     if min(values) <= 0:
-        raise click.BadParameter(f'"{text}": sigmas are above zero; a sigma of zero means readings without error.')
+        raise click.BadParameter(f'"{text}": a sigma of zero means readings without error; sigmas are above zero.')
     first, second, third = (None if _is_auto(part) else value for part, value in zip(parts, values, strict=True))
     return first, second, third
 

@@ -13,7 +13,7 @@ from ftproc.records import GOOD, PATCH
 from tests import drone
 
 NOISE = (0.5, 3e-4, 3e-4)  # m, rad, rad
-TIME_S = np.arange(0, 60, 0.05)
+TIME_S = np.arange(0, 48, 0.05)
 AUTOMATIC = Known(np.full(3, np.nan), None, 4.0)
 NEARLY = 0.97  # of the rows, within 5 sigma: where a manoeuvre begins a few are not
 
@@ -40,8 +40,7 @@ def jump(component, sigmas, begin_s, end_s=np.inf):
     return change
 
 
-@pytest.mark.parametrize("lag_s", [0.0, 1.0])
-@pytest.mark.parametrize(("component", "sigmas"), [(0, 30.0), (1, -20.0), (2, 25.0)])
+@pytest.mark.parametrize(("component", "sigmas", "lag_s"), [(0, 30.0, 0.0), (1, -20.0, 1.0), (2, 25.0, 0.0)])
 def test_a_step_that_stays_is_bridged(component, sigmas, lag_s):
     time_s, off, label = flown(jump(component, sigmas, 30.0), lag_s)
     after = time_s > 30.5
@@ -50,7 +49,7 @@ def test_a_step_that_stays_is_bridged(component, sigmas, lag_s):
     assert (label[:, [c for c in range(3) if c != component]] == GOOD).mean() > 0.9
 
 
-@pytest.mark.parametrize("component", [0, 1, 2])
+@pytest.mark.parametrize("component", [0, 1])
 def test_after_a_patch_with_an_offset_readings_count_again(component):
     time_s, off, label = flown(jump(component, 25.0, 30.0, 38.0))
     assert (off[time_s > 30] < 5).mean() > NEARLY

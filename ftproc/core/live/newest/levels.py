@@ -30,6 +30,7 @@ LIKELIER = 3.0  # and the margin, by which a jump must be likelier than that the
 WELL = 3.0  # sigmas of the noise, as 1-sigma of a jump that is taken out
 NEARLY = 0.5  # of what the readings were off, within which they are back
 JUMPED, BACK = 4, 2  # readings in a row that show it
+FASTEST = 1e3  # 1/s, of the growth of an offset
 SHORTEST, LONGER = 8, math.sqrt(2)  # readings of an earlier patch that is tried, and times as many in the next
 
 
@@ -141,18 +142,18 @@ def _with_jump(case: Open, measurement: FloatArray, c: int, run: IntArray) -> tu
 def _back(case: Open, c: int, run: IntArray) -> tuple[Open, float]:
     """Nothing is to be taken out of the readings of a run any more; which tells what was to be before."""
     log, n = case.log._replace(weight=_used(case, run, c)), len(case.log.time_s)
-    level, variance = float(case.level[-1, c]), float(case.level_sigma[-1, c]) ** 2
+    level, variance = case.level[-1, c], case.level_sigma[-1, c] ** 2
     curve = Curve(c, int(run[0]), n, (0.0,))
     said = said_of(log, case.model, [case.start], columns_of([curve], Setting(log.time_s, np.zeros((n, 3)))))
-    score, information = float(said.score[0]), float(said.information[0, 0])
+    score, information = said.score[0], said.information[0, 0]
     left = score + information * level  # by which the offset is less than the level, within its sigma
     likely = said.log_likelihood - score * level - 0.5 * information * level**2
-    likely += 0.5 * left**2 / (information + 1 / variance) - 0.5 * math.log1p(information * variance)
+    likely += 0.5 * left**2 / (information + 1 / variance) - 0.5 * np.log1p(information * variance)
     gain = likely + _rejections(case, log) - log_probability(case, case.log.weight)
     levels, sigma, begin = case.level.copy(), case.level_sigma.copy(), _begin(case, c)
     levels[begin:, c] -= left / (information + 1 / variance)
     levels[run[0] :, c] = sigma[run[0] :, c] = 0.0
-    start = case.start if begin > 0 else _widened(case.start, c, math.sqrt(variance))
+    start = case.start if begin > 0 else _widened(case.start, c, float(np.sqrt(variance)))
     return _levelled(case, run, c, levels, sigma)._replace(start=start), gain
 
 
@@ -224,7 +225,7 @@ def _widened(start: Start, c: int, sigma: float, rate: float = 0.0) -> Start:
     length = (1.0, float(np.hypot(x[0], x[1])), float(np.linalg.norm(x[:3])))[c]
     moves = line_of_sight_axes(x[None, :3])[0, c] * length * sigma
     covariance[:3, :3] += np.outer(moves, moves)
-    covariance[3:6, 3:6] += np.outer(moves, moves) * rate**2
+    covariance[3:6, 3:6] += np.outer(moves, moves) * min(rate, FASTEST) ** 2
     return start._replace(covariance=covariance)
 
 
