@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ftproc.core.editing.lasting.faults import Shift, spread
+from ftproc.core.editing.lasting.faults import Shift, allowing
 from ftproc.core.filtering.records import FilterRun
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.model import kinematics
@@ -49,8 +49,5 @@ def worse_of(run: Run, other: Run) -> Run:
 
 def widened(run: Run, shifts: Sequence[Shift]) -> Run:
     """A run with sigmas that allow for the uncertain sizes of the shifts that were taken out of its readings."""
-    sigma, los_sigma = run.sigma.copy(), run.los_sigma.copy()
-    along_axes, along_lines = spread(run.state, shifts)
-    sigma[:, :3] = np.sqrt(sigma[:, :3] ** 2 + along_axes)
-    los_sigma[:, :3] = np.sqrt(los_sigma[:, :3] ** 2 + along_lines)
+    sigma, los_sigma = allowing(run.state, run.sigma, run.los_sigma, shifts)
     return run._replace(sigma=sigma, los_sigma=los_sigma)

@@ -69,7 +69,7 @@ class GatedWindow(Window):
         super()._adopt(found, samples)
         if self.track is None:
             rows, label = super().shown(0, len(self))
-            self.gated, self.gated_labels = Columns(rows=rows, label=label, used=self.kept["weight"]), Labels()
+            self.gated, self.gated_labels = Columns(rows=rows, label=label), Labels()
             self.gated_labels.reset(self.kept["weight"], self.measurement)
             self.track, self.second = Track(0, self.filters.copy(), gate.gate_of(self.how)), Second()
             self.second.filters = self.filters.copy()
@@ -115,7 +115,7 @@ class GatedWindow(Window):
         new = rows[n - low :]
         kept = np.where(new["weight"] > gate.rejection_weight(self.how.gate), 1.0, 0.0)
         label = self.gated_labels.add(kept, measurement)
-        self.gated.append(rows=new, used=kept, label=np.column_stack([label, np.full(len(label), 3.0)]))
+        self.gated.append(rows=new, label=np.column_stack([label, np.full(len(label), 3.0)]))
         self.reacquired += [low + start.sample for start in recursion.starts]
 
     def _mix(self, log: Observations, starts: list[Start], first: int, rows: Any) -> None:

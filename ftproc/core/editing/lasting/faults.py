@@ -214,6 +214,18 @@ def spread(state: FloatArray, shifts: Sequence[Shift]) -> tuple[FloatArray, Floa
     return axes, lines
 
 
+def allowing(
+    state: FloatArray, sigma: FloatArray, los_sigma: FloatArray, shifts: Sequence[Shift]
+) -> tuple[FloatArray, FloatArray]:
+    """Sigmas (n, 9) of states (n, 9), and (n, 6) along the lines of sight, that allow for the uncertain sizes of
+    shifts."""
+    along_axes, along_lines = spread(state, shifts)
+    sigma, los_sigma = sigma.copy(), los_sigma.copy()
+    sigma[:, :3] = np.sqrt(sigma[:, :3] ** 2 + along_axes)
+    los_sigma[:, :3] = np.sqrt(los_sigma[:, :3] ** 2 + along_lines)
+    return sigma, los_sigma
+
+
 def others(
     read: Observations, possible: NDArray[np.bool_], model: Model, setting: Setting, steps: Sequence[Step],
     rivals: Sequence[Rival], first: FloatArray,

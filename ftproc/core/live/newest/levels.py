@@ -16,7 +16,7 @@ import numpy as np
 
 from ftproc.core.editing import patch_likelihood
 from ftproc.core.editing.lasting.curves import Curve, Fitted, Setting, columns_of, fitted
-from ftproc.core.editing.lasting.faults import Shift, spread
+from ftproc.core.editing.lasting.faults import Shift, allowing
 from ftproc.core.filtering.columns import said_of
 from ftproc.core.filtering.records import Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
@@ -27,8 +27,8 @@ from ftproc.records import FloatArray, IntArray
 
 LIKELIER = 3.0  # and the margin, by which a jump must be likelier than that the track has followed a patch: steps are
 # by 10 and more, where walks off the track end up to 6
-WELL = 3.0  # sigmas of the noise, as 1-sigma of a jump that is taken out
-NEARLY = 0.5  # of what the readings were off, within which they are back
+WELL = 3.0  # sigmas of the noise, as 1-sigma of a jump that is taken out (tracks that followed a patch: up to 286)
+NEARLY = 0.5  # of what the readings were off, within which they are back (another target that moves: 5.9 to 2.0 m)
 JUMPED, BACK = 4, 2  # readings in a row that show it
 FASTEST = 1e3  # 1/s, of the growth of an offset
 SHORTEST, LONGER = 8, math.sqrt(2)  # readings of an earlier patch that is tried, and times as many in the next
@@ -232,9 +232,8 @@ def _widened(start: Start, c: int, sigma: float, rate: float = 0.0) -> Start:
 def widen(found: Any, level: FloatArray, sigma: FloatArray) -> None:
     """Let the sigmas of rows or of a smoothed log allow for the sizes of levels (n, 3) with these 1-sigmas."""
     if sigma.any():
-        axes, lines = spread(found.state, list(_shifts(level, sigma)))
-        found.sigma[:, :3] = np.sqrt(found.sigma[:, :3] ** 2 + axes)
-        found.los_sigma[:, :3] = np.sqrt(found.los_sigma[:, :3] ** 2 + lines)
+        shifts = list(_shifts(level, sigma))
+        found.sigma[:], found.los_sigma[:] = allowing(found.state, found.sigma, found.los_sigma, shifts)
 
 
 def _shifts(level: FloatArray, sigma: FloatArray) -> Iterator[Shift]:
