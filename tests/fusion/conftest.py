@@ -12,7 +12,7 @@ from tests.cli.conftest import run
 
 __all__ = ["run"]
 
-SEED, DURATION_S = 2, 60.0
+SEED, DURATION_S = 2, 40.0
 
 
 @pytest.fixture(scope="session")

@@ -48,7 +48,7 @@ def with_rates(simulated, sigma, seed=0, **changed):
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
-    simulated = simulate_range("range-radar", seed=3, duration_s=60.0)
+    simulated = simulate_range("range-radar", seed=3, duration_s=40.0)
     found = fused(simulated, tmp_path_factory.mktemp("plain"))
     return simulated, found, errors(simulated, found)[0]
 

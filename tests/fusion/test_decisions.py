@@ -20,7 +20,7 @@ def stations(folder: Path) -> list[str]:
 def test_stations_are_named_and_each_line_has_its_effect(folder, run):
     one, other = stations(folder)[:2]
     Path("d.csv").write_text(
-        f"component,from_s,to_s,use,station\nazimuth,10,12,bad,{one}\nelevation,20,20.5,good,{other}\n"
+        f"component,from_s,to_s,use,station\nazimuth,10,12,bad,{one}\nelevation,15,15.5,good,{other}\n"
     )
     result = run("filter", "--fuse", "range.toml", "--smooth", "--decisions", "d.csv", "--write-decisions", "e.csv",
                  "-o", "a.parquet")  # fmt: skip
@@ -67,6 +67,8 @@ def test_a_fused_run_that_is_not_consistent_says_what_to_do_next(folder, run):
     table = pq.read_table(log).to_pandas() if log.suffix == ".parquet" else pd.read_csv(log)
     table.loc[table.time_s.between(10, 30), table.columns[2]] += 0.3
     table.to_parquet(log) if log.suffix == ".parquet" else table.to_csv(log, index=False)
+    other = pd.read_csv("theodolite3.csv")
+    other[~other.time_s.between(6, 20)].to_csv("theodolite3.csv", index=False)
     result = run("filter", "--fuse", "range.toml", "-o", "a.parquet")
     found = json.loads(pq.read_schema("a.parquet").metadata[b"ftproc"])["summary"]
     assert found["trust"]["verdict"] != "consistent"

@@ -39,7 +39,7 @@ def test_a_scan_beside_a_jump_has_no_wider_cells_in_a_longer_flight(width, n):
 
 
 def test_a_jump_that_is_none_asks_for_no_process_noise_of_its_own(tmp_path, monkeypatch):
-    ranges.write(simulate_range("range-theodolites", 1, 60.0), str(tmp_path / "range"), None)
+    ranges.write(simulate_range("range-theodolites", 1, 40.0), str(tmp_path / "range"), None)
     fit_jerk, jump, fits, jumps = weighing.fit_jerk, search._at, list[object](), list[object]()
     monkeypatch.setattr(weighing, "fit_jerk", lambda *of: fits.append(0) or fit_jerk(*of))
     monkeypatch.setattr(search, "_at", lambda *of: jumps.append(0) or jump(*of))

@@ -19,7 +19,7 @@ SILENT = 1e-9
 @pytest.fixture(scope="module")
 def stations(tmp_path_factory):
     folder = tmp_path_factory.mktemp("three")
-    ranges.write(simulate_range("range-theodolites", 1, 120.0), str(folder), None)
+    ranges.write(simulate_range("range-theodolites", 1, 60.0), str(folder), None)
     range_ = range_file.load(str(folder / "range.toml"))
     return logs.as_seen(range_.instruments, logs.read(range_)[1])[0]
 
@@ -33,7 +33,7 @@ def at_once(stations):
     return fused(stations)
 
 
-def in_parts(monkeypatch, most=1500, beside=400):
+def in_parts(monkeypatch, most=750, beside=200):
     monkeypatch.setattr(whole, "MOST", most)
     monkeypatch.setattr(whole, "BESIDE", beside)
 
@@ -66,7 +66,7 @@ def test_stretches_give_what_the_whole_gives(stations, at_once, monkeypatch, smo
 
 
 def test_a_station_may_be_silent_for_a_whole_stretch(stations, monkeypatch):
-    some = [stations[0], *(cut(each, 60.0) for each in stations[1:])]
+    some = [stations[0], *(cut(each, 30.0) for each in stations[1:])]
     in_parts(monkeypatch)
     found = fused(some)
     assert [len(each) for each in found.weight] == [len(each.time_s) for each in some]
@@ -92,7 +92,7 @@ def test_a_stretch_without_a_first_track_joins_its_neighbour(stations, monkeypat
     monkeypatch.setattr(flight_faults, "fuse", fails_once)
     found = fused(stations)
     assert failed
-    assert max(sizes) > 1500 + 2 * 400
+    assert max(sizes) > 750 + 2 * 200
     assert all(np.isfinite(each).all() for each in found.position)
     monkeypatch.setattr(flight_faults, "fuse", fails_always)
     with pytest.raises(engine.Alone):
@@ -108,8 +108,8 @@ def test_what_other_stretches_have_said_narrows_the_biases(stations):
         return flight_faults.fuse(part, FilterSettings().gate, None, ("white-jerk",), known, lambda number: None)
 
     nothing = Likelihood.nothing(PARAMETERS * len(stations))
-    first, alone = half(nothing, 0.0, 60.0), half(nothing, 60.0, 121.0)
-    second = half(engine.likelihood(first), 60.0, 121.0)
+    first, alone = half(nothing, 0.0, 30.0), half(nothing, 30.0, 61.0)
+    second = half(engine.likelihood(first), 30.0, 61.0)
     ratio = second.constants.sigma / np.maximum(alone.constants.sigma, SILENT)
     assert ratio.max() < 1.02
     assert np.median(ratio[np.stack([each.prior for each in stations]) > 0]) < 0.9
