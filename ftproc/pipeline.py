@@ -46,7 +46,10 @@ class Filtering:
     """One log on its way through the filter: `parts` yields its trajectory in parts; `metadata` is valid for all of it,
     and known after the last part. Errors as in `filter_log`."""
 
-    def __init__(self, log: MeasurementLog, settings: FilterSettings, model: Model | None) -> None:
+    def __init__(
+        self, log: MeasurementLog, settings: FilterSettings, model: Model | None, before: Filtering | None = None
+    ) -> None:
+        """before: the same log filtered with other settings. What it was edited to holds if only smoothing differs."""
         self.log, self.settings, self.model = log, settings, model
         self.method = registry.named(settings.method)
         sanity.check_settings(settings)
@@ -58,6 +61,8 @@ class Filtering:
         self.at_once = simultaneous.of(self.record) if settings.editing == "two-pass" else None
         if self.at_once is not None:
             self.record = self.at_once.of_stamps(self.record)
+        if before is not None and replace(settings, smooth=before.settings.smooth) == before.settings:
+            self.record = replace(self.record, edited=before.record.edited)
         self.statistics = RunStatistics(log, self.record.absent, self.height)
         self.why_not = ""  # nothing is corrected
         self.live: LiveCorrection | None = None  # of the rows so far, if each is corrected by what is known by it
@@ -73,6 +78,8 @@ class Filtering:
                 return
             except ValueError as cause:
                 raise sanity.no_start(self.log, cause) from cause
+            if len(part.estimate.label) == len(self.record):
+                self.record = replace(self.record, edited=part.estimate.edited)
             yield self._trajectory(part if self.at_once is None else self.at_once.of_rows(part))
 
     @cached_property

@@ -44,7 +44,7 @@ def _tried(filtering: Filtering, step: Step) -> int | None:
     """The verdict with a step, as its index in LEVELS; None if it cannot be had."""
     settings = filtering.settings if step.settings is None else step.settings
     try:
-        other = Filtering(filtering.log, replace(settings), filtering.model if step.model else None)
+        other = Filtering(filtering.log, replace(settings), filtering.model if step.model else None, filtering)
         for _ in other.parts():
             pass
         return LEVELS.index(level_of(other.metadata["summary"]["trust"]))

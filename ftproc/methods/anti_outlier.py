@@ -65,7 +65,7 @@ def parts(record: Recording, settings: FilterSettings) -> Iterator[Part]:
 def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | None = None) -> Estimate:
     """Two-pass editing. usual: of a segment, what is usual in the log, see `core.editing.two_pass`."""
     known = preparing.what_is_known(readings, settings)
-    edited = two_pass.edit(readings.time_s, readings.measurement, known, usual)
+    found = edited = readings.edited or two_pass.edit(readings.time_s, readings.measurement, known, usual)
     specified = np.isfinite(known.sigma)
     log, model, channel = edited.log, edited.model, None
     if readings.range_rate is not None:
@@ -113,6 +113,7 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         alternative=decision.alternative,
         faults=edited.faults, motion=motion, smoothed_sigma_m=could_be, hindsight=hindsight,
         range_rate=channel and channel.filtered(left), last=_last_of(motion, smoothed or run),
+        edited=found if usual is None else None,
     )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from ftproc.records import FlagArray, FloatArray, IntArray, forget
 
 if TYPE_CHECKING:
     from ftproc.core.beside import Channel
+    from ftproc.core.editing.two_pass import Edited
 
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: stands in for a component that is missing throughout
 Run = TypeVar("Run", FilterRun, SmootherRun)
@@ -34,7 +35,7 @@ class Readings(NamedTuple):
     components' noise cannot be had from the log, with what is assumed for it: (3,) 1-sigma m, rad, rad, NaN where
     the log tells; the times of the readings of each component that are accepted by hand; and how the noise of single
     readings is known to differ, if it is. range_rate: (n,) m/s, NaN where missing, if there are such, and the interval
-    in which they are ambiguous, zero if they are not."""
+    in which they are ambiguous, zero if they are not. edited: the same, if they have been edited before."""
 
     time_s: FloatArray
     measurement: FloatArray
@@ -43,6 +44,7 @@ class Readings(NamedTuple):
     uneven: Uneven | None = None
     range_rate: FloatArray | None = None
     rate_interval_mps: float = 0.0
+    edited: Edited | None = None
 
     def unedited(self) -> Observations:
         """The log with every reading used."""
@@ -59,7 +61,7 @@ class Recording:
 
     time_s: (n,). measurement: (n, 3). assumed_sigma: as in `Readings`. absent: components that are missing throughout.
     rejected: (n, 3) readings that are not to be used, if there are any. accepted, uneven, range_rate,
-    rate_interval_mps: as in `Readings`.
+    rate_interval_mps, edited (all of it): as in `Readings`.
     """
 
     time_s: FloatArray
@@ -71,6 +73,7 @@ class Recording:
     uneven: Uneven | None = None
     range_rate: FloatArray | None = None
     rate_interval_mps: float = 0.0
+    edited: Edited | None = None
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -96,7 +99,7 @@ class Recording:
 
     def whole(self) -> Readings:
         """The readings of all of it."""
-        return self.part(slice(0, len(self)))
+        return self.part(slice(0, len(self)))._replace(edited=self.edited)
 
 
 class Estimate(NamedTuple):
@@ -114,7 +117,7 @@ class Estimate(NamedTuple):
     estimate, where live editing has none of some; absent: the components that it has not seen. smoothed_sigma_m: the
     median 1-sigma of the position that the smoother would have, where it is known and was not asked for, and
     hindsight: (n, 9) its states. range_rate: what is known of the range rates, see `methods.range_rates`. last: state
-    and covariance after the last sample, of a ballistic motion.
+    and covariance after the last sample, of a ballistic motion. edited: what two-pass editing left.
     """
 
     run: FilterRun
@@ -137,6 +140,7 @@ class Estimate(NamedTuple):
     hindsight: FloatArray | None = None
     range_rate: Channel | None = None
     last: Start | None = None
+    edited: Edited | None = None
 
     @property
     def smoothed_run(self) -> FilterRun:

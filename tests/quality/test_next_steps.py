@@ -10,6 +10,7 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.batch import trying
+from ftproc.core.editing import two_pass
 from ftproc.files.reading import logs
 from ftproc.long_records import joined
 from ftproc.quality import next_steps, summary
@@ -144,6 +145,27 @@ def test_nothing_is_said_of_a_consistent_run_and_nothing_tried_in_a_long_log(mon
     monkeypatch.setattr(trying, "MOST_ROWS", 100)
     bad, _ = found(flight(6).log, replace(SMOOTH, jerk_psd_m2ps5=1e-4))
     assert {each["outcome"] for each in trying.steps(bad, bad.metadata["summary"], str)} == {None}
+
+
+def test_a_log_is_edited_once_to_be_smoothed_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    edited, edit = list[int](), two_pass.edit
+
+    def counted(time_s: np.ndarray, *of: object) -> two_pass.Edited:
+        edited.append(len(time_s))
+        return edit(time_s, *of)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(two_pass, "edit", counted)
+    log = flight(12, "isolated=0.4:20-300").log
+    filtering, _ = found(log, FilterSettings())
+    steps = [step for step in filtering.next_steps if step.settings is not None]
+    assert [step.advice for step in steps] == ["add --smooth"]
+    after = pipeline.Filtering(log, replace(steps[0].settings), None, filtering)
+    again = joined(list(after.parts()))
+    assert len(edited) == 1
+    fresh, state = found(log, SMOOTH)
+    np.testing.assert_array_equal(again.state[:, :3], state)
+    assert after.metadata["summary"] == fresh.metadata["summary"]
+    assert pipeline.Filtering(log, replace(SMOOTH, gate=5.0), None, filtering).record.edited is None
 
 
 def test_what_would_be_better_is_what_the_smoother_publishes() -> None:
