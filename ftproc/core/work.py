@@ -12,14 +12,23 @@ SEVERAL = 5  # times as much of several stations, in all: 2,000 events on either
 
 class Work:
     """What a search in a log of so many samples may still cost, in all hypotheses about it: `left`. passed: hypotheses
-    that no work was left for."""
+    that no work was left for. apart: the same of a search of its own, so that enough is left for the rest."""
 
-    def __init__(self, samples: int, at_least: int = WORK, each: int = WORK_PER_SAMPLE) -> None:
+    def __init__(
+        self, samples: int, at_least: int = WORK, each: int = WORK_PER_SAMPLE, apart: Work | None = None
+    ) -> None:
         """at_least: how much work any log is worth; a window that moves on is worth none."""
-        self.left, self.of_window, self.passed = at_least + each * samples, at_least == 0, 0
+        self.left, self.of_window, self.passed, self.apart = at_least + each * samples, at_least == 0, 0, apart
+
+    @property
+    def passed_in_all(self) -> int:
+        """Hypotheses that no work was left for, those apart among them."""
+        return self.passed + (0 if self.apart is None else self.apart.passed)
 
 
 def for_lasting_faults(samples: int, stations: int = 1) -> Work:
-    """What the search for faults that last and the reassessment of rejected runs may cost; several stations share
-    it."""
-    return Work(samples, LASTING if stations == 1 else SEVERAL * LASTING, LASTING_PER_SAMPLE)
+    """What the search for faults that last and the reassessment of rejected runs may cost, and apart from it that for
+    patches that were followed in one station; several share it."""
+    if stations > 1:
+        return Work(samples, SEVERAL * LASTING, LASTING_PER_SAMPLE)
+    return Work(samples, LASTING, LASTING_PER_SAMPLE, Work(samples, LASTING, LASTING_PER_SAMPLE))

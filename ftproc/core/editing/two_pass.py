@@ -132,7 +132,7 @@ def edit(
         decision, open_ = reassess_rejected(record, decision, for_lasting)
         rivals = [*rivals, *open_]
     decision = decision._replace(
-        weight=np.where(accepted, 1.0, decision.weight), unexamined=decision.unexamined + for_lasting.passed
+        weight=np.where(accepted, 1.0, decision.weight), unexamined=decision.unexamined + for_lasting.passed_in_all
     )
     if segment_of is None and not short:
         decision = allow_for_colour(record, decision)

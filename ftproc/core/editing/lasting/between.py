@@ -25,7 +25,6 @@ from ftproc.core.editing.lasting.scanned import FOLLOWED, MOST_EACH, Scanned, in
 from ftproc.core.editing.lasting.screen import leaves_curves, may_leave_curves
 from ftproc.core.editing.lasting.weighing import TAKEN_IN, Found, Scene, Weighed, weighed
 from ftproc.core.identification.stretches import runs_of
-from ftproc.core.work import for_lasting_faults
 from ftproc.records import FloatArray
 
 TERMS, PER_TERM = (5, 2, 8, 12, 22), 4  # of a curve, and samples for each at least
@@ -147,8 +146,8 @@ def likeliest_followed(seen: Scanned) -> Found | None:
     """The likeliest patch between two rejected runs, or jumps, of one station, if it is likelier than these alone."""
     if len(seen.scene.rates) > 1:
         return None
-    found, n, work = list[Found](), seen.samples, for_lasting_faults(seen.samples)  # so that enough is left for jumps
-    scene, tried = seen.scene._replace(work=work), list[list[list[Curve]]]()
+    found, n, work = list[Found](), seen.samples, seen.scene.work
+    scene, tried = seen.scene._replace(work=work and work.apart), list[list[list[Curve]]]()
 
     @functools.cache
     def without(begin: int, end: int, taken_in: bool) -> Weighed:

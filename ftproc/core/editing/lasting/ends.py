@@ -10,13 +10,12 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.proposals import Channels, LocatedJump, proposals
-from ftproc.core.editing.lasting.scanned import Scanned, in_whole, weighed_on
+from ftproc.core.editing.lasting.scanned import End, Scanned, in_whole, weighed_on
 from ftproc.core.editing.lasting.weighing import TAKEN_IN, Found, Scene, Weighed
 from ftproc.core.identification.profile import median_level
 from ftproc.core.identification.stretches import runs_of
@@ -25,28 +24,22 @@ from ftproc.records import FloatArray
 TERMS = (1, 2, 3)  # of what a part of the log sees of a long curve
 
 
-class End(NamedTuple):
-    """What a jump alone is. short: the likeliest short patch that begins or ends there, None if no fault is
-    likelier. odds: in log-probability, of it, or of a patch that is rejected there, to an end of a long fault."""
-
-    short: Found | None
-    odds: float
-
-
 def around(seen: Scanned, sample: int) -> slice:
     """The part of the log on which a jump is weighed alone."""
     return seen.near(max(sample - seen.around, 0), min(sample + seen.around, seen.samples))
 
 
-def by_itself(seen: Scanned, channels: Channels, sample: int, one_end: float) -> End:
-    """What a jump of some channels, or of one of them, is alone. one_end: log-odds of a long fault that has it as
-    an end."""
-    with contextlib.suppress(ValueError, np.linalg.LinAlgError):  # the part does not tell
-        return _by_itself(seen, channels, sample, one_end)
-    return End(None, -math.inf)
+def by_itself(seen: Scanned, channels: Channels, sample: int) -> End:
+    """What a jump of some channels, or of one of them, is alone: found out once."""
+    key = tuple(channels), sample
+    if key not in seen.ends:
+        seen.ends[key] = End(None, -math.inf)
+        with contextlib.suppress(ValueError, np.linalg.LinAlgError):  # the part does not tell
+            seen.ends[key] = _by_itself(seen, channels, sample)
+    return seen.ends[key]
 
 
-def _by_itself(seen: Scanned, channels: Channels, sample: int, one_end: float) -> End:
+def _by_itself(seen: Scanned, channels: Channels, sample: int) -> End:
     n, near = seen.samples, around(seen, sample)
     part, null = seen.scene.part(near), weighed_on(seen.scene.part(near), near, ())
     sides = (sample, n), (0, sample)  # by one term they are the same
@@ -62,7 +55,7 @@ def _by_itself(seen: Scanned, channels: Channels, sample: int, one_end: float) -
     if short is None and not _is_rejected(part, channels, sample - near.start, seen.width, null.weight):
         return End(None, -math.inf)
     gain = 0.0 if short is None else short.gain
-    return End(short, gain - (step.log_probability - null.log_probability + one_end))
+    return End(short, gain - (step.log_probability - null.log_probability))
 
 
 def instead_of(seen: Scanned, found: Found) -> list[Found] | None:
@@ -77,10 +70,10 @@ def instead_of(seen: Scanned, found: Found) -> list[Found] | None:
     one_end = seen.prior(curves) / len(edges)
     beyond = seen.prior([Curve(curves[0].component, 1, n - 1, ())]) - one_end
     channels = [(curve.component, curve.station) for curve in curves]
-    ends = [by_itself(seen, channels, edge, one_end) for edge in edges]
-    if sum(max(end.odds, beyond) for end in ends) <= 0:
+    ends = [by_itself(seen, channels, edge) for edge in edges]
+    if sum(max(end.odds(one_end), beyond) for end in ends) <= 0:
         return None
-    return [end.short for end in ends if end.short is not None and end.odds > beyond] or None
+    return [end.short for end in ends if end.short is not None and end.odds(one_end) > beyond] or None
 
 
 def _short(seen: Scanned, channels: Channels, near: slice, sample: int, step: Weighed) -> Iterator[list[Curve]]:

@@ -13,7 +13,7 @@ from ftproc.core.editing.lasting import clock, scan
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.proposals import CELLS, LONGEST, cell_of
 from ftproc.core.editing.lasting.scan import Jump
-from ftproc.core.editing.lasting.weighing import TAKEN_IN, Scene, Weighed, weighed
+from ftproc.core.editing.lasting.weighing import TAKEN_IN, Found, Scene, Weighed, weighed
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.identification.stretches import runs_of
@@ -33,10 +33,24 @@ MOST_EACH = 20.0  # of log-probability, of each reading: where more is gained, t
 FOLLOWED = 25.0  # the same of a patch that motion explains but for its ends: turns gain 18 without one
 
 
+class End(NamedTuple):
+    """What a jump alone is. short: the likeliest short patch that begins or ends there, None if no fault is
+    likelier. gain: in log-probability, of it, or of a patch that is rejected there, beyond that of a step, as an end of
+    a long fault is one."""
+
+    short: Found | None
+    gain: float
+
+    def odds(self, one_end: float) -> float:
+        """In log-probability, to an end of a long fault. one_end: log-odds of such a fault that has it as an end."""
+        return self.gain - one_end
+
+
 class Scanned(NamedTuple):
     """A scene that was scanned for jumps; the samples on each side of what is weighed, those within which its jumps
     are known, the jumps, and the samples in a cell of a scan beside one. longest: share of the log that is off at most.
-    left: jumps, of those that were looked at, which the process noise of the part around them leaves."""
+    left: jumps, of those that were looked at, which the process noise of the part around them leaves. runs: see
+    `_runs`. ends: what jumps of channels before a sample are alone, of those that were looked at so, see `ends`."""
 
     scene: Scene
     around: int
@@ -46,6 +60,7 @@ class Scanned(NamedTuple):
     longest: float
     left: list[Jump]
     runs: FloatArray
+    ends: dict[tuple[tuple[tuple[int, int], ...], int], End]
 
     @property
     def samples(self) -> int:
@@ -94,9 +109,8 @@ def scanned(scene: Scene) -> Scanned:
             for s, c in channels
         ]
         between = np.stack(gain).reshape(len(scene.rates), CLOCK + 1, -1)
-        return Scanned(
-            scene, AROUND[1], width, scan.jumps_between(between, edges, LEAST_GAIN, TOGETHER), cell, LONGEST, [], runs
-        )
+        jumps = scan.jumps_between(between, edges, LEAST_GAIN, TOGETHER)
+        return Scanned(scene, AROUND[1], width, jumps, cell, LONGEST, [], runs, {})
     found = []
     for each in (log, scene.log) if (log.weight != scene.log.weight).any() else (log,):
         smoothed = smooth_log(each, scene.at_median, scene.starts(each), RESIDUALS)
@@ -106,7 +120,7 @@ def scanned(scene: Scene) -> Scanned:
     found += scan.beside_runs(scene.log.weight, scene.possible, off, LEAST_OFF)[:JUMPS]
     found += clock.gaps(scene.setting, JUMPS)
     longest = LONGEST if memory > REMEMBERED else SHORT
-    return Scanned(scene, around, width, scan.distinct(found), width, longest, [], runs)
+    return Scanned(scene, around, width, scan.distinct(found), width, longest, [], runs, {})
 
 
 def _runs(scene: Scene) -> FloatArray:

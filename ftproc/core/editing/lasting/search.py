@@ -178,8 +178,8 @@ def _at(seen: Scanned, jump: Jump) -> Found | None:
     ends = [edge for curves in proposed for edge in (curves[0].begin, curves[0].end) if 0 < edge < n]
     whole, alone = seen.near(min(ends), max(ends)), around(seen, located.sample)
     if whole.stop - whole.start > alone.stop - alone.start:
-        end = by_itself(seen, located.channels, located.sample, seen.prior(in_whole(step, near, n)))
-        if end.short is not None and end.odds > OPEN:
+        end = by_itself(seen, located.channels, located.sample)
+        if end.short is not None and end.odds(seen.prior(in_whole(step, near, n))) > OPEN:
             return end.short
     best = _best(seen, proposed, whole, located)
     short = None if best is None else instead_of(seen, best)

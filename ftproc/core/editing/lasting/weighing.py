@@ -150,7 +150,8 @@ def weighed(scene: Scene, weight: FloatArray, curves: Sequence[Curve]) -> Weighe
         known = found.curves
         starts = scene.starts(found.log)
         if not scene.fixed:
-            model = fit_profile(found.log, starts, fit_jerk(found.log, starts, scene.at_median), PROFILE_STEPS)
+            level = fit_jerk(found.log, starts, scene.at_median)
+            model = fit_profile(found.log, starts, level, PROFILE_STEPS)
         smoothed = smooth_log(found.log, model, starts, RESIDUALS)
         before, weight = weight, _decided(scene, smoothed, model)
         settled = bool((weight == before).all())
@@ -159,19 +160,23 @@ def weighed(scene: Scene, weight: FloatArray, curves: Sequence[Curve]) -> Weighe
     if curves or not settled:
         found = _fitted(scene, scene.log._replace(weight=weight), model, known)
         smoothed = smooth_log(found.log, model, scene.starts(found.log), RESIDUALS)
-    likely = found.log_probability if curves else smoothed.log_likelihood
-    likely += _rejections(scene, weight, smoothed, model) - roughness(model)
-    first = np.cumsum([0, *(len(curve.size) for curve in found.curves)])[:-1]
-    sigma = np.sqrt(np.diag(found.covariance))[first] if curves else np.zeros(0)
-    return Weighed(found.curves, tuple(sigma.tolist()), weight, model, likely)
+    return _understood(scene, found, smoothed, weight, model)
 
 
 def as_it_is(scene: Scene, weight: FloatArray, model: Model) -> Weighed:
     """The scene without curves, with these weights (n, 3) and by this model."""
-    log = scene.log._replace(weight=weight)
-    smoothed = smooth_log(log, model, scene.starts(log), RESIDUALS)
-    likely = smoothed.log_likelihood + _rejections(scene, weight, smoothed, model) - roughness(model)
-    return Weighed((), (), weight, model, likely)
+    found = _fitted(scene, scene.log._replace(weight=weight), model, ())
+    smoothed = smooth_log(found.log, model, scene.starts(found.log), RESIDUALS)
+    return _understood(scene, found, smoothed, weight, model)
+
+
+def _understood(scene: Scene, found: Fitted, smoothed: SmootherRun, weight: FloatArray, model: Model) -> Weighed:
+    """The scene with fitted curves, weights (n, 3) and a model, and what is smoothed with them."""
+    likely = found.log_probability if found.curves else smoothed.log_likelihood
+    likely += _rejections(scene, weight, smoothed, model) - roughness(model)
+    first = np.cumsum([0, *(len(curve.size) for curve in found.curves)])[:-1]
+    sigma = np.sqrt(np.diag(found.covariance))[first] if found.curves else np.zeros(0)
+    return Weighed(found.curves, tuple(sigma.tolist()), weight, model, likely)
 
 
 def late_of(log: Observations, state: FloatArray) -> FloatArray:
