@@ -31,4 +31,4 @@ def for_lasting_faults(samples: int, stations: int = 1) -> Work:
     patches that were followed in one station; several share it."""
     if stations > 1:
         return Work(samples, SEVERAL * LASTING, LASTING_PER_SAMPLE)
-    return Work(samples, LASTING, LASTING_PER_SAMPLE, Work(samples, LASTING, LASTING_PER_SAMPLE))
+    return Work(samples, LASTING, LASTING_PER_SAMPLE, Work(samples, LASTING, 2 * LASTING_PER_SAMPLE))

@@ -23,7 +23,7 @@ from ftproc.simulation import list_scenarios, parse_instrument, simulate
 from ftproc.simulation.ranges import RANGES, simulate_range
 from tests import drone
 from tests.bench import instruments
-from tests.trust import faulty_logs
+from tests.trust import faulty_logs, hard
 
 SEEDS = (300, 301)
 LONGEST_S = 240.0
@@ -31,6 +31,7 @@ LONGEST_S = 240.0
 DRONES = {"1": (0.02, 3e-5, 3e-5), "0.5": (0.005, 1e-5, 1e-5), "0.2": (0.002, 1e-5, 1e-5)}
 #: Seconds between the ranges of an instrument, and from each to the angles that belong to it.
 APART = {"5": 0.006, "0.5": 0.001}
+WAVES = ("sine/36", "sine/42", "sine/54")  # patches of hard flights that go to and fro
 HELD_S = 1200.0  # of an aircraft that holds, at 10 Hz
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 
@@ -57,9 +58,10 @@ def names() -> list[str]:
     slow = [f"drone/{dt_s}/{seed}" for dt_s in DRONES for seed in SEEDS]
     slow += [f"apart/{dt_s}/{seed}" for dt_s in APART for seed in SEEDS]
     slow += [f"holding/0.1/{seed}" for seed in SEEDS]
+    waves = [f"hard/{what}" for what in WAVES]
     fused = [f"range/{name}/{seed}" for name in RANGES for seed in SEEDS]
     samples = [f"sample/{path.name}/0" for path in sorted(SAMPLES.iterdir()) if _is_log(path)]
-    return [*samples, "range/sample/0", *scenarios, *effects, *faults, *slow, *fused]
+    return [*samples, "range/sample/0", *scenarios, *effects, *faults, *waves, *slow, *fused]
 
 
 def _is_log(path: Path) -> bool:
@@ -104,6 +106,11 @@ def _fault(what: str, seed: int, room: Path) -> Seen:
     return Seen(found.log, found.truth.time_s, found.truth.position_m)
 
 
+def _hard(what: str, seed: int, room: Path) -> Seen:
+    found = hard.make(what, seed).simulated
+    return Seen(found.log, found.truth.time_s, found.truth.position_m)
+
+
 def _drone(what: str, seed: int, room: Path) -> Seen:
     log, position_m = drone.seen(seed, float(what), DRONES[what])
     return Seen(log, log.time_s, position_m)
@@ -138,6 +145,7 @@ _MAKERS: dict[str, Callable[[str, int, Path], Seen]] = {
     "scenario": _scenario,
     "effect": _effect,
     "fault": _fault,
+    "hard": _hard,
     "drone": _drone,
     "apart": _apart,
     "holding": _holding,

@@ -21,15 +21,18 @@ from numpy.typing import NDArray
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.proposals import LONGEST
 from ftproc.core.editing.lasting.scan import Jump
-from ftproc.core.editing.lasting.scanned import FOLLOWED, MOST_EACH, Scanned, in_whole, weighed_on, worth
-from ftproc.core.editing.lasting.screen import leaves_curves, may_leave_curves
+from ftproc.core.editing.lasting.scanned import FOLLOWED, MARGIN, MOST_EACH, Scanned, in_whole, weighed_on, worth
+from ftproc.core.editing.lasting.screen import AGILE, leaves_curves, may_leave_curves, others_are_calm
 from ftproc.core.editing.lasting.weighing import TAKEN_IN, Found, Scene, Weighed, weighed
+from ftproc.core.identification.profile import pieces
 from ftproc.core.identification.stretches import runs_of
 from ftproc.records import FloatArray
 
-TERMS, PER_TERM = (5, 2, 8, 12, 22), 4  # of a curve, and samples for each at least
+TERMS, PER_TERM = (5, 2, 8, 12, 22, 48), 4  # of a curve, and samples for each at least
+MANY, WAVES = 22, (12, 48)  # of a curve that a screen looks for, and of those that go to and fro
 TRIMMED = 2  # times that the ends of a patch are brought to where its readings fit it
-FROM_IT, MOST = 2, 6  # runs from the first to the last, and stretches that are weighed
+FROM_IT, MOST = 2, 6  # runs from the first to the last, and stretches that are weighed;
+LEAST, AGILEST = 2, 2  # of those that leave nothing where they begin and end, and that are agile
 
 
 class Between(NamedTuple):
@@ -85,6 +88,12 @@ def followed(seen: Scanned) -> list[list[Between]]:
     return [*found, *([each._replace(component=c) for c in range(CLOCK)] for each in likely)]  # another target
 
 
+def agile(seen: Scanned) -> list[list[Between]]:
+    """Where a patch that goes to and fro may have been followed that leaves nothing where it begins and ends."""
+    at_jumps = between_jumps(seen.jumps, seen.left, seen.width, seen.scene.possible, wanted=False)
+    return [[each] for each in (*at_jumps[:LEAST], *between_knots(seen.scene))]
+
+
 def between_runs(scene: Scene, jumps: Sequence[Jump], within: int) -> list[Between]:
     """The stretches of a component from one rejected run to another, at one of which it jumps; the shortest first."""
     found = list[tuple[int, Between]]()
@@ -98,10 +107,10 @@ def between_runs(scene: Scene, jumps: Sequence[Jump], within: int) -> list[Betwe
 
 
 def between_jumps(
-    jumps: Sequence[Jump], left: Sequence[Jump], within: int, possible: NDArray[np.bool_]
+    jumps: Sequence[Jump], left: Sequence[Jump], within: int, possible: NDArray[np.bool_], wanted: bool = True
 ) -> list[Between]:
     """The stretches from one jump of a component to another; those of the largest jumps first. At one of their ends
-    motion leaves a jump, and they have no gap. possible (n, 3): readings that may be good."""
+    motion leaves a jump, or at none, as wanted, and they have no gap. possible (n, 3): readings that may be good."""
     found, n = list[tuple[float, Between]](), len(possible)
     for c in range(CLOCK):
         own = [jump for jump in jumps if any(c in way for way in jump.ways)]
@@ -109,9 +118,26 @@ def between_jumps(
         for (one, a, b), (other, d, e) in itertools.permutations(ends, 2):
             leaves = any(low <= jump.sample <= high for low, high in ((a, b), (d, e)) for jump in left)
             fits = PER_TERM * TERMS[0] + b <= d and e - a <= LONGEST * n
-            if leaves and a < d and fits and not _has_a_gap(possible[a:e, c]):
+            if leaves == wanted and a < d and fits and not _has_a_gap(possible[a:e, c]):
                 found.append((min(one, other), Between(c, a, b, d, e)))
     return [each for _, each in sorted(found, key=lambda of: -of[0])][:MOST]
+
+
+def between_knots(scene: Scene) -> list[Between]:
+    """The stretches in which the process noise is far above what is usual, of each component; those where it is most
+    first."""
+    own, n, found = scene.own, len(scene.possible), list[tuple[float, Between]]()
+    if own is None or scene.fixed:
+        return []
+    above, knot = own.jerk[:, 0] / scene.at_median.jerk[0, 0], pieces(scene.log.time_s, own)
+    for a, b in runs_of(above > AGILE).tolist():
+        begin, end = np.searchsorted(knot, (a, b)).tolist()
+        width = (end - begin) // (b - a)
+        if PER_TERM * TERMS[0] <= end - begin <= LONGEST * n:
+            stretches = (Between(c, begin, begin + width, end - width, end) for c in range(CLOCK))
+            whole = (each for each in stretches if not _has_a_gap(scene.possible[begin:end, each.component]))
+            found += [(float(above[a:b].max()), each) for each in whole]
+    return [each for _, each in sorted(found, key=lambda of: -of[0])][: CLOCK * AGILEST]
 
 
 def _has_a_gap(possible: NDArray[np.bool_]) -> bool:
@@ -154,7 +180,8 @@ def likeliest_followed(seen: Scanned) -> Found | None:
         part = scene.part(slice(begin, end))
         return weighed(part, part.taken_in if taken_in else part.log.weight, ())
 
-    for stretches in followed(seen):
+    waves = agile(seen)
+    for stretches in [*followed(seen), *waves]:
         if not worth(scene):
             break
         near = seen.near(min(each.begin for each in stretches), max(each.end for each in stretches))
@@ -165,7 +192,10 @@ def likeliest_followed(seen: Scanned) -> Found | None:
         tried.append(ends)
         with contextlib.suppress(ValueError, np.linalg.LinAlgError):
             span = near.start, near.stop
-            first = of_few_terms(part, ends, FOLLOWED, seen.prior(ends[0]), partial(without, *span, False))
+            if stretches in waves:
+                first = of_many_terms(part, ends[0], partial(without, *span, False))
+            else:
+                first = of_few_terms(part, ends, FOLLOWED, seen.prior(ends[0]), partial(without, *span, False))
             if first is None:
                 continue
             runs = [curve for each in stretches for curve in each.runs()]
@@ -173,9 +203,10 @@ def likeliest_followed(seen: Scanned) -> Found | None:
             best = of_any_shape(part, first)
             best = max(best, weighed_on(part, slice(0, len(part.possible)), best.curves), key=_likelihood)
             gain = best.log_probability - null.log_probability + seen.prior(best.curves)
-            if gain < MOST_EACH * part.possible.sum():
+            least = MARGIN if stretches in waves else FOLLOWED
+            if least < gain < MOST_EACH * part.possible.sum():
                 found.append(Found(in_whole(best, near, n), best.sigma, gain))
-    return max((each for each in found if each.gain > FOLLOWED), key=lambda each: each.gain, default=None)
+    return max(found, key=lambda each: each.gain, default=None)
 
 
 def of_few_terms(
@@ -184,13 +215,24 @@ def of_few_terms(
     """The likeliest of curves of a few terms with these ends; None if those with the last ends explain the part of a
     log no better than motion does, and most terms too little for a gain of so much with this prior: motion that does
     not follow the patch leaves more to them. without: weighs the part without any."""
-    few, most = ends[-1], [curve.of(max(TERMS)) for curve in ends[-1]]
+    few, most = ends[-1], [curve.of(MANY) for curve in ends[-1]]
     if not may_leave_curves(part, few, most, least - prior):
         return None
     first = weighed(part, part.log.weight, few)
     if first.log_probability > without().log_probability or leaves_curves(part, most, least, without()):
         return _likeliest(part, ends[:-1], first)
     return None
+
+
+def of_many_terms(part: Scene, curves: Sequence[Curve], without: Callable[[], Weighed]) -> Weighed | None:
+    """The likeliest of curves with these ends and many terms, as waves need; None if other readings ask for the process
+    noise that a part of a log has there, or motion is likelier."""
+    if not others_are_calm(part, curves):
+        return None
+    shortest = min(curve.end - curve.begin for curve in curves)
+    many = {max(terms for terms in TERMS if PER_TERM * terms <= shortest and terms <= most) for most in WAVES}
+    found = _likeliest(part, ([curve.of(terms) for curve in curves] for terms in sorted(many)), without())
+    return found if found.curves else None
 
 
 def of_any_shape(part: Scene, best: Weighed) -> Weighed:

@@ -21,12 +21,14 @@ from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.weighing import Scene, Weighed, as_it_is
 from ftproc.core.filtering.columns import said_of
 from ftproc.core.filtering.records import Model, Observations
-from ftproc.core.identification.profile import median_level
+from ftproc.core.filtering.smoother import likelihood_of
+from ftproc.core.identification.profile import median_level, pieces
 from ftproc.core.identification.stretches import runs_of
 from ftproc.records import FloatArray
 
 LEFT = 6.0  # in log-likelihood. With the process noise of the part: up to 5.4 where there is no step, from 7 on where
 # there is; with the median of the log, from 13 on
+AGILE = 30.0  # times the usual process noise
 HIDDEN = 25.0  # the same by the typical process noise of the part, where it may have grown for the jump: turns 20
 
 
@@ -69,6 +71,26 @@ def may_leave_curves(part: Scene, few: Sequence[Curve], most: Sequence[Curve], l
     if not leaves_curves(part, few, LEFT, decided):
         least = max(least, LEFT + decided.log_probability - by_median.log_probability)
     return leaves_curves(part, most, least, by_median)
+
+
+def others_are_calm(part: Scene, curves: Sequence[Curve]) -> bool:
+    """Whether a part of a log seems agile where curves act, but the readings that they do not act on are as likely with
+    the usual process noise there: what moves does so in more than one component."""
+    own, usual, inside = part.own, part.at_median, np.zeros(0, np.int64)
+    if own is None:
+        return False
+    weight, knot = part.log.weight.copy(), pieces(part.log.time_s, own)
+    for curve in curves:
+        weight[curve.rows, curve.component] = 0.0
+        inside = np.union1d(inside, knot[curve.rows])
+    if own.jerk[inside, 0].max() < AGILE * usual.jerk[0, 0]:
+        return False
+    jerk = own.jerk.copy()
+    jerk[inside] = np.minimum(jerk[inside], usual.jerk)
+    log = part.log._replace(weight=weight)
+    starts = part.starts(log)
+    calm = likelihood_of(log, own._replace(jerk=jerk), starts)
+    return calm > likelihood_of(log, own, starts) - LEFT
 
 
 def _gain(part: Scene, curves: Sequence[Curve], log: Observations, model: Model) -> float:

@@ -118,6 +118,7 @@ def test_no_curves_are_weighed_where_nothing_was_followed(monkeypatch):
     """A flight of turns with rejected runs on either side of them, whose process noise is known to be larger there."""
     flight, weighed = simulate("manoeuvre", seed=101, duration_s=120.0, dt_s=0.1, outliers=PATCHES), between.weighed
     few, stretches, each = between.of_few_terms, list[object](), list[object]()
+    monkeypatch.setattr(between, "agile", lambda seen: [])
     monkeypatch.setattr(between, "of_few_terms", lambda *of: stretches.append(0) or few(*of))
     monkeypatch.setattr(between, "weighed", lambda *of: each.append(0) or weighed(*of))
 
@@ -134,6 +135,32 @@ def test_no_curves_are_weighed_where_nothing_was_followed(monkeypatch):
     for screen in SCREENS:
         monkeypatch.setattr(between, screen, lambda *of: True)
     assert weighings() > 6 * len(stretches)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("seed", [36, 42])
+def test_a_wave_that_leaves_nothing_where_it_begins_and_ends_is_found(seed):
+    """An azimuth of a drone that swings for 52 s, and the range of a fighter, for 22 s: 206 and 66 m off, and
+    consistent, where the process noise alone follows them. A short patch at its end explains little of the first."""
+    dirty = hard.make("sine", seed).simulated
+    bad = dirty.truth.outlier > 0
+    found = two_pass.edit(dirty.log.time_s, dirty.log.measurement, UNKNOWN)
+    assert found.weight[bad].mean() < 0.02
+    assert found.weight[~bad].mean() > 0.98
+
+
+@pytest.mark.compiled
+def test_no_waves_are_weighed_where_other_components_show_the_motion_too(monkeypatch):
+    flight, stretches, each = simulate("manoeuvre-clean", seed=4, duration_s=60.0), list[object](), list[object]()
+    many, weighed = between.of_many_terms, between.weighed
+    monkeypatch.setattr(between, "of_many_terms", lambda *of: stretches.append(0) or many(*of))
+    monkeypatch.setattr(between, "weighed", lambda *of: each.append(0) or weighed(*of))
+    two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN)
+    assert stretches
+    assert not each
+    monkeypatch.setattr(between, "others_are_calm", lambda *of: True)
+    two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN)
+    assert len(each) >= len(stretches) / 2
 
 
 @pytest.mark.compiled

@@ -183,6 +183,7 @@ def test_a_find_that_loses_the_track_is_taken_back(monkeypatch):
         return screen.leaves_curves(part, most, least, weighing.as_it_is(part, part.log.weight, part.at_median))
 
     monkeypatch.setattr(between, "may_leave_curves", at_typical_noise)
+    monkeypatch.setattr(between, "agile", lambda seen: [])
     spec = "isolated=0.02:6-300,patch=3:5-80:8-150,mixed=3:10-150:8-200"
     flight = simulate("manoeuvre", seed=51, duration_s=300.0, dt_s=0.1, outliers=spec)
     found = pipeline.filter_log(flight.log, FilterSettings(smooth=True))
