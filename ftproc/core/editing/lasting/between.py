@@ -22,7 +22,7 @@ from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.proposals import LONGEST
 from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.scanned import FOLLOWED, MARGIN, MOST_EACH, Scanned, in_whole, weighed_on, worth
-from ftproc.core.editing.lasting.screen import AGILE, leaves_curves, may_leave_curves, others_are_calm
+from ftproc.core.editing.lasting.screen import AGILE, leaves_curves, may_leave_curves, others_as_usual
 from ftproc.core.editing.lasting.weighing import TAKEN_IN, Found, Scene, Weighed, weighed
 from ftproc.core.identification.profile import pieces
 from ftproc.core.identification.stretches import runs_of
@@ -227,7 +227,7 @@ def of_few_terms(
 def of_many_terms(part: Scene, curves: Sequence[Curve], without: Callable[[], Weighed]) -> Weighed | None:
     """The likeliest of curves with these ends and many terms, as waves need; None if other readings ask for the process
     noise that a part of a log has there, or motion is likelier."""
-    if not others_are_calm(part, curves):
+    if not others_as_usual(part, curves):
         return None
     shortest = min(curve.end - curve.begin for curve in curves)
     many = {max(terms for terms in TERMS if PER_TERM * terms <= shortest and terms <= most) for most in WAVES}

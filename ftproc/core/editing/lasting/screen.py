@@ -73,7 +73,7 @@ def may_leave_curves(part: Scene, few: Sequence[Curve], most: Sequence[Curve], l
     return leaves_curves(part, most, least, by_median)
 
 
-def others_are_calm(part: Scene, curves: Sequence[Curve]) -> bool:
+def others_as_usual(part: Scene, curves: Sequence[Curve]) -> bool:
     """Whether a part of a log seems agile where curves act, but the readings that they do not act on are as likely with
     the usual process noise there: what moves does so in more than one component."""
     own, usual, inside = part.own, part.at_median, np.zeros(0, np.int64)
@@ -89,8 +89,8 @@ def others_are_calm(part: Scene, curves: Sequence[Curve]) -> bool:
     jerk[inside] = np.minimum(jerk[inside], usual.jerk)
     log = part.log._replace(weight=weight)
     starts = part.starts(log)
-    calm = likelihood_of(log, own._replace(jerk=jerk), starts)
-    return calm > likelihood_of(log, own, starts) - LEFT
+    typical = likelihood_of(log, own._replace(jerk=jerk), starts)
+    return typical > likelihood_of(log, own, starts) - LEFT
 
 
 def _gain(part: Scene, curves: Sequence[Curve], log: Observations, model: Model) -> float:

@@ -158,7 +158,7 @@ def test_no_waves_are_weighed_where_other_components_show_the_motion_too(monkeyp
     two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN)
     assert stretches
     assert not each
-    monkeypatch.setattr(between, "others_are_calm", lambda *of: True)
+    monkeypatch.setattr(between, "others_as_usual", lambda *of: True)
     two_pass.edit(flight.log.time_s, flight.log.measurement, UNKNOWN)
     assert len(each) >= len(stretches) / 2
 
