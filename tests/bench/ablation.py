@@ -126,7 +126,6 @@ RULES: dict[str, tuple[Off, ...]] = {
     "patches that were followed": (Off(f"{EDITING}.lasting.search", "likeliest_followed", _nothing),),
     "waves that were followed": (Off(f"{EDITING}.lasting.between", "agile", _empty),),
     "waves that other components do not show": (Off(f"{EDITING}.lasting.between", "others_as_usual", lambda *_: True),),
-    "patches that explain far more than their ends": (Off(f"{EDITING}.lasting.search", "MUCH_MORE", np.inf),),
     "one-sided errors": (Off(TWO_PASS, "_one_sided", _empty),),
     "patches between jumps": (Off(f"{EDITING}.jump_patches", "find", lambda time_s, *_: np.zeros(len(time_s))),),
     "readings that were not measured": (Off(TWO_PASS, "without_copies", _as_read),),

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ftproc.core.editing.lasting.between import MANY, likeliest_followed
+from ftproc.core.editing.lasting.between import likeliest_followed
 from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.ends import around, by_itself, instead_of
 from ftproc.core.editing.lasting.proposals import SHORTEST, LocatedJump, exactly, other_end, proposals, steps
@@ -37,7 +37,6 @@ from ftproc.core.identification.profile import median_level
 
 ROUNDS = 8  # over a log
 CERTAIN = 4.0  # sigmas of its size from which a component takes part in a fault of several
-MUCH_MORE = 150.0  # in log-probability, that waves which were followed explain beyond what their ends do by themselves
 OPEN = 12.0  # in log-probability, within which a jump may be one or another: beside agile targets it tells little
 
 
@@ -58,9 +57,6 @@ def search(scene: Scene) -> list[Found]:
     if followed is None:
         return found
     short = instead_of(first, followed)
-    waves = min(len(curve.size) for curve in followed.curves) >= MANY
-    if short is not None and waves and sum(each.gain for each in short) + MUCH_MORE < followed.gain:
-        short = None
     for each in [followed] if short is None else short:
         found = _likelier(first, found, each)
     return found

@@ -141,7 +141,7 @@ def test_no_curves_are_weighed_where_nothing_was_followed(monkeypatch):
 @pytest.mark.parametrize("seed", [36, 42])
 def test_a_wave_that_leaves_nothing_where_it_begins_and_ends_is_found(seed):
     """An azimuth of a drone that swings for 52 s, and the range of a fighter, for 22 s: 206 and 66 m off, and
-    consistent, where the process noise alone follows them. A short patch at its end explains little of the first."""
+    consistent, where the process noise alone follows them."""
     dirty = hard.make("sine", seed).simulated
     bad = dirty.truth.outlier > 0
     found = two_pass.edit(dirty.log.time_s, dirty.log.measurement, UNKNOWN)
