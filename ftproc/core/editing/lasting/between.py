@@ -22,17 +22,17 @@ from ftproc.core.editing.lasting.curves import CLOCK, Curve
 from ftproc.core.editing.lasting.proposals import LONGEST
 from ftproc.core.editing.lasting.scan import Jump
 from ftproc.core.editing.lasting.scanned import FOLLOWED, MARGIN, MOST_EACH, Scanned, in_whole, weighed_on, worth
-from ftproc.core.editing.lasting.screen import AGILE, leaves_curves, may_leave_curves, others_as_usual
+from ftproc.core.editing.lasting.screen import ELEVATED, leaves_curves, may_leave_curves, others_as_usual
 from ftproc.core.editing.lasting.weighing import TAKEN_IN, Found, Scene, Weighed, weighed
 from ftproc.core.identification.profile import pieces
 from ftproc.core.identification.stretches import runs_of
 from ftproc.records import FloatArray
 
 TERMS, PER_TERM = (5, 2, 8, 12, 22, 48), 4  # of a curve, and samples for each at least
-MANY, WAVES = 22, (12, 48)  # of a curve that a screen looks for, and of those that go to and fro
+MANY = 22  # of a curve that a screen looks for
 TRIMMED = 2  # times that the ends of a patch are brought to where its readings fit it
-FROM_IT, MOST = 2, 6  # runs from the first to the last, and stretches that are weighed;
-LEAST, AGILEST = 2, 2  # of those that leave nothing where they begin and end, and that are agile
+FROM_IT, MOST = 2, 6  # runs from the first to the last, and stretches that are weighed
+OF_EITHER = 2  # of those that leave nothing where they begin and end: from jump to jump, and by the process noise
 
 
 class Between(NamedTuple):
@@ -91,7 +91,7 @@ def followed(seen: Scanned) -> list[list[Between]]:
 def agile(seen: Scanned) -> list[list[Between]]:
     """Where a patch that goes to and fro may have been followed that leaves nothing where it begins and ends."""
     at_jumps = between_jumps(seen.jumps, seen.left, seen.width, seen.scene.possible, wanted=False)
-    return [[each] for each in (*at_jumps[:LEAST], *between_knots(seen.scene))]
+    return [[each] for each in (*at_jumps[:OF_EITHER], *between_knots(seen.scene))]
 
 
 def between_runs(scene: Scene, jumps: Sequence[Jump], within: int) -> list[Between]:
@@ -130,14 +130,14 @@ def between_knots(scene: Scene) -> list[Between]:
     if own is None or scene.fixed:
         return []
     above, knot = own.jerk[:, 0] / scene.at_median.jerk[0, 0], pieces(scene.log.time_s, own)
-    for a, b in runs_of(above > AGILE).tolist():
+    for a, b in runs_of(above > ELEVATED).tolist():
         begin, end = np.searchsorted(knot, (a, b)).tolist()
         width = (end - begin) // (b - a)
         if PER_TERM * TERMS[0] <= end - begin <= LONGEST * n:
             stretches = (Between(c, begin, begin + width, end - width, end) for c in range(CLOCK))
             whole = (each for each in stretches if not _has_a_gap(scene.possible[begin:end, each.component]))
             found += [(float(above[a:b].max()), each) for each in whole]
-    return [each for _, each in sorted(found, key=lambda of: -of[0])][: CLOCK * AGILEST]
+    return [each for _, each in sorted(found, key=lambda of: -of[0])][: CLOCK * OF_EITHER]
 
 
 def _has_a_gap(possible: NDArray[np.bool_]) -> bool:
@@ -225,14 +225,14 @@ def of_few_terms(
 
 
 def of_many_terms(part: Scene, curves: Sequence[Curve], without: Callable[[], Weighed]) -> Weighed | None:
-    """The likeliest of curves with these ends and many terms, as waves need; None if other readings ask for the process
-    noise that a part of a log has there, or motion is likelier."""
+    """Curves with these ends and as many terms as they may have, as waves need; None if other readings ask for the
+    process noise that a part of a log has there, or motion is likelier."""
     if not others_as_usual(part, curves):
         return None
     shortest = min(curve.end - curve.begin for curve in curves)
-    many = {max(terms for terms in TERMS if PER_TERM * terms <= shortest and terms <= most) for most in WAVES}
-    found = _likeliest(part, ([curve.of(terms) for curve in curves] for terms in sorted(many)), without())
-    return found if found.curves else None
+    terms = max(each for each in TERMS if PER_TERM * each <= shortest)
+    found = weighed(part, part.log.weight, [curve.of(terms) for curve in curves])
+    return found if found.log_probability > without().log_probability else None
 
 
 def of_any_shape(part: Scene, best: Weighed) -> Weighed:

@@ -28,7 +28,7 @@ from ftproc.records import FloatArray
 
 LEFT = 6.0  # in log-likelihood. With the process noise of the part: up to 5.4 where there is no step, from 7 on where
 # there is; with the median of the log, from 13 on
-AGILE = 30.0  # times the usual process noise
+ELEVATED = 30.0  # times the usual process noise
 HIDDEN = 25.0  # the same by the typical process noise of the part, where it may have grown for the jump: turns 20
 
 
@@ -83,7 +83,7 @@ def others_as_usual(part: Scene, curves: Sequence[Curve]) -> bool:
     for curve in curves:
         weight[curve.rows, curve.component] = 0.0
         inside = np.union1d(inside, knot[curve.rows])
-    if own.jerk[inside, 0].max() < AGILE * usual.jerk[0, 0]:
+    if own.jerk[inside, 0].max() < ELEVATED * usual.jerk[0, 0]:
         return False
     jerk = own.jerk.copy()
     jerk[inside] = np.minimum(jerk[inside], usual.jerk)
