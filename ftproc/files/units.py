@@ -83,20 +83,15 @@ SPELLINGS: Mapping[str, tuple[str, ...]] = {
     "us": ("usec", "usecs", "microsec", "microsecond", "microseconds", "μs", "μsec"),
     "ns": ("nsec", "nsecs", "nanosec", "nanosecond", "nanoseconds"),
     "min": ("mins", "minute", "minutes"),
-    "h": ("hr", "hrs", "hour", "hours"),
+    "h": ("hr", "hrs", "hour", "hours", "ч"),
     "d": ("day", "days"),
     "m": ("meter", "meters", "metre", "metres", "mtr", "mtrs", "м", "米", "미터"),
     "km": ("kms", "kilometer", "kilometers", "kilometre", "kilometres", "км", "公里", "千米"),
     "ft": ("feet", "foot"),
     "kft": ("kilofeet", "kfeet"),
     "fl": ("flightlevel", "flightlevels"),
-    "mps": ("m/s", "m/sec", "ms-1", "м/с"),
-    "kmps": ("km/s", "kms-1", "км/с"),
-    "kmh": ("km/h", "kph", "км/ч"),
+    "kmh": ("kph",),
     "kt": ("kts", "knot", "knots", "kn"),
-    "fps": ("ft/s", "ft/sec"),
-    "mmps": ("mm/s",),
-    "cmps": ("cm/s",),
     "db": ("dbm", "dbw", "dbsm", "dbhz", "db-hz", "dbmv", "dbfs", "decibel", "decibels", "дб", "дбм", "分贝"),
     "nmi": ("nauticalmile", "nauticalmiles", "nautmile", "nautmiles", "nautmi", "nautical"),
     "mi": ("mile", "miles", "smi", "sm", "statutemile", "statutemiles"),
@@ -125,6 +120,11 @@ SPELLINGS: Mapping[str, tuple[str, ...]] = {
     "arcsec": ("arcsecs", "arcsecond", "arcseconds", "asec", "secofarc"),
 }
 _BY_SPELLING = {word: name for name, words in SPELLINGS.items() for word in words}
+#: A length over a time: m/s, m s^-1, km_h, meters_per_second; without anything between them where both are short.
+_OVER_TIME = re.compile(
+    r"(?P<length>.+?)(?:/|per|p)(?P<time>[^\W\d_]+)|(?P<short>[^\W\d_]{1,3})[·*]?(?P<inverse>[^\W\d_]+)(?:\^?\(?-1\)?)?"
+)
+_OF_SPEEDS = {"s": 1.0, "h": 3600.0}
 
 
 _NUMBER = r"(?:\d{1,9}(?:\.\d{0,9})?|\.\d{1,9})(?:e[+-]?\d{1,2})?"
@@ -145,7 +145,19 @@ def _plainly_named(quantity: str, word: str) -> Unit | None:
     plain = word.lower().replace(" ", "").replace(".", "").replace("_", "").replace("º", "°").replace("µ", "μ")
     if word.strip() == "Mm":  # megametres
         return None
-    return UNITS[quantity].get(plain) or UNITS[quantity].get(_BY_SPELLING.get(plain, ""))
+    known = UNITS[quantity].get(plain) or UNITS[quantity].get(_BY_SPELLING.get(plain, ""))
+    return known or (_speed_named(plain) if quantity == "range_rate" else None)
+
+
+def _speed_named(plain: str) -> Unit | None:
+    found = _OVER_TIME.fullmatch(plain)
+    length = found and _plainly_named("range", found["length"] or found["short"])
+    time = found and _plainly_named("time", found["time"] or found["inverse"])
+    if not length or not time or time.name not in _OF_SPEEDS:
+        return None
+    factor = length.multiply / length.divide / _OF_SPEEDS[time.name]
+    same = (unit for unit in _SPEEDS if math.isclose(unit.multiply / unit.divide, factor))
+    return next(same, Unit(f"{length.name}/{time.name}", length.multiply, length.divide * _OF_SPEEDS[time.name]))
 
 
 def _scaled(quantity: str, word: str) -> Unit | None:

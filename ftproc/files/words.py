@@ -69,10 +69,12 @@ FURTHER_ALIASES: Mapping[str, tuple[str, ...]] = {
     ),
     "range_rate": _split(
         """
-        rangerate rrate rdot rhodot rrdot rangedot rngrate doppler dopplervelocity dopplerspeed radialvelocity
-        radialspeed radvel vradial vr vrad rangevelocity openingspeed openingvelocity openingrate closingspeed
+        rangerate rrate rdot rhodot rrdot rangedot rngrate rngdot slantrangerate srrate rr doppler dopplervelocity
+        dopplerspeed radialvelocity radialspeed radialvel radialrate velocityradial radvel vradial vr vrad vlos
+        rangevelocity losvelocity lineofsightvelocity drdt drangedt
+        openingspeed openingvelocity openingrate closingspeed
         closingvelocity closingrate closurerate closurespeed radialgeschwindigkeit entfernungsanderung
-        vitesseradiale velocidadradial радиальнаяскорость 径向速度
+        vitesseradiale velocidadradial velocitaradiale радиальнаяскорость 径向速度 径向速率 視線速度 시선속도
         """
     ),
     "signal": _split(

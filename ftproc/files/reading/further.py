@@ -2,12 +2,13 @@
 network that learned from it, the strength of the signal.
 
 Names and units are those of `words.FURTHER_ALIASES` and `units.UNITS`. Where neither the name nor
-`--units` says the unit, a height is asked about, because the positions rest on it; others are left out, a rate with a
-word.
+`--units` says the unit, a height is asked about, because the positions rest on it; a rate is in the unit that the
+ranges show, or left out with a word; others are left out.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -15,19 +16,21 @@ import numpy as np
 
 from ftproc.errors import InputError, nearest
 from ftproc.files.options import ABSENT
+from ftproc.files.reading import rates
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.meaning.names import Name, taken_apart
+from ftproc.files.reading.meaning.names import Name, compatible, taken_apart
 from ftproc.files.reading.meaning.numbers import Origin, numbers
 from ftproc.files.reading.meaning.questions import answer, listed
 from ftproc.files.reading.meaning.readings import sentinel
-from ftproc.files.units import SPELLINGS, UNITS, Unit, unit_named
+from ftproc.files.units import UNITS, Unit, unit_named
 from ftproc.files.words import FURTHER_ALIASES, WEAK_ALIASES
-from ftproc.records import FloatArray, Heights
+from ftproc.records import COMPONENTS, FloatArray, Heights, MeasurementLog
 
 HEIGHT, RANGE_RATE, SIGNAL = "height", "range_rate", "signal"
 #: Words of names by which a height is geometric; any other is taken for a barometric one. And names of flight levels.
 _GEOMETRIC = ("geo", "gnss", "gps", "msl", "ellips", "height_m")
 _LEVELS = ("flightlevel", "fl", "modec", "flugflache", "эшелон", "飞行高度层")
+OPEN = Unit("")  # that nothing states
 _CLOSING = ("closing", "closure")  # begin the names of rates that count inward
 _WHAT = {HEIGHT: "the height of the target", RANGE_RATE: "the range rate", SIGNAL: "the strength of the signal"}
 
@@ -40,6 +43,7 @@ class Further(NamedTuple):
     name: str
     unit: Unit
     other_kind: bool
+    why: str = "its name"
 
     def read(self, header: TableHeader) -> FloatArray:
         """(n,) in SI units, rates outward, NaN where missing. Raises InputError for a cell that is no number."""
@@ -53,7 +57,7 @@ class Further(NamedTuple):
         """As `understanding` describes columns."""
         kinds = {HEIGHT: ("geometric", "barometric"), RANGE_RATE: ("outward", "inward, by its name")}
         kind = kinds.get(self.quantity, ("over any reference",))[self.other_kind]
-        return {"column": self.name, "unit": self.unit.name, "unit_from": kind, "why": "its name"}
+        return {"column": self.name, "unit": self.unit.name, "unit_from": kind, "why": self.why}
 
 
 def of_rows(beside: tuple[Further, ...], header: TableHeader, row: Any) -> dict[str, Any]:
@@ -62,6 +66,26 @@ def of_rows(beside: tuple[Further, ...], header: TableHeader, row: Any) -> dict[
     height = next((each for each in beside if each.quantity == HEIGHT), None)
     heights = Heights(found[HEIGHT], height.other_kind) if height else None
     return {"heights": heights, "range_rate": found.get(RANGE_RATE), "signal_db": found.get(SIGNAL)}
+
+
+def in_known_units(
+    beside: tuple[Further, ...], header: TableHeader, log: MeasurementLog
+) -> tuple[tuple[Further, ...], tuple[str, ...]]:
+    """Those whose unit something states, or the ranges of the log show; and a word on each that is left out."""
+    known: list[Further] = []
+    doubts: list[str] = []
+    for each in beside:
+        unit: Unit | None = each.unit
+        if unit == OPEN:
+            ranges_m = log.measurement[:, COMPONENTS.index("range")]
+            unit = rates.unit_by_motion(log.time_s, ranges_m, each.read(header)[log.row])
+            each = each._replace(why="its name, and its unit by the ranges")
+        if unit is None:
+            say = f"--units {RANGE_RATE}=mps (or km/h, kt)"
+            doubts.append(f'"{each.name}" may be a range rate: if so, say {say}')
+        else:
+            known.append(each._replace(unit=unit))
+    return tuple(known), tuple(doubts)
 
 
 def find(
@@ -78,14 +102,6 @@ def find(
     wanted += [SIGNAL] if signal or SIGNAL in columns else []
     taken = {index for column in found.values() for index in column.positions}
     return tuple(_found(header, wanted, taken, units, columns))
-
-
-def doubts(header: TableHeader, beside: tuple[Further, ...], columns: Mapping[str, str]) -> list[str]:
-    """A word on a column that has the name of a range rate, but not its unit."""
-    if RANGE_RATE in columns or any(each.quantity == RANGE_RATE for each in beside) or header.is_of_a_standard:
-        return []
-    names = [name for name in header.names if not taken_apart(name).unit and _means(RANGE_RATE, taken_apart(name))]
-    return [f'"{name}" may be a range rate: if so, say --units {RANGE_RATE}=mps (or km/h, kt)' for name in names[:1]]
 
 
 def _found(
@@ -135,6 +151,7 @@ def _described(header: TableHeader, quantity: str, index: int, name: Name, state
     text, unit = header.names[index], _unit(quantity, name, stated)
     if unit is None and header.is_of_a_standard and quantity == RANGE_RATE:
         unit = unit_named(quantity, "mps")
+    unit = OPEN if unit is None and quantity == RANGE_RATE else unit
     if unit is None and quantity != HEIGHT:
         return None
     if unit is None:
@@ -169,19 +186,21 @@ def _apart(quantity: str, text: str, unit: str) -> Name:
     """The name taken apart, with the units of this quantity, of which FL is a name too."""
     if unit_named(quantity, unit):
         return taken_apart(text)._replace(foreign=False, unit=unit)
-    plain, known = text.strip().rstrip(")]}> "), (*UNITS[quantity], *_SPELT[quantity])
-    ending = max((word for word in known if plain.lower().endswith(word)), key=len, default="")
-    before = plain[: len(plain) - len(ending)]
-    if not ending or (before and before[-1].isalnum()):
+    plain = compatible(text).strip().rstrip(")]}> ")
+    endings = (found.end() for found in _WHERE_UNITS_BEGIN.finditer(plain))
+    begin = next((k for k in endings if unit_named(quantity, plain[k:])), None)
+    if begin is None:
         return taken_apart(text, unit)
-    found = taken_apart(before.rstrip(" _.,:([{</-"))
+    ending, before = plain[begin:], plain[:begin].rstrip(" _.,:([{</-")
+    found = taken_apart(before.removesuffix(" in").removesuffix("_in"))
     level = unit_named(HEIGHT, ending) == UNITS[HEIGHT]["fl"]
     if level and found.stem not in FURTHER_ALIASES[HEIGHT]:
         found = found._replace(stem="fl")
     return found._replace(foreign=False, unit=ending)
 
 
-_SPELT = {quantity: [word for unit in UNITS[quantity] for word in SPELLINGS.get(unit, ())] for quantity in _WHAT}
+#: Before a word, and before a capital letter within one: range_rate|_m_s, range|Rate|Kt.
+_WHERE_UNITS_BEGIN = re.compile(r"(?:^|[\W_]+|(?<=[^\W\d_A-Z])(?=[A-Z]))(?=\w)")
 
 
 def _means(quantity: str, name: Name) -> bool:

@@ -97,7 +97,6 @@ def read(
     found = schema.resolve(header.source, header.names, unit_of, column_of, header.units, propose)
     beside = further.find(header, found, unit_of, column_of, extract.signal)
     plan = _Plan(header, found, station, _conditions(header, extract), extract=extract, beside=beside)
-    plan = plan._replace(open=tuple(further.doubts(header, beside, column_of)))
     if keep_columns:
         wanted = [*plan.positions(), *(each.position for each in beside if each.quantity != further.SIGNAL)]
         plan = plan._replace(others=tuple(index for index in range(len(header.names)) if index not in wanted))
@@ -186,6 +185,8 @@ def _at_once(plan: _Plan) -> MeasurementLog:
         gone = tuple(int(kept[row]) for row in log.rows_without_time)
         log = replace(log, row=kept[log.row], rows_without_time=gone, rows_in_file=table.num_rows)
     if plan.beside:
+        beside, left_out = further.in_known_units(plan.beside, header, log)
+        plan = plan._replace(beside=beside, open=left_out)
         log = replace(log, **further.of_rows(plan.beside, header, log.row))
     plan = plan._replace(found=judged.found)
     if not (plan.extract.target or header.stated.target):

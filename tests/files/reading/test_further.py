@@ -95,6 +95,12 @@ def test_rows_stay_together(tmp_path):
         ("closing_speed_kmh", -1 / 3.6),
         ("RDOT_ft/s", 0.3048),
         ("target range rate, km/s", 1000.0),
+        ("range_rate_m_s", 1.0),
+        ("rr_m_per_s", 1.0),
+        ("rangeRateKt", 1852 / 3600),
+        ("radial velocity in feet per second", 0.3048),
+        ("Vr [m·s⁻¹]", 1.0),
+        ("радиальная скорость, км/ч", 1 / 3.6),
     ],
 )
 def test_names_and_units_of_range_rates(tmp_path, head, mps):
@@ -113,6 +119,36 @@ def test_a_range_rate_without_a_unit_is_left_out_with_a_word(tmp_path):
     assert "--units range_rate=mps" in " ".join(log.remarks)
     assert logs.read(path, units="range_rate=kt").range_rate[0] == pytest.approx(35 * 1852 / 3600)
     assert "--units range_rate" not in " ".join(logs.read(path, columns="range_rate=none").remarks)
+
+
+@pytest.mark.parametrize("mps", [1.0, -1.0, 1 / 3.6, 1852 / 3600, 0.3048, 1000.0])
+def test_the_ranges_tell_the_unit_of_a_rate_that_states_none(tmp_path, mps):
+    noise = np.random.default_rng(1).normal(size=(2, 400))
+    time_s = 0.1 * np.arange(400)
+    ranges_m = np.hypot(40 * (time_s - 15), 800)
+    rate = np.gradient(ranges_m, time_s) + 0.3 * noise[0]
+    rate[::17] = 900.0
+    rows = [
+        f"{t:.1f},{r:.3f},0.1,0.1,{float(v / mps)!r}\n"
+        for t, r, v in zip(time_s, ranges_m + 0.5 * noise[1], rate, strict=True)
+    ]
+    path = tmp_path / "log.csv"
+    path.write_text("time_s,range_m,azimuth_rad,elevation_rad,range_rate\n" + "".join(rows))
+    log = logs.read(path)
+    np.testing.assert_allclose(log.range_rate, rate * np.sign(mps), rtol=1e-4)
+    assert log.understood["columns"]["range_rate"]["why"] == "its name, and its unit by the ranges"
+
+
+@pytest.mark.parametrize("kind", ["constant", "noise", "another thing"])
+def test_what_is_no_rate_of_the_ranges_is_left_out(tmp_path, kind):
+    noise = np.random.default_rng(2).normal(size=400)
+    column = {"constant": np.full(400, 30.0), "noise": 5 * noise, "another thing": 40 + np.cumsum(noise)}[kind]
+    rows = [f"{0.1 * k:.1f},{5000 + 3 * k},0.1,0.1,{value:.4f}\n" for k, value in enumerate(column)]
+    path = tmp_path / "log.csv"
+    path.write_text("time_s,range_m,azimuth_rad,elevation_rad,range_rate\n" + "".join(rows))
+    log = logs.read(path)
+    assert log.range_rate is None
+    assert "may be a range rate" in " ".join(log.remarks)
 
 
 def test_doppler_in_hertz_is_no_range_rate(tmp_path):

@@ -123,7 +123,7 @@ def taken_apart(text: str, unit: str = "") -> Name:
     """A name, and the cell under it in a row of units (which wins)."""
     if max(len(text), len(unit)) > LONGEST_NAME:
         return Name(text, "", ())
-    plain = _compatible(text).strip().strip("\"'#%;!:").strip()
+    plain = compatible(text).strip().strip("\"'#%;!:").strip()
     plain = _EAST_OF_NORTH.sub("", _VALUE.sub("", _NUMBERED.sub("", plain)))
     found, notation, foreign = "", "", False
     opening = _OPENING.search(plain) if plain.endswith(_CLOSING) else None
@@ -146,7 +146,7 @@ def taken_apart(text: str, unit: str = "") -> Name:
         if found in NOTATIONS:
             found, notation = "", found
     if unit:
-        inside = _compatible(unit).strip().strip("()[]{}<>").strip()
+        inside = compatible(unit).strip().strip("()[]{}<>").strip()
         foreign = inside.lower() in _FOREIGN
         squeezed = _squeezed(inside)
         if _is_unit(inside):
@@ -159,7 +159,7 @@ def taken_apart(text: str, unit: str = "") -> Name:
     return Name(text, stem, words, found, notation, foreign)
 
 
-def _compatible(text: str) -> str:
+def compatible(text: str) -> str:
     """Letters and digits without their forms; exponents of ten stay exponents."""
     with_powers = _SUPERSCRIPT.sub(lambda power: f"^{power[0]}", text.replace("º", "°"))
     return unicodedata.normalize("NFKC", with_powers).replace("\u2212", "-")
