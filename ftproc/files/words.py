@@ -19,7 +19,7 @@ def _split(words: str) -> tuple[str, ...]:
 ALIASES: Mapping[str, tuple[str, ...]] = {
     "time": _split(
         """
-        time t timestamp datetime utc gps tod sod tow sow epoch irig irigb jd mjd seconds secs sec elapsed
+        time t timestamp datetime utc ut gps tod sod tow sow epoch irig irigb jd mjd seconds secs sec elapsed
         elapsedtime elapsedseconds timeofday secondsofday secofday secsofday timeofweek secondsofweek gpstime
         gpstow gpstimeofweek gpsseconds utctime timeutc timegps utctimestamp utcdatetime datetimeutc dateandtime unix
         unixtime posix posixtime timesinceepoch secondssinceepoch juliandate julianday
@@ -30,29 +30,40 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
         secondsaftermidnight
         secondspastmidnight secondssincemidnight secspastmidnight secpastmidnight secsaftermidnight
         timepastmidnight timeaftermidnight timesincemidnight utcofposition timez zulutime
-        zeit uhrzeit temps heure tiempo
-        hora tempo ora czas tid tijd cas zaman время час 时间 時間 時刻 时刻 시간
+        zeit uhrzeit temps heure heuretu heureutc heuretuc instant tiempo
+        hora horautc tempo ora orautc czas czasutc tid tidspunkt tijd tijdstip aika ido cas zaman saat время времяutc
+        час 时间 時間 時刻 时刻 시간 시각
         """
     ),
     "range": _split(
         """
         range r slantrange sr rng rho slrange slrng slantrng srange srng entfernung schragentfernung
         schragdistanz schragdist schragstrecke schraegstrecke schraegentfernung schraegdistanz schraegdist
-        distanceoblique distanciainclinada distanciaobliqua egikmesafe egikmenzil дальность наклоннаядальность
-        дальністьпохила дальність 斜距 斜距离 斜距離 경사거리
+        distanceoblique distanceinclinee distanceradiale distanciainclinada distanciageometrica distanciaobliqua
+        alcance alcanceinclinado alcanceobliquo distanciageometrica distanzaobliqua distanzainclinata distanzaradiale
+        portee porteeoblique schuineafstand snedavstand skraavstand skraafstand lutandeavstand sikmadalka
+        sikmavzdalenost odlegloscskosna odlegloscpochyla ferdetavolsag vinoetaisyys egikmesafe egikmenzil menzil
+        дальность наклоннаядальность дальностьнаклонная расстояниенаклонное наклонноерасстояние дальністьпохила
+        похиладальність дальність 斜距 斜距离 斜距離 直线距离 경사거리 사거리
         """
     ),
     "azimuth": _split(
         """
         azimuth az a azimuthangle azangle azim azi azmth azm bearing brg azimut acimut azymut azimute gisement
-        baring peilung seitenwinkel азимут пеленг 方位角 方位 방위각
+        azimutal angleazimutal angleazimut anguloazimutal angoloazimutale azimutti azimutwinkel baring peilung peiling
+        seitenwinkel relevement rilevamento marcacion marcacao namiar kattazimutu yonacisi istikamet istikametacisi
+        semt semtacisi азимут уголазимута пеленг 方位角 方位 水平角 방위각 방위
         """
     ),
     "elevation": _split(
         """
         elevation el e elevationangle elangle elev elevangle altitudeangle hohenwinkel hoehenwinkel elevationswinkel
-        elevacion elevazione elevacao elevatie elewacja elevace hojdvinkel yukselis yukselisacisi уголместа
-        кутмісця 俯仰角 俯仰 仰角 高低角 高度角 고각 앙각
+        elevacion elevazione elevacao elevatie elewacja elevace angledelevation anglesite angledesite angulodeelevacion
+        anguloelevacion angulodesituacion anguloelevacao angulodeelevacao angolodielevazione angoloelevazione
+        angolodisito angolosito elevatiehoek hojdvinkel hoydevinkel hojdevinkel elevationsvinkel korkeuskulma
+        emelkedesiszog lagewinkel katpodniesienia katelewacji katwzniesienia elevacniuhel vyskovyuhel polohovyuhel
+        unghideelevatie yukselis yukselisacisi
+        уголместа уголвозвышения кутмісця 俯仰角 俯仰 仰角 高低角 高度角 고각 앙각 고도각
         """
     ),
 }
@@ -92,18 +103,21 @@ WEAK_ALIASES: Mapping[str, tuple[str, ...]] = {
     "time": ("date", "gpst", "daytime"),
     "range": _split(
         """
-        dist sd distance slantdistance slopedistance slopedist slant distanz distancia distanza odległosc
-        avstand afstand mesafe d 距离 距離 거리
+        dist sd distance slantdistance slopedistance slopedist slant distanz distancia distanza odleglosc
+        avstand afstand mesafe vzdalenost tavolsag etaisyys расстояние д d 距离 距離 거리
         """
     ),
     "azimuth": _split(
         """
         theta hz hr richtung horizontalwinkel horizontalrichtung horizontalangle horizontaldirection hzangle hangle ha
-        horangle horizangle аз β
+        horangle horizangle horizontalvinkel anglehorizontal angulohorizontal angoloorizzontale kathorizontalny аз β
         """
     ),
     "elevation": _split(
-        "v vertikalwinkel verticalangle vertangle vangle va elv alt altitude site depression depressionangle ум ε"
+        """
+        v h vertikalwinkel verticalangle vertangle vangle va elv alt altitude site sito situ depression depressionangle
+        ум ε
+        """
     ),
 }
 
@@ -121,10 +135,10 @@ OF_TIMES = frozenset(
 )
 
 #: Weak aliases that need a unit, because alone they are a height, a place or anything.
-ONLY_BY_UNIT = ("alt", "altitude", "site", "d", "hr", "z", "vz", "β", "ε")
+ONLY_BY_UNIT = ("alt", "altitude", "site", "sito", "situ", "d", "д", "h", "hr", "z", "vz", "β", "ε")
 
 #: Names of angles of which none says whether it is the azimuth, and from where the other one counts.
-EITHER_ANGLE = ("theta", "phi", "psi", "alpha", "θ", "φ", "ψ", "α", "pan", "tilt")
+EITHER_ANGLE = ("theta", "phi", "psi", "alpha", "θ", "φ", "ψ", "α", "beta", "β", "pan", "tilt")
 
 #: Names in German, in which Grad are degrees.
 GERMAN = frozenset(_split("zeit uhrzeit entfernung schragentfernung schragdistanz hohenwinkel distanz"))
@@ -201,9 +215,13 @@ TURNED = {
 }
 
 
+_LETTERS = str.maketrans({"ł": "l", "ı": "i", "ø": "o", "đ": "d", "æ": "ae", "ß": "ss"})  # that have no parts
+
+
 def plain_letters(text: str) -> str:
     """Small letters without accents."""
     bare = "".join(
-        letter for letter in unicodedata.normalize("NFKD", text).lower() if not unicodedata.combining(letter)
-    )
+        letter for letter in unicodedata.normalize("NFKD", text).lower().translate(_LETTERS)
+        if not unicodedata.combining(letter)
+    )  # fmt: skip
     return unicodedata.normalize("NFC", bare)

@@ -23,7 +23,7 @@ from ftproc.files.words import (
 )
 
 #: Opening and closing brackets, and what may stand before them. The patterns take time by the length of a name.
-_OPENING, _CLOSING = re.compile(r"[(\[{<]"), (")", "]", "}", ">")
+_OPENING, _CLOSING = ("(", "[", "{", "<"), (")", "]", "}", ">")
 _BEFORE = " \t\n\r_.,:/-"
 _LAST = re.compile(r"(.*\S)(?:\s*/\s*|\s+in\s+|\s*,\s*|[\s_.-]+)(\S+)", re.IGNORECASE)
 _OVER_ALL = re.compile(r"(.*\S)(?:\s*/\s*|\s+in\s+|\s*,\s*)((?:[x*·]\s*)?\.?\d.*)", re.IGNORECASE)  # Range in 100 m
@@ -56,15 +56,20 @@ _FOREIGN = frozenset(
 #: Words in brackets that are notations of a time or an angle.
 NOTATIONS = frozenset(
     [
-        *("utc", "gps", "gpst", "hms", "hhmmss", "dms", "ddmmss", "dddmmss", "dmmss", "zulu", "z", "tai"),
+        *("utc", "utcg", "gps", "gpst", "hms", "hhmmss", "dms", "ddmmss", "dddmmss", "dmmss", "zulu", "z", "tai"),
         *("degmin", "degminsec"),
         *("t", "true"),  # from true north
     ]
 )
 
 
-#: Notations in words of degrees, as digits.
-_DEGREES = {"degmin": "ddmm", "degminsec": "ddmmss"}
+#: Words beside that of the zenith.
+_VERTICAL = QUALIFIERS.union(ALIASES["elevation"], WEAK_ALIASES["elevation"]) - {"e", "alt", "altitude"}
+#: Names of angles whose unit g is the gon, and not an acceleration.
+_OF_SURVEYORS = frozenset((*WEAK_ALIASES["azimuth"], "v", "vz", *ZENITH_ALIASES)) - {"z"}
+
+#: Notations in other words: of degrees, as digits, and of UTC in the Gregorian calendar.
+_ALSO = {"degmin": "ddmm", "degminsec": "ddmmss", "utcg": "utc"}
 
 #: Words of azimuths that count clockwise from north, and how else it is written.
 _FROM_NORTH = frozenset(("bearing", "brg", "taz", "north", "clockwise", "cw", "peilung", "пеленг"))
@@ -86,7 +91,9 @@ class Name(NamedTuple):
 
     def means(self, quantity: str) -> int:
         """0: not this quantity; 1: by one of its names; 2: by a name that other things have too."""
-        if self.foreign or ((self.unit or self.stem in ONLY_BY_UNIT) and not self.is_in_a_unit_of(quantity)):
+        known = self.stem in ALIASES[quantity] or self.stem in WEAK_ALIASES[quantity]
+        needs_unit = self.unit or (self.stem if known else self.core()) in ONLY_BY_UNIT
+        if self.foreign or (needs_unit and not self.is_in_a_unit_of(quantity)):
             return 0
         for rank, aliases in ((1, ALIASES), (2, WEAK_ALIASES)):
             if self.stem in aliases[quantity]:
@@ -110,7 +117,9 @@ class Name(NamedTuple):
     def is_zenith(self) -> bool:
         """Whether it names zenith angles."""
         alone = self.stem not in ONLY_BY_UNIT or self.is_in_a_unit_of("elevation")
-        return not self.foreign and alone and bool({self.stem, self.core()} & set(ZENITH_ALIASES))
+        marked = [word for word in self.words if word in ZENITH_ALIASES and len(word) > 2]
+        among = bool(marked) and _VERTICAL.issuperset({*self.words} - {*marked})
+        return not self.foreign and alone and (among or bool({self.stem, self.core()} & set(ZENITH_ALIASES)))
 
     def is_in_a_unit_of(self, quantity: str) -> bool:
         """Whether its unit, or a notation of degrees, is one of the quantity."""
@@ -126,9 +135,9 @@ def taken_apart(text: str, unit: str = "") -> Name:
     plain = compatible(text).strip().strip("\"'#%;!:").strip()
     plain = _EAST_OF_NORTH.sub("", _VALUE.sub("", _NUMBERED.sub("", plain)))
     found, notation, foreign = "", "", False
-    opening = _OPENING.search(plain) if plain.endswith(_CLOSING) else None
-    if opening:
-        before, inside = plain[: opening.start()].rstrip(_BEFORE), plain[opening.end() : -1].strip()
+    opening = plain.rfind(_OPENING[_CLOSING.index(plain[-1])]) if plain.endswith(_CLOSING) else -1
+    if opening >= 0:
+        before, inside = plain[:opening].rstrip(_BEFORE), plain[opening + 1 : -1].strip()
         known = _unit_inside(inside)
         squeezed = _squeezed(inside)
         if known:
@@ -136,9 +145,13 @@ def taken_apart(text: str, unit: str = "") -> Name:
         elif frames := _OF_FRAMES.fullmatch(inside):
             plain, notation = before, f"{frames[1]}fps"
         elif squeezed in NOTATIONS or "hh" in squeezed or "dd" in squeezed or "yy" in squeezed:
-            plain, notation = before, _DEGREES.get(squeezed, squeezed)
+            plain, notation = before, _ALSO.get(squeezed, squeezed)
+        elif squeezed == "g" and not _OF_SURVEYORS.isdisjoint(_words(before)[1]):
+            plain, found = before, "gon"
         elif inside.lower() in _FOREIGN:
             plain, foreign = before, True
+        elif squeezed in ZENITH_ALIASES:
+            plain = f"{before} {squeezed}"
         elif inside:
             plain, found = before, inside
     elif not _is_name(plain):
