@@ -20,6 +20,7 @@ from ftproc.files.reading.formats import blocks, content, encoding, layout, trim
 from ftproc.files.reading.formats.header import Blocks, TableHeader
 from ftproc.files.reading.formats.layout import BLANKS
 from ftproc.files.reading.formats.standards import catalogue
+from ftproc.files.reading.meaning import preamble
 from ftproc.files.words import MISSING_WORDS
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def _described(data: bytes, room: limits.Room, cut: bool = False) -> TableHeader
     """A text of a format that `catalogue` lists; None if it is none. cut: `data` is only the beginning."""
     head = data[:_HEAD]
     trimming.refuse_wide(room.name, head)
-    if _plain(head) is not None:
+    if not head.lstrip().startswith(b"[[") and _plain(head) is not None:
         return None
     sample = encoding.as_utf8(room.name, head, cut or len(data) > len(head)).data.decode("utf-8", "replace")
     return catalogue.read(sample, lambda: encoding.as_utf8(room.name, data, cut).data.decode("utf-8", "replace"), room)
@@ -210,12 +211,12 @@ def split(source: str, data: bytes, widths: Sequence[int] = (), cut: bool = Fals
         text = text._replace(data=trimming.unboxed(text.data))
     if not text.data.strip():
         raise InputError(f"{source}: the file is empty; expected a header line and rows.")
-    plain = None if widths else _plain(text.data)
-    if plain is not None:
+    if (plain := None if widths else _plain(text.data)) is not None:
         names, delimiter, start = plain
         found = CsvText(source, names, delimiter, memoryview(b""), False)
     else:
         found, start = _searched(source, text.data, widths)
+    widths = found.widths
     body = memoryview(text.data)[start:]
     if not cut:
         body, dropped = trimming.rows_only(source, body, found.names, found.delimiter, widths)
@@ -261,6 +262,8 @@ def _searched(source: str, data: bytes, widths: Sequence[int]) -> tuple[CsvText,
     lines = re.split(rb"(\r\n|\r|\n)", data[:_HEAD])
     texts = [line.decode("utf-8", "replace") for line in lines[::2]]
     found = layout.find(texts, widths)
+    if found and not found.named and (widths := widths or preamble.ruled(texts)):
+        found = layout.find(texts, widths)
     if found is None:
         names, delimiter, start = _first_line(source, data)
         return CsvText(source, names, delimiter, memoryview(b""), False), start
@@ -270,8 +273,7 @@ def _searched(source: str, data: bytes, widths: Sequence[int]) -> tuple[CsvText,
     parts += [f"{found.above} lines above the table"] if found.above else []
     parts += ["a row of units" if found.row_of_units else "units stated above the table"] if found.units else []
     text = CsvText(source, names, found.separator, memoryview(b""), False, widths=widths, units=found.units)
-    text = text._replace(above=found.said)
-    return text._replace(form=", ".join(parts)), start
+    return text._replace(above=found.said, form=", ".join(parts)), start
 
 
 def _first_line(source: str, data: bytes) -> tuple[list[str], str, int]:
@@ -279,7 +281,7 @@ def _first_line(source: str, data: bytes) -> tuple[list[str], str, int]:
     found = layout.LINE.match(data)
     assert found is not None
     line = found[1].decode("utf-8", "replace")
-    delimiter = max(",;\t", key=line.count)  # the comma if there is none
+    delimiter = max(",;\t", key=line.count)
     try:
         names = [name.strip() for name in next(csv.reader([line], delimiter=delimiter))]
     except (csv.Error, StopIteration) as error:

@@ -17,6 +17,7 @@ from ftproc.files.reading.formats.standards import asterix
 
 _DEEPEST = 12  # objects inside each other
 _HELD, _REFERENCE = 64, 16  # bytes that an object or list takes in memory, and one that is in it
+_INNERMOST = re.compile(r"\[([^\[\]]+)\]")
 _BETWEEN = re.compile(r"[\s,]*")  # two documents
 UNIT_KEYS = ("unit", "units", "uom")  # and its unit
 _VALUES = ("val", "value")  # keys under which decoders put the value of an item, beside its meaning
@@ -51,6 +52,12 @@ def of_records(found: Any, form: str, room: limits.Room) -> TableHeader | None:
     return columns.header(form) if columns.rows > 1 and len(columns.columns) > 1 else None
 
 
+def nested_rows(text: str, room: limits.Room) -> TableHeader | None:
+    """Rows of numbers in brackets, as programs print arrays."""
+    rows = [re.split(r"\s*,\s*|\s+", row.strip(" ,\n")) for row in _INNERMOST.findall(text)]
+    return of_records(rows, "rows in brackets", room)
+
+
 def plots(text: str, room: limits.Room) -> TableHeader | None:
     """The plots of ASTERIX in a JSON text, None if it has none."""
     return asterix.document(_parsed(room.name, text), lambda record: dict(flat(room.name, record, "", 0)), room)
@@ -78,8 +85,10 @@ def _parsed(name: str, text: str) -> Any:
 
 def _records(found: Any) -> Iterable[Mapping[str, Any]]:
     """The objects of a document, one for each reading."""
-    records = _of_rows(found) or (_of_columns(found) if _is_columns(found) else _deepest_list(found))
+    inner = [each for each in found.values() if _is_columns(each)] if isinstance(found, Mapping) else []
     units = found.get("units") if isinstance(found, Mapping) else None
+    found = inner[0] if len(inner) == 1 and not _is_columns(found) else found
+    records = _of_rows(found) or (_of_columns(found) if _is_columns(found) else _deepest_list(found))
     if not isinstance(units, Mapping) or not all(isinstance(unit, str) for unit in units.values()):
         return records
     called = {name: f"{name} [{unit}]" for name, unit in units.items()}

@@ -77,7 +77,11 @@ class TableHeader:
 def of_arrow(
     table: pa.Table, source: str, form: str = "", units: Sequence[str] = (), decimal_comma: bool = False
 ) -> TableHeader:
-    """The header of a table in memory."""
+    """The header of a table in memory, the values inside structures as columns of their own: `polar.rho`."""
+    import pyarrow as pa
+
+    while any(pa.types.is_struct(field.type) for field in table.schema):
+        table, units = table.flatten(), ()
     return TableHeader(
         source,
         list(table.column_names),

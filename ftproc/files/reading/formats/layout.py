@@ -10,13 +10,12 @@ import bisect
 import csv
 import itertools
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from ftproc.files.reading.meaning import parts
 from ftproc.files.reading.meaning.names import taken_apart
-from ftproc.files.reading.meaning.preamble import units_stated
-from ftproc.files.units import unit_named
+from ftproc.files.reading.meaning.preamble import are_units, enumerated, units_stated
 from ftproc.files.words import QUANTITIES
 
 #: How comment lines begin. A semicolon does so too, where it is not the separator.
@@ -37,7 +36,7 @@ _WITH_BLANKS = re.compile(
     r')\s*"?'
 )
 _LONGEST_CELL = 200  # characters of a number or a time
-_RULE = re.compile(r"(?=[+*#|,;\s]*+(?:[-=_][+*#|,;\s]++)*+[-=_]{2})[-=_+*#|,;\s]*+")
+_RULE = re.compile(r"(?=[+*#|,;:\s]*+(?:[-=_][+*#|,;:\s]++)*+[-=_]{2})[-=_+*#|,;:\s]*+")
 #: Columns without a name above them: the name that they get -> how the rows begin.
 _UNNAMED = {
     "Date": r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s+\d{1,2}:\d{2}",
@@ -45,7 +44,6 @@ _UNNAMED = {
     "row": r"\s*\"?(\d+)\"?\s",  # as R numbers them
 }
 _NUMBERED = re.compile(r"^\d+\s*[:=)]\s*(?=[^\W\d])")  # a number before a name: `1:time`
-_ENUMERATED = re.compile(r"[\s#%;*]*+(?:columns?|col|fields?)?[\s.]*+#?(\d++)\s*+[:=.)-]\s*([^\W\d].*)", re.IGNORECASE)
 _CALLED = re.compile(
     r"^\s*(?:columns?|fields?|names?|header)\s*[:=]\s*", re.IGNORECASE
 )  # before the names in a comment
@@ -163,16 +161,18 @@ def _with_names(
     index = top - 1
     while index >= 0 and _RULE.fullmatch(lines[filled[index]]):  # a rule under the names
         index -= 1
+    over = [lines[number] for number in filled[: index + 1]]
+    index = _above_comments(over, index, lambda line: _heading(line, separator, width, block, widths))
     if index >= 0:
         cells = _heading(lines[filled[index]], separator, width, block, widths)
-        if cells is not None and _is_units(cells) and index:
+        if cells is not None and are_units(cells) and index:
             units, index = cells, index - 1
     names = None if index < 0 else _heading(lines[filled[index]], separator, width, block, widths)
     split_up = parts.under(_over_columns(lines[filled[index]], block, width), units) if units and not widths else None
     names, units = split_up or (names, units)
     if names is not None and sum(bool(_CELL.fullmatch(_NUMBERED.sub("", name))) for name in names) > len(names) / 2:
         names = None
-    names = _enumerated([lines[number] for number in filled[:top]], width) or names
+    names = enumerated([lines[number] for number in filled[:top]], width) or names
     if names is None and top < start:  # the numbers above belong to something else
         return _with_names(lines, filled, start, separator, {**rows, **{n: [""] for n in filled[top:start]}}, widths)
     if names is None and index >= 0 and top - index == 1 and (cells := _mismatched(lines[filled[index]], separator)):
@@ -195,10 +195,15 @@ def _with_names(
                   row_of_units, said)  # fmt: skip
 
 
-def _enumerated(above: Sequence[str], width: int) -> list[str] | None:
-    """The names of columns that lines above the table number: `Column 2: range (m)`."""
-    found = {int(match[1]): match[2].strip() for line in above if (match := _ENUMERATED.fullmatch(line))}
-    return [found[k] for k in range(1, width + 1)] if sorted(found) == list(range(1, width + 1)) else None
+def _above_comments(lines: Sequence[str], index: int, heading: Callable[[str], list[str] | None]) -> int:
+    """The index of the line of names, or of units, where comments stand between these and the rows."""
+    for above in range(index, -1, -1):
+        cells = heading(lines[above]) or []
+        if are_units(cells) or sum(any(map(taken_apart(cell).means, QUANTITIES)) for cell in cells) > 1:
+            return above
+        if not is_comment(lines[above]):
+            break
+    return index
 
 
 def _mismatched(line: str, separator: str) -> list[str]:
@@ -206,15 +211,6 @@ def _mismatched(line: str, separator: str) -> list[str]:
     cells = split(line, separator)
     plain = all(re.fullmatch(r"[A-Za-z_]\w*(?: ?[(\[].{1,8}[)\]])?", cell) for cell in cells)
     return cells if plain and separator != BLANKS and len(cells) > 1 else []
-
-
-def _is_units(cells: Sequence[str]) -> bool:
-    """Whether most cells are names of units."""
-    words = [cell.strip("()[]{} ") for cell in cells]
-    present = [word for word in words if word.strip("-")]
-    known = sum(any(unit_named(quantity, word) is not None for quantity in QUANTITIES) for word in present)
-    brackets = sum(bool(re.fullmatch(r"[(\[].*[)\]]", cell)) for cell in cells)
-    return bool(present) and 2 * max(known, brackets) >= len(present)
 
 
 def _heading(line: str, separator: str, width: int, block: Sequence[str], widths: Sequence[int]) -> list[str] | None:

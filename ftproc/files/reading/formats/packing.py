@@ -5,6 +5,7 @@ from __future__ import annotations
 import bz2
 import gzip
 import lzma
+import re
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +16,11 @@ from ftproc.files.limits import Room, short_name
 from ftproc.files.reading.formats import content
 
 _CHUNK = 8 << 20  # bytes
+#: Members of an archive that are written for people.
+_DOCUMENT = re.compile(
+    r"(?:^|/)(?:read_?me|licen[cs]e|copying|changelog|about|notes)\b|\.(?:md|pdf|html?|docx?|rtf|png|jpe?g)$",
+    re.IGNORECASE,
+)
 
 #: Ending -> how such a file begins, and its name in messages.
 KINDS = {
@@ -35,14 +41,14 @@ def ending(name: str, head: bytes) -> str | None:
     )
 
 
-def unpacked(name: str, path: Path, kind: str, directory: Path, room: Room) -> Path:
-    """Unpack into `directory`; the file there ends as the name does without the ending. Raises InputError, also for
-    what grows beyond the limit."""
+def unpacked(name: str, path: Path, kind: str, directory: Path, room: Room, part: str = "") -> Path:
+    """Unpack into `directory`; the file there ends as the name does without the ending. part: the wanted member of an
+    archive. Raises InputError, also for what grows beyond the limit."""
     what = KINDS[kind][1]
     with content.undamaged(name, f"a {what} file", "copy it again"):
         try:
             if kind == ".zip":
-                return _from_zip(name, path, directory, room)
+                return _from_zip(name, path, directory, room, part)
             inner = path.name[: -len(kind)] if path.name.lower().endswith(kind) else path.name
             target = directory / short_name(inner)
             with _OPEN[kind](path) as packed:
@@ -70,17 +76,22 @@ def _copy(packed: IO[bytes], target: Path, room: Room) -> None:
             stream.write(data)
 
 
-def _from_zip(name: str, path: Path, directory: Path, room: Room) -> Path:
+def _from_zip(name: str, path: Path, directory: Path, room: Room, part: str) -> Path:
     with zipfile.ZipFile(path) as archive:
-        members = [m for m in archive.infolist() if not m.is_dir() and not m.filename.startswith(("__MACOSX/", "."))]
+        files = [m for m in archive.infolist() if not m.is_dir() and not m.filename.startswith(("__MACOSX/", "."))]
+        members = [m for m in files if m.filename == part] if part else files
+        if len(members) > 1:
+            members = [m for m in members if not _DOCUMENT.search(m.filename)] or members
         if len(members) != 1:
-            files = ", ".join(member.filename for member in members[:10]) or "nothing"
+            held = ", ".join(member.filename for member in files[:10]) or "nothing"
+            whole = name.removesuffix(f"#{part}")
             raise InputError(
-                f"{name}: a zip archive must hold one log, this one holds {files}. Unpack it, name a file."
+                f"{whole}: {f'there is no {part} in this zip archive' if part else 'which file of this zip archive?'} "
+                f"It holds {held}. Name one behind #, such as {whole}#{files[0].filename if files else 'log.csv'}."
             )
         if members[0].flag_bits & 1:
             raise InputError(f"{name}: the zip archive needs a password; unpack it first.")
-        target = directory / short_name(members[0].filename)
+        target = directory / short_name(Path(members[0].filename).name)
         with archive.open(members[0]) as packed:
             _copy(packed, target, room)
         return target

@@ -16,10 +16,11 @@ from ftproc.files.words import QUANTITIES
 _SAMPLE = 200  # lines by which a text is known
 _MOSTLY = 0.6  # of these hold several pairs
 _STAMP = r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}[T ])?\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?(?:\s?Z|\s?UTC|[+-]\d{2}:?\d{2})?"
+_DMS = r"[+-]?\d{1,3}\s?[°dD]\s?\d{1,2}\s?['′m]\s?\d{1,2}(?:[.,]\d+)?(?:''|[\"″s])?"  # 320°42'38.6", 320d42'38.6
 #: Parts of a name are bounded, and taken whole, so that a search takes time by the length of the text.
 _NAME = r"[\"']?(?P<name>[^\W\d][\w./°-]{0,100}+(?:\s?[(\[][^)\]=:]{0,100}+[)\]])?)[\"']?"
 _VALUE = (
-    rf"(?P<value>\"[^\"]*\"|'[^']*'|{_STAMP}"
+    rf"(?P<value>\"[^\"]*\"|'[^']*'|{_STAMP}|{_DMS}"
     r"|[+-]?\.?\d[^\s,;{}\]\"'|]*(?:,\d+(?=\s*;|\s*$|\s+[^\W\d]))?(?:\s[A-Za-z°]{1,4}(?=\s*(?:[,;|]|$)))?"
     r"|(?>[^\s,;{}=:\"'|]+)(?!\s*[=:]))"
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping, Sequence
 
@@ -25,6 +26,8 @@ _GROUPS = {
     **dict.fromkeys(("distance", "distances", "length", "lengths", "ranges"), QUANTITIES[1:2]),
     "times": QUANTITIES[:1],
 }
+_RULE = re.compile(r"(?<!\S)[-=_]{3,}(?!\S)")
+_ENUMERATED = re.compile(r"[\s#%;*]*+(?:columns?|col|fields?)?[\s.]*+#?(\d++)\s*+[:=.)-]\s*([^\W\d].*)", re.IGNORECASE)
 
 
 def units_stated(above: Sequence[str], names: Sequence[str]) -> list[str]:
@@ -69,3 +72,25 @@ def _found(pattern: re.Pattern[str], line: str) -> dict[str, str]:
 
 def _of(name: Name, stated: Mapping[str, str]) -> str:
     return next((unit for quantity, unit in stated.items() if name.means(quantity)), "")
+
+
+def enumerated(above: Sequence[str], width: int) -> list[str] | None:
+    """The names of columns that lines above the table number: `Column 2: range (m)`."""
+    found = {int(match[1]): match[2].strip() for line in above if (match := _ENUMERATED.fullmatch(line))}
+    return [found[k] for k in range(1, width + 1)] if sorted(found) == list(range(1, width + 1)) else None
+
+
+def are_units(cells: Sequence[str]) -> bool:
+    """Whether most cells are names of units."""
+    words = [cell.strip("()[]{} ") for cell in cells]
+    present = [word for word in words if word.strip("-")]
+    known = sum(any(unit_named(quantity, word) is not None for quantity in QUANTITIES) for word in present)
+    brackets = sum(bool(re.fullmatch(r"[(\[].*[)\]]", cell)) for cell in cells)
+    return bool(present) and 2 * max(known, brackets) >= len(present)
+
+
+def ruled(lines: Sequence[str]) -> list[int]:
+    """The widths of columns of which each has a rule of its own under its name; nothing without such rules."""
+    groups = next((found for line in lines if len(found := list(_RULE.finditer(line))) > 2), [])
+    ends = [each.end() for each in groups][:-1]
+    return [*(high - low for low, high in itertools.pairwise([0, *ends])), max(map(len, lines))] if ends else []

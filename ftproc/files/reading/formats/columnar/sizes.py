@@ -31,6 +31,12 @@ def is_text(kind: pa.DataType) -> bool:
     return bool(t.is_string(kind) or t.is_binary(kind) or t.is_large_string(kind) or t.is_large_binary(kind))
 
 
+def is_structure(kind: pa.DataType) -> bool:
+    import pyarrow as pa
+
+    return bool(pa.types.is_struct(kind))
+
+
 def is_number(kind: pa.DataType) -> bool:
     """Whether a value takes eight bytes at most, wherever it stands."""
     import pyarrow as pa

@@ -56,7 +56,9 @@ _TARGETS = (
 )
 _STATION = _Role("010", "sic|identification")
 _ITEM = re.compile(r"(?:^|[^A-Za-z0-9])I?(\d{3})(?:[^A-Za-z0-9]+|$)(.*)")
+_CATEGORY = re.compile(r"^(?:CAT)?I?0?48[/_.: -](?=I?\d{3})", re.IGNORECASE)
 _KEY = re.compile(r"I?\d{3}")
+_FEW = 20  # rows by which a column holds numbers
 _BLOCK = re.compile(r"CAT(\d{3})")
 #: Names of columns, without marks, by which a target is known; and those that stand beside RHO and THETA.
 _OF_TARGETS = ("acaddr", "aircraftaddress", "targetaddress", "ta", "icao", "icao24", "tn", "trackno", "tracknumber")
@@ -93,7 +95,14 @@ def by_names(header: TableHeader) -> TableHeader:
     """A table with RHO and THETA beside other items of category 048, with what the standard states of them."""
     plain = [re.sub(r"[^a-z0-9]", "", name.lower()) for name in header.names]
     words = {word for name in header.names for word in re.split(r"[^a-z0-9]+", name.lower())}
-    if not {"rho", "theta"} <= words or (len(_BESIDE & {*plain, *words}) < 2 and not {"polar", "coordinates"} <= words):
+    bare = {_CATEGORY.sub("", name): name for name in header.names}
+    if len(bare) < len(header.names):
+        return header
+    items = [
+        name for k, name in enumerate(bare) if _ITEM.match(name) and name != bare[name] and _has_numbers(header, k)
+    ]
+    beside = len(_BESIDE & {*plain, *words}) > 1 or len(items) > 2 or {"polar", "coordinates"} <= words
+    if not ({"rho", "theta"} <= words and beside):
         return header
     indices = {
         quantity: [k for k, name in enumerate(header.names) if word in re.split(r"[^a-z0-9]+", name.lower())]
@@ -102,11 +111,17 @@ def by_names(header: TableHeader) -> TableHeader:
     if any(len(found) != 1 for found in indices.values()) or header.units:
         return header
     columns = {quantity: header.names[found[0]] for quantity, found in indices.items()}
-    time = _named(tuple(header.names), _QUANTITIES["time"])
-    units = ["deg" if name == columns["azimuth"] else "s" * (name == time) for name in header.names]
+    time = _named((*items, *header.names), _QUANTITIES["time"])
+    time = bare.get(time, time)
+    time = header.names[plain.index("tod")] if "tod" in plain and "time" not in plain else time
+    level = bare.get(_named(tuple(items), (_Role("090", ""),)), "")
+    stated_units = {columns["azimuth"]: "deg", time: "s", level: "fl"}
+    units = [stated_units.get(name, "") for name in header.names]
     if max(map(_float, header.load([], indices["range"]).column(0).to_pylist()), default=0.0) <= _FARTHEST_NMI:
         units[indices["range"][0]] = "nmi"
     target = next((header.names[plain.index(word)] for word in _OF_TARGETS if word in plain), "")
+    target = target or next(filter(None, (bare.get(_named(tuple(items), (role,)), "") for role in _TARGETS[:2])), "")
+    columns |= {"height": level} if level else {}
     if not any(taken_apart(name).means("elevation") == 1 for name in header.names):
         columns["elevation"] = ABSENT
     known = Stated(columns | ({"time": time} if time else {}), "north", target)
@@ -227,6 +242,10 @@ def stated(header: TableHeader, category: int, table: Sparse) -> TableHeader:
         )
     known = Stated(columns, "north", target, _named(names, (_STATION,)))
     return replace(header, stated=known, units=[unit.get(name, "") for name in names])
+
+
+def _has_numbers(header: TableHeader, index: int) -> bool:
+    return any(map(_float, header.load([], [index]).column(0).slice(0, _FEW).to_pylist()))
 
 
 def _float(cell: Any) -> float:

@@ -71,6 +71,7 @@ TEXTS = (
     _no("Topcon GTS", r"\A_'[^\r\n]{0,200}_\(", f"a field book of a total station (Topcon), {_SURVEY}"),
     _no("Sokkia SDR", r"\A00NM(?:SDR|\w\w)", f"a field book of a total station (SDR), {_SURVEY}"),
     _of("XML", r"\A\s*<(?:\?xml\b|[A-Za-z][\w:.-]*[\s>])", markup.read),
+    _of("rows in brackets", r"\A\s*\[\s*\[", documents.nested_rows),
     _of("names and values", r"[=:]\s*[\"']?[+-]?\.?\d", tagged.pairs),
 )  # fmt: skip
 
