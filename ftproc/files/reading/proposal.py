@@ -23,7 +23,7 @@ from ftproc.files.reading.meaning.numbers import as_text, parsed, without_text
 from ftproc.files.reading.meaning.questions import Proposal, Propose, answer, named
 from ftproc.files.reading.meaning.values import motion, plausibility
 from ftproc.files.units import UNITS, Unit
-from ftproc.files.words import OTHER_THINGS, QUANTITIES
+from ftproc.files.words import NOT_UNITS, OTHER_THINGS, QUANTITIES
 from ftproc.records import FloatArray
 
 if TYPE_CHECKING:
@@ -78,6 +78,8 @@ def _proposed(header: TableHeader, free: Sequence[int], found: Mapping[str, Sequ
     indices = list(free)[:_MOST_COLUMNS]
     if not indices:
         return Proposal()
+    if "time" in found and len(found) > 1:
+        return _of_angles(header, indices, found)
     table = header.load([], indices).slice(0, _ROWS)
     cells = {index: table.column(k) for k, index in enumerate(indices)}
     numbers = {index: values for index, column in cells.items() if (values := _values(column, header)) is not None}
@@ -94,6 +96,37 @@ def _proposed(header: TableHeader, free: Sequence[int], found: Mapping[str, Sequ
     time, columns = best
     clock = "+".join(named(header.names[index], index) for index in time)
     return Proposal(answer(header.names, columns, "" if "time" in found else clock, joined), seen)
+
+
+def _of_angles(header: TableHeader, free: Sequence[int], found: Mapping[str, Sequence[int]]) -> Proposal:
+    """The angles that are wanting among columns whose names say nothing."""
+    known = {q: positions[0] for q, positions in found.items() if q != "time" and len(positions) == 1}
+    table = header.load([], [*free, *known.values()]).slice(0, _ROWS)
+    cells = dict(zip([*free, *known.values()], table.columns, strict=True))
+    numbers = {index: values for index, column in cells.items() if (values := _values(column, header)) is not None}
+    varied = [index for index in free if _varies(cells[index], numbers.get(index))]
+    wanted = [quantity for quantity in QUANTITIES[2:] if quantity not in found]
+    unnamed = [index for index in varied if index in numbers and not _says_something(header.names[index])]
+    if "range" not in known or len(known) < len(found) - 1 or not set(known.values()) <= set(numbers):
+        return Proposal(varied=varied)
+    fixed = {quantity: numbers[index] for quantity, index in known.items()}
+    clock = _clock(header, tuple(found["time"]))
+    choice = _likeliest(clock, fixed, {index: numbers[index] for index in unnamed[:_MOST_TRIED]}, [wanted])
+    columns = {quantity: choice[quantity] for quantity in wanted} if choice else {}
+    return Proposal(answer(header.names, columns), "", columns, varied)
+
+
+def _varies(column: pa.ChunkedArray, values: FloatArray | None) -> bool:
+    if values is None:
+        return len(column.unique()) > 1
+    return bool(np.ptp(values[np.isfinite(values)]) > 0 and not (values[1:] == values[:-1] + 1).all())
+
+
+def _says_something(name: str) -> bool:
+    """Whether a name, or its unit, is that of a quantity or of something else."""
+    apart = taken_apart(name)
+    of_another = apart.unit and not apart.is_in_a_unit_of("azimuth") and any(map(apart.is_in_a_unit_of, QUANTITIES))
+    return _is_other(name) or bool(of_another) or bool({apart.stem, *apart.words} & NOT_UNITS)
 
 
 def _of_minutes(numbers: dict[int, FloatArray]) -> set[int]:
@@ -157,15 +190,26 @@ def _best(
             and not (values[1:] == values[:-1] + 1).all()
         ][:_MOST_TRIED]  # fmt: skip
         kinds = [QUANTITIES[1:]] if len(varied) > 2 else [QUANTITIES[1:3], QUANTITIES[2:]]
-        tries = [
-            each
-            for kind in kinds
-            for indices in itertools.permutations(varied, len(kind))
-            for each in _tries(clock, {q: numbers[p] for q, p in zip(kind, indices, strict=True)}, indices)
-        ]
-        tries.sort(key=lambda each: -each.odds)
-        if tries and all(each.odds * _CLEARLY < tries[0].odds for each in tries if each.columns != tries[0].columns):
-            return time, tries[0].columns
+        choice = _likeliest(clock, {}, {index: numbers[index] for index in varied}, kinds)
+        if choice is not None:
+            return time, choice
+    return None
+
+
+def _likeliest(
+    clock: FloatArray, fixed: Mapping[str, FloatArray], free: Mapping[int, FloatArray], kinds: Sequence[Sequence[str]]
+) -> Mapping[str, int] | None:
+    """The columns of quantities that make a target which moves like one, if no other choice nearly does. fixed: the
+    readings that are known. free: of columns. kinds: the quantities that are sought together."""
+    tries = [
+        each
+        for kind in kinds
+        for indices in itertools.permutations(free, len(kind))
+        for each in _tries(clock, fixed, dict(zip(kind, indices, strict=True)), free)
+    ]
+    tries.sort(key=lambda each: -each.odds)
+    if tries and all(each.odds * _CLEARLY < tries[0].odds for each in tries if each.columns != tries[0].columns):
+        return tries[0].columns
     return None
 
 
@@ -175,8 +219,12 @@ def _is_other(name: str) -> bool:
     return apart.foreign or bool({apart.stem, *apart.words} & OTHER_THINGS)
 
 
-def _tries(clock: FloatArray, readings: Mapping[str, FloatArray], indices: Sequence[int]) -> Iterator[_Try]:
+def _tries(
+    clock: FloatArray, fixed: Mapping[str, FloatArray], columns: Mapping[str, int], values: Mapping[int, FloatArray]
+) -> Iterator[_Try]:  # fmt: skip
     """A choice of columns, in each of the common units in which the target moves like one."""
+    either = {**fixed, **{quantity: values[index] for quantity, index in columns.items()}}
+    readings = {quantity: either[quantity] for quantity in QUANTITIES if quantity in either}
     if len(clock) != len(next(iter(readings.values()))):
         return
     raw = {"time": clock, **readings}
@@ -189,7 +237,7 @@ def _tries(clock: FloatArray, readings: Mapping[str, FloatArray], indices: Seque
         names = {"time": "s", "range": length, "azimuth": angle, "elevation": angle}
         way = motion.Way(tuple(UNITS[q][names[q]] if q in raw else None for q in QUANTITIES))
         if _is_a_target(moved, way):
-            yield _Try(moved.likelihood(way) * a * b, dict(zip(readings, indices, strict=True)))
+            yield _Try(moved.likelihood(way) * a * b, columns)
 
 
 def _fits(quantity: str, unit: Unit, sizes: plausibility.Sizes) -> bool:

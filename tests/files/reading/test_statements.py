@@ -32,7 +32,7 @@ def log(tmp_path: Path) -> Log:
     [
         ("# two-way range", "ranges there and back. If these are such, say --columns range=range_m --units", "range=m"),
         ("# vertical angle is a zenith distance", "say --elevation-from zenith; if not, --elevation-from horizon", ""),
-        ("# azimuth counted from south", "azimuth_zero_deg = 180 in the [station] of a station file", "north"),
+        ("# azimuth counted from south", "zero_deg = 180 under [azimuth]", "north"),
     ],
 )
 def test_a_line_above_the_table_is_heard(log: Log, line: str, sentence: str, otherwise: str) -> None:

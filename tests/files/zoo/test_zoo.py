@@ -15,6 +15,7 @@ from ftproc.files.reading import logs
 from ftproc.records import MeasurementLog
 from ftproc.settings import Station
 from tests.files.zoo.animals import all_animals
+from tests.files.zoo.exports import all_exports
 from tests.files.zoo.flight import Animal, flight
 from tests.files.zoo.neighbours import all_neighbours
 from tests.files.zoo.others import all_others
@@ -22,7 +23,15 @@ from tests.files.zoo.radars import all_radars
 from tests.files.zoo.standards import all_standards
 from tests.files.zoo.strangers import all_strangers
 
-ANIMALS = [*all_animals(), *all_others(), *all_strangers(), *all_radars(), *all_standards(), *all_neighbours()]
+ANIMALS = [
+    *all_animals(),
+    *all_others(),
+    *all_strangers(),
+    *all_radars(),
+    *all_standards(),
+    *all_neighbours(),
+    *all_exports(),
+]
 MOST_QUESTIONS = 0.1  # share of the animals
 
 

@@ -32,10 +32,12 @@ _OF_THE_QUANTITY = frozenset(["true", "corr", "raw", "ref"])
 
 class Proposal(NamedTuple):
     """answer: the options that say which column is which, as they were tried on the log; or "". seen: what each column
-    holds."""
+    holds. columns: of the quantities in the answer. varied: the free columns that neither stay nor count."""
 
     answer: str = ""
     seen: str = ""
+    columns: Mapping[str, int] = {}
+    varied: Collection[int] = ()
 
 
 #: Free columns, and those of each quantity that is known -> which of the free ones may be which; see `proposal`.
@@ -136,6 +138,19 @@ def refuse_hours(source: str, name: Name, quantity: str) -> None:
             f'{source}: column "{name.text}" is in hours ({name.notation}), which are read as times only. '
             "Convert it to degrees (15 to the hour) and rename it; "
             f"if it is in degrees, minutes and seconds, say --units {quantity}=deg."
+        )
+
+
+def refuse_left_out(source: str, names: Sequence[str], proposed: Proposal) -> None:
+    """Ask about columns with names that say nothing, which make a target that moves like one with those that are
+    known."""
+    if proposed.columns:
+        (one, first), *others = ((quantity, names[index]) for quantity, index in proposed.columns.items())
+        which = "".join([f'"{first}" may be the {one}', *(f' and "{name}" the {other}' for other, name in others)])
+        none = ",".join(f"{quantity}={ABSENT}" for quantity in proposed.columns)
+        raise InputError(
+            f"{source}: by the values, {which}. Say {proposed.answer}, which gives a target that moves like one, or "
+            f"--columns {none} if not."
         )
 
 

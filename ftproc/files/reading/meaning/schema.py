@@ -99,11 +99,17 @@ def resolve(
     if not {"range", "azimuth"} & {*found, *columns}:
         questions.refuse_positions(source, apart)
     questions.check_complete(source, names, {q: column.positions for q, column in found.items()}, propose)
+    absent = [q for q in QUANTITIES[2:] if q not in found and columns.get(q) != ABSENT]
+    free = [k for k in range(len(names)) if k not in taken]
+    proposed = propose(free, {q: column.positions for q, column in found.items()}) if absent and free else None
+    if proposed and set(absent) >= set(proposed.columns):
+        questions.refuse_left_out(source, names, proposed)
+    free = [k for k in free if k in proposed.varied] if proposed and proposed.varied else free
     for quantity in QUANTITIES:
         if quantity not in found and columns.get(quantity) != ABSENT:
             azimuth = found.get("azimuth") if quantity == "elevation" and "azimuth" not in columns else None
             doubtful = azimuth is not None and apart[azimuth.position].means("azimuth") == 2
-            questions.refuse_alike(source, apart, [k for k in range(len(names)) if k not in taken], quantity, doubtful)
+            questions.refuse_alike(source, apart, free, quantity, doubtful)
     return found
 
 

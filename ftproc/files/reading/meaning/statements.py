@@ -22,7 +22,7 @@ _CONVENTIONS = (
     (r"two[- ]?way|round[- ]?trip", "range", "ranges there and back", "--units 'range=0.5 m' (half of each)"),
     (r"zenith(?:al)?[ -](?:distance|angle)", "elevation", "angles from the zenith", "--elevation-from zenith"),
     (r"(?:from|zero at|counted from|south is zero) (?:the )?south\b", "azimuth", "azimuths from south",
-     "azimuth_from = \"north\" and azimuth_zero_deg = 180 in the [station] of a station file"),
+     "--config FILE with from = \"north\" and zero_deg = 180 under [azimuth] in it"),
 )  # fmt: skip
 
 
