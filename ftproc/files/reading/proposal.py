@@ -100,20 +100,23 @@ def _proposed(header: TableHeader, free: Sequence[int], found: Mapping[str, Sequ
 
 def _of_angles(header: TableHeader, free: Sequence[int], found: Mapping[str, Sequence[int]]) -> Proposal:
     """The angles that are wanting among columns whose names say nothing."""
+    free = [index for index in free if not _says_something(header.names[index])]
+    if not free:
+        return Proposal()
     known = {q: positions[0] for q, positions in found.items() if q != "time" and len(positions) == 1}
     table = header.load([], [*free, *known.values()]).slice(0, _ROWS)
     cells = dict(zip([*free, *known.values()], table.columns, strict=True))
     numbers = {index: values for index, column in cells.items() if (values := _values(column, header)) is not None}
-    varied = [index for index in free if _varies(cells[index], numbers.get(index))]
+    idle = [index for index in free if not _varies(cells[index], numbers.get(index))]
     wanted = [quantity for quantity in QUANTITIES[2:] if quantity not in found]
-    unnamed = [index for index in varied if index in numbers and not _says_something(header.names[index])]
+    unnamed = [index for index in free if index in numbers and index not in idle]
     if "range" not in known or len(known) < len(found) - 1 or not set(known.values()) <= set(numbers):
-        return Proposal(varied=varied)
+        return Proposal(idle=idle)
     fixed = {quantity: numbers[index] for quantity, index in known.items()}
     clock = _clock(header, tuple(found["time"]))
     choice = _likeliest(clock, fixed, {index: numbers[index] for index in unnamed[:_MOST_TRIED]}, [wanted])
     columns = {quantity: choice[quantity] for quantity in wanted} if choice else {}
-    return Proposal(answer(header.names, columns), "", columns, varied)
+    return Proposal(answer(header.names, columns), "", columns, idle)
 
 
 def _varies(column: pa.ChunkedArray, values: FloatArray | None) -> bool:

@@ -32,12 +32,12 @@ _OF_THE_QUANTITY = frozenset(["true", "corr", "raw", "ref"])
 
 class Proposal(NamedTuple):
     """answer: the options that say which column is which, as they were tried on the log; or "". seen: what each column
-    holds. columns: of the quantities in the answer. varied: the free columns that neither stay nor count."""
+    holds. columns: of the quantities in the answer. idle: free columns that stay or count."""
 
     answer: str = ""
     seen: str = ""
     columns: Mapping[str, int] = {}
-    varied: Collection[int] = ()
+    idle: Collection[int] = ()
 
 
 #: Free columns, and those of each quantity that is known -> which of the free ones may be which; see `proposal`.

@@ -104,7 +104,7 @@ def resolve(
     proposed = propose(free, {q: column.positions for q, column in found.items()}) if absent and free else None
     if proposed and set(absent) >= set(proposed.columns):
         questions.refuse_left_out(source, names, proposed)
-    free = [k for k in free if k in proposed.varied] if proposed and proposed.varied else free
+    free = [k for k in free if not proposed or k not in proposed.idle]
     for quantity in QUANTITIES:
         if quantity not in found and columns.get(quantity) != ABSENT:
             azimuth = found.get("azimuth") if quantity == "elevation" and "azimuth" not in columns else None
