@@ -227,14 +227,11 @@ def shapes() -> Iterator[Case]:
         gone = HEADER.replace(name, "something")
         if other == "time":
             yield Case("log", "no time", written(text(header=gone)), ("no time column", "--columns time=something"))
+        elif other == "range":
+            lacks = lambda log: bool(np.isnan(log.measurement).all(0).sum() == 1)  # noqa: E731
+            yield Case("log", "no range", written(text(header=gone)), None, lacks)
         else:
-            yield Case(
-                "log",
-                f"no {other}",
-                written(text(header=gone)),
-                None,
-                lambda log: bool(np.isnan(log.measurement).all(0).sum() == 1),
-            )
+            yield Case("log", f"no {other}", written(text(header=gone)), ("may be the", f"--columns {other}=something"))
     for header, words in (
         ("a;b;c;d", "no line of column names"),
         ("time_s,x,y,z", "neither range"),

@@ -12,7 +12,7 @@ from ftproc.files.limits import Room
 from ftproc.files.reading.formats import content
 from ftproc.files.reading.formats.arrays.rehearsal import rehearse
 from ftproc.files.reading.formats.columnar import sizes
-from ftproc.files.reading.formats.header import Blocks, TableHeader, of_arrow, units_of
+from ftproc.files.reading.formats.header import Blocks, TableHeader, is_log, of_arrow, units_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -26,7 +26,8 @@ def read(name: str, path: Path, room: Room) -> TableHeader:
     content.read(name, path, limit=1)  # for its messages
     file = _Parquet(name, path, room)
     metadata = file.schema.metadata or {}
-    if any(sizes.is_structure(field.type) for field in file.schema):
+    plain = [field.name for field in file.schema if not sizes.is_structure(field.type)]
+    if len(plain) < len(file.names) and not is_log(plain, {}):
         return of_arrow(file.load([], range(len(file.names))), name, "Parquet")
     return TableHeader(
         name, file.names, file.load, metadata=metadata, blocks=file.blocks, units=units_of(file.schema), form="Parquet"
