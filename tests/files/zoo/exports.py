@@ -75,6 +75,9 @@ def printed() -> Iterator[Animal]:
     pairs = zip(STAMPS.tolist(), *cells, F.r.tolist(), strict=True)
     text = "".join(f"{when} AZ={a} EL={e} R={r:.3f}m\n" for when, a, e, r in pairs)
     yield Animal("degrees with minutes and seconds in pairs", written("a.log", text), NORTH, **DMS)
+    rows = lines("", F.t, F.r, F.a, F.e, separator="  ").splitlines()
+    rows[50] = f"{rows[50].split()[0]}  ---  ---  ---"
+    yield Animal("dashes without names", written("a.txt", "\n".join([*rows, ""])), columns, 0, missing=3)
     item = "I048/140,I048/040-RHO,I048/040-THETA,I048/161"
     tracks = np.full(len(F.t), 1044)
     text = lines(f"{item},I048/090", F.t + 36000, F.r / 1852, DEG_A, tracks, np.full(len(F.t), 310.25))
@@ -88,6 +91,7 @@ def structures() -> Iterator[Animal]:
     yield Animal("columns beside their units", written("a.json", json.dumps(document)), NORTH, 0)
     yield Animal("a structure in Parquet", _structured, NORTH, 0)
     yield Animal("an archive with a note", _archive, NORTH, 0)
+    yield Animal("a file of an archive", _member, NORTH, 0)
 
 
 def _structured(directory: Path) -> Path:
@@ -101,6 +105,13 @@ def _archive(directory: Path) -> Path:
         archive.writestr("README.txt", "Recorded on the range.\n")
         archive.writestr("run/track.csv", PLAIN)
     return directory / "a.zip"
+
+
+def _member(directory: Path) -> Path:
+    with zipfile.ZipFile(directory / "a.zip", "w") as archive:
+        archive.writestr("other.csv", "time_s,range_m\n0,1\n")
+        archive.writestr("track.csv", PLAIN)
+    return directory / "a.zip#track.csv"
 
 
 def asked() -> Iterator[Animal]:

@@ -262,7 +262,7 @@ def _searched(source: str, data: bytes, widths: Sequence[int]) -> tuple[CsvText,
     lines = re.split(rb"(\r\n|\r|\n)", data[:_HEAD])
     texts = [line.decode("utf-8", "replace") for line in lines[::2]]
     found = layout.find(texts, widths)
-    if found and not found.named and (widths := widths or preamble.ruled(texts)):
+    if found and not found.named and (widths := widths or preamble.ruled(texts, found.first)):
         found = layout.find(texts, widths)
     if found is None:
         names, delimiter, start = _first_line(source, data)
@@ -281,7 +281,7 @@ def _first_line(source: str, data: bytes) -> tuple[list[str], str, int]:
     found = layout.LINE.match(data)
     assert found is not None
     line = found[1].decode("utf-8", "replace")
-    delimiter = max(",;\t", key=line.count)
+    delimiter = max(",;\t", key=line.count)  # the comma if there is none
     try:
         names = [name.strip() for name in next(csv.reader([line], delimiter=delimiter))]
     except (csv.Error, StopIteration) as error:

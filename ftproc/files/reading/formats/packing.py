@@ -58,6 +58,12 @@ def unpacked(name: str, path: Path, kind: str, directory: Path, room: Room, part
             raise InputError(f"{name}: the {what} file is cut short; copy it again.") from error
 
 
+def is_member(path: Path, part: str) -> bool:
+    """Whether an archive holds a file of this name."""
+    with zipfile.ZipFile(path) as archive:
+        return part in archive.namelist()
+
+
 def _zstd(path: Path) -> Any:
     import pyarrow as pa
 
@@ -79,14 +85,14 @@ def _copy(packed: IO[bytes], target: Path, room: Room) -> None:
 def _from_zip(name: str, path: Path, directory: Path, room: Room, part: str) -> Path:
     with zipfile.ZipFile(path) as archive:
         files = [m for m in archive.infolist() if not m.is_dir() and not m.filename.startswith(("__MACOSX/", "."))]
-        members = [m for m in files if m.filename == part] if part else files
+        members = [m for m in files if m.filename == part] or files
         if len(members) > 1:
             members = [m for m in members if not _DOCUMENT.search(m.filename)] or members
         if len(members) != 1:
             held = ", ".join(member.filename for member in files[:10]) or "nothing"
             whole = name.removesuffix(f"#{part}")
             raise InputError(
-                f"{whole}: {f'there is no {part} in this zip archive' if part else 'which file of this zip archive?'} "
+                f"{whole}: which file of this zip archive? "
                 f"It holds {held}. Name one behind #, such as {whole}#{files[0].filename if files else 'log.csv'}."
             )
         if members[0].flag_bits & 1:

@@ -166,9 +166,9 @@ def _of_file(name: str, path: Path, how: How, scratch: _Scratch, deep: int = 0) 
     if packed is not None:
         if deep > _DEEPEST:
             raise InputError(f"{name}: packed more than {_DEEPEST} times over; unpack it first.")
-        part = how.part if packed == ".zip" else ""
-        inner = packing.unpacked(name, path, packed, scratch.path(), how.room, part)
-        return _of_file(name, inner, how._replace(part="") if part else how, scratch, deep + 1)
+        inner = packing.unpacked(name, path, packed, scratch.path(), how.room, how.part)
+        named = packed == ".zip" and how.part and packing.is_member(path, how.part)
+        return _of_file(name, inner, how._replace(part="") if named else how, scratch, deep + 1)
     by_bytes = next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), ".csv")
     return FORMATS[layout.ending(path, FORMATS) or by_bytes](name, path, how)
 

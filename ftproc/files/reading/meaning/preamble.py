@@ -89,8 +89,9 @@ def are_units(cells: Sequence[str]) -> bool:
     return bool(present) and 2 * max(known, brackets) >= len(present)
 
 
-def ruled(lines: Sequence[str]) -> list[int]:
-    """The widths of columns of which each has a rule of its own under its name; nothing without such rules."""
-    groups = next((found for line in lines if len(found := list(_RULE.finditer(line))) > 2), [])
+def ruled(lines: Sequence[str], first: int) -> list[int]:
+    """The widths of columns of which each has a rule of its own above the rows, which begin with line `first`; nothing
+    without such rules."""
+    groups = next((found for line in lines[:first] if len(found := list(_RULE.finditer(line))) > 2), [])
     ends = [each.end() for each in groups][:-1]
     return [*(high - low for low, high in itertools.pairwise([0, *ends])), max(map(len, lines))] if ends else []

@@ -116,7 +116,7 @@ def by_names(header: TableHeader) -> TableHeader:
     time = header.names[plain.index("tod")] if "tod" in plain and "time" not in plain else time
     level = bare.get(_named(tuple(items), (_Role("090", ""),)), "")
     stated_units = {columns["azimuth"]: "deg", time: "s", level: "fl"}
-    units = [stated_units.get(name, "") for name in header.names]
+    units = [name and stated_units.get(name, "") for name in header.names]
     if max(map(_float, header.load([], indices["range"]).column(0).to_pylist()), default=0.0) <= _FARTHEST_NMI:
         units[indices["range"][0]] = "nmi"
     target = next((header.names[plain.index(word)] for word in _OF_TARGETS if word in plain), "")
