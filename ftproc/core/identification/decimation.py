@@ -42,9 +42,9 @@ def how_many(scales: Scales, model: Model, knot_s: float) -> int:
 
 
 def merged(log: Observations, starts: list[Start], count: int) -> tuple[Observations, list[Start]]:
-    """The log with `count` neighbours merged, or as it is where some components are seen far less often than others,
-    or it has curves through gaps; and its starts."""
-    seen = totals(log.weight > 0)
+    """The log with `count` neighbours merged, or as it is where some of what is measured is seen far less often than
+    the rest, or it has curves through gaps; and its starts."""
+    seen = np.r_[totals(log.weight > 0), [np.count_nonzero(_used(each)) for each in log.beside]]
     alike = log.about is None and count > 1 and seen.min() > OFTEN * seen.max()
     return merge(log, starts, count) if alike else (log, starts)
 
@@ -54,7 +54,9 @@ def merge(log: Observations, starts: list[Start], count: int) -> tuple[Observati
     interval = typical(np.diff(log.time_s))
     begins = np.zeros(len(log.time_s), bool)
     begins[[start.sample for start in starts]] = True
-    time, z, number, group = _means(*log[:3], begins, count, 1.5 * count * interval)
+    values = np.column_stack([log.measurement, *(each.value for each in log.beside)])
+    weight = np.column_stack([log.weight, *map(_used, log.beside)])
+    time, z, number, group = _means(log.time_s, values, weight, begins, count, 1.5 * count * interval)
     moved = []
     for start in starts:
         sample = int(group[start.sample])
@@ -66,29 +68,25 @@ def merge(log: Observations, starts: list[Start], count: int) -> tuple[Observati
         size = np.bincount(group)[:, None]
         means = (np.stack([np.bincount(group, each[:, c]) for c in range(3)], 1) / size for each in log.uneven)
         uneven = Uneven(*means)
-    beside = tuple(_mean_scalars(each, group) for each in log.beside)
-    return Observations(time, z, number, uneven, beside=beside), moved
+    beside = tuple(
+        each._replace(value=z[:, c], variance=np.full(len(time), each.variance[0]), weight=number[:, c])
+        for c, each in enumerate(log.beside, 3)
+    )
+    return Observations(time, z[:, :3].copy(), number[:, :3].copy(), uneven, beside=beside), moved
 
 
-def _mean_scalars(scalars: Scalars, group: IntArray) -> Scalars:
-    """The means of those that are used, of each group; of one point."""
-    used = scalars.weight * np.isfinite(scalars.value)
-    weight = np.bincount(group, used).astype(float)
-
-    def mean(values: FloatArray) -> FloatArray:
-        total = np.bincount(group, np.where(used > 0, values, 0.0) * used)
-        found: FloatArray = np.divide(total, weight, out=np.full(len(weight), np.nan), where=weight > 0)
-        return found
-
-    return scalars._replace(value=mean(scalars.value), variance=mean(scalars.variance), weight=weight)
+def _used(scalars: Scalars) -> FloatArray:
+    """(n,) weights, zero where nothing is measured."""
+    return scalars.weight * np.isfinite(scalars.value)
 
 
 @kernel
 def _means(
     time: Vector, z: Matrix, weight: Matrix, begins: Flags, count: int, longest: float
 ) -> tuple[Vector, Matrix, Matrix, Indices]:
-    """Times (m,), means (m, 3) and numbers (m, 3) of groups, and the group of each sample (n,)."""
-    n = len(time)
+    """Times (m,), means (m, c) and numbers (m, c) of groups, of values (n, c) of which the second is an angle, and the
+    group of each sample (n,)."""
+    n, columns = len(time), z.shape[1]
     group = np.zeros(n, np.int64)
     m, first = 0, 0
     for k in range(1, n):
@@ -101,10 +99,11 @@ def _means(
         t[group[k]] += time[k]
         size[group[k]] += 1
     t /= size
-    mean, number, late, base = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros((m, 3)), np.zeros((m, 3))
+    mean, number = np.zeros((m, columns)), np.zeros((m, columns))
+    late, base = np.zeros((m, columns)), np.zeros((m, columns))
     for k in range(n):
         g = group[k]
-        for c in range(3):
+        for c in range(columns):
             if weight[k, c] > 0 and math.isfinite(z[k, c]):
                 if number[g, c] == 0:
                     base[g, c] = z[k, c]
@@ -112,13 +111,13 @@ def _means(
                 late[g, c] += time[k] - t[g]
                 number[g, c] += 1
     for g in range(m):
-        for c in range(3):
+        for c in range(columns):
             if number[g, c] > 0:
                 mean[g, c] = base[g, c] + mean[g, c] / number[g, c]
                 late[g, c] /= number[g, c]
     merged = mean.copy()
     for g in range(m):
-        for c in range(3):
+        for c in range(columns):
             if number[g, c] == 0:
                 merged[g, c] = math.nan
             elif late[g, c] != 0.0:  # some of the group is missing: its mean is of another time

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from ftproc.core.filtering.records import Observations
+from ftproc.core.filtering.records import Observations, Scalars
 from ftproc.core.filtering.smoother import score_log
 from ftproc.core.identification import decimation
 from ftproc.core.identification.scales import Scales, scales_of
@@ -45,6 +45,30 @@ def test_mean_of_some_is_moved_to_the_time_of_all():
     np.testing.assert_allclose(merged[1:-1, 0], 1000 + 50 * t[1:-1], atol=1e-9)
     np.testing.assert_allclose(np.sin(merged[:, 1] - 3.1 - 0.02 * t), 0, atol=4e-4)
     assert number[0, 0] == number[2, 1] == number[5, 2] == 3
+
+
+@pytest.mark.parametrize("every", [1, 2, 4])
+def test_what_is_beside_is_moved_to_the_time_of_all(every):
+    """Of a target that accelerates rates are right at their own times alone."""
+    time = 0.1 * np.arange(40)
+    a = matched(1, 40)
+    weight = (np.arange(40) % every == 0).astype(float)
+    rates = Scalars.rates(100 - 30 * time, 0.04, weight)
+    log = Observations(time, a.z, a.weight, beside=(rates,))
+    short, _ = decimation.merge(log, a.starts, 4)
+    t, (merged,) = short.time_s, short.beside
+    np.testing.assert_allclose(merged.value[1:-1], 100 - 30 * t[1:-1], atol=1e-9)
+    np.testing.assert_array_equal(merged.weight, 4 / every)
+    np.testing.assert_array_equal(merged.variance, 0.04)
+
+
+def test_logs_whose_rates_are_seldom_seen_stay_as_they_are():
+    a = matched(1, 40)
+    rates = Scalars.rates(np.zeros(40), 1.0, (np.arange(40) % 2 == 0).astype(float))
+    log = a.log._replace(beside=(rates,))
+    assert decimation.merged(log, a.starts, 4)[0] is log
+    often = log._replace(beside=(rates._replace(weight=np.ones(40)),))
+    assert len(decimation.merged(often, a.starts, 4)[0].time_s) == 10
 
 
 def test_missing_group_stays_missing_and_a_gap_ends_one():
