@@ -64,20 +64,21 @@ def parts(record: Recording, settings: FilterSettings, block: int = BLOCK) -> It
             low = sum(len(each.rows) for each in history)
             both = [*history, *found]
             times = record.part(slice(first - low, first + count)).time_s
-            yield Part(estimate(live, both, times), first - low, low, low + count)
+            yield Part(estimate(live, both, times, record.range_rate is not None), first - low, low, low + count)
             history = [_last(both, HISTORY)]
 
 
-def estimate(live: LiveEditor, found: Sequence[Published], time_s: FloatArray) -> Estimate:
-    """The rows that have left the editor, one after the other, with their times (n,)."""
+def estimate(live: LiveEditor, found: Sequence[Published], time_s: FloatArray, rates: bool = False) -> Estimate:
+    """The rows that have left the editor, one after the other, with their times (n,). rates: whether the log has range
+    rates, also where these rows have none."""
     rows = np.concatenate([each.rows for each in found])
     labels = np.concatenate([each.label for each in found]).astype(np.uint8)
     label, of_rates = np.ascontiguousarray(labels[:, : beside.RATE]), labels[:, beside.RATE]
     known = np.concatenate([each.known for each in found])
     again = np.concatenate([each.reacquired for each in found])
     run, lost = FilterRun.of(time_s, rows, 0.0), tuple(np.flatnonzero(again).tolist())
-    rates = _rates(live, of_rates) if (of_rates != MISSING).any() else None
-    return Estimate(run, label, live.model, reacquired=lost, known=known, absent=live.absent, range_rate=rates)
+    rate = _rates(live, of_rates) if rates or (of_rates != MISSING).any() else None
+    return Estimate(run, label, live.model, reacquired=lost, known=known, absent=live.absent, range_rate=rate)
 
 
 def _rates(live: LiveEditor, label: FlagArray) -> Channel:

@@ -13,6 +13,7 @@ from ftproc.core import threads
 from ftproc.correction import model_file
 from ftproc.methods import anti_outlier, live
 from ftproc.methods.estimate import Recording
+from ftproc.records import MISSING
 from ftproc.settings import FilterSettings
 from tests.simulated import simulate
 
@@ -203,3 +204,12 @@ def test_segments_share_a_log_evenly(in_segments, length, count):
     assert found[-1][1] == length
     sizes = [high - low for low, high in found]
     assert max(sizes) - min(sizes) <= 1
+
+
+def test_every_stretch_of_a_log_with_range_rates_has_their_labels(flight):
+    """Also one in which the instrument measures none any more; a log of such stretches could not be written."""
+    log = start_of(flight.log, 600)
+    rate = np.where(np.arange(600) < 200, np.linspace(100, 50, 600), np.nan)
+    parts = list(live.parts(replace(record(log), range_rate=rate), FilterSettings(editing="live"), 100))
+    labels = [part.estimate.rows(part.low, part.high).range_rate.label for part in parts]
+    assert (np.concatenate(labels)[-400:] == MISSING).all()
