@@ -56,6 +56,7 @@ class Window:
         self.next_times, self.next_late = np.ones(3), np.zeros(3)  # how the noise of the next readings differs
         # Samples of re-acquisition; how many left before their lag, are kept no more, came before the track's start.
         self.reacquired, self.left, self.forgotten, self.begun = list[int](), 0, 0, -1
+        self.fresh = 0  # samples that no refresh has seen
         self.under_way: Whole | None = None
         self.turning = Turning(acts=not (known.white_jerk or stand_ins))
         self.kept, self.side = Kept.nothing(), beside.Rates()
@@ -186,7 +187,7 @@ class Window:
 
     def append(self, time_s: FloatArray, measurement: FloatArray) -> None:
         """Filter the next readings, each decided on when it comes."""
-        n = len(self)
+        n, self.fresh = len(self), self.fresh + len(time_s)
         stuck = self._take(time_s, measurement)
         first_s, span = float(self.time_s[self.near]), Span(1, 1 + len(time_s), 0)
         log = self.kept.observed(slice(n - 1, n + len(time_s)), self.side)
@@ -247,7 +248,7 @@ class Window:
         by_hand, kept = self.known.accepted.of(log.time_s, log.measurement), self.kept
         before = Open(log, self.allowed, self.anchor, self.rates, by_hand, *(kept[name][near] for name in KEPT))
         jumps, free = self.forgotten + self.near > self.begun and not self.white, self.known.jerk_psd is None
-        case, self.model = decided(before, gate, self.model, scales if free else None, jumps)
+        case, self.model = decided(before, gate, self.model, scales if free else None, jumps, self.fresh)
         if case.level is not before.level:
             self.under_way, self.anchor = None, case.start  # an edit of all knows nothing of it
             for name in KEPT:
@@ -266,6 +267,7 @@ class Window:
         used, came = np.column_stack([log.weight, left]), self.came[near]
         kept["label"][near] = labelled(used, came)
         self.labels.reset(used, came)
+        self.fresh = 0
         self.next_times, self.next_late = typical(kept["times"], kept["late"])
 
     def _chains(self, model: Model) -> Any:

@@ -125,6 +125,38 @@ def test_where_a_track_has_followed_a_patch_the_return_is_no_jump():
     assert (off[time_s > 101] < 5).all()
 
 
+def errors_live(flight, stop_s):
+    """Times (n,), errors m and in sigmas of the live rows of a simulated flight, and labels (n, 4)."""
+    rows = flight.log.time_s < stop_s
+    time_s, editor = flight.log.time_s[rows], LiveEditor(AUTOMATIC)
+    out = [*editor.push(time_s, flight.log.measurement[rows]), *editor.finish()]
+    state, sigma = (np.concatenate([each.rows[name] for each in out])[:, :3] for name in ("state", "sigma"))
+    off = np.abs(state - flight.truth.position_m[np.isin(flight.truth.time_s, time_s)])
+    return time_s, np.sqrt((off**2).sum(1)), (off / sigma).max(1), np.concatenate([each.label for each in out])
+
+
+def test_the_onset_of_a_manoeuvre_that_was_taken_for_a_jump_is_seen_by_more_readings():
+    """Pulled at 11 s: the range leaves the track all at once. Nothing was ever to bring it back."""
+    flight = simulate("manoeuvre-clean", seed=100, duration_s=120.0)
+    time_s, _, off, label = errors_live(flight, 25.0)
+    after = time_s > 12.5
+    assert (off[after] < 5).all()
+    assert (label[after, :3] == GOOD).mean() > 0.99
+
+
+def test_the_end_of_a_patch_that_the_track_has_followed_is_no_jump():
+    """Six times readings walk off within 4 s: an agile track follows, and is left where it went when they are back."""
+    flight = simulate("cruise", seed=101, duration_s=180.0, dt_s=0.1, outliers="none")
+    walk, calm = np.linspace(0, 1, 40), np.ones(1801, bool)
+    for k in range(6):
+        begin = 1801 * (2 + k) // 9
+        flight.log.measurement[begin : begin + 40, 0 if k % 2 else 2] += walk * (150 if k % 2 else -0.008)
+        calm[begin : begin + 80] = False
+    _, off_m, _, label = errors_live(flight, 181.0)
+    assert (label[calm][:, [0, 2]] == GOOD).mean() > 0.95
+    assert np.nanmean(off_m[calm] > 10) < 0.02
+
+
 def test_a_track_that_begins_on_a_patch_returns():
     time_s, off, _ = flown(jump(1, 25.0, 0.0, 3.0))
     assert (off[time_s > 6] < 5).mean() > NEARLY

@@ -11,10 +11,15 @@ from ftproc.core.live.newest.readmission import MARGIN, Open, readmitted, settle
 COMPONENTS = 3  # that may jump at once
 
 
-def decided(case: Open, gate: float, profile: Model, scales: Scales | None, jumps: bool) -> tuple[Open, Model]:
+def decided(
+    case: Open, gate: float, profile: Model, scales: Scales | None, jumps: bool, fresh: int
+) -> tuple[Open, Model]:
     """The likeliest case, and the process noise without its allowance. gate: in sigmas. scales: see `readmitted`.
-    jumps: whether readings may jump, as the track is old enough to tell."""
+    jumps: whether readings may jump, as the track is old enough to tell. fresh: samples that are new."""
     case = settled(case, gate)
+    later = levels.hindsight(case, profile, scales, fresh) if scales is not None else None
+    if later is not None and later.gain > MARGIN:
+        return settled(later.case, gate), later.profile
     for _ in range(COMPONENTS):
         other = readmitted(case, profile, scales)
         rival = 0.0 if other is None else max(other.gain, 0.0)

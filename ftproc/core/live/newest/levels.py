@@ -18,9 +18,11 @@ from ftproc.core.editing import patch_likelihood
 from ftproc.core.editing.lasting.curves import Curve, Fitted, Setting, columns_of, fitted
 from ftproc.core.editing.lasting.faults import Shift, allowing
 from ftproc.core.filtering.columns import said_of
-from ftproc.core.filtering.records import Observations, Start
+from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, smooth_log
-from ftproc.core.live.newest.readmission import Open, log_probability, rejected
+from ftproc.core.identification.profile import roughness
+from ftproc.core.identification.scales import Scales
+from ftproc.core.live.newest.readmission import Open, Other, log_probability, moving, rejected
 from ftproc.core.model.frames import line_of_sight_axes, wrap
 from ftproc.order_statistics import median
 from ftproc.records import FloatArray, IntArray
@@ -32,6 +34,7 @@ NEARLY = 0.5  # of what the readings were off, within which they are back (anoth
 JUMPED, BACK = 4, 2  # readings in a row that show it
 FASTEST = 1e3  # 1/s, of the growth of an offset
 SHORTEST, LONGER = 8, math.sqrt(2)  # readings of an earlier patch that is tried, and times as many in the next
+NEARLY_WHOLE = 1e-9  # powers of LONGER are rounded
 
 
 @np.errstate(all="ignore")  # where times stand still numbers may overflow; what comes of it has no gain
@@ -129,10 +132,13 @@ def _off_the_track(case: Open, c: int, run: IntArray, drift: float) -> Open:
     return back._replace(start=_widened(case.start, c, drift, 1 / max(time_s[since] - time_s[0], 1e-300)))
 
 
-def _with_jump(case: Open, measurement: FloatArray, c: int, run: IntArray) -> tuple[Fitted, float]:
-    """A constant for what a run is off by, and the log-probability of all readings with it."""
+def _with_jump(case: Open, measurement: FloatArray, c: int, run: IntArray, about: float = 0.0) -> tuple[Fitted, float]:
+    """A constant for what a run is off by, which is about so much, and the log-probability of all readings with it."""
     log = case.log._replace(measurement=measurement, weight=_used(case, run, c))
-    curve, setting = Curve(c, int(run[0]), len(log.time_s), (0.0,)), Setting(log.time_s, np.zeros((len(log.time_s), 3)))
+    curve, setting = (
+        Curve(c, int(run[0]), len(log.time_s), (about,)),
+        Setting(log.time_s, np.zeros((len(log.time_s), 3))),
+    )
     jump = fitted(log, case.model, [case.start], setting, [curve])
     begins, stays = case.rates[c, 1:].tolist()
     there = math.log(begins) + len(run) * math.log(stays)
@@ -164,8 +170,50 @@ def _was_a_patch(case: Open, c: int, run: IntArray) -> Iterator[tuple[Open, floa
     if begin > 0 and len(jumped):
         raw = case.log.measurement.copy()
         raw[begin:, c] += case.level[begin:, c]
-        _, now = _with_jump(case, raw, c, jumped)
+        _, now = _with_jump(case, raw, c, jumped, float(case.level[-1, c]))
         yield from ((other, likely - now) for other, likely in _without(case, c, jumped, run))
+
+
+def hindsight(case: Open, profile: Model, scales: Scales, fresh: int) -> Other | None:
+    """What more readings tell by now of what has jumped: nothing has, but the target has begun to move; or the track
+    has followed a patch until then. Each with the process noise for it, and the gain in log-probability. fresh: how
+    many samples are new; it is weighed where there are half as many again as the last time, or so."""
+    found = list[Other]()
+    for c in np.flatnonzero(case.level[-1] != 0):
+        begin = _begin(case, int(c))
+        jumped = begin + np.flatnonzero(case.log.weight[begin:, c] > 0)
+        age = len(case.log.time_s) - begin
+        if begin > 0 and len(jumped) and _times(age) > _times(max(age - fresh, 1)):
+            found += _as_it_came(case, int(c), jumped, profile, scales)
+    return max(found, key=lambda each: each.gain, default=None)
+
+
+def _times(samples: int) -> int:
+    """How many times LONGER one must be for so many samples."""
+    return int(math.log(samples) / math.log(LONGER) + NEARLY_WHOLE)
+
+
+def _as_it_came(case: Open, c: int, jumped: IntArray, profile: Model, scales: Scales) -> Iterator[Other]:
+    """The readings of a component that have jumped are right as they came, where those before are, or the last of
+    them were a patch."""
+    begin, level, sigma = _begin(case, c), case.level.copy(), case.level_sigma.copy()
+    level[begin:, c] = sigma[begin:, c] = 0.0
+    none = _levelled(case, np.r_[jumped, rejected(case, c)], c, level, sigma)
+    _, now = _with_jump(case, none.log.measurement, c, jumped, float(case.level[-1, c]))
+    for off in (jumped[:0], *_last_ones(np.flatnonzero(case.log.weight[:begin, c] > 0))):
+        weight, possible = none.log.weight.copy(), case.possible.copy()
+        weight[off, c], possible[off, c] = 0.0, False
+        other = none._replace(log=none.log._replace(weight=weight))
+        found = moving(other, profile, scales, now - roughness(case.model))
+        yield found._replace(case=found.case._replace(possible=possible))
+
+
+def _last_ones(good: IntArray) -> Iterator[IntArray]:
+    """The last of some samples, more and more of them."""
+    length = float(SHORTEST)
+    while length < len(good):
+        yield good[-int(length) :]
+        length *= LONGER
 
 
 def _without(case: Open, c: int, off: IntArray, run: IntArray) -> Iterator[tuple[Open, float]]:
@@ -190,10 +238,8 @@ def _without(case: Open, c: int, off: IntArray, run: IntArray) -> Iterator[tuple
 def _earlier_patches(case: Open, c: int, run: IntArray) -> Iterator[tuple[Open, float]]:
     """The readings before a run were a patch, which the track has followed."""
     now, good = log_probability(case, case.log.weight), np.flatnonzero(case.log.weight[:, c] > 0)
-    length = float(SHORTEST)
-    while case.level[-1, c] == 0 and length < len(good):
-        yield from ((other, likely - now) for other, likely in _without(case, c, good[-int(length) :], run))
-        length *= LONGER
+    for off in _last_ones(good) if case.level[-1, c] == 0 else ():
+        yield from ((other, likely - now) for other, likely in _without(case, c, off, run))
 
 
 def _levelled(case: Open, run: IntArray, c: int, level: FloatArray, sigma: FloatArray) -> Open:

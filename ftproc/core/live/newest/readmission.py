@@ -80,11 +80,17 @@ def readmitted(case: Open, profile: Model, scales: Scales | None) -> Other | Non
     weight = case.log.weight.copy()
     for c, run in runs.items():
         weight[run, c] = 1.0
-    log = case.log._replace(weight=weight)
-    profile = fit_profile(log, [case.start], profile, MOVES_STEPS, scales)
-    moves = case._replace(log=log, model=with_allowance(log, profile, scales))
-    gain = log_probability(moves, weight) - roughness(moves.model) - found[0] + roughness(case.model)
-    return Other(moves, profile, gain) if gain > other.gain else other
+    moves = case._replace(log=case.log._replace(weight=weight))
+    rival = moving(moves, profile, scales, found[0] - roughness(case.model))
+    return rival if rival.gain > other.gain else other
+
+
+def moving(case: Open, profile: Model, scales: Scales, now: float) -> Other:
+    """A case with the process noise by which its target has begun to move. now: the penalised log-probability of what
+    it is an alternative to."""
+    profile = fit_profile(case.log, [case.start], profile, MOVES_STEPS, scales)
+    moves = case._replace(model=with_allowance(case.log, profile, scales))
+    return Other(moves, profile, log_probability(moves, case.log.weight) - roughness(moves.model) - now)
 
 
 def _others(weight: FloatArray, runs: dict[int, NDArray[np.int64]]) -> Iterator[FloatArray]:
