@@ -19,14 +19,16 @@ from ftproc.core.editing.copies import rounding_step
 from ftproc.core.filtering import beside as layout
 from ftproc.core.filtering.forward import filter_with_beside
 from ftproc.core.filtering.records import Model, Observations, Scalars, Start
-from ftproc.order_statistics import median
+from ftproc.core.filtering.smoother import smooth_log
+from ftproc.order_statistics import median, typical
 from ftproc.records import FloatArray
 
 Labels = NDArray[np.uint8]
 
 FEWEST = 16  # scalars that tell their noise
 ROUNDS, STILL = 8, 0.02  # of deciding, and the change of ln(noise variance) with which they end
-SURE = 8.0  # in log-likelihood, by which the other sense must be likelier
+SURE = 8.0  # in log-likelihood, by which the other sense must be likelier, or that they are late
+LEAST_LATE = 0.05  # of an interval, by which they must be late
 TAILS = 4.0  # degrees of freedom of the distribution that tells the sense
 FAR = 6.0  # sigmas from what the readings say, of a scalar that is not used to begin with
 MOST_REJECTED = 0.5  # share of those that contradict the readings: with more, none is used
@@ -43,13 +45,14 @@ NONE = np.zeros(1, bool)  # is good by hand
 
 class Channel(NamedTuple):
     """What is known of the rates of a log. rates: (n,) outward, with weights and noise. label: (n,). closing: whether
-    the log counts inward. told: variance with which the readings predict them, of their own. why: they are not used, ""
-    if they are. used: those of the last run, where the motion is chosen without them. innovation, sigma: (n,) of the
-    filter."""
+    the log counts inward. late_s: by which they are late, and corrected. told: variance with which the readings
+    predict them, of their own. why: they are not used, "" if they are. used: those of the last run, where the motion
+    is chosen without them. innovation, sigma: (n,) of the filter."""
 
     rates: Scalars
     label: Labels
     closing: bool = False
+    late_s: float = 0.0
     told: float = 0.0
     why: str = ""
     used: Scalars | None = None
@@ -112,7 +115,7 @@ def understood(
     if rates.weight.sum() < (1 - MOST_REJECTED) * there.sum():
         return channel.left_out("most of the range rates contradict the readings: none is used")
     told = median(predicted[there]) / float(rates.variance[0])
-    return Channel(rates, labels_of(rates.weight, value), closing, told)
+    return Channel(rates, labels_of(rates.weight, value), closing, told=told)
 
 
 def of_the_rest(log: Observations, model: Model, starts: list[Start], kind: int = 0) -> float:
@@ -123,6 +126,28 @@ def of_the_rest(log: Observations, model: Model, starts: list[Start], kind: int 
     used = np.flatnonzero(np.isfinite(left[kind, :, layout.SPREAD]) & (left[kind, :, layout.WEIGHT] > 0))
     residual, spread = left[kind, used, layout.RESIDUAL], left[kind, used, layout.SPREAD]
     return run.log_likelihood + 0.5 * float((np.log(spread) + residual**2 / spread).sum())
+
+
+def lateness(log: Observations, model: Model, starts: list[Start]) -> tuple[float, FloatArray]:
+    """By how many seconds the range rates beside a log are late, zero if they do not tell, and how they grow, (n,)
+    m/s2. A rate that is late by T is off by T times its growth, so the log-likelihood is a parabola in T."""
+    state = smooth_log(log, model, starts).state
+    slant = np.maximum(np.sqrt((state[:, :3] ** 2).sum(1)), layout.NEAREST_M)
+    rate = (state[:, :3] * state[:, 3:6]).sum(1) / slant
+    growth = ((state[:, 3:6] ** 2).sum(1) + (state[:, :3] * state[:, 6:]).sum(1) - rate**2) / slant
+    (rates,) = log.beside
+    step = typical(np.diff(log.time_s))
+
+    def likely(late_s: float) -> float:
+        moved = rates._replace(value=rates.value + late_s * growth)
+        return filter_with_beside(log._replace(beside=(moved,)), model, starts)[0].log_likelihood
+
+    low, here, high = map(likely, (-step, 0.0, step))
+    rise, bend = (high - low) / 2, 2 * here - low - high
+    if not (bend > 0 and rise**2 / (2 * bend) > SURE):
+        return 0.0, growth
+    late_s = step * rise / bend
+    return (late_s if abs(late_s) > LEAST_LATE * step else 0.0), growth
 
 
 def decided(rates: Scalars, residuals: Residuals, gate: float, accepted: NDArray[np.bool_] = NONE) -> Scalars:

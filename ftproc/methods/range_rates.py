@@ -1,9 +1,9 @@
 """Range rates beside the readings of a log: their sense, their noise, their outliers, and the process noise with them.
 
 The readings are edited without them. What the record then predicts of each rate shows whether they count outward or
-inward and which of them are wrong; noise and decisions follow in turn from the leave-one-out residuals, the noise by
-maximum likelihood, the outliers by the Markov chain of `outlier_chain`. The jerk profile is then fitted again, with the
-rates. Rates that do not help to predict the readings, but hinder it, are left out.
+inward, which of them are wrong, and whether they are late; noise and decisions follow in turn from the leave-one-out
+residuals, the noise by maximum likelihood, the outliers by the Markov chain of `outlier_chain`. The jerk profile is
+then fitted again, with the rates. Rates that do not help to predict the readings, but hinder it, are left out.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from ftproc.records import FlagArray, FloatArray
 TELLING = 0.02  # variance with which the readings predict rates, of the rates' own: with less, the motion is that which
 # the readings tell
 STEPS = 3  # of the search for a profile
+LATE_ROUNDS = 3  # of finding out how late they are
 
 
 def fit(
@@ -42,7 +43,17 @@ def fit(
         found = residuals_beside(log._replace(beside=(rates,)), model, starts)[0]
         return found[:, 0], found[:, 1]
 
-    channel = beside.understood(Scalars.rates(value, 1.0, np.zeros(len(value))), residuals, gate, interval, accepted)
+    def understood(value: FloatArray) -> beside.Channel:
+        unused = Scalars.rates(value, 1.0, np.zeros(len(value)))
+        return beside.understood(unused, residuals, gate, interval, accepted)
+
+    channel = understood(value)
+    for _ in range(LATE_ROUNDS if channel.told >= TELLING else 0):
+        late_s, growth = beside.lateness(log._replace(beside=(channel.rates,)), model, starts)
+        if late_s == 0:
+            break
+        late_s += channel.late_s
+        channel = understood(value + (-late_s if channel.closing else late_s) * growth)._replace(late_s=late_s)
     if channel.why:
         return log, model, channel
     if channel.told < TELLING:

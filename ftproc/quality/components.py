@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -67,6 +68,7 @@ class RangeRate:
 
     def __init__(self, every: int) -> None:
         self.component, self.closing, self.why = Component(every), False, dict[str, None]()
+        self.late_s = list[float]()
         self.noises: list[float] = []
 
     @property
@@ -82,6 +84,7 @@ class RangeRate:
             return
         self.closing |= channel.closing
         self.noises.append(channel.noise_mps)
+        self.late_s.append(channel.late_s)
         with np.errstate(invalid="ignore", divide="ignore"):
             squares = np.square(channel.innovation / channel.sigma)
         self.component.add_innovations(squares, channel.sigma, channel.rates.weight > 0)
@@ -89,7 +92,14 @@ class RangeRate:
     def remarks(self) -> list[str]:
         """What was done with them, and why they are not used."""
         turned = ["the range rates count inward, as the motion shows, and are turned round"] if self.closing else []
-        return [*turned, *self.why]
+        return [*turned, *self._shifted(), *self.why]
+
+    def _shifted(self) -> Iterator[str]:
+        """By how much they were late or early."""
+        if found := [each for each in self.late_s if each != 0]:
+            late_s = median(np.array(found))
+            side = "late" if late_s > 0 else "early"
+            yield f"the range rates are {side} by {abs(late_s):.3g} s, as the motion shows, and are corrected for it"
 
     def figures(self) -> dict[str, Any]:
         """As those of other components."""
