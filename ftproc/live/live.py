@@ -220,7 +220,7 @@ class Live:
             del kept[:count]
         if count:
             self._left_s = float(time_s[-1])
-        return self._trajectory(self._order.take(count), time_s, row, None if self._rates else self._model)
+        return self._trajectory(self._order.take(count), time_s, row, self._model)
 
     def _trajectory(self, left: Iterable[Left], time_s: FloatArray, row: IntArray, model: Model | None) -> Trajectory:
         """The rows that have left, with these times and numbers (n,), corrected by a model."""
@@ -230,7 +230,7 @@ class Live:
             high = low + sum(len(each.rows) for each in found)
             estimate = live.estimate(self._order.editor, found, time_s[low:high])._replace(absent=absent)
             correction = np.zeros((high - low, 6))
-            plain = not absent and self._barometric is None and not self._rates
+            plain = not absent and self._barometric is None
             if model is not None and plain:
                 correction = self._correction.of(estimate.run, model.filter)
             parts.append(

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ftproc.correction import model_file
 from ftproc.pipeline import filter_log
 from ftproc.quality import summary
 from ftproc.records import MISSING
@@ -98,7 +99,48 @@ def test_rates_of_something_else_are_left_out(plain):
     assert (errors(found, flight.truth) / without).max() < 1.02
 
 
-@pytest.mark.parametrize("fault", ["bias", "late", "scale", "held", "ambiguous"])
+@pytest.mark.parametrize("seen", [lambda k, n: k % 4 == 0, lambda k, n: k < n / 3])
+def test_those_of_a_part_of_the_rows_are_better_than_none(plain, seen):
+    flight, without = plain
+    log, n = with_rates(flight, 0.3), len(flight.log)
+    rate = np.where(seen(np.arange(n), n), log.range_rate, np.nan)
+    for settings, bound in ((SMOOTH, 1.0), (FilterSettings(), 1.01)):
+        alone = without if settings.smooth else errors(filter_log(flight.log, settings), flight.truth)
+        found = filter_log(replace(log, range_rate=rate), settings)
+        assert (errors(found, flight.truth) < bound * alone).all()
+
+
+@pytest.mark.parametrize(("rows", "sigma"), [(1, 0.3), (1, 1.0), (6, 1.0), (-2, 0.3)])
+def test_late_ones_are_told_and_corrected(plain, rows, sigma):
+    """Those that a radar stamps at the end of its dwell time, or a converter at the next row."""
+    flight, without = plain
+    log = with_rates(flight, sigma)
+    late = np.roll(log.range_rate, rows)
+    late[: max(rows, 0)] = late[len(late) + min(rows, 0) :] = np.nan
+    found = filter_log(replace(log, range_rate=late), SMOOTH)
+    (said,) = found.metadata["summary"]["remarks"]
+    assert ("late" if rows > 0 else "early") in said
+    late_s = float(said.split(" by ")[1].split(" s")[0])
+    assert late_s == pytest.approx(abs(rows) * 0.05, abs=0.005)
+    assert (errors(found, flight.truth) < 0.97 * without).all()
+    assert found.metadata["summary"]["trust"]["verdict"] == "consistent"
+
+
+def test_those_in_time_are_not_moved(plain):
+    flight, _ = plain
+    for seed in range(3):
+        assert filter_log(with_rates(flight, 0.5, seed), SMOOTH).metadata["summary"]["remarks"] == []
+
+
+def test_the_network_corrects_a_filtered_log_with_rates_too(plain):
+    flight, _ = plain
+    log = with_rates(flight, 1.0)
+    found, plainly = filter_log(log, model=model_file.named("packaged")), filter_log(log)
+    assert np.abs(found.correction).max() > 0.1
+    assert (errors(found, flight.truth) < errors(plainly, flight.truth)).all()
+
+
+@pytest.mark.parametrize("fault", ["bias", "scale", "held", "ambiguous"])
 def test_rates_that_hinder_are_left_out(plain, fault):
     """The result is that without them, and the summary says so."""
     flight, _ = plain
@@ -106,7 +148,6 @@ def test_rates_that_hinder_are_left_out(plain, fault):
     rate = log.range_rate
     wrong = {
         "bias": rate + 5.0,
-        "late": np.roll(rate, 6),
         "scale": 1.02 * rate,
         "held": np.repeat(rate[::8], 8)[: len(rate)],
         "ambiguous": (rate + 25) % 50 - 25,
