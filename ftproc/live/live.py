@@ -16,13 +16,14 @@ from numpy.typing import ArrayLike
 from ftproc.core.components import bounded
 from ftproc.core.identification import unseen_motion
 from ftproc.core.live.editor import LiveEditor
+from ftproc.core.live.rows import Published
 from ftproc.core.model import kinematics
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.correction.live import LiveCorrection, live_model
 from ftproc.correction.model import Model
 from ftproc.errors import InputError, UsageError
 from ftproc.files import arrow
-from ftproc.live.order import Left, Order
+from ftproc.live.order import Order
 from ftproc.long_records import joined
 from ftproc.methods import heights, live, registry
 from ftproc.methods import range_rates as rates_of
@@ -175,8 +176,7 @@ class Live:
         at_s, none = time_s - self._order.begins_s, np.full((1, 4), np.nan)
         found = self._coasting.push(np.array([at_s]), none)
         found += self._coasting.tick(math.nextafter(at_s + self._lag_s, math.inf))
-        left = [Left(each, self._coasting.absent) for each in found]
-        return self._trajectory(left, np.array([time_s]), np.array([-1]), None)
+        return self._trajectory(found, np.array([time_s]), np.array([-1]), None)
 
     @property
     def wait_s(self) -> float:
@@ -222,16 +222,17 @@ class Live:
             self._left_s = float(time_s[-1])
         return self._trajectory(self._order.take(count), time_s, row, self._model)
 
-    def _trajectory(self, left: Iterable[Left], time_s: FloatArray, row: IntArray, model: Model | None) -> Trajectory:
+    def _trajectory(
+        self, left: Iterable[Published], time_s: FloatArray, row: IntArray, model: Model | None
+    ) -> Trajectory:
         """The rows that have left, with these times and numbers (n,), corrected by a model."""
         parts, low = [], 0
         for absent, some in itertools.groupby(left, lambda each: each.absent):
-            found = [each.rows for each in some]
+            found = list(some)
             high = low + sum(len(each.rows) for each in found)
-            estimate = live.estimate(self._order.editor, found, time_s[low:high])._replace(absent=absent)
+            estimate = live.estimate(self._order.editor, found, time_s[low:high])
             correction = np.zeros((high - low, 6))
-            plain = not absent and self._barometric is None
-            if model is not None and plain:
+            if model is not None and not absent and self._barometric is None:
                 correction = self._correction.of(estimate.run, model.filter)
             parts.append(
                 _trajectory(
@@ -270,7 +271,7 @@ def _trajectory(
         found = estimate.range_rate.label if estimate.range_rate is not None else np.full(n, MISSING, np.uint8)
         columns = rates_of.columns(state, los_sigma, found)
     if barometric is not None:
-        common = heights.Common(None, np.empty(0), barometric=barometric)
+        common = heights.Common(None, np.empty(0), barometric=barometric, scale=heights.TEMPERATURE * barometric)
         state, sigma, path_sigma = heights.placed(common, slice(None), state, sigma, path_sigma)
         cleaned_sigma = heights.elevated(common, slice(None), cleaned, cleaned_sigma)
         label, column = heights.labelled(label)

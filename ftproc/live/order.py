@@ -22,13 +22,6 @@ MORE = 2.0  # times the largest lateness seen lately: so long readings are held 
 LATELY = 2000  # readings
 
 
-class Left(NamedTuple):
-    """Rows that have left the editor, and the components that it had not seen by then."""
-
-    rows: Published
-    absent: tuple[int, ...]
-
-
 class _Copy(NamedTuple):
     """An editor that had taken so many readings, the last of them at this time."""
 
@@ -47,7 +40,7 @@ class Order:
     def __init__(self, editor: LiveEditor, late_s: float) -> None:
         """late_s: by how much less than this a reading may come late."""
         self.editor, self.late_s, self.hold_s = editor, late_s, 0.0
-        self.left = deque[Left]()
+        self.left = deque[Published]()
         self.taken = self.known = 0  # rows that have been taken from `left`, and all that have left
         self.newest_s, self.begins_s = -math.inf, 0.0
         self._held: tuple[list[float], list[FloatArray], list[float]] = [], [], []  # times, readings, arrivals
@@ -129,15 +122,15 @@ class Order:
         self.settle(math.inf)
         self._leave(self.editor.finish())
 
-    def take(self, count: int) -> Iterator[Left]:
+    def take(self, count: int) -> Iterator[Published]:
         """The first rows that have left, so many of them."""
         self.taken += count
         while count > 0:
-            rows, absent = self.left.popleft()
+            rows = self.left.popleft()
             if len(rows.rows) > count:
-                self.left.appendleft(Left(_part(rows, slice(count, None)), absent))
-                rows = _part(rows, slice(0, count))
-            yield Left(rows, absent)
+                self.left.appendleft(rows.part(slice(count, None)))
+                rows = rows.part(slice(0, count))
+            yield rows
             count -= len(rows.rows)
 
     def _note(self, count: int, late_s: float) -> None:
@@ -203,21 +196,16 @@ class Order:
     def _forget(self, published: int) -> None:
         """The rows from this one on have not left the editor yet."""
         self.known = max(published, self.taken)
-        while self.left and self.left[-1].rows.first >= published:
+        while self.left and self.left[-1].first >= published:
             self.left.pop()
-        if self.left and published < self.left[-1].rows.first + len(self.left[-1].rows.rows):
-            rows, absent = self.left.pop()
-            self.left.append(Left(_part(rows, slice(0, published - rows.first)), absent))
+        if self.left and published < self.left[-1].first + len(self.left[-1].rows):
+            rows = self.left.pop()
+            self.left.append(rows.part(slice(0, published - rows.first)))
 
     def _leave(self, found: list[Published]) -> None:
         """Keep what has not left before: the editor may have gone back."""
         for rows in found:
             known = self.known - rows.first
             if len(rows.rows) > known:
-                self.left.append(Left(_part(rows, slice(known, None)), self.editor.absent))
+                self.left.append(rows.part(slice(known, None)))
                 self.known = rows.first + len(rows.rows)
-
-
-def _part(found: Published, rows: slice) -> Published:
-    arrays = (array[rows] for array in found[1:])
-    return Published._make([found.first + (rows.start or 0), *arrays])

@@ -53,7 +53,7 @@ _ENTRY = struct.Struct("<dBII")  # time of the clock, kind, size, and a check of
 _KINDS: dict[str, Any] = {
     kind.__name__: kind
     for kind in (
-        live.Live, order.Order, order.Left, order._Copy, growing.Lines, forms.Form, forms.Json, forms.Nmea,
+        live.Live, order.Order, order._Copy, growing.Lines, forms.Form, forms.Json, forms.Nmea,
         forms.Cycle, plots.Plots,
         editor.LiveEditor, window.Window, recursive.GatedWindow, recursive.Gating, whole.Whole, doubt.Doubt,
         pace.Pace, pace.Clock, pieces.Sizes, readings.Columns, kept.Kept, pieces.Flown, readings.Labels,

@@ -45,8 +45,31 @@ def editor(settings: FilterSettings, accepted: Accepted = NOTHING) -> LiveEditor
 def parts(record: Recording, settings: FilterSettings, block: int = BLOCK) -> Iterator[Part]:
     """The estimate of a log by stretches; whatever their length, it is the same. Samples before the track is confirmed
     have none. Raises ValueError when it never is."""
-    record = replace(record, absent=())  # whether a component is missing throughout shows only at the end
     live, history = editor(settings, record.accepted), list[Published]()
+    for left in _left(live, record, block):
+        for new in _alike(left):
+            first, count = new[0].first, sum(len(each.rows) for each in new)
+            low = sum(len(each.rows) for each in history)
+            both = [*history, *new]
+            times = record.time_s[first - low : first + count]
+            yield Part(estimate(live, both, times, record.range_rate is not None), first - low, low, low + count)
+            history = [_last(both, HISTORY)]
+
+
+def _alike(left: Sequence[Published]) -> list[list[Published]]:
+    """Those one after the other before which the same components were never seen, or that have no estimate at all."""
+    found = list[list[Published]]()
+    for each in left:
+        known = [rows.absent for rows in found[-1] if rows.known.any()] if found else []
+        if not found or (known and each.known.any() and known[-1] != each.absent):
+            found.append([])
+        found[-1].append(each)
+    return found
+
+
+def _left(live: LiveEditor, record: Recording, block: int) -> Iterator[list[Published]]:
+    """The rows of a log that leave an editor, which takes so many at once. Errors as in `parts`."""
+    record = replace(record, absent=())  # whether a component is missing throughout shows only at the end
     for rows in chunks(len(record), block):
         readings = record.part(rows)
         came = readings.measurement
@@ -59,13 +82,7 @@ def parts(record: Recording, settings: FilterSettings, block: int = BLOCK) -> It
                 raise ValueError(
                     "the readings are too few, or agree too little, for a track to be confirmed; use --editing two-pass"
                 )
-        if found:
-            first, count = found[0].first, sum(len(each.rows) for each in found)
-            low = sum(len(each.rows) for each in history)
-            both = [*history, *found]
-            times = record.part(slice(first - low, first + count)).time_s
-            yield Part(estimate(live, both, times, record.range_rate is not None), first - low, low, low + count)
-            history = [_last(both, HISTORY)]
+        yield found
 
 
 def estimate(live: LiveEditor, found: Sequence[Published], time_s: FloatArray, rates: bool = False) -> Estimate:
@@ -78,7 +95,11 @@ def estimate(live: LiveEditor, found: Sequence[Published], time_s: FloatArray, r
     again = np.concatenate([each.reacquired for each in found])
     run, lost = FilterRun.of(time_s, rows, 0.0), tuple(np.flatnonzero(again).tolist())
     rate = _rates(live, of_rates) if rates or (of_rates != MISSING).any() else None
-    return Estimate(run, label, live.model, reacquired=lost, known=known, absent=live.absent, range_rate=rate)
+    return Estimate(run, label, live.model, reacquired=lost, known=known, absent=_last_absent(found), range_rate=rate)
+
+
+def _last_absent(found: Sequence[Published]) -> tuple[int, ...]:
+    return next((each.absent for each in reversed(found) if each.known.any()), ())
 
 
 def _rates(live: LiveEditor, label: FlagArray) -> Channel:
@@ -93,15 +114,16 @@ def _rates(live: LiveEditor, label: FlagArray) -> Channel:
 
 def _last(found: Sequence[Published], count: int) -> Published:
     """The last rows of several."""
-    rows, label, known, again = (np.concatenate(each)[-count:] for each in list(zip(*found, strict=True))[1:])
+    rows, label, known, again = (np.concatenate(each)[-count:] for each in list(zip(*found, strict=True))[1:-1])
     return Published(0, rows, label, known, again)
 
 
 def whole(readings: Readings, settings: FilterSettings) -> Estimate:
     """The estimate of a whole log. Errors as in `parts`."""
     record = Recording(*readings[:3], accepted=readings.accepted, range_rate=readings.range_rate)
-    (part,) = parts(record, settings, len(record))
-    return part.estimate
+    live = editor(settings, record.accepted)
+    (left,) = _left(live, record, len(record))
+    return estimate(live, left, record.time_s, record.range_rate is not None)
 
 
 def smoothed(readings: Readings, settings: FilterSettings) -> Estimate:

@@ -213,3 +213,17 @@ def test_every_stretch_of_a_log_with_range_rates_has_their_labels(flight):
     parts = list(live.parts(replace(record(log), range_rate=rate), FilterSettings(editing="live"), 100))
     labels = [part.estimate.rows(part.low, part.high).range_rate.label for part in parts]
     assert (np.concatenate(labels)[-400:] == MISSING).all()
+
+
+def test_rows_before_the_first_elevation_have_no_position_live(flight):
+    """They had one with an elevation of zero, kilometres off."""
+    log = start_of(flight.log, 900)
+    log.measurement[:300, 2] = np.nan
+    for block in (900, 100):
+        parts = list(live.parts(record(log), FilterSettings(editing="live"), block))
+        absent = np.concatenate([np.full(part.high - part.low, 2 in part.estimate.absent) for part in parts])
+        assert absent[:300].all()
+        assert not absent[330:].any()
+    found = pipeline.filter_log(log, FilterSettings(editing="live"))
+    assert np.isnan(found.state[:300]).all()
+    assert np.isfinite(found.state[350:]).all()

@@ -296,5 +296,5 @@ class LiveEditor:
                 rows[name] = getattr(smoothed, name)[first - begin : stop - begin]
         label[:, list(self.absent)] = 3.0
         again = np.isin(np.arange(low, low + n), window.reacquired)
-        yield Published(first, rows, label, without_what_is_lost(rows), again)
+        yield Published(first, rows, label, without_what_is_lost(rows), again, self.absent)
         self.published = stop

@@ -18,13 +18,19 @@ LATELY = 8  # samples whose innovations tell whether the sigmas hold
 class Published(NamedTuple):
     """Rows that leave. first: number of the first, from zero. rows: `Row` records (n,), NaN where there is no estimate.
     label: (n, 4) as of `outlier_chain.label_runs`, and of range rates. known: (n,) whether there is an estimate.
-    reacquired: (n,) whether a lost track was found again there."""
+    reacquired: (n,) whether a lost track was found again there. absent: components that were never seen by then."""
 
     first: int
     rows: Any
     label: FloatArray
     known: NDArray[np.bool_]
     reacquired: NDArray[np.bool_]
+    absent: tuple[int, ...] = ()
+
+    def part(self, rows: slice) -> Published:
+        """Some of them."""
+        label, known, again = self.label[rows], self.known[rows], self.reacquired[rows]
+        return Published(self.first + (rows.start or 0), self.rows[rows], label, known, again, self.absent)
 
 
 class Waiting(NamedTuple):
