@@ -189,8 +189,9 @@ class Filtering:
                 rate, spread, _ = columns.values()
                 channels["range_rate"] = beside.of_rates(log, estimate.range_rate, rate, spread)
         if self.height is not None and tuple(absent) in ((), heights.ABSENT):
-            state, sigma, path_sigma = heights.placed(self.height, rows, state, sigma, path_sigma)
-            cleaned_sigma = heights.elevated(self.height, rows, cleaned, cleaned_sigma)
+            common = self.height.where(bool(absent))
+            state, sigma, path_sigma = heights.placed(common, rows, state, sigma, path_sigma)
+            cleaned_sigma = heights.elevated(common, rows, cleaned, cleaned_sigma)
         elif absent:
             state[:], sigma[:], path_sigma[:] = np.nan, np.nan, np.nan
         if absent:  # the filter ran on a stand-in; what depends on it is not published
@@ -201,7 +202,7 @@ class Filtering:
             raise InputError(f"{self.log.name}: {name} diverged; give --noise and --jerk, or check the log's units")
         estimate = estimate._replace(label=by_hand.labelled(estimate.label, log.by_hand))
         label, variance = estimate.label, cleaned_sigma**2 + estimate.model.reading_variance
-        if self.height is not None and not absent:
+        if self.height is not None and self.height.prior is None:
             label = heights.relabelled(self.height, rows, label)
             label[:, 2] = by_hand.labelled(label[:, 2], log.by_hand, "height")
             estimate = estimate._replace(label=label)

@@ -4,20 +4,28 @@ A reading that lies on no line through neighbours, those before, those after, or
 channel then jumps by more than its rate and what this may change, a run ends. Runs that follow each other contradict;
 others agree where the target can have come from the one to the other. The runs that agree and have most readings are
 good.
+
+Where the channel is silent for long, what was read before and after stands in: on the line between, with a 1-sigma that
+grows with the time to the nearest reading, up to what is known of any target. A filter that had nothing there would
+leave the target free to rise for as long.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.order_statistics import median
 from ftproc.records import FloatArray
 
+LEAST, FEWEST = 0.1, 3  # m, 1-sigma: no instrument is so good; and values that tell their scatter
 GATE = 6.0  # sigmas beyond what the target may do
 REACH = 5  # readings on each side, from which the rate is taken
 RUNS_BEFORE = 30  # runs
+SILENT_S, DRIFT_MPS = 30.0, 10.0  # between readings that stand in, and how fast an aircraft leaves the line, 1-sigma
 _BEFORE, _AFTER = ((-2, -1), (-3, -1), (-3, -2)), ((1, 2), (1, 3), (2, 3))
 _AROUND = ((-1, 1), (-2, 1), (-1, 2), (-2, 2))
 
@@ -32,6 +40,13 @@ class Agile(NamedTuple):
 AIRCRAFT = Agile(1.0, 50.0)  # the height of an airliner, with 10,000 ft/min to spare
 
 
+def screened(time_s: FloatArray, values: FloatArray, step: float) -> tuple[float, NDArray[np.bool_]]:
+    """The noise 1-sigma of values (n,) m that are rounded to such steps, and (n,) which are no outliers."""
+    scatter = _scatter(values)
+    own = max(step / math.sqrt(12) if scatter < step else scatter, LEAST)
+    return own, good(time_s, values, own)
+
+
 def good(time_s: FloatArray, values: FloatArray, sigma: float, agile: Agile = AIRCRAFT) -> NDArray[np.bool_]:
     """(n,) which values are no outliers; False where missing. time_s (n,) never decreasing, sigma: their noise."""
     kept = np.isfinite(values)
@@ -42,6 +57,25 @@ def good(time_s: FloatArray, values: FloatArray, sigma: float, agile: Agile = AI
     there = np.flatnonzero(kept)
     kept[there[~_agreeing(time_s[there], values[there], sigma, agile)]] = False
     return kept
+
+
+def standing_in(
+    time_s: FloatArray, values: FloatArray, most: float
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Values (n,) with one in each SILENT_S that stands in where none is near; the 1-sigma (n,) by which the target may
+    have left the line that they are on; and (n,) which they are. time_s (n,) never decreasing. most: 1-sigma of the
+    value of any target."""
+    there = np.flatnonzero(np.isfinite(values))
+    known_s, k = time_s[there], np.searchsorted(time_s[there], time_s, side="right")
+    before = time_s - np.r_[-np.inf, known_s][k]
+    nearest = np.minimum(before, np.r_[known_s, np.inf][k] - time_s)
+    off = np.minimum(DRIFT_MPS * np.maximum(nearest - SILENT_S / 2, 0.0), most)
+    which = np.flatnonzero(nearest > SILENT_S)
+    number = np.floor(np.where(k > 0, before, time_s)[which] / SILENT_S)
+    new = (np.diff(number, prepend=np.nan) != 0) | (np.diff(k[which], prepend=-1) != 0)
+    chosen = np.zeros(len(values), bool)
+    chosen[which[new]] = True
+    return np.where(chosen, np.interp(time_s, known_s, values[there]), values), off, chosen
 
 
 def _alone(t: FloatArray, x: FloatArray, sigma: float, agile: Agile) -> NDArray[np.bool_]:
@@ -115,3 +149,9 @@ def _agreeing(t: FloatArray, x: FloatArray, sigma: float, agile: Agile) -> NDArr
         chosen[edges[run] : edges[run + 1]] = True
         run = int(before[run])
     return chosen
+
+
+def _scatter(values: FloatArray) -> float:
+    """Noise 1-sigma of single values, by their second differences."""
+    seen = values[np.isfinite(values)]
+    return median(np.abs(np.diff(seen, 2))) * 1.4826 / math.sqrt(6) if len(seen) > FEWEST else 0.0

@@ -38,7 +38,6 @@ ABSENT = (2,)  # components that are missing where a height stands in
 PRESSURE_M, TEMPERATURE = 80.0, 0.02  # 1-sigma of barometric heights: 10 hPa, and 5 K of 250 K as a share of the height
 SLOW_MPS = 30.0  # a target that is never faster is taken for a ship or a vehicle
 CHANGES_S = 300.0  # correlation time of an unknown height, for the sigmas of its rates
-LEAST_M = 0.1  # 1-sigma of a height: no instrument is so good
 STEEPEST = 0.9  # sine of the elevation: nearer to the vertical the azimuth says nothing of x and y
 MOST_OUTSIDE = 0.1  # share of heights that may be larger than the range
 FEWEST, BLOCKS, MOST_OF_BLOCKS = 3, 64, 0.9  # readings in a block, and blocks, for the speed; and of these speeds
@@ -61,7 +60,8 @@ ANY = Prior(0.0, 6000.0, "any target")
 class Common(NamedTuple):
     """What stands for the elevation. prior: if no height is measured. sigma_m: (n,) that all heights may be off by
     together. range_m: by which the noise of the elevations is that of single heights. rejected: (n,) heights that are
-    outliers. station_m: the station's own height, m. barometric: whether they are, where they are used as they come."""
+    outliers. station_m: the station's own height, m. barometric: whether they are, where they are used as they come.
+    silent: (n,) where others stand in. scale: 1-sigma, by a share of which all may be too large or too small."""
 
     prior: Prior | None
     sigma_m: FloatArray
@@ -69,6 +69,12 @@ class Common(NamedTuple):
     rejected: NDArray[np.bool_] | None = None
     station_m: float = 0.0
     barometric: bool | None = None
+    silent: NDArray[np.bool_] | None = None
+    scale: float = 0.0
+
+    def where(self, absent: bool) -> Common:
+        """What stands for the elevation of rows before which no height has come yet, or of others."""
+        return Common(ANY, self.sigma_m) if absent and self.prior is None else self
 
     def off_m(self, part: slice, above_m: FloatArray) -> FloatArray:
         """(n,) m 1-sigma of some samples that are so high, (n,) m."""
@@ -98,15 +104,16 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
         return _as_they_come(recording, log, by_hand, station_m)
     above = np.where(by_hand == REJECTED, np.nan, bounded(heights.above_m) - station_m)
     slant, step = _cleaned_ranges(recording, settings), rounding_step(heights.above_m)
-    own, good = screened(log.time_s, above, step)
+    own, good = alone.screened(log.time_s, above, step)
     good |= by_hand == ACCEPTED
     rejected = np.isfinite(above) & ~good
-    above = np.where(good, above, np.nan)
+    most = prior_of(log, settings).sigma_m
+    above, away_m, silent = alone.standing_in(log.time_s, np.where(good, above, np.nan), most)
     measurement[:, 2] = elevation(above, slant)
     _check(log, np.isfinite(above) & np.isfinite(slant), measurement[:, 2])
     ground = np.maximum(slant * np.cos(measurement[:, 2]), 1.0)
-    each = own / ground
-    typical = float(np.nanmedian(each))
+    each = np.where(silent, math.sqrt(CHANGES_S / alone.SILENT_S) * away_m, own) / ground
+    typical = float(np.nanmedian(each[good]))
     common = common_sigma(heights.barometric, above)
     times = np.ones((len(log), 3))
     times[:, 2] = np.where(np.isfinite(each), (each / typical) ** 2, 1.0)
@@ -114,13 +121,14 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
     assumed[2] = typical
     times_s = log.time_s - log.time_s[0]
     decided = recording.accepted.times or (np.zeros(0),) * 3
-    accepted = Accepted((*decided[:2], times_s[good], *decided[3:]))
+    accepted = Accepted((*decided[:2], times_s[good | silent], *decided[3:]))
     uneven = Uneven(times, np.zeros_like(times))
     found = replace(
         recording, measurement=measurement, assumed_sigma=assumed, absent=(), accepted=accepted, uneven=uneven
     )
     known = np.where(np.isfinite(common), common, float(np.nanmedian(common)))
-    return found, Common(None, np.hypot(known, step / math.sqrt(12)), own / typical, rejected, station_m)
+    off_m, scale = np.hypot(np.hypot(known, away_m), step / math.sqrt(12)), TEMPERATURE * heights.barometric
+    return found, Common(None, off_m, own / typical, rejected, station_m, silent=silent, scale=scale)
 
 
 def _as_they_come(
@@ -139,7 +147,7 @@ def _as_they_come(
     found = replace(recording, measurement=measurement, absent=(), accepted=accepted)
     barometric, typical = log.heights.barometric, max(float(np.nanmedian(ground)), 1.0)
     off = common_sigma(barometric, np.nan_to_num(above))
-    return found, Common(None, off, typical, None, station_m, barometric)
+    return found, Common(None, off, typical, None, station_m, barometric, scale=TEMPERATURE * barometric)
 
 
 def common_sigma(barometric: bool, above_m: FloatArray) -> FloatArray:
@@ -153,13 +161,6 @@ def elevation(above_m: FloatArray, range_m: FloatArray) -> FloatArray:
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = sine(above_m, range_m)
         return np.where(np.abs(ratio) <= 1, np.arcsin(np.clip(ratio, -1, 1)), np.nan)
-
-
-def screened(time_s: FloatArray, above_m: FloatArray, step: float) -> tuple[float, NDArray[np.bool_]]:
-    """The noise 1-sigma of heights (n,) m in such steps, and (n,) which are no outliers."""
-    scatter = _scatter(above_m)
-    own = max(step / math.sqrt(12) if scatter < step else scatter, LEAST_M)
-    return own, alone.good(time_s, above_m, own)
 
 
 def _check(log: MeasurementLog, both: NDArray[np.bool_], elevation: FloatArray) -> None:
@@ -187,12 +188,6 @@ def _cleaned_ranges(recording: Recording, settings: FilterSettings) -> FloatArra
         state = run.state[part.low : part.high, :3]
         found[part.first + part.low : part.first + part.high] = np.sqrt((state**2).sum(1))
     return found
-
-
-def _scatter(values: FloatArray) -> float:
-    """Noise 1-sigma of single values, by their second differences."""
-    seen = values[np.isfinite(values)]
-    return median(np.abs(np.diff(seen, 2))) * 1.4826 / math.sqrt(6) if len(seen) > FEWEST else 0.0
 
 
 def prior_of(log: MeasurementLog, settings: FilterSettings, causal: bool = False) -> Prior:
@@ -223,7 +218,7 @@ def placed(
     """The states (n, 9), their sigmas (n, 9) and those of `kinematics` (n, 6) of some samples, with the prior of the
     height instead of z, and with what the heights may be off by together."""
     if common.prior is None:
-        found, wide = state, _widened(state, sigma, common.off_m(part, state[:, 2]))
+        found, wide = state, _widened(state, sigma, common.off_m(part, state[:, 2]), common.scale)
     else:
         found, wide = _moved(common.prior, state, sigma)
     return found, wide, kinematics.widened(found, path_sigma, sigma, np.maximum(wide, sigma))
@@ -240,9 +235,10 @@ def elevated(common: Common, part: slice, cleaned: FloatArray, sigma: FloatArray
 
 def relabelled(common: Common, part: slice, label: FlagArray) -> FlagArray:
     """The labels (n, 3) of some samples of a log with heights, with those of the heights for the elevations."""
-    if common.rejected is None:
+    if common.rejected is None or common.silent is None:
         return label
     rejected, found = common.rejected[part], label.copy()
+    found[common.silent[part], 2] = label[common.silent[part], 2] = MISSING
     there = np.flatnonzero(rejected | (label[:, 2] != MISSING))
     used = np.ones((len(there), 3))
     used[:, 2] = ~rejected[there] & ~np.isin(label[there, 2], (ISOLATED, PATCH))
@@ -292,9 +288,13 @@ def _add(sigma: FloatArray, first: int, along: FloatArray, more: FloatArray) -> 
     sigma[:, first : first + 2] = np.hypot(sigma[:, first : first + 2], along * more[:, None])
 
 
-def _widened(state: FloatArray, sigma: FloatArray, off_m: FloatArray) -> FloatArray:
-    """The sigmas (n, 9) with an error (n,) that all heights have together."""
+def _widened(state: FloatArray, sigma: FloatArray, off_m: FloatArray, scale: float) -> FloatArray:
+    """The sigmas (n, 9) with an error (n,) that all heights have together, of which a share grows with them."""
     flat, wide = np.maximum(np.hypot(state[:, 0], state[:, 1]), 1e-9), sigma.copy()
+    along, rate = state[:, :2] / flat[:, None], np.abs(state[:, 5])
+    steep = np.minimum(np.abs(state[:, 2]) / flat, 10.0)
     wide[:, 2] = np.hypot(sigma[:, 2], off_m)
-    _add(wide, 0, state[:, :2] / flat[:, None], np.minimum(np.abs(state[:, 2]) / flat, 10.0) * off_m)
+    wide[:, [5, 8]] = np.hypot(sigma[:, [5, 8]], scale * state[:, [5, 8]])
+    _add(wide, 0, along, steep * off_m)
+    _add(wide, 3, along, np.minimum(rate / flat, 1.0) * off_m + steep * scale * rate)
     return wide

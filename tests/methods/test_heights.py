@@ -10,7 +10,7 @@ from ftproc.errors import InputError
 from ftproc.methods import heights
 from ftproc.pipeline import filter_log
 from ftproc.quality import summary
-from ftproc.records import MISSING, Heights
+from ftproc.records import MISSING, Heights, MeasurementLog
 from ftproc.settings import FilterSettings
 from ftproc.simulation import simulate
 
@@ -134,6 +134,55 @@ def test_a_patch_of_wrong_levels_is_left_out():
     label = np.asarray(found.extra.column("outlier_height"))[80:91]
     assert np.isin(label, (1, 2, MISSING)).all()
     assert inside(found, flight.truth) >= 0.95
+
+
+@pytest.mark.parametrize("silent", [slice(0, 70), slice(70, 150), slice(140, None)], ids=["first", "between", "last"])
+@pytest.mark.parametrize("smooth", [True, False])
+def test_where_no_heights_come_for_long_others_stand_in(surveillance, silent, smooth):
+    """As a transponder in a turn, or one that is switched on late: the target was free to rise, and went 30 km off."""
+    flight, _ = surveillance
+    above = flight.log.heights.above_m.copy()
+    above[silent] = np.nan
+    found = filter_log(replace(flight.log, heights=Heights(above, True)), FilterSettings(smooth=smooth))
+    assert inside(found, flight.truth) >= 0.95
+    off_m = np.sqrt(((found.state[:, :3] - flight.truth.position_m) ** 2).sum(1))
+    assert off_m.max() < 6000
+    label = np.asarray(found.extra.column("outlier_height"))
+    assert (label[silent] == MISSING).all()
+
+
+def test_the_scale_of_barometric_heights_is_in_the_sigmas_of_the_climb():
+    """A rocket: 2 % of its height and of its climb, by warm air."""
+    rng, t = np.random.default_rng(1), np.arange(0, 80, 0.1)
+    climb = np.minimum(35 * t, 875) - np.maximum(t - 25, 0) * 9.8
+    position = np.stack([8000 + 120 * t, 3000 + 60 * t, 50 + np.cumsum(climb) * 0.1], 1)
+    slant = np.sqrt((position**2).sum(1))
+    above = np.sqrt((position[:, :2] ** 2).sum(1) + (position[:, 2] + heights.EARTH_M) ** 2) - heights.EARTH_M
+    readings = [slant + 3 * rng.standard_normal(800), np.arctan2(*position[:, 1::-1].T), np.full(800, np.nan)]
+    readings[1] += 2e-4 * rng.standard_normal(800)
+    barometric = Heights(0.975 * above + rng.standard_normal(800), True)
+    log = MeasurementLog("rocket", time_s=t, measurement=np.stack(readings, 1), row=np.arange(800), heights=barometric)
+    for settings in (SMOOTH, FilterSettings(), FilterSettings(editing="live")):
+        found = filter_log(log, settings)
+        known = np.isfinite(found.state[:, 5]) & (np.abs(t - 25) > 1)
+        off = np.abs(found.state[:, 5] - climb)[known] / found.sigma[known, 5]
+        assert (off < 3).mean() > 0.97
+
+
+@pytest.mark.parametrize("lag_s", [0.0, 10.0])
+def test_before_the_first_height_live_rows_have_the_prior(lag_s):
+    """They had the height of the station, with the sigma of a height that is read."""
+    flight = simulate("surveillance-2d", seed=1)
+    above = flight.log.heights.above_m.copy()
+    above[:70] = np.nan
+    log = replace(flight.log, heights=Heights(above, True))
+    found = filter_log(log, FilterSettings(editing="live", lag_s=lag_s))
+    known = np.isfinite(found.state[:, 0])
+    assert known[40:66].all()
+    off = np.abs(found.state[:, :3] - flight.truth.position_m) <= 5 * found.sigma[:, :3]
+    assert off[known].all(1).mean() > 0.94
+    assert (found.sigma[40:66, 2] > 5000).all()
+    assert (found.sigma[100:, 2] < 500).all()
 
 
 @pytest.mark.parametrize("editing", ["live", "forward"])

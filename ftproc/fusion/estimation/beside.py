@@ -22,7 +22,7 @@ from ftproc.core.filtering import beside as layout
 from ftproc.core.filtering.records import Scalars
 from ftproc.core.model.earth import ECCENTRICITY2, MEAN_RADIUS_M, RADIUS_M, Geodetic
 from ftproc.fusion.estimation.events import OFFSET, Events, Seen, Side
-from ftproc.methods import heights
+from ftproc.methods import alone, heights
 from ftproc.records import FloatArray, IntArray, MeasurementLog
 
 HEIGHT, RANGE_RATE, ASSUMED = "height", "range_rate", "assumed height"
@@ -69,7 +69,7 @@ def sides(log: MeasurementLog, place: FloatArray, origin: Geodetic | None) -> tu
     if log.heights is not None and np.isfinite(log.heights.above_m).any():
         radius, level = _earth(origin)
         above, centre = bounded(log.heights.above_m) - level, np.array([0.0, 0.0, -radius])
-        own, good = heights.screened(log.time_s, above, rounding_step(log.heights.above_m))
+        own, good = alone.screened(log.time_s, above, rounding_step(log.heights.above_m))
         found.append(Side(HEIGHT, layout.DISTANCE, above, own, good.astype(float), centre, True, level))
         prior = np.array([heights.PRESSURE_M, heights.TEMPERATURE]) * log.heights.barometric
     return tuple(found), prior
