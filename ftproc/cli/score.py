@@ -151,11 +151,11 @@ class Scored(NamedTuple):
 def _scored(trajectory: Trajectory, truth: Truth | None, asked: Sequence[Limits], first: Trajectory | None) -> Scored:
     """first: another trajectory, with which this one is compared. Raises InputError."""
     from ftproc.scoring import compare, limits, score
-    from ftproc.scoring.matching import exchanged_axes
+    from ftproc.scoring.agreement import doubt
 
+    if truth is not None and (why := doubt(trajectory.name, trajectory.time_s, trajectory.state[:, :3], truth)):
+        click.echo(f"ftproc: {why}", err=True)
     found = score(trajectory, truth)
-    if truth is not None and (doubt := exchanged_axes(trajectory, truth)):
-        click.echo(f"ftproc: {doubt}", err=True)
     judged = [limits.judge(trajectory, truth, each.limits) for each in asked] if truth is not None else []
     text = "".join(limits.text(trajectory.name, each, one) for each, one in zip(asked, judged, strict=bool(judged)))
     results = [result for one in judged for result in one]

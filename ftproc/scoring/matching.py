@@ -1,5 +1,4 @@
-"""The truth at the times of a trajectory: the same sample where there is one, else interpolated; and whether both have
-the same axes."""
+"""The truth at the times of a trajectory: the same sample where there is one, else interpolated."""
 
 from __future__ import annotations
 
@@ -8,9 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ftproc.records import FlagArray, FloatArray, IntArray, Trajectory, Truth
-
-FAR_BETTER = 0.1  # share of the error that remains, at most, when x and y are exchanged
+from ftproc.records import FlagArray, FloatArray, IntArray, Truth
 
 LONGEST = 5.0  # intervals between the truth's times, over which it is interpolated
 _NEAR = 5  # intervals on both sides by which the usual one is judged
@@ -52,26 +49,6 @@ def match(time_s: FloatArray, truth: Truth) -> MatchedTruth:
         outlier[exact] = truth.outlier[rows[exact]]
     between = ~exact & np.isfinite(position).all(axis=1)
     return MatchedTruth(position, velocity, acceleration, outlier, exact, between)
-
-
-def exchanged_axes(trajectory: Trajectory, truth: Truth) -> str | None:
-    """A sentence when the truth fits far better with x and y exchanged: one has x east, the other x north."""
-    position = match(trajectory.time_s, truth).position_m
-    error = _median_length(trajectory.state[:, :3] - position)
-    exchanged = _median_length(trajectory.state[:, :3] - position[:, [1, 0, 2]])
-    if not exchanged < FAR_BETTER * error:
-        return None
-    return (
-        f"{truth.name} fits {trajectory.name} far better with x and y exchanged: one has x north, the other x east. "
-        "Exchange x and y in the truth (vx and vy too)."
-    )
-
-
-def _median_length(error: FloatArray) -> float:
-    """Median length of (n, 3) errors in m; NaN when there is none."""
-    length = np.sqrt((error**2).sum(1))
-    finite = length[np.isfinite(length)]
-    return float(np.median(finite)) if len(finite) else np.nan
 
 
 def _same_sample(time_s: FloatArray, truth_s: FloatArray) -> IntArray:

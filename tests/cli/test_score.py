@@ -56,6 +56,14 @@ def test_exchanged_axes_are_reported(run, clean):
     assert run("score", clean, "--truth", "flight.truth.csv").err == ""
 
 
+def test_another_clock_is_reported(run, clean):
+    truth = pd.read_csv("flight.truth.csv")
+    truth.assign(time_s=truth.time_s + 18).to_csv("gps.csv", index=False)
+    result = run("score", clean, "--truth", "gps.csv")
+    assert result.code == 0
+    assert "its clock is moved: it is 18 s (GPS against UTC) ahead" in result.err
+
+
 def test_several_with_one_truth_or_one_each(run, clean):
     rows = {}
     for name, truths in {"one": ["flight.truth.csv"], "each": ["flight.truth.csv"] * 2}.items():

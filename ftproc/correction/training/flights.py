@@ -17,6 +17,7 @@ from ftproc.methods import registry
 from ftproc.methods.estimate import Estimate
 from ftproc.quality import sanity
 from ftproc.records import COMPONENTS, MeasurementLog, Truth
+from ftproc.scoring.agreement import doubt
 from ftproc.scoring.matching import match
 from ftproc.settings import FilterSettings, TrainSettings
 
@@ -90,6 +91,9 @@ def _flown(log: MeasurementLog, truth: Truth | None, estimate: Estimate, proven:
     known = match(log.time_s, truth)
     if not np.isfinite(known.position_m).any():
         raise InputError(f"{truth.name}: its times do not overlap those of {log.name}")
+    best = estimate.run if smoothed is None else smoothed
+    if why := doubt(log.name, log.time_s, best.state[:, :3], truth):
+        raise InputError(f"{why} Nothing is learned from it.")
     found = {FILTER: Flight(estimate.run, known.position_m, known.velocity_mps, later)}
     if smoothed is not None:
         found[SMOOTHER] = Flight(estimate.smoothed_run, known.position_m, known.velocity_mps)

@@ -28,6 +28,12 @@ def test_refuses_what_it_cannot_learn_from():
     late = Truth("late.csv", flight.truth.time_s + 1e4, flight.truth.position_m)
     with pytest.raises(InputError, match=r"^late\.csv: its times do not overlap those of "):
         train_flights([(flight.log, late)], settings)
+    other = simulate("cruise", seed=2, duration_s=40.0).truth
+    with pytest.raises(InputError, match=r"the truth of another flight.* Nothing is learned from it\.$"):
+        train_flights([(flight.log, other)], settings)
+    utc = replace(flight.truth, time_s=flight.truth.time_s + 18.0)
+    with pytest.raises(InputError, match=r"it is 18 s \(GPS against UTC\) ahead"):
+        train_flights([(flight.log, utc)], settings)
 
 
 def test_of_live_editing_the_filter_alone_is_corrected():
