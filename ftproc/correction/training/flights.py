@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ftproc.core.model.frames import to_cartesian
 from ftproc.correction.model import FILTER, SMOOTHER, Model
 from ftproc.correction.training import Progress, silent
 from ftproc.correction.training.samples import Flight
@@ -91,8 +92,7 @@ def _flown(log: MeasurementLog, truth: Truth | None, estimate: Estimate, proven:
     known = match(log.time_s, truth)
     if not np.isfinite(known.position_m).any():
         raise InputError(f"{truth.name}: its times do not overlap those of {log.name}")
-    best = estimate.run if smoothed is None else smoothed
-    if why := doubt(log.name, log.time_s, best.state[:, :3], truth):
+    if why := doubt(log.name, log.time_s, to_cartesian(log.measurement), truth):
         raise InputError(f"{why} Nothing is learned from it.")
     found = {FILTER: Flight(estimate.run, known.position_m, known.velocity_mps, later)}
     if smoothed is not None:
