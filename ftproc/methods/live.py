@@ -18,7 +18,7 @@ from ftproc.core.filtering.smoother import PATHS, smooth_log
 from ftproc.core.identification.likelihood import Fixed, first_jerk, fit_level
 from ftproc.core.live import beside
 from ftproc.core.live.editor import LiveEditor
-from ftproc.core.live.recursive import Gating
+from ftproc.core.live.recursive import GatedWindow, Gating
 from ftproc.core.live.rows import Published
 from ftproc.core.model.motion import isotropic
 from ftproc.long_records import chunks
@@ -28,7 +28,8 @@ from ftproc.records import GOOD, MISSING, FlagArray, FloatArray
 from ftproc.settings import FilterSettings
 
 BLOCK = 4096  # samples that are taken at once
-NOT_USED = "the range rates are not used by now: too few, or they contradict the readings or do not add to them"
+NOT_USED = "the range rates are not used by now: too few, or they contradict the readings, are late, or add nothing"
+OF_PAPER = "the range rates are not used: the paper's recursive editing has none; leave --editing forward out"
 HISTORY = 256  # samples before a stretch that go with it: the network uses samples before
 
 
@@ -107,7 +108,7 @@ def _rates(live: LiveEditor, label: FlagArray) -> Channel:
     side = beside.Rates() if live.window is None else live.window.side
     n = len(label)
     rates = Scalars.rates(np.full(n, np.nan), side.sigma_mps**2, np.zeros(n))
-    why = "" if side.used else NOT_USED
+    why = "" if side.used else OF_PAPER if isinstance(live.window, GatedWindow) else NOT_USED
     unknown = np.full((2, n), np.nan)
     return Channel(rates, np.ascontiguousarray(label), side.sign < 0, why=why, innovation=unknown[0], sigma=unknown[1])
 
