@@ -132,6 +132,7 @@ def remarks(fused: Fused, zero_s: float) -> list[Remark]:
     return [
         *notes.notes(fused, zero_s),
         *_steps(fused, zero_s),
+        *_unstated(fused),
         *_improbable(fused),
         *too_fast(consistency.least_acceleration(fused.track.state, fused.track.sigma)),
         *_scattered(fused),
@@ -169,6 +170,20 @@ def _steps(fused: Fused, zero_s: float) -> Iterator[Remark]:
         name, unit = faults.NAMES[each.component], faults.UNITS[each.component]
         step = {"component": name, "time_s": each.time_s + zero_s, f"size_{unit}": each.size}
         yield Remark(SUSPECT, f"{each.station}: {faults.step_in_words(step, {})}; the estimate allows for it")
+
+
+def _unstated(fused: Fused) -> Iterator[Remark]:
+    """Components that contradict the range file throughout, whose biases were estimated for that."""
+    for c, key in enumerate(("range_bias_sigma_m", "azimuth_bias_sigma_mrad", "elevation_bias_sigma_mrad")):
+        named = [s for s, station in enumerate(fused.stations) if c in station.unstated]
+        if not named:
+            continue
+        names = " and ".join(fused.stations[s].name for s in named)
+        off, word = max(fused.constants.prior[s, c] for s in named), fused.stations[named[0]].names[c]
+        size = f"{1000 * off:.3g} mrad" if c else f"{off:.3g} m"
+        text = f"{names}: the {word} readings are off by {size} from "
+        text += "first to last, against the range file, which takes them as exact; the bias is taken as unknown. State "
+        yield Remark(SUSPECT, f"{text}{key}, and check the places and the conventions")
 
 
 def _scattered(fused: Fused) -> Iterator[Remark]:

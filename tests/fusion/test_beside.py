@@ -191,3 +191,24 @@ def test_numbers_that_no_instrument_reads_are_outliers(plain, tmp_path, channel)
     found = fused(replace(simulated, stations=(first, *rest)), tmp_path)
     off = np.abs(found.trajectory.state[:, :3] - reference.trajectory.state[:, :3])
     assert (off < 0.5 * reference.trajectory.sigma[:, :3]).all()
+
+
+def test_two_radars_without_elevations_do_not_put_a_target_below_the_ground(tmp_path):
+    """A drone at 40 to 80 m, seen by two harbour radars: ranges and azimuths fit as well 60 m below."""
+    t = np.arange(0, 200, 0.2)
+    position = np.stack([200 + 8 * t * np.cos(t / 60), 100 + 6 * t * np.sin(t / 50 + 1), 60 + 20 * np.sin(t / 40)], 1)
+    for seed in (0, 1):
+        rng, text = np.random.default_rng(seed), ""
+        for k, place in enumerate(([0.0, 0.0, 0.0], [800.0, -300.0, 0.0])):
+            seen = np.stack([np.interp(np.arange(0.3 * k, 199), t, axis) for axis in position.T], 1) - place
+            n = len(seen)
+            slant = np.sqrt((seen**2).sum(1)) + rng.standard_normal(n)
+            azimuth = np.arctan2(seen[:, 1], seen[:, 0]) + 2e-3 * rng.standard_normal(n)
+            log = pd.DataFrame({"time_s": np.arange(0.3 * k, 199), "range_m": slant, "azimuth_rad": azimuth})
+            log.to_csv(tmp_path / f"r{k}.csv", index=False)
+            text += f'[station.r{k}]\nlog = "r{k}.csv"\neast_m = {place[0]}\nnorth_m = {place[1]}\nup_m = 0\n'
+        (tmp_path / "range.toml").write_text(text)
+        track = flight.fuse(range_file.load(str(tmp_path / "range.toml")), SMOOTH).trajectory
+        off = track.state[:, 2] - np.interp(track.time_s, t, position[:, 2])
+        assert np.abs(off).max() < 80
+        assert (np.abs(off) <= 5 * track.sigma[:, 2]).all()

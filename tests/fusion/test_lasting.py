@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from ftproc.core import work
 from ftproc.core.editing.lasting import proposals, search, weighing
+from ftproc.core.model import frames
 from ftproc.files.writing import ranges
 from ftproc.fusion import flight, range_file
 from ftproc.settings import FilterSettings
@@ -49,3 +52,43 @@ def test_a_jump_that_is_none_asks_for_no_process_noise_of_its_own(tmp_path, monk
     monkeypatch.setattr(search, "_left_as_steps", lambda seen, jump: jump)
     fused(tmp_path / "range")
     assert len(fits) > 5 * len(jumps)
+
+
+def two_radars(folder, off):
+    """Truth (n, 4) time s and position m of an airliner that two radars have seen for six minutes; off: by what the
+    readings of the first are larger, m, rad, rad."""
+    rng, t, text = np.random.default_rng(0), np.arange(0, 361, 1.0), ""
+    position = np.stack([-30_000 + 200 * t, 20_000 - 8000 * np.sin(t / 200), 8000 + 500 * np.sin(t / 150)], 1)
+    for k, place in enumerate(([0.0, 0.0, 0.0], [30_000.0, -12_000.0, 0.0])):
+        at = np.arange(0.3 * k, 360, 4.0)
+        seen = np.stack([np.interp(at, t, axis) for axis in position.T], 1) - place
+        z = (
+            frames.from_cartesian(seen)
+            + rng.standard_normal(seen.shape) * [25.0, 8e-4, 8e-4]
+            + np.array(off) * (k == 0)
+        )
+        log = pd.DataFrame(z, columns=["range_m", "azimuth_rad", "elevation_rad"]).assign(time_s=at)
+        log.to_csv(folder / f"r{k}.csv", index=False)
+        text += f'[station.r{k}]\nlog = "r{k}.csv"\neast_m = {place[0]}\nnorth_m = {place[1]}\nup_m = 0\n'
+    (folder / "range.toml").write_text(text)
+    return np.column_stack([t, position])
+
+
+def test_an_offset_that_the_range_file_does_not_state_is_a_bias(tmp_path):
+    """It was called a step after the first reading, and the track hung on that."""
+    truth = two_radars(tmp_path, (0.0, -5e-3, 0.0))
+    track = fused(tmp_path)
+    trust = track.metadata["summary"]["trust"]
+    assert trust["verdict"] == "suspect"
+    said = " ".join(trust["reasons"])
+    assert "r0 and r1: the azimuth readings are off by" in said
+    assert "State azimuth_bias_sigma_mrad" in said
+    assert "steps by" not in said
+    at = np.stack([np.interp(track.time_s, truth[:, 0], axis) for axis in truth[:, 1:].T], 1)
+    assert (np.abs(track.state[:, :3] - at) <= 4 * track.sigma[:, :3]).all(1).mean() > 0.97
+
+
+def test_where_the_range_file_is_right_no_bias_is_taken_as_unknown(tmp_path):
+    two_radars(tmp_path, (0.0, 0.0, 0.0))
+    trust = fused(tmp_path).metadata["summary"]["trust"]
+    assert trust["verdict"] == "consistent"

@@ -23,9 +23,11 @@ from ftproc.core.filtering.records import Scalars
 from ftproc.core.model.earth import ECCENTRICITY2, MEAN_RADIUS_M, RADIUS_M, Geodetic
 from ftproc.fusion.estimation.events import OFFSET, Events, Seen, Side
 from ftproc.methods import alone, heights
+from ftproc.order_statistics import median
 from ftproc.records import FloatArray, IntArray, MeasurementLog
 
 HEIGHT, RANGE_RATE, ASSUMED = "height", "range_rate", "assumed height"
+BELOW = 2.0  # sigmas that a target must be below the ground
 NO_HEIGHTS = "the heights make the readings less likely: none is used"
 SHORTEST_M = 1.0  # of a distance over the ground
 
@@ -97,6 +99,23 @@ def with_prior(stations: list[Seen], priors: Sequence[heights.Prior], origin: Ge
             side = side._replace(why=f"no station tells the height: it is taken for {words}")
             found[s] = station._replace(beside=(*station.beside, side), prior=biases)
     return found
+
+
+def above_ground(stations: list[Seen], state: FloatArray, sigma: FloatArray) -> list[Seen] | None:
+    """The stations with a height as far above them as a target is below with these states (n, 9) and 1-sigmas (n, 9),
+    where its height is assumed: ranges and azimuths alone do not tell above from below. None where it is not below."""
+    assumed = any(side.name == ASSUMED for station in stations for side in station.beside)
+    below = min(float(station.place[2]) for station in stations) - median(state[:, 2])
+    if not (assumed and below > BELOW * median(sigma[:, 2])):
+        return None
+    return [
+        station._replace(
+            beside=tuple(
+                side._replace(value=side.value + below) if side.name == ASSUMED else side for side in station.beside
+            )
+        )
+        for station in stations
+    ]
 
 
 def _earth(origin: Geodetic | None) -> tuple[float, float]:

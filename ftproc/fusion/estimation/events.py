@@ -61,7 +61,8 @@ class Seen(NamedTuple):
     the offset m and the scale; zero for what is known. known: (3,) noise 1-sigma that the user specified, else NaN.
     accepted: (n, 3) readings that are good by hand. beside: what else it measures. times: (n,) of the noise's variance,
     by row, where the log states it. away_m: how far from the target a place is that positions are seen from, zero for a
-    tracker. copied: (3, kinds) readings of each component that were not measured, see `copies`; these are missing."""
+    tracker. copied: (3, kinds) readings of each component that were not measured, see `copies`; these are missing.
+    unstated: components whose bias the range file takes as known, against what the readings say."""
 
     name: str
     time_s: FloatArray
@@ -75,6 +76,7 @@ class Seen(NamedTuple):
     times: FloatArray | None = None
     away_m: float = 0.0
     copied: IntArray = np.zeros((3, 4), np.int64)
+    unstated: tuple[int, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:

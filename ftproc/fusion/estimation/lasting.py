@@ -18,6 +18,8 @@ from ftproc.core.work import Work
 from ftproc.fusion.estimation.events import Events, Seen
 from ftproc.records import FloatArray, IntArray
 
+NEARLY_ALL = 0.05  # of a log, that a step leaves out, where it is an offset
+
 
 class Step(NamedTuple):
     """From a time of its own clock, s, on (or until then) the readings of a component of a station are larger by a size
@@ -54,6 +56,24 @@ class Decided(NamedTuple):
     sigma: FloatArray
     residual: FloatArray
     rates: FloatArray
+
+
+def with_biases(stations: list[Seen], steps: Sequence[Step]) -> list[Seen] | None:
+    """The stations with unknown biases where a step of what is taken as exact holds for all of a station's log, or
+    nearly: that is no step, but an offset that the range file does not state. Of two stations either may have it, of
+    more the one that steps. None without such."""
+    found, names = list(stations), [station.name for station in stations]
+    for step in steps:
+        c, named = step.component, names.index(step.station)
+        before = float(np.mean(stations[named].time_s < step.time_s))
+        if c == CLOCK or stations[named].prior[c] > 0 or min(before, 1 - before) > NEARLY_ALL:
+            continue
+        for s in (0, 1) if len(stations) == 2 else (named,):
+            station, prior = found[s], found[s].prior.copy()
+            if c in station.components and stations[s].prior[c] == 0:
+                prior[c] = np.hypot(prior[c], step.size)
+                found[s] = station._replace(prior=prior, unstated=(*{*station.unstated, c},))
+    return found if any(a is not b for a, b in zip(found, stations, strict=True)) else None
 
 
 def contradicted(stations: Sequence[Seen], weight: Sequence[FloatArray]) -> bool:

@@ -19,8 +19,8 @@ from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification import motion_models
 from ftproc.core.model import kinematics
 from ftproc.core.model.stations import levelled
-from ftproc.fusion.estimation import engine, flight_faults, motions
-from ftproc.fusion.estimation.beside import ASSUMED, Aside, expected
+from ftproc.fusion.estimation import engine, flight_faults, lasting, motions
+from ftproc.fusion.estimation.beside import ASSUMED, Aside, above_ground, expected
 from ftproc.fusion.estimation.constants import FARTHEST, Constants, Likelihood, parameters
 from ftproc.fusion.estimation.engine import Current
 from ftproc.fusion.estimation.events import CLOCK, Seen, Side
@@ -92,6 +92,19 @@ def fuse(
     """The fused flight of two or more stations. smooth: whether the track is smoothed, or filtered with the decisions
     and the biases of the whole flight. progress is called with the rounds that are done, and the most there may be.
     names: of the models of motion to choose from. Raises engine.Alone."""
+    run = functools.partial(_fused, gate=gate, jerk_psd=jerk_psd, smooth=smooth, progress=progress, names=names)
+    fused = run(stations)
+    if (others := lasting.with_biases(stations, fused.steps)) is not None:
+        fused = run(others)
+    others = above_ground(fused.stations, fused.track.state, fused.track.sigma)
+    return fused if others is None else run(others)
+
+
+def _fused(
+    stations: list[Seen], gate: float, jerk_psd: float | None, smooth: bool, progress: Callable[[int, int], None],
+    names: tuple[str, ...],
+) -> Fused:  # fmt: skip
+    """The same, of what the range file says."""
     prior = np.stack([station.prior for station in stations])
     times = np.sort(np.concatenate([station.time_s for station in stations]))
     pieces = -(-len(times) // MOST)
