@@ -66,6 +66,8 @@ def standing_in(
     have left the line that they are on; and (n,) which they are. time_s (n,) never decreasing. most: 1-sigma of the
     value of any target."""
     there = np.flatnonzero(np.isfinite(values))
+    if not len(there):
+        return values, np.full(len(values), most), np.zeros(len(values), bool)
     known_s, k = time_s[there], np.searchsorted(time_s[there], time_s, side="right")
     before = time_s - np.r_[-np.inf, known_s][k]
     nearest = np.minimum(before, np.r_[known_s, np.inf][k] - time_s)

@@ -238,10 +238,10 @@ def relabelled(common: Common, part: slice, label: FlagArray) -> FlagArray:
     if common.rejected is None or common.silent is None:
         return label
     rejected, found = common.rejected[part], label.copy()
-    found[common.silent[part], 2] = label[common.silent[part], 2] = MISSING
-    there = np.flatnonzero(rejected | (label[:, 2] != MISSING))
+    found[common.silent[part], 2] = MISSING
+    there = np.flatnonzero(rejected | (found[:, 2] != MISSING))
     used = np.ones((len(there), 3))
-    used[:, 2] = ~rejected[there] & ~np.isin(label[there, 2], (ISOLATED, PATCH))
+    used[:, 2] = ~rejected[there] & ~np.isin(found[there, 2], (ISOLATED, PATCH))
     found[there, 2] = preparing.labels(used, np.zeros_like(used))[:, 2]
     return found
 

@@ -52,19 +52,20 @@ def parts(record: Recording, settings: FilterSettings, block: int = BLOCK) -> It
             first, count = new[0].first, sum(len(each.rows) for each in new)
             low = sum(len(each.rows) for each in history)
             both = [*history, *new]
-            times = record.time_s[first - low : first + count]
+            times = record.part(slice(first - low, first + count)).time_s
             yield Part(estimate(live, both, times, record.range_rate is not None), first - low, low, low + count)
             history = [_last(both, HISTORY)]
 
 
 def _alike(left: Sequence[Published]) -> list[list[Published]]:
     """Those one after the other before which the same components were never seen, or that have no estimate at all."""
-    found = list[list[Published]]()
+    found, absent = list[list[Published]](), None
     for each in left:
-        known = [rows.absent for rows in found[-1] if rows.known.any()] if found else []
-        if not found or (known and each.known.any() and known[-1] != each.absent):
+        here = each.absent if each.known.any() else absent
+        if not found or (absent is not None and here != absent):
             found.append([])
         found[-1].append(each)
+        absent = here
     return found
 
 
@@ -124,7 +125,7 @@ def whole(readings: Readings, settings: FilterSettings) -> Estimate:
     record = Recording(*readings[:3], accepted=readings.accepted, range_rate=readings.range_rate)
     live = editor(settings, record.accepted)
     (left,) = _left(live, record, len(record))
-    return estimate(live, left, record.time_s, record.range_rate is not None)
+    return estimate(live, left, record.part(slice(0, len(record))).time_s, record.range_rate is not None)
 
 
 def smoothed(readings: Readings, settings: FilterSettings) -> Estimate:

@@ -50,3 +50,38 @@ def test_a_patch_is_found_whole(length):
 def test_few_readings(n):
     t = np.arange(float(n))
     assert alone.good(t, 100.0 + t, 1.0).all()
+
+
+def test_where_nothing_is_read_for_long_the_line_stands_in():
+    t = np.arange(0, 1000, 4.0)
+    x = 3000 + 5 * t
+    seen = (t < 200) | (t >= 600)
+    values, off, chosen = alone.standing_in(t, np.where(seen, x, np.nan), 3500.0)
+    np.testing.assert_array_equal(values[seen], x[seen])
+    np.testing.assert_allclose(values[chosen], x[chosen])
+    assert np.isnan(values[~seen & ~chosen]).all()
+    assert not chosen[seen].any()
+    assert (np.diff(t[chosen]) >= alone.SILENT_S - 4).all()
+    assert (t[chosen] > 196 + alone.SILENT_S).all()
+    assert (t[chosen] < 600 - alone.SILENT_S).all()
+    nearest = np.minimum(np.abs(t - 196), np.abs(t - 600))[~seen]
+    np.testing.assert_allclose(off[~seen], 10 * np.maximum(nearest - 15, 0))
+    assert (off[seen] == 0).all()
+
+
+@pytest.mark.parametrize("side", ["before", "after"])
+def test_before_the_first_and_after_the_last_the_nearest_stands_in_up_to_what_is_known_of_any(side):
+    t = np.arange(0, 1000, 4.0)
+    seen = t >= 500 if side == "before" else t < 500
+    values, off, chosen = alone.standing_in(t, np.where(seen, 3000 + 5 * t, np.nan), 1000.0)
+    assert chosen.sum() in (15, 16)
+    assert (values[chosen] == (5500 if side == "before" else 3000 + 5 * 496)).all()
+    assert off.max() == 1000.0
+
+
+def test_of_nothing_nothing_stands_in():
+    t = np.arange(0, 100, 4.0)
+    values, off, chosen = alone.standing_in(t, np.full(25, np.nan), 50.0)
+    assert np.isnan(values).all()
+    assert (off == 50.0).all()
+    assert not chosen.any()

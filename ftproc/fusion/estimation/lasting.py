@@ -72,7 +72,7 @@ def with_biases(stations: list[Seen], steps: Sequence[Step]) -> list[Seen] | Non
             station, prior = found[s], found[s].prior.copy()
             if c in station.components and stations[s].prior[c] == 0:
                 prior[c] = np.hypot(prior[c], step.size)
-                found[s] = station._replace(prior=prior, unstated=(*{*station.unstated, c},))
+                found[s] = station._replace(prior=prior, unstated=tuple(sorted({*station.unstated, c})))
     return found if any(a is not b for a, b in zip(found, stations, strict=True)) else None
 
 

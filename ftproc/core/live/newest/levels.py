@@ -135,10 +135,8 @@ def _off_the_track(case: Open, c: int, run: IntArray, drift: float) -> Open:
 def _with_jump(case: Open, measurement: FloatArray, c: int, run: IntArray, about: float = 0.0) -> tuple[Fitted, float]:
     """A constant for what a run is off by, which is about so much, and the log-probability of all readings with it."""
     log = case.log._replace(measurement=measurement, weight=_used(case, run, c))
-    curve, setting = (
-        Curve(c, int(run[0]), len(log.time_s), (about,)),
-        Setting(log.time_s, np.zeros((len(log.time_s), 3))),
-    )
+    n = len(log.time_s)
+    curve, setting = Curve(c, int(run[0]), n, (about,)), Setting(log.time_s, np.zeros((n, 3)))
     jump = fitted(log, case.model, [case.start], setting, [curve])
     begins, stays = case.rates[c, 1:].tolist()
     there = math.log(begins) + len(run) * math.log(stays)
