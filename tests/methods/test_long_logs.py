@@ -227,3 +227,13 @@ def test_rows_before_the_first_elevation_have_no_position_live(flight):
     found = pipeline.filter_log(log, FilterSettings(editing="live"))
     assert np.isnan(found.state[:300]).all()
     assert np.isfinite(found.state[350:]).all()
+
+
+@pytest.mark.parametrize("rows", [301, 305, 320])
+def test_a_log_that_ends_with_the_first_elevations_has_a_summary_live(flight, rows):
+    """No track is confirmed with them by then, so there was no process noise to tell of."""
+    log = start_of(flight.log, rows)
+    log.measurement[:300, 2] = np.nan
+    found = pipeline.filter_log(log, FilterSettings(editing="live"))
+    assert found.metadata["summary"]["jerk_psd_m2ps5"]["median"] > 0
+    assert np.isnan(found.state[:300]).all()

@@ -49,6 +49,7 @@ class LiveEditor:
         """lag_s: seconds that a row waits for later readings. window: the kind of window that edits."""
         self.known, self.lag_s, self.kind = known, lag_s, window
         self.window: Window | None = None
+        self.flown = Model(np.full(3, np.nan), np.empty((0, 3)))
         self.confirmed_once = False
         self.waiting = Waiting.nothing()
         self.absent: tuple[int, ...] = ()
@@ -63,8 +64,8 @@ class LiveEditor:
 
     @property
     def model(self) -> Model:
-        """Noise and process noise of the track; of none before it is confirmed."""
-        return Model(np.full(3, np.nan), np.empty((0, 3))) if self.window is None else self.window.allowed
+        """Noise and process noise of the track, or of the one before it; of none before the first is confirmed."""
+        return self.flown if self.window is None else self.window.allowed
 
     def push(self, time_s: FloatArray, measurement: FloatArray) -> list[Published]:
         """Take the next rows, time_s (n,) never decreasing, measurement (n, 3), or (n, 4) with range rates; the rows
@@ -148,11 +149,10 @@ class LiveEditor:
     def _begin_again(self) -> None:
         """A component is seen for the first time: what is known without it does not tell where the target is."""
         assert self.window is not None
-        window = self.window
+        window, self.flown = self.window, self.window.allowed
         low = max(min(len(window) - window.sizes.near, self.published - self._first), 0)
-        measurement = window.came[low:]
-        measurement[:, list(self.absent)] = np.nan
-        self.waiting = Waiting(window.time_s[low:].copy(), measurement)
+        self.waiting = Waiting(window.time_s[low:].copy(), window.came[low:])
+        self.waiting.measurement[:, list(self.absent)] = np.nan
         self.window, self.absent, self.next_edit = None, (), self.count + FEWEST_READINGS
 
     # -- when to edit -----------------------------------------------------------------------------------------------
