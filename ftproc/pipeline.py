@@ -188,8 +188,8 @@ class Filtering:
             if estimate.range_rate is not None:
                 rate, spread, _ = columns.values()
                 channels["range_rate"] = beside.of_rates(log, estimate.range_rate, rate, spread)
-        if self.height is not None and tuple(absent) in ((), heights.ABSENT):
-            common = self.height.where(bool(absent))
+        common = heights.at(self.height, tuple(absent), self.log, self.settings)
+        if common is not None and tuple(absent) in ((), heights.ABSENT):
             state, sigma, path_sigma = heights.placed(common, rows, state, sigma, path_sigma)
             cleaned_sigma = heights.elevated(common, rows, cleaned, cleaned_sigma)
         elif absent:

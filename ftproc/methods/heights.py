@@ -72,10 +72,6 @@ class Common(NamedTuple):
     silent: NDArray[np.bool_] | None = None
     scale: float = 0.0
 
-    def where(self, absent: bool) -> Common:
-        """What stands for the elevation of rows before which no height has come yet, or of others."""
-        return Common(ANY, self.sigma_m) if absent and self.prior is None else self
-
     def off_m(self, part: slice, above_m: FloatArray) -> FloatArray:
         """(n,) m 1-sigma of some samples that are so high, (n,) m."""
         return self.sigma_m[part] if self.barometric is None else common_sigma(self.barometric, above_m)
@@ -129,6 +125,13 @@ def stand_in(recording: Recording, log: MeasurementLog, settings: FilterSettings
     known = np.where(np.isfinite(common), common, float(np.nanmedian(common)))
     off_m, scale = np.hypot(np.hypot(known, away_m), step / math.sqrt(12)), TEMPERATURE * heights.barometric
     return found, Common(None, off_m, own / typical, rejected, station_m, silent=silent, scale=scale)
+
+
+def at(common: Common | None, absent: tuple[int, ...], log: MeasurementLog, settings: FilterSettings) -> Common | None:
+    """What stands for the elevation of rows before which these components were never seen."""
+    if absent != ABSENT or (common is not None and common.prior is not None):
+        return common
+    return Common(prior_of(log, settings, causal=True), np.zeros(len(log)))
 
 
 def _as_they_come(
@@ -271,16 +274,12 @@ def _moved(prior: Prior, state: FloatArray, sigma: FloatArray) -> tuple[FloatArr
     found[:, 3:5] = along * speed[:, None] + across * (ground * spin)[:, None]
     found[:, 6:8] = along * (growth - ground * spin**2)[:, None] + across * (ground * spun + 2 * speed * spin)[:, None]
     wide[:, [2, 5, 8]] = prior.sigma_m / CHANGES_S ** np.arange(3)
-    ends = np.stack([_ground(slant, z + sign * 2 * prior.sigma_m) for sign in (-1, 1)])
+    ends = np.sqrt([np.maximum(slant**2 - (z + sign * 2 * prior.sigma_m) ** 2, 0.0) for sign in (-1, 1)])
     open_m = np.abs(ends - ground).max(0) / 2
     _add(wide, 0, along, open_m)
     _add(wide, 3, along, np.hypot(np.abs(speed) * open_m, np.abs(z) * prior.sigma_m / CHANGES_S) / ground)
     found[np.isnan(state[:, :3]).any(1)] = wide[np.isnan(state[:, :3]).any(1)] = np.nan
     return found, wide
-
-
-def _ground(slant: FloatArray, z: FloatArray) -> FloatArray:
-    return np.sqrt(np.maximum(slant**2 - z**2, 0.0))
 
 
 def _add(sigma: FloatArray, first: int, along: FloatArray, more: FloatArray) -> None:

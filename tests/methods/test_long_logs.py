@@ -215,8 +215,8 @@ def test_every_stretch_of_a_log_with_range_rates_has_their_labels(flight):
     assert (np.concatenate(labels)[-400:] == MISSING).all()
 
 
-def test_rows_before_the_first_elevation_have_no_position_live(flight):
-    """They had one with an elevation of zero, kilometres off."""
+def test_rows_before_the_first_elevation_have_the_prior_of_any_target_live(flight):
+    """They had an elevation of zero as if it were read, kilometres off."""
     log = start_of(flight.log, 900)
     log.measurement[:300, 2] = np.nan
     for block in (900, 100):
@@ -225,8 +225,10 @@ def test_rows_before_the_first_elevation_have_no_position_live(flight):
         assert absent[:300].all()
         assert not absent[330:].any()
     found = pipeline.filter_log(log, FilterSettings(editing="live"))
-    assert np.isnan(found.state[:300]).all()
-    assert np.isfinite(found.state[350:]).all()
+    cut = pipeline.filter_log(start_of(log, 250), FilterSettings(editing="live"))
+    np.testing.assert_array_equal(found.state[:250], cut.state)  # a log that ends before knows no more
+    assert (found.sigma[50:300, 2] == 6000).all()
+    assert (found.sigma[350:, 2] < 1000).all()
 
 
 @pytest.mark.parametrize("rows", [301, 305, 320])
@@ -236,4 +238,4 @@ def test_a_log_that_ends_with_the_first_elevations_has_a_summary_live(flight, ro
     log.measurement[:300, 2] = np.nan
     found = pipeline.filter_log(log, FilterSettings(editing="live"))
     assert found.metadata["summary"]["jerk_psd_m2ps5"]["median"] > 0
-    assert np.isnan(found.state[:300]).all()
+    assert (found.sigma[50:300, 2] == 6000).all()
