@@ -173,7 +173,7 @@ def _was_a_patch(case: Open, c: int, run: IntArray) -> Iterator[tuple[Open, floa
 
 
 def hindsight(case: Open, profile: Model, scales: Scales, fresh: int) -> Other | None:
-    """What more readings tell by now of what has jumped: nothing has, but the target has begun to move; or the track
+    """What more readings tell by now of what has jumped: nothing has, but the target begins to move; or the track
     has followed a patch until then. Each with the process noise for it, and the gain in log-probability. fresh: how
     many samples are new; it is weighed where there are half as many again as the last time, or so."""
     found = list[Other]()

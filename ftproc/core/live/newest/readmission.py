@@ -86,7 +86,7 @@ def readmitted(case: Open, profile: Model, scales: Scales | None) -> Other | Non
 
 
 def moving(case: Open, profile: Model, scales: Scales, now: float) -> Other:
-    """A case with the process noise by which its target has begun to move. now: the penalised log-probability of what
+    """A case with the process noise by which its target begins to move. now: the penalised log-probability of what
     it is an alternative to."""
     profile = fit_profile(case.log, [case.start], profile, MOVES_STEPS, scales)
     moves = case._replace(model=with_allowance(case.log, profile, scales))
