@@ -165,7 +165,7 @@ class Filtering:
         """The rows of a part that count, corrected, and added to the statistics."""
         absent = list(part.estimate.absent if part.estimate.known is not None else self.record.absent)
         correction, outside = np.zeros((len(part.estimate.label), 6)), 0.0
-        plain = not absent and self.height is None  # as what the network was taught
+        plain = not absent and self.height is None  # as what the network was taught, but for range rates
         if self.model is not None and self.method.corrected and plain:
             correction, outside, self.why_not = self._corrected(part, self.model)
         correction, estimate = correction[part.low : part.high], part.estimate.rows(part.low, part.high)

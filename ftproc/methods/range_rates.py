@@ -48,7 +48,7 @@ def fit(
         return beside.understood(unused, residuals, gate, interval, accepted)
 
     channel = understood(value)
-    for _ in range(LATE_ROUNDS if channel.told >= TELLING else 0):
+    for _ in range(LATE_ROUNDS if channel.told >= beside.USEFUL else 0):
         late_s, growth = beside.lateness(log._replace(beside=(channel.rates,)), model, starts)
         if late_s == 0:
             break

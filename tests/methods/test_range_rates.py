@@ -126,6 +126,16 @@ def test_late_ones_are_told_and_corrected(plain, rows, sigma):
     assert found.metadata["summary"]["trust"]["verdict"] == "consistent"
 
 
+def test_late_ones_of_which_single_readings_say_little_are_corrected_too():
+    """At 50 Hz the readings predict each rate well: its noise is more than seven times what is not known of it."""
+    flight = simulate("family", seed=321, duration_s=120.0, outliers="none")
+    log = with_rates(flight, 0.5, seed=321)
+    late = np.r_[np.nan, log.range_rate[:-1]]
+    found, without = filter_log(replace(log, range_rate=late), SMOOTH), filter_log(flight.log, SMOOTH)
+    assert "late by 0.0" in " ".join(found.metadata["summary"]["remarks"])
+    assert (errors(found, flight.truth) < errors(without, flight.truth)).all()
+
+
 def test_those_in_time_are_not_moved(plain):
     flight, _ = plain
     for seed in range(3):
