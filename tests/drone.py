@@ -9,8 +9,8 @@ import numpy as np
 
 from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.records import FloatArray, MeasurementLog
-from ftproc.simulation.aircraft import Airframe, fly
-from ftproc.simulation.flights import CRUISER, LIGHT
+from ftproc.simulation.flights.aircraft import Airframe, fly
+from ftproc.simulation.flights.kinds import CRUISER, LIGHT
 
 DRONE = replace(
     LIGHT, speed_mps=(4, 15), turn_g=(1.05, 1.5), climb_rad=(0.05, 0.4), pull_g=(0.1, 0.4), thrust_mps2=(1, 3),

@@ -9,7 +9,7 @@ import numpy as np
 
 from ftproc.core.model.frames import from_cartesian, to_cartesian, wrap
 from ftproc.records import COMPONENTS, FloatArray
-from ftproc.simulation.kinematics import Flight
+from ftproc.simulation.flights.kinematics import Flight
 
 REFRACTION_SCALE_HEIGHT_M = 8000.0
 DIFFERENCE_S = 0.01  # over which rates of angles are taken

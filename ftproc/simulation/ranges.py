@@ -14,11 +14,11 @@ from ftproc.core.model.frames import wrap
 from ftproc.errors import UsageError
 from ftproc.records import FlagArray, FloatArray, MeasurementLog, Truth
 from ftproc.simulation.contamination import CODES, contaminate
-from ftproc.simulation.flights import FLIGHTS
+from ftproc.simulation.flights.kinds import FLIGHTS
+from ftproc.simulation.flights.kinematics import Flight
 from ftproc.simulation.further import OFFSET_M
 from ftproc.simulation.further import measured as measured_beside
 from ftproc.simulation.instrument import readable, unit_noise
-from ftproc.simulation.kinematics import Flight
 from ftproc.simulation.outlier_spec import parse_outliers
 from ftproc.simulation.sampling import kept_rows, sample_times
 

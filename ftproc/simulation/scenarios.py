@@ -171,6 +171,29 @@ _ABRUPT = Scenario(
     range_noise_m=(0.5, 5.0),
     angle_noise_rad=(5e-5, 3e-4),
 )
+_AERODYNAMIC = Scenario(
+    "aerodynamic",
+    "theodolite at 20 Hz, aircraft flown by lift, drag, thrust, side-slip, wind and gusts; no outliers",
+    flights=("aerodynamic-fighter", "aerodynamic-light", "aerodynamic-airliner"),
+    duration_s=(120.0, 120.0),
+    dt_s=(0.05,),
+    range_noise_m=(2.0, 5.0),
+    angle_noise_rad=(1e-4, 3e-4),
+)
+_BALLISTIC = replace(
+    _AERODYNAMIC,
+    name="ballistic",
+    description="theodolite at 20 Hz; a bomb, shell or rocket, with drag by Mach number and wind; no outliers",
+    flights=("bomb", "shell", "sounding-rocket"),
+    duration_s=(20.0, 40.0),
+)
+_RELEASE = replace(
+    _BALLISTIC,
+    name="release",
+    description="theodolite at 20 Hz; a store dropped by an aircraft, every other one with a parachute; no outliers",
+    flights=("release",),
+    duration_s=(30.0, 50.0),
+)
 
 _DIRT = (
     "none",
@@ -244,6 +267,9 @@ _SCENARIOS: dict[str, Scenario] = {
         _CRUISE,
         _CALIBRATION,
         _ABRUPT,
+        _AERODYNAMIC,
+        _BALLISTIC,
+        _RELEASE,
         _FAMILY,
     )
 }

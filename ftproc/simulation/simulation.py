@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ftproc.errors import UsageError
 from ftproc.records import FloatArray, IntArray, MeasurementLog, Truth
 from ftproc.simulation.contamination import contaminate
-from ftproc.simulation.flights import FLIGHTS
+from ftproc.simulation.flights.kinds import FLIGHTS
+from ftproc.simulation.flights.kinematics import Flight
 from ftproc.simulation.further import measured, with_signal
 from ftproc.simulation.instrument import (
     InstrumentErrors,
@@ -26,7 +27,6 @@ from ftproc.simulation.instrument import (
     systematic,
     unit_noise,
 )
-from ftproc.simulation.kinematics import Flight
 from ftproc.simulation.outlier_spec import OutlierSpec, parse_outliers
 from ftproc.simulation.sampling import jumps, kept_rows, row_count, sample_times, with_duplicates
 from ftproc.simulation.scenarios import Plan, draw, find_scenario

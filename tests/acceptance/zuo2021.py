@@ -26,7 +26,7 @@ from ftproc.correction.training.flights import train_flights
 from ftproc.records import Trajectory
 from ftproc.settings import EPOCHS, FilterSettings, TrainSettings
 from ftproc.simulation import Simulation, simulate
-from ftproc.simulation.kinematics import constant_acceleration
+from ftproc.simulation.flights.kinematics import constant_acceleration
 from ftproc.simulation.scenarios import draw, find_scenario
 from ftproc.simulation.simulation import measure
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from ftproc.records import FloatArray
-from ftproc.simulation.abrupt import ABRUPT, STEP_S
+from ftproc.simulation.flights.abrupt import ABRUPT
+from ftproc.simulation.flights.kinematics import STEP_S
 
 LASTS_S = 50.0
 TIME_S = np.arange(0.0, LASTS_S, STEP_S)

@@ -8,8 +8,8 @@ import pytest
 from ftproc.core.model.frames import from_cartesian, wrap
 from ftproc.records import FloatArray
 from ftproc.simulation import InstrumentErrors, simulate
+from ftproc.simulation.flights.kinematics import Flight, constant_acceleration
 from ftproc.simulation.instrument import readable, servo_lag, systematic, unit_noise
-from ftproc.simulation.kinematics import Flight, constant_acceleration
 
 
 def test_correlated_noise_has_the_stated_correlation_and_variance() -> None:

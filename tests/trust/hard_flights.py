@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ftproc.records import FloatArray
-from ftproc.simulation.abrupt import ABRUPT
-from ftproc.simulation.aircraft import Airframe, fly
-from ftproc.simulation.flights import AIRLINER, FIGHTER, FLIGHTS, HELICOPTER, LIGHT
+from ftproc.simulation.flights.abrupt import ABRUPT
+from ftproc.simulation.flights.aircraft import Airframe, fly
+from ftproc.simulation.flights.kinds import AIRLINER, FIGHTER, FLIGHTS, HELICOPTER, LIGHT
+from ftproc.simulation.flights.kinematics import GRAVITY_MPS2, Flight, heading, integrate, smoothed
 from ftproc.simulation.instrument import PERFECT
-from ftproc.simulation.kinematics import GRAVITY_MPS2, Flight, heading, integrate, smoothed
 from ftproc.simulation.scenarios import Plan
 from ftproc.simulation.simulation import measure
 from tests.drone import DRONE

@@ -8,33 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from ftproc.records import FloatArray
-from ftproc.simulation.kinematics import GRAVITY_MPS2, Flight, heading, integrate
+from ftproc.simulation.flights.kinematics import DOWN_MPS2, GRAVITY_MPS2, LEAD_S, Flight, flown, heading
 
-STEP_S, MOST_STEPS = 0.005, 20_000
-LEAD_S = 2.0  # before time 0, and after the end
-LOWEST_M = 3.0  # above the station's horizontal plane
 Draw = np.random.Generator
-#: (3,) acceleration m/s2 from the time s, and (3,) position m and velocity m/s.
-Force = Callable[[float, FloatArray, FloatArray], FloatArray]
-
-_DOWN = np.array([0.0, 0.0, -GRAVITY_MPS2])
-
-
-def _flown(force: Force, duration_s: float, position: FloatArray, velocity: FloatArray) -> Flight:
-    """A point mass from (3,) m and m/s on, whose truth is the exact integral of the accelerations that it had; lifted
-    where it would come below the station."""
-    step = max(STEP_S, duration_s / MOST_STEPS)
-    time = np.arange(-LEAD_S, duration_s + LEAD_S, step)
-    acceleration = np.empty((len(time), 3))
-    p, v = position.copy(), velocity.copy()
-    for k, t in enumerate(time.tolist()):
-        acceleration[k] = force(t, p, v)
-        p += step * (v + step / 2 * acceleration[k])
-        v += step * acceleration[k]
-    begun = velocity + step / 2 * acceleration[0]  # what has stopped rests in the integral of the trapezoids, too
-    flight = integrate(-LEAD_S, step, acceleration, begun, position)
-    lift = max(0.0, LOWEST_M - float(flight.position[:, 2].min()))
-    return flight.moved(np.array([0.0, 0.0, lift]))
 
 
 def _drag(velocity: FloatArray, terminal_mps: float) -> FloatArray:
@@ -58,10 +34,10 @@ def _parachute(rng: Draw, duration_s: float) -> Flight:
 
     def force(t: float, p: FloatArray, v: FloatArray) -> FloatArray:
         filled = min(max((t - opens) / filling, 0.0), 1.0)
-        return _DOWN + _drag(v, 1 / np.sqrt((1 - filled) / falling**2 + filled / hanging**2))
+        return DOWN_MPS2 + _drag(v, 1 / np.sqrt((1 - filled) / falling**2 + filled / hanging**2))
 
     height = falling * opens + hanging * (duration_s - opens) + 100.0
-    return _flown(force, duration_s, _at(rng, 1000.0, 4000.0, height), rng.uniform(30.0, 60.0) * heading(rng))
+    return flown(force, duration_s, _at(rng, 1000.0, 4000.0, height), rng.uniform(30.0, 60.0) * heading(rng))
 
 
 def _impact(rng: Draw, duration_s: float) -> Flight:
@@ -70,9 +46,9 @@ def _impact(rng: Draw, duration_s: float) -> Flight:
     velocity, terminal = rng.uniform(40.0, 180.0) * heading(rng, 0.2), rng.uniform(120.0, 300.0)
 
     def force(t: float, p: FloatArray, v: FloatArray) -> FloatArray:
-        return _DOWN + _drag(v, terminal) if t < hits else -v / brake
+        return DOWN_MPS2 + _drag(v, terminal) if t < hits else -v / brake
 
-    return _flown(force, duration_s, _at(rng, 800.0, 3000.0, GRAVITY_MPS2 / 2 * (hits + LEAD_S) ** 2), velocity)
+    return flown(force, duration_s, _at(rng, 800.0, 3000.0, GRAVITY_MPS2 / 2 * (hits + LEAD_S) ** 2), velocity)
 
 
 def _staged(start: FloatArray, velocity: FloatArray, times: list[float], thrusts: list[float]) -> Flight:
@@ -81,9 +57,9 @@ def _staged(start: FloatArray, velocity: FloatArray, times: list[float], thrusts
 
     def force(t: float, p: FloatArray, v: FloatArray) -> FloatArray:
         thrust = sum(size for (first, last), size in stages if first <= t < last)
-        return _DOWN * (0.3 if t > times[0] else 1.0) + thrust * v / np.sqrt(v @ v) + _drag(v, 1500.0)
+        return DOWN_MPS2 * (0.3 if t > times[0] else 1.0) + thrust * v / np.sqrt(v @ v) + _drag(v, 1500.0)
 
-    return _flown(force, times[-1] - LEAD_S, start, velocity)
+    return flown(force, times[-1] - LEAD_S, start, velocity)
 
 
 def _ignition(rng: Draw, duration_s: float) -> Flight:
@@ -115,7 +91,7 @@ def _touchdown(rng: Draw, duration_s: float) -> Flight:
         return np.array([brake[0], brake[1], -v[2] / 0.06])
 
     start = _at(rng, 300.0, 2000.0, 10.0 + sink * (lands + LEAD_S))
-    return _flown(force, duration_s, start, speed * along - np.array([0.0, 0.0, sink]))
+    return flown(force, duration_s, start, speed * along - np.array([0.0, 0.0, sink]))
 
 
 def _catapult(rng: Draw, duration_s: float) -> Flight:
@@ -129,7 +105,7 @@ def _catapult(rng: Draw, duration_s: float) -> Flight:
             return np.zeros(3)
         return throw * along if t < shot + stroke else thrust * np.exp((shot - t) / 10.0) * along + climb
 
-    return _flown(force, duration_s, _at(rng, 200.0, 1500.0, 20.0), np.zeros(3))
+    return flown(force, duration_s, _at(rng, 200.0, 1500.0, 20.0), np.zeros(3))
 
 
 #: Name -> builder of a flight that covers 0 to `duration_s`, in the station's local frame.

@@ -7,10 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from ftproc.core.model.frames import from_cartesian
-from ftproc.simulation.abrupt import ABRUPT
-from ftproc.simulation.aircraft import Airframe, fly, follow
-from ftproc.simulation.kinematics import GRAVITY_MPS2, Flight, constant_acceleration, gusts, integrate, smoothed
+from ftproc.simulation.flights.abrupt import ABRUPT
+from ftproc.simulation.flights.aerodynamic import AIR_STEP_S, CRAFTS, Craft, aerodynamic
+from ftproc.simulation.flights.aircraft import Airframe, fly, follow, placed
+from ftproc.simulation.flights.kinematics import (
+    GRAVITY_MPS2,
+    LEAD_S,
+    Flight,
+    constant_acceleration,
+    flown,
+    gusts,
+    integrate,
+    smoothed,
+)
+from ftproc.simulation.flights.unsteered import UNSTEERED
 
 FIGHTER = Airframe(
     speed_mps=(140, 290), turn_g=(1.5, 5.0), turn_rad=(0.5, 2.8), climb_rad=(0.1, 0.5), pull_g=(0.5, 2.0),
@@ -37,28 +47,29 @@ CRUISER = replace(
     leg_s=(40, 120), area_m=(5e3, 10e3), radius_m=6e3, gust_mps2=0.15,
 )  # fmt: skip
 
-LOWEST_M = 30.0  # above the station's horizontal plane
+AIRFRAMES = {"fighter": FIGHTER, "light": LIGHT, "airliner": AIRLINER}
 
 
 def _manoeuvring(airframe: Airframe) -> Callable[[np.random.Generator, float], Flight]:
     def build(rng: np.random.Generator, duration_s: float) -> Flight:
         flight = fly(airframe, duration_s, rng)
         away, bearing = rng.uniform(*airframe.area_m), rng.uniform(-np.pi, np.pi)
-        return _placed(flight, airframe, duration_s, away, bearing)
+        return placed(flight, airframe, duration_s, away, bearing)
 
     return build
 
 
-def _placed(flight: Flight, airframe: Airframe, duration_s: float, away_m: float, bearing: float) -> Flight:
-    """Place the area's centre at a distance and bearing, farther away while the flight is too close or too steep."""
-    path = flight.at(np.linspace(0.0, duration_s, max(2000, round(2 * duration_s))))[0]
-    lift = max(0.0, LOWEST_M - float(path[:, 2].min()))
-    while True:
-        shift = np.array([away_m * np.cos(bearing), away_m * np.sin(bearing), lift])
-        slant, _, elevation = from_cartesian(path + shift).T
-        if slant.min() >= airframe.closest_m and elevation.max() <= airframe.steepest_rad:
-            return flight.moved(shift)
-        away_m *= 1.15
+def _by_air(airframe: Airframe, craft: Craft) -> Callable[[np.random.Generator, float], Flight]:
+    """The same, by the forces of the air; every other one slips to the side at times."""
+    meant = _manoeuvring(replace(airframe, gust_mps2=0.0))
+
+    def build(rng: np.random.Generator, duration_s: float) -> Flight:
+        path = meant(rng, duration_s)
+        force = aerodynamic(craft, path, bool(rng.random() < 0.5), rng)
+        start, velocity, _ = (each[0] for each in path.at(np.array([-LEAD_S])))
+        return flown(force, duration_s, start, velocity, AIR_STEP_S)
+
+    return build
 
 
 def _overhead(rng: np.random.Generator, duration_s: float) -> Flight:
@@ -148,5 +159,7 @@ FLIGHTS: dict[str, Callable[[np.random.Generator, float], Flight]] = {
     "orbit": _orbit,
     "rocket": _rocket,
     "ship": _ship,
+    **{f"aerodynamic-{name}": _by_air(airframe, CRAFTS[name]) for name, airframe in AIRFRAMES.items()},
     **ABRUPT,
+    **UNSTEERED,
 }

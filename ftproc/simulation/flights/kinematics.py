@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +10,13 @@ import numpy as np
 from ftproc.records import FloatArray
 
 GRAVITY_MPS2 = 9.80665
+DOWN_MPS2 = np.array([0.0, 0.0, -GRAVITY_MPS2])
+STEP_S, MOST_STEPS = 0.005, 20_000  # of a point mass
+LEAD_S = 2.0  # before time 0, and after the end
+LOWEST_M = 3.0  # above the station's horizontal plane
+
+#: (3,) acceleration m/s2 from the time s, and (3,) position m and velocity m/s; asked for once a step, in order.
+Force = Callable[[float, FloatArray, FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,25 @@ def integrate(
     cells = step_s * v[:-1] + step_s**2 * (a0 / 3 + a1 / 6)
     p = np.vstack([position, position + np.cumsum(cells, axis=0)])
     return Flight(start_s, step_s, p, v, acceleration)
+
+
+def flown(
+    force: Force, duration_s: float, position: FloatArray, velocity: FloatArray, step_s: float = STEP_S
+) -> Flight:
+    """A point mass from (3,) m and m/s on, whose truth is the exact integral of the accelerations that it had; lifted
+    where it would come below the station."""
+    step = max(step_s, duration_s / MOST_STEPS)
+    time = np.arange(-LEAD_S, duration_s + LEAD_S, step)
+    acceleration = np.empty((len(time), 3))
+    p, v = position.copy(), velocity.copy()
+    for k, t in enumerate(time.tolist()):
+        acceleration[k] = force(t, p, v)
+        p += step * (v + step / 2 * acceleration[k])
+        v += step * acceleration[k]
+    begun = velocity + step / 2 * acceleration[0]  # what has stopped rests in the integral of the trapezoids, too
+    flight = integrate(-LEAD_S, step, acceleration, begun, position)
+    lift = max(0.0, LOWEST_M - float(flight.position[:, 2].min()))
+    return flight.moved(np.array([0.0, 0.0, lift]))
 
 
 def constant_acceleration(

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ftproc.core.model.frames import from_cartesian
 from ftproc.records import FloatArray
-from ftproc.simulation.kinematics import GRAVITY_MPS2, Flight, gusts, integrate, smoothed
+from ftproc.simulation.flights.kinematics import GRAVITY_MPS2, Flight, gusts, integrate, smoothed
 
 Range = tuple[float, float]
 
+GROUND_M = 30.0  # lowest height above the station's horizontal plane
 PUSH_G = 0.6  # largest decrease from 1 g when pushing over: the load factor stays positive
 
 
@@ -77,6 +79,18 @@ def follow(
     acceleration = path_acceleration(speed, climb, heading, rate) + gust
     velocity = initial[0] * np.array([np.cos(initial[1]), np.sin(initial[1]), 0.0])
     return integrate(-lead_s, step, acceleration, velocity + gust_velocity, initial[2])
+
+
+def placed(flight: Flight, airframe: Airframe, duration_s: float, away_m: float, bearing: float) -> Flight:
+    """Place the area's centre at a distance and bearing, farther away while the flight is too close or too steep."""
+    path = flight.at(np.linspace(0.0, duration_s, max(2000, round(2 * duration_s))))[0]
+    lift = max(0.0, GROUND_M - float(path[:, 2].min()))
+    while True:
+        shift = np.array([away_m * np.cos(bearing), away_m * np.sin(bearing), lift])
+        slant, _, elevation = from_cartesian(path + shift).T
+        if slant.min() >= airframe.closest_m and elevation.max() <= airframe.steepest_rad:
+            return flight.moved(shift)
+        away_m *= 1.15
 
 
 def path_acceleration(speed: FloatArray, climb: FloatArray, heading: FloatArray, rate: FloatArray) -> FloatArray:
