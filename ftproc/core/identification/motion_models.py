@@ -31,7 +31,7 @@ MODELS = {
     ORBITAL: Motion(acts=True),
 }
 NOTHING = np.zeros(3, bool)
-STEPS = 3  # of the search for a profile
+STEPS, LONG_STEPS = 3, 10  # of the search for a profile; where it falls by powers of ten once a motor is out
 MARGIN = 8.0  # in log-likelihood, by which a model must explain a log better than white jerk does: with less, the luck
 # of a single flight decides which is the better one
 CLOSE = 2 * MARGIN  # with less, white jerk is as good as another model, or that as good as white jerk
@@ -161,7 +161,8 @@ def _may_be(name: str, course: FloatArray) -> bool:
 
 
 def falls(course: FloatArray) -> bool:
-    """Whether a good part of a course (n, 9) has almost no lift."""
+    """Whether a good part of a course (n, 9) has almost no lift: that of a bomb, or of a rocket; or an aircraft dropped
+    what is followed."""
     v, force = course[:, 3:6], course[:, 6:] + np.array([0.0, 0.0, GRAVITY])
     along = (force * v).sum(1) / np.maximum((v * v).sum(1), AT_REST_MPS**2)
     lift = np.sqrt(((force - along[:, None] * v) ** 2).sum(1))
@@ -183,7 +184,7 @@ def _unsteered(short: Logged, model: Model) -> tuple[Model, float]:
         tried = [shape._replace(jerk=times * shape.jerk) for times in JERK_SHARES]
         best = max(tried, key=lambda each: _finite(likelihood_of(log, each, starts)))
         for _ in range(2):
-            best, likelihood = climbed(log, starts, best, STEPS, scales)
+            best, likelihood = climbed(log, starts, best, LONG_STEPS, scales)
             best = best._replace(motion=best.motion.about(smooth_log(log, best, starts).state))
         found.append((best, likelihood))
     best, likelihood = max(found, key=lambda each: _finite(each[1]))

@@ -2,16 +2,16 @@
 
 With g(p) the gravity of a round earth, W the earth's rotation, and D = a - g + 2 W x v the specific force,
 
-    a' = G v - 2 W x a - W x (W x v) + w x D + (2 v.a / s^2 - climb / H) D + white jerk
-    w = v x a / s^2      s^2 = v^2 + v0^2      G = dg/dp
+    a' = G v - 2 W x a - W x (W x v) + w x D + b (2 v.a / s^2 - climb / H) D + white jerk
+    w = v x a / s^2      s^2 = v^2 + v0^2      G = dg/dp      b = max(-D.v / (|D| s), 0)
 
-The specific force of an aircraft turns with its velocity (w x D). That of a body which nobody steers also grows with
-the square of its speed and falls with the density of the air. v0 lets the turn fade in hover and at rest. Each model of
-motion is a choice of what of this there is.
+The specific force of an aircraft turns with its velocity (w x D). What brakes also grows with the square of the speed
+and falls with the density of the air; b is its share of the force, so that a motor, the wings of an aircraft and the
+bomb that it drops follow one law. v0 lets the turn fade in hover and at rest. A model of motion is a choice of these.
 
 Over an interval T this is half a kick, the motion of constant acceleration, and half a kick (Strang splitting, of
 second order in T): a <- a + T/2 (f + J (x - x0)), linearised about the states x0 of a course on both sides of the
-interval, or about the estimate itself. A kick changes only the three rows of the acceleration.
+interval, or about the estimate itself, b being held. A kick changes only the three rows of the acceleration.
 
 The jerk has its densities along the path, across it, and upward: with t = v / s and u = z - z.t t, so that a path which
 is steep, or has no direction, needs no special case, W = n I + (m - n) tt' + (o - n) uu'.
@@ -76,7 +76,8 @@ def linearise(f: Forced, x: FloatArray, by: Motion, h: float, variance: float) -
     dd = max(d0 * d0 + d1 * d1 + d2 * d2, LEAST_FORCE)
     vd, ad, va = v0 * d0 + v1 * d1 + v2 * d2, a0 * d0 + a1 * d1 + a2 * d2, v0 * a0 + v1 * a1 + v2 * a2
     known = dd / (dd + variance)
-    turns, pressed = known * by.turns * i2, known * by.pressed
+    braked = max(-vd * math.sqrt(i2 / dd), 0.0)
+    turns, pressed = known * by.turns * i2, known * by.pressed * braked
     swell = pressed * (2 * va * i2 - rv * ir / SCALE_HEIGHT_M)
     v, a, d, r = (v0, v1, v2), (a0, a1, a2), (d0, d1, d2), (r0, r1, r2)
     s, b = f.slope, f.kick

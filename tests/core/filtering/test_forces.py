@@ -33,15 +33,22 @@ def specific(x, by):
     return x[6:] + pull * p + 2 * np.cross(by.rotation[0], x[3:6])
 
 
-def force(x, by):
-    """a' of a state (9,), as the head of `forces` writes it."""
+def braked(x, by):
+    """b of a state (9,), as the head of `forces` writes it."""
+    d, v = specific(x, by), x[3:6]
+    return max(-d @ v / np.sqrt(d @ d * (v @ v + forces.AT_REST_MPS**2)), 0.0)
+
+
+def force(x, by, share=None):
+    """a' of a state (9,), as the head of `forces` writes it. share: b, where it is held."""
     p, v, a = x[:3] + np.array([0, 0, forces.EARTH_M]), x[3:6], x[6:]
     r, w = np.linalg.norm(p), by.rotation[0]
     pull = forces.GRAVITY * forces.EARTH_M**2 / r**3
     d, s2 = specific(x, by), v @ v + forces.AT_REST_MPS**2
     tide = -pull * (np.eye(3) - 3 * np.outer(p, p) / r**2) @ v - 2 * np.cross(w, a)
     swells = 2 * v @ a / s2 - v @ p / r / forces.SCALE_HEIGHT_M
-    return tide + by.turns * np.cross(np.cross(v, a) / s2, d) + by.pressed * swells * d
+    share = braked(x, by) if share is None else share
+    return tide + by.turns * np.cross(np.cross(v, a) / s2, d) + by.pressed * share * swells * d
 
 
 def kick(x, by, h, vague=0.0):
@@ -49,8 +56,10 @@ def kick(x, by, h, vague=0.0):
     second order. vague: variance of the acceleration, by which the share of the force that is known turns and grows."""
     size = np.sum(specific(x, by) ** 2)
     by = by._replace(turns=by.turns * size / (size + vague), pressed=by.pressed * size / (size + vague))
-    f0, step = force(x, by), 1e-4
-    slope = np.array([(force(x + step * e, by) - force(x - step * e, by)) / (2 * step) for e in np.eye(9)[3:]]).T
+    held, step = braked(x, by), 1e-4
+    f0 = force(x, by, held)
+    sides = [[force(x + side * step * e, by, held) for side in (1, -1)] for e in np.eye(9)[3:]]
+    slope = np.array([(after - before) / (2 * step) for after, before in sides]).T
     a = np.zeros((10, 10))
     a[6:9, 3:9], a[6:9, 9] = slope, f0 - slope @ x[3:]
     return np.eye(10) + a * h + a @ a * (h * h / 2)

@@ -145,3 +145,18 @@ def test_gaps_are_crossed_in_steps():
     np.testing.assert_allclose(run.state, plain.state, rtol=1e-7, atol=1e-6)
     np.testing.assert_allclose(run.sigma, plain.sigma, rtol=1e-6)
     assert with_steps(a.log, a.starts, a.truth * 0)[2] is None
+
+
+@pytest.mark.parametrize(("scenario", "position", "velocity"), [("ballistic", 0.9, 0.8), ("release", 0.93, 0.85)])
+def test_what_nobody_steers_is_told_by_its_drag(scenario, position, velocity):
+    """Bombs, shells, rockets that burn first, and stores that an aircraft carries first: by one law of force."""
+    ratios, names = [], []
+    for seed in range(1, 7):
+        flight = simulate(scenario, seed=seed)
+        white, _ = errors(flight, motion=WHITE)
+        found, said = errors(flight)
+        names.append(said["motion"])
+        ratios.append(found / white)
+    assert names.count("ballistic") >= 5
+    assert (np.median(ratios, 0) < [position, velocity]).all()
+    assert np.max(ratios) < 1.02
