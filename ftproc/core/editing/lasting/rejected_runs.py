@@ -48,6 +48,7 @@ SELDOM, OPEN = 8.0, 5.0  # ln of how much more often such runs are motion than p
 MARGIN = 6.0  # in log-probability, by which other decisions must be better: on 25 manoeuvring flights none of 18 that
 # were better by more was worse in truth, of 12 that were better by less 7
 LENGTHS = (13, 40)  # samples beside a run that may belong to a patch
+AGILE = 100.0  # times the median process noise, where the search for that of motion which begins at once begins, too
 ROUNDS, REPEATS = 2, 3  # over a log, whose runs may have changed; of deciding
 WEIGHED = 10  # times that the samples around a run are weighed, about
 ELSEWHERE = 3.0  # sigmas of the position, by which two understandings must differ to be distinguished
@@ -55,16 +56,18 @@ ELSEWHERE = 3.0  # sigmas of the position, by which two understandings must diff
 
 class Run(NamedTuple):
     """A rejected run of a component: the samples (m,) of its readings, and those of them (m,) that may be motion, of
-    which there are none where it does not join the track."""
+    which there are none where it does not join the track. beside: runs of other components at the same time, which are
+    the same motion."""
 
     component: int
     samples: IntArray
     motion: IntArray
+    beside: tuple[Run, ...] = ()
 
     @property
-    def key(self) -> tuple[int, bytes]:
+    def key(self) -> tuple[int, int, bytes]:
         """What distinguishes it from others."""
-        return self.component, self.samples.tobytes()
+        return self.component, len(self.beside), self.samples.tobytes()
 
     def near(self, around: int) -> slice:
         """The samples that are weighed."""
@@ -73,8 +76,8 @@ class Run(NamedTuple):
 
     def moves(self, before: FloatArray, after: FloatArray, offset: int) -> bool:
         """Whether other decisions (n, 3) take it for motion: they take it in, and reject nothing for it."""
-        taken_in = after[self.motion - offset, self.component]
-        return len(taken_in) > 0 and bool(taken_in.mean() > 0.5 and (after >= before).all())
+        taken_in = [after[each.motion - offset, each.component] for each in (self, *self.beside)]
+        return all(len(each) > 0 and each.mean() > 0.5 for each in taken_in) and bool((after >= before).all())
 
     def around(self, offset: int) -> slice:
         """The samples that are decided on, counted from one."""
@@ -85,7 +88,7 @@ class Run(NamedTuple):
 def reassess_rejected(record: Record, decision: Decision, work: Work) -> tuple[Decision, tuple[Rival, ...]]:
     """The decisions on a log, replaced around rejected runs where others are likelier, while there is work left; and
     those of which either may be."""
-    at_median, rivals, seen = median_level(decision.model), list[Rival](), set[tuple[int, bytes]]()
+    at_median, rivals, seen = median_level(decision.model), list[Rival](), set[tuple[int, int, bytes]]()
     around, found = samples_around(record.weighted(decision.weight), at_median), decision
     for _ in range(ROUNDS):
         weight = found.weight.copy()
@@ -104,7 +107,7 @@ def reassess_rejected(record: Record, decision: Decision, work: Work) -> tuple[D
                 best, gain = _likeliest(part, own, run, near.start)
             except ValueError:  # a component has too few readings there
                 continue
-            if gain > 0 and best[run.samples - near.start, run.component].mean() > 0.5:
+            if gain > 0 and not run.beside and best[run.samples - near.start, run.component].mean() > 0.5:
                 gain = min(gain, _more_than_a_curve(part, own, best, run, near.start))
             if gain > 0:
                 weight[near] = best
@@ -140,8 +143,13 @@ def _likeliest(part: Record, decision: Decision, run: Run, offset: int) -> tuple
             else:
                 other = _decided(part, decision._replace(weight=way), unfollowed, here, decided)
             if other.tobytes() not in found:
-                prior = SELDOM if run.moves(before, other, offset) and not follows else -MARGIN
-                gain = log_probability(part, _with(part, decision, other)) - as_before() + prior
+                moves = run.moves(before, other, offset)
+                prior = SELDOM * (1 + len(run.beside)) if moves and (run.beside or not follows) else -MARGIN
+                found_so = _with(part, decision, other)
+                gain = log_probability(part, found_so) - as_before() + prior
+                if moves and run.beside:
+                    agile = found_so.model._replace(jerk=AGILE * found_so.model.jerk)
+                    gain = max(gain, log_probability(part, found_so._replace(model=agile)) - as_before() + prior)
                 found[other.tobytes()] = gain, other
     del found[before.tobytes()]
     gain, other = max(found.values(), key=lambda each: each[0], default=(-np.inf, before))
@@ -169,9 +177,12 @@ def _ways(part: Record, weight: FloatArray, run: Run, offset: int) -> Iterator[t
     c, first, last = run.component, int(run.samples[0]) - offset, int(run.samples[-1]) + 1 - offset
     if len(run.motion):
         other = weight.copy()
-        other[run.motion - offset, c] = 1.0
+        for each in (run, *run.beside):
+            other[each.motion - offset, each.component] = 1.0
         yield other, False
         yield other, True
+    if run.beside:
+        return
     yield weight, False
     for length, before, good in itertools.product(LENGTHS, (True, False), (False, True)):
         other = weight.copy()
@@ -223,18 +234,38 @@ def _apart(part: Record, decision: Decision, other: FloatArray) -> bool:
 
 
 def _runs(record: Record, decision: Decision, around: int) -> Iterator[Run]:
-    """The rejected runs of a log."""
-    found, marked = list[tuple[int, IntArray]](), np.zeros(len(record.time_s), bool)
+    """The rejected runs of a log, those of several components together first."""
+    found, marked = list[tuple[int, IntArray, tuple[bool, bool]]](), np.zeros(len(record.time_s), bool)
     for c in range(3):
         seen = np.flatnonzero(record.possible[:, c])
-        found += [(c, seen[begin:end]) for begin, end in runs_of(decision.weight[seen, c] <= 0, SHORTEST)]
-    for _, inside in found:
+        runs = runs_of(decision.weight[seen, c] <= 0, SHORTEST)
+        found += [(c, seen[begin:end], (begin == 0, end == len(seen))) for begin, end in runs]
+    for _, inside, _ in found:
         marked[inside] = True
     residual, variance = residuals_near(record.weighted(decision.weight), decision.model, marked, around)
-    for c, inside in found:
+    alone = list[Run]()
+    for c, inside, open_ends in found:
         away = residual[inside, c] / np.sqrt(variance[inside, c])
-        joined = max(np.sort(np.abs(edge))[1] for edge in (away[:ENDS], away[-ENDS:])) < JOINED
-        near = np.abs(away) < FAR
+        edges = [edge for edge, is_open in zip((away[:ENDS], away[-ENDS:]), open_ends, strict=True) if not is_open]
+        joined = len(edges) > 0 and max(np.sort(np.abs(edge))[1] for edge in edges) < JOINED
+        near = (np.abs(away) < FAR) | any(open_ends)
         above = away[near] > 0
         same = (above[1:] == above[:-1]).sum() >= SAME_SIDE * (len(above) - 1)
-        yield Run(c, inside, inside[near] if joined and same else inside[:0])
+        alone.append(Run(c, inside, inside[near] if joined and same else inside[:0]))
+    yield from _together(alone)
+    yield from alone
+
+
+def _together(alone: list[Run]) -> Iterator[Run]:
+    """Runs that may be motion of one component with those of others that are rejected at about the same time."""
+    may_move = [run for run in alone if len(run.motion)]
+    for run in may_move:
+        beside = tuple(each for each in may_move if each.component > run.component and _same_time(run, each))
+        if beside and len({each.component for each in beside}) == len(beside):
+            yield run._replace(beside=beside)
+
+
+def _same_time(one: Run, other: Run) -> bool:
+    """Whether two runs are rejected together for more than half of the time of both."""
+    begins, ends = (one.samples[0], other.samples[0]), (one.samples[-1], other.samples[-1])
+    return bool(2 * (min(ends) - max(begins)) > max(ends) - min(begins))

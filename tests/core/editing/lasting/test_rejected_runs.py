@@ -58,6 +58,40 @@ def test_what_may_be_motion_or_a_patch_is_named(monkeypatch, margin, chosen):
     assert any("may be" in reason for reason in summary["trust"]["reasons"])
 
 
+@pytest.mark.parametrize("seed", [0, 13])
+def test_a_launch_at_the_beginning_of_a_log_is_no_patch(monkeypatch, seed):
+    """A rocket burns for a second or two, with which its log begins: azimuth and elevation leave together what becomes
+    of it. Each by itself seems a patch, 17 and 30 m off."""
+
+    def off_m():
+        found = pipeline.filter_log(flight.log, FilterSettings(smooth=True))
+        error_m = np.sqrt(((found.state[:, :3] - flight.truth.position_m) ** 2).sum(1).mean())
+        return error_m, (found.outlier != 0).sum()
+
+    flight = simulate("ballistic", seed=seed)
+    error_m, outliers = off_m()
+    assert error_m < 0.7
+    assert outliers == 0
+    monkeypatch.setattr(rejected_runs, "_together", lambda alone: ())
+    assert off_m()[0] > 10.0
+
+
+def test_runs_that_are_rejected_at_the_same_time_are_weighed_together():
+    runs = [Run(c, np.arange(*span), np.arange(*motion)) for c, span, motion in (
+        (0, (10, 30), (10, 30)), (1, (12, 34), (12, 34)), (2, (12, 34), (0, 0)), (2, (40, 60), (40, 60)),
+    )]  # fmt: skip
+    (found,) = rejected_runs._together(runs)
+    assert (found.component, [each.component for each in found.beside]) == (0, [1])
+    assert found.key != runs[0].key
+    ways = list(rejected_runs._ways(None, np.zeros((100, 3)), found, 0))
+    assert [follows for _, follows in ways] == [False, True]
+    assert all((way.sum(0) == [20, 22, 0]).all() for way, _ in ways)
+    before, after = np.zeros((100, 3)), ways[0][0]
+    assert found.moves(before, after, 0)
+    after[:, 1] = 0.0
+    assert not found.moves(before, after, 0)
+
+
 def test_what_is_alike_is_left_alone():
     """Where nothing is rejected there is nothing to reassess, and the very decision is returned."""
     flight = simulate("calibration", seed=2, duration_s=60.0, dt_s=0.2, outliers="none")
