@@ -24,7 +24,7 @@ MAX_KNOTS = 4000  # nor more than so many knots
 WALK_PRECISION = 0.7  # of the random walk of ln(jerk) from knot to knot ...
 ABRUPT = 1.0  # ... whose steps beyond this are as rare as their size, not its square: flights turn and take off at once
 ALLOWANCE = 1.4  # on the likeliest jerk: too little makes sigmas dishonest, a little too much costs almost nothing
-LONGEST_MEMORY = 1.0  # knots: less jerk than gives the filter such a memory shows in no knot, so none has less
+LONGEST_MEMORY = 2.0  # knots: less jerk than gives the filter such a memory shows in no knot, so none has less
 
 
 def fit_profile(
