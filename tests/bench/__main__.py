@@ -1,6 +1,6 @@
 """`python -m tests.bench [NAME...]`: tables of the README and the guide, as Markdown on standard output and in
-out/bench.md. The names: samples, accuracy, sigmas, ablation, methods, rivals, instruments, correction, network,
-speed, start, scale, live, pages, training."""
+out/bench.md. The names: samples, accuracy, sigmas, ablation, methods, motions, rivals, instruments, correction,
+network, speed, start, scale, live, pages, training."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from tests.bench import (
     instruments,
     live,
     methods,
+    motions,
     network,
     pages,
     rivals,
@@ -33,6 +34,7 @@ TABLES = {
     "sigmas": sigmas,
     "ablation": ablation,
     "methods": methods,
+    "motions": motions,
     "rivals": rivals,
     "instruments": instruments,
     "correction": correction,

@@ -132,6 +132,7 @@ BLOCKS = {
     "samples": table("python -m tests.bench samples", slow=False),
     "accuracy": table("python -m tests.bench accuracy"),
     "sigmas": table("python -m tests.bench sigmas"),
+    "motions": table("python -m tests.bench motions"),
     "tracks": table('python -m tests.bench.tracks "$TRACKS"', needs="TRACKS"),
     "instruments": table("python -m tests.bench instruments"),
     "zuo2021": table("python -m tests.acceptance.zuo2021"),
