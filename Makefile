@@ -171,7 +171,8 @@ readme: $(developer) ## write the tables and outputs in the READMEs; BLOCKS="spe
 model: $(installed) ## train the packaged model anew (MODEL_FLAGS)
 	$(ftproc) train $(MODEL_FLAGS) -o ftproc/correction/default.safetensors
 
-trust: $(developer) ## the table of reliability: bad files, attacks, faults, long runs, fuzz (some fifty minutes)
+trust: $(developer) ## the table of reliability: bad files, attacks, faults, long runs, fuzz, and slow tests (an hour)
+	FTPROC_SLOW=1 $(bin)/python -m pytest -q -m slow
 	$(bin)/python -m tests.trust
 
 fuzz: $(developer) ## fuzz the readers and the filter (FUZZ) for FUZZ_SECONDS each; findings go to out/fuzz

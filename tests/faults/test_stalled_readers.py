@@ -30,7 +30,7 @@ COMMANDS = {
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("stalled")
-    flights.write_log(simulate("manoeuvre", duration_s=200.0, seed=1).log, folder / "long.csv")
+    flights.write_log(simulate("manoeuvre", duration_s=60.0, seed=1).log, folder / "long.csv")
     return folder
 
 

@@ -77,7 +77,8 @@ def test_turns_are_followed_live(seed):
 
 
 @pytest.mark.parametrize(
-    ("seed", "dt_s", "lasts_s"), [(1, 0.1, 1200.0), (2, 0.1, 1200.0), (3, 0.1, 1200.0), (4, 0.1, 6500.0)]
+    ("seed", "dt_s", "lasts_s"),
+    [(1, 0.1, 1200.0), (2, 0.1, 1200.0), (3, 0.1, 1200.0), pytest.param(4, 0.1, 6500.0, marks=pytest.mark.slow)],
 )
 def test_turns_between_the_spans_that_stand_for_a_long_log_are_flown(seed, dt_s, lasts_s):
     """They were taken for outliers, and the track was lost, by up to 200 km; the last is edited in segments."""

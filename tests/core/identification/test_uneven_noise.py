@@ -292,7 +292,7 @@ def share_off(step):
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("step", [(1.0, 1.7e-4, 1.7e-4), (5.0, 9e-4, 9e-4)])
+@pytest.mark.parametrize("step", [(1.0, 1.7e-4, 1.7e-4), pytest.param((5.0, 9e-4, 9e-4), marks=pytest.mark.slow)])
 def test_coarse_rounding_of_a_slow_target_is_neither_drift_nor_correlated_noise(step, monkeypatch):
     assert share_off(np.array(step)) < 0.005
     monkeypatch.setattr(decisions, "_repeats", lambda record, decision: False)

@@ -58,7 +58,7 @@ def test_readings_that_are_a_little_off_for_long(seed):
     assert found.weight.mean() > 1 - 1.05 * 100 / found.weight.size
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_another_target_for_half_a_minute_is_a_patch_of_all_components(seed):
     flight, draw = flown(40 + seed), np.random.default_rng(seed)
     z = flight.log.measurement.copy()

@@ -135,7 +135,7 @@ def test_a_jump_beside_which_readings_were_rejected_is_seen_only_with_these_take
     assert not found[-1]
 
 
-@pytest.mark.parametrize(("low", "high"), [(62_000, 76_000), (38_000, 50_000)])
+@pytest.mark.parametrize(("low", "high"), [(62_000, 76_000), pytest.param(38_000, 50_000, marks=pytest.mark.slow)])
 def test_no_track_runs_away_where_far_more_was_found_than_is_off(low, high):
     """Two parts of a fighter's flight, at 20 Hz, with patches of 4 to 60 samples or 10 to 200: two of which all between
     them seemed off, and a sine of 178 m, rejected at first, that motion may follow; kilometres, and 16 m, off without
@@ -167,7 +167,9 @@ def test_a_jump_does_not_hide_in_noise_that_seems_to_grow(name, seed):
     assert found.metadata["summary"]["trust"]["verdict"] != "consistent"
 
 
-@pytest.mark.parametrize(("name", "seed", "rms_m"), [("seldom", 3, 200.0), ("often", 4, 25.0)])
+@pytest.mark.parametrize(
+    ("name", "seed", "rms_m"), [("seldom", 3, 200.0), pytest.param("often", 4, 25.0, marks=pytest.mark.slow)]
+)
 def test_two_short_patches_are_not_one_long(name, seed, rms_m):
     """Flights with many patches of seconds: 4,322 and 677 m off where what lies between two of them is left out."""
     made = hard.make(name, seed).simulated
@@ -175,6 +177,7 @@ def test_two_short_patches_are_not_one_long(name, seed, rms_m):
     assert np.sqrt((off**2).sum(1).mean()) < rms_m
 
 
+@pytest.mark.slow
 def test_a_find_that_loses_the_track_is_taken_back(monkeypatch):
     """A fighter seems off from one patch to another if a curve there is asked only what it explains at typical process
     noise: 52 m, 11 km with all finds kept."""

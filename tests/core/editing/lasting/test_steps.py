@@ -89,6 +89,7 @@ def test_both_angles_at_once_among_outliers_and_after_a_loss_of_track():
     assert all(195 <= s.sample <= 210 for s in found)
 
 
+@pytest.mark.slow
 def test_steps_that_hard_flying_hides_among_many_outliers():
     """The filter follows such a step as motion, and rejects what lies beside it."""
     found = 0
