@@ -168,8 +168,8 @@ def _with_names(
         if cells is not None and are_units(cells) and index:
             units, index = cells, index - 1
     names = None if index < 0 else _heading(lines[filled[index]], separator, width, block, widths)
-    split_up = parts.under(_over_columns(lines[filled[index]], block, width), units) if units and not widths else None
-    names, units = split_up or (names, units)
+    groups = _groups(lines[filled[index]], names or [], separator, block, width) if units and not widths else []
+    names, units = parts.under(groups, units) or (names, units)
     if names is not None and sum(bool(_CELL.fullmatch(_NUMBERED.sub("", name))) for name in names) > len(names) / 2:
         names = None
     names = enumerated([lines[number] for number in filled[:top]], width) or names
@@ -283,10 +283,14 @@ def _above_columns(line: str, block: Sequence[str], width: int) -> list[str]:
     return [" ".join(words) for words in cells]
 
 
-def _over_columns(line: str, block: Sequence[str], width: int) -> list[str]:
-    """The words, two blanks apart from others, that are nearest to each column; nothing if the rows do not line up."""
-    over = {(found.start() + found.end()) / 2: found[0] for found in re.finditer(r"\S+(?: \S+)*", line)}
-    return [over[min(over, key=lambda centre: abs(centre - middle))] for middle in _middles(block, width) if over]
+def _groups(line: str, cells: Sequence[str], separator: str, block: Sequence[str], width: int) -> list[str]:
+    """What stands over each column in the line of names: an empty cell belongs to the name before it, and words two
+    blanks apart from others to all the columns that they are nearest to; nothing if the rows do not line up."""
+    if separator != BLANKS:
+        return [next(filter(None, cells[k::-1]), "") for k in range(len(cells))]
+    over = [(found.start() + found.end(), found[0]) for found in re.finditer(r"\S+(?: \S+)*", line)]
+    nearest = [min(over, key=lambda each: abs(each[0] - 2 * middle)) for middle in _middles(block, width) if over]
+    return [words for _, words in nearest] if {*nearest} == {*over} else []
 
 
 def _middles(block: Sequence[str], width: int) -> list[float]:

@@ -52,21 +52,23 @@ _ANGLE = {
 
 def under(groups: Sequence[str], units: Sequence[str]) -> tuple[list[str], list[str]] | None:
     """Names and units of columns, some of which are parts of what stands over several: `AZIMUTH` over `DEG MIN SEC`,
-    `ZULU TIME` over `HH MM SS.SSS`; None unless a column of minutes follows one of degrees or hours. groups: what
-    stands over each column. units: the words under it."""
+    `ZULU TIME` over `HH MM SS.SSS`; None unless all that stands over several does. A column of metres beside one of
+    degrees has a name of its own. groups: what stands over each column. units: the words under it."""
     words = [unit.lower().strip("()[]").partition(".")[0] for unit in units]
-    larger = {*_ANGLE["deg"], *_TIME["hour"]}
-    if not all(groups) or not any(a in larger and b in _ANGLE["min"] for a, b in itertools.pairwise(words)):
-        return None
-    clock = [bool({*taken_apart(group).words} & {*ALIASES["time"]}) and word in _OF_CLOCK
-             for group, word in zip(groups, words, strict=True)]  # fmt: skip
-    return (
-        [
-            word if of else f"{group} {unit}" if groups.count(group) > 1 else group
-            for group, unit, word, of in zip(groups, units, words, clock, strict=True)
-        ],
-        ["" if of else unit for unit, of in zip(units, clock, strict=True)],
-    )
+    names, left, column = list(groups), list(units), 0
+    for group, run in itertools.groupby(groups):
+        mine = slice(column, column := column + len(list(run)))
+        if mine.stop - mine.start == 1:
+            continue
+        angle = [word in part for word, part in zip(words[mine], _ANGLE.values(), strict=False)]
+        clock = {*taken_apart(group).words} & {*ALIASES["time"]} and _OF_CLOCK.issuperset(words[mine])
+        if clock:
+            names[mine], left[mine] = words[mine], [""] * len(words[mine])
+        elif group and len(angle) == len(words[mine]) and all(angle):
+            names[mine] = [f"{group} {unit}" for unit in units[mine]]
+        else:
+            return None
+    return (names, left) if names != [*groups] else None
 
 
 def found(quantity: str, names: Mapping[int, Name]) -> dict[str, int] | None:
