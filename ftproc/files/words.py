@@ -53,6 +53,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
         azimutal angleazimutal angleazimut anguloazimutal angoloazimutale azimutti azimutwinkel baring peilung peiling
         seitenwinkel relevement rilevamento marcacion marcacao namiar kattazimutu yonacisi istikamet istikametacisi
         semt semtacisi азимут уголазимута пеленг 方位角 方位 水平角 방위각 방위
+        demora pejling suuntima kerteriz seitenpeilung katkursowy курсовоиугол 舷角 真方位 相对方位 相対方位
         """
     ),
     "elevation": _split(
@@ -154,6 +155,16 @@ ZENITH_ALIASES = _split(
 #: Names of angles below the horizontal.
 DEPRESSIONS = ("depression", "depressionangle")
 
+#: Words of an azimuth that counts from true north, beside `true`.
+TRUE = frozenset(
+    _split(
+        """
+    vrai vraie vero vera verdadero verdadera verdadeiro verdadeira rechtweisend rechtweisende rw wahre hakiki
+    rzeczywisty ware истинныи
+    """
+    )
+)
+
 #: Words of a name that say nothing about the quantity.
 QUALIFIERS = frozenset(
     _split(
@@ -163,7 +174,7 @@ QUALIFIERS = frozenset(
     actual act ist istwert gemessen mesure mesuree medido medida misurato
     """
     )
-)
+).union(TRUE)
 
 #: Words that make a column something other than the quantity; they are not unknown units.
 NOT_UNITS = frozenset(
@@ -178,6 +189,39 @@ NOT_UNITS = frozenset(
     """
     )
 )
+
+
+#: Names of azimuths that count from the head of a ship, on land from the north of a grid; so do gunners and surveyors.
+AT_SEA = "gisement"
+
+#: Words of courses, which are the headings of a carrier or belong to the target.
+COURSES = frozenset(_split("course kurs rumbo rumo koers rota rotta route курс 航向"))
+
+#: Words of speeds, with which a course is that of a target as well as of a carrier.
+SPEEDS = frozenset(
+    _split("speed velocity sog fahrt geschwindigkeit vitesse velocidad velocidade velocita snelheid fart скорость 航速")
+)
+
+#: What an azimuth may count from beside an axis or true north: words of its name, its mark behind the unit, and words
+#: of the column that is to be added to it.
+TURNED = {
+    "the head of the carrier": (
+        frozenset(
+            (
+                *_split("relative rel body bow relativo relativa relatif relativ polare boegpeiling nispi katkursowy"),
+                *_split("seitenpeilung marcacion курсовоиугол курсовои относительныи 舷角 相对方位 相対方位"),
+                AT_SEA,
+            )
+        ),
+        "R",
+        COURSES.union(_split("heading hdg yaw cap prora proa steuerkurs 船首向 艏向")),
+    ),
+    "magnetic north": (
+        frozenset(_split("magnetic mag compass")),
+        "M",
+        frozenset(_split("variation declination magvar")),
+    ),
+}
 
 
 #: Words of columns that are neither a time, a range nor an angle from a station.
@@ -195,7 +239,7 @@ OTHER_THINGS = frozenset(
     remark remarks comment comments note notes name label text info description operator prism
     """
     )
-)
+).union(*(added for _, _, added in TURNED.values()))
 
 
 #: Words of a column that holds the readings of another after a correction, or the correction itself.
@@ -206,14 +250,6 @@ MISSING_WORDS = (
     *("", "NaN", "nan", "NAN", "-NaN", "-nan", "NA", "N/A", "n/a", "#NA", "#N/A", "#N/A N/A", "<NA>"),
     *("NULL", "Null", "null", "None", "none", "1.#IND", "-1.#IND", "1.#QNAN", "-1.#QNAN"),
 )
-
-#: What an azimuth may count from beside an axis or true north: words of its name, its mark behind the unit, and words
-#: of the column that is to be added to it.
-TURNED = {
-    "the head of the carrier": (frozenset(_split("relative rel body bow")), "R", frozenset(_split("heading hdg yaw"))),
-    "magnetic north": (frozenset(_split("magnetic mag")), "M", frozenset(_split("variation declination magvar"))),
-}
-
 
 _LETTERS = str.maketrans({"ł": "l", "ı": "i", "ø": "o", "đ": "d", "æ": "ae", "ß": "ss"})  # that have no parts
 

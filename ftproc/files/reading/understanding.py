@@ -11,11 +11,11 @@ from ftproc.files.layout import CANONICAL
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.further import HEIGHT, Further
-from ftproc.files.reading.meaning import names
+from ftproc.files.reading.meaning import bearings
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.questions import answer, listed
 from ftproc.files.reading.meaning.schema import Column
-from ftproc.files.words import NOT_UNITS, TURNED
+from ftproc.files.words import AT_SEA, COURSES, NOT_UNITS, TURNED
 from ftproc.records import COMPONENTS
 from ftproc.settings import Station
 
@@ -132,15 +132,22 @@ def knows_axis(station: Station, found: Mapping[str, Column]) -> bool:
 def assumed_of(found: Mapping[str, Column]) -> list[str]:
     """What must hold for an azimuth whose name says that it counts from a direction which may change."""
     azimuth = found.get("azimuth")
-    turns = azimuth is not None and "added" not in azimuth.roles and names.counts_from(taken_apart(azimuth.name))
-    return [f"{turns}, from which the azimuth counts, stays where it is"] if turns == next(iter(TURNED)) else []
+    if azimuth is None:
+        return []
+    if "added" in azimuth.roles:
+        added = azimuth.name.split(" + ")[azimuth.roles.index("added")]
+        return [f'"{added}" is the heading of the carrier'] if COURSES & {*taken_apart(added).words} else []
+    turns = bearings.counts_from(taken_apart(azimuth.name))
+    counts = "may count" if azimuth.key == AT_SEA else "counts"
+    return [f"{turns}, from which the azimuth {counts}, stays where it is"] if turns == next(iter(TURNED)) else []
 
 
 def _axis(found: Mapping[str, Column]) -> str:
     """The doubt about where azimuths count from."""
-    what = names.counts_from(taken_apart(found["azimuth"].name)) if "azimuth" in found else ""
+    azimuth = found.get("azimuth")
+    what = bearings.counts_from(taken_apart(azimuth.name)) if azimuth and azimuth.key != AT_SEA else ""
     return f"the azimuth counts from {what}" if what else _AXIS
 
 
 def _is_from_north(azimuth: Column) -> bool:
-    return "added" in azimuth.roles or names.says_north(azimuth.name)
+    return "added" in azimuth.roles or bearings.says_north(azimuth.name)

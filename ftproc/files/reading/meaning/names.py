@@ -16,6 +16,7 @@ from ftproc.files.words import (
     ONLY_BY_UNIT,
     QUALIFIERS,
     QUANTITIES,
+    TRUE,
     TURNED,
     WEAK_ALIASES,
     ZENITH_ALIASES,
@@ -48,8 +49,9 @@ _VALUE = re.compile(r"[._/](val|value)$", re.IGNORECASE)  # how decoders end the
 #: Units of other quantities, by which a column is known for something else.
 _FOREIGN = frozenset(
     [
-        *("m/s", "mps", "km/h", "kmh", "kph", "kt", "kts", "knots", "ft/s", "fps", "deg/s", "dps", "rad/s", "mrad/s"),
-        *("hz", "khz", "mhz", "ghz", "db", "dbm", "v", "mv", "w", "k", "c", "degc", "°c", "degf", "hpa", "mbar", "pa"),
+        *("m/s", "mps", "km/h", "kmh", "kph", "kt", "kts", "kn", "knots", "ft/s", "fps", "deg/s", "dps", "rad/s"),
+        *("mrad/s", "hz", "khz", "mhz", "ghz", "db", "dbm", "v", "mv", "w", "k", "c", "degc", "°c", "degf", "hpa"),
+        *("mbar", "pa"),
         *("%", "counts", "count", "raw", "m/s2", "m/s^2", "g", "ppm", "fl", "fpm", "ft/min", "nm/h", "rpm", "°/s"),
     ]
 )
@@ -71,9 +73,10 @@ _OF_SURVEYORS = frozenset((*WEAK_ALIASES["azimuth"], "v", "vz", *ZENITH_ALIASES)
 #: Notations in other words: of degrees, as digits, and of UTC in the Gregorian calendar.
 _ALSO = {"degmin": "ddmm", "degminsec": "ddmmss", "utcg": "utc"}
 
-#: Words of azimuths that count clockwise from north, and how else it is written.
-_FROM_NORTH = frozenset(("bearing", "brg", "taz", "north", "clockwise", "cw", "peilung", "пеленг"))
-_EAST_OF_NORTH = re.compile(r"\+?\s*(?:E|east) (?:of|from) (?:due |true )?N(?:orth)?\b", re.IGNORECASE)
+#: How else it is written that azimuths count clockwise from north.
+EAST_OF_NORTH = re.compile(r"\+?\s*(?:E|east) (?:of|from) (?:due |true )?N(?:orth)?\b", re.IGNORECASE)
+#: Words in brackets that say from where bearings count.
+_SENSES = TRUE.union(*(words for words, _, _ in TURNED.values()))
 
 
 class Name(NamedTuple):
@@ -133,7 +136,7 @@ def taken_apart(text: str, unit: str = "") -> Name:
     if max(len(text), len(unit)) > LONGEST_NAME:
         return Name(text, "", ())
     plain = compatible(text).strip().strip("\"'#%;!:").strip()
-    plain = _EAST_OF_NORTH.sub("", _VALUE.sub("", _NUMBERED.sub("", plain)))
+    plain = EAST_OF_NORTH.sub("", _VALUE.sub("", _NUMBERED.sub("", plain)))
     found, notation, foreign = "", "", False
     opening = plain.rfind(_OPENING[_CLOSING.index(plain[-1])]) if plain.endswith(_CLOSING) else -1
     if opening >= 0:
@@ -150,8 +153,8 @@ def taken_apart(text: str, unit: str = "") -> Name:
             plain, found = before, "gon"
         elif inside.lower() in _FOREIGN:
             plain, foreign = before, True
-        elif squeezed in ZENITH_ALIASES:
-            plain = f"{before} {squeezed}"
+        elif squeezed in ZENITH_ALIASES or plain_letters(inside).strip(". ") in _SENSES:
+            plain = f"{before} {inside.strip('. ')}"
         elif inside:
             plain, found = before, inside
     elif not _is_name(plain):
@@ -183,27 +186,6 @@ def _unit_inside(text: str) -> str:
     if _is_unit(text) or _COUNTS.search(_LIMITS_OF_VALUES.sub("", text)):
         return text if _is_unit(text) else ""
     return next((part for part in re.split(r"[\s,;]+", text) if _is_unit(part)), "")
-
-
-def counts_from(name: Name) -> str:
-    """What an azimuth of this name counts from, one of TURNED; "" where the name does not say so."""
-    inside = (
-        set(re.findall(r"[A-Z]+", name.text[max(map(name.text.rfind, "([")) :]))
-        if name.text.endswith((")", "]"))
-        else set()
-    )
-    found = (what for what, (words, mark, _) in TURNED.items() if words & {*name.words} or mark in inside)
-    is_azimuth = {name.stem, name.core(), *name.words} & {*ALIASES["azimuth"]} - {"a"}
-    return next(found, "") if is_azimuth else ""
-
-
-def says_north(text: str) -> bool:
-    """Whether the name of an azimuth says that it counts clockwise from true north."""
-    name = taken_apart(text)
-    if counts_from(name):
-        return False
-    from_north = name.notation in ("t", "true") or name.words[:1] == ("true",) or _FROM_NORTH & {name.stem, *name.words}
-    return bool(from_north or _EAST_OF_NORTH.search(text))
 
 
 def _squeezed(text: str) -> str:
@@ -253,7 +235,8 @@ def _without_in(text: str) -> str:
 
 
 def _words(text: str) -> tuple[str, tuple[str, ...]]:
-    """Stem and words of the last part of a path such as `CAT048.I040.RHO`."""
+    """Stem and words of the last part of a path such as `CAT048.I040.RHO`; `Rel. Bearing` is none."""
+    text = re.sub(r"\.\s+", " ", text)
     context, _, last = text.rpartition("/") if "/" in text else text.rpartition(".")
     parts = _NOT_WORDS.split(last.lower())
     around = set(_NOT_WORDS.split(context.lower())) - {""}

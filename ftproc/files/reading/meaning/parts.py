@@ -6,9 +6,10 @@ import itertools
 import re
 from collections.abc import Callable, Mapping, Sequence
 
-from ftproc.files.reading.meaning.names import Name, counts_from, taken_apart
+from ftproc.files.reading.meaning.bearings import turned
+from ftproc.files.reading.meaning.names import Name, taken_apart
 from ftproc.files.units import unit_named
-from ftproc.files.words import ALIASES, TURNED, WEAK_ALIASES, ZENITH_ALIASES
+from ftproc.files.words import ALIASES, WEAK_ALIASES, ZENITH_ALIASES
 
 _SECONDS_OF_WEEK = frozenset(
     ["tow", "sow", "gpstow", "gpssow", "timeofweek", "secondsofweek", "secofweek", "itow", "gpsseconds", "weekseconds"]
@@ -164,17 +165,6 @@ def unit_of_day(name: Name) -> str | None:
 def unit_of_fraction(name: Name) -> str:
     """The unit of a fraction of the second."""
     return next(FRACTIONS[word] for word in (*_spellings(name), name.unit.lower()) if word in FRACTIONS)
-
-
-def turned(names: Mapping[int, Name]) -> dict[str, int] | None:
-    """The columns of an azimuth that counts from the head of the carrier, or from magnetic north, and of what is to be
-    added to it: {"azimuth": position, "added": position}."""
-    for what, (_, _, words) in TURNED.items():
-        mine = [index for index, name in names.items() if counts_from(name) == what]
-        added = [index for index, name in names.items() if words & {*name.words} and not name.foreign]
-        if len(mine) == len(added) == 1 and mine != added:
-            return {"azimuth": mine[0], "added": added[0]}
-    return None
 
 
 def _angle(quantity: str, names: Mapping[int, Name]) -> dict[str, int] | None:

@@ -9,16 +9,19 @@ from typing import NamedTuple
 from ftproc.errors import InputError, nearest, quoted
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
-from ftproc.files.reading.meaning.names import Name, counts_from, taken_apart
+from ftproc.files.reading.meaning.bearings import counts_from, says_north
+from ftproc.files.reading.meaning.names import Name, taken_apart
 from ftproc.files.units import LIGHT_MPS, UNITS, unit_named
 from ftproc.files.words import (
     ALIASES,
+    COURSES,
     EITHER_ANGLE,
     FURTHER_ALIASES,
     NOT_UNITS,
     ONLY_BY_UNIT,
     OTHER_THINGS,
     QUANTITIES,
+    SPEEDS,
     WEAK_ALIASES,
 )
 
@@ -141,6 +144,21 @@ def refuse_hours(source: str, name: Name, quantity: str) -> None:
         )
 
 
+def refuse_course(source: str, apart: Sequence[Name], roles: Mapping[str, int]) -> None:
+    """Ask whose course stands beside azimuths from the head of the carrier, if a speed does too."""
+    if "added" not in roles or not COURSES & {*apart[roles["added"]].words}:
+        return
+    if any(SPEEDS & {*name.words} for name in apart):
+        (mine, azimuth), (course, added) = ((apart[roles[role]].text, roles[role]) for role in ("azimuth", "added"))
+        names = [name.text for name in apart]
+        both = quoted(f"azimuth={named(mine, azimuth)}+{named(course, added)}")
+        raise InputError(
+            f'{source}: "{mine}" counts from the head of the carrier, and "{course}" may be its heading or the course '
+            f"of the target. Say --columns {both} if it is the heading, or {answer(names, {'azimuth': azimuth})} if "
+            "the head of the carrier stays where it is."
+        )
+
+
 def refuse_left_out(source: str, names: Sequence[str], proposed: Proposal) -> None:
     """Ask about columns with names that say nothing, which make a target that moves like one with those that are
     known."""
@@ -168,7 +186,8 @@ def refuse_alike(
         either = quantity != "range" and name.core() in EITHER_ANGLE
         if quantity == "elevation" and unit_named("height", name.unit):
             continue
-        another = words & OTHER_THINGS or name.is_zenith() or any(name.means(each) for each in QUANTITIES)
+        bearing = quantity == "elevation" and (counts_from(name) or says_north(name.text))
+        another = words & OTHER_THINGS or bearing or name.is_zenith() or any(map(name.means, QUANTITIES))
         alike = known & words or (name.is_in_a_unit_of(quantity) and not another)
         bare = quantity == "range" and name.stem == "d"
         unknown = doubtful and not another and not any(name.stem in stems for stems in FURTHER_ALIASES.values())

@@ -19,7 +19,7 @@ from typing import NamedTuple
 from ftproc.errors import InputError, nearest
 from ftproc.files.layout import CANONICAL
 from ftproc.files.options import ABSENT
-from ftproc.files.reading.meaning import parts, questions
+from ftproc.files.reading.meaning import bearings, parts, questions
 from ftproc.files.reading.meaning.names import Name, taken_apart
 from ftproc.files.reading.meaning.questions import Propose, answer, listed
 from ftproc.files.units import Unit, si_unit, unit_named
@@ -217,10 +217,12 @@ def _is_corrected(name: Name, quantity: str) -> bool:
 
 def _recognised(table: _Table, quantity: str, free: Sequence[int]) -> Column | None:
     names, canonical = table.names, CANONICAL[quantity]
+    free = bearings.preferred(table.apart, free) if quantity == "azimuth" else free
     fits = [index for index in free if table.apart[index].means(quantity) == 1]
     if any(names[index] == canonical for index in fits):
         fits = [index for index in fits if table.apart[index].unit]
     elif (roles := parts.found(quantity, {index: table.apart[index] for index in free})) is not None:
+        questions.refuse_course(table.source, table.apart, roles)
         return table.joint(quantity, roles, f"their names: {', '.join(roles)}")
     if not fits and quantity == "azimuth":
         questions.refuse_either(table.source, table.apart, free)
