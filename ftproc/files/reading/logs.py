@@ -152,7 +152,10 @@ def _in_blocks(plan: _Plan) -> MeasurementLog | None:
     if spooled is None:
         return None
     log, sample = spooled
-    judged = converting.judged(header.source, sample, plan.found, clocks[0], plan.station)
+    try:
+        judged = converting.judged(header.source, sample, plan.found, clocks[0], plan.station)
+    except InputError:  # the whole file shows whether this comes of several targets
+        return None
     if judged.found != plan.found:
         return _in_blocks(plan._replace(found=judged.found))
     timed = large.readings(sample)[~np.isnan(sample["time"])]
@@ -172,7 +175,13 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     choosing.refuse_several(header, plan.extract, kept)
     converted = converting.converted(header, found, table.columns if kept is None else table.take(kept).columns)
     known = converted.quantities, converted.found, converted.clock, plan.station, header.is_of_a_standard
-    judged = converting.judged(header.source, *known)
+    one_target = bool(plan.extract.target or header.stated.target)
+    try:
+        judged = converting.judged(header.source, *known)
+    except InputError:  # rows of several targets have no motion that tells the units
+        if not one_target:
+            several.refuse(header, found, _in_time_order(header.source, converted.quantities, None), kept)
+        raise
     packed = {q: column for q, column in judged.found.items() if column.notation != converted.found[q].notation}
     if packed:  # their cells are read again
         return _at_once(plan._replace(found={**found, **packed}, notes=judged.doubts))
@@ -189,7 +198,7 @@ def _at_once(plan: _Plan) -> MeasurementLog:
         plan = plan._replace(beside=beside, open=left_out)
         log = replace(log, **further.of_rows(plan.beside, header, log.row))
     plan = plan._replace(found=judged.found)
-    if not (plan.extract.target or header.stated.target):
+    if not one_target:
         several.refuse(header, judged.found, log)
     notes = (*header.stated.notes, *notes, *converted.notes, *converted.clock.notes, *spread)
     clock = converted.clock

@@ -42,14 +42,18 @@ class Column(NamedTuple):
     values: tuple[str, ...]
 
 
-def refuse(header: TableHeader, found: Mapping[str, schema.Column], log: MeasurementLog) -> None:
-    """Raise InputError, a question, if a log in SI units and in time order holds several targets."""
+def refuse(
+    header: TableHeader, found: Mapping[str, schema.Column], log: MeasurementLog, kept: IntArray | None = None
+) -> None:
+    """Raise InputError, a question, if a log in SI units and in time order holds several targets. kept: the rows of the
+    file among which its rows count; None: in the file."""
     used = {index for column in found.values() for index in column.positions}
     free = [index for index, name in enumerate(header.names) if index not in used and header.names.count(name) == 1]
     mixed = alternate(log.measurement)
     if not mixed:
         free = [index for index in free if numbers_targets(header.names[index])]
-    column = column_of(log.measurement, _cells(header, free[:_MOST_COLUMNS], log.row)) if free else None
+    row = log.row if kept is None else kept[log.row]
+    column = column_of(log.measurement, _cells(header, free[:_MOST_COLUMNS], row)) if free else None
     if column is not None:
         first, count = column.values[0], len(column.values)
         shown = ", ".join(column.values[:6]) + (", ..." if count > 6 else "")
