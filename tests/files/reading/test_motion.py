@@ -84,3 +84,23 @@ def test_values_that_nothing_has_are_bent_without_end() -> None:
     """Their squares overflow, without a warning."""
     draw = np.random.default_rng(0).standard_normal((8, 3))
     assert paths.bent(1e-300 * np.arange(8.0), 1e150 * draw, np.full(8, 1e150)) == np.inf
+
+
+@pytest.mark.parametrize(("head", "size"), [("elevation", 1.0), ("el_deg", 180 / np.pi)])
+def test_steep_elevations_that_may_be_zenith_angles_are_asked_about(tmp_path: Path, head: str, size: float) -> None:
+    """Of a target near the horizon, of which the motion does not tell."""
+    time, distance, azimuth, elevation = flown(1.0, 300, np.array([10.0, 40.0, 2.0]))
+    way = distance * np.array([np.cos(azimuth), np.sin(azimuth)])
+    wavy = (np.arctan2(way[1] + 300 * np.sin(time / 15), way[0] + 300 * np.cos(time / 11))) % (2 * np.pi)
+    with pytest.raises(InputError, match=f'"{head}" counts.*Say --elevation-from horizon or --elevation-from zenith'):
+        read(tmp_path / "a.csv", f"time,range_m,az_rad,{head}", time, distance, wavy, (np.pi / 2 - elevation) * size)
+
+
+def test_steep_elevations_of_a_straight_way_need_no_word(tmp_path: Path) -> None:
+    time, _, azimuth, _ = flown(1.0, 300, np.array([10.0, 0.0, 0.0]))
+    x, y, z = 10 * time - 1500, 500 + 0 * time, 6000 + 0 * time
+    distance = np.sqrt(x**2 + y**2 + z**2)
+    noise = azimuth - np.arctan2(-700.0, 2500 + 10 * time) % (2 * np.pi)
+    found = read(tmp_path / "a.csv", "time,range_m,azimuth,elevation", time, distance,
+                 np.arctan2(y, x) % (2 * np.pi) + noise, np.arcsin(z / distance) + noise)  # fmt: skip
+    assert np.median(found[:, 3]) > 1.0

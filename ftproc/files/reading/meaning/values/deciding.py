@@ -52,7 +52,7 @@ def judged(log: Known, quantities: Mapping[str, FloatArray]) -> Open:
     if not any(choice.odds for choice in choices):
         raise asking.impossible(log, sizes)
     choices.sort(key=lambda choice: -choice.odds)
-    decided, conditions = _decided(log, sizes, choices)
+    decided, conditions = _decided(log, sizes, choices, moved)
     if moved and _counts_down(moved, choices[0].way, decided.get("elevation")):
         conditions = (*conditions, "the elevation counts upwards")
     return _unpacked(log, quantities, Open(decided, tuple(notes), conditions))
@@ -96,7 +96,7 @@ def _choices(log: Known, sizes: Mapping[str, Sizes], moved: motion.Motion | None
 
 
 def _decided(
-    log: Known, sizes: Mapping[str, Sizes], choices: Sequence[Choice]
+    log: Known, sizes: Mapping[str, Sizes], choices: Sequence[Choice], moved: motion.Motion | None
 ) -> tuple[Mapping[str, Column], tuple[str, ...]]:
     """The columns with the units of the likeliest way, and what is assumed. Raises InputError, a question."""
     best = choices[0]
@@ -113,11 +113,24 @@ def _decided(
         if len(likely) > 1:
             likely = asking.of_angles(likely) if usual.way.units[:2] == taken.way.units[:2] else likely
             raise asking.left_open(log, likely if usual in likely else [*likely, usual])
+    if moved and (zenith := _as_zenith(log, moved, choices, taken)):
+        raise asking.left_open(log, [taken, zenith])
     units = dict(zip(QUANTITIES, taken.way.units, strict=True))
     found = {q: column._replace(unit=units[q] or column.unit) for q, column in log.found.items()}
     if taken.way.zenith and not log.is_zenith:
         found["elevation"] = found["elevation"]._replace(zenith=True)
     return found, _assumed(log, found, _rivals(log, choices, taken))
+
+
+def _as_zenith(log: Known, moved: motion.Motion, choices: Sequence[Choice], taken: Choice) -> Choice | None:
+    """The same with zenith angles, where most elevations would be steep, which they seldom are, and the motion does not
+    speak against it."""
+    elevation = log.found.get("elevation")
+    if elevation is None or taken.way.zenith or ways.is_canonical(elevation):
+        return None
+    steep = abs(moved.elevation(taken.way)) > ways.STEEP_RAD
+    same = (choice for choice in choices if choice.way == taken.way._replace(zenith=True))
+    return next((choice for choice in same if steep and choice.odds * _DOUBTED > taken.odds), None)
 
 
 def _in_own_names(log: Known, way: Way) -> bool:

@@ -36,7 +36,7 @@ _CANONICAL = 0.3  # times as likely in a column of the program's own name
 _MIXED, _ONE_WRONG = 0.03, 0.2  # two angles in two units, where no name states one, and where names do
 _ZENITH, _ZENITH_BY_SURVEYORS, _EXCHANGED = 0.02, 0.5, 0.003
 _SMALL_RAD, _SMALL = 6.284, 0.05  # azimuths that are all below a turn in rad, in another unit
-_STEEP_RAD, _STEEP = math.radians(60), 0.03  # few records have a median elevation above this
+STEEP_RAD, _STEEP = math.radians(60), 0.03  # few records have a median elevation above this
 _LOW = 0.2  # elevations that are all below the zenith in rad, in another unit
 _UPRIGHT_RAD, _FEW = 1.65, 24  # beyond any elevation; angles, among which one is no rule
 _OTHER_TURN = 1e-3  # azimuths that jump by the turn of another unit
@@ -183,7 +183,7 @@ def _fit(
         if quantity == "elevation" and not upright:
             found *= _SMALL
         half_rad = mine.half * unit.multiply / unit.divide
-        if quantity == "elevation" and (math.pi / 2 - half_rad if zenith else half_rad) > _STEEP_RAD:
+        if quantity == "elevation" and (math.pi / 2 - half_rad if zenith else half_rad) > STEEP_RAD:
             found *= _STEEP
         if quantity == "azimuth" and mine.turn and not plausibility.turns(unit, mine):
             found *= _OTHER_TURN
