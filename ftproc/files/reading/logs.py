@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,8 +17,9 @@ from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.formats.standards import choosing
-from ftproc.files.reading.meaning import questions, rows, schema, several, statements
+from ftproc.files.reading.meaning import apart, rows, schema, several, statements
 from ftproc.files.reading.meaning.values import deciding, plausibility, stamps
+from ftproc.files.words import QUANTITIES
 from ftproc.records import FloatArray, IntArray, MeasurementLog
 from ftproc.settings import Station
 
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 Found = Mapping[str, schema.Column]
-_FEWEST = 10  # rows of one time that say nothing of when each was taken
 
 
 class _Plan(NamedTuple):
@@ -179,15 +179,17 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     try:
         judged = converting.judged(header.source, *known)
     except InputError:  # rows of several targets have no motion that tells the units
+        log = _in_time_order(header.source, converted.quantities, None)
         if not one_target:
-            several.refuse(header, found, _in_time_order(header.source, converted.quantities, None), kept)
+            several.refuse(header, found, log, kept)
+        _refuse_apart(plan, log, [q for q in QUANTITIES[1:] if q not in found or found[q].unit_is_stated])
         raise
     packed = {q: column for q, column in judged.found.items() if column.notation != converted.found[q].notation}
     if packed:  # their cells are read again
         return _at_once(plan._replace(found={**found, **packed}, notes=judged.doubts))
     quantities = converting.in_other_units(converted.quantities, converted.found, judged.found)
     quantities["time"], spread = stamps.spread(quantities)
-    _refuse_one_time(header, found["time"], quantities["time"])
+    stamps.refuse_one(header, found["time"], quantities["time"])
     extra = table.select(list(range(len(chosen), table.num_columns))) if plan.others else None
     log = _in_time_order(header.source, quantities, extra if kept is None or extra is None else extra.take(kept))
     if kept is not None:
@@ -200,6 +202,7 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     plan = plan._replace(found=judged.found)
     if not one_target:
         several.refuse(header, judged.found, log)
+    _refuse_apart(plan, log, QUANTITIES[1:])
     notes = (*header.stated.notes, *notes, *converted.notes, *converted.clock.notes, *spread)
     clock = converted.clock
     if judged.found["time"].unit != converted.found["time"].unit:
@@ -262,16 +265,10 @@ def _check_others(header: TableHeader, others: Iterable[int]) -> None:
             )
 
 
-def _refuse_one_time(header: TableHeader, column: schema.Column, time: FloatArray) -> None:
-    """Ask for the time where that of all rows is the same: a date alone, or a number that was cut."""
-    known = time[np.isfinite(time)]
-    if known.size >= _FEWEST and (known == known[0]).all():
-        others = [name for index, name in enumerate(header.names) if index not in column.positions]
-        raise InputError(
-            f'{header.source}: all {known.size} rows have the same time in "{column.name}", so it does not say when '
-            f"each was taken. If another column does, say --columns time=NAME, or time='{column.name}+NAME' for a date "
-            f"and a time of day; the others are: {questions.listed(others)}."
-        )
+def _refuse_apart(plan: _Plan, log: MeasurementLog, known: Sequence[str]) -> None:
+    """Refuse rows that the user says to be of one target, where they cannot be."""
+    if plan.extract.target == ABSENT:
+        apart.refuse(log, known)
 
 
 def _in_time_order(source: str, quantities: Mapping[str, FloatArray], extra: pa.Table | None) -> MeasurementLog:

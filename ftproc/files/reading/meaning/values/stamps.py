@@ -12,12 +12,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ftproc.errors import InputError
+from ftproc.files.reading.formats.header import TableHeader
+from ftproc.files.reading.meaning.questions import listed
+from ftproc.files.reading.meaning.schema import Column
 from ftproc.order_statistics import median
 from ftproc.records import COMPONENTS, FloatArray
 
 _ROWS = 5000  # by which the clock is judged
 _STEPS = (1e-6, 100.0)  # of clocks, s
 _LATEST = 1e12  # s
+_FEWEST_OF_ONE = 10  # rows of one time that say nothing of when each was taken
 _FEWEST = 5  # steps of the clock
 _COARSE = 0.5  # of the time from row to row, for a step that counts
 _ALIKE = 0.99  # of the times are a few whole steps apart
@@ -67,6 +72,18 @@ def spread(quantities: Mapping[str, FloatArray]) -> tuple[FloatArray, tuple[str,
     start = np.where(on_grid <= high + tolerance, on_grid, (low + high) / 2)
     each = np.searchsorted(found.first, np.arange(len(time)), side="right") - 1
     return np.maximum.accumulate(start[each] + np.arange(len(time)) * clock.period), (_note(clock, rounded),)
+
+
+def refuse_one(header: TableHeader, column: Column, time: FloatArray) -> None:
+    """Ask for the time where that of all rows is the same: a date alone, or a number that was cut."""
+    known = time[np.isfinite(time)]
+    if known.size >= _FEWEST_OF_ONE and (known == known[0]).all():
+        others = [name for index, name in enumerate(header.names) if index not in column.positions]
+        raise InputError(
+            f'{header.source}: all {known.size} rows have the same time in "{column.name}", so it does not say when '
+            f"each was taken. If another column does, say --columns time=NAME, or time='{column.name}+NAME' for a date "
+            f"and a time of day; the others are: {listed(others)}."
+        )
 
 
 def coarse(time: FloatArray) -> _Clock | None:
