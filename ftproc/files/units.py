@@ -148,7 +148,21 @@ SPELLINGS: Mapping[str, tuple[str, ...]] = {
     "kmh": ("kph",),
     "kt": ("kts", "knot", "knots", "kn"),
     "db": ("dbm", "dbw", "dbsm", "dbhz", "db-hz", "dbmv", "dbfs", "decibel", "decibels", "дб", "дбм", "分贝"),
-    "nmi": ("nauticalmile", "nauticalmiles", "nautmile", "nautmiles", "nautmi", "nautical"),
+    "nmi": (
+        *(
+            "nauticalmile",
+            "nauticalmiles",
+            "nautmile",
+            "nautmiles",
+            "nautmi",
+            "nautical",
+            "mn",
+            "seemeile",
+            "seemeilen",
+        ),
+        *("millenautique", "millesnautiques", "millanáutica", "millasnáuticas", "migliomarino", "miglianautiche"),
+        *("sjömil", "sømil", "zeemijl", "zeemijlen", "морскаямиля", "морскиемили", "мормили", "海里"),
+    ),
     "mi": ("mile", "miles", "smi", "sm", "statutemile", "statutemiles"),
     "yd": ("yds", "yard", "yards"),
     "dmi": ("datamile", "datamiles"),  # of 6000 ft, of radars

@@ -105,7 +105,7 @@ WEAK_ALIASES: Mapping[str, tuple[str, ...]] = {
     "range": _split(
         """
         dist sd distance slantdistance slopedistance slopedist slant distanz distancia distanza odleglosc
-        avstand afstand mesafe vzdalenost tavolsag etaisyys расстояние д d 距离 距離 거리
+        abstand avstand afstand mesafe vzdalenost tavolsag etaisyys расстояние д d 距离 距離 거리
         """
     ),
     "azimuth": _split(
@@ -141,8 +141,10 @@ ONLY_BY_UNIT = ("alt", "altitude", "site", "sito", "situ", "d", "д", "h", "hr",
 #: Names of angles of which none says whether it is the azimuth, and from where the other one counts.
 EITHER_ANGLE = ("theta", "phi", "psi", "alpha", "θ", "φ", "ψ", "α", "beta", "β", "pan", "tilt")
 
-#: Names in German, in which Grad are degrees.
-GERMAN = frozenset(_split("zeit uhrzeit entfernung schragentfernung schragdistanz hohenwinkel distanz"))
+#: Names in German, in which Grad are degrees, and sm Seemeilen.
+GERMAN = frozenset(
+    _split("zeit uhrzeit entfernung schragentfernung schragdistanz hohenwinkel distanz abstand peilung seitenpeilung")
+)
 
 #: Names of zenith angles, which are 90 degrees minus the elevation.
 ZENITH_ALIASES = _split(

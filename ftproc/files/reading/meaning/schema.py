@@ -82,6 +82,7 @@ def resolve(
     apart = [taken_apart(name, unit) for name, unit in zip(names, unit_row or [""] * len(names), strict=True)]
     if any(name.stem in GERMAN for name in apart):  # whose Grad are degrees, unless the values say otherwise
         apart = [name._replace(unit="") if re.search(r"\bgrad *[)\]]?$", name.text, re.I) else name for name in apart]
+        apart = [name._replace(unit="nmi") if name.unit.lower() == "sm" else name for name in apart]
     table = _Table(source, names, apart, units)
     questions.refuse_side_by_side(source, apart, columns)
     found: dict[str, Column] = {}

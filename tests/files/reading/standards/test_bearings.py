@@ -97,3 +97,16 @@ def test_a_compass_bearing_and_the_variation_are_a_bearing_from_north(make: Make
                                r="Range (m)")))  # fmt: skip
     assert log.frame == "north-east-up"
     np.testing.assert_allclose(np.mod(log.measurement[:, 1] - A + 1, 2 * np.pi), 1, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "distance", ["Abstand (sm)", "Entfernung [sm]", "Distanz (Seemeilen)", "Abstand (NM)", "Distancia (mn)"]
+)
+def test_nautical_miles_of_seafarers(make: Make, distance: str) -> None:
+    log = logs.read(make(table(t="Uhrzeit (s)", true="rw. Peilung (°)", r=distance)))
+    np.testing.assert_allclose(log.measurement[:, 0], 1852 * np.round(R, 2), rtol=1e-9)
+
+
+def test_sm_in_english_are_statute_miles(make: Make) -> None:
+    log = logs.read(make(table(t="Time (s)", true="Bearing (deg)", r="Range (sm)")))
+    np.testing.assert_allclose(log.measurement[:, 0], 1609.344 * np.round(R, 2), rtol=1e-9)
