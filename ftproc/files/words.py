@@ -99,6 +99,11 @@ FURTHER_ALIASES: Mapping[str, tuple[str, ...]] = {
     ),
 }
 
+#: Names of depths, which are heights of targets below the water with the opposite sign, or those of the water itself.
+DEPTHS = frozenset(
+    _split("depth tiefe profondeur profundidad profundidade profondita diepte dybde djup dyp глубина глибина 深度")
+)
+
 #: Names that other things have too: used where no column has one of ALIASES.
 WEAK_ALIASES: Mapping[str, tuple[str, ...]] = {
     "time": ("date", "gpst", "daytime"),

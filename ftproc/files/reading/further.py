@@ -9,7 +9,7 @@ ranges show, or left out with a word; others are left out.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +23,7 @@ from ftproc.files.reading.meaning.numbers import Origin, numbers
 from ftproc.files.reading.meaning.questions import answer, listed
 from ftproc.files.reading.meaning.readings import sentinel
 from ftproc.files.units import UNITS, Unit, unit_named
-from ftproc.files.words import FURTHER_ALIASES, WEAK_ALIASES
+from ftproc.files.words import DEPTHS, FURTHER_ALIASES, NOT_UNITS, WEAK_ALIASES
 from ftproc.records import COMPONENTS, FloatArray, Heights, MeasurementLog
 
 HEIGHT, RANGE_RATE, SIGNAL = "height", "range_rate", "signal"
@@ -116,6 +116,8 @@ def _found(
         if quantity != HEIGHT:  # of no known unit it is none
             indices = [k for k in indices if _unit(quantity, apart[k], units.get(quantity))] or indices
         indices = [_stated(header, quantity, stated)] if stated else indices
+        if quantity == HEIGHT and not indices:
+            _refuse_depth(header, apart, [k for k in range(len(apart)) if k not in taken])
         if len(indices) > 1 and not header.is_of_a_standard:
             both = listed([header.names[index] for index in indices])
             say = answer(header.names, {quantity: indices[0]})
@@ -172,13 +174,38 @@ def _as_angle(text: str, name: Name) -> str:
 
 def _unit(quantity: str, name: Name, stated: str | None) -> Unit | None:
     level = quantity == HEIGHT and {name.core(), name.stem} & {*_LEVELS}
-    return unit_named(quantity, stated or name.unit or ("fl" if level else ""))
+    unit = unit_named(quantity, stated or name.unit or ("fl" if level else ""))
+    return unit._replace(multiply=-unit.multiply) if unit and _is_depth(quantity, name) else unit
+
+
+def _is_depth(quantity: str, name: Name) -> bool:
+    return quantity == HEIGHT and bool(DEPTHS & {name.stem, *name.words})
+
+
+def _refuse_depth(header: TableHeader, apart: Sequence[Name], free: Iterable[int]) -> None:
+    """Ask whether a depth is that of the target."""
+    for index in free:
+        name = apart[index]
+        if (
+            _is_depth(HEIGHT, name)
+            and not name.foreign
+            and not NOT_UNITS & {*name.words}
+            and _has_numbers(header, index)
+        ):
+            say = answer(header.names, {HEIGHT: index})
+            unit = "" if name.unit else f" --units {HEIGHT}=m (or {', '.join(UNITS[HEIGHT])})"
+            raise InputError(
+                f'{header.source}: column "{header.names[index]}" may be the depth of the target below the station. '
+                f"Say {say}{unit}, which counts it downwards, or --columns {HEIGHT}={ABSENT} if it is something else, "
+                "such as the depth of the water."
+            )
 
 
 def _other_kind(quantity: str, text: str, name: Name, unit: Unit) -> bool:
     """Whether a height is barometric, a rate closing."""
     if quantity == HEIGHT:
-        return unit.name == "fl" or not any(word in text.lower() for word in _GEOMETRIC)
+        geometric = any(word in text.lower() for word in _GEOMETRIC) or _is_depth(quantity, name)
+        return unit.name == "fl" or not geometric
     return quantity == RANGE_RATE and any(word.startswith(_CLOSING) for word in (name.core(), name.stem))
 
 

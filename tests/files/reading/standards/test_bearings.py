@@ -110,3 +110,16 @@ def test_nautical_miles_of_seafarers(make: Make, distance: str) -> None:
 def test_sm_in_english_are_statute_miles(make: Make) -> None:
     log = logs.read(make(table(t="Time (s)", true="Bearing (deg)", r="Range (sm)")))
     np.testing.assert_allclose(log.measurement[:, 0], 1609.344 * np.round(R, 2), rtol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "unit"), [("Depth_m", 1.0), ("depth_ft", 0.3048), ("Profondeur (m)", 1.0)])
+def test_a_depth_beside_ranges_and_bearings_is_asked_about_and_counts_downwards(
+    make: Make, name: str, unit: float
+) -> None:
+    path = make(table(t="t (s)", true="Bearing (deg)", r="Slant Range (m)", speed=name))
+    assert f"height={name}" in refused(path)
+    log = logs.read(path, columns={"height": name})
+    assert log.heights is not None
+    np.testing.assert_allclose(log.heights.above_m, -12.1 * unit)
+    assert not log.heights.barometric
+    assert logs.read(path, columns={"height": "none"}).heights is None
