@@ -104,3 +104,16 @@ def test_steep_elevations_of_a_straight_way_need_no_word(tmp_path: Path) -> None
     found = read(tmp_path / "a.csv", "time,range_m,azimuth,elevation", time, distance,
                  np.arctan2(y, x) % (2 * np.pi) + noise, np.arcsin(z / distance) + noise)  # fmt: skip
     assert np.median(found[:, 3]) > 1.0
+
+
+def test_degrees_are_offered_before_mils(tmp_path: Path) -> None:
+    """Of noisy angles, which are likelier in mils."""
+    time = np.arange(600) * 0.1
+    rng = np.random.default_rng(2)
+    azimuth = 8 + 44 * np.sin(time / 40) + rng.normal(0, 1.0, 600)
+    elevation = 12 + 7 * np.cos(time / 30) + rng.normal(0, 1.0, 600)
+    distance = 350 + 170 * np.cos(time / 25) + rng.normal(0, 1.5, 600)
+    with pytest.raises(InputError, match="no unit is stated") as question:
+        read(tmp_path / "a.csv", "time_s,range_m,az,el", time, distance, azimuth, elevation)
+    said = str(question.value)
+    assert 0 < said.index("=deg") < said.index("=mil")

@@ -57,7 +57,7 @@ def _impossible(log: Known, sizes: Mapping[str, Sizes]) -> str:
 
 def left_open(log: Known, likely: Sequence[Choice]) -> InputError:
     """The question where nothing is stated and the motion does not tell."""
-    ways = [choice.way for choice in likely]
+    ways = sorted((choice.way for choice in likely), key=_in_mils)
     quantities, *_ = _differing(log, ways)
     what = f"no unit is stated for {_differing_words(log, ways)}" if quantities else "it is not stated from where " \
            f"{_differing_words(log, ways)} counts"  # fmt: skip
@@ -65,6 +65,11 @@ def left_open(log: Known, likely: Sequence[Choice]) -> InputError:
         f"{log.source}: {what}, and the motion of the target does not tell which it is. "
         f"Say {' or '.join(_answers(log, ways))}."
     )
+
+
+def _in_mils(way: Way) -> bool:
+    """Whether an angle is in a unit of gunners, which others seldom use."""
+    return any(unit is not None and unit.name.startswith(("mil", "mrad")) for unit in way.units[2:])
 
 
 def _differing(log: Known, ways: Sequence[Way]) -> tuple[list[str], bool, bool]:
