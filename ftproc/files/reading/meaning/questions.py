@@ -28,6 +28,7 @@ from ftproc.files.words import (
 _COUNTS = frozenset(("counts", "count", "cnt", "cnts", "ticks"))
 _FLIGHTS = frozenset(("tof", "timeofflight", "flighttime", "roundtriptime", "rtt", "laufzeit"))
 _HORIZONTAL = frozenset(("hd", "horizontaldistance", "horizontalrange", "groundrange", "grounddistance", "hdist"))
+_BESIDE_V = {"range": "s", "azimuth": "h"}  # the slope distance and the horizontal angle of surveyors
 _MOST_WORDS = 6  # of a name that may number its target
 #: Words of NOT_UNITS with which a column may still be the quantity.
 _OF_THE_QUANTITY = frozenset(["true", "corr", "raw", "ref"])
@@ -178,6 +179,7 @@ def refuse_alike(
     """Ask about a column that may be the quantity, so that it is not left out without a word. doubtful: the other angle
     has a name that this one may have too, so any column with a name that is not known may be it."""
     known = {alias for alias in ALIASES[quantity] if len(alias) > 1}
+    surveyors = any(each.stem == "v" and index not in free for index, each in enumerate(apart))
     other = NOT_UNITS - _OF_THE_QUANTITY
     for index in free if quantity != "time" else ():
         name = apart[index]
@@ -189,7 +191,7 @@ def refuse_alike(
         bearing = quantity == "elevation" and (counts_from(name) or says_north(name.text))
         another = words & OTHER_THINGS or bearing or name.is_zenith() or any(map(name.means, QUANTITIES))
         alike = known & words or (name.is_in_a_unit_of(quantity) and not another)
-        bare = quantity == "range" and name.stem == "d"
+        bare = (quantity == "range" and name.stem == "d") or (surveyors and name.stem == _BESIDE_V.get(quantity))
         unknown = doubtful and not another and not any(name.stem in stems for stems in FURTHER_ALIASES.values())
         if not name.foreign and (either or bare or ((alike or unknown) and not other & words)):
             say = answer([each.text for each in apart], {quantity: index})
