@@ -123,3 +123,8 @@ def test_a_depth_beside_ranges_and_bearings_is_asked_about_and_counts_downwards(
     np.testing.assert_allclose(log.heights.above_m, -12.1 * unit)
     assert not log.heights.barometric
     assert logs.read(path, columns={"height": "none"}).heights is None
+
+
+def test_other_words_cut_short_before_a_distance_say_nothing(make: Make) -> None:
+    log = logs.read(make(table(t="Время, с", true="Пеленг, град", r="Накл. расстояние, м")))
+    np.testing.assert_allclose(log.measurement[:, 0], np.round(R, 2))
