@@ -236,7 +236,7 @@ def _without_in(text: str) -> str:
 
 def _words(text: str) -> tuple[str, tuple[str, ...]]:
     """Stem and words of the last part of a path such as `CAT048.I040.RHO`; `Rel. Bearing` is none."""
-    text = re.sub(r"(\w+)\.\s+", lambda of: of[1] + " " if plain_letters(of[1]) in _SENSES else of[0], text)
+    text = re.sub(r"(?<!\w)(\w+)\.\s+", lambda of: of[1] + " " if plain_letters(of[1]) in _SENSES else of[0], text)
     context, _, last = text.rpartition("/") if "/" in text else text.rpartition(".")
     parts = _NOT_WORDS.split(last.lower())
     around = set(_NOT_WORDS.split(context.lower())) - {""}
