@@ -174,7 +174,7 @@ def test_what_would_be_better_is_what_the_smoother_publishes() -> None:
     s = here.metadata["summary"]
     for trajectory, name in ((here, "median_sigma_m"), (smooth, "median_sigma_smoothed_m")):
         assert s[name] == pytest.approx(
-            np.median(np.sqrt((trajectory.sigma[:, :3] ** 2).sum(1))), rel=0.03
+            np.median(np.sqrt((trajectory.sigma[:, :3] ** 2).sum(1))), rel=0.07
         )  # which then allows for unseen motion
     last = summary.text(here.metadata).splitlines()[-1]
     assert last.startswith(f"  better     1 sigma of {s['median_sigma_smoothed_m']:.3g} m, not ")
