@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from ftproc.records import FloatArray
-from ftproc.simulation.flights.aerodynamic import AIR_STEP_S, CRAFTS
+from ftproc.simulation.flights.aerodynamic import AIR_STEP_S, CRAFTS, aerodynamic
 from ftproc.simulation.flights.air import Air, by_mach, density, sound_mps
 from ftproc.simulation.flights.kinds import FLIGHTS
-from ftproc.simulation.flights.kinematics import DOWN_MPS2, GRAVITY_MPS2
+from ftproc.simulation.flights.kinematics import DOWN_MPS2, GRAVITY_MPS2, constant_acceleration
+from ftproc.simulation.flights.kinematics import flown as flown_by
 from ftproc.simulation.flights.unsteered import UNSTEERED
 
 AIRCRAFT = [f"aerodynamic-{name}" for name in CRAFTS]
@@ -77,6 +78,20 @@ def test_aircraft_are_carried_by_their_wings(name: str) -> None:
         assert 0.8 < np.median(lift) / GRAVITY_MPS2 < 4.0
         assert lift.max() < most[name] * GRAVITY_MPS2
         assert abs(along).max() < 2 * GRAVITY_MPS2
+
+
+def test_long_flights_have_longer_steps_and_the_same_lags() -> None:
+    """An hour has steps of 0.18 s: the pilot still keeps to the path, and the wing carries the aircraft."""
+    craft, lasts_s = CRAFTS["light"], 3600.0
+    path = constant_acceleration(lasts_s, np.array([0.0, 0.0, 1500.0]), np.array([60.0, 0.0, 0.0]), np.zeros(3))
+    force = aerodynamic(craft, path, True, np.random.default_rng(2))
+    flight = flown_by(force, lasts_s, np.array([0.0, 0.0, 1500.0]), np.array([60.0, 0.0, 0.0]), AIR_STEP_S)
+    time_s = np.arange(0.0, lasts_s, 1.0)
+    position, _, acceleration = flight.at(time_s)
+    assert flight.step_s > 5 * AIR_STEP_S
+    assert np.linalg.norm(position - path.at(time_s)[0], axis=1).max() < 150.0
+    assert np.linalg.norm(acceleration - DOWN_MPS2, axis=1).min() / GRAVITY_MPS2 > 0.3
+    assert np.linalg.norm(acceleration - DOWN_MPS2, axis=1).max() / GRAVITY_MPS2 < 2.5
 
 
 def test_bombs_and_shells_have_drag_alone() -> None:

@@ -88,13 +88,15 @@ class _Flown:
         self.craft, self.path, self.air, self.slips = craft, path, air, slips
         self.loading = rng.uniform(*craft.loading_kgpm2)
         self.pitch_s, self.roll_s = rng.uniform(*craft.pitch_s), rng.uniform(*craft.roll_s)
-        self.begun, self.lift, self.thrust, self.slip = False, 0.0, 0.0, 0.0
+        self.time_s = self.step_s = math.inf  # of the last step, and since then: in the first one all is as meant
+        self.lift = self.thrust = self.slip = 0.0
         self.up, self.turned, self.felt = np.array([0.0, 0.0, 1.0]), np.zeros(3), np.zeros(3)
 
     def force(self, t: float, p: FloatArray, v: FloatArray) -> FloatArray:
         """(3,) m/s2 at a time s, position m and velocity m/s."""
         craft, height = self.craft, float(p[2])
-        gust = self.air.further(AIR_STEP_S * math.sqrt(float(v @ v)))
+        self.step_s, self.time_s = math.inf if math.isinf(self.time_s) else t - self.time_s, t
+        gust = self.air.further((AIR_STEP_S if math.isinf(self.step_s) else self.step_s) * math.sqrt(float(v @ v)))
         through = v - self.air.wind(height) - gust
         speed = max(math.sqrt(float(through @ through)), LEAST_SPEED_MPS)
         ahead, pressure = through / speed, 0.5 * density(height) * speed * speed / self.loading
@@ -110,13 +112,12 @@ class _Flown:
         drag = pressure * (craft.drag * by_mach(speed / sound_mps(height), 1.0) + craft.induced * coefficient**2)
         thrust = float(np.clip(wanted @ ahead + drag, *craft.thrust_mps2))
         self.thrust += self._part(craft.throttle_s) * (thrust - self.thrust)
-        self.begun = True
         by_air = coefficient * self.up + craft.side_slope * slip * side
         return np.asarray(DOWN_MPS2 + pressure * by_air + (self.thrust - drag) * ahead)
 
     def _part(self, late_s: float) -> float:
-        """Of a change, in a step; all of it in the first one."""
-        return min(AIR_STEP_S / late_s, 1.0) if self.begun else 1.0
+        """Of a change, in a step."""
+        return min(self.step_s / late_s, 1.0)
 
     def _wanted(self, t: float, p: FloatArray, v: FloatArray) -> FloatArray:
         """(3,) specific force m/s2 that would lead back to the path."""
