@@ -162,6 +162,7 @@ def _in_blocks(plan: _Plan) -> MeasurementLog | None:
     times = sample["time"][~np.isnan(sample["time"])]
     if several.alternate(timed) or log.duplicate_times > len(log) / 3 or stamps.coarse(times) is not None:
         return None  # only the whole file shows what these are
+    _refuse_apart(plan, log, QUANTITIES[1:])
     return _explained(plan, log, clocks[0]._replace(epoch=log.epoch), (), judged, timed)
 
 

@@ -14,9 +14,11 @@ from ftproc.records import COMPONENTS, FloatArray, MeasurementLog
 _FEWEST = 24  # rows, for a judgement
 _AT_ONCE = 0.2  # of the mean gap: rows nearer in time than that are of one time
 _LONGEST_M = 458.0  # the Seawise Giant, the longest ship
-_APART_M = 2 * _LONGEST_M  # for the noise of two ranges
-_APART_RAD = 0.1  # beyond the width of the beams of radars, and the noise of two angles
-_MOVES, _LAGS = 3.0, 8  # times as far as the rows move on from the nearest of so many before, for a clock that stands
+_NOISES = 6.0  # of how far rows of one time are apart, as it changes from time to time, at most
+_MOST_NOISE_M, _MOST_NOISE_RAD = 458.0, 0.08
+_BEAM_RAD = 0.02  # of radars
+_EVEN = 0.3  # of the way to the next time, by which rows miss their share of it where the clock stands meanwhile
+_MOST = 20_000  # rows that are judged, in stretches
 _OFTEN, _ALWAYS = 1 / 3, 0.8  # of the times have several rows, and of these are apart: single ones are outliers
 _LARGEST = 1e15  # of a reading
 
@@ -24,37 +26,54 @@ _LARGEST = 1e15  # of a reading
 def refuse(log: MeasurementLog, known: Sequence[str]) -> None:
     """Raise InputError if the rows of one time, of a log in SI units and in time order, are of several targets. known:
     the components of which the units are known."""
-    if len(log) < _FEWEST:
+    parts = [slice(0, len(log))]
+    if len(log) > _MOST:
+        parts = [slice(k * len(log) // 4, k * len(log) // 4 + _MOST // 4) for k in range(4)]
+    for part in parts:
+        _refuse(log.name, log.time_s[part], np.array(log.measurement[part]), known)
+
+
+def _refuse(source: str, time_s: FloatArray, measurement: FloatArray, known: Sequence[str]) -> None:
+    if len(time_s) < _FEWEST:
         return
-    gap = np.diff(log.time_s)
+    gap = np.diff(time_s)
     start = np.flatnonzero(np.r_[True, gap > _AT_ONCE * gap.mean()])
-    count = np.diff(np.r_[start, len(log)])
+    count = np.diff(np.r_[start, len(time_s)])
     several = count > 1
-    if several.sum() < max(_OFTEN * len(count), 1):
+    if several.sum() < max(_OFTEN * len(count), 2):
         return
-    reading = np.where([c in known for c in COMPONENTS], np.clip(log.measurement, -_LARGEST, _LARGEST), np.nan)
+    reading = np.where([c in known for c in COMPONENTS], np.clip(measurement, -_LARGEST, _LARGEST), np.nan)
     away = _within_half_a_turn(reading - np.repeat(reading[start], count, axis=0))
     low, high = np.fmin.reduceat(away, start), np.fmax.reduceat(away, start)
     span, middle = (high - low)[several], reading[start] + (low + high) / 2
-    steps = (np.abs(_within_half_a_turn(reading[lag:] - reading[:-lag]))[_LAGS - lag :] for lag in range(1, _LAGS + 1))
-    moves = np.fmin.reduce(list(steps))
+    first, share = reading[start[:-1]], ((count - 1) / count)[:-1, None]
+    on = _within_half_a_turn(reading[start[1:]] - first)
+    missed = _within_half_a_turn(reading[start[1:] - 1] - first) - on * share
     distance = middle[several, :1]
     wide_m = span * np.where(np.isfinite(distance), np.abs(distance), math.inf)
     wide_m[:, 0] = span[:, 0]
     far = np.zeros(len(span), bool)
     for c in range(3):
-        moved = _MOVES * median(moves[np.isfinite(moves[:, c]), c]) * count[several]
-        far |= (span[:, c] > np.maximum(moved, _APART_RAD if c else 0.0)) & (wide_m[:, c] > _APART_M)
+        if _typical(missed[several[:-1], c]) >= _EVEN * _typical(on[several[:-1], c]):
+            noise_m, noise_rad = (_NOISES * _typical(np.diff(each[:, c])) for each in (wide_m, span))
+            beam_rad = _BEAM_RAD + min(noise_rad, _MOST_NOISE_RAD) if c else 0.0
+            far |= (span[:, c] > beam_rad) & (wide_m[:, c] > _LONGEST_M + min(noise_m, _MOST_NOISE_M))
     if far.mean() < _ALWAYS:
         return
     most = np.fmax.reduce(wide_m[far], axis=1)
     angle = math.degrees(median(np.fmax.reduce(span[far, 1:], axis=1)))
     size = f"{median(most) / 1e3:.3g} km" if np.isfinite(most).all() else f"{min(angle, 360 - angle):.3g} deg"
     raise InputError(
-        f"{log.name}: rows of one time are {size} apart (median), which no target is (the longest ship has "
+        f"{source}: rows of one time are {size} apart (median), which no target is (the longest ship has "
         f"{_LONGEST_M:.0f} m) and no noise makes: these are several targets. Keep the rows of one, with --target "
         "COLUMN=VALUE or --where, or split the file."
     )
+
+
+def _typical(values: FloatArray) -> float:
+    """The median size of those that are there."""
+    present = np.abs(values[np.isfinite(values)])
+    return float(median(present)) if present.size else 0.0
 
 
 def _within_half_a_turn(step: FloatArray) -> FloatArray:

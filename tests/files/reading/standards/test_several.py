@@ -8,6 +8,7 @@ import pytest
 from ftproc.errors import InputError
 from ftproc.files.options import Extract, parse_where
 from ftproc.files.reading import logs
+from ftproc.files.reading.formats import content
 from ftproc.records import FloatArray
 from tests.files.conftest import Make, refused
 
@@ -89,6 +90,18 @@ def test_rows_of_one_time_that_are_kilometres_apart_are_no_one_target(
     assert "rows of one time are " in sentence
     assert " km apart (median), which no target is" in sentence
     assert " deg apart" in read_as_one(make, rows[:, [0, 2, 3]], "time_s,az_rad,el_rad")
+
+
+@pytest.mark.parametrize("speed", [-120.0, -30.0])
+@pytest.mark.parametrize("second", [(41e3, 9e3), (40.8e3, 9.1e3), (40e3, 10.1e3)])
+def test_two_aircraft_a_kilometre_apart_are_no_one_target(
+    make: Make, monkeypatch: pytest.MonkeyPatch, speed: float, second: tuple[float, float]
+) -> None:
+    rows = tracks(4.0, 1.0, speed, (40e3, 9e3), second)
+    assert " apart (median), which no target is" in read_as_one(make, rows)
+    rows[1::2, 0] += 0.1  # read in blocks, as times that are nearly the same are there
+    monkeypatch.setattr(content, "LARGE", 0)
+    assert " apart (median), which no target is" in read_as_one(make, rows)
 
 
 def test_a_ship_clutter_and_a_clock_that_stands_are_one_target(make: Make) -> None:
