@@ -57,14 +57,14 @@ class Columns(NamedTuple):
 
     def rates(self, value: FloatArray) -> FloatArray:
         """(n,) m/s, outward if the name says inward."""
-        return value if self.rate is None else self.rate.unit.to_si(-value if self.rate.other_kind else value)
+        return value if self.rate is None else self.rate.to_si(value)
 
     def split(self, readings: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Range, azimuth and elevation (n, 3) of readings (n, 5), and (n,) heights above the station, m."""
         measurement = bounded(readings[:, RANGE:RATE])
         if self.height is None:
             return measurement, np.full(len(measurement), np.nan)
-        above = bounded(self.height.unit.to_si(measurement[:, -1])) - self.own_m
+        above = bounded(self.height.to_si(measurement[:, -1])) - self.own_m
         measurement[:, -1] = np.nan
         return measurement, above
 

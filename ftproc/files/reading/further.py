@@ -51,6 +51,11 @@ class Further(NamedTuple):
         values = numbers(header.load([], [self.position]).column(0), origin)
         while (number := sentinel(values)) is not None:
             values = np.where(values == number, np.nan, values)
+        return self.to_si(values)
+
+    def to_si(self, values: FloatArray) -> FloatArray:
+        """Values as written -> rates outward, heights upward: a depth is below, with whichever sign it is written."""
+        values = np.abs(values) if self.unit.multiply < 0 else values
         return self.unit.to_si(-values if self.quantity == RANGE_RATE and self.other_kind else values)
 
     def described(self) -> dict[str, Any]:

@@ -123,6 +123,8 @@ def test_a_depth_beside_ranges_and_bearings_is_asked_about_and_counts_downwards(
     np.testing.assert_allclose(log.heights.above_m, -12.1 * unit)
     assert not log.heights.barometric
     assert logs.read(path, columns={"height": "none"}).heights is None
+    below = make(path.read_text().replace(";12.1", ";-12.1"))  # with the sign of a height
+    np.testing.assert_allclose(logs.read(below, columns={"height": name}).heights.above_m, -12.1 * unit)
 
 
 def test_other_words_cut_short_before_a_distance_say_nothing(make: Make) -> None:
