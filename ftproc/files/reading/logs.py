@@ -87,6 +87,7 @@ def read(
     choosing.refuse_open(header, {**unit_of, **column_of})
     header = statements.with_units_beside(header)
     statements.refuse_unheard(header, station, unit_of)
+    statements.refuse_counts(header, unit_of)
     column_of = {**header.stated.columns, **column_of}
     if header.stated.azimuth_from and station.azimuth_from is None:
         station = replace(station, azimuth_from=header.stated.azimuth_from)

@@ -18,6 +18,8 @@ from tests.files.conftest import Make
         (["Units  range ft  az deg  el deg"], ["", "ft", "deg", "deg"]),
         (["Unit of time: ms"], ["ms", "", "", ""]),
         (["Unit: Radar 7, range 40 km, rate unit: ft", "Range rate unit: ft"], []),
+        (["# range in 0.1 m", "# az, el in units of 0.01 deg"], ["", "0.1 m", "0.01 deg", "0.01 deg"]),
+        (["# Range unit: x10 m", "# time in 1/128 s"], ["1/128 s", "x10 m", "", ""]),
         (["Speed unit: m", "max range in km", "Range unit: furlong"], []),
     ],
 )

@@ -11,6 +11,7 @@ import pytest
 from ftproc.errors import InputError
 from ftproc.files.reading import logs
 from ftproc.settings import Station
+from tests.files.conftest import Make, refused
 
 PLAIN = "time_s,range_m,azimuth_deg,elevation_deg"
 ROWS = "".join(f"{k},{9000 + 40 * k},{30 + 0.1 * k},{10 + 0.02 * k}\n" for k in range(60))
@@ -92,3 +93,23 @@ def test_a_zone_behind_hhmmss_is_no_digit(log: Log) -> None:
     cells = "".join(f"1010{10 + k},{9000 + 40 * k},{30 + k / 10},10\n" for k in range(9))
     found = logs.read(log("Time (HHMMSS Z),range_m,azimuth_deg,elevation_deg", cells))
     assert found.time_s[0] == pytest.approx(36610)
+
+
+@pytest.mark.parametrize(
+    ("line", "say"),
+    [
+        ("range: LSB 0.1 m", "--units 'range=0.1 m'"),
+        ("1 count of range = 0.1 m", "--units 'range=0.1 m'"),
+        ("LSB = 0.0054931640625 deg", "--units 'azimuth=0.0054931640625 deg,elevation=0.0054931640625 deg'"),
+        ("azimuth scale: 0.01 deg", "--units 'azimuth=0.01 deg'"),
+        ("16-bit angles, 65536 counts = 360 deg", "--units 'azimuth=360/65536 deg,elevation=360/65536 deg'"),
+        ("angles in counts, 65536 counts per turn", "--units 'azimuth=1/65536 turn,elevation=1/65536 turn'"),
+    ],
+)
+def test_the_worth_of_a_count_above_the_table_is_asked_about(make: Make, line: str, say: str) -> None:
+    rows = "".join(f"{k / 2},{50000 + 7 * k},{2000 + k},{1000 + k}\n" for k in range(30))
+    path = make(f"# {line}\nt,range,az,el\n{rows}")
+    assert say in refused(path)
+    units = dict(pair.split("=") for pair in say.removeprefix("--units ").strip("'").split(","))
+    log = logs.read(path, units={"range": "m", "azimuth": "cdeg", "elevation": "cdeg"} | units)
+    assert log.understood["columns"][next(iter(units))]["unit"] == next(iter(units.values()))

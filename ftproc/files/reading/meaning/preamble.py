@@ -11,21 +11,30 @@ from ftproc.files.units import unit_named
 from ftproc.files.words import QUANTITIES
 
 _UNIT = re.compile(r"\b(?:units?|einheit(?:en)?|unité?s?|unidad(?:es)?)\b(?:\s+(?:of|for|von|de))?", re.IGNORECASE)
-_NAME, _STATED = r"(?P<name>[^\W\d_][\w &/]*?)", r"(?P<unit>[^\s=:;,|()\[\]]+)"
+_FACTOR = r"(?:(?:[x×*·]\s*)?\.?\d[\d.eE/^*+-]*\s*(?:[x×*·]\s*)?)?"  # before a unit: 0.1 m, 1/256 nmi
+_NAME, _STATED = r"(?P<name>[^\W\d_][\w &/]*?)", r"[^\s=:;,|()\[\]]+"
 _PAIRS = (  # the first that finds any
-    re.compile(rf"{_NAME}\s*(?:[=:;,|\t(\[]+|\b(?:in|is|are)\b)\s*{_STATED}"),
-    re.compile(rf"{_NAME}\s+{_STATED}"),
+    re.compile(rf"{_NAME}\s*(?:[=:;,|\t(\[]+|\b(?:in|is|are)\b)\s*(?P<unit>{_FACTOR}{_STATED})"),
+    re.compile(rf"{_NAME}\s+(?P<unit>{_STATED})"),
 )
 _IN_BRACKETS = re.compile(rf"{_NAME}\s*[\[(](?P<unit>[^\])]{{1,20}})[\])]")
+_IN_UNITS_OF = re.compile(r"\bin units of\b", re.IGNORECASE)
 _ALL = re.compile(r"^(?:all|the)\s+", re.IGNORECASE)
-_IN = re.compile(rf"{_NAME}\s+(?:(?:is|are)\s+)?in\s+(?P<unit>[^\W\d_]+(?: miles)?)", re.IGNORECASE)  # ranges in feet
+_IN = re.compile(  # ranges in feet; az, el in 0.01 deg
+    r"(?P<name>[^\W\d_][\w &/,]*?)\s+(?:(?:is|are)\s+)?(?:given |expressed |written )?in\s+"
+    rf"(?P<unit>{_FACTOR}[^\W\d_]+(?: miles)?)",
+    re.IGNORECASE,
+)
 _SEVERAL = 2  # names with units in brackets in one line, which needs no word for units
 _MOST_LINES, _LONGEST = 200, 300  # that are searched: above the table, and characters of one
-_GROUPS = {
+#: Words for several columns -> their quantities.
+_GROUPED: Mapping[str, Sequence[str]] = {
     **dict.fromkeys(("angle", "angles", "winkel"), QUANTITIES[2:]),
     **dict.fromkeys(("distance", "distances", "length", "lengths", "ranges"), QUANTITIES[1:2]),
     "times": QUANTITIES[:1],
 }
+#: The same by quantity.
+GROUPS = {q: tuple(word for word, mine in _GROUPED.items() if q in (mine, *mine)) for q in QUANTITIES}
 _RULE = re.compile(r"(?<!\S)[-=_]{3,}(?!\S)")
 _ENUMERATED = re.compile(r"[\s#%;*]*+(?:columns?|col|fields?)?[\s.]*+#?(\d++)\s*+[:=.)-]\s*([^\W\d].*)", re.IGNORECASE)
 
@@ -45,6 +54,7 @@ def units_stated(above: Sequence[str], names: Sequence[str]) -> list[str]:
 
 def _pairs(line: str) -> dict[str, str]:
     """The quantities of a line and their units as written."""
+    line = _IN_UNITS_OF.sub("in", line)
     if not _UNIT.search(line):
         found = _found(_IN_BRACKETS, line)
         return found if len(found) >= _SEVERAL else _found(_IN, line)
@@ -63,9 +73,9 @@ def _found(pattern: re.Pattern[str], line: str) -> dict[str, str]:
     return {
         quantity: pair["unit"]
         for pair in pattern.finditer(line)
-        for word in re.split(r"\s+and\s+|\s*[&/]\s*", pair["name"])
+        for word in re.split(r",?\s+and\s+|\s*[&/,]\s*", pair["name"])
         for name in (taken_apart(_ALL.sub("", word)),)
-        for quantity in _GROUPS.get(name.stem, filter(name.means, QUANTITIES))
+        for quantity in _GROUPED.get(name.stem, filter(name.means, QUANTITIES))
         if unit_named(quantity, pair["unit"])
     }
 

@@ -7,13 +7,16 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from ftproc.errors import InputError
+import numpy as np
+
+from ftproc.errors import InputError, quoted
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning.names import taken_apart
-from ftproc.files.reading.meaning.numbers import as_text
+from ftproc.files.reading.meaning.numbers import as_text, parsed
+from ftproc.files.reading.meaning.preamble import GROUPS
 from ftproc.files.reading.meaning.questions import answer
 from ftproc.files.units import unit_named
-from ftproc.files.words import QUANTITIES
+from ftproc.files.words import ALIASES, QUANTITIES
 from ftproc.settings import Station
 
 _OF_UNITS, _VALUE = ("units", "unit", "uom", "einheit", "unité"), ("value", "val")  # how names of columns end
@@ -24,6 +27,12 @@ _CONVENTIONS = (
     (r"(?:from|zero at|counted from|south is zero) (?:the )?south\b", "azimuth", "azimuths from south",
      "--config FILE with from = \"north\" and zero_deg = 180 under [azimuth] in it"),
 )  # fmt: skip
+
+#: Words of lines that say what one count is worth; the worth of one, or of many.
+_OF_COUNTS = re.compile(r"\b(?:lsbs?|scal(?:e|ed|ing)|counts?|ticks?)\b", re.IGNORECASE)
+_MANY = re.compile(r"\b(?P<many>\d+)\s*(?:counts?|ticks?|lsbs?)\b.*?\b(?P<number>[\d.]*)\s*(?P<unit>°|[^\W\d]\w*$)")
+_ONE = re.compile(r"(?<![\w.])(?P<worth>\.?\d[\d.eE/^*+-]*\s*(?:[^\W\d]\w*|°))(?!\s*[=:])")
+_LONGEST_LINE = 300  # characters
 
 
 def with_units_beside(header: TableHeader) -> TableHeader:
@@ -75,3 +84,39 @@ def refuse_unheard(header: TableHeader, station: Station, stated: Mapping[str, s
                 f'{header.source}: a line above the table, "{line.strip()[:80]}", speaks of {what}. If these are such, '
                 f"say {say}; if not, {'--units ' if quantity == 'range' else ''}{otherwise[quantity]}."
             )
+
+
+def refuse_counts(header: TableHeader, stated: Mapping[str, str]) -> None:
+    """Ask where a line above the table says what one count is worth, and columns of whole numbers without a unit may
+    hold such counts. stated: the units that the user has named."""
+    apart = [taken_apart(*each) for each in zip(header.names, header.units or [""] * len(header.names), strict=True)]
+    bare = {k: name for k, name in enumerate(apart) if not name.unit}
+    for line in header.above:
+        worth = _worth(line)
+        words = {taken_apart(word).stem for word in re.split(r"\W+", line)}
+        fits = [q for q in QUANTITIES if worth and unit_named(q, worth)]
+        fits = [q for q in fits if any(len(word) > 1 and word in (*ALIASES[q], *GROUPS[q]) for word in words)] or fits
+        mine = {q: k for q in fits if q not in stated for k, name in bare.items() if name.means(q)}
+        if mine and all(_are_whole(header, k) for k in mine.values()):
+            hold = " and ".join(f'"{header.names[k]}"' for k in mine.values()) + " hold" + "s" * (len(mine) == 1)
+            unit = re.sub(r"^[\d./]+\s*", "", worth)
+            counts, plain = (quoted(",".join(f"{q}={each}" for q in mine)) for each in (worth, unit))
+            raise InputError(
+                f'{header.source}: a line above the table, "{line.strip()[:80]}", says what a count is worth. If '
+                f"{hold} such counts, say --units {counts}; if not, --units {plain}."
+            )
+
+
+def _worth(line: str) -> str:
+    """What one count is worth by a line, such as 0.1 m or 360/65536 deg; "" of other lines."""
+    if len(line) > _LONGEST_LINE or not _OF_COUNTS.search(line):
+        return ""
+    if (many := _MANY.search(line)) and int(many["many"]) > 1:
+        return f"{many['number'] or 1}/{many['many']} {many['unit']}"
+    each = (one["worth"] for one in _ONE.finditer(_OF_COUNTS.sub("", line)))
+    return next((worth for worth in each if any(unit_named(q, worth) for q in QUANTITIES)), "")
+
+
+def _are_whole(header: TableHeader, index: int) -> bool:
+    values = parsed(as_text(header.load([], [index]).column(0)), header.decimal_comma)
+    return values is not None and bool((np.round(values) == values)[np.isfinite(values)].all())
