@@ -104,7 +104,10 @@ SPELLINGS: Mapping[str, tuple[str, ...]] = {
     "ms": ("msec", "msecs", "millisec", "millisecond", "milliseconds", "мс", "毫秒"),
     "us": ("usec", "usecs", "microsec", "microsecond", "microseconds", "μs", "μsec"),
     "ns": ("nsec", "nsecs", "nanosec", "nanosecond", "nanoseconds"),
-    "min": ("mins", "minute", "minutes"),
+    "min": (
+        *("mins", "minute", "minutes", "minuten", "minutos", "minuti", "minuty", "minuter", "minutter", "dakika"),
+        *("мин", "минута", "минуты", "минут", "хв", "分", "分钟", "분"),
+    ),
     "h": ("hr", "hrs", "hour", "hours", "ч"),
     "d": ("day", "days"),
     "m": (

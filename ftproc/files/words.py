@@ -37,7 +37,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     ),
     "range": _split(
         """
-        range r slantrange sr rng rho slrange slrng slantrng srange srng entfernung schragentfernung
+        range r slantrange sr rng rho slrange slrng slantrng srange srng entfernung entf schragentfernung
         schragdistanz schragdist schragstrecke schraegstrecke schraegentfernung schraegdistanz schraegdist
         distanceoblique distanceinclinee distanceradiale distanciainclinada distanciageometrica distanciaobliqua
         alcance alcanceinclinado alcanceobliquo distanciageometrica distanzaobliqua distanzainclinata distanzaradiale
@@ -148,7 +148,9 @@ EITHER_ANGLE = ("theta", "phi", "psi", "alpha", "θ", "φ", "ψ", "α", "beta", 
 
 #: Names in German, in which Grad are degrees, and sm Seemeilen.
 GERMAN = frozenset(
-    _split("zeit uhrzeit entfernung schragentfernung schragdistanz hohenwinkel distanz abstand peilung seitenpeilung")
+    _split(
+        "zeit uhrzeit entfernung entf schragentfernung schragdistanz hohenwinkel distanz abstand peilung seitenpeilung"
+    )
 )
 
 #: Names of zenith angles, which are 90 degrees minus the elevation.

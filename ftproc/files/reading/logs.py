@@ -17,7 +17,7 @@ from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.formats.standards import choosing
-from ftproc.files.reading.meaning import apart, rows, schema, several, statements
+from ftproc.files.reading.meaning import apart, carried, rows, schema, several, statements
 from ftproc.files.reading.meaning.values import deciding, plausibility, stamps
 from ftproc.files.words import QUANTITIES
 from ftproc.records import FloatArray, IntArray, MeasurementLog
@@ -87,15 +87,17 @@ def read(
     choosing.refuse_open(header, {**unit_of, **column_of})
     header = statements.with_units_beside(header)
     statements.refuse_unheard(header, station, unit_of)
-    statements.refuse_counts(header, unit_of)
     column_of = {**header.stated.columns, **column_of}
     if header.stated.azimuth_from and station.azimuth_from is None:
         station = replace(station, azimuth_from=header.stated.azimuth_from)
+    parted = carried.columns(header, column_of)
+    column_of = {**parted, **column_of}
     propose = proposal.by_values(header)
     if "time" not in column_of and not schema.has_time(header.names, header.units):
         index = proposal.the_moments(header, range(len(header.names)))
         column_of = column_of if index is None else {**column_of, "time": str(index + 1)}
     found = schema.resolve(header.source, header.names, unit_of, column_of, header.units, propose)
+    found |= {quantity: found[quantity]._replace(why=carried.WHY) for quantity in parted}
     beside = further.find(header, found, unit_of, column_of, extract.signal)
     plan = _Plan(header, found, station, _conditions(header, extract), extract=extract, beside=beside)
     if keep_columns:

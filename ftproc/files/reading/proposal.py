@@ -17,7 +17,7 @@ from ftproc.errors import InputError
 from ftproc.files.reading import converting
 from ftproc.files.reading.clocks import notations
 from ftproc.files.reading.formats.header import TableHeader
-from ftproc.files.reading.meaning import schema
+from ftproc.files.reading.meaning import carried, schema
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.numbers import as_text, parsed, without_text
 from ftproc.files.reading.meaning.questions import Proposal, Propose, answer, named
@@ -34,7 +34,6 @@ _COUNTERS = ("", *"nik", *("no", "nr", "num", "number", "row", "index", "idx", "
 _ROWS = 2000
 _MOST_COLUMNS, _MOST_TRIED, _SHOWN = 60, 7, 8
 _RISES = 0.98  # of the steps of a time are forward
-_MOST_OF_A_MINUTE = 45  # s, of which seconds of arc take all values
 _CLEARLY = 10.0  # times likelier than any other choice
 _STRAIGHT, _LEAST_TURN_RAD = 0.3, 0.03  # a path that no wrong choice gives, seen from a side
 _TURNED_RAD, _GONE = 0.09, 0.05  # or a path that is bent, of which angles and range change so much
@@ -85,7 +84,7 @@ def _proposed(header: TableHeader, free: Sequence[int], found: Mapping[str, Sequ
     numbers = {index: values for index, column in cells.items() if (values := _values(column, header)) is not None}
     joined = _of_minutes(numbers)
     seen = "; ".join(_shown(header, index, cells[index], numbers.get(index)) for index in indices[:_SHOWN])
-    cells = {index: cells[index] for index in cells if not {index - 1, index - 2} & joined}
+    cells = {index: cells[index] for index in cells if index in numbers or not {index - 1, index - 2} & {*joined}}
     times = [tuple(found["time"])] if "time" in found else list(_times(header, cells, numbers))
     if "time" not in found and found:  # only the time is sought
         only = [index for index in times if len(index) == 1]
@@ -100,13 +99,14 @@ def _proposed(header: TableHeader, free: Sequence[int], found: Mapping[str, Sequ
 
 def _of_angles(header: TableHeader, free: Sequence[int], found: Mapping[str, Sequence[int]]) -> Proposal:
     """The angles that are wanting among columns whose names say nothing."""
-    free = [index for index in free if not _says_something(header.names[index])]
+    indices, free = free, [index for index in free if not _says_something(header.names[index])]
     if not free:
         return Proposal()
     known = {q: positions[0] for q, positions in found.items() if q != "time" and len(positions) == 1}
-    table = header.load([], [*free, *known.values()]).slice(0, _ROWS)
-    cells = dict(zip([*free, *known.values()], table.columns, strict=True))
+    wide = [*dict.fromkeys([*(index + k for index in free for k in range(3) if index + k in indices), *known.values()])]
+    cells = dict(zip(wide, header.load([], wide).slice(0, _ROWS).columns, strict=True))
     numbers = {index: values for index, column in cells.items() if (values := _values(column, header)) is not None}
+    joined = _of_minutes(numbers)
     idle = [index for index in free if not _varies(cells[index], numbers.get(index))]
     wanted = [quantity for quantity in QUANTITIES[2:] if quantity not in found]
     unnamed = [index for index in free if index in numbers and index not in idle]
@@ -116,7 +116,7 @@ def _of_angles(header: TableHeader, free: Sequence[int], found: Mapping[str, Seq
     clock = _clock(header, tuple(found["time"]))
     choice = _likeliest(clock, fixed, {index: numbers[index] for index in unnamed[:_MOST_TRIED]}, [wanted])
     columns = {quantity: choice[quantity] for quantity in wanted} if choice else {}
-    return Proposal(answer(header.names, columns), "", columns, idle)
+    return Proposal(answer(header.names, columns, "", joined), "", columns, idle)
 
 
 def _varies(column: pa.ChunkedArray, values: FloatArray | None) -> bool:
@@ -132,20 +132,16 @@ def _says_something(name: str) -> bool:
     return _is_other(name) or bool(of_another) or bool({apart.stem, *apart.words} & NOT_UNITS)
 
 
-def _of_minutes(numbers: dict[int, FloatArray]) -> set[int]:
-    """The columns of degrees before columns of minutes and seconds; their values become those of all three."""
-    found = set()
+def _of_minutes(numbers: dict[int, FloatArray]) -> dict[int, int]:
+    """How many columns behind one of degrees hold minutes and seconds; its values become those of all."""
+    found = {}
     for index in sorted(numbers):
-        parts = [numbers[index + k] for k in range(3) if index + k in numbers]
-        if len(parts) < 3 or not np.isfinite(parts).all():
-            continue
-        degrees, minutes, seconds = parts
-        whole = all((part == np.round(part)).all() for part in (degrees, minutes))
-        below = all(((part >= 0) & (part < 60)).all() for part in (minutes, seconds))
-        if whole and below and np.ptp(seconds) > _MOST_OF_A_MINUTE:
-            numbers[index] = degrees + np.where(np.signbit(degrees), -1, 1) * (minutes + seconds / 60) / 60
-            del numbers[index + 1], numbers[index + 2]
-            found.add(index)
+        parts = [numbers.get(index + k) for k in range(3)]
+        if count := carried.behind(parts, carried.SIXTIES) if index in numbers else 0:
+            each = [numbers.pop(index + k) if k else numbers[index] for k in range(count + 1)]
+            rest = sum(part / 60.0 ** (k + 1) for k, part in enumerate(each[1:]))
+            numbers[index] = each[0] + np.where(np.signbit(each[0]), -1, 1) * rest
+            found[index] = count
     return found
 
 

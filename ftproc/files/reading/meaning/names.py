@@ -39,6 +39,7 @@ _COUNTS = re.compile(
     re.IGNORECASE,
 )
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
+_EASTERN, _LONGEST_UNIT = "\u2e80", 4  # letters from here on stand before a unit without a blank; of its letters
 _NOT_WORDS = re.compile(r"(?:[^\w°]|_)+")
 _OF_FRAMES = re.compile(r"(\d+(?:\.\d+)?)\s*(?:fps|frames?(?:\s*/\s*s| per second)?)", re.IGNORECASE)
 _NUMBERED = re.compile(r"^\d+\s*[:=)]\s*(?=[^\W\d])")  # the number of a column before its name
@@ -224,6 +225,9 @@ def _suffix(text: str) -> tuple[str, str, bool]:
             return _without_in(found[1]), found[2], False
     if found and found[2].lower() in NOTATIONS and found[2].lower() not in ("utc", "gps", "gpst", "z", "zulu"):
         return found[1], found[2].lower(), False
+    for k in range(max(1, len(text) - _LONGEST_UNIT), len(text)):  # 斜距km
+        if text[k - 1] > _EASTERN and _is_unit(text[k:]) and _is_name(text[:k]):
+            return text[:k], text[k:], False
     parts = _CAMEL.split(text)
     if len(parts) > 1 and len(parts[-1]) > 1 and _is_unit(parts[-1]):
         return "".join(parts[:-1]), parts[-1], False

@@ -43,12 +43,19 @@ _OF_CLOCK = frozenset(word for role in ("hour", "minute", "second") for word in 
 _PREFIXES = ("utc", "gps", "gmt")  # of the names of parts, such as UTC_HH
 #: Times that do not count from a midnight, and parts of one.
 _ELAPSED = frozenset([*_TIME["second"], "t", "elapsed", "elapsedtime", "elapsedseconds", "missiontime"])
-#: Parts of an angle -> units in the names.
+#: Parts of an angle -> what its unit is called, and how it is abbreviated.
 _ANGLE = {
-    "deg": ("d", "deg", "degs", "degree", "degrees", "°", "dd", "ddd"),
-    "min": ("m", "min", "mins", "minute", "minutes", "'", "mm", "arcmin"),
-    "sec": ("s", "sec", "secs", "second", "seconds", '"', "ss", "arcsec"),
+    "deg": {"deg", "grad", "d", "dd", "ddd"},
+    "min": {"min", "arcmin", "m", "mm", "'", "′"},
+    "sec": {"s", "arcsec", "ss", "''", '"', "″"},
 }
+
+
+def role(word: str) -> str:
+    """The part of an angle that a unit is, one of _ANGLE; "" of other words."""
+    units = [unit_named(quantity, word) for quantity in ("azimuth", "time")]
+    names = {word.lower(), *(unit.name for unit in units if unit)}
+    return next((part for part, words in _ANGLE.items() if words & names), "")
 
 
 def under(groups: Sequence[str], units: Sequence[str]) -> tuple[list[str], list[str]] | None:
@@ -61,7 +68,7 @@ def under(groups: Sequence[str], units: Sequence[str]) -> tuple[list[str], list[
         mine = slice(column, column := column + len(list(run)))
         if mine.stop - mine.start == 1:
             continue
-        angle = [word in part for word, part in zip(words[mine], _ANGLE.values(), strict=False)]
+        angle = [role(word) == part for word, part in zip(words[mine], _ANGLE, strict=False)]
         clock = {*taken_apart(group).words} & {*ALIASES["time"]} and _OF_CLOCK.issuperset(words[mine])
         if clock:
             names[mine], left[mine] = words[mine], [""] * len(words[mine])
@@ -84,8 +91,9 @@ def together(quantity: str, names: Sequence[Name]) -> dict[str, int] | None:
     by_index = dict(enumerate(names))
     if quantity == "time":
         return _time(by_index) or ({"date": 0, "time": 1} if len(names) == 2 else None)
-    roles = _angle(quantity, by_index)
-    return roles or (dict(zip(_ANGLE, range(3), strict=True)) if len(names) == 3 else None)
+    if quantity == "range":
+        return {f"part {k + 1}": k for k in by_index}
+    return _angle(quantity, by_index) or (dict(zip(_ANGLE, by_index, strict=False)) if len(names) <= 3 else None)
 
 
 def _time(names: Mapping[int, Name]) -> dict[str, int] | None:
@@ -171,9 +179,9 @@ def _angle(quantity: str, names: Mapping[int, Name]) -> dict[str, int] | None:
     if quantity == "azimuth" and (roles := turned(names)) is not None:
         return roles
     for stem in (*ALIASES[quantity], *WEAK_ALIASES[quantity], *(ZENITH_ALIASES if quantity == "elevation" else ())):
-        mine = {index: name.unit.lower() for index, name in names.items() if name.stem == stem}
-        fits = {role: [index for index, unit in mine.items() if unit in words] for role, words in _ANGLE.items()}
-        known = {role: only[0] for role, only in fits.items() if len(only) == 1}
+        mine = {index: role(name.unit or name.text.split()[-1]) for index, name in names.items() if name.stem == stem}
+        fits = {part: [index for index, found in mine.items() if found == part] for part in _ANGLE}
+        known = {part: only[0] for part, only in fits.items() if len(only) == 1}
         if len(known) == len(mine) > 1 and {"deg", "min"} <= set(known):
             return known
     return None

@@ -54,12 +54,12 @@ def named(name: str, index: int) -> str:
     return name if plain else str(index + 1)
 
 
-def answer(names: Sequence[str], columns: Mapping[str, int], time: str = "", joined: Collection[int] = ()) -> str:
-    """`--columns range=RNG,azimuth=3`, as a shell takes it. time: its columns, such as 1+2. joined: those of degrees
-    with minutes and seconds in the two columns behind them."""
-    behind = {index: range(index, index + 3 if index in joined else index + 1) for index in columns.values()}
+def answer(names: Sequence[str], columns: Mapping[str, int], time: str = "", joined: Mapping[int, int] = {}) -> str:
+    """`--columns range=RNG,azimuth=3`, as a shell takes it. time: its columns, such as 1+2. joined: how many columns
+    behind hold the rest of a number, such as minutes."""
+    called = [named(name, k) if names.count(name) == 1 else str(k + 1) for k, name in enumerate(names)]
     each = [f"time={time}"] if time else []
-    each += (f"{q}={'+'.join(named(names[k], k) for k in behind[index])}" for q, index in columns.items())
+    each += (f"{q}={'+'.join(called[index : index + 1 + joined.get(index, 0)])}" for q, index in columns.items())
     return f"--columns {quoted(','.join(each))}"
 
 

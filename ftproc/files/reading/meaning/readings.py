@@ -72,6 +72,8 @@ def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) 
     """The readings of one quantity. Raises InputError for the first cell that is no finite number."""
     if "added" in described.roles:
         return _turned([numbers(column, origin) for column in columns], described)
+    if len(columns) > 1 and described.quantity == "range":
+        return _summed([numbers(column, origin) for column in columns], described)
     if len(columns) > 1:
         degrees, minutes, *seconds = (numbers(column, origin) for column in columns)
         sign = np.where(np.signbit(degrees), -1.0, 1.0)
@@ -119,6 +121,13 @@ def _turned(angles: Sequence[FloatArray], described: Column) -> Readings:
         return Readings(angles[0] + angles[1], described)
     total = units[0].to_si(angles[0]) + units[1].to_si(angles[1])
     return Readings(total, described._replace(unit=UNITS["azimuth"]["rad"], unit_in_name=True))
+
+
+def _summed(lengths: Sequence[FloatArray], described: Column) -> Readings:
+    """Ranges of which one column holds the whole km, another the m beyond."""
+    units = [unit_named("range", word) or described.unit for word in described.written]
+    total = np.sum([unit.to_si(values) for unit, values in zip(units, lengths, strict=True)], axis=0)
+    return Readings(total, described._replace(unit=UNITS["range"]["m"], unit_in_name=True))
 
 
 def without_sentinels(found: Mapping[str, Readings]) -> dict[str, Readings]:

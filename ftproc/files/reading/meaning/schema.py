@@ -81,7 +81,10 @@ def resolve(
         raise InputError(f"{source}: this is a trajectory that ftproc wrote, no log: ftproc score {source}.")
     apart = [taken_apart(name, unit) for name, unit in zip(names, unit_row or [""] * len(names), strict=True)]
     if any(name.stem in GERMAN for name in apart):  # whose Grad are degrees, unless the values say otherwise
-        apart = [name._replace(unit="") if re.search(r"\bgrad *[)\]]?$", name.text, re.I) else name for name in apart]
+        apart = [
+            name._replace(unit="") if re.search(r"(?<![^\W_])grad *[)\]]?$", name.text, re.I) else name
+            for name in apart
+        ]
         apart = [name._replace(unit="nmi") if name.unit.lower() == "sm" else name for name in apart]
     table = _Table(source, names, apart, units)
     questions.refuse_side_by_side(source, apart, columns)
@@ -156,7 +159,7 @@ class _Table(NamedTuple):
         written = tuple(
             (parts.unit_of_day(self.apart[index]) or self.apart[index].unit)
             if role == "time"
-            else self.apart[index].unit
+            else self.apart[index].unit or (self.apart[index].stem if quantity == "range" else "")
             for role, index in roles.items()
         )
         time = self.apart[roles["time"]] if "time" in roles else self.apart[indices[0]]

@@ -65,8 +65,9 @@ def _before(name: str, endings: Sequence[str]) -> str | None:
 
 
 def refuse_unheard(header: TableHeader, station: Station, stated: Mapping[str, str]) -> None:
-    """Ask where a line above the table says a convention that nothing else has settled. stated: the units that the user
-    has named."""
+    """Ask where a line above the table says a convention, or the worth of a count, that nothing else has settled.
+    stated: the units that the user has named."""
+    _refuse_counts(header, stated)
     names = [taken_apart(name) for name in header.names]
     settled = {
         "range": "range" in stated or not any(name.means("range") for name in names),
@@ -86,7 +87,7 @@ def refuse_unheard(header: TableHeader, station: Station, stated: Mapping[str, s
             )
 
 
-def refuse_counts(header: TableHeader, stated: Mapping[str, str]) -> None:
+def _refuse_counts(header: TableHeader, stated: Mapping[str, str]) -> None:
     """Ask where a line above the table says what one count is worth, and columns of whole numbers without a unit may
     hold such counts. stated: the units that the user has named."""
     apart = [taken_apart(*each) for each in zip(header.names, header.units or [""] * len(header.names), strict=True)]
