@@ -25,15 +25,20 @@ _ZONES = {
     "MDT": -6, "PST": -8, "PDT": -7, "AKDT": -8, "HST": -10, "JST": 9, "KST": 9, "AEST": 10, "AEDT": 11,
 }  # fmt: skip
 _ZONE = rf"\s*(?P<zone>Z|z|UTC|UT|GMT|[+-]\d{{2}}(?::?\d{{2}})?|{'|'.join(_ZONES)})?(?:\[[\w/]+\])?"
-_YEAR_FIRST = r"(?P<year>\d{4})[-/.](?P<month>\d{1,2})[-/.](?P<day>\d{1,2})"
+_YEAR_FIRST = r"(?P<year>\d{4})[-/._](?P<month>\d{1,2})[-/._](?P<day>\d{1,2})"
 _COMPACT = r"(?P<year>(?:19|20)\d{2})(?P<month>\d{2})(?P<day>\d{2})"
 _DAY_FIRST = r"(?P<day>\d{1,2})[-/.](?P<month>\d{1,2})[-/.](?P<year>\d{4}|\d{2})"
 _MONTH_FIRST = r"(?P<month>\d{1,2})[-/.](?P<day>\d{1,2})[-/.](?P<year>\d{4}|\d{2})"
-_NAMED = r"(?P<day>\d{1,2})[-/. ](?P<name>[A-Za-z]{3,9})\.?[-/. ,]+(?P<year>\d{4}|\d{2})"
-_NAMED_FIRST = r"(?P<name>[A-Za-z]{3,9})\.?[-/. ](?P<day>\d{1,2})[-/. ,]+(?P<year>\d{4}|\d{2})"
+_WEEKDAY = r"(?:[A-Za-z]{3,9}\.?,?\s+)?"
+_NAMED = rf"{_WEEKDAY}(?P<day>\d{{1,2}})[-/. ]?(?P<name>[A-Za-z]{{3,9}})\.?[-/. ,]*(?P<year>\d{{4}}|\d{{2}})"
+_YEAR_NAMED = r"(?P<year>\d{4})[-/. ]?(?P<name>[A-Za-z]{3,9})\.?[-/. ]?(?P<day>\d{1,2})"
+_NAMED_FIRST = _WEEKDAY + r"(?P<name>[A-Za-z]{3,9})\.?[-/. ](?P<day>\d{1,2})[-/. ,]+(?P<year>\d{4}|\d{2})"
 _ORDINAL = r"(?P<year>\d{4})[-:/. ]?(?P<doy>\d{3})"
-_DOTTED = _CLOCK.replace(":", "[.]", 2)  # as Oracle writes them
-_BETWEEN = r"[T _,;:]+\s*"
+_SHORT_ORDINAL = _ORDINAL.replace("{4}", "{2}")
+_DOTTED = _CLOCK.replace(":", "[-._ ]", 2).replace("[.,]", "[.,_]")  # as Oracle and names of files write them
+_WITHOUT = r"(?P<hour>\d{2})(?P<minute>\d{2})(?P<second>\d{2}(?:[.,]\d*)?)"
+_BETWEEN = r"[T _,;:.-]+\s*"
+_HAN = r"(?P<year>\d{4})年(?P<month>\d{1,2})月(?P<day>\d{1,2})[日号]\s*"
 
 _DATES = {
     "year-month-day": _YEAR_FIRST,
@@ -42,15 +47,25 @@ _DATES = {
     "month/day/year": _MONTH_FIRST,
     "day month year": _NAMED,
     "month day year": _NAMED_FIRST,
+    "year month day": _YEAR_NAMED,
     "year and day of year": _ORDINAL,
 }
 MINUTES = r"(?P<hour>)(?P<minute>\d{1,2}):(?P<second>\d{2}[.,]\d+)"  # as Excel shows times of day
 #: Name of a notation -> its pattern, for whole cells.
 STAMPS: Mapping[str, str] = {
-    **{f"{name} and time of day": f"{date}{_BETWEEN}{_CLOCK}{_ZONE}" for name, date in _DATES.items()},
+    **{
+        f"{name} and time of day{how}": f"{date}{_BETWEEN}{clock}{_ZONE}"
+        for name, date in {**_DATES, "two digits of the year and day of year": _SHORT_ORDINAL}.items()
+        for how, clock in (("", _CLOCK), (" with dots", _DOTTED), (" without colons", _WITHOUT))
+    },
+    "年月日": f"{_HAN}{_CLOCK}{_ZONE}",
+    "年月日时分秒": _HAN + r"(?P<hour>\d{1,2})[时時点](?P<minute>\d{1,2})分(?P<second>\d{1,2}(?:\.\d*)?)秒?",
+    "month day, time of day and year": (
+        rf"{_WEEKDAY}(?P<name>[A-Za-z]{{3,9}})\s+(?P<day>\d{{1,2}})\s+{_CLOCK}{_ZONE}\s+(?P<year>\d{{4}})"
+    ),
     "day of year and time of day": rf"(?P<doy>\d{{1,3}})[-:/.T ]+{_CLOCK}{_ZONE}",
     "time of day": f"T?{_CLOCK}{_ZONE}",
-    "day month year and time of day with dots": f"{_NAMED}{_BETWEEN}{_DOTTED}{_ZONE}",
+    "time of day with dots": r"(?P<hour>\d{2})[-._](?P<minute>\d{2})[-._](?P<second>\d{2}[.,_]\d+)",
     "minutes and seconds": MINUTES,
     "duration": rf"(?:T?[+]|[+]?0 days )(?:0 days )?{_CLOCK}",
     "hours, minutes and seconds": r"(?P<hour>\d{1,2})h\s*(?P<minute>\d{1,2})m\s*(?P<second>\d{1,2}(?:[.,]\d*)?)s?",
@@ -89,8 +104,9 @@ class Moments(NamedTuple):
 def matching(text: pa.ChunkedArray, patterns: Mapping[str, str]) -> dict[str, Moments]:
     """The notations in which every cell of a column is a moment, in the order of `patterns`."""
     found = {}
+    first = text.slice(first_present(text), 1)
     for name, pattern in patterns.items():
-        moments = parsed(text, pattern)
+        moments = parsed(text, pattern) if parsed(first, pattern) else None
         if moments is not None and moments.right.all():
             found[name] = moments
     return found
@@ -170,14 +186,20 @@ def _days(get: functools.partial[FloatArray | None], n: int) -> tuple[IntArray, 
         right &= (doy >= 1) & (doy <= 366)
         if year is None:
             return np.nan_to_num(doy).astype(np.int64), right
-        first = (np.nan_to_num(year).astype(np.int64) - 1970).astype("datetime64[Y]").astype("datetime64[D]")
+        first = (
+            (_of_century(np.nan_to_num(year)).astype(np.int64) - 1970).astype("datetime64[Y]").astype("datetime64[D]")
+        )
         return first.astype(np.int64) + np.nan_to_num(doy).astype(np.int64) - 1, right
     if names is not None:
         month = np.array([_MONTH_NUMBERS.get(cell[:3].lower(), 0) for cell in names], float)
     if year is None or month is None or date is None:
         return np.zeros(n, np.int64), right
-    full = np.where(year < 100, year + np.where(year < 70, 2000, 1900), year)
-    return _of_calendar(full, month, date)
+    return _of_calendar(_of_century(year), month, date)
+
+
+def _of_century(year: FloatArray) -> FloatArray:
+    """Years of four digits."""
+    return np.where(year < 100, year + np.where(year < 70, 2000, 1900), year)
 
 
 def _of_calendar(year: FloatArray, month: FloatArray, date: FloatArray) -> tuple[IntArray, NDArray[np.bool_]]:
@@ -227,7 +249,7 @@ def _field(fields: pa.ChunkedArray, name: str) -> FloatArray | None:
 
     if name not in [field.name for field in fields.type]:
         return None
-    cells = pc.replace_substring_regex(pc.struct_field(fields, name), "[,:]", ".")
+    cells = pc.replace_substring_regex(pc.struct_field(fields, name), "[,:_]", ".")
     cells = pc.if_else(pc.equal(cells, ""), None, cells)
     return arrow.to_numpy(cells.cast(pa.float64()))
 

@@ -50,6 +50,7 @@ _TICKS = (
 _SURELY_UNIX = 1.5e9  # s: 2017; from there on seconds since 1980 are in the future
 _GPS_FROM = 3e8
 _DIGITS = re.compile(r"hms|hhmmss(?:m*|s*|f*)")  # names of such numbers
+_CALENDAR = (1.97e13, 2.1e13)  # yyyymmddhhmmss
 _BEHIND = (1e3, 1e2, 1e1, 1e6)  # digits of the second behind hhmmss, without a point
 _SAMPLE = 2000  # times by which the size and the step are judged
 _LARGEST = 1e300  # two larger numbers would overflow in a mean
@@ -78,6 +79,10 @@ def read(values: FloatArray, column: Column, source: str = "") -> Clock:
         _, _, start, per_second, words = counted_from
         seconds = values / per_second - start if per_second == 1 else (values - start * per_second) / per_second
         return Clock(seconds, UNIX_EPOCH, f"{words}, by the size of the numbers")
+    of_day = values % 1e6  # behind a date without year or in another order, such as yyyyddd or yymmdd
+    if kind in ("", "unix", "day") and 1e6 <= size < _CALENDAR[0] and is_hhmmss(of_day) and _jumps(of_day):
+        seconds, notes = unrolled(from_hhmmss(of_day), DAY_S)
+        return Clock(seconds, "", "time of day as hhmmss behind a date, in s since midnight", notes)
     for power, name in ((1e9, "ns"), (1e6, "us"), (1e3, "ms")):
         if kind != "week" and column.name != CANONICAL["time"] and _UNIX_FROM <= size / power < _UNIX_TO:
             return Clock(values / power, UNIX_EPOCH, f"{name} since 1970 UTC, by the size of the numbers")
@@ -173,7 +178,7 @@ def _is_hhmmss_named_s(values: FloatArray, column: Column) -> bool:
 
 def _is_calendar(known: FloatArray) -> bool:
     """Whether all numbers are possible moments written as yyyymmddhhmmss."""
-    if known.min() < 1.97e13 or known.max() >= 2.1e13:
+    if known.min() < _CALENDAR[0] or known.max() >= _CALENDAR[1]:
         return False
     day = np.floor(known / 1e6)
     month, date = np.floor(day / 100) % 100, day % 100

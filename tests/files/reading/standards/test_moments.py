@@ -1,5 +1,7 @@
 """When a reading of a standard's file was taken."""
 
+import datetime
+
 import numpy as np
 import pytest
 
@@ -59,3 +61,30 @@ def test_epochs_of_clocks_that_are_not_utc(make: Make) -> None:
         assert any("SCLK are taken for UTC" in remark for remark in log.remarks) == (system == "SCLK")
     expected = {"UTC": 43200, "GPS": 43182, "TAI": 43163, "TT": 43130.816, "SCLK": 43200}
     assert first == pytest.approx(expected)
+
+
+WRITTEN = (
+    *("%Y-%j-%H:%M:%S.%f", "%Y/%j-%H:%M:%S.%f", "%Y.%j.%H:%M:%S.%f", "%Y%jT%H%M%S.%f", "%Y-%jT%H:%M:%S.%fZ"),
+    *("%y-%j-%H:%M:%S.%f", "%y%j %H:%M:%S.%f", "%d%b%Y:%H:%M:%S.%f", "%d%b%y %H:%M:%S.%f", "%Y-%b-%d %H:%M:%S.%f"),
+    *("%Y-%m-%d-%H-%M-%S.%f", "%Y_%m_%d_%H_%M_%S_%f", "%Y-%m-%d %H.%M.%S.%f", "%d/%m/%Y - %H:%M:%S.%f"),
+    *("%a, %d %b %Y %H:%M:%S.%f GMT", "%A, %B %d, %Y %I:%M:%S.%f %p", "%a %b %d %H:%M:%S.%f %Y"),
+    *("%Y年%m月%d日 %H:%M:%S.%f", "%Y年%m月%d日%H时%M分%S.%f秒"),
+)
+
+
+@pytest.mark.parametrize("written", WRITTEN)
+def test_dates_and_times_as_printouts_write_them(make: Make, written: str) -> None:
+    first = datetime.datetime(2023, 6, 14, 23, 59, 45, 250_000)  # passes midnight
+    cells = [(first + datetime.timedelta(seconds=0.5 * k)).strftime(written) for k in range(60)]
+    log = logs.read(make("Time;range_m;az_deg\n" + "".join(f"{cell};{900 + k};20\n" for k, cell in enumerate(cells))))
+    np.testing.assert_allclose(log.time_s, 86385.25 + 0.5 * np.arange(60), atol=1e-6)
+    assert log.epoch == "2023-06-14T00:00:00Z"
+
+
+@pytest.mark.parametrize("written", ["%Y%j%H%M%S", "%y%m%d%H%M%S", "%y%j%H%M%S", "%j%H%M%S"])
+def test_digits_of_a_time_of_day_behind_those_of_a_date(make: Make, written: str) -> None:
+    first = datetime.datetime(2023, 6, 14, 23, 57, 0)
+    cells = [(first + datetime.timedelta(seconds=2 * k)).strftime(written) for k in range(150)]
+    log = logs.read(make("Time,range_m,az_deg\n" + "".join(f"{cell},{900 + k},20\n" for k, cell in enumerate(cells))))
+    np.testing.assert_allclose(log.time_s, 86220 + 2 * np.arange(150), atol=1e-6)
+    assert "hhmmss behind a date" in log.understood["clock"]
