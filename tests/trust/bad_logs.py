@@ -127,7 +127,7 @@ def bytes_() -> Iterator[Case]:
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600), "NUL"),
         (b"%PDF-1.4\n%\xe2\xe3\n", "PDF document"),
         (b'{"a": 1}', "no line of column names"),
-        (b"<html><body>", "no rows"),
+        (b"<html><body>", "a page of HTML"),
         (b"Rar!\x1a\x07\x01\x00", "NUL"),
     ):
         yield Case("log", f"file of {content[:12]!r}", written(content), (what,))

@@ -20,6 +20,7 @@ from ftproc.files.reading.formats import blocks, content, encoding, layout, trim
 from ftproc.files.reading.formats.header import Blocks, TableHeader
 from ftproc.files.reading.formats.layout import BLANKS
 from ftproc.files.reading.formats.standards import catalogue
+from ftproc.files.reading.formats.texts import wrapped
 from ftproc.files.reading.meaning import preamble
 from ftproc.files.words import MISSING_WORDS
 
@@ -39,7 +40,7 @@ def text_file(name: str, path: Path, room: limits.Room, widths: Sequence[int] = 
     if large:
         head = content.read(name, path, limit=_HEAD)
         lines = head[: head.rfind(b"\n") + 1 or len(head)]
-        if not trimming.is_boxed(head) and _described(lines, room, cut=True) is None:
+        if not (trimming.is_boxed(head) or _unwrapped(lines, room)[1]) and _described(lines, room, cut=True) is None:
             return _large_file(name, path)
     return text_bytes(content.read(name, path), room, widths)
 
@@ -47,12 +48,22 @@ def text_file(name: str, path: Path, room: limits.Room, widths: Sequence[int] = 
 def text_bytes(data: bytes, room: limits.Room, widths: Sequence[int] = ()) -> TableHeader:
     """The bytes of a text file. Raises InputError."""
     name = room.name
-    known = None if widths else _described(data, room)
+    plain, language = ("", "") if widths else _unwrapped(data, room)
+    data = plain.encode() if language else data
+    known = None if widths or language else _described(data, room)
     if known is not None:
         return known
     text = split(name, data, widths)
+    text = text._replace(form=f"{language}, {text.form}" if language else text.form)
     commas = text.delimiter != "," or len(_QUOTED_COMMA.findall(text.body, 0, _HEAD)) > 2
     return TableHeader(text.source, text.names, text.load, commas, units=text.units, form=text.form, above=text.above)
+
+
+def _unwrapped(data: bytes, room: limits.Room) -> tuple[str, str]:
+    """The table that stands in another language, and the name of that; "" of other texts."""
+    if _plain(data[:_HEAD]) is not None:
+        return "", ""
+    return wrapped.unwrapped(encoding.as_utf8(room.name, data).data.decode("utf-8", "replace"), room)
 
 
 def _described(data: bytes, room: limits.Room, cut: bool = False) -> TableHeader | None:
@@ -265,7 +276,7 @@ def _searched(source: str, data: bytes, widths: Sequence[int]) -> tuple[CsvText,
     if found and not found.named and (widths := widths or preamble.ruled(texts, found.first)):
         found = layout.find(texts, widths)
     if found is None:
-        names, delimiter, start = _first_line(source, data)
+        names, delimiter, start = trimming.first_line(source, data)
         return CsvText(source, names, delimiter, memoryview(b""), False), start
     start = sum(map(len, lines[: 2 * found.first]))
     names = [name.strip() for name in found.names]
@@ -274,26 +285,6 @@ def _searched(source: str, data: bytes, widths: Sequence[int]) -> tuple[CsvText,
     parts += ["a row of units" if found.row_of_units else "units stated above the table"] if found.units else []
     text = CsvText(source, names, found.separator, memoryview(b""), False, widths=widths, units=found.units)
     return text._replace(above=found.said, form=", ".join(parts)), start
-
-
-def _first_line(source: str, data: bytes) -> tuple[list[str], str, int]:
-    """Names and separator of a file in which no line is like a row: of its first line."""
-    found = layout.LINE.match(data)
-    assert found is not None
-    line = found[1].decode("utf-8", "replace")
-    delimiter = max(",;\t", key=line.count)  # the comma if there is none
-    try:
-        names = [name.strip() for name in next(csv.reader([line], delimiter=delimiter))]
-    except (csv.Error, StopIteration) as error:
-        raise InputError(
-            f"{source}: the header line cannot be read as CSV ({error}); correct it, or delete the lines before it."
-        ) from error
-    if len(names) == 1 and re.search(r"\S[ |]+\S", names[0]):
-        raise InputError(
-            f'{source}: the header line "{line[:80]}" has no separator, and no line looks like a row of a log; '
-            "separate the cells with commas, semicolons or tabs."
-        )
-    return names, delimiter, found.end()
 
 
 def _spans_lines(cells: list[str]) -> bool:

@@ -36,7 +36,7 @@ _WITH_BLANKS = re.compile(
     r')\s*"?'
 )
 _LONGEST_CELL = 200  # characters of a number or a time
-_RULE = re.compile(r"(?=[+*#|,;:\s]*+(?:[-=_][+*#|,;:\s]++)*+[-=_]{2})[-=_+*#|,;:\s]*+")
+RULE = re.compile(r"(?=[+*#|,;:\s]*+(?:[-=_][+*#|,;:\s]++)*+[-=_]{2})[-=_+*#|,;:\s]*+")
 #: Columns without a name above them: the name that they get -> how the rows begin.
 _UNNAMED = {
     "Date": r"\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s+\d{1,2}:\d{2}",
@@ -152,14 +152,14 @@ def _with_names(
     width = len(rows[filled[start]])
     block = [lines[number] for number in filled[start : start + 50]]
     top = start
-    while top and not _RULE.fullmatch(lines[filled[top - 1]]):
+    while top and not RULE.fullmatch(lines[filled[top - 1]]):
         above = rows[filled[top - 1]]
         if not (is_data(above, strictly=True) or (len(above) == width and all(map(_is_nothing, above)))):
             break
         top -= 1
     units: list[str] = []
     index = top - 1
-    while index >= 0 and _RULE.fullmatch(lines[filled[index]]):  # a rule under the names
+    while index >= 0 and RULE.fullmatch(lines[filled[index]]):  # a rule under the names
         index -= 1
     over = [lines[number] for number in filled[: index + 1]]
     index = _above_comments(over, index, lambda line: _heading(line, separator, width, block, widths))

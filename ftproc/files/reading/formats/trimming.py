@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Sequence
 
@@ -204,9 +205,31 @@ def _is_footer(line: str, names: Sequence[str], separator: str, widths: Sequence
     cells = layout.split(line, separator, widths)
     if not line.strip(" \x1a\0"):
         return "\x1a" in line
+    if layout.RULE.fullmatch(line):
+        return True
     if widths:
         return not layout.is_data(cells) and bool(re.match(r"\s*[A-Za-z#*=-]", line))
     different = len(cells) != len(names)
     if different and _COUNTED.fullmatch(line.strip()):
         return True
     return different and bool(re.match(r"\s*[A-Za-z#*=<-]", line)) and not layout.is_data(cells, strictly=True)
+
+
+def first_line(source: str, data: bytes) -> tuple[list[str], str, int]:
+    """Names and separator of a file in which no line is like a row: of its first line."""
+    found = layout.LINE.match(data)
+    assert found is not None
+    line = found[1].decode("utf-8", "replace")
+    delimiter = max(",;\t", key=line.count)  # the comma if there is none
+    try:
+        names = [name.strip() for name in next(csv.reader([line], delimiter=delimiter))]
+    except (csv.Error, StopIteration) as error:
+        raise InputError(
+            f"{source}: the header line cannot be read as CSV ({error}); correct it, or delete the lines before it."
+        ) from error
+    if len(names) == 1 and re.search(r"\S[ |]+\S", names[0]):
+        raise InputError(
+            f'{source}: the header line "{line[:80]}" has no separator, and no line looks like a row of a log; '
+            "separate the cells with commas, semicolons or tabs."
+        )
+    return names, delimiter, found.end()

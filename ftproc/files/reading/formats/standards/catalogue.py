@@ -8,9 +8,10 @@ from typing import NamedTuple
 
 from ftproc.errors import InputError
 from ftproc.files.limits import Room
-from ftproc.files.reading.formats import content, documents, tagged
+from ftproc.files.reading.formats import content, documents
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.formats.standards import asterix, crd, gsi, kinds, markup, meteors, nmea, tdm
+from ftproc.files.reading.formats.texts import tagged
 
 _HEAD = 1 << 16  # bytes in which a format is recognised
 
@@ -70,6 +71,11 @@ TEXTS = (
         "a prism in it, export times, circles and slope distances as .csv"),
     _no("Topcon GTS", r"\A_'[^\r\n]{0,200}_\(", f"a field book of a total station (Topcon), {_SURVEY}"),
     _no("Sokkia SDR", r"\A00NM(?:SDR|\w\w)", f"a field book of a total station (SDR), {_SURVEY}"),
+    _no("SQL", r"^[ \t]*(?:INSERT\s+INTO|CREATE\s+TABLE)\b", "a listing of statements of SQL that do not fill one "
+        "table of a log; export the table as .csv"),
+    _no("HTML", r"\A\s*<(?i:(?:!DOCTYPE\s+)?html\b)", "a page of HTML without a table of a log; save that as .csv"),
+    _no("tshark", r"^Frame \d+: \d+ bytes on wire", "a listing of packets; save the packets as .pcap, or their "
+        "fields as JSON (tshark -T json)"),
     _of("XML", r"\A\s*<(?:\?xml\b|[A-Za-z][\w:.-]*[\s>])", markup.read),
     _of("rows in brackets", r"\A\s*\[\s*\[", documents.nested_rows),
     _of("names and values", r"[=:]\s*[\"']?[+-]?\.?\d", tagged.pairs),

@@ -28,8 +28,16 @@ _PAIR = re.compile(rf"(?<![\w.]){_NAME}\s*[=:]\s*{_VALUE}")
 _LEADING = re.compile(rf"\W*(?:[A-Z][a-z]{{2}} +\d{{1,2}} +)?({_STAMP}|\d+\.\d+)(?=[\s,;|\])])")  # Jun  3 of syslog
 _TRAILING = re.compile(r"\s(\d{10,19})\s*$")  # since 1970, at the end of a point of a database
 _COUNTED = re.compile(r"[+-]?\d+[iu]")  # whole numbers there
-_RECORD = re.compile(r"\n-{3,}\s*\n")  # between records of one pair to a line
-_ITEM = re.compile(r"\n(?=[ \t]*- +[^\W\d]\w*:)")  # before an item of a list of them, as in YAML
+#: Between records of one pair to a line: a rule; before an item of a list, as in YAML, a section, or a message of
+#: protobuf; an empty line.
+_BETWEEN_RECORDS = (
+    re.compile(r"\n-{3,}\s*\n"),
+    re.compile(r"\n(?=[ \t]*- +[^\W\d]\w*:)"),
+    re.compile(r"\n(?=\[[^\]\n]*\]+[ \t]*\n)"),
+    re.compile(r"\n(?=\w+[ \t]*\{[ \t]*\n)"),
+    re.compile(r"\n[ \t]*\n"),
+)
+_ALONE = 0.9  # of the pairs in such a text are alone in their line
 _FEWEST = 2  # pairs in a row
 _WHOLE = 0.7  # of the records on one line hold each reading
 
@@ -62,10 +70,32 @@ def _stamped(record: str, found: dict[str, str]) -> dict[str, str]:
 
 
 def _rows(text: str) -> list[str]:
-    for between in (_RECORD, _ITEM):
-        if len(between.findall(text)) > 2:
+    """The records of a text, or its lines."""
+    for between in _BETWEEN_RECORDS:
+        if len(between.findall(text)) > 2 and _one_to_a_line(text[: _SAMPLE * 200]):
             return [record.replace("\n", "; ") for record in between.split(text)]
-    return text.splitlines()
+    return _repeated(text) or text.splitlines()
+
+
+def _one_to_a_line(text: str) -> bool:
+    found = [len(_PAIR.findall(line)) for line in text.splitlines()]
+    return found.count(1) >= _ALONE * sum(map(bool, found)) > 0
+
+
+def _repeated(text: str) -> list[str]:
+    """The records of a text of one pair to a line in which the same names come again and again, all as often."""
+    sample = text[: _SAMPLE * 200].splitlines()
+    if len(sample) < _FEWEST or not _one_to_a_line("\n".join(sample[: 2 * _SAMPLE])):
+        return []
+    lines = [(pair["name"].strip(), line) for line in text.splitlines() if (pair := _PAIR.search(line))]
+    counts = Counter(name for name, _ in lines)
+    width = len(counts)
+    if not _FEWEST <= width <= limits.MOST_COLUMNS or max(counts.values()) < _FEWEST:
+        return []
+    records = ["; ".join(line for _, line in lines[k : k + width]) for k in range(0, len(lines), width)]
+    order = [name for name, _ in lines[:width]]
+    in_order = all(name == order[k % width] for k, (name, _) in enumerate(lines))
+    return records if in_order else []
 
 
 def _is_tagged(lines: Sequence[str]) -> bool:
