@@ -22,6 +22,7 @@ from ftproc.files.reading.formats.arrays import hdf5, matlab, saved
 from ftproc.files.reading.formats.columnar import ipc, parquet
 from ftproc.files.reading.formats.header import TableHeader, of_arrow
 from ftproc.files.reading.formats.standards import asterix, octets
+from ftproc.files.reading.formats.texts import upright
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -110,7 +111,7 @@ def read_header(source: Source, widths: Sequence[int] = ()) -> TableHeader:
         scratch.remove()
         raise
     if not header.is_of_a_standard:
-        header = asterix.by_names(header)
+        header = upright.upright(asterix.by_names(header))
     weakref.finalize(header, scratch.remove)
     return header
 

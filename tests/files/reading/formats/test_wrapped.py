@@ -60,6 +60,14 @@ TEXTS = {
     "vectors of a program": across(" ", "{name} = [{cells}];"),
     "columns of a program": across("; ", "{name} = [{cells}]"),
     "units in cells": re.sub(r"_(s|m|deg),", r",\1,", across(",")),
+    "a row for each quantity": below(
+        "time_s,name,value", "{0},range_m,{1}\n{0},az_deg,{2}\n{0},el_deg,{3}",
+    ),
+    "a row for each quantity and unit": "t;quantity;value;unit\n" + "".join(
+        f"{t};{name};{cell};{unit}\n" for name, unit, cells in zip(
+            ("range", "azimuth", "elevation"), ("m", "deg", "deg"), COLUMNS[1:], strict=True
+        ) for t, cell in zip(COLUMNS[0], cells, strict=True)
+    ),
     "sections": "[site]\nname = X\n\n" + each("[plot {k}]\ntime_s = {0}\nrange_m = {1}\naz_deg = {2}\nel_deg = {3}\n"),
     "an array of TOML": each("[[plot]]\nt = {0}\nrange = {1}\naz = {2}\nel = {3}"),
     "records with units": each(RECORD + "\n"),
@@ -115,3 +123,15 @@ def test_records_of_which_one_lacks_a_pair_are_not_mixed_up(make: Make) -> None:
     log = logs.read(make(re.sub(r"range_m = .*\n", "", sections, count=1), "log.txt"))
     assert np.isnan(log.measurement[0, 0])
     np.testing.assert_allclose(log.measurement[1:, 0], R[1:], atol=1e-5)
+
+
+@pytest.mark.parametrize("rest", ["{r}", "0.00001,0.0002,-0.0003,0.00004,{r},1234"])
+@pytest.mark.parametrize("before", ["14:25:{k:02d} > %R1Q,2167:2\n14:25:{k:02d} < ", "14:25:{k:02d};"])
+def test_replies_of_a_total_station_with_a_time_of_day(make: Make, before: str, rest: str) -> None:
+    line = before + "%R1P,0,0:0,{a},{z}," + rest + "\n"
+    text = [line.format(k=k, a=a, z=np.pi / 2 - e, r=r) for k, (r, a, e) in enumerate(zip(R, A, E, strict=True))]
+    log = logs.read(make("".join(text), "log.txt"))
+    np.testing.assert_allclose(log.time_s - log.time_s[0], T, atol=1e-6)
+    np.testing.assert_allclose(log.measurement, np.column_stack([R, A, E]), atol=1e-5)
+    without = "".join(each[each.index("%R1P") :] for each in text)
+    assert "without times" in refused(make(without, "log.txt"))

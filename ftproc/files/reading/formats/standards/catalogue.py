@@ -50,6 +50,8 @@ TEXTS = (
     _of("NMEA 0183", r"^.{0,60}[$!][A-Z][A-Z0-9]{2,7},", nmea.read),
     _of("Leica GSI", r"\A\s*\*?\d\d[\d.]{4}[+-]\w{8}", gsi.read),
     _of("lines of several kinds", kinds.MARK, kinds.read),
+    _no("GeoCOM", r"\A\s*%R1[QP],", "a dialogue with a total station (GeoCOM) without times; log the time before "
+        "each reply"),
     _no("ILRS CPF", r"\A\s*[hH]1\s+CPF\b", f"a prediction of the ILRS (CPF), {_EPHEMERIS}"),
     _no("SP3", r"\A#[a-d][PV]\d{4} ", f"an SP3 file, {_EPHEMERIS}"),
     _no("CCSDS OEM", r"\A\W*CCSDS_O[EPM]M_VERS\s*=|<(?:\w+:)?o[epm]m\b", f"a CCSDS message with {_EPHEMERIS}"),

@@ -49,8 +49,8 @@ LAYOUTS = (
         "GeoCOM",
         (
             _kind(
-                r"(?P<time>\d{4}-\d\d-\d\d[T ]\S+|\d+(?:\.\d+)?)\W.*%R1P,0,\d+:0,"
-                rf"(?P<Hz>{_N}),(?P<zenith>{_N}),(?P<range>{_N})",
+                r"\W*(?P<time>\d{4}-\d\d-\d\d[T ][^\s,;<>]+|\d+:\d\d:[\d.]+|\d+(?:\.\d+)?)(?![\d.:]).*%R1P,0,\d+:0,"
+                rf"(?P<Hz>{_N}),(?P<zenith>{_N}),(?:(?:{_N},){{4}})?(?P<range>{_N})(?:,\d+)?",
                 Hz="rad",
                 zenith="rad",
                 range="m",
