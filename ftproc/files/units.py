@@ -41,6 +41,8 @@ _LENGTHS = (
         Unit("cm", divide=1e2),
         Unit("mm", divide=1e3),
         Unit("dmi", 1828.8),
+        Unit("cable", 185.2),  # a tenth of a nautical mile
+        Unit("fathom", 1.8288),
     ),
 )
 _HEIGHTS = (*_LENGTHS, Unit("fl", 30.48))  # of 100 ft
@@ -169,6 +171,21 @@ SPELLINGS: Mapping[str, tuple[str, ...]] = {
     "mi": ("mile", "miles", "smi", "sm", "statutemile", "statutemiles"),
     "yd": ("yds", "yard", "yards"),
     "dmi": ("datamile", "datamiles"),  # of 6000 ft, of radars
+    "cable": (
+        *(
+            "cables",
+            "cbl",
+            "cbls",
+            "cablelength",
+            "cablelengths",
+            "kabellänge",
+            "kabellängen",
+            "encablure",
+            "encablures",
+        ),
+        *("каб", "кабельтов", "кабельтова", "кабельтовых", "кабельтовы", "链"),
+    ),
+    "fathom": ("fathoms", "fth", "fths", "ftm", "ftms", "faden"),
     "kyd": ("kyds", "kyard", "kyards", "kiloyard", "kiloyards"),
     "cm": ("centimeter", "centimeters", "centimetre", "centimetres"),
     "mm": ("millimeter", "millimeters", "millimetre", "millimetres"),

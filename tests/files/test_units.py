@@ -19,6 +19,8 @@ ONE_IN_SI = [
     ("range", "ft", 0.3048),
     ("range", "nmi", 1852.0),
     ("range", "nm", 1852.0),
+    ("range", "cable", 185.2),
+    ("range", "fathom", 1.8288),
     ("azimuth", "rad", 1.0),
     ("azimuth", "deg", math.pi / 180),
     ("azimuth", "mrad", 1e-3),

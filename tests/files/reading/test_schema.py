@@ -170,6 +170,9 @@ def test_an_unknown_unit_in_a_name_is_not_taken_for_an_angles_only_log() -> None
     assert '"furlong" in column "range_furlong" is not a unit of range; understood are m, km, ft, nmi, nm' in sentence
     assert "--columns range=none" in sentence
     assert set(found(["time_s", "range_furlong", "azimuth_rad"], columns={"range": "none"})) == {"time", "azimuth"}
+    assert '"furlong"' in refused(["time_s", "Range [furlong]"], columns={"range": "Range [furlong]"})
+    stated = found(["time_s", "Range [furlong]"], {"range": "201.168 m"}, {"range": "Range [furlong]"})
+    assert stated["range"] == ("Range [furlong]", "201.168 m")
     assert "range=none" not in refused(["time_fortnight", "range_m"])
     assert "time=none" not in refused(["time_fortnight", "range_m"])
 

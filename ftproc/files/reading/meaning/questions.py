@@ -214,15 +214,15 @@ def _refuse_scale(source: str, apart: Sequence[Name], index: int, quantity: str)
         )
     if quantity == "range" and words & _FLIGHTS:
         unit = unit_named("time", name.unit)
-        scale = f"{LIGHT_MPS / 2 * (unit.multiply / unit.divide if unit else 1.0):.9g} m"
+        scale = f"'range={LIGHT_MPS / 2 * (unit.multiply / unit.divide if unit else 1.0):.9g} m'"
         what = f"times of flight{'' if unit else ' in a unit that its name does not state'}"
     elif quantity != "range" and words & _COUNTS and words & {each for each in ALIASES[quantity] if len(each) > 1}:
-        scale, what = "1/65536 turn", "counts of an encoder (with the number of its counts in a turn)"
+        scale, what = f"'{quantity}=1/65536 turn' (16 bits) or '{quantity}=1/131072 turn' (17)", "counts of an encoder"
     else:
         return
     raise InputError(
         f'{source}: column "{name.text}" may be the {quantity} as {what}. Say {answer(names, {quantity: index})} '
-        f"--units '{quantity}={scale}', or --columns {quantity}={ABSENT} if it is something else."
+        f"--units {scale}, or --columns {quantity}={ABSENT} if it is something else."
     )
 
 
