@@ -24,6 +24,7 @@ from ftproc.files.reading.meaning.questions import Proposal, Propose, answer, na
 from ftproc.files.reading.meaning.values import motion, plausibility
 from ftproc.files.units import UNITS, Unit
 from ftproc.files.words import NOT_UNITS, OTHER_THINGS, QUANTITIES
+from ftproc.order_statistics import median
 from ftproc.records import FloatArray
 
 if TYPE_CHECKING:
@@ -82,8 +83,11 @@ def _proposed(header: TableHeader, free: Sequence[int], found: Mapping[str, Sequ
     table = header.load([], indices).slice(0, _ROWS)
     cells = {index: table.column(k) for k, index in enumerate(indices)}
     numbers = {index: values for index, column in cells.items() if (values := _values(column, header)) is not None}
-    joined = _of_minutes(numbers)
-    seen = "; ".join(_shown(header, index, cells[index], numbers.get(index)) for index in indices[:_SHOWN])
+    joined = carried.joined(numbers)
+    rough = {index: _roughness(cells[index], numbers.get(index)) for index in indices}
+    shown = sorted(sorted(indices, key=rough.__getitem__)[:_SHOWN])
+    seen = "; ".join(_shown(header, index, cells[index], numbers.get(index)) for index in shown)
+    seen += f"; and {len(free) - len(shown)} more, which change less smoothly" if len(free) > len(shown) else ""
     cells = {index: cells[index] for index in cells if index in numbers or not {index - 1, index - 2} & {*joined}}
     times = [tuple(found["time"])] if "time" in found else list(_times(header, cells, numbers))
     if "time" not in found and found:  # only the time is sought
@@ -106,17 +110,29 @@ def _of_angles(header: TableHeader, free: Sequence[int], found: Mapping[str, Seq
     wide = [*dict.fromkeys([*(index + k for index in free for k in range(3) if index + k in indices), *known.values()])]
     cells = dict(zip(wide, header.load([], wide).slice(0, _ROWS).columns, strict=True))
     numbers = {index: values for index, column in cells.items() if (values := _values(column, header)) is not None}
-    joined = _of_minutes(numbers)
+    joined = carried.joined(numbers)
     idle = [index for index in free if not _varies(cells[index], numbers.get(index))]
     wanted = [quantity for quantity in QUANTITIES[2:] if quantity not in found]
     unnamed = [index for index in free if index in numbers and index not in idle]
+    unnamed = sorted(unnamed, key=lambda index: _bends(numbers[index]))[:_MOST_TRIED]
     if "range" not in known or len(known) < len(found) - 1 or not set(known.values()) <= set(numbers):
         return Proposal(idle=idle)
     fixed = {quantity: numbers[index] for quantity, index in known.items()}
     clock = _clock(header, tuple(found["time"]))
-    choice = _likeliest(clock, fixed, {index: numbers[index] for index in unnamed[:_MOST_TRIED]}, [wanted])
+    choice = _likeliest(clock, fixed, {index: numbers[index] for index in unnamed}, [wanted])
     columns = {quantity: choice[quantity] for quantity in wanted} if choice else {}
     return Proposal(answer(header.names, columns, "", joined), "", columns, idle)
+
+
+def _bends(values: FloatArray) -> float:
+    """How unevenly numbers go on, as a share of all that they take; those of readings do so least."""
+    known = values[np.isfinite(values)]
+    return median(np.abs(np.diff(known, 2))) / np.ptp(known) if len(known) > 2 and np.ptp(known) > 0 else math.inf
+
+
+def _roughness(column: pa.ChunkedArray, values: FloatArray | None) -> float:
+    """The same, of text too."""
+    return _bends(values) if values is not None else 0.0 if len(column.unique()) > 1 else math.inf
 
 
 def _varies(column: pa.ChunkedArray, values: FloatArray | None) -> bool:
@@ -130,19 +146,6 @@ def _says_something(name: str) -> bool:
     apart = taken_apart(name)
     of_another = apart.unit and not apart.is_in_a_unit_of("azimuth") and any(map(apart.is_in_a_unit_of, QUANTITIES))
     return _is_other(name) or bool(of_another) or bool({apart.stem, *apart.words} & NOT_UNITS)
-
-
-def _of_minutes(numbers: dict[int, FloatArray]) -> dict[int, int]:
-    """How many columns behind one of degrees hold minutes and seconds; its values become those of all."""
-    found = {}
-    for index in sorted(numbers):
-        parts = [numbers.get(index + k) for k in range(3)]
-        if count := carried.behind(parts, carried.SIXTIES) if index in numbers else 0:
-            each = [numbers.pop(index + k) if k else numbers[index] for k in range(count + 1)]
-            rest = sum(part / 60.0 ** (k + 1) for k, part in enumerate(each[1:]))
-            numbers[index] = each[0] + np.where(np.signbit(each[0]), -1, 1) * rest
-            found[index] = count
-    return found
 
 
 def _times(
@@ -187,7 +190,8 @@ def _best(
             index for index, values in numbers.items()
             if index not in time and np.ptp(values[np.isfinite(values)]) > 0 and not _is_other(header.names[index])
             and not (values[1:] == values[:-1] + 1).all()
-        ][:_MOST_TRIED]  # fmt: skip
+        ]  # fmt: skip
+        varied = sorted(varied, key=lambda index: _bends(numbers[index]))[:_MOST_TRIED]
         kinds = [QUANTITIES[1:]] if len(varied) > 2 else [QUANTITIES[1:3], QUANTITIES[2:]]
         choice = _likeliest(clock, {}, {index: numbers[index] for index in varied}, kinds)
         if choice is not None:

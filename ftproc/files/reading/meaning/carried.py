@@ -103,6 +103,19 @@ def behind(values: Sequence[FloatArray | None], bases: Sequence[float], alike: i
     return count
 
 
+def joined(numbers: dict[int, FloatArray]) -> dict[int, int]:
+    """How many columns behind one of degrees hold minutes and seconds; its values become those of all."""
+    found = {}
+    for index in sorted(numbers):
+        parts = [numbers.get(index + k) for k in range(3)]
+        if count := behind(parts, SIXTIES) if index in numbers else 0:
+            each = [numbers.pop(index + k) if k else numbers[index] for k in range(count + 1)]
+            rest = sum(part / 60.0 ** (k + 1) for k, part in enumerate(each[1:]))
+            numbers[index] = each[0] + np.where(np.signbit(each[0]), -1, 1) * rest
+            found[index] = count
+    return found
+
+
 def _carries(whole: FloatArray, rest: FloatArray) -> bool:
     """Whether the rest begins again whenever the whole steps."""
     before, after = (np.abs(np.diff(values, 2)) for values in (whole, whole + rest))

@@ -27,6 +27,8 @@ from ftproc.files.words import ALIASES, CORRECTED, GERMAN, QUANTITIES, WEAK_ALIA
 
 _OF_A_TRAJECTORY = ("row", "x_m", "vx_mps", "sigma_x_m", "outlier_range", "nis")
 
+_MOST_ALIKE = 3  # columns by a name that other things have too
+
 
 class Column(NamedTuple):
     """The column (or columns) of a quantity, its unit, and who stated the unit.
@@ -249,6 +251,8 @@ def _recognised(table: _Table, quantity: str, free: Sequence[int]) -> Column | N
     if corrected:  # or what was corrected
         fits, kinds = [fits[0], *corrected], set()
     weak = all(table.apart[index].means(quantity) == 2 for index in fits)
+    if weak and len(fits) > _MOST_ALIKE:  # v1, v2, v3, ...
+        return None
     if len(fits) > 1 and (quantity != "time" or weak or len(kinds) < len(fits)):
         raise InputError(
             f"{table.source}: columns {' and '.join(names[index] for index in fits)} could each be the {quantity}. "
