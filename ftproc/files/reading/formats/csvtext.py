@@ -40,7 +40,10 @@ def text_file(name: str, path: Path, room: limits.Room, widths: Sequence[int] = 
     if large:
         head = content.read(name, path, limit=_HEAD)
         lines = head[: head.rfind(b"\n") + 1 or len(head)]
-        if not (trimming.is_boxed(head) or _unwrapped(lines, room)[1]) and _described(lines, room, cut=True) is None:
+        if (
+            not (trimming.is_boxed(head) or _unwrapped(lines, room, cut=True)[1])
+            and _described(lines, room, cut=True) is None
+        ):
             return _large_file(name, path)
     return text_bytes(content.read(name, path), room, widths)
 
@@ -59,11 +62,12 @@ def text_bytes(data: bytes, room: limits.Room, widths: Sequence[int] = ()) -> Ta
     return TableHeader(text.source, text.names, text.load, commas, units=text.units, form=text.form, above=text.above)
 
 
-def _unwrapped(data: bytes, room: limits.Room) -> tuple[str, str]:
-    """The table that stands in another language, and the name of that; "" of other texts."""
+def _unwrapped(data: bytes, room: limits.Room, cut: bool = False) -> tuple[str, str]:
+    """The table that stands in another language, and the name of that; "" of other texts. cut: `data` is only the
+    beginning."""
     if _plain(data[:_HEAD]) is not None:
         return "", ""
-    return wrapped.unwrapped(encoding.as_utf8(room.name, data).data.decode("utf-8", "replace"), room)
+    return wrapped.unwrapped(encoding.as_utf8(room.name, data, cut).data.decode("utf-8", "replace"), room)
 
 
 def _described(data: bytes, room: limits.Room, cut: bool = False) -> TableHeader | None:

@@ -11,7 +11,7 @@ from ftproc.files.limits import Room
 from ftproc.files.reading.formats import content, documents
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.formats.standards import asterix, crd, gsi, kinds, markup, meteors, nmea, tdm
-from ftproc.files.reading.formats.texts import tagged
+from ftproc.files.reading.formats.texts import tagged, templated
 
 _HEAD = 1 << 16  # bytes in which a format is recognised
 
@@ -81,6 +81,7 @@ TEXTS = (
     _of("XML", r"\A\s*<(?:\?xml\b|[A-Za-z][\w:.-]*[\s>])", markup.read),
     _of("rows in brackets", r"\A\s*\[\s*\[", documents.nested_rows),
     _of("names and values", r"[=:]\s*[\"']?[+-]?\.?\d", tagged.pairs),
+    _of("numbers among words", r"^(?=.{0,200}[^\W\d][^\W\d]).{0,200}\s[+-]?\.?\d", templated.read),
 )  # fmt: skip
 
 

@@ -25,7 +25,7 @@ _VALUE = (
     r"|(?>[^\s,;{}=:\"'|]+)(?!\s*[=:]))"
 )
 _PAIR = re.compile(rf"(?<![\w.]){_NAME}\s*[=:]\s*{_VALUE}")
-_LEADING = re.compile(rf"\W*(?:[A-Z][a-z]{{2}} +\d{{1,2}} +)?({_STAMP}|\d+\.\d+)(?=[\s,;|\])])")  # Jun  3 of syslog
+_LEADING = re.compile(rf"\W*(?:[A-Z][a-z]{{2}} +\d{{1,2}} +)?({_STAMP}|\d+\.\d+)(?=[\s,;|\])]|:\s)")  # Jun  3 of syslog
 _TRAILING = re.compile(r"\s(\d{10,19})\s*$")  # since 1970, at the end of a point of a database
 _COUNTED = re.compile(r"[+-]?\d+[iu]")  # whole numbers there
 #: Between records of one pair to a line: a rule; before an item of a list, as in YAML, a section, or a message of
