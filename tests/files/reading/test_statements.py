@@ -113,3 +113,11 @@ def test_the_worth_of_a_count_above_the_table_is_asked_about(make: Make, line: s
     units = dict(pair.split("=") for pair in say.removeprefix("--units ").strip("'").split(","))
     log = logs.read(path, units={"range": "m", "azimuth": "cdeg", "elevation": "cdeg"} | units)
     assert log.understood["columns"][next(iter(units))]["unit"] == next(iter(units.values()))
+
+
+@pytest.mark.parametrize(
+    "line", ["250 counts recorded in 60 s", "radar range scale 24 NM", "scale 1 m", "Counts: see page 3"]
+)
+def test_other_lines_with_counts_and_scales_say_nothing(make: Make, line: str) -> None:
+    rows = "".join(f"{k / 2},{50000 + 7 * k},{20 + k / 8},{10 + k / 16}\n" for k in range(30))
+    assert len(logs.read(make(f"# {line}\ntime,range,az_deg,el_deg\n{rows}"), units="range=m")) == 30

@@ -29,8 +29,14 @@ _CONVENTIONS = (
 )  # fmt: skip
 
 #: Words of lines that say what one count is worth; the worth of one, or of many.
-_OF_COUNTS = re.compile(r"\b(?:lsbs?|scal(?:e|ed|ing)|counts?|ticks?)\b", re.IGNORECASE)
-_MANY = re.compile(r"\b(?P<many>\d+)\s*(?:counts?|ticks?|lsbs?)\b.*?\b(?P<number>[\d.]*)\s*(?P<unit>°|[^\W\d]\w*$)")
+_OF_COUNTS = re.compile(
+    r"\b(?:lsbs?|scal(?:e factor|ed|ing)|counts?|ticks?)\b|\bscale\b(?=\D{0,20}0?\.\d)", re.IGNORECASE
+)
+_MANY = re.compile(
+    r"\b(?P<many>\d+)\s*(?:counts?|ticks?|lsbs?)\s*(?:=|:|per\b|is\b|are\b|make\b|to\b|in\s+(?=an?\b|one\b))\s*"
+    r"(?:an?\s+|one\s+)?(?P<number>[\d.]*)\s*(?P<unit>°|[^\W\d]\w*)",
+    re.IGNORECASE,
+)
 _ONE = re.compile(r"(?<![\w.])(?P<worth>\.?\d[\d.eE/^*+-]*\s*(?:[^\W\d]\w*|°))(?!\s*[=:])")
 _LONGEST_LINE = 300  # characters
 
@@ -114,6 +120,8 @@ def _worth(line: str) -> str:
         return ""
     if (many := _MANY.search(line)) and int(many["many"]) > 1:
         return f"{many['number'] or 1}/{many['many']} {many['unit']}"
+    if re.search(r"\b(?!1\b)\d+\s*(?:counts?|ticks?)\b", line):  # how many there are
+        return ""
     each = (one["worth"] for one in _ONE.finditer(_OF_COUNTS.sub("", line)))
     return next((worth for worth in each if any(unit_named(q, worth) for q in QUANTITIES)), "")
 

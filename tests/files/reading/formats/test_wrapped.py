@@ -47,6 +47,12 @@ TEXTS = {
     "SQL of PostgreSQL": below(
         f"SET x = 0;\nCOPY public.plots ({', '.join(NAMES)}) FROM stdin;", "{0}\t{1}\t{2}\t{3}", "\\.\n\nSELECT 1;\n"
     ),
+    "SQL of two tables": "INSERT INTO site VALUES (1,'X');\n"
+    + each(f"INSERT INTO plots ({', '.join(NAMES)}) VALUES ({{0}}, {{1}}, {{2}}, {{3}});"),
+    "SQL of Microsoft": each(
+        "INSERT [dbo].[plots] ([time_s], [range_m], [az_deg], [el_deg]) "
+        "VALUES (CAST({0} AS Decimal(10, 2)), {1}, N'{2}', {3})"
+    ),
     "LaTeX": below(
         f"\\begin{{tabular}}{{r@{{ }}r|rr}}\n\\toprule\n{' & '.join(NAMES)} \\\\\n\\midrule",
         "{0} & ${1}$ & {2} & {3} \\\\ \\hline", "\\bottomrule\n\\end{tabular}\n",
@@ -55,13 +61,17 @@ TEXTS = {
     "rows of a matrix": below(f"# {', '.join(NAMES)}\nz = np.array([", "    [{0}, {1}, {2}, {3}],", "])\n"),
     "a drawn table": below(f"{BOX}│ {' │ '.join(NAMES)} │\n╞══╪══╪══╪══╡", "│ {0} │ {1} │ {2} │ {3} │", "└──┴──┘\n"),
     "a table of a wiki": below(f"||{'||'.join(NAMES)}||", "|{0}|{1}|{2}|{3}|"),
+    "a table of MediaWiki": below(
+        f"{{| class='wikitable'\n! {' !! '.join(NAMES)}", "|-\n| {0} || {1} || {2} || {3}", "|}\n"
+    ),
+    "tuples of a program": below(f"# {', '.join(NAMES)}\ndata = [", "    ({0}, {1}, {2}, {3}),", "]\n"),
     "rules above and below": below(f"==== ====\n{' '.join(NAMES)}\n==== ====", "{0} {1} {2} {3}", "==== ====\n"),
     "a line for each column": across(","),
     "vectors of a program": across(" ", "{name} = [{cells}];"),
     "columns of a program": across("; ", "{name} = [{cells}]"),
     "units in cells": re.sub(r"_(s|m|deg),", r",\1,", across(",")),
     "a row for each quantity": below(
-        "time_s,name,value", "{0},range_m,{1}\n{0},az_deg,{2}\n{0},el_deg,{3}",
+        "time_s,name,value,quality", "{0},range_m,{1},1\n{0},az_deg,{2},2\n{0},el_deg,{3},3",
     ),
     "a row for each quantity and unit": "t;quantity;value;unit\n" + "".join(
         f"{t};{name};{cell};{unit}\n" for name, unit, cells in zip(
@@ -102,6 +112,8 @@ def test_what_is_left_of_other_languages_is_refused(make: Make) -> None:
         lambda n: "INSERT INTO a VALUES " + "(" * n,
         lambda n: "CREATE TABLE (" * (n // 8) + "\nINSERT INTO a VALUES (1)",
         lambda n: "a=[\n" * n,
+        lambda n: "a=[\n1" * n,
+        lambda n: "CAST(" * n + "\nINSERT INTO a VALUES (1)",
         lambda n: "<tr>" * n + "<td>" + "<" * n,
         lambda n: "<tr><td>" * n,
         lambda n: "\\begin{tabular}{" + "{" * n,

@@ -11,6 +11,7 @@ from ftproc.errors import InputError
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning.names import taken_apart
 from ftproc.files.reading.meaning.numbers import as_text, parsed
+from ftproc.files.reading.meaning.several import numbers_targets
 from ftproc.files.units import unit_named
 from ftproc.files.words import QUANTITIES
 
@@ -37,6 +38,8 @@ def upright(header: TableHeader) -> TableHeader:
         return header
     unit = next((k for k, column in enumerate(cells) if k != which and _are_units(column)), None)
     keys = [k for k in range(len(cells)) if k not in (which, unit, called[0])]
+    times = [k for k in keys if taken_apart(header.names[k]).means("time") or numbers_targets(header.names[k])]
+    keys = times or keys  # what else differs by the quantity, such as its quality, is left out
     found = _columns([column.to_pylist() for column in cells], which, called[0], unit, keys)
     return header if found is None else _with(header, keys, found)
 

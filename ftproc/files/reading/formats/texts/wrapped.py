@@ -18,7 +18,9 @@ _TUPLE = re.compile(r"\(((?:'(?:[^']|'')*+'|[^()'])*+)\)")
 _COLUMN = re.compile(r"\s*[`\"\[]?(?P<name>\w+)")
 _NO_COLUMNS = ("primary", "key", "constraint", "unique", "index", "foreign", "check")
 _TABULAR = r"\\(?:begin|end)\{(?:tabular|longtable|array)\*?\}(?:\[[^\[\]]*\])?(?:\{(?:[^{}]|\{[^{}]*\})*+\})?"
-_MATRIX = re.compile(r"(?m)^[ \t]*\w+[ \t]*=[ \t]*(?:np\.array\()?\[[ \t]*(?:%.*)?\n")
+_MATRIX = re.compile(r"(?m)^[^\n=#%]{1,80}=[ \t]*(?:np\.array\()?[\[({][ \t]*(?:%.*)?\n(?=[ \t]*[\[({]?[ \t]*[-+.\d])")
+_CLOSING = re.compile(r"[\])}]")
+_ITS_END = re.compile(r"(?m)^[ \t]*[\])}]|[\])}][ \t]*[\])}]")
 #: The beginning of a line that is a column: its name, perhaps its unit in a cell of its own, before its first number.
 _NAMED_LINE = re.compile(
     r"[ \t]{0,20}[\"']?(?P<name>[^\W\d][^=:\[\],;\t|]{0,60}?(?:[(\[][^)\]]{1,20}[)\]])?)[\"']?[ \t]{0,20}"
@@ -72,21 +74,21 @@ def _sql(text: str) -> str:
     if copied:
         rows = text[copied.end() :].partition("\\.")[0]
         return _lines([re.split(r"\s*,\s*", copied[1])]) + rows
-    before, *inserts = re.split(r"(?i)\bINSERT\s+INTO\s+", text)
-    tables, rows_of, names = set[str](), list[list[str]](), list[str]()
+    plain = re.sub(r"(?i)\bCAST\(([^()]{0,80}?)\s+AS\s+\w+(?:\([^()]{0,20}\))?\)", r"\1", re.sub(r"\bN'", "'", text))
+    before, *inserts = re.split(r"(?i)\bINSERT\s+(?:INTO\s+|(?=\[))", plain)
+    created = re.search(r"(?is)\bCREATE\s+TABLE\b[^(]*\((.*?)\)[^,()]*;", before[-_HEAD // 4 :])
+    found = (_COLUMN.match(part) for part in re.split(r",(?![^(]*\))", created[1] if created else ""))
+    names_of_created = [each["name"] for each in found if each and each["name"].lower() not in _NO_COLUMNS]
+    tables: dict[str, tuple[list[str], list[list[str]]]] = {}
     for insert in inserts:
         head, _, values = re.sub(r"(?i)\bVALUES\b", "\0", insert, count=1).partition("\0")
         table, _, columns = head.partition("(")
-        tables.add(table.strip())
-        names = names or re.findall(r"\w+", columns)
+        names, rows_of = tables.setdefault(table.strip(), (re.findall(r"\w+", columns) or names_of_created, []))
         rows_of += csv.reader(_TUPLE.findall(values), quotechar="'", skipinitialspace=True)
-    created = re.search(r"(?is)\bCREATE\s+TABLE\b[^(]*\((.*?)\)[^,()]*;", before[-_HEAD // 4 :])
-    if not names and created:
-        found = (_COLUMN.match(part) for part in re.split(r",(?![^(]*\))", created[1]))
-        names = [each["name"] for each in found if each and each["name"].lower() not in _NO_COLUMNS]
-    widths = {len(row) for row in rows_of}
-    if len(tables) != 1 or len(widths) != 1:
+    filled = [each for each in tables.values() if len(tables) == 1 or is_log(each[0], {})]
+    if len(filled) != 1 or len(widths := {len(row) for row in filled[0][1]}) != 1:
         return ""
+    names, rows_of = filled[0]
     return _lines([*([names] if {len(names)} == widths else []), *rows_of])
 
 
@@ -103,17 +105,16 @@ def _matrix(text: str) -> str:
     found = _MATRIX.search(text)
     if found is None:
         return ""
-    end = text.find("]", found.end())
-    if "[" in text[found.end() : end]:  # each row in brackets too
-        closed = re.compile(r"(?m)^[ \t]*\]|\][ \t]*\]").search(text, found.end())
-        end = closed.start() if closed else -1
-    rows = re.sub(r"(?m)[ \t]*(?:;|\.\.\.|\],?)[ \t]*$|^[ \t]*\[", "", text[found.end() : end])
+    nested = text[found.end() :].lstrip()[:1] in "[({"  # each row in brackets too
+    closed = (_ITS_END if nested else _CLOSING).search(text, found.end())
+    end = closed.start() if closed else -1
+    rows = re.sub(r"(?m)[ \t]*[\])}]?[ \t]*(?:;|\.\.\.|,)?[ \t]*$|^[ \t]*[\[({]", "", text[found.end() : end])
     return text[: found.start()] + rows + "\n" if end > 0 else ""
 
 
 def _across(text: str) -> str:
     """Lines of which each is a column: a name before its cells."""
-    lines = [line for line in text.splitlines() if line.strip()]
+    lines = [line for line in text.splitlines() if line.strip() and line[0] not in "#%"]
     if not 2 <= len(lines) <= _MOST_ACROSS:
         return ""
     starts = itertools.takewhile(bool, (_NAMED_LINE.match(line[:_LONGEST_START]) for line in lines))
@@ -140,18 +141,28 @@ def _of_a_wiki(text: str) -> str:
     return re.sub(r"(?m)^\|\|(.*)\|\|[ \t]*$", lambda line: f"|{line[1].replace('||', '|')}|", text)
 
 
+def _of_mediawiki(text: str) -> str:
+    rows = [
+        line for line in map(str.strip, text.splitlines()) if line[:1] in ("!", "|") and line[:2] not in ("|-", "|}")
+    ]
+    return _lines(re.split(r"\|\||!!", line.lstrip("!|")) for line in rows)
+
+
 def _language(name: str, mark: str, plain: Callable[[str], str]) -> Language:
     return Language(name, re.compile(mark, re.MULTILINE | re.IGNORECASE), plain)
 
 
 LANGUAGES = (
     _language("HTML", r"<tr\b[^<>]*>\s*<t[dh]\b", _html),
-    _language("SQL", r"^[ \t]*INSERT\s+INTO\s|^COPY\s.*FROM\s+stdin", _sql),
+    _language("SQL", r"^[ \t]*INSERT\s+(?:INTO\s|\[)|^COPY\s.*FROM\s+stdin", _sql),
     _language("LaTeX", r"\\begin\{(?:tabular|longtable|array)", _latex),
-    _language("a matrix", r"^[ \t]*\w+[ \t]*=[ \t]*(?:np\.array\()?\[[ \t]*(?:%.*)?$", _matrix),
+    _language("a matrix", _MATRIX.pattern, _matrix),
     _language("a drawn table", r"^[ \t]*[│┃║┌╒╔╭┏]", _boxed),
     _language("a table of a wiki", r"^\|\|.*\|\|[ \t]*$", _of_a_wiki),
+    _language("a table of MediaWiki", r"^\{\|.*$", _of_mediawiki),
     _language(
-        "a line for each column", r"\A[ \t]{0,20}[\"']?[^\W\d].{0,60}?[=:,;\t|\[ ][ \t]{0,20}[-+.\d].{8}", _across
+        "a line for each column",
+        r"\A(?:[#%].*\n)*[ \t]{0,20}[\"']?[^\W\d].{0,60}?[=:,;\t|\[ ][ \t]{0,20}[-+.\d].{8}",
+        _across,
     ),
 )
