@@ -8,11 +8,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ftproc.errors import InputError
+from ftproc.errors import InputError, quoted
 from ftproc.files.reading.formats.header import TableHeader
 from ftproc.files.reading.meaning import parts
 from ftproc.files.reading.meaning.names import Name, taken_apart
 from ftproc.files.reading.meaning.numbers import as_text, parsed
+from ftproc.files.reading.meaning.schema import Column
 from ftproc.files.units import Unit, unit_named
 from ftproc.files.words import QUANTITIES
 from ftproc.records import FloatArray
@@ -21,6 +22,7 @@ WHY = "its columns carry over into each other"
 SIXTIES = (60.0, 60.0)  # minutes to a degree, seconds to a minute
 _SMOOTHER = 0.3  # of the bends of the first column are left, where the second carries over into it
 _MOST_OF_ONE = 0.75  # of what makes one of the first column does the second reach
+_MOST = 0.5  # of the cells
 _FEWEST = 2  # rows at which the first one bends
 
 
@@ -101,6 +103,22 @@ def behind(values: Sequence[FloatArray | None], bases: Sequence[float], alike: i
             break
         count += 1
     return count
+
+
+def refuse_others(source: str, described: Column, degrees: FloatArray, minutes: FloatArray) -> None:
+    """Ask where most degrees have decimals, or most minutes are beyond 60, so that one column may be another thing,
+    unless the user names both."""
+    first, second, *_ = described.name.split(" + ")
+    quantity = described.quantity
+    part = np.count_nonzero(np.isfinite(degrees) & (degrees % 1 != 0)) > _MOST * np.count_nonzero(np.isfinite(degrees))
+    beyond = np.count_nonzero((minutes < 0) | (minutes > SIXTIES[0])) > _MOST * np.count_nonzero(np.isfinite(minutes))
+    if (part or beyond) and described.why != "--columns":
+        why = f'"{first}" has decimals' if part else f'"{second}" is beyond 60'
+        alone, both = (quoted(f"{quantity}={named}") for named in (first, f"{first}+{second}"))
+        raise InputError(
+            f'{source}: the names say that "{first}" and "{second}" are degrees and minutes, but {why}. Say --columns '
+            f"{alone} if it is the {quantity} alone, or --columns {both}."
+        )
 
 
 def joined(numbers: dict[int, FloatArray]) -> dict[int, int]:

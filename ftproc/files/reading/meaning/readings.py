@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ftproc.files import arrow
+from ftproc.files.reading.meaning import carried
 from ftproc.files.reading.meaning.numbers import (
     Origin,
     as_text,
@@ -76,6 +77,7 @@ def read(columns: Sequence[pa.ChunkedArray], origin: Origin, described: Column) 
         return _summed([numbers(column, origin) for column in columns], described)
     if len(columns) > 1:
         degrees, minutes, *seconds = (numbers(column, origin) for column in columns)
+        carried.refuse_others(origin.source, described, degrees, minutes)
         sign = np.where(np.signbit(degrees), -1.0, 1.0)
         rest = seconds[0] if seconds else np.zeros(len(minutes))
         return Readings(_joined(sign, np.abs(degrees), minutes, rest), _in_degrees(described))

@@ -80,3 +80,12 @@ def test_the_elevation_is_written_as_the_azimuth(make: Make) -> None:
     level = np.radians(7.2 + 0.001 * T)  # no minute of which shows anything
     log = logs.read(make("t,range,AZ,,EL,\n" + rows(T, R, *parts(A % (2 * np.pi), 2), *parts(level, 2))))
     np.testing.assert_allclose(log.measurement[:, 2], level, atol=1e-6)
+
+
+def test_a_minimum_beside_degrees_is_no_minutes(make: Make) -> None:
+    azimuth = A * DEG % 360
+    path = make("t_s,range_m,az_deg,az_min,el_deg\n" + rows(T, R, azimuth, azimuth - 1.5, E * DEG))
+    assert '"az_deg" has decimals. Say --columns azimuth=az_deg if' in refused(path)
+    np.testing.assert_allclose(np.degrees(logs.read(path, columns="azimuth=az_deg").measurement[:, 1]) % 360, azimuth)
+    path = make("t_s,range_m,az_deg,az_min,el_deg\n" + rows(T, R, np.round(azimuth), azimuth - 190, E * DEG))
+    assert '"az_min" is beyond 60' in refused(path)
