@@ -223,7 +223,8 @@ def _motion(fused: Fused) -> dict[str, Any]:
     rows = dict[str, int]()
     for motion, there in fused.motions:
         rows[motion.name] = rows.get(motion.name, 0) + there
-    return statistics.motion(rows, sum(motion.gain for motion, _ in fused.motions))
+    abrupt_s = [each for motion, _ in fused.motions for each in motion.abrupt_s]
+    return statistics.motion(rows, sum(motion.gain for motion, _ in fused.motions), abrupt_s)
 
 
 def _impact(fused: Fused, last_s: float, site: Geodetic | None) -> dict[str, Any]:

@@ -79,15 +79,15 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     again = preparing.re_initialized(edited.starts)
     over = _bridged(log, model, edited.starts, settings.jerk_psd_m2ps5 is not None)
     label = preparing.labels(np.where(over.read, 0.0, over.log.weight), log.measurement)
-    others, edited = edited.others, edited._replace(log=over.log, model=over.model, starts=over.starts)
 
-    def chosen(names: tuple[str, ...]) -> Chosen:
-        found = motion_models.choose(over.log, over.starts, over.model, names, specified)
+    def chosen(names: tuple[str, ...], white: Model) -> Chosen:
+        found = motion_models.choose(over.log, over.starts, white, names, specified)
         return found if channel is None or channel.used is None else found.with_beside(channel.used)
 
     wanted = PATHS if settings.smooth else STATES  # cheap, proves the correction, and says what could be had
-    motion = chosen(names)
-    white = chosen((motion_models.WHITE,)) if motion_models.WHITE in names else motion
+    motion = chosen(names, over.model)
+    others, edited = edited.others, edited._replace(log=over.log, model=motion.white, starts=over.starts)
+    white = chosen((motion_models.WHITE,), motion.white) if motion_models.WHITE in names else motion
     motion, (run, smoothed, left) = _followed(motion, white, wanted)
     for other in _as_likely(edited, known, run):
         filtered, other_smoothed, _ = _with_motion(motion, other, wanted)
@@ -176,7 +176,7 @@ def _as_likely(edited: two_pass.Edited, known: two_pass.Known, run: FilterRun) -
     decision, free = edited.decision, np.isnan(known.sigma)
     slowest = decision.slowest if decision.alternative is None else decision.alternative.slowest
     most = likelihood.most_noise(edited.log, edited.model, edited.starts, np.where(free, run.innovation_sigma, 0.0))
-    yield from (other for other in (slowest, most) if other is not None)
+    yield from (other._replace(jolts=edited.model.jolts) for other in (slowest, most) if other is not None)
 
 
 def _elsewhere(edited: two_pass.Edited, others: Sequence[Observations], fixed: bool) -> Iterator[FloatArray]:

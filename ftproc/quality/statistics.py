@@ -49,7 +49,7 @@ class RunStatistics:
         self.sigmas: list[FloatArray] = []
         self.jerk: list[FloatArray] = []
         self.motions: dict[str, int] = {}
-        self.motion_gain = 0.0
+        self.motion_gain, self.abrupt_s = 0.0, list[float]()
         self.acceleration = 0.0  # m/s2, that the target had at least
         self.last: Start | None = None
         self.lowest_m = np.inf  # of the heights, with their 1-sigma
@@ -102,6 +102,7 @@ class RunStatistics:
             name = estimate.motion.name
             self.motions[name] = self.motions.get(name, 0) + len(time_s)
             self.motion_gain += estimate.motion.gain
+            self.abrupt_s += [each for each in estimate.motion.abrupt_s() if time_s[0] <= each <= time_s[-1]]
         self.reacquired += len(estimate.reacquired)
         if estimate.settled is not None:
             self.converged = estimate.settled and self.converged is not False
@@ -214,7 +215,7 @@ class RunStatistics:
             **({} if self.height is None else self.height.figures()),
             "average_gradient": self._average_gradient(),
             "jerk_psd_m2ps5": jerk if np.isfinite(psd).all() else None,
-            **motion(self.motions, self.motion_gain),
+            **motion(self.motions, self.motion_gain, self.abrupt_s),
             "acceleration_at_least_mps2": self.acceleration,
             "left_behind": self.left_behind,
             "nis_mean": self.nis_sum / self.nis_count if self.nis_count else None,
@@ -251,12 +252,12 @@ class RunStatistics:
         return {name: intervals for name, intervals in found.items() if intervals}
 
 
-def motion(rows: Mapping[str, int], gain: float) -> dict[str, Any]:
+def motion(rows: Mapping[str, int], gain: float, abrupt_s: list[float]) -> dict[str, Any]:
     """The model of motion of most rows, of a method that chooses one; the share of these rows; and by how much more
-    likely the readings are with what was chosen than with white jerk, or with the best rival than with white jerk.
-    rows: of each model by name."""
+    likely the readings are with what was chosen than with white jerk, or with the best rival than with white jerk; and
+    the times of abrupt changes of the acceleration. rows: of each model by name."""
     if not rows:
         return {"motion": None}
     name = max(rows, key=lambda each: rows[each])
     share = rows[name] / sum(rows.values())
-    return {"motion": name.replace("-", " "), "motion_share": share, "motion_gain": gain}
+    return {"motion": name.replace("-", " "), "motion_share": share, "motion_gain": gain, "abrupt_changes_s": abrupt_s}

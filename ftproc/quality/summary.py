@@ -99,6 +99,9 @@ def facts(s: Mapping[str, Any]) -> list[tuple[str, str]]:
 def motion(s: Mapping[str, Any]) -> str:
     """The model of motion, and how much more likely than white jerk it, or its best rival, is."""
     some = "" if s["motion_share"] == 1 else f" in {100 * s['motion_share']:.0f} % of the rows"
+    if s.get("abrupt_changes_s"):
+        moments = Moments.of_summary(s)
+        some += ", which changes abruptly at " + verdict.listed([moments.words(each) for each in s["abrupt_changes_s"]])
     if s["motion_gain"] == 0:
         return f"{s['motion']}{some}"
     rival = "white jerk" if s["motion"] != "white jerk" else "any other motion"

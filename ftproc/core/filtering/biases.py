@@ -286,7 +286,7 @@ def smooth_biased(log: Observations, model: Model, start: Start, directions: Dir
         profile.beside, np.zeros((kinds * rows, m)),
     )  # fmt: skip
     memory.back["paths"] = 1.0
-    jerk = np.zeros((len(model.jerk), 2, 3))
+    jerk = np.zeros((len(profile.jerk), 2, 3))
     likelihood = _sweep_biased(Span(first, n, first), samples, profile, memory, jerk, STATES)
     covariance = memory.back["cov"][0] + memory.state @ memory.state.T
     head = Start(first, memory.back["state"][0, :9].copy(), covariance)

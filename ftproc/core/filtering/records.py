@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ftproc.core.compiled import empty, kernel, record, zeros
 from ftproc.core.filtering import beside as layout
 from ftproc.core.filtering.filters import COLOURED, FILTER
-from ftproc.core.model.motion import WHITE_JERK, Motion, Profile
+from ftproc.core.model.motion import NO_JOLTS, WHITE_JERK, Jolts, Motion, Profile
 from ftproc.core.signatures import Layout, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
@@ -205,7 +205,7 @@ class Model(NamedTuple):
     noise_variance: (3,) of white noise, m^2, rad^2, rad^2, or (stations, 3). jerk: (m, 3) density of the jerk along x,
     y and z, m^2/s^5, each row holding for `knot_s` seconds from the first sample on. markov_variance, tau_s: (3,) of
     the noise that is correlated in time (first-order Gauss-Markov), which adds to the white; zero for none. motion:
-    what moves the target beside its jerk, whose densities are then along the path, across it, and upward.
+    what moves the target beside its jerk, whose densities are then along the path, across it, and upward; and jolts.
     """
 
     noise_variance: FloatArray
@@ -214,6 +214,7 @@ class Model(NamedTuple):
     markov_variance: FloatArray = np.zeros(3)
     tau_s: FloatArray = np.ones(3)
     motion: Motion = WHITE_JERK
+    jolts: Jolts = NO_JOLTS
 
     @property
     def coloured(self) -> bool:
@@ -232,8 +233,7 @@ class Model(NamedTuple):
     @property
     def reading_variance(self) -> FloatArray:
         """(3,) variance of the noise of a single reading."""
-        variance: FloatArray = self.noise_variance + self.markov_variance
-        return variance
+        return np.asarray(self.noise_variance + self.markov_variance)
 
     def correlation(self, interval_s: float) -> FloatArray:
         """(3,) of the noise of readings that are so far apart."""
@@ -242,7 +242,7 @@ class Model(NamedTuple):
 
     def profile(self, time_s: FloatArray) -> Profile:
         """The process noise of a log with these times."""
-        return Profile(self.jerk, self.knot_s, float(time_s[0]), self.motion)
+        return self.jolts.into(Profile(self.jerk, self.knot_s, float(time_s[0]), self.motion), time_s)
 
     def profile_of(self, log: Observations) -> Profile:
         """The same with what the log has beside its readings."""

@@ -230,7 +230,7 @@ def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) ->
     sweep = _sweep_coloured if model.coloured else _sweep
     estimates = empty(ESTIMATED, n if wanted == STATES else 0)
     residuals = scratch(LEFT, n if wanted >= RESIDUALS else 0)
-    (noise, markov), tau, jerk = np.zeros((2, 2, 3)), np.zeros(3), np.zeros((len(model.jerk), 2, 3))
+    (noise, markov), tau, jerk = np.zeros((2, 2, 3)), np.zeros(3), np.zeros((len(profile.jerk), 2, 3))
     likelihood, found = 0.0, list[Start]()
     for start, stop in between(starts, n):
         memory = memory_of(stop - start.sample, model.filter(start), estimates, residuals)
@@ -243,6 +243,7 @@ def _swept(log: Observations, model: Model, starts: list[Start], wanted: int) ->
             back, p = memory.back[0], memory.after["p"][0]
             covariance = back["cov"] if wanted == STATES else heads.smoothed_covariance(p, back["n_first"])
             found.append(Start(start.sample, back["state"][:9].copy(), covariance[:9, :9].copy()))
+    jerk = jerk[: len(model.jerk)]
     slopes = (Slope(*noise), Slope(*markov), tau, Slope(jerk[:, 0] * model.jerk, jerk[:, 1] * model.jerk))
     return _Swept(Scores(likelihood, *slopes), estimates, residuals, tuple(found), profile.beside)
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Scalars, Start, Uneven
 from ftproc.core.filtering.smoother import SmootherRun, likelihood_of, smooth_log
-from ftproc.core.identification import decimation, orbits
-from ftproc.core.identification.profile import ALLOWANCE, climbed, median_level, with_allowance
+from ftproc.core.identification import decimation, jolts, orbits
+from ftproc.core.identification.profile import ALLOWANCE, climbed, median_level, roughness, with_allowance
 from ftproc.core.identification.scales import Scales, scales_of
 from ftproc.core.model.forces import AT_REST_MPS, GRAVITY
 from ftproc.core.model.motion import WHITE_JERK, Motion
@@ -45,7 +45,8 @@ class Chosen(NamedTuple):
     """The motion of a log.
 
     name: in MODELS. model: with the profile that was fitted, and, of an orbit, the noise. gain: by how much more likely
-    the log is than with white jerk, in log-likelihood. log, starts: those to run over, with steps in the gaps. row:
+    the log is than with white jerk, in log-likelihood. log, starts: those to run over, with steps in the gaps. white:
+    the model with white jerk from which it was fitted. row:
     (n,) where the log's own samples are among these. rival: another motion that explains the log about as well.
     """
 
@@ -54,6 +55,7 @@ class Chosen(NamedTuple):
     gain: float
     log: Observations
     starts: list[Start]
+    white: Model
     row: IntArray | None = None
     rival: Chosen | None = None
 
@@ -66,6 +68,14 @@ class Chosen(NamedTuple):
         spread = scalars if self.row is None else scalars.spread(self.row, len(self.log.time_s))
         rival = None if self.rival is None else self.rival.with_beside(scalars)
         return self._replace(log=self.log._replace(beside=(spread,)), rival=rival)
+
+    def abrupt_s(self) -> list[float]:
+        """The times of the abrupt changes of the acceleration."""
+        return self.model.jolts.changes_s(self.model.knot_s)
+
+    def log_probability(self) -> float:
+        """Of the readings and of the jerk profile."""
+        return likelihood_of(self.log, self.model, self.starts) - roughness(self.model)
 
     def of_rows(self, run: Run) -> Run:
         """A run over the log with its steps, of the log's own samples."""
@@ -83,17 +93,28 @@ def of_rows(run: Run, row: IntArray | None) -> Run:
 def choose(
     log: Observations, starts: list[Start], white: Model, names: tuple[str, ...], known: NDArray[np.bool_] = NOTHING
 ) -> Chosen:
-    """The likeliest motion of a log of these names. white: the model with white jerk, whose profile has its allowance.
-    known: (3,) which noise the user has specified.
+    """The likeliest motion of a log of these names, with abrupt changes where it tells some. white: the model with
+    white jerk, whose profile has its allowance. known: (3,) which noise the user has specified.
 
-    A single name is taken without asking how likely it is.
+    A single name is taken without asking how likely it is; of white jerk, without abrupt changes.
     """
+    if not [name for name in names if name != WHITE]:
+        return Chosen(WHITE, white, 0.0, log, starts, white)
+    found = _chosen(log, starts, white, names, known)
+    with_changes = jolts.told(log, starts, white)
+    if with_changes is None:
+        return found
+    other = _chosen(log, starts, with_changes, names, known)
+    return other if other.log_probability() > found.log_probability() + jolts.SURE else found
+
+
+def _chosen(
+    log: Observations, starts: list[Start], white: Model, names: tuple[str, ...], known: NDArray[np.bool_]
+) -> Chosen:
     others = [name for name in names if name != WHITE]
-    if not others:
-        return Chosen(WHITE, white, 0.0, log, starts)
     fitted, short, course = _fitted(log, starts, white, others, known)
     best = max(fitted, key=lambda each: _finite(each.gain))
-    other = Chosen(WHITE, white, best.gain, log, starts)
+    other = Chosen(WHITE, white, best.gain, log, starts, white)
     if best.gain > MARGIN or WHITE not in names:
         found = _about_its_track(best, log, short, course, white)
         return found._replace(rival=other if WHITE in names and best.gain < CLOSE else None)
@@ -128,7 +149,7 @@ def _fitted(
             )
         else:
             model, likelihood = (_unsteered if motion.pressed else _steered)(short, begin)
-        found.append(Chosen(name, model, likelihood - base, dense, own, row))
+        found.append(Chosen(name, model, likelihood - base, dense, own, white, row))
     return found, short.log, course
 
 

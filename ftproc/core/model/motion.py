@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.compiled import part
-from ftproc.core.signatures import Cube, Matrix
+from ftproc.core.signatures import Cube, Matrix, Vector
 
 FloatArray = NDArray[np.float64]
 
@@ -75,21 +75,61 @@ WHITE_JERK = Motion()
 
 class Profile(NamedTuple):
     """The process noise of a log: jerk (m, 3) densities along x, y and z, each row holding for knot_s
-    seconds from first_s on; the motion that it drives; and the scalars (kinds, n, ...) that its samples
-    have beside their readings, of no kind if they have none, see `filtering.beside`."""
+    seconds from first_s on, but the last rows, one for each time of jolt_s (j,), only up to the sample of that time;
+    the motion that it drives; and the scalars (kinds, n, ...) that its samples have beside their readings, of no kind
+    if they have none, see `filtering.beside`."""
 
     jerk: Matrix
     knot_s: float
     first_s: float
     motion: Motion = WHITE_JERK
     beside: Cube = np.zeros((0, 0, 32))
+    jolt_s: Vector = np.zeros(0)
+
+
+class Jolts(NamedTuple):
+    """Abrupt changes of the acceleration: time_s (j,), in order, before which a sample is the first one after it, and
+    the variance (j,) m^2/s^4 of each axis. What is not known of its time is shared out among several."""
+
+    time_s: FloatArray
+    variance: FloatArray
+
+    def __add__(self, other: Jolts) -> Jolts:  # type: ignore[override]
+        """Those of both."""
+        time_s, which = np.unique(np.append(self.time_s, other.time_s), return_inverse=True)
+        return Jolts(time_s, np.bincount(which, np.append(self.variance, other.variance)).astype(float))
+
+    def into(self, profile: Profile, time_s: FloatArray) -> Profile:
+        """The process noise of a log with these times, with those that lie between its samples."""
+        inside = (self.time_s > time_s[0]) & (self.time_s <= time_s[-1])
+        if not inside.any():
+            return profile
+        sample = np.searchsorted(time_s, self.time_s[inside])
+        density = self.variance[inside] / (time_s[sample] - time_s[sample - 1])
+        jerk = np.append(profile.jerk, np.repeat(density[:, None], 3, 1), 0)
+        return profile._replace(jerk=jerk, jolt_s=time_s[sample])
+
+    def changes_s(self, apart_s: float) -> list[float]:
+        """The time of each change, of those that are farther apart than this."""
+        if not len(self.time_s):
+            return []
+        change = np.append(0, np.cumsum(np.diff(self.time_s) > apart_s))
+        moment, size = np.bincount(change, self.variance * self.time_s), np.bincount(change, self.variance)
+        return [float(each) for each in moment / size]
+
+
+NO_JOLTS = Jolts(np.zeros(0), np.zeros(0))
 
 
 @part
 def knot_index(time_s: float, profile: Profile) -> int:
-    """The piece of the jerk profile that holds at a time."""
+    """The piece of the jerk profile that holds up to a sample of this time."""
+    jolts = len(profile.jolt_s)
+    for j in range(jolts):
+        if profile.jolt_s[j] == time_s:
+            return len(profile.jerk) - jolts + j
     index = int((time_s - profile.first_s) / profile.knot_s)
-    return max(min(index, len(profile.jerk) - 1), 0)
+    return max(min(index, len(profile.jerk) - jolts - 1), 0)
 
 
 @part

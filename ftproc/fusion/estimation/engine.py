@@ -261,4 +261,4 @@ def last(current: Current, names: tuple[str, ...]) -> Current:
     known = np.any([np.isfinite(station.known) for station in current.stations], 0)
     motion, model = motions.choose(current.log, current.start, current.model, names, known)
     current = current._replace(motion=motion, model=model)
-    return _smoothed(_smoothed(current)) if model.motion.acts else current
+    return _smoothed(_smoothed(current)) if model.motion.acts or motion.abrupt_s else current

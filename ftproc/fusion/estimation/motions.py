@@ -27,14 +27,16 @@ OTHER_KNOTS = 1.5  # times the distance of the knots of the jerk profile, before
 
 class Motive(NamedTuple):
     """name: of the motion, in `motion_models.MODELS`. gain: by how much likelier the readings are than with white jerk;
-    of white jerk, by how much the best of the others is, see `motion_models.Chosen`."""
+    of white jerk, by how much the best of the others is, see `motion_models.Chosen`. abrupt_s: times of abrupt changes
+    of the acceleration."""
 
     name: str = motion_models.WHITE
     gain: float = 0.0
+    abrupt_s: tuple[float, ...] = ()
 
-    def share(self, of: float) -> Motive:
-        """What such a share of the rows has of the gain."""
-        return self._replace(gain=of * self.gain)
+    def share(self, of: float, first_s: float, stop_s: float) -> Motive:
+        """What such a share of the rows, between these times, has of the gain."""
+        return self._replace(gain=of * self.gain, abrupt_s=tuple(t for t in self.abrupt_s if first_s <= t < stop_s))
 
 
 def choose(
@@ -43,7 +45,7 @@ def choose(
     """The likeliest motion of these names, and the model with it. white: as in `motion_models.choose`; known: (3,)
     components whose noise the user has specified."""
     found = motion_models.choose(log, [start], white, names, known)
-    return Motive(found.name, found.gain), found.model
+    return Motive(found.name, found.gain, tuple(found.abrupt_s())), found.model
 
 
 class _Stepped(NamedTuple):

@@ -140,7 +140,7 @@ def test_gaps_are_crossed_in_steps():
     assert np.diff(dense.time_s).max() <= motion_models.FARTHEST_TURN / 0.2 * 1.05
     assert starts[0].sample == 0
     # with white jerk they change nothing
-    found = motion_models.Chosen(WHITE, a.model, 0.0, dense, starts, row)
+    found = motion_models.Chosen(WHITE, a.model, 0.0, dense, starts, a.model, row)
     run, plain = found.of_rows(smooth_log(dense, a.model, starts)), smooth_log(log, a.model, a.starts)
     np.testing.assert_allclose(run.state, plain.state, rtol=1e-7, atol=1e-6)
     np.testing.assert_allclose(run.sigma, plain.sigma, rtol=1e-6)
