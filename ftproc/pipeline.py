@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ftproc.core.identification import unseen_motion
+from ftproc.core.identification.motions import unseen_motion
 from ftproc.core.model import kinematics
 from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.derived import impact

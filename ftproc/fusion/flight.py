@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ftproc import pipeline
-from ftproc.core.identification import motion_models, unseen_motion
+from ftproc.core.identification.motions import motion_models, unseen_motion
 from ftproc.core.impact import heights
 from ftproc.core.model import kinematics
 from ftproc.core.model.earth import Geodetic

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ftproc.core.components import bounded
-from ftproc.core.identification import unseen_motion
+from ftproc.core.identification.motions import unseen_motion
 from ftproc.core.live.editor import LiveEditor
 from ftproc.core.live.rows import Published
 from ftproc.core.model import kinematics

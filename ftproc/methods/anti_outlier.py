@@ -24,8 +24,9 @@ from ftproc.core.filtering.beside import WIDTH
 from ftproc.core.filtering.initialization import WIDEST_BLIND_BRIDGE, find_starts
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import PATHS, STATES, SmootherRun, likelihood_of, smooth_log
-from ftproc.core.identification import likelihood, motion_models
-from ftproc.core.identification.motion_models import Chosen
+from ftproc.core.identification import likelihood
+from ftproc.core.identification.motions import motion_models
+from ftproc.core.identification.motions.motion_models import Chosen
 from ftproc.core.identification.profile import ALLOWANCE, fit_profile, median_level, with_allowance
 from ftproc.methods import bridging, live, preparing, range_rates
 from ftproc.methods.bridging import Bridged

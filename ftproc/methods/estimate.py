@@ -14,7 +14,7 @@ from ftproc.core.editing.lasting.faults import Faults
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start, Uneven
 from ftproc.core.filtering.smoother import SmootherRun
 from ftproc.core.identification.coloured_noise import Coloured
-from ftproc.core.identification.motion_models import Chosen
+from ftproc.core.identification.motions.motion_models import Chosen
 from ftproc.long_records import thinned
 from ftproc.order_statistics import median
 from ftproc.records import FlagArray, FloatArray, IntArray, forget

@@ -12,8 +12,8 @@ from ftproc.core.filtering import forward
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start, between
 from ftproc.core.filtering.smoother import HEADS, PATHS, smooth_log
-from ftproc.core.identification import motion_models
 from ftproc.core.identification.likelihood import Fixed, first_jerk, fit_level
+from ftproc.core.identification.motions import motion_models
 from ftproc.core.identification.profile import from_knot, median_level
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import isotropic

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from ftproc.core.identification import unseen_motion
+from ftproc.core.identification.motions import unseen_motion
 from ftproc.pipeline import filter_log
 from ftproc.settings import FilterSettings
 from tests.simulated import simulate

@@ -110,7 +110,7 @@ RULES: dict[str, tuple[Off, ...]] = {
     "the likeliest fault alone": (Off(f"{EDITING}.lasting.settling", "_likeliest", _empty),),
     "rejected runs on a curve": (Off(f"{EDITING}.lasting.rejected_runs", "_more_than_a_curve", lambda *_: np.inf),),
     "runs of several components as one motion": (Off(f"{EDITING}.lasting.rejected_runs", "_together", _empty),),
-    "abrupt changes": (Off(f"{IDENTIFICATION}.jolts", "told", _nothing),),
+    "abrupt changes": (Off(f"{IDENTIFICATION}.motions.jolts", "told", _nothing),),
     "patches of several that were joined": (
         Off(f"{EDITING}.lasting.search", "_joined", lambda seen, found, new: [*found, new]),
     ),

@@ -12,7 +12,7 @@ import numpy as np
 
 from ftproc import pipeline
 from ftproc.core import threads
-from ftproc.core.identification.motion_models import WHITE
+from ftproc.core.identification.motions.motion_models import WHITE
 from ftproc.errors import FtprocError
 from ftproc.records import FloatArray
 from ftproc.settings import AUTO, FilterSettings

@@ -11,7 +11,7 @@ import pytest
 
 from ftproc.core import impact
 from ftproc.core.filtering.records import Model, Start
-from ftproc.core.identification.motion_models import MODELS
+from ftproc.core.identification.motions.motion_models import MODELS
 from ftproc.core.impact import heights
 from ftproc.core.model.forces import EARTH_M, GRAVITY
 from ftproc.core.model.frames import from_cartesian

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from ftproc.core.identification.motion_models import MARGIN, MODELS, WHITE
+from ftproc.core.identification.motions.motion_models import MARGIN, MODELS, WHITE
 from ftproc.core.model.frames import from_cartesian
 from ftproc.files.writing import ranges
 from ftproc.fusion import logs, range_file

@@ -17,7 +17,7 @@ import numpy as np
 from ftproc.core.filtering.forward import Span
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import SmootherRun, smooth_log
-from ftproc.core.identification.motion_models import MODELS
+from ftproc.core.identification.motions.motion_models import MODELS
 from ftproc.core.identification.profile import ALLOWANCE, climbed, with_allowance
 from ftproc.core.identification.scales import Scales
 from ftproc.core.live.pieces import filtered, later

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ftproc.core.editing.lasting.curves import CLOCK
 from ftproc.core.editing.lasting.scanned import MARGIN, PRIOR
 from ftproc.core.editing.patch_likelihood import log_probability_of_all
-from ftproc.core.identification.motion_models import WHITE
+from ftproc.core.identification.motions.motion_models import WHITE
 from ftproc.core.identification.profile import roughness
 from ftproc.core.work import for_lasting_faults
 from ftproc.fusion.estimation import beside, engine, jumps_beside, lasting

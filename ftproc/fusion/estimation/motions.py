@@ -16,7 +16,7 @@ from ftproc.core.filtering.biases import Biased, Directions, smooth_biased
 from ftproc.core.filtering.forward import filter_log
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import PATHS, residuals_beside, smooth_log
-from ftproc.core.identification import motion_models
+from ftproc.core.identification.motions import motion_models
 from ftproc.core.identification.profile import knot_length
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.moving import between

@@ -16,7 +16,7 @@ import numpy as np
 from ftproc.core import impact
 from ftproc.core.filtering.records import FilterRun, Model, Start
 from ftproc.core.filtering.smoother import SmootherRun
-from ftproc.core.identification import motion_models
+from ftproc.core.identification.motions import motion_models
 from ftproc.core.model import kinematics
 from ftproc.core.model.stations import levelled
 from ftproc.fusion.estimation import engine, flight_faults, lasting, motions

@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ftproc import pipeline
-from ftproc.core.identification import orbits
-from ftproc.core.identification.orbits import EARTH_RADPS, _direction, _rotation
+from ftproc.core.identification.motions import orbits
+from ftproc.core.identification.motions.orbits import EARTH_RADPS, _direction, _rotation
 from ftproc.core.model.frames import from_cartesian
 from ftproc.records import MeasurementLog
 from ftproc.settings import FilterSettings

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Scalars, Start, Uneven
 from ftproc.core.filtering.smoother import SmootherRun, likelihood_of, smooth_log
-from ftproc.core.identification import decimation, jolts, orbits
+from ftproc.core.identification import decimation
+from ftproc.core.identification.motions import jolts, orbits
 from ftproc.core.identification.profile import ALLOWANCE, climbed, median_level, roughness, with_allowance
 from ftproc.core.identification.scales import Scales, scales_of
 from ftproc.core.model.forces import AT_REST_MPS, GRAVITY

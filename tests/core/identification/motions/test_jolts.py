@@ -7,7 +7,7 @@ import pytest
 
 from ftproc import pipeline
 from ftproc.core.filtering.smoother import likelihood_of, smooth_log
-from ftproc.core.identification import jolts
+from ftproc.core.identification.motions import jolts
 from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.model.frames import from_cartesian
 from ftproc.core.model.motion import NO_JOLTS, Jolts, isotropic

@@ -11,8 +11,8 @@ from ftproc import pipeline
 from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Uneven
 from ftproc.core.filtering.smoother import smooth_log
-from ftproc.core.identification import motion_models
-from ftproc.core.identification.motion_models import MODELS, WHITE, choose, with_steps
+from ftproc.core.identification.motions import motion_models
+from ftproc.core.identification.motions.motion_models import MODELS, WHITE, choose, with_steps
 from ftproc.core.identification.profile import fit_profile, with_allowance
 from ftproc.core.model.motion import isotropic
 from ftproc.methods import preparing

@@ -7,7 +7,7 @@ import pytest
 
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import smooth_log
-from ftproc.core.identification.unseen_motion import AT_REST, FASTEST, HIDDEN, PER_SPEED, widened
+from ftproc.core.identification.motions.unseen_motion import AT_REST, FASTEST, HIDDEN, PER_SPEED, widened
 from ftproc.core.model.frames import from_cartesian, line_of_sight_axes
 from ftproc.core.model.motion import isotropic
 
