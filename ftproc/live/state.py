@@ -58,7 +58,7 @@ _KINDS: dict[str, Any] = {
         editor.LiveEditor, window.Window, recursive.GatedWindow, recursive.Gating, whole.Whole, doubt.Doubt,
         pace.Pace, pace.Clock, pieces.Sizes, readings.Columns, kept.Kept, pieces.Flown, readings.Labels,
         readings.Repeats, rows.Waiting, rows.Published, records.Model, records.Start, smoother.SmootherRun,
-        two_pass.Known, track.Track, gate.GateSettings, by_hand.Accepted, motion.Motion, beside.Rates,
+        two_pass.Known, track.Track, gate.GateSettings, by_hand.Accepted, motion.Motion, motion.Jolts, beside.Rates,
         heights.Prior, times.Times, times.Pause, turning.Second, turning.Turning, correction.LiveCorrection,
         records.FilterRun,
     )

@@ -68,8 +68,7 @@ class LiveEditor:
         return self.flown if self.window is None else self.window.allowed
 
     def push(self, time_s: FloatArray, measurement: FloatArray) -> list[Published]:
-        """Take the next rows, time_s (n,) never decreasing, measurement (n, 3), or (n, 4) with range rates; the rows
-        that leave."""
+        """Take the next rows, time_s (n,) in order, measurement (n, 3) or (n, 4) with range rates; those that leave."""
         measurement = beside.widened(measurement)
         found: list[Published] = []
         low = 0
@@ -90,7 +89,9 @@ class LiveEditor:
                 high = self._slice_end(time_s, measurement, low)
                 if self.lag_s > 0:
                     found += self._due(float(time_s[high - 1]))
-                self._note_gap(self.window, float(time_s[low]))
+                if self._is_blinded(self.window, float(time_s[low])):
+                    self._begin_again()
+                    continue
                 self.window.append(time_s[low:high], with_stand_ins(measurement[low:high], self.absent))
                 self.count, self.clock = self.count + high - low, self.clock.after(time_s[low:high])
                 if self.lag_s == 0:  # what an edit finds out is known from the newest row on
@@ -147,7 +148,7 @@ class LiveEditor:
         self._edited(window)
 
     def _begin_again(self) -> None:
-        """A component is seen for the first time: what is known without it does not tell where the target is."""
+        """Nothing tells where the target is by now: a component is seen for the first time, or a gap was long."""
         assert self.window is not None
         window, self.flown = self.window, self.window.allowed
         low = max(min(len(window) - window.sizes.near, self.published - self._first), 0)
@@ -163,8 +164,7 @@ class LiveEditor:
         return self.count - len(self.waiting.time_s if self.window is None else self.window)
 
     def _before_a_pause(self, window: Window, time_s: float) -> list[Published]:
-        """Where a row that no refresh has seen must leave before this time: those before it, as they are by then, which
-        is when its lag has passed; and a refresh."""
+        """Where a row that no refresh has seen must leave before this time: those before it; and a refresh."""
         unseen = window.time_s[self.refreshed - self._first :]
         if self.lag_s == 0 or not len(unseen) or time_s <= unseen[0] + self.lag_s:
             return []
@@ -186,11 +186,11 @@ class LiveEditor:
         seen = np.flatnonzero(np.isfinite(measurement[low:high, list(self.absent)]).any(1))
         return low + int(seen[0]) if len(seen) else high
 
-    def _note_gap(self, window: Window, time_s: float) -> None:
-        """After a gap that may be too long to bridge, all of the window is edited as soon as a track can begin."""
-        if time_s - window.time_s[-1] > self.pace.longest_s:
-            self.next_edit = min(self.next_edit, self.count + FEWEST_READINGS + 1)
-            window.expect_gap(time_s)
+    def _is_blinded(self, window: Window, time_s: float) -> bool:
+        """Whether a gap ends here that is too long to bridge; after any, all of the window is edited soon."""
+        gap = time_s - window.time_s[-1] > self.pace.longest_s
+        self.next_edit = min(self.next_edit, self.count + FEWEST_READINGS + 1) if gap else self.next_edit
+        return bool(gap) and window.expect_gap(time_s)
 
     def _next_turn(self, window: Window) -> int:
         """How many rows there are when there is something to do again."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from ftproc.core.filtering.beside import WEIGHT
 from ftproc.core.filtering.forward import Span, run_weighted, run_weighted_coloured
+from ftproc.core.filtering.initialization import WIDEST_BLIND_BRIDGE
 from ftproc.core.filtering.records import Model, Observations, Start, empty_rows
 from ftproc.core.identification.profile import MAX_KNOTS
 from ftproc.core.live.predictive_chain import run_predictive, run_predictive_coloured
@@ -52,6 +53,13 @@ class Flown(NamedTuple):
         empty[np.minimum((time_s - time_s[0] + 1e-9) / model.knot_s, len(empty) - 1).astype(int)] = False
         empty[1:] |= empty[:-1]
         return model._replace(jerk=np.where(empty[:, None], np.maximum(model.jerk, self.jerk), model.jerk))
+
+
+def may_be_anywhere(place_m: FloatArray, model: Model, gap_s: float) -> bool:
+    """Whether a target at this place (3,) may be so far away after a gap that a filter would linearise about a wrong
+    one."""
+    moved_m = math.sqrt(float(model.jerk[-1].max()) * gap_s**5 / 20)
+    return moved_m > WIDEST_BLIND_BRIDGE * float(np.linalg.norm(place_m))
 
 
 def predicted(filters: Any) -> Start:

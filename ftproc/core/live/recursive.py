@@ -75,6 +75,10 @@ class GatedWindow(Window):
             self.second.filters = self.filters.copy()
             self._accompany(self.track)
 
+    def expect_gap(self, next_s: float) -> bool:
+        super().expect_gap(next_s)
+        return False  # the paper's filter goes on
+
     def _take(self, time_s: FloatArray, measurement: FloatArray) -> list[tuple[IntArray, int]]:
         return super()._take(time_s, beside.widened(measurement[:, : beside.RATE]))  # the paper has no range rates
 

@@ -12,6 +12,7 @@ from ftproc.core.live.beside import WIDTH
 from ftproc.records import FloatArray
 
 ASSUMED_READING = (10_000.0, 0.0, 0.0)  # m, rad, rad: of what was never seen
+FASTEST_MPS = 12_000.0  # of what stays with the earth: a velocity with such a 1-sigma is not known at all
 LATELY = 8  # samples whose innovations tell whether the sigmas hold
 
 
@@ -75,9 +76,9 @@ def _forget(rows: Any) -> None:
 
 def without_what_is_lost(rows: Any) -> NDArray[np.bool_]:
     """(n,) whether rows (n,) have an estimate, which is taken out of the others: after a gap of years a covariance may
-    hold no variances any more."""
+    hold no variances any more, or say nothing, as of what manoeuvres harder than its readings can follow."""
     known: NDArray[np.bool_] = ((rows["sigma"] > 0) & np.isfinite(rows["sigma"])).all(1)
-    known &= np.isfinite(rows["state"]).all(1)
+    known &= np.isfinite(rows["state"]).all(1) & (rows["sigma"][:, 3:6] < FASTEST_MPS).all(1)
     if not known.all():
         lost = rows[~known]
         _forget(lost)

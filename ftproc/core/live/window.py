@@ -26,7 +26,7 @@ from ftproc.core.live.kept import Kept
 from ftproc.core.live.newest import levels
 from ftproc.core.live.newest.deciding import decided
 from ftproc.core.live.newest.readmission import KEPT, Open
-from ftproc.core.live.pieces import BLOCK, Flown, Sizes, filtered, later, piece, predicted, stretched
+from ftproc.core.live.pieces import BLOCK, Flown, Sizes, filtered, later, may_be_anywhere, piece, predicted, stretched
 from ftproc.core.live.predictive_chain import OPEN, chains_of
 from ftproc.core.live.readings import Labels, Repeats, labelled, typical, used_lately
 from ftproc.core.live.turning import Case, Turning
@@ -199,10 +199,11 @@ class Window:
         kept["label"][n:] = self.labels.add(used, self.came[n:])
         self._bar(stuck)
 
-    def expect_gap(self, next_s: float) -> None:
-        """The next reading comes after a gap."""
+    def expect_gap(self, next_s: float) -> bool:
+        """The next reading comes after a gap; whether that is too long to be bridged."""
         if self.known.jerk_psd is None:
             self.allowed = self.flown.unseen(self.allowed, np.append(self.time_s[self.near :], next_s))
+        return may_be_anywhere(self.filters["x"][0, :3], self.allowed, next_s - float(self.time_s[-1]))
 
     def _take(self, time_s: FloatArray, measurement: FloatArray) -> list[tuple[IntArray, int]]:
         """Keep the next readings, undecided where they may be good at all: no target is at the station, or behind it,
@@ -227,8 +228,7 @@ class Window:
     def _bar(self, repeated: list[tuple[IntArray, int]]) -> None:
         """Readings that turn out to be repeated are not possible either, from the next refresh on."""
         for samples, c in repeated:
-            self.kept["possible"][samples, c] = False
-            self.kept["weight"][samples, c] = 0.0
+            self.kept["possible"][samples, c] = self.kept["weight"][samples, c] = 0
 
     def _filtered(
         self, log: Observations, span: Span, model: Model, filters: Any, chains: Any = None, first_s: float = math.nan

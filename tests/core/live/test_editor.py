@@ -214,3 +214,27 @@ def test_a_track_of_fewer_components_is_confirmed(flight, way, absent):
     there = [c for c in range(3) if c not in absent]
     bad = flight.truth.outlier[: len(label), there] > 0
     assert (label[40:, there][bad[40:]] > 0).mean() > (0.3 if way == "forward" else 0.7)
+
+
+@pytest.mark.parametrize("lag_s", [0.0, 2.0])
+def test_after_a_gap_in_which_the_target_may_go_anywhere_a_track_begins_again(lag_s):
+    """A hard turn, a gap of 15 s. A filter that goes on linearises kilometres away: 100 km off, for a second."""
+    flight = simulate("family", seed=707)
+    found = rows_of_part(flight.log, lag_s)
+    after = flight.log.time_s > 111.0
+    error = np.sqrt(((found["state"][:, :3] - flight.truth.position_m) ** 2).sum(1))
+    known = np.isfinite(error)
+    if lag_s == 0:
+        assert 4 <= np.count_nonzero(~known & after) <= 20
+        assert not known[after][:4].any()
+    else:
+        assert known[after].all()
+    assert known[~after][20:].all()
+    assert error[known & after].max() < 25.0
+    assert found["sigma"][known & after, :3].max() < 25.0
+
+
+def rows_of_part(log, lag_s):
+    editor = live.editor(FilterSettings(editing="live", lag_s=lag_s))
+    found = [*editor.push(log.time_s, log.measurement), *editor.finish()]
+    return {name: np.concatenate([each.rows[name] for each in found]) for name in ("state", "sigma")}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ftproc.core.filtering.records import empty_rows
-from ftproc.core.live.rows import LATELY, widened
+from ftproc.core.live.rows import LATELY, widened, without_what_is_lost
 
 
 def rows_of(nis, used=3):
@@ -48,3 +48,12 @@ def test_a_row_is_the_same_alone_as_among_others():
     for k in range(LATELY, 50):
         (alone,) = widened(rows[k - LATELY + 1 : k + 1].copy(), LATELY - 1)
         assert alone["sigma"] == pytest.approx(whole[k]["sigma"])
+
+
+def test_a_velocity_that_may_be_that_of_anything_is_no_estimate():
+    rows = empty_rows(3)
+    rows["sigma"] = 1.0
+    rows["sigma"][1, 4] = 2e4
+    np.testing.assert_array_equal(without_what_is_lost(rows), [True, False, True])
+    assert np.isnan(rows["state"][1]).all()
+    assert (rows["state"][[0, 2]] == 0).all()
