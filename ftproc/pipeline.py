@@ -15,7 +15,7 @@ from ftproc.core.model.frames import from_cartesian, measurement_sigma
 from ftproc.derived import impact
 from ftproc.errors import InputError, UsageError
 from ftproc.long_records import joined
-from ftproc.methods import heights, range_rates, registry, simultaneous
+from ftproc.methods import heights, registry, scalars, simultaneous
 from ftproc.methods.estimate import Estimate, Part
 from ftproc.quality import beside, by_hand, next_steps, provenance, sanity
 from ftproc.quality.next_steps import Step
@@ -184,10 +184,16 @@ class Filtering:
             if channel is not None:
                 labels = by_hand.labelled(channel.label, log.by_hand, "range_rate")
                 estimate = estimate._replace(range_rate=channel._replace(label=labels))
-            columns = range_rates.columns(state, los_sigma, labels)
+            columns = scalars.columns(state, los_sigma, labels)
             if estimate.range_rate is not None:
                 rate, spread, _ = columns.values()
                 channels["range_rate"] = beside.of_rates(log, estimate.range_rate, rate, spread)
+        beside_elevation = log.heights is not None and self.height is None
+        if beside_elevation:
+            channel, columns["outlier_height"] = estimate.height, np.full(len(state), MISSING, np.uint8)
+            if channel is not None:
+                columns["outlier_height"] = by_hand.labelled(channel.label, log.by_hand, "height")
+                estimate = estimate._replace(height=channel._replace(label=columns["outlier_height"]))
         common = heights.at(self.height, tuple(absent), self.log, self.settings)
         if common is not None and tuple(absent) in ((), heights.ABSENT):
             state, sigma, path_sigma = heights.placed(common, rows, state, sigma, path_sigma)
@@ -200,6 +206,8 @@ class Filtering:
         elif np.isinf(state).any() or (estimate.cleaned is None and np.isnan(state[known]).any()):
             name = self.method.name
             raise InputError(f"{self.log.name}: {name} diverged; give --noise and --jerk, or check the log's units")
+        if beside_elevation and estimate.height is not None:
+            channels["height"] = beside.of_heights_beside(log, estimate.height, state, sigma)
         estimate = estimate._replace(label=by_hand.labelled(estimate.label, log.by_hand))
         label, variance = estimate.label, cleaned_sigma**2 + estimate.model.reading_variance
         if self.height is not None and self.height.prior is None:

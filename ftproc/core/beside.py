@@ -33,7 +33,7 @@ TAILS = 4.0  # degrees of freedom of the distribution that tells the sense
 FAR = 6.0  # sigmas from what the readings say, of a scalar that is not used to begin with
 MOST_REJECTED = 0.5  # share of those that contradict the readings: with more, none is used
 CONTRADICTS = 8.0  # in log-likelihood, by which they may make the readings less likely, by chance
-HINDERS = "the range rates make the readings less likely (biased, late, or not measured): none is used"
+HINDERS = "the {} make the readings less likely (biased, late, or not measured): none is used"
 TURN = 0.1  # of the interval, 1-sigma, up to which the readings tell the turn of an ambiguous range rate
 LEAST = 1e-4  # m/s or m, 1-sigma: no instrument is so good
 USEFUL = 5e-4  # variance with which the readings predict a scalar, of its own: with less, even the forty or so in a
@@ -47,7 +47,8 @@ class Channel(NamedTuple):
     """What is known of the rates of a log. rates: (n,) outward, with weights and noise. label: (n,). closing: whether
     the log counts inward. late_s: by which they are late, and corrected. told: variance with which the readings
     predict them, of their own. why: they are not used, "" if they are. used: those of the last run, where the motion
-    is chosen without them. innovation, sigma: (n,) of the filter."""
+    is chosen without them. off: (n,) that was taken out of heights, m; off_sigma_m: (n, k) what k independent unknowns
+    in it may be off by, 1-sigma. innovation, sigma: (n,) of the filter."""
 
     rates: Scalars
     label: Labels
@@ -56,13 +57,15 @@ class Channel(NamedTuple):
     told: float = 0.0
     why: str = ""
     used: Scalars | None = None
+    off: FloatArray = np.zeros(0)
+    off_sigma_m: FloatArray = np.zeros((0, 0))
     innovation: FloatArray = np.zeros(0)
     sigma: FloatArray = np.zeros(0)
 
     @property
-    def noise_mps(self) -> float:
-        """1-sigma of their noise."""
-        return math.sqrt(float(self.rates.variance[0]))
+    def noise(self) -> float:
+        """1-sigma of their noise, m/s or m; of the best of them."""
+        return math.sqrt(float(self.rates.variance.min()))
 
     @property
     def silent(self) -> Scalars:
@@ -71,7 +74,8 @@ class Channel(NamedTuple):
 
     def of_rows(self, rows: slice | NDArray[np.int64]) -> Channel:
         """Of some of the samples."""
-        own: dict[str, Any] = {name: getattr(self, name)[rows] for name in ("label", "innovation", "sigma")}
+        names = [name for name in ("label", "innovation", "sigma", "off") if len(getattr(self, name))]
+        own: dict[str, Any] = {name: getattr(self, name)[rows] for name in names}
         return self._replace(rates=self.rates.part(rows), **own)
 
     def filtered(self, left: FloatArray) -> Channel:
@@ -150,18 +154,24 @@ def lateness(log: Observations, model: Model, starts: list[Start]) -> tuple[floa
     return (late_s if abs(late_s) > LEAST_LATE * step else 0.0), growth
 
 
-def decided(rates: Scalars, residuals: Residuals, gate: float, accepted: NDArray[np.bool_] = NONE) -> Scalars:
-    """Noise and weights in turn, until they stand still. accepted: (n,) that are good by hand."""
+def decided(
+    rates: Scalars, residuals: Residuals, gate: float, accepted: NDArray[np.bool_] = NONE, step: float = 0.0
+) -> Scalars:
+    """Noise and weights in turn, until they stand still; the noise of one is as many times that of another as before.
+    accepted: (n,) that are good by hand. step: to which they were rounded, where their values show it no more."""
     chances = np.tile(np.array(outlier_chain.START_RATES), (3, 1))
-    n, least = len(rates.value), _least(rates.value) ** 2
+    least = max(_least(rates.value), step / math.sqrt(12)) ** 2
     for _ in range(ROUNDS):
         residual, spread = residuals(rates)
-        used, before = rates.weight > 0, float(rates.variance[0])
-        ratio = float(((residual / spread) ** 2)[used].sum() / (1 / spread)[used].sum()) if used.any() else 1.0
+        used, before = rates.weight > 0, float(rates.variance.min())
+        times = rates.variance / before
+        share = times / spread
+        ratio = float((share * residual**2 / spread)[used].sum() / share[used].sum()) if used.any() else 1.0
         variance = max(before * min(max(ratio, 0.1), 10.0), least)
-        weight = np.where(accepted, 1.0, good(residual, spread - before + variance, variance, gate, chances))
+        wide = spread + (variance - before) * times
+        weight = np.where(accepted, 1.0, good(residual, wide, variance, gate, chances))
         still = (weight == rates.weight).all() and abs(math.log(variance / before)) < STILL
-        rates = rates._replace(variance=np.full(n, variance), weight=weight)
+        rates = rates._replace(variance=variance * times, weight=weight)
         if still:
             break
     return rates

@@ -11,8 +11,8 @@ from ftproc.records import FloatArray
 
 
 class Accepted(NamedTuple):
-    """times: those of the readings of each component, and of the range rates behind them, that are good whatever an
-    editor finds, (m,) s each; nothing if there are none."""
+    """times: those of the readings of each component, and of the range rates and the heights behind them, that are good
+    whatever an editor finds, (m,) s each; nothing if there are none."""
 
     times: tuple[FloatArray, ...] = ()
 
@@ -25,7 +25,14 @@ class Accepted(NamedTuple):
 
     def rates(self, time_s: FloatArray) -> NDArray[np.bool_]:
         """(n,) which of the range rates at some times (n,) these are."""
-        return np.isin(time_s, self.times[3]) if len(self.times) > 3 else np.zeros(len(time_s), bool)
+        return self._beside(3, time_s)
+
+    def heights(self, time_s: FloatArray) -> NDArray[np.bool_]:
+        """The same of heights beside elevations."""
+        return self._beside(4, time_s)
+
+    def _beside(self, c: int, time_s: FloatArray) -> NDArray[np.bool_]:
+        return np.isin(time_s, self.times[c]) if len(self.times) > c else np.zeros(len(time_s), bool)
 
 
 NOTHING = Accepted()

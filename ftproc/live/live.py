@@ -25,8 +25,8 @@ from ftproc.errors import InputError, UsageError
 from ftproc.files import arrow
 from ftproc.live.order import Order
 from ftproc.long_records import joined
-from ftproc.methods import heights, live, registry
-from ftproc.methods import range_rates as rates_of
+from ftproc.methods import alone, heights, live, registry
+from ftproc.methods import scalars as rates_of
 from ftproc.methods.estimate import Estimate
 from ftproc.order_statistics import median
 from ftproc.quality import sanity
@@ -271,7 +271,7 @@ def _trajectory(
         found = estimate.range_rate.label if estimate.range_rate is not None else np.full(n, MISSING, np.uint8)
         columns = rates_of.columns(state, los_sigma, found)
     if barometric is not None:
-        common = heights.Common(None, np.empty(0), barometric=barometric, scale=heights.TEMPERATURE * barometric)
+        common = heights.Common(None, np.empty(0), barometric=barometric, scale=alone.TEMPERATURE * barometric)
         state, sigma, path_sigma = heights.placed(common, slice(None), state, sigma, path_sigma)
         cleaned_sigma = heights.elevated(common, slice(None), cleaned, cleaned_sigma)
         label, column = heights.labelled(label)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ftproc.order_statistics import median
 from ftproc.records import FloatArray
 
+PRESSURE_M, TEMPERATURE = 80.0, 0.02  # 1-sigma of barometric heights: 10 hPa, and 5 K of 250 K as a share of the height
 LEAST, FEWEST = 0.1, 3  # m, 1-sigma: no instrument is so good; and values that tell their scatter
 GATE = 6.0  # sigmas beyond what the target may do
 REACH = 5  # readings on each side, from which the rate is taken

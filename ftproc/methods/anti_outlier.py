@@ -20,7 +20,6 @@ import numpy as np
 from ftproc.core import impact, threads
 from ftproc.core.editing import two_pass
 from ftproc.core.filtering import forward
-from ftproc.core.filtering.beside import WIDTH
 from ftproc.core.filtering.initialization import WIDEST_BLIND_BRIDGE, find_starts
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import PATHS, STATES, SmootherRun, likelihood_of, smooth_log
@@ -28,10 +27,10 @@ from ftproc.core.identification import likelihood
 from ftproc.core.identification.motions import motion_models
 from ftproc.core.identification.motions.motion_models import Chosen
 from ftproc.core.identification.profile import ALLOWANCE, fit_profile, median_level, with_allowance
-from ftproc.methods import bridging, live, preparing, range_rates
+from ftproc.methods import bridging, live, preparing, scalars
 from ftproc.methods.bridging import Bridged
 from ftproc.methods.estimate import Estimate, Part, Readings, Recording, typical_interval
-from ftproc.methods.widening import reaching, widened, worse_of
+from ftproc.methods.widening import off_by, reaching, widened, worse_of
 from ftproc.order_statistics import median
 from ftproc.records import ISOLATED, PATCH, FloatArray
 from ftproc.settings import FilterSettings
@@ -68,12 +67,17 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
     known = preparing.what_is_known(readings, settings)
     found = edited = readings.edited or two_pass.edit(readings.time_s, readings.measurement, known, usual)
     specified = np.isfinite(known.sigma)
-    log, model, channel = edited.log, edited.model, None
+    log, model, how = edited.log, edited.model, (settings.gate, settings.jerk_psd_m2ps5 is not None)
+    channel = height = None
     if readings.range_rate is not None:
-        how = settings.gate, settings.jerk_psd_m2ps5 is not None
         given = readings.range_rate, readings.rate_interval_mps
         accepted = readings.accepted.rates(readings.time_s)
-        log, model, channel = range_rates.fit(log, model, edited.starts, given, how, accepted)
+        log, model, channel = scalars.fit(log, model, edited.starts, given, how, accepted)
+    if readings.heights is not None:
+        accepted = readings.accepted.heights(readings.time_s)
+        log, model, height = scalars.fit_heights(log, model, edited.starts, readings.heights, how, accepted)
+    channels = [each for each in (channel, height) if each is not None and not each.why]
+    used = tuple(each.rates if each.used is None else each.used for each in channels)
     names = preparing.motions(settings)
     if len(edited.starts) > MOST_PIECES and motion_models.WHITE in names:
         names = (motion_models.WHITE,)
@@ -83,7 +87,12 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
 
     def chosen(names: tuple[str, ...], white: Model) -> Chosen:
         found = motion_models.choose(over.log, over.starts, white, names, specified)
-        return found if channel is None or channel.used is None else found.with_beside(channel.used)
+        if all(each.used is None for each in channels):
+            return found
+        found = found.with_beside(used)
+        if height is None or height.why or how[1]:
+            return found
+        return found._replace(model=scalars.upward(found.model, scalars.profile(found.log, found.model, found.starts)))
 
     wanted = PATHS if settings.smooth else STATES  # cheap, proves the correction, and says what could be had
     motion = chosen(names, over.model)
@@ -94,6 +103,12 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         filtered, other_smoothed, _ = _with_motion(motion, other, wanted)
         run = worse_of(run, filtered)
         smoothed = smoothed and other_smoothed and worse_of(smoothed, other_smoothed)
+    for off in () if height is None or height.why else height.off_sigma_m.T:
+        moved = motion.with_beside((*used[:-1], used[-1]._replace(value=used[-1].value + off)))
+        filtered, other_smoothed, _ = _with_motion(moved, motion.model, wanted)
+        run = off_by(run, np.nan_to_num(filtered.state - run.state))
+        if smoothed is not None and other_smoothed is not None:
+            smoothed = off_by(smoothed, np.nan_to_num(other_smoothed.state - smoothed.state))
     rows = 1 + int(np.flatnonzero(edited.weight.any(1))[-1])
     fixed = settings.jerk_psd_m2ps5 is not None
     for away in (*_elsewhere(edited, others, fixed), *_by_rival(motion, smoothed)):
@@ -106,14 +121,15 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         if usual is None:  # else it is of one segment
             could_be = median(np.sqrt((smoothed.sigma[:, :3] ** 2).sum(1)))
         hindsight, smoothed = smoothed.state, None
-    decision = edited.decision
+    decision, seen = edited.decision, iter(left)
+    channel, height = (each if each is None or each.why else each.filtered(next(seen)) for each in (channel, height))
     stand_still = decision.settled or not np.isin(label, (ISOLATED, PATCH)).any()  # else where would one look?
     return Estimate(
         run, label, motion.model, smoothed, again, stand_still,
         unexamined=decision.unexamined, stamp_s=decision.stamp_s, drifts=decision.drifts,
         alternative=decision.alternative,
         faults=edited.faults, motion=motion, smoothed_sigma_m=could_be, hindsight=hindsight,
-        range_rate=channel and channel.filtered(left), last=_last_of(motion, smoothed or run),
+        range_rate=channel, height=height, last=_last_of(motion, smoothed or run),
         edited=found if usual is None else None,
     )  # fmt: skip
 
@@ -156,12 +172,11 @@ def _leaves_its_course(motion: Chosen, smoothed: SmootherRun | None) -> bool:
 
 
 def _with_motion(motion: Chosen, model: Model, wanted: int | None) -> tuple[FilterRun, SmootherRun | None, FloatArray]:
-    """The filter and, if asked, the smoother over an edited log, by a model; and what the filter leaves of its range
-    rates, see `core.filtering.beside`. wanted: of the smoother."""
+    """The filter and, if asked, the smoother over an edited log, by a model; and what the filter leaves of its scalars,
+    (kinds, n, WIDTH), see `core.filtering.beside`. wanted: of the smoother."""
     starts = preparing.smoothed_starts(motion.log, model, motion.starts)
-    run, beside = forward.filter_with_beside(motion.log, model.causal, starts)
-    left = beside[0] if len(beside) else np.zeros((0, WIDTH))
-    left = left if motion.row is None or not len(left) else left[motion.row]
+    run, left = forward.filter_with_beside(motion.log, model.causal, starts)
+    left = left if motion.row is None or not len(left) else left[:, motion.row]
     smoothed = motion.of_rows(smooth_log(motion.log, model, motion.starts, wanted)) if wanted is not None else None
     return motion.of_rows(run), smoothed, left
 

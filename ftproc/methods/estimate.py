@@ -17,7 +17,7 @@ from ftproc.core.identification.coloured_noise import Coloured
 from ftproc.core.identification.motions.motion_models import Chosen
 from ftproc.long_records import thinned
 from ftproc.order_statistics import median
-from ftproc.records import FlagArray, FloatArray, IntArray, forget
+from ftproc.records import FlagArray, FloatArray, Heights, IntArray, forget
 
 if TYPE_CHECKING:
     from ftproc.core.beside import Channel
@@ -35,7 +35,8 @@ class Readings(NamedTuple):
     components' noise cannot be had from the log, with what is assumed for it: (3,) 1-sigma m, rad, rad, NaN where
     the log tells; the times of the readings of each component that are accepted by hand; and how the noise of single
     readings is known to differ, if it is. range_rate: (n,) m/s, NaN where missing, if there are such, and the interval
-    in which they are ambiguous, zero if they are not. edited: the same, if they have been edited before."""
+    in which they are ambiguous, zero if they are not. heights: beside elevations. edited: the same, if they have been
+    edited before."""
 
     time_s: FloatArray
     measurement: FloatArray
@@ -44,6 +45,7 @@ class Readings(NamedTuple):
     uneven: Uneven | None = None
     range_rate: FloatArray | None = None
     rate_interval_mps: float = 0.0
+    heights: Heights | None = None
     edited: Edited | None = None
 
     def unedited(self) -> Observations:
@@ -61,7 +63,7 @@ class Recording:
 
     time_s: (n,). measurement: (n, 3). assumed_sigma: as in `Readings`. absent: components that are missing throughout.
     rejected: (n, 3) readings that are not to be used, if there are any. accepted, uneven, range_rate,
-    rate_interval_mps, edited (all of it): as in `Readings`.
+    rate_interval_mps, heights, edited (all of it): as in `Readings`.
     """
 
     time_s: FloatArray
@@ -73,6 +75,7 @@ class Recording:
     uneven: Uneven | None = None
     range_rate: FloatArray | None = None
     rate_interval_mps: float = 0.0
+    heights: Heights | None = None
     edited: Edited | None = None
 
     def __len__(self) -> int:
@@ -90,7 +93,8 @@ class Recording:
         uneven = None if self.uneven is None else self.uneven.part(rows)
         rate = None if self.range_rate is None else np.ascontiguousarray(bounded(self.range_rate[rows]))
         measurement = np.ascontiguousarray(measurement)
-        beside = uneven, rate, self.rate_interval_mps
+        heights = self.heights and self.heights._replace(above_m=bounded(self.heights.above_m[rows]))
+        beside = uneven, rate, self.rate_interval_mps, heights
         return Readings(time_s, measurement, self.assumed_sigma, self.accepted, *beside)
 
     def spans(self) -> list[slice]:
@@ -116,8 +120,9 @@ class Estimate(NamedTuple):
     method without sigmas, whose labels nothing else tests. motion: that was chosen. known: (n,) which samples have an
     estimate, where live editing has none of some; absent: the components that it has not seen. smoothed_sigma_m: the
     median 1-sigma of the position that the smoother would have, where it is known and was not asked for, and
-    hindsight: (n, 9) its states. range_rate: what is known of the range rates, see `methods.range_rates`. last: state
-    and covariance after the last sample, of a ballistic motion. edited: what two-pass editing left.
+    hindsight: (n, 9) its states. range_rate: what is known of the range rates, see `methods.scalars`; height: of
+    the heights beside elevations. last: state and covariance after the last sample, of a ballistic motion. edited: what
+    two-pass editing left.
     """
 
     run: FilterRun
@@ -139,6 +144,7 @@ class Estimate(NamedTuple):
     smoothed_sigma_m: float | None = None
     hindsight: FloatArray | None = None
     range_rate: Channel | None = None
+    height: Channel | None = None
     last: Start | None = None
     edited: Edited | None = None
 
@@ -167,6 +173,7 @@ class Estimate(NamedTuple):
             faults=None if self.faults is None else self.faults.rows(low, high),
             motion=None if self.motion is None else self.motion.share((high - low) / len(self.label)),
             range_rate=None if self.range_rate is None else self.range_rate.of_rows(slice(low, high)),
+            height=None if self.height is None else self.height.of_rows(slice(low, high)),
         )
 
     def at(self, sample: IntArray, first: IntArray) -> Estimate:
@@ -194,6 +201,7 @@ class Estimate(NamedTuple):
             screened_out=None if self.screened_out is None else self.screened_out[sample],
             faults=None if self.faults is None else self.faults.at(sample, first),
             range_rate=None if self.range_rate is None else self.range_rate.of_rows(sample),
+            height=None if self.height is None else self.height.of_rows(sample),
         )
 
 

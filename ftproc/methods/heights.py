@@ -29,13 +29,13 @@ from ftproc.core.model import kinematics
 from ftproc.core.model.earth import MEAN_RADIUS_M as EARTH_M
 from ftproc.errors import InputError
 from ftproc.methods import alone, anti_outlier, preparing
+from ftproc.methods.alone import PRESSURE_M, TEMPERATURE
 from ftproc.methods.estimate import Recording
 from ftproc.order_statistics import median
 from ftproc.records import ACCEPTED, ISOLATED, MISSING, PATCH, REJECTED, FlagArray, FloatArray, MeasurementLog
 from ftproc.settings import FilterSettings
 
 ABSENT = (2,)  # components that are missing where a height stands in
-PRESSURE_M, TEMPERATURE = 80.0, 0.02  # 1-sigma of barometric heights: 10 hPa, and 5 K of 250 K as a share of the height
 SLOW_MPS = 30.0  # a target that is never faster is taken for a ship or a vehicle
 CHANGES_S = 300.0  # correlation time of an unknown height, for the sigmas of its rates
 STEEPEST = 0.9  # sine of the elevation: nearer to the vertical the azimuth says nothing of x and y

@@ -56,10 +56,13 @@ class Simultaneous(NamedTuple):
         if self.times is not None:
             uneven = uneven or Uneven.none(len(self.times))
             uneven = uneven._replace(times=uneven.times * self.times)
-        rate = None if recording.range_rate is None else recording.range_rate[self.first[:-1]]
+        first, heights = self.first[:-1], recording.heights
+        rate = None if recording.range_rate is None else recording.range_rate[first]
+        heights = heights and heights._replace(above_m=heights.above_m[first])
         return replace(
-            recording, time_s=self.time_s, measurement=self.measurement, rejected=None, uneven=uneven, range_rate=rate
-        )
+            recording, time_s=self.time_s, measurement=self.measurement, rejected=None, uneven=uneven, range_rate=rate,
+            heights=heights,
+        )  # fmt: skip
 
     def of_rows(self, part: Part) -> Part:
         """The estimate of all rows from one of the stamps. All rows of a stamp have its state; its first one has its

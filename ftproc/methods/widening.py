@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -32,6 +32,11 @@ def reaching(run: Run, away: FloatArray, rows: int) -> Run:
         nearby = maximum_filter1d(np.abs(of[:rows]), width, axis=0)
         return HALFWAY * np.concatenate([nearby, np.abs(of[rows:])])
 
+    return off_by(run, away, reach)
+
+
+def off_by(run: Run, away: FloatArray, reach: Callable[[FloatArray], FloatArray] = np.abs) -> Run:
+    """A run with sigmas that allow for an error away (n, 9) of 1 sigma. reach: how far it goes."""
     sigma, los_sigma = np.hypot(run.sigma, reach(away)), run.los_sigma.copy()
     sight = line_of_sight_axes(run.state[:, :3])
     for lines in (slice(0, 3), slice(3, 6)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ftproc.core import impact
 from ftproc.core.beside import Channel
 from ftproc.core.model.earth import MEAN_RADIUS_M
 from ftproc.methods.heights import Common
@@ -13,7 +14,16 @@ from ftproc.records import BESIDE, Beside, Diagnostics, FlagArray, FloatArray, M
 def of_rates(log: MeasurementLog, channel: Channel, cleaned: FloatArray, sigma: FloatArray) -> Beside:
     """Of the range rates of a log (of n rows): their innovations, also of a smoothed run. cleaned, sigma: (n,) m/s."""
     assert log.range_rate is not None
-    reading = -log.range_rate if channel.closing else log.range_rate
+    return _of_scalars(-log.range_rate if channel.closing else log.range_rate, channel, cleaned, sigma)
+
+
+def of_heights_beside(log: MeasurementLog, channel: Channel, state: FloatArray, sigma: FloatArray) -> Beside:
+    """Of heights beside the elevations of a log (of n rows), see `of_rates`. state, sigma: (n, 9)."""
+    assert log.heights is not None
+    return _of_scalars(log.heights.above_m, channel, impact.heights(state[:, :3]) + channel.off, sigma[:, 2])
+
+
+def _of_scalars(reading: FloatArray, channel: Channel, cleaned: FloatArray, sigma: FloatArray) -> Beside:
     if channel.why or len(channel.innovation) != len(reading):  # they are not used: there are no sigmas
         return Beside(reading, cleaned, reading - cleaned, np.full(len(reading), np.nan), channel.label)
     spread = np.sqrt(sigma**2 + channel.rates.variance)

@@ -15,6 +15,7 @@ from ftproc.records import ACCEPTED, GOOD, ISOLATED, MISSING, PATCH, REJECTED, F
 if TYPE_CHECKING:
     from ftproc.core.beside import Channel
 
+TESTED = 2.0  # times the least variance: of heights, more is what stands for many that are rounded to the same
 _LABELS = {"isolated": ISOLATED, "patch": PATCH, "missing": MISSING}
 
 
@@ -63,13 +64,14 @@ class Component:
         }
 
 
-class RangeRate:
-    """Figures of the range rates of a log, to which those of its parts are added."""
+class Scalars:
+    """Figures of the range rates of a log, or of its heights beside elevations, to which those of its parts are
+    added."""
 
     def __init__(self, every: int) -> None:
         self.component, self.closing, self.why = Component(every), False, dict[str, None]()
         self.late_s = list[float]()
-        self.noises: list[float] = []
+        self.noises, self.off_m = list[float](), list[float]()
 
     @property
     def used(self) -> bool:
@@ -83,16 +85,22 @@ class RangeRate:
             self.why[channel.why] = None
             return
         self.closing |= channel.closing
-        self.noises.append(channel.noise_mps)
+        self.noises.append(channel.noise)
         self.late_s.append(channel.late_s)
+        if np.isfinite(channel.off).any():
+            self.off_m.append(float(np.nanmedian(channel.off)))
         with np.errstate(invalid="ignore", divide="ignore"):
             squares = np.square(channel.innovation / channel.sigma)
-        self.component.add_innovations(squares, channel.sigma, channel.rates.weight > 0)
+        tested = (channel.rates.weight > 0) & (channel.rates.variance <= TESTED * channel.rates.variance.min())
+        self.component.add_innovations(squares, channel.sigma, tested)
 
-    def remarks(self) -> list[str]:
+    def remarks(self) -> Iterator[str]:
         """What was done with them, and why they are not used."""
+        if self.off_m:
+            off_m = median(np.array(self.off_m))
+            yield f"the heights are {off_m:.3g} m above those by the elevations, which is taken out"
         turned = ["the range rates count inward, as the motion shows, and are turned round"] if self.closing else []
-        return [*turned, *self._shifted(), *self.why]
+        yield from (*turned, *self._shifted(), *self.why)
 
     def _shifted(self) -> Iterator[str]:
         """By how much they were late or early."""
@@ -101,15 +109,15 @@ class RangeRate:
             side = "late" if late_s > 0 else "early"
             yield f"the range rates are {side} by {abs(late_s):.3g} s, as the motion shows, and are corrected for it"
 
-    def figures(self) -> dict[str, Any]:
-        """As those of other components."""
+    def figures(self, name: str) -> dict[str, Any]:
+        """As those of other components. name: range_rate or height."""
         noise = median(np.array(self.noises))
         return {
             **self.component.counts(),
             "held": 0,
             "interpolated": 0,
             "computed": 0,
-            "noise_mps": noise,
+            "noise_m" if name == "height" else "noise_mps": noise,
             "noise_correlation": 0.0,
             **self.component.consistency(noise),
         }

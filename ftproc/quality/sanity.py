@@ -27,20 +27,23 @@ ASSUMED_SIGMA = (10.0, 1e-3, 1e-3)  # m, rad, rad: of a component with fewer
 
 def recording(log: MeasurementLog) -> Recording:
     """The log as the methods take it. Raises InputError as `check`."""
-    count, rejected, accepted, rate = check(log), None, NOTHING, log.range_rate
+    count, rejected, accepted, rate, heights = check(log), None, NOTHING, log.range_rate, log.heights
     if log.by_hand is not None:
         flags, of_rates, times = log.by_hand.flags, log.by_hand.of("range_rate"), log.time_s - log.time_s[0]
-        accepted = Accepted(tuple(times[flag == ACCEPTED] for flag in (*flags.T, of_rates)))
+        of_heights = log.by_hand.of("height")
+        accepted = Accepted(tuple(times[flag == ACCEPTED] for flag in (*flags.T, of_rates, of_heights)))
         rejected = flags == REJECTED
         count = count - totals(rejected)
         rate = rate if rate is None else np.where(of_rates == REJECTED, np.nan, rate)
+        if heights is not None:
+            heights = heights._replace(above_m=np.where(of_heights == REJECTED, np.nan, heights.above_m))
     assumed = np.where(count < FEWEST_READINGS, ASSUMED_SIGMA, np.nan)
     absent = tuple(np.flatnonzero(count == 0).tolist())
     if len(absent) == len(COMPONENTS):
         raise InputError(f"{log.name}: every reading is rejected by hand; check the decisions.")
     return Recording(
         log.time_s, log.measurement, assumed, absent, rejected, accepted, range_rate=rate,
-        rate_interval_mps=log.station.range_rate_interval_mps,
+        rate_interval_mps=log.station.range_rate_interval_mps, heights=None if absent else heights,
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from ftproc.files.moments import NO_ZONE
 from ftproc.methods.estimate import ASSUMED_READING, typical_interval
 from ftproc.order_statistics import median
 from ftproc.quality import consistency, verdict
-from ftproc.quality.components import Component, RangeRate
+from ftproc.quality.components import Component, Scalars
 from ftproc.quality.faults import FaultStatistics, clock_set_back
 from ftproc.records import COMPONENTS, GOOD, FloatArray, MeasurementLog
 from ftproc.scoring.figures import changes
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ftproc.methods.heights import Common
 
 UNITS = ("m", "rad", "rad")
+NO_HEIGHTS = "the heights beside the elevations are not used: only the main method's two-pass editing uses them"
 GAP_INTERVALS = 3.0  # median intervals that make a gap
 MOST_KEPT = 250_000  # samples whose sigmas are kept; of more, the largest of every few
 
@@ -37,7 +38,7 @@ class RunStatistics:
 
     def __init__(self, log: MeasurementLog, absent: Sequence[int], height: Common | None = None) -> None:
         self.log, self.absent, self.height = log, absent, height
-        self.range_rate: RangeRate | None = None
+        self.beside = dict[str, Scalars]()
         self.zone_stated = NO_ZONE not in log.understood.get("doubts", ())
         self.every = 1 + (len(log) - 1) // MOST_KEPT
         self.interval_s = typical_interval(log.time_s)
@@ -118,9 +119,9 @@ class RunStatistics:
         if estimate.screened_out is not None:
             self.screened_out += int(estimate.screened_out.sum())
             self.overlooked += int((estimate.screened_out & (estimate.label == GOOD)).sum())
-        if estimate.range_rate is not None:
-            self.range_rate = self.range_rate or RangeRate(self.every)
-            self.range_rate.add(time_s, estimate.range_rate)
+        for name, channel in (("range_rate", estimate.range_rate), ("height", estimate.height)):
+            if channel is not None:
+                self.beside.setdefault(name, Scalars(self.every)).add(time_s, channel)
         if estimate.faults is not None:
             self.faults.add(time_s, estimate.faults)
         if correction.any():
@@ -188,8 +189,7 @@ class RunStatistics:
                 name, part = "height", {**part, "noise_m": noise * self.height.range_m}
                 del part["noise_rad"]
             components[name] = part
-        if self.range_rate is not None and self.range_rate.used:
-            components["range_rate"] = self.range_rate.figures()
+        components |= {name: each.figures(name) for name, each in self.beside.items() if each.used}
         psd = np.concatenate(self.jerk)
         jerk = {"lowest": float(psd.min()), "median": median(psd), "highest": float(psd.max())}
         time_s, sigma = np.concatenate(self.times), np.concatenate(self.sigmas)
@@ -201,7 +201,7 @@ class RunStatistics:
             "rows_out_of_order": log.rows_out_of_order,
             "duplicate_times": log.duplicate_times,
             "rows_without_estimate": self.unknown,
-            "remarks": [*log.remarks, *(self.range_rate.remarks() if self.range_rate else ())],
+            "remarks": [*log.remarks, *self._beside()],
             "assumed": list(log.understood.get("assumed", ())),
             "duration_s": float(log.time_s[-1] - log.time_s[0]),
             "start_s": float(log.time_s[0]),
@@ -244,6 +244,13 @@ class RunStatistics:
         figures |= correction
         trust = verdict.verdict(verdict.remarks(figures), verdict.too_wide(figures), figures["assumed"])
         return figures | {"trust": trust}
+
+    def _beside(self) -> Iterator[str]:
+        """What was done with what is measured beside the readings, in words."""
+        for each in self.beside.values():
+            yield from each.remarks()
+        if self.log.heights is not None and self.height is None and "height" not in self.beside:
+            yield NO_HEIGHTS
 
     def _poorly_observable_readings(self, time_s: FloatArray, sigma: FloatArray) -> dict[str, list[dict[str, float]]]:
         """By component, of a log in which the position is not observable."""

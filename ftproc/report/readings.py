@@ -12,7 +12,7 @@ from ftproc.report import drawing, style
 from ftproc.report.drawing import Drawn
 from ftproc.report.patches import steps, worst
 from ftproc.report.thinning import MOST_MARKED, Timeline
-from ftproc.report.view import Channel, View
+from ftproc.report.view import Channel, View, apart
 
 ROW_HEIGHT = 190
 ROOM = 0.35  # share of the trajectory's extent, above and below it, where outliers are drawn
@@ -106,8 +106,8 @@ def residuals(view: View) -> Drawn:
         note = "No reading was edited: the gate was not used."
     if steps(view):
         note += " A step is taken out of the readings on its shorter side."
-    if "range_rate" in known.beside and known.residual_kind != "innovation":
-        note += " Those of range rates are innovations."
+    if known.residual_kind != "innovation" and (names := known.beside.keys() & apart(view.trajectory)):
+        note += f" Those of {' and '.join(sorted(name.replace('_', ' ') + 's' for name in names))} are innovations."
     return Drawn(figure, f"{_WHAT[known.residual_kind]}. {note}")
 
 

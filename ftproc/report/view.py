@@ -15,9 +15,11 @@ from ftproc.files.moments import Moments
 from ftproc.quality.verdict import LEVELS, level_of
 from ftproc.records import (
     ACCEPTED,
+    BESIDE,
     COMPONENTS,
     GOOD,
     ISOLATED,
+    MISSING,
     PATCH,
     REJECTED,
     Diagnostics,
@@ -124,6 +126,12 @@ def summary_of(trajectory: Trajectory) -> Mapping[str, Any]:
     return found
 
 
+def apart(trajectory: Trajectory) -> tuple[str, ...]:
+    """Channels that stand for no range, azimuth or elevation: NIS is without them, and their residuals are
+    innovations."""
+    return BESIDE if (trajectory.outlier[:, 2] != MISSING).any() else BESIDE[:1]
+
+
 def view(trajectory: Trajectory, truth: Truth | None = None) -> View:
     """The view of a trajectory, with its errors against a truth."""
     error = cleaned_error = scored = None
@@ -137,7 +145,8 @@ def view(trajectory: Trajectory, truth: Truth | None = None) -> View:
         cleaned_error[:, 1] = wrap(cleaned_error[:, 1])
         scored = score(trajectory, truth) if np.isfinite(known.position_m).any() else None
     channels = tuple(_channels(trajectory))
-    used = [np.isin(channel.flags, (GOOD, ACCEPTED)) for channel in channels if channel.name != "range_rate"]
+    scalars = apart(trajectory)
+    used = [np.isin(channel.flags, (GOOD, ACCEPTED)) for channel in channels if channel.name not in scalars]
     return View(
         trajectory, Timeline.of(trajectory.time_s), channels, np.sum(used, 0, float), error, cleaned_error, scored
     )

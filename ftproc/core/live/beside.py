@@ -48,7 +48,7 @@ def learned(log: Observations, model: Model, starts: list[Start], rate: FloatArr
     hinder = beside.of_the_rest(both, model, starts) < beside.of_the_rest(log, model, starts) - beside.CONTRADICTS
     if hinder or beside.lateness(both, model, starts)[0] != 0:
         return Rates(), np.zeros(len(rate))
-    return Rates(-1.0 if channel.closing else 1.0, channel.noise_mps, True), channel.rates.weight
+    return Rates(-1.0 if channel.closing else 1.0, channel.noise, True), channel.rates.weight
 
 
 def decided(log: Observations, model: Model, start: Start) -> Observations:

@@ -68,13 +68,18 @@ def sides(log: MeasurementLog, place: FloatArray, origin: Geodetic | None) -> tu
         value = bounded(log.range_rate)
         side = Side(RANGE_RATE, layout.RATE, value, 1.0, np.isfinite(value).astype(float), place)
         found.append(side._replace(interval=log.station.range_rate_interval_mps))
-    if log.heights is not None and np.isfinite(log.heights.above_m).any():
+    if log.heights is not None and np.isfinite(log.heights.above_m).any() and not elevated(log):
         radius, level = _earth(origin)
         above, centre = bounded(log.heights.above_m) - level, np.array([0.0, 0.0, -radius])
         own, good = alone.screened(log.time_s, above, rounding_step(log.heights.above_m))
         found.append(Side(HEIGHT, layout.DISTANCE, above, own, good.astype(float), centre, True, level))
-        prior = np.array([heights.PRESSURE_M, heights.TEMPERATURE]) * log.heights.barometric
+        prior = np.array([alone.PRESSURE_M, alone.TEMPERATURE]) * log.heights.barometric
     return tuple(found), prior
+
+
+def elevated(log: MeasurementLog) -> bool:
+    """Whether a log has heights beside elevations: these are left out."""
+    return log.heights is not None and bool(np.isfinite(log.measurement[:, 2]).any())
 
 
 def with_prior(stations: list[Seen], priors: Sequence[heights.Prior], origin: Geodetic | None) -> list[Seen]:
@@ -224,4 +229,7 @@ def _fitted(current: Flight, s: int, j: int, gate: float, smoothed: Callable[[Fl
         return with_(now, why=channel.why)
     if channel.told < understanding.USEFUL:
         return with_(channel.rates, closing=channel.closing)
-    return likelier(with_(channel.rates, used=True, closing=channel.closing), with_(now, why=understanding.HINDERS))
+    return likelier(
+        with_(channel.rates, used=True, closing=channel.closing),
+        with_(now, why=understanding.HINDERS.format("range rates")),
+    )

@@ -64,11 +64,12 @@ class Chosen(NamedTuple):
         """What such a share of the samples has of the gain."""
         return self._replace(gain=of * self.gain)
 
-    def with_beside(self, scalars: Scalars) -> Chosen:
+    def with_beside(self, scalars: tuple[Scalars, ...]) -> Chosen:
         """The same with these scalars of the log's own samples in place of its own."""
-        spread = scalars if self.row is None else scalars.spread(self.row, len(self.log.time_s))
+        row, n = self.row, len(self.log.time_s)
+        spread = scalars if row is None else tuple(each.spread(row, n) for each in scalars)
         rival = None if self.rival is None else self.rival.with_beside(scalars)
-        return self._replace(log=self.log._replace(beside=(spread,)), rival=rival)
+        return self._replace(log=self.log._replace(beside=spread), rival=rival)
 
     def abrupt_s(self) -> list[float]:
         """The times of the abrupt changes of the acceleration."""
