@@ -76,7 +76,7 @@ def as_seen(
         seen.append(
             Seen(
                 instrument.name, time_s, z, instrument.place, instrument.axes, prior, np.array(stated, float), accepted,
-                sides, instrument.times, instrument.away_m, copied,
+                sides, instrument.times, instrument.away_m, copied, elevated=beside.elevated(log),
             )
         )  # fmt: skip
     priors = [heights.prior_of(log, each.recipe.settings) for each, log in zip(instruments, found, strict=True)]

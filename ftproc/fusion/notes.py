@@ -47,6 +47,8 @@ def _beside(fused: Fused) -> Iterator[str]:
             for text in faults.copies_in_words(station.names[c], faults.copies(station.copied[c]), measured):
                 yield f"{station.name}: {text}"
         yield from (side.why for side in station.beside if side.name == ASSUMED)
+        if station.elevated:
+            yield f"{station.name}: the heights beside the elevations are not used, as those of a single log are"
     for station, sides in zip(fused.stations, fused.beside, strict=False):
         for each in sides.values():
             if each.side.why:

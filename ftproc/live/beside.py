@@ -24,12 +24,13 @@ RATE = len(QUANTITIES)  # the column of range rates, after those of all logs
 
 class Columns(NamedTuple):
     """The columns, the height of the station, m, and what is known of the target's if none is measured. Heights
-    stand in the column of elevations until they are these."""
+    stand in the column of elevations until they are these. unused: the column of heights beside elevations."""
 
     rate: Further | None = None
     height: Further | None = None
     own_m: float = 0.0
     prior: heights.Prior | None = None
+    unused: str = ""
 
     @classmethod
     def of(cls, names: Sequence[str], row: Sequence[str], found: Mapping[str, Any], recipe: Recipe) -> Columns:
@@ -39,9 +40,10 @@ class Columns(NamedTuple):
         plane = {"range", "azimuth"} <= set(found) and "elevation" not in found
         site = recipe.settings.site
         specified = recipe.settings.height
+        unused = height.name if height is not None and "elevation" in found else ""
         height = height if plane and specified is None else None
         prior = heights.Prior(*specified, heights.SPECIFIED) if specified else heights.ANY
-        return cls(rate, height, site[2] if site else 0.0, prior if plane and height is None else None)
+        return cls(rate, height, site[2] if site else 0.0, prior if plane and height is None else None, unused)
 
     @property
     def barometric(self) -> bool | None:

@@ -274,6 +274,8 @@ class _Table(NamedTuple):
             yield f"readings: {', '.join(said)}"
         if (height := self.beside.height) is not None:
             yield f'"{height.name}" in {height.unit.name} stands for the elevation'
+        if name := self.beside.unused:
+            yield f'"{name}" is not used: --follow uses no heights beside elevations'
         yield from (
             f'"{column.name}" counts downwards and is turned round'
             for column in self.found.values()

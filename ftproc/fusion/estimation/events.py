@@ -62,7 +62,8 @@ class Seen(NamedTuple):
     accepted: (n, 3) readings that are good by hand. beside: what else it measures. times: (n,) of the noise's variance,
     by row, where the log states it. away_m: how far from the target a place is that positions are seen from, zero for a
     tracker. copied: (3, kinds) readings of each component that were not measured, see `copies`; these are missing.
-    unstated: components whose bias the range file takes as known, against what the readings say."""
+    unstated: components whose bias the range file takes as known, against what the readings say. elevated: whether it
+    has heights beside elevations, which are not used."""
 
     name: str
     time_s: FloatArray
@@ -77,6 +78,7 @@ class Seen(NamedTuple):
     away_m: float = 0.0
     copied: IntArray = np.zeros((3, 4), np.int64)
     unstated: tuple[int, ...] = ()
+    elevated: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
