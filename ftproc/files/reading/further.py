@@ -1,9 +1,9 @@
-"""What a log holds beside range, azimuth and elevation: range rates, heights where no elevation is measured, and, for a
-network that learned from it, the strength of the signal.
+"""What a log holds beside range, azimuth and elevation: range rates, heights, and, for a network that learned from it,
+the strength of the signal.
 
 Names and units are those of `words.FURTHER_ALIASES` and `units.UNITS`. Where neither the name nor
-`--units` says the unit, a height is asked about, because the positions rest on it; a rate is in the unit that the
-ranges show, or left out with a word; others are left out.
+`--units` says the unit, a height is asked about, because the positions rest on it, or, beside elevations, left out with
+a word; a rate is in the unit that the ranges show, or left out with a word; others are left out.
 """
 
 from __future__ import annotations
@@ -65,6 +65,12 @@ class Further(NamedTuple):
         return {"column": self.name, "unit": self.unit.name, "unit_from": kind, "why": self.why}
 
 
+def published(beside: tuple[Further, ...], found: Mapping[str, Any]) -> list[int]:
+    """Positions of the columns that the trajectory has cleaned, and need not be kept. found: columns by quantity."""
+    raw = {SIGNAL, HEIGHT} if "elevation" in found else {SIGNAL}
+    return [each.position for each in beside if each.quantity not in raw]
+
+
 def of_rows(beside: tuple[Further, ...], header: TableHeader, row: Any) -> dict[str, Any]:
     """The fields of a `MeasurementLog` of these rows of the file."""
     found = {each.quantity: each.read(header)[row] for each in beside}
@@ -81,6 +87,10 @@ def in_known_units(
     doubts: list[str] = []
     for each in beside:
         unit: Unit | None = each.unit
+        if unit == OPEN and each.quantity == HEIGHT:
+            say = f"--columns {HEIGHT}=NAME --units {HEIGHT}=m (or {', '.join(UNITS[HEIGHT])})"
+            doubts.append(f'"{each.name}" may be the height of the target: if so, say {say}')
+            continue
         if unit == OPEN:
             ranges_m = log.measurement[:, COMPONENTS.index("range")]
             unit = rates.unit_by_motion(log.time_s, ranges_m, each.read(header)[log.row])
@@ -96,33 +106,44 @@ def in_known_units(
 def find(
     header: TableHeader, found: Mapping[str, Any], units: Mapping[str, str], columns: Mapping[str, str], signal: bool
 ) -> tuple[Further, ...]:
-    """The range rate of a log with ranges, and its height, where it has ranges and azimuths, but no elevations; the
-    strength of its signal, if that is wanted.
+    """The range rate of a log with ranges, its height, where it has azimuths too, and, if wanted, the strength of its
+    signal.
 
     found: the columns of the log by quantity. units, columns: as stated by the user. Raises InputError where the user
     names a column that is not there, and, with a question, for a quantity whose unit is not known.
     """
     wanted = [RANGE_RATE] if "range" in found else []
-    wanted += [HEIGHT] if {"range", "azimuth"} <= set(found) and "elevation" not in found else []
+    wanted += [HEIGHT] if {"range", "azimuth"} <= set(found) else []
     wanted += [SIGNAL] if signal or SIGNAL in columns else []
     taken = {index for column in found.values() for index in column.positions}
-    return tuple(_found(header, wanted, taken, units, columns))
+    return tuple(_found(header, wanted, taken, units, columns, "elevation" in found))
 
 
 def _found(
-    header: TableHeader, wanted: list[str], taken: set[int], units: Mapping[str, str], columns: Mapping[str, str]
+    header: TableHeader,
+    wanted: list[str],
+    taken: set[int],
+    units: Mapping[str, str],
+    columns: Mapping[str, str],
+    elevated: bool,
 ) -> Iterator[Further]:
+    """elevated: whether elevations are measured, so that nothing is asked about a height."""
     for quantity in wanted:
         stated = columns.get(quantity, "")
         if stated == ABSENT:
             continue
         apart = _all_apart(quantity, header.names, header.units)
         indices = [k for k, name in enumerate(apart) if k not in taken and _means(quantity, name)]
-        if quantity != HEIGHT:  # of no known unit it is none
+        unasked = quantity == HEIGHT and elevated and not stated
+        if quantity != HEIGHT or unasked:  # of no known unit it is none
             indices = [k for k in indices if _unit(quantity, apart[k], units.get(quantity))] or indices
         indices = [_stated(header, quantity, stated)] if stated else indices
-        if quantity == HEIGHT and not indices:
+        if quantity == HEIGHT and not indices and not elevated:
             _refuse_depth(header, apart, [k for k in range(len(apart)) if k not in taken])
+        if unasked and indices and (len(indices) > 1 or not _unit(quantity, apart[indices[0]], units.get(quantity))):
+            if not header.is_of_a_standard:
+                yield Further(quantity, indices[0], ", ".join(header.names[k] for k in indices), OPEN, False)
+            continue
         if len(indices) > 1 and not header.is_of_a_standard:
             both = listed([header.names[index] for index in indices])
             say = answer(header.names, {quantity: indices[0]})

@@ -12,7 +12,7 @@ import numpy as np
 from ftproc.errors import InputError
 from ftproc.files import conventions
 from ftproc.files.options import ABSENT, Condition, Extract, parse_columns, parse_units, parse_where
-from ftproc.files.reading import converting, further, large, proposal, understanding
+from ftproc.files.reading import computed, converting, further, large, proposal, understanding
 from ftproc.files.reading.clocks.clock import Clock
 from ftproc.files.reading.formats import tables
 from ftproc.files.reading.formats.header import TableHeader
@@ -101,8 +101,8 @@ def read(
     beside = further.find(header, found, unit_of, column_of, extract.signal)
     plan = _Plan(header, found, station, _conditions(header, extract), extract=extract, beside=beside)
     if keep_columns:
-        wanted = [*plan.positions(), *(each.position for each in beside if each.quantity != further.SIGNAL)]
-        plan = plan._replace(others=tuple(index for index in range(len(header.names)) if index not in wanted))
+        gone = {*plan.positions(), *further.published(beside, found)}
+        plan = plan._replace(others=tuple(index for index in range(len(header.names)) if index not in gone))
         _check_others(header, plan.others)
     whole = plan.others or plan.conditions or beside or header.stated.target or header.stated.station
     if not whole and station.refraction is None:  # refraction needs ranges of other blocks
@@ -212,7 +212,7 @@ def _at_once(plan: _Plan) -> MeasurementLog:
     if judged.found["time"].unit != converted.found["time"].unit:
         clock = clock._replace(words=f"numbers in {judged.found['time'].unit.name}, by the motion")
     explained = _explained(plan, replace(log, epoch=clock.epoch), clock, notes, judged)
-    return conventions.apply(explained, explained.station)
+    return computed.checked(conventions.apply(explained, explained.station))
 
 
 def _loaded(plan: _Plan) -> list[int]:
@@ -247,8 +247,8 @@ def _explained(
     station = understanding.as_named(plan.station, plan.found)
     values = log.measurement if sample is None else sample
     beside = {each.position for each in plan.beside}
-    names = [] if plan.header.is_of_a_standard or log.heights is not None else plan.header.names
-    names = [name for index, name in enumerate(names) if index not in beside]
+    known = plan.header.is_of_a_standard or (log.heights is not None and "elevation" not in plan.found)
+    names = [] if known else [name for index, name in enumerate(plan.header.names) if index not in beside]
     remarks = schema.remarks(names, plan.found, bool(clock.epoch))
     doubtful = (*plan.notes, *judged.doubts, *plan.open, *plausibility.doubts(values, station))
     words = (*notes, *doubtful)

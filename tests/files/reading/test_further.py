@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d, median_filter
 
+from ftproc.core.impact import heights as true_heights
 from ftproc.errors import InputError, UsageError
 from ftproc.files.options import Extract
-from ftproc.files.reading import logs
+from ftproc.files.reading import computed, logs
+from ftproc.simulation import simulate
 
 HEARD = Extract(signal=True)
 
@@ -67,10 +70,77 @@ def test_two_heights_are_asked_about(tmp_path):
     assert not log.heights.barometric
 
 
-def test_with_elevations_nobody_asks(tmp_path):
+@pytest.mark.parametrize(("head", "cells"), [("altitude", "350"), ("FL,geo_height_m", "350,10700")])
+def test_with_elevations_nobody_asks(tmp_path, head, cells):
     path = tmp_path / "log.csv"
-    path.write_text("time_s,range_m,azimuth_rad,elevation_rad,altitude\n0,50000,0.1,0.1,350\n1,50100,0.1,0.1,350\n")
-    assert logs.read(path).heights is None
+    path.write_text(
+        f"time_s,range_m,azimuth_rad,elevation_rad,{head}\n0,5000,0.1,0.1,{cells}\n1,5010,0.1,0.1,{cells}\n"
+    )
+    log = logs.read(path)
+    assert log.heights is None
+    name = head.replace(",", ", ")
+    assert f'"{name}" may be the height of the target: if so, say --columns height=NAME' in " ".join(log.remarks)
+    first = head.split(",")[0]
+    assert logs.read(path, columns=f"height={first}", units="height=fl").heights is not None
+
+
+def beside_elevations(tmp_path, above_m, head="alt_ft", unit_m=0.3048):
+    """A log of a radar, with a column of heights by (ranges, sines of elevations, true heights)."""
+    flight = simulate("radar", seed=1)
+    r, a, e = flight.log.measurement.T
+    values = above_m(r, np.sin(e), true_heights(flight.truth.position_m)) / unit_m
+    path = tmp_path / "radar.csv"
+    rows = "".join(
+        ",".join("" if np.isnan(x) else repr(float(x)) for x in row) + "\n"
+        for row in zip(flight.log.time_s, r, a, e, values, strict=True)
+    )
+    path.write_text(f"time_s,range_m,azimuth_rad,elevation_rad,{head}\n{rows}")
+    return path
+
+
+NOISE = np.random.default_rng(1).standard_normal(10_000)
+
+
+@pytest.mark.parametrize("noise_m", [0.0, 3.0, 30.0])
+def test_heights_beside_elevations_are_kept(tmp_path, noise_m):
+    path = beside_elevations(tmp_path, lambda r, s, h: h + 100 + noise_m * NOISE[: len(h)])
+    log = logs.read(path, keep_columns=True)
+    assert log.heights.barometric
+    assert np.isfinite(log.heights.above_m).all()
+    assert '"alt_ft" is the height of the target, beside the elevation' in log.remarks
+    assert log.extra.column_names == ["alt_ft"]
+    assert logs.read(path, columns="height=none").heights is None
+
+
+def smoothed(values):
+    known = np.isfinite(values)
+    values = np.interp(np.arange(len(values)), np.flatnonzero(known), values[known])
+    values = median_filter(values, 5)
+    return gaussian_filter1d(values, 2.0)
+
+
+@pytest.mark.parametrize(
+    "above_m",
+    [
+        lambda r, s, h: r * s + 50,
+        lambda r, s, h: r * s + r**2 * (1 - s**2) * 0.75 / 2 / 6_371_000,
+        lambda r, s, h: np.round(r * s),
+        lambda r, s, h: np.round(r * s / 10) * 10,
+        lambda r, s, h: np.round(r * s / 7.62) * 7.62,
+        lambda r, s, h: np.round(smoothed(r * s)),
+    ],
+    ids=["plain", "refracted", "1 m", "10 m", "25 ft", "smoothed"],
+)
+def test_heights_computed_from_elevations_are_not_used(tmp_path, above_m):
+    log = logs.read(beside_elevations(tmp_path, above_m))
+    assert log.heights is None
+    assert computed.COMPUTED in log.remarks
+
+
+def test_heights_that_do_not_change_are_not_used(tmp_path):
+    log = logs.read(beside_elevations(tmp_path, lambda r, s, h: np.full(len(h), 612.0)))
+    assert log.heights is None
+    assert computed.CONSTANT in log.remarks
 
 
 def test_words_are_no_heights(tmp_path):
