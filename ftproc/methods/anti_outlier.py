@@ -78,6 +78,7 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
         log, model, height = scalars.fit_heights(log, model, edited.starts, readings.heights, how, accepted)
     channels = [each for each in (channel, height) if each is not None and not each.why]
     used = tuple(each.rates if each.used is None else each.used for each in channels)
+    told = tuple(each.silent if each is height else one for each, one in zip(channels, used, strict=True))
     names = preparing.motions(settings)
     if len(edited.starts) > MOST_PIECES and motion_models.WHITE in names:
         names = (motion_models.WHITE,)
@@ -87,18 +88,18 @@ def edited_twice(readings: Readings, settings: FilterSettings, usual: Model | No
 
     def chosen(names: tuple[str, ...], white: Model) -> Chosen:
         found = motion_models.choose(over.log, over.starts, white, names, specified)
-        if all(each.used is None for each in channels):
-            return found
-        found = found.with_beside(used)
-        if height is None or height.why or how[1]:
-            return found
-        return found._replace(model=scalars.upward(found.model, scalars.profile(found.log, found.model, found.starts)))
+        return found if channel is None or channel.used is None else found.with_beside(told)
 
     wanted = PATHS if settings.smooth else STATES  # cheap, proves the correction, and says what could be had
     motion = chosen(names, over.model)
     others, edited = edited.others, edited._replace(log=over.log, model=motion.white, starts=over.starts)
     white = chosen((motion_models.WHITE,), motion.white) if motion_models.WHITE in names else motion
     motion, (run, smoothed, left) = _followed(motion, white, wanted)
+    if height is not None and not height.why:
+        motion = motion.with_beside(used)
+        if not how[1]:
+            motion = motion._replace(model=scalars.upward(motion.log, motion.model, motion.starts))
+        run, smoothed, left = _with_motion(motion, motion.model, wanted)
     for other in _as_likely(edited, known, run):
         filtered, other_smoothed, _ = _with_motion(motion, other, wanted)
         run = worse_of(run, filtered)

@@ -33,11 +33,10 @@ STEPS = 3  # of the search for a profile
 OFFSET_M = 1000.0  # 1-sigma of the zero of heights: the height of the station, and the pressure of the air,
 FARTHEST_OFF = 5.0  # of which so many are too many
 OFFSET_ROUNDS, STEP_M = 2, 10.0  # of offset and noise in turn; and by how much the heights are moved at most to find it
-LEAST_GAIN = (
-    0.25  # of the variance of a height, that an elevation has as a height: with less, heights gain nothing, and
-)
+LEAST_GAIN = 1.0  # of the variance of a height, that an elevation has as a height: with less, heights gain little, and
 # what is not white in their noise, such as rounding, does harm
 FEWEST_HEIGHTS = 3  # different ones
+NEAR, DITHERED = 33, 3.0  # rows in which those of the same height are counted, and of these so few that noise is why
 HELD = 1.5  # steps of the rounding between one height and the next: more are heights that come less often than rows
 CENTRE = np.array([0.0, 0.0, -EARTH_M])  # of the earth
 LATE_ROUNDS = 3  # of finding out how late they are
@@ -132,6 +131,8 @@ def _basis(log: Observations, model: Model, starts: list[Start]) -> FloatArray:
 def _read_once(value: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Values (n,) of which those that are held count once, and how many times the variance of one each of those has
     that are rounded to the same (n,): all these together are one reading."""
+    from scipy.ndimage import uniform_filter1d
+
     there = np.flatnonzero(np.isfinite(value))
     times = np.ones(len(value))
     if len(there) < beside.FEWEST:
@@ -143,7 +144,8 @@ def _read_once(value: FloatArray) -> tuple[FloatArray, FloatArray]:
         held = value.copy()
         held[there[~new]] = np.nan
         return held, times
-    times[there] = np.repeat(length, length)
+    own, typical = np.repeat(length, length), 1 / np.maximum(uniform_filter1d(new.astype(float), NEAR), 1 / NEAR)
+    times[there] = np.where(own > NEAR, own, np.where(typical > DITHERED, typical, 1.0))
     return value, times
 
 
@@ -176,8 +178,7 @@ def _with_profile(
         used = channel.silent if channel.told < beside.USEFUL else channel.rates
         return with_(channel.silent), model, channel._replace(used=used)
     if not jerk_fixed:
-        fitted = profile(with_(channel.rates), model, starts)
-        model = upward(model, fitted) if of_heights else fitted
+        model = (upward if of_heights else profile)(with_(channel.rates), model, starts)
         rates = beside.decided(channel.rates, _residuals(log, model, starts), gate, accepted, step)
         channel = channel._replace(rates=rates, label=beside.labels_of(rates.weight, rates.value))
     both = with_(channel.rates)
@@ -192,9 +193,12 @@ def profile(log: Observations, model: Model, starts: list[Start]) -> Model:
     return with_allowance(log, fit_profile(log, starts, model._replace(jerk=model.jerk / ALLOWANCE), STEPS))
 
 
-def upward(model: Model, fitted: Model) -> Model:
-    """The model with the vertical process noise of another: heights say nothing of the motion over the ground."""
-    return model._replace(jerk=np.column_stack([model.jerk[:, :2], fitted.jerk[:, 2]]))
+def upward(log: Observations, model: Model, starts: list[Start]) -> Model:
+    """The same of the vertical process noise alone, because heights say nothing of the motion over the ground; where
+    that makes the log likelier."""
+    found = model._replace(jerk=np.column_stack([model.jerk[:, :2], profile(log, model, starts).jerk[:, 2]]))
+    gained = likelihood_of(log, found, starts) - likelihood_of(log, model, starts)
+    return found if gained > beside.SURE else model
 
 
 def _offset(

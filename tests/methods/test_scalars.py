@@ -128,7 +128,18 @@ def test_held_ones_count_once() -> None:
     assert (times == 1).all()
     rounded, times = scalars._read_once(np.repeat(STEP_M * np.arange(20), 5))
     assert np.isfinite(rounded).all()
-    assert (times == 5).all()
+    np.testing.assert_allclose(times, 5, rtol=0.35)
+    _, times = scalars._read_once(np.repeat(np.r_[0.0, STEP_M, 0.0], (10, 200, 90)))
+    assert (times[10:210] == 200).all()
+
+
+def test_noise_across_the_steps_is_that_of_single_heights() -> None:
+    """Those of the same height by chance were taken for one, and the others were too far off."""
+    flight, _ = poor()
+    found = filter_log(with_heights(flight, np.round(measured(flight, 4.0) / STEP_M) * STEP_M), SMOOTH)
+    part = found.metadata["summary"]["components"]["height"]
+    assert part["noise_m"] == pytest.approx(np.hypot(4.0, STEP_M / np.sqrt(12)), rel=0.1)
+    assert 0.9 < part["innovation_ratio"] < 1.1
 
 
 @pytest.mark.parametrize(
