@@ -35,6 +35,8 @@ FARTHEST_OFF = 5.0  # of which so many are too many
 OFFSET_ROUNDS, STEP_M = 2, 10.0  # of offset and noise in turn; and by how much the heights are moved at most to find it
 LEAST_GAIN = 1.0  # of the variance of a height, that an elevation has as a height: with less, heights gain little, and
 # what is not white in their noise, such as rounding, does harm
+MOST_WRONG = 0.25  # share of heights that are outliers
+CONTRADICT = "many of the heights contradict the readings: none is used"
 FEWEST_HEIGHTS = 3  # different ones
 NEAR, DITHERED = 33, 3.0  # rows in which those of the same height are counted, and of these so few that noise is why
 HELD = 1.5  # steps of the rounding between one height and the next: more are heights that come less often than rows
@@ -103,17 +105,17 @@ def fit_heights(
         rates = beside.decided(rates, _residuals(log, model, starts), how[0], near, step)
     told = median((spread - unused.variance)[known]) / float(rates.variance.min()) if known.any() else 0.0
     channel = channel._replace(rates=rates, label=beside.labels_of(rates.weight, value), told=told)
-    if rates.weight.sum() < (1 - beside.MOST_REJECTED) * np.isfinite(value).sum():
-        return log, model, channel.left_out("most of the heights contradict the readings: none is used")
+    if _contradict(rates):
+        return log, model, channel.left_out(CONTRADICT)
     ground = np.sqrt((smooth_log(log, model, starts).state[:, :2] ** 2).sum(1))
     if np.mean(ground**2) * model.reading_variance[2] < LEAST_GAIN * np.median(rates.variance):
         return log, model, channel.left_out("the elevations tell the height better than the heights: none is used")
     if abs(off[0]) > FARTHEST_OFF * OFFSET_M:
         why = f"the heights are {abs(off[0]) / 1000:.3g} km off, of another unit, or target: none is used"
         return log, model, channel.left_out(why)
-    both, found, channel = _with_profile(log, model, starts, channel, how, accepted, step)
-    if channel.why:
-        return both, found, channel
+    _, found, channel = _with_profile(log, model, starts, channel, how, accepted, step)
+    if channel.why or _contradict(channel.rates):
+        return log, model, channel if channel.why else channel.left_out(CONTRADICT)
     measured = log._replace(beside=(*log.beside, channel.rates))
     off, factor, rates = _offset(measured, found, starts, (basis, prior, off))
     used = rates if channel.used is None else channel.used._replace(value=rates.value)
@@ -126,6 +128,11 @@ def _basis(log: Observations, model: Model, starts: list[Start]) -> FloatArray:
     is none of their scale."""
     above = impact.heights(smooth_log(log, model, starts).state[:, :3])
     return np.stack([np.ones(len(above)), above - median(above)])
+
+
+def _contradict(heights: Scalars) -> bool:
+    """Whether so many are outliers that none is to be used."""
+    return bool(heights.weight.sum() < (1 - MOST_WRONG) * np.isfinite(heights.value).sum())
 
 
 def _read_once(value: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -19,7 +19,7 @@ from ftproc.records import FloatArray, MeasurementLog
 FEWEST = 32  # rows, or means of rows, that tell
 SIZES, LAGS = (1, 2, 4, 8, 16), 32  # rows of a mean, and means by which heights come later or earlier at most
 CORRELATED, SURE = 0.3, 4.5  # correlation that no measured height has, and standard errors of one by chance
-MOTION = 1.25  # times the variance by their noise that elevations have: with more, what is common is the motion
+MOTION = 1.6  # times the variance by their noise that elevations have: with more, what is common is the motion
 ORDER, NEIGHBOURS = 3, 7  # of differences; rows of a median
 LIMIT, SCALE = 3.0, 1.4826  # sigmas, one of which is so many medians, beyond which values count less
 COMPUTED = "the heights follow the noise of the elevations, from which they are computed: they are not used"
