@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d, median_filter
 
 from ftproc.core.impact import heights as above
 from ftproc.files import decisions
@@ -206,3 +207,30 @@ def test_decisions_by_hand() -> None:
     label = np.asarray(filter_log(log, SMOOTH).extra.column("outlier_height"))
     assert (label[np.isin(log.row, range(100, 103))] == ACCEPTED).all()
     assert (label[np.isin(log.row, range(200, 205))] == REJECTED).all()
+
+
+def test_the_vertical_process_noise_follows_them() -> None:
+    """Elevations that are poor show no climb begin, and what they allow for is too smooth for heights."""
+    flight, without = poor()
+    ratio = errors(filter_log(with_heights(flight, measured(flight, 3.0)), SMOOTH), flight) / errors(without, flight)
+    assert ratio[2] < 0.1
+
+
+def test_the_motion_over_the_ground_is_that_of_the_readings() -> None:
+    """Fitted again with heights, it was 1.18 times as far off in velocity."""
+    flight = simulate("radar", seed=9, noise=(30.0, 1e-3, 2e-3))
+    found = filter_log(with_heights(flight, measured(flight, 3.0)), SMOOTH)
+    assert (errors(found, flight) / errors(filter_log(flight.log, SMOOTH), flight)).max() < 1.01
+
+
+def test_smoothed_elevations_that_pass_as_heights_do_no_harm() -> None:
+    """Half of them were outliers, and z 2.1 times as far off with the others."""
+    flight = simulate("radar", seed=1)
+    r, _, e = flight.log.measurement.T
+    z = r * np.sin(e)
+    known = np.isfinite(z)
+    z = np.interp(np.arange(len(z)), np.flatnonzero(known), z[known])
+    off = np.abs(z - (middle := median_filter(z, 5)))
+    column = gaussian_filter1d(np.where(off > 7 * np.median(off), middle, z), 5.0)
+    found = filter_log(with_heights(flight, column), SMOOTH)
+    assert (errors(found, flight) / errors(filter_log(flight.log, SMOOTH), flight)).max() < 1.01
