@@ -6,14 +6,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ftproc.core.filtering.initialization import find_starts
-from ftproc.core.filtering.records import Model, Observations
+from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, SmootherRun, smooth_log
 from ftproc.core.identification.profile import from_knot, median_level
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.identification.stretches import Stretches, runs_of, stretches_of, widened
 from ftproc.records import FloatArray, IntArray
 
+FREE, WIDER = (50.0, 20.0, 20.0), 3.0  # m, m/s, m/s2, and times its own: 1-sigma of the state where a part begins
 AROUND, MEMORIES = (60, 200), 8.0  # samples on each side that tell what lies between, and memories
+
+
+def start_of_part(state: FloatArray, sigma: FloatArray) -> Start:
+    """Where a filter over a part of a log starts, from a smoothed state (9,) and its 1-sigma."""
+    return Start(0, state, np.diag(np.repeat(FREE, 3) ** 2 + (WIDER * sigma) ** 2))
 
 
 def samples_around(log: Observations, at_median: Model) -> int:

@@ -19,6 +19,7 @@ from ftproc.core.filtering.initialization import find_starts
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import RESIDUALS, SmootherRun, smooth_log
 from ftproc.core.identification.likelihood import fit_jerk
+from ftproc.core.identification.nearby import start_of_part
 from ftproc.core.identification.profile import fit_profile, median_level, of_part, roughness
 from ftproc.core.identification.stretches import runs_of
 from ftproc.core.identification.uneven_noise import rates
@@ -31,7 +32,6 @@ BESIDE = 12  # samples between two faults that may be one: a track that was foll
 SETTLED = 2  # rounds of deciding, at most
 TAKEN_IN, EVEN = 3, 5.0  # readings in a rejected run, and second differences in sigmas, that may be a track
 PROFILE_STEPS = 2  # of the search for the process noise
-FREE, WIDER = (50.0, 20.0, 20.0), 3.0  # m, m/s, m/s2, and times its own: 1-sigma of the state where a part begins
 
 
 class Scene(NamedTuple):
@@ -95,7 +95,7 @@ class Scene(NamedTuple):
     def starts(self, log: Observations) -> list[Start]:
         """Where a filter over the log starts."""
         if self.track is not None and self.doubt is not None:
-            return [Start(0, self.track[0], np.diag(np.repeat(FREE, 3) ** 2 + (WIDER * self.doubt[0]) ** 2))]
+            return [start_of_part(self.track[0], self.doubt[0])]
         return find_starts(log, self.at_median.noise_variance, float(self.at_median.jerk[0, 0]))
 
 

@@ -16,6 +16,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from ftproc.core.filtering.columns import Columns, said_of
 from ftproc.core.filtering.records import Model, Observations, Start
 from ftproc.core.filtering.smoother import likelihood_of, smooth_log
+from ftproc.core.identification.nearby import start_of_part
 from ftproc.core.identification.profile import ALLOWANCE, climbed, fit_profile, of_part, roughness, with_allowance
 from ftproc.core.identification.scales import scales_of
 from ftproc.core.model.motion import NO_JOLTS, Jolts
@@ -29,7 +30,6 @@ LEAST_SHARE = 0.01  # of its variance, that an interval has
 SURE = 8.0  # in log-likelihood, by which a change explains the readings better
 MOST_CHANGES = 3  # at a peak: a motor that is lit and burns out
 STEPS = 3  # of the search for a profile
-FREE = np.diag(np.repeat((50.0, 20.0, 20.0), 3) ** 2)  # m2, m2/s2, m2/s4 added to the state's where a part begins
 
 
 def told(log: Observations, starts: list[Start], model: Model) -> Model | None:
@@ -39,17 +39,16 @@ def told(log: Observations, starts: list[Start], model: Model) -> Model | None:
         return None
     likeliest = model._replace(jerk=model.jerk / ALLOWANCE)
     quiet, peaks = without_peaks(likeliest.jerk[:, 0])
-    run = None
-    found = likeliest
+    run, found = None, likeliest
     for first, last in peaks:
-        edges = (np.array([first - 1, last + 1, first - BESIDE_KNOTS, last + BESIDE_KNOTS])) * model.knot_s
+        edges = np.array([first - 1, last + 1, first - BESIDE_KNOTS, last + BESIDE_KNOTS]) * model.knot_s
         low, high, begin, end = np.searchsorted(log.time_s, log.time_s[0] + edges)
         inside = np.arange(max(low, begin + 2), min(high, end - 2))
         inside = inside[log.time_s[inside] > log.time_s[inside - 1]]
         if len(inside) == 0 or any(begin < start.sample < end for start in starts) or begin < starts[0].sample:
             continue
         run = run or smooth_log(log, model, starts)
-        start = Start(0, run.state[begin], np.diag((3 * run.sigma[begin]) ** 2) + FREE)
+        start = start_of_part(run.state[begin], run.sigma[begin])
         jerk = found.jerk.copy()
         jerk[first:last] *= (quiet[first:last] / jerk[first:last, 0])[:, None]
         part, since_s = log.part(slice(begin, end)), log.time_s[begin:end] - log.time_s[0]

@@ -33,8 +33,8 @@ MODELS = {
 }
 NOTHING = np.zeros(3, bool)
 STEPS, LONG_STEPS = 3, 10  # of the search for a profile; where it falls by powers of ten once a motor is out
-MARGIN = 8.0  # in log-likelihood, by which a model must explain a log better than white jerk does: with less, the luck
-# of a single flight decides which is the better one
+MARGIN = jolts.SURE  # in log-likelihood, by which a model must explain a log better than white jerk does: with less,
+# the luck of a single flight decides which is the better one
 CLOSE = 2 * MARGIN  # with less, white jerk is as good as another model, or that as good as white jerk
 FARTHEST_TURN = 0.2  # rad, over which the motion goes on in one step
 MOST_STEPS = 100  # in a gap
