@@ -24,7 +24,7 @@ from ftproc.core.filtering.initialization import WIDEST_BLIND_BRIDGE, find_start
 from ftproc.core.filtering.records import FilterRun, Model, Observations, Start
 from ftproc.core.filtering.smoother import PATHS, STATES, SmootherRun, likelihood_of, smooth_log
 from ftproc.core.identification import likelihood
-from ftproc.core.identification.motions import motion_models
+from ftproc.core.identification.motions import motion_models, orbits
 from ftproc.core.identification.motions.motion_models import Chosen
 from ftproc.core.identification.profile import ALLOWANCE, fit_profile, median_level, with_allowance
 from ftproc.methods import bridging, live, preparing, scalars
@@ -39,6 +39,7 @@ LONGEST_WHOLE = 60_000  # samples of a log that is edited as a whole
 KEPT = 30_000  # samples of a segment, without its margins,
 KEPT_MARGINS = 12  # or so many times its margin
 MOST_PIECES = 20  # of a track: what is re-initialized so often shows no motion (two targets in turn: 115)
+MOST_COURSES = 6  # about which a motion is linearised, each that to which the one before led
 MARGIN_S, LEAST_MARGIN, MOST_MARGIN = 60.0, 1_000, 10_000  # s and samples on each side of a segment
 
 
@@ -153,23 +154,30 @@ def _followed(
 ) -> tuple[Chosen, tuple[FilterRun, SmootherRun | None, FloatArray]]:
     """A motion and what comes of it, or of white jerk, if the filter follows that better: it knows no course but its
     own estimate, and may diverge where the smoother is right about the course; or if the smoother leaves the course
-    about which it is linearised. wanted: of the smoother."""
+    about which it is linearised, and that to which it leads, and so on. wanted: of the smoother."""
     found = _with_motion(motion, motion.model, wanted)
+    near = orbits.NEAR if motion.name == motion_models.ORBITAL else WIDEST_BLIND_BRIDGE
+    for _ in range(MOST_COURSES):
+        if motion.name == motion_models.WHITE or not _leaves_its_course(motion, found[1], near):
+            break
+        motion = motion.about_its_own()
+        found = _with_motion(motion, motion.model, wanted)
     if motion.name != white.name:
         starts = preparing.smoothed_starts(white.log, white.model, white.starts)
         other = likelihood_of(white.log, white.model.causal, starts)
-        if other > found[0].log_likelihood or _leaves_its_course(motion, found[1]):
+        if other > found[0].log_likelihood or _leaves_its_course(motion, found[1], WIDEST_BLIND_BRIDGE):
             return white, _with_motion(white, white.model, wanted)
     return motion, found
 
 
-def _leaves_its_course(motion: Chosen, smoothed: SmootherRun | None) -> bool:
-    """Whether a smoothed track goes so far away that a filter would linearise about a wrong place."""
+def _leaves_its_course(motion: Chosen, smoothed: SmootherRun | None, near: float) -> bool:
+    """Whether a smoothed track goes farther away than near, times its range, from the course about which its model is
+    linearised."""
     if smoothed is None:
         return False
     course = motion.model.motion.course if motion.row is None else motion.model.motion.course[motion.row]
     away, range_m = ((each[:, :3] ** 2).sum(1) for each in (smoothed.state - course, course))
-    return not bool((away < WIDEST_BLIND_BRIDGE**2 * range_m).all())
+    return not bool((away < near**2 * range_m).all())
 
 
 def _with_motion(motion: Chosen, model: Model, wanted: int | None) -> tuple[FilterRun, SmootherRun | None, FloatArray]:

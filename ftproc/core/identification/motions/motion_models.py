@@ -71,6 +71,11 @@ class Chosen(NamedTuple):
         rival = None if self.rival is None else self.rival.with_beside(scalars)
         return self._replace(log=self.log._replace(beside=spread), rival=rival)
 
+    def about_its_own(self) -> Chosen:
+        """The same, linearised about the track to which it leads."""
+        track = smooth_log(self.log, self.model, self.starts).state
+        return self._replace(model=self.model._replace(motion=self.model.motion.about(track)))
+
     def abrupt_s(self) -> list[float]:
         """The times of the abrupt changes of the acceleration."""
         return self.model.jolts.changes_s(self.model.knot_s)
@@ -161,11 +166,9 @@ def _about_its_track(
     """A motion that was fitted to a short log along a course (m, 9), linearised about the track of the log that it is
     for; again: and about the track that follows."""
     track = course if found.log is short else smooth_log(found.log, white, found.starts).state
-    model = found.model._replace(motion=found.model.motion.about(track))
-    if short is log and again:  # else the samples are far closer than the motion is followed
-        track = smooth_log(found.log, model, found.starts).state
-        model = model._replace(motion=model.motion.about(track))
-    return found._replace(model=model)
+    found = found._replace(model=found.model._replace(motion=found.model.motion.about(track)))
+    # Else the samples are far closer than the motion is followed.
+    return found.about_its_own() if short is log and again else found
 
 
 class Logged(NamedTuple):

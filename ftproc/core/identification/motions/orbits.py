@@ -8,7 +8,6 @@ likeliest.
 
 from __future__ import annotations
 
-import itertools
 import math
 from typing import NamedTuple
 
@@ -29,7 +28,11 @@ FARTHEST_TURN = 0.005  # rad, over which the motion goes on in one step
 EARTH_RADPS = 7.292115e-5  # its rotation
 LATITUDES, NORTHS = np.radians([-60, -30, 0, 30, 60]), np.radians(np.arange(0, 360, 45))
 LESS_JERK = (1.0, 1e-2, 1e-4)  # times the jerk that stands in for the earth's rotation while it is not known
-STEPS, ROUNDS, TURNS = 12, 3, 16  # of the search for noise and jerk; of both searches; of that for the rotation
+STARTS = 2  # latitudes from which it is searched on: the track that comes of white jerk may be far off
+NEAR = 1e-4  # of the range: from a course farther away gravity is not followed (the first course of a satellite whose
+# ranges are read in a later half of its pass is 5 to 20 % off)
+STEPS, ROUNDS, TURNS = 12, 20, 16  # of the search for noise and jerk; of both searches; of that for the rotation
+SETTLED = 0.1  # in log-likelihood, that both searches gain
 HOPELESS = 200.0  # in log-likelihood: a still earth that is so far behind is no start (a satellite's is ahead, by 65)
 NARROWER = 0.5  # times the angle of a turn, after one that leads nowhere
 FARTHEST = 12.0, 25.0  # ln of times: less noise variance, and less jerk, than white jerk leaves
@@ -64,16 +67,30 @@ def fit(track: Track, model: Model, rival: float = -math.inf) -> tuple[Model, fl
     still = _settled(track, median_level(model)._replace(motion=Motion(acts=True).about(model.motion.course)))
     if (likelihood := track.likelihood(still)) < rival - HOPELESS:
         return still, likelihood
-    turning = [
-        still._replace(jerk=times * still.jerk, motion=still.motion._replace(rotation=_rotation(np.array(direction))))
-        for direction in itertools.product(LATITUDES, NORTHS)
-        for times in LESS_JERK
+
+    def turning(latitude: float, north: float, times: float) -> Model:
+        rotation = _rotation(np.array([latitude, north]))
+        return still._replace(jerk=times * still.jerk, motion=still.motion._replace(rotation=rotation))
+
+    likeliest = [
+        max((turning(latitude, north, times) for north in NORTHS for times in LESS_JERK), key=track.likelihood)
+        for latitude in LATITUDES
     ]
-    best = max(turning, key=track.likelihood)
-    for _ in range(ROUNDS):
-        best = _turned(track, _settled(track, best))
-    best = max(still, _settled(track, best), key=track.likelihood)
+    first = sorted(likeliest, key=track.likelihood)[-STARTS:]
+    found = [still, *(_until_settled(track, each) for each in first)]
+    best = max(found, key=track.likelihood)
     return best, track.likelihood(best)
+
+
+def _until_settled(track: Track, model: Model) -> Model:
+    """The likeliest noise, jerk and rotation: of each in turn, while the log becomes likelier."""
+    likelihood = -math.inf
+    for _ in range(ROUNDS):
+        model = _settled(track, _turned(track, model))
+        likelihood, before = track.likelihood(model), likelihood
+        if likelihood < before + SETTLED:
+            break
+    return model
 
 
 def _rotation(direction: FloatArray) -> FloatArray:

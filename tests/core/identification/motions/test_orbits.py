@@ -75,6 +75,19 @@ def test_a_satellite_is_moved_by_gravity(seed):
     assert (np.sqrt(after / before) < (nearer, slower)).all()
 
 
+@pytest.mark.parametrize(("of", "seed", "farthest_m"), [(3, 53, 600), (2, 12, 4000)])
+def test_the_course_about_which_gravity_is_followed_may_begin_far_off(of, seed, farthest_m):
+    """Ranges in every third row, and without angles, of the later half of a pass: white jerk is 127 km off, and an
+    orbit from one start of the earth's axis 170."""
+    log, truth = passed(np.random.default_rng(seed), *PASSES[of][:5], 0.0)
+    measurement, row = log.measurement.copy(), np.arange(len(log))
+    ranged = (row % 3 == 0) & (row > len(log) / 2)
+    measurement[~ranged, 0], measurement[ranged, 1:] = np.nan, np.nan
+    found = pipeline.filter_log(replace(log, measurement=measurement), SMOOTH)
+    assert found.metadata["summary"]["motion"] == "orbital"
+    assert np.abs(found.state[:, :3] - truth[:, :3]).max() < farthest_m
+
+
 def test_what_flies_in_the_air_is_in_no_orbit():
     course = np.zeros((10, 9))
     assert not orbits.may_be(course)
